@@ -61,11 +61,15 @@ class Cause:
 
 @dataclass(frozen=True, slots=True)
 class Causes:
-    """The cause of a disagreement, if one is found; else the ``nearest``; ``tried`` is how many were compared."""
+    """The cause of a disagreement, if one is found; else the ``nearest``; ``tried`` is how many were compared.
+
+    ``is_noise`` says that nothing but noise is left without any.
+    """
 
     found: Cause | None = None
     nearest: Cause | None = None
     tried: int = 0
+    is_noise: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,16 +162,21 @@ def causes_of(
     for measured, agreement in zip(read, agreements, strict=True):
         search.records.append(search.record_of(measured, agreement))
     none, _ = search.evaluated([Change()])[0]
-    if none is None or float(none.max()) < ONLY_NOISE:
+    if none is not None and float(none.max()) < ONLY_NOISE:
+        return Causes(is_noise=True)
+    if none is None:
         return Causes()
     faults = tuple(_faults(search.records, none))
     if faults:
         return Causes(replace(faults[0], same=faults[1:]), None, len(none))
+    if settings.motion == "measured":
+        # The angle is an input, and a delay of the sensors one of an input.
+        return Causes()
     report(Progress("searching for causes"))
     tried: list[Cause] = []
     names = set.intersection(*(set(one.recording.names) for one in read))
     # Numbers of the set are compared with sensors: the gain of a command is the area of its valve.
-    stages = (_motions(search), _exchanges(device, names), [*_sizes(device, names, settings), *_numbers(search)])
+    stages = (_motions(search), _exchanges(device, names), [*_sizes(device, names), *_numbers(search)])
     for stage in (*stages, _effects(device)):
         tried += search.compared(list(stage), none)
         tried.sort(key=lambda one: -one.gain)
@@ -253,7 +262,9 @@ class _Search:
         found: list[list[Floats] | None] = []
         for place, change in enumerate(changes):
             one = replayed.get(place)
-            found.append(_freed(record, one, change, self.settings.longest_delay) if isinstance(one, Replayed) else None)
+            found.append(
+                _freed(record, one, change, self.settings.longest_delay) if isinstance(one, Replayed) else None
+            )
         return found
 
     def _replay(self, measured: Measured, change: Change) -> Replay:
@@ -488,7 +499,7 @@ _LONG_DELAYS = _both_ways(0.015, 0.03, 0.05, 0.08, 0.12)
 _RATES = (0.7, 0.85, 0.94, 0.98, 0.995, 1.005, 1.02, 1.06, 1.15, 1.4)
 
 
-def _sizes(device: Device, names: Collection[str], settings: ReplaySettings) -> Iterator[Candidate]:
+def _sizes(device: Device, names: Collection[str]) -> Iterator[Candidate]:
     """Gain and zero of one sensor, of all pressures, of command and supply; delays and the rate of the clock."""
     supply = device.supply
     room = supply.atmospheric_pressure
@@ -517,9 +528,6 @@ def _sizes(device: Device, names: Collection[str], settings: ReplaySettings) -> 
             is_ratio=True,
             usual=usual_gain,
         )
-    if settings.motion == "measured":
-        # The angle, an input, would be late too.
-        return
     compared = [name for name in _SENSORS if name in names]
     for name in compared:
         words = f"{name} seems to be later than the other channels by {{:.3g}} ms"

@@ -345,10 +345,10 @@ def verdict(validation: Validation) -> str:
     )
     why = _why(validation.causes)
     if not validation.passes:
-        parts = [part for part in (why, size, failed and f"beyond the limit: {failed}") if part]
-        return f"{name} does not agree: {'; '.join(parts)}"
-    agrees = f"{name} agrees with {count} recording{'s' * (count > 1)}: every RMS error is within its limit"
-    return f"{agrees}; {size}; {why}" if why else f"{agrees}; nothing but noise is left"
+        parts = (why, size, f"beyond the limit: {failed}") if why else (failed, size)
+        return f"{name} does not agree: {'; '.join(parts if failed else parts[:2])}"
+    rest = "nothing but noise is left" if validation.causes.is_noise else "; ".join([size, *([why] if why else [])])
+    return f"{name} agrees with {count} recording{'s' * (count > 1)}: every RMS error is within its limit; {rest}"
 
 
 def _why(causes: Causes) -> str:
