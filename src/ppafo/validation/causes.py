@@ -391,7 +391,8 @@ def _faults(records: Sequence[_Record], none: Floats) -> Iterator[Cause]:
     for (record, one), square in zip(channels, none.tolist(), strict=True):
         words = _fault_of(one, record.measured.recording.time) if square >= ONLY_NOISE else ""
         if words:
-            yield Cause(f"samples of {one.name}", f"{one.name} {words} ({record.measured.file})", 0.0, 0.0)
+            file = f" ({record.measured.file})" if len(records) > 1 else ""
+            yield Cause(f"samples of {one.name}", f"{one.name} {words}{file}", 0.0, 0.0)
 
 
 def _fault_of(one: _Channel, time: Floats) -> str:
