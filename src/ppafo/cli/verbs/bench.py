@@ -28,7 +28,6 @@ Problem = Annotated["str | Path", Word("PROBLEM", Path)]
 Batch = Annotated[int, Word("N", counting_number, option="--next", const=1)]
 Set = Annotated["str | Path", Word("PARAMETERS")]
 Recording = Annotated["str | Path", Word("RECORDING")]
-Against = Annotated[str, Word("SET[:PATH=VALUE,...]")]
 Motion = Annotated[str, Word("free|measured|held|leg")]
 Initial = Annotated[str, Word("CHANNEL=VALUE")]
 Limits = Annotated[Sequence[str], Word("[CHANNEL=]LIMIT", option="--threshold")]
@@ -91,7 +90,6 @@ def validate(
     parameter_set: Set,
     recordings: Sequence[Recording],
     *,
-    against: Sequence[Against] = (),
     valve: Name | None = None,
     overrides: Overrides = (),
     motion: Motion = "free",
@@ -113,8 +111,6 @@ def validate(
 
     parameter_set: name of a parameter set, or a .toml file
     recordings: a .csv or .nc file, or a result folder; several may be given
-    against: another set, or a set with other values or another level of the model, to be compared by log predictive
-        density: 'fitted.toml', 'ppafo2011:friction.static_torque=0 N m'; may be repeated
     valve: valve of the parameter set; default: its default valve
     motion: free: the model moves the vane; measured: the vane follows the recorded angle; held: the vane stays at its
         initial angle; leg: the model moves vane and foot on the fixture of step-response (default free)
@@ -140,6 +136,5 @@ def validate(
         thresholds,
         longest_delay,
         columns,
-        against,
         progress,
     )
