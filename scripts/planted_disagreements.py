@@ -146,7 +146,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, nargs="+", required=True)
     parser.add_argument("--right", type=int, default=0, metavar="COUNT", help="nothing planted, COUNT times")
     words = parser.parse_args()
-    print("| planted | right | wrong | none | named first (or, the same for the recording) |\n|---|---|---|---|---|")
+    print("| planted | right | wrong | none | named first |\n|---|---|---|---|---|")
     total: Counter[str] = Counter()
     begun = time.process_time()
     for fault in FAULTS:
@@ -154,8 +154,8 @@ def main() -> None:
         counts = Counter(judged(fault, one) for one in found)
         total += counts
         best = found[0].causes.found
-        said = "" if best is None else in_words(best)
-        said += "" if best is None or not best.same else f" ({', '.join(one.name for one in best.same)})"
+        same = "" if best is None or not best.same else f", or {', '.join(one.name for one in best.same)}"
+        said = "" if best is None else f"{best.name}{same}"
         cells = (fault.title, *(counts[verdict] for verdict in VERDICTS), said)
         print(f"| {' | '.join(map(str, cells))} |", flush=True)
     spent = (time.process_time() - begun) / total.total()

@@ -66,7 +66,7 @@ def test_recorded_commands_of_closed_loops_give_the_same_pressures_again(scenari
 
 def test_a_changed_parameter_fails_and_its_channels_are_named(step: Step, agree: Agree) -> None:
     device, recording = step
-    other = dataclasses.replace(device, foot_plate=dataclasses.replace(device.foot_plate, gravity_torque=4.0))
+    other = dataclasses.replace(device, foot_plate=dataclasses.replace(device.foot_plate, gravity_torque=8.0))
     agreement = agree(recording, other)
     assert not agreement.passes
     assert not next(channel for channel in agreement.channels if channel.channel == "angle").passes
