@@ -1,6 +1,5 @@
 """Causes of a disagreement: each stage names what was planted, and nothing is named that leaves more than noise."""
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -169,6 +168,7 @@ def test_a_real_cylinder_that_is_led_at_constant_pressure_is_replayed(shared_dat
         pytest.skip("the recordings of real cylinders are not here")
     rows = np.loadtxt(file)[15:800]
     device = load_scenario("step-response", ["device.set=cylinder-lever"]).device
+    device = replace(device, supply=replace(device.supply, relieving=True))
     middle = 0.5 * (device.actuator.angle_min + device.actuator.angle_max)
     angle = middle + (rows[:, 4] - 0.5 * (rows[:, 4].max() + rows[:, 4].min())) * 1e-3 / 0.025
     pressure = ROOM + 1e5 * rows[:, 5]
@@ -183,6 +183,4 @@ def test_a_real_cylinder_that_is_led_at_constant_pressure_is_replayed(shared_dat
     settings = ReplaySettings(motion="measured", initial={"pressure_2": ROOM})
     agreement = compare_recording(measured, device, settings)
     assert [one.channel for one in agreement.channels] == ["pressure_1"]
-    assert math.isfinite(agreement.channels[0].rms)
-    # Its regulator took gas back; that of the set does not, so that a chamber that is pressed together rises above it.
-    assert agreement.channels[0].bias > 0.0
+    assert agreement.channels[0].fraction < 0.05
