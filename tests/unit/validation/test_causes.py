@@ -151,7 +151,7 @@ def test_two_mistakes_at_once_have_no_single_cause_and_the_nearest_is_said(bench
 
 
 def test_a_cylinder_is_searched_as_a_vane_is() -> None:
-    scenario = load_scenario("step-response", ["device.set=cylinder-lever", "motion.kind=free", "run.duration=0.2 s"])
+    scenario = load_scenario("step-response", ["device.set=cylinder-lever", "motion.kind=free", "run.duration=0.1 s"])
     recording = simulate(scenario).recording
     settings = {**scenario.device.actuator.settings, "bore": 0.024}
     device = replace(scenario.device, actuator=replace(scenario.device.actuator, settings=settings))
