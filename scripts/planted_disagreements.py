@@ -146,7 +146,6 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, nargs="+", required=True)
     parser.add_argument("--right", type=int, default=0, metavar="COUNT", help="nothing planted, COUNT times")
     words = parser.parse_args()
-    print("| planted | right | wrong | none | named first (or, the same for the recording) |\n|---|---|---|---|---|")
     total: Counter[str] = Counter()
     begun = time.process_time()
     for fault in FAULTS:
@@ -154,10 +153,9 @@ def main() -> None:
         counts = Counter(judged(fault, one) for one in found)
         total += counts
         best = found[0].causes.found
-        said = "" if best is None else in_words(best)
-        said += "" if best is None or not best.same else f" ({', '.join(one.name for one in best.same)})"
-        cells = (fault.title, *(counts[verdict] for verdict in VERDICTS), said)
-        print(f"| {' | '.join(map(str, cells))} |", flush=True)
+        same = [] if best is None else [one.name for one in (best, *best.same)]
+        said = ", ".join(f"{counts[verdict]} {verdict}" for verdict in VERDICTS if counts[verdict])
+        print(f"{fault.title}: {said} ({' or '.join(same)})", flush=True)
     spent = (time.process_time() - begun) / total.total()
     print(f"\n{', '.join(f'{total[verdict]} {verdict}' for verdict in VERDICTS)}; {spent:.1f} CPU s each", flush=True)
     if words.right:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -150,7 +151,7 @@ def test_two_mistakes_at_once_have_no_single_cause_and_the_nearest_is_said(bench
 
 
 def test_a_cylinder_is_searched_as_a_vane_is() -> None:
-    scenario = load_scenario("step-response", ["device.set=cylinder-lever", "motion.kind=free", "run.duration=0.2 s"])
+    scenario = load_scenario("step-response", ["device.set=cylinder-lever", "motion.kind=free", "run.duration=0.1 s"])
     recording = simulate(scenario).recording
     settings = {**scenario.device.actuator.settings, "bore": 0.024}
     device = replace(scenario.device, actuator=replace(scenario.device.actuator, settings=settings))
@@ -158,3 +159,28 @@ def test_a_cylinder_is_searched_as_a_vane_is() -> None:
     assert found is not None
     assert found.name == "actuator.bore"
     assert found.numbers["actuator.bore"][0] == pytest.approx(0.0257, rel=1e-3)
+
+
+def test_a_real_cylinder_that_is_led_at_constant_pressure_is_replayed(shared_data: Path) -> None:
+    """Zillen (2021), CC0: a single-acting cylinder is driven back and forth at 3 bar; its stroke as a lever's angle."""
+    file = shared_data / "pneumatic" / "zillen2021_cylinder_friction" / "KDN_3bar.csv"
+    if not file.is_file():
+        pytest.skip("the recordings of real cylinders are not here")
+    rows = np.loadtxt(file)[15:800]
+    device = load_scenario("step-response", ["device.set=cylinder-lever"]).device
+    device = replace(device, supply=replace(device.supply, relieving=True))
+    middle = 0.5 * (device.actuator.angle_min + device.actuator.angle_max)
+    angle = middle + (rows[:, 4] - 0.5 * (rows[:, 4].max() + rows[:, 4].min())) * 1e-3 / 0.025
+    pressure = ROOM + 1e5 * rows[:, 5]
+    channels = {
+        "command": Channel(np.ones(len(rows)), "-"),
+        "supply_pressure": Channel(np.full(len(rows), pressure.mean()), "Pa"),
+        "angle": Channel(angle, "rad"),
+        "pressure_1": Channel(pressure, "Pa"),
+    }
+    time = 1e-3 * rows[:, 0]
+    measured = check_recording(Recording("cylinder", time - time[0], channels), device, "r.csv")
+    settings = ReplaySettings(motion="measured", initial={"pressure_2": ROOM})
+    agreement = compare_recording(measured, device, settings)
+    assert [one.channel for one in agreement.channels] == ["pressure_1"]
+    assert agreement.channels[0].fraction < 0.05

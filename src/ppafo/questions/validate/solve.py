@@ -271,7 +271,7 @@ _HEAD = tuple(
         Column,
         (
             *("channel", "RMS error", "in noise", "variation", "of range", "limit", "bias", "largest", "at"),
-            *("own delay", "verdict"),
+            "verdict",
         ),
     )
 )
@@ -454,7 +454,6 @@ def channel_cells(channel: ChannelAgreement) -> tuple[str, ...]:
         _error(channel, channel.bias),
         _error(channel, channel.largest),
         f"{channel.largest_time:.4g} s",
-        f"{'limit, ' if channel.delay_is_at_limit else ''}{_number(_MILLISECONDS * channel.delay)} ms",
         "pass" if channel.passes else "FAIL",
     )
 
@@ -503,7 +502,5 @@ def _channel_data(channel: ChannelAgreement) -> dict[str, Any]:
         "bias": channel.bias,
         "largest": channel.largest,
         "largest_time": channel.largest_time,
-        "delay": channel.delay,
-        "delay_is_at_limit": channel.delay_is_at_limit,
         "shown": {"unit": display_unit(quantity), "rms": display_value(channel.rms, quantity)},
     }
