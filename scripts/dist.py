@@ -30,7 +30,7 @@ TRIED = (
     ("workbench", "--out", "page.html"),
     ("new", "scenario", "mine"),
     ("simulate", "mine.toml", "--out", "mine"),
-    ("examples", "write-a-scenario"),
+    ("new", "example", "write-a-scenario"),
     ("simulate", "write-a-scenario/stairs.toml", "--out", "stairs"),
 )
 """What a new user tries, in an empty folder."""

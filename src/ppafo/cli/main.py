@@ -42,7 +42,6 @@ All commands: ppafo --help"""
 
 EXIT_BAD_INPUT = 2
 _LONGEST_MESSAGE = 1000
-_DURATION = "run.duration"
 
 OBJECTS_BETWEEN_COLLECTIONS = 1_000_000
 """The usual 700 make Python look for garbage hundreds of times while it imports, which is a tenth of a start."""
@@ -110,11 +109,13 @@ def _run(words: list[str]) -> int:
         check_words(words)
         parser = build_parser(words)
         check_options(words, parser)
-        parsed = parser.parse_args(words)
+        parsed, unknown = parser.parse_known_args(words)
+        if unknown:
+            shown = " ".join(word for word in (parsed.command, getattr(parsed, "action", None)) if word)
+            raise UsageError(f"unrecognized arguments: {' '.join(unknown)}; see 'ppafo {shown} --help'")
         if parsed.command is None:
             print(FIRST_STEPS, file=sys.stderr)
             return EXIT_BAD_INPUT
-        _check_duration_once(getattr(parsed, "overrides", ()), getattr(parsed, "minutes", None))
         return int(parsed.run(parsed))
     except PpafoError as error:
         interrupts.check()  # what an interrupt broke is no mistake of the user's
@@ -124,12 +125,6 @@ def _run(words: list[str]) -> int:
     except KeyboardInterrupt as interrupt:
         print(f"ppafo: {str(interrupt) or 'interrupted; nothing is half written'}", file=sys.stderr)
         return EXIT_INTERRUPTED
-
-
-def _check_duration_once(overrides: Sequence[str], minutes: object) -> None:
-    """Refuse a duration that is set beside an option for it."""
-    if minutes is not None and any(override.partition("=")[0].strip() == _DURATION for override in overrides):
-        raise UsageError(f"--set {_DURATION}: the same as --minutes; leave one out")
 
 
 def _readable(message: str) -> str:

@@ -90,12 +90,13 @@ def _walked(
     strikes: tuple[float, ...] | None,
 ) -> Mapping[str, bytes]:
     from ppafo.exports.opensim import check_strikes, opensim_files
-    from ppafo.walking.loading import load_walk
+    from ppafo.walking.loading import check_duration_once, load_walk
     from ppafo.walking.motion import check_led, walk_of
     from ppafo.walking.walk import walk
 
     if strikes is not None:
         check_strikes(strikes)
+    check_duration_once(overrides, minutes)
     chosen = load_walk(name, overrides, gait)
     check_led(chosen, "a torque file for OpenSim")
     few_strides = _FEW_STRIDES if walk_of(chosen).course is None else None

@@ -86,6 +86,12 @@ def list_walks() -> tuple[str, ...]:
     return FILE.names()
 
 
+def check_duration_once(overrides: Iterable[str], minutes: float | None) -> None:
+    """Raise ScenarioError for a duration that an override sets beside ``minutes``."""
+    if minutes is not None and any(split_override(one, ScenarioError)[0] == "run.duration" for one in overrides):
+        raise ScenarioError("--set run.duration: the same as --minutes; leave one out")
+
+
 def load_walk(
     name_or_path: str | Path,
     overrides: Iterable[str] = (),

@@ -14,6 +14,7 @@ import ppafo
 from ppafo.cli.main import main
 from ppafo.errors import DataError, PpafoError, ScenarioError
 from ppafo.loading import json_schema, list_all_scenarios, load_scenario, reloaded, scenario_from_dict
+from ppafo.questions.walk.answer import walk_with_and_without
 from ppafo.simulation.loading import load_scenario as load_vane
 from ppafo.simulation.numbers import declared_numbers
 from ppafo.simulation.scenario import Scenario
@@ -271,3 +272,8 @@ def test_the_page_knows_every_rule_by_which_a_default_of_a_walk_follows_others()
     rules = {f"{term.function.__module__.rpartition('.')[2]}.{term.function.__name__}" for term in terms}
     assert "loading.lag_of_bandwidth" in rules
     assert {rule for rule in rules if f'"{rule}":' not in page} == set()
+
+
+def test_a_duration_is_given_once_in_python_too() -> None:
+    with pytest.raises(ScenarioError, match=r"run\.duration: the same as --minutes"):
+        walk_with_and_without(NAME, minutes=0.2, overrides=["run.duration = 30 s"])

@@ -38,7 +38,7 @@ from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.walking import course as courses
 from ppafo.walking.figures.legs import animation, frames_figure, strip_figure
 from ppafo.walking.figures.mean_stride import walk_figure
-from ppafo.walking.loading import FILE, load_walk
+from ppafo.walking.loading import FILE, check_duration_once, load_walk
 from ppafo.walking.motion import person_remarks, walk_of
 from ppafo.walking.person import START_VARIATION, THRESHOLD_VARIATION
 from ppafo.walking.planning import law_of
@@ -406,6 +406,7 @@ def walk_with_and_without(
     """
     chosen = configuration
     if not isinstance(chosen, Scenario):
+        check_duration_once(overrides, minutes)
         chosen = load_walk(chosen, overrides, gait, course, bottle)
     report = progress or report_nothing
     if wearers is not None:
