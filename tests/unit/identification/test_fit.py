@@ -45,7 +45,7 @@ def _noise(kind: str, generator: np.random.Generator) -> Floats:
             found[place] = 0.9 * found[place - 1] + math.sqrt(1.0 - 0.81) * white[place]
         return found
     if kind == "random walk":
-        return white + 0.1 * np.cumsum(generator.normal(size=_COUNT))
+        return white + 0.03 * np.cumsum(generator.normal(size=_COUNT))
     if kind == "Student t":
         return generator.standard_t(3.0, _COUNT) / math.sqrt(3.0)
     if kind == "hum":
