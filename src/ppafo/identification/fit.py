@@ -8,6 +8,7 @@ estimated from them. Each difference of the Jacobian is as long as changes the r
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -115,6 +116,7 @@ _STEPS = (1.0e-7, 1.0e-3)
 
 _HIGHEST_ORDER = 12
 _PASSES = 6
+_ROUNDS = 20
 _SETTLED = 0.03
 _EVALUATIONS = 40
 _SIGNIFICANCE = 0.01
@@ -219,16 +221,19 @@ class _Work:
         """The channels, each once."""
         return tuple(dict.fromkeys(one.channel for one in self.blocks))
 
-    def deviations(self, left: Floats, freedom: Mapping[str, float]) -> Floats:
-        """Return the noise [SI] of each row, pooled over the recordings of its channel, no less than the floor."""
-        found = np.empty(len(left))
+    def deviations(self, series: Floats) -> Floats:
+        """Return the noise [SI] of each row, pooled over the recordings of its channel, no less than the floor.
+
+        ``series`` are residuals, and in further columns what the error of the numbers may hide of them.
+        """
+        found = np.empty(len(series))
+        least = max(1.0e-12 * float(np.abs(series[:, 0]).max()), 1.0e-300)
         for channel in self.channels:
-            own = np.concatenate([left[rows] for rows in self.rows_of(channel)])
-            pooled = math.sqrt(float(own @ own) / max(len(own) - freedom.get(channel, 0.0), 1.0))
+            own = np.concatenate([series[rows] for rows in self.rows_of(channel)])
+            pooled = math.sqrt(float(np.square(own).sum()) / len(own))
             for one in self.blocks:
                 if one.channel == channel:
-                    least = max(one.floor, 1.0e-12 * float(np.abs(left).max()), 1.0e-300)
-                    found[one.rows] = max(pooled, least)
+                    found[one.rows] = max(pooled, one.floor, least)
         return found
 
 
@@ -238,7 +243,7 @@ def _search(work: _Work, start: Floats) -> tuple[Floats, bool]:
     left = work.one(point)
     if not np.isfinite(left).all():
         raise IdentificationError("no run succeeds at the start values; give others, or check the recordings")
-    noise = work.deviations(left, {})
+    noise = work.deviations(left[:, None])
     for number in range(_PASSES):
         weight = 1.0 / noise
 
@@ -253,28 +258,24 @@ def _search(work: _Work, start: Floats) -> tuple[Floats, bool]:
             gtol=None, loss="linear" if number else "soft_l1", max_nfev=_EVALUATIONS,
         )  # fmt: skip
         point, settled = np.asarray(result.x), bool(result.status > 0)
-        before, noise = noise, work.deviations(work.one(point), _leverage(work, np.asarray(result.jac)))
+        before, noise = noise, work.deviations(work.one(point)[:, None])
         if number and settled and float(np.abs(np.log(noise / before)).max()) < _SETTLED:
             break
     return point, settled
 
 
-def _leverage(work: _Work, jacobian: Floats) -> dict[str, float]:
-    """Return how many numbers the samples of each channel settle; the last rows are those of the priors."""
-    basis = np.linalg.svd(jacobian, full_matrices=False)[0]
-    own = np.square(basis).sum(axis=1)
-    return {channel: sum(float(own[rows].sum()) for rows in work.rows_of(channel)) for channel in work.channels}
-
-
 def burg(series: Sequence[Floats], highest: int = _HIGHEST_ORDER) -> tuple[float, ...]:
-    """Return the reflection coefficients [-] of one autoregression of several series (Burg), as many as AIC wants."""
+    """Return the reflection coefficients [-] of one autoregression of several series (Burg), as many as AIC wants.
+
+    Columns of a series (samples, columns) add up, as its residuals and their error do.
+    """
     forward, backward = list(series), list(series)
     count = sum(len(one) for one in series)
     power, found, best = 1.0, [], (0.0, 0)
     for order in range(1, min(highest, count // 10, min(len(one) for one in series) - 2) + 1):
         ahead, behind = [one[1:] for one in forward], [one[:-1] for one in backward]
-        across = sum(float(a @ b) for a, b in zip(ahead, behind, strict=True))
-        size = sum(float(a @ a + b @ b) for a, b in zip(ahead, behind, strict=True))
+        across = sum(float(np.sum(a * b)) for a, b in zip(ahead, behind, strict=True))
+        size = sum(float(np.sum(a * a + b * b)) for a, b in zip(ahead, behind, strict=True))
         if size <= 0.0:
             break
         found.append(2.0 * across / size)
@@ -297,32 +298,69 @@ def whiten(values: Floats, noise: Noise) -> Floats:
     return done
 
 
+class _Linear(NamedTuple):
+    """Residuals and Jacobian whitened [-] side by side, root and covariance of scaled numbers, noise by channel."""
+
+    rows: Floats
+    root: Floats
+    noise: Floats
+    sensors: dict[str, Noise]
+
+
+def _linear(work: _Work, point: Floats, left: Floats, slopes: Floats) -> tuple[_Linear, Floats]:
+    """Return the problem whitened at a point, and the step to its least squares within the bounds.
+
+    What the numbers absorb of the noise is missing in the residuals; its expectation J C J' is added until both agree
+    (expectation and maximisation), so that slow noise is not taken for little noise.
+    """
+    step, hidden = np.zeros(len(point)), np.zeros((len(left), 0))
+    limits = work.low - point - 1.0e-300, work.high - point + 1.0e-300
+    for _ in range(_ROUNDS):
+        series = np.column_stack([left + slopes @ step, hidden])
+        noise = work.deviations(series)
+        known, rows = {}, np.column_stack([left, slopes]) / noise[:, None]
+        for channel in work.channels:
+            own = work.rows_of(channel)
+            reflection = burg([series[one] / noise[one, None] for one in own])
+            known[channel] = Noise(float(noise[own[0]][0]), reflection)
+            for one in own:
+                rows[one] = whiten(rows[one], Noise(1.0, reflection))
+        root = _root_of_inverse(rows[:, 1:].T @ rows[:, 1:] + np.diag(np.square(work.prior)))
+        hidden = slopes @ root
+        before = step
+        solved = lsq_linear(
+            np.concatenate([rows[:, 1:], np.diag(work.prior)]),
+            -np.concatenate([rows[:, 0], (point - work.mean) * work.prior]),
+            limits,
+            method="bvls",
+        )
+        step = np.asarray(solved.x)
+        if np.abs((step - before) @ np.linalg.pinv(root)).max() < 0.01 and series.shape[1] > 1:
+            break
+    return _Linear(rows, root, noise, known), step
+
+
+def _root_of_inverse(curvature: Floats) -> Floats:
+    """Return a matrix whose product with its transpose is the inverse; large along what is not seen."""
+    size = np.sqrt(np.maximum(np.diag(curvature), 1.0e-300))
+    values, vectors = np.linalg.eigh(curvature / size / size[:, None])
+    return np.asarray(vectors / np.sqrt(np.maximum(values, 1.0e-14)) / size[:, None])
+
+
 def _whitened(work: _Work, point: Floats, settled: bool, confidence: float) -> Fit:
     """Return the fit after whitening and one more Gauss-Newton step from the least squares."""
     left = work.one(point)
-    noise = work.deviations(left, {})
-    slopes = work.jacobian(point, 1.0 / noise)
-    rows, known = _innovations(work, left, slopes, noise)
-    step = lsq_linear(
-        np.concatenate([rows[:, 1:], np.diag(work.prior)]),
-        -np.concatenate([rows[:, 0], (point - work.mean) * work.prior]),
-        (work.low - point - 1.0e-300, work.high - point + 1.0e-300),
-        method="bvls",
-    )
-    reached = np.clip(point + step.x, work.low, work.high)
+    slopes = work.jacobian(point, 1.0 / work.deviations(left[:, None]))
+    linear, step = _linear(work, point, left, slopes)
+    reached = np.clip(point + step, work.low, work.high)
     after = work.one(reached)
-    if np.isfinite(after).all() and _cost(work, after, reached, noise, known) <= _cost(work, left, point, noise, known):
+    if np.isfinite(after).all() and _cost(work, after, reached, linear) <= _cost(work, left, point, linear):
         point, left = reached, after
-        slopes = work.jacobian(point, 1.0 / noise)
-    whole = np.concatenate([slopes / noise[:, None], np.diag(work.prior)])
-    noise = work.deviations(left, _leverage(work, whole))
-    rows, known = _innovations(work, left, slopes, noise)
+        slopes = work.jacobian(point, 1.0 / linear.noise)
+        linear, _ = _linear(work, point, left, slopes)
+    known, rows = linear.sensors, linear.rows
     whitened, errors = rows[:, 1:], rows[:, 0]
-    curvature = whitened.T @ whitened + np.diag(np.square(work.prior))
-    size = np.sqrt(np.maximum(np.diag(curvature), 1.0e-300))
-    values, vectors = np.linalg.eigh(curvature / size / size[:, None])
-    half = vectors / np.sqrt(np.maximum(values, 1.0e-14)) / size[:, None]
-    covariance = half @ half.T
+    covariance = linear.root @ linear.root.T
     freedom = max(len(left) - float(np.sum(whitened * (whitened @ covariance))), 1.0)
     wide = float(student.ppf(0.5 + 0.5 * confidence, freedom)) * np.sqrt(np.diag(covariance))
     touching = _touches(work, point, errors @ whitened + np.square(work.prior) * (point - work.mean))
@@ -355,22 +393,10 @@ def _whitened(work: _Work, point: Floats, settled: bool, confidence: float) -> F
     )
 
 
-def _innovations(work: _Work, left: Floats, slopes: Floats, noise: Floats) -> tuple[Floats, dict[str, Noise]]:
-    """Return residuals and Jacobian, side by side, whitened [-], and the noise of each channel."""
-    known, rows = {}, np.column_stack([left, slopes])
-    for channel in work.channels:
-        own = [one for one in work.blocks if one.channel == channel]
-        reflection = burg([left[one.rows] / noise[one.rows] for one in own])
-        known[channel] = Noise(float(noise[own[0].rows][0]), reflection)
-        for one in own:
-            rows[one.rows] = whiten(rows[one.rows], Noise(float(noise[one.rows][0]), reflection))
-    return rows, known
-
-
-def _cost(work: _Work, left: Floats, point: Floats, noise: Floats, known: Mapping[str, Noise]) -> float:
+def _cost(work: _Work, left: Floats, point: Floats, linear: _Linear) -> float:
     """Return the sum of squares [-] of whitened residuals and priors."""
-    scaled = (left / noise)[:, None]
-    parts = [whiten(scaled[one.rows], Noise(1.0, known[one.channel].reflection)) for one in work.blocks]
+    scaled = (left / linear.noise)[:, None]
+    parts = [whiten(scaled[one.rows], Noise(1.0, linear.sensors[one.channel].reflection)) for one in work.blocks]
     return sum(float(np.square(one).sum()) for one in parts) + float(np.square((point - work.mean) * work.prior).sum())
 
 
@@ -402,10 +428,7 @@ def _conflict(work: _Work, rows: Floats, point: Floats, free: Mask, freedom: flo
     """
     errors, slopes = rows[:, 0], rows[:, 1:][:, free]
     prior, shift = np.square(work.prior[free]), (point - work.mean)[free]
-    whole = slopes.T @ slopes + np.diag(prior)
-    size = np.sqrt(np.maximum(np.diag(whole), 1.0e-300))
-    values, vectors = np.linalg.eigh(whole / size / size[:, None])
-    root = vectors / np.sqrt(np.maximum(values, 1.0e-14)) / size[:, None]
+    root = _root_of_inverse(slopes.T @ slopes + np.diag(prior))
     groups, found = list(_groups(work)), None
     for name, own in groups:
         part = np.concatenate([slopes[one] for one in own])

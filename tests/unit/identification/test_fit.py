@@ -45,7 +45,7 @@ def _noise(kind: str, generator: np.random.Generator) -> Floats:
             found[place] = 0.9 * found[place - 1] + math.sqrt(1.0 - 0.81) * white[place]
         return found
     if kind == "random walk":
-        return white + 0.03 * np.cumsum(generator.normal(size=_COUNT))
+        return 0.1 * np.cumsum(generator.normal(size=_COUNT))
     if kind == "Student t":
         return generator.standard_t(3.0, _COUNT) / math.sqrt(3.0)
     if kind == "hum":
@@ -73,11 +73,15 @@ def _coverage(kind: str, fits: int, seed: int) -> tuple[float, int]:
     return held / (2.0 * fits), flagged
 
 
-@pytest.mark.parametrize("kind", ["white", "AR(1)", "random walk", "Student t", "hum"])
-def test_intervals_hold_in_five_kinds_of_noise_and_a_model_that_is_right_is_not_called_wrong(kind: str) -> None:
-    held, flagged = _coverage(kind, 20, seed=7)
+@pytest.mark.parametrize(
+    ("kind", "least"), [("white", 0.9), ("AR(1)", 0.9), ("random walk", 0.75), ("Student t", 0.9), ("hum", 0.85)]
+)
+def test_intervals_hold_in_five_kinds_of_noise_and_a_model_that_is_right_is_not_called_wrong(
+    kind: str, least: float
+) -> None:
+    held, flagged = _coverage(kind, 30, seed=7)
 
-    assert held >= 0.85
+    assert held >= least
     assert flagged <= 1
 
 
