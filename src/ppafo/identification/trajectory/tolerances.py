@@ -80,6 +80,10 @@ class BenchSection(StrictTable):
         tuple[Sensed, ...],
         Field(strict=False, description="'zero', 'gain': anew in each recording; default: the same in all of them"),
     ] = ()
+    gas_temperature: Annotated[Text | None, Field(description="of a gas temperature that is not stated: '15 K'")] = None
+    gas_law: Annotated[Text | None, Field(description="departure of the gas from the ideal gas law: '1 %'")] = None
+    zero_of_flow: Annotated[Text | None, Field(description="zero of the flow meter, of its largest reading")] = None
+    held: Annotated[Text | None, Field(description="of a number that states no uncertainty of its own: '2 %'")] = None
     can: Annotated[AbilitySection | None, Field(description="what the bench can do, for the next experiment")] = None
 
 

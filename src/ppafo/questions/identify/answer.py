@@ -27,7 +27,7 @@ from ppafo.answers.style import (
 from ppafo.constants import PASCALS_PER_PSI, STANDARD_ATMOSPHERE
 from ppafo.errors import DataError
 from ppafo.identification.bench.result import BenchResult, count_of, figure_3, procedure_figure
-from ppafo.identification.estimate import BENCH_VERDICTS, Check, Estimate, Prospect
+from ppafo.identification.estimate import BENCH_VERDICTS, Check, Estimate
 from ppafo.identification.new_set import NewSet, in_set_unit
 from ppafo.identification.trajectory.fitting import TrajectoryFit
 from ppafo.identification.trajectory.follow_up import Expected, Profile
@@ -45,20 +45,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-@dataclass(frozen=True, slots=True)
-class Beforehand:
-    """What the recordings of a procedure can give and what not, said before anything was fitted."""
-
-    procedure: str
-    prospects: tuple[Prospect, ...]
-
-
 @dataclass(frozen=True, slots=True, repr=False)
 class Identification(Solved):
     """The outcome of a problem: what could be had, results in the order of making, the set before and after."""
 
     name: str
-    beforehand: tuple[Beforehand, ...]
     results: tuple[BenchResult, ...]
     trajectory: TrajectoryOutcome | None
     before: ParameterSet
@@ -75,7 +66,7 @@ class Identification(Solved):
     def is_good(self) -> bool:
         """Whether every check holds and the new set makes a device where the old one did."""
         fitted = () if self.trajectory is None else self.trajectory.failed
-        return not self.new_set.problem and not fitted and not any(result.failed for result in self.results)
+        return not self.new_set.problem and not fitted and not any(result.conflict for result in self.results)
 
     @property
     def kind(self) -> RecordingKind:
@@ -299,7 +290,6 @@ def answer_of(identification: Identification) -> Answer:
         title=f"The parameter set {name}",
         lead=(),
         sections=(
-            *(_beforehand_section(item) for item in identification.beforehand),
             *(_procedure_section(result, identification.before) for result in identification.results),
             *((_trajectory_section(fitted, identification.before),) if fitted else ()),
             *((plan_section(plan),) if plan else ()),
@@ -310,7 +300,6 @@ def answer_of(identification: Identification) -> Answer:
             "problem": identification.name,
             "started_from": identification.before.name,
             "is_good": identification.is_good,
-            "beforehand": [plain(item) for item in identification.beforehand],
             "procedures": [_procedure_data(result) for result in identification.results],
             **_trajectory_data(identification.trajectory),
             "new_set": {
@@ -334,19 +323,16 @@ def _count_sentence(identification: Identification) -> str:
     return f"{found}{rest}"
 
 
-def _beforehand_section(item: Beforehand) -> Section:
-    """Return what was known of a procedure before anything was fitted."""
-    words = {True: "sufficient", False: "INSUFFICIENT"}
-    remarks = tuple(f"{words[one.can_be_had]}: {one.name}: {one.statement}" for one in item.prospects)
-    return Section(f"before {item.procedure}, from the recordings alone:", remarks=remarks)
-
-
 def _procedure_section(result: BenchResult, before: ParameterSet) -> Section:
     kind = "" if result.kind == "measured" else f" ({result.kind})"
     return Section(
         f"{result.procedure}{kind}: {result.summary}",
         table=Table((), tuple(estimate_row(item, before) for item in result.estimates)),
-        remarks=(*_checks(result.checks), *(f"remark: {remark}" for remark in result.remarks)),
+        remarks=(
+            *((f"holds for this model only: {result.conflict}",) if result.conflict else ()),
+            *(f"{item.path}: {item.explanation}" for item in result.estimates),
+            *(f"remark: {remark}" for remark in result.remarks),
+        ),
     )
 
 
@@ -478,7 +464,7 @@ def _procedure_data(result: BenchResult) -> dict[str, Any]:
         "summary": result.summary,
         "recordings_are": result.kind,
         "estimates": [plain(item) for item in result.estimates],
-        "checks": [plain(item) for item in result.checks],
+        "conflict": result.conflict,
         "remarks": list(result.remarks),
     }
 

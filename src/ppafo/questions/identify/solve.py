@@ -11,8 +11,8 @@ from ppafo.identification.problem import (
     ProblemFile,
     ProcedureProblem,
     Setting,
+    bench_tolerances,
     load_problem,
-    prospects_of,
     run_procedure,
     window_of,
 )
@@ -24,8 +24,8 @@ from ppafo.parameters.device import VANE
 from ppafo.parameters.loading import list_sets, load_parameter_set
 from ppafo.parameters.overrides import check_valve
 from ppafo.parameters.parameter_set import ParameterSet, apply_overrides, atmospheric_pressure, chosen_valve
-from ppafo.progress import Progress, Report, report_nothing
-from ppafo.questions.identify.answer import Beforehand, Identification, _bench_estimates
+from ppafo.progress import Report, report_nothing
+from ppafo.questions.identify.answer import Identification, _bench_estimates
 from ppafo.questions.identify.plan import Plan, planted_device
 from ppafo.storage.foreign import read_foreign
 from ppafo.storage.result_folder import read_recording
@@ -56,7 +56,7 @@ def solve_problem(
         raise IdentificationError(f"{file}: --next needs a table {missing}")
     before = _base_set(problem, folder)
     valve = chosen_valve(before, problem.device.valve)
-    if before.actuator_kind != VANE:
+    if before.actuator_kind != VANE and problem.trajectory is not None:
         raise IdentificationError(
             f"{file}: identification is made for a vane, and '{before.name}' has an actuator '{before.actuator_kind}'"
         )
@@ -85,9 +85,9 @@ def solve_problem(
             raise IdentificationError(f"{file}: {twice}")
         found += uses
     used = tuple(found)
-    beforehand = tuple(_look(task, Setting(before, valve, task.place), progress) for task in tasks)
+    known = bench_tolerances(problem.bench, file)
     for task in tasks:
-        result = run_procedure(task.sources, task.item, Setting(current, valve, task.place))
+        result = run_procedure(task.sources, task.item, Setting(current, valve, task.place, known))
         results.append(result)
         current = with_estimates(current, result.estimates).parameter_set
     bench = {estimate.path: estimate for estimate in _bench_estimates(results)}
@@ -112,7 +112,7 @@ def solve_problem(
         earlier = () if problem.trajectory is None else problem.trajectory.experiments
         planted = planted_device(folder / one.recording for one in earlier)
         plan = Plan(fitted.following, file, f"{problem.name}.toml", problem.device.valve, _rate(can), planted)
-    return Identification(problem.name, beforehand, tuple(results), fitted, before, named, plan)
+    return Identification(problem.name, tuple(results), fitted, before, named, plan)
 
 
 def _rate(can: AbilitySection | None) -> str:
@@ -126,14 +126,6 @@ class _Task:
     item: ProcedureProblem
     sources: tuple[Source, ...]
     place: str
-
-
-def _look(task: _Task, setting: Setting, report: Report) -> Beforehand:
-    found = Beforehand(task.item.kind, prospects_of(task.sources, task.item, setting))
-    missing = [prospect for prospect in found.prospects if not prospect.can_be_had]
-    for prospect in missing:
-        report(Progress(f"{found.procedure}: insufficient data: {prospect.name}: {prospect.statement}"))
-    return found
 
 
 def _base_set(problem: ProblemFile, folder: Path) -> ParameterSet:
