@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from ppafo.identification.trajectory.information import covariance, directions_for, solution
 
 from ppafo.identification.linear_systems import inverse_of, inverse_of_steps, rank_of, solution_of
 from ppafo.identification.noise.shapes import previous_samples, regression_of
-from ppafo.identification.trajectory.information import covariance, directions_for, solution
 
 UNITS = np.array([1.0e9, 1.0e-9, 1.0])
 
