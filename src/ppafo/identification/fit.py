@@ -267,12 +267,13 @@ def _search(work: _Work, start: Floats) -> tuple[Floats, bool]:
 def burg(series: Sequence[Floats], highest: int = _HIGHEST_ORDER) -> tuple[float, ...]:
     """Return the reflection coefficients [-] of one autoregression of several series (Burg), as many as AIC wants.
 
-    Columns of a series (samples, columns) add up, as its residuals and their error do.
+    Columns of a series (samples, columns) add up, as its residuals and their error do. Of 100 samples AIC would take
+    noise for an autoregression in a third of all cases: there is at most one coefficient for each 100.
     """
     forward, backward = list(series), list(series)
     count = sum(len(one) for one in series)
     power, found, best = 1.0, [], (0.0, 0)
-    for order in range(1, min(highest, count // 10, min(len(one) for one in series) - 2) + 1):
+    for order in range(1, min(highest, count // 100, min(len(one) for one in series) - 2) + 1):
         ahead, behind = [one[1:] for one in forward], [one[:-1] for one in backward]
         across = sum(float(np.sum(a * b)) for a, b in zip(ahead, behind, strict=True))
         size = sum(float(np.sum(a * a + b * b)) for a, b in zip(ahead, behind, strict=True))
