@@ -115,6 +115,9 @@ _STEPS = (1.0e-7, 1.0e-3)
 """Shortest and longest difference over the scale of a number."""
 
 _HIGHEST_ORDER = 12
+_LARGEST_REFLECTION = 1.0 - 1.0e-9
+"""Of residuals that follow a law exactly, such as those of a constant: no innovation would be left."""
+
 _PASSES = 6
 _ROUNDS = 20
 _SETTLED = 0.03
@@ -279,7 +282,7 @@ def burg(series: Sequence[Floats], highest: int = _HIGHEST_ORDER) -> tuple[float
         size = sum(float(np.sum(a * a + b * b)) for a, b in zip(ahead, behind, strict=True))
         if size <= 0.0:
             break
-        found.append(2.0 * across / size)
+        found.append(max(-_LARGEST_REFLECTION, min(_LARGEST_REFLECTION, 2.0 * across / size)))
         forward = [a - found[-1] * b for a, b in zip(ahead, behind, strict=True)]
         backward = [b - found[-1] * a for a, b in zip(ahead, behind, strict=True)]
         power *= 1.0 - found[-1] ** 2
@@ -343,7 +346,7 @@ def _linear(work: _Work, point: Floats, left: Floats, slopes: Floats) -> tuple[_
 
 def _root_of_inverse(curvature: Floats) -> Floats:
     """Return a matrix whose product with its transpose is the inverse; large along what is not seen."""
-    size = np.sqrt(np.maximum(np.diag(curvature), 1.0e-300))
+    size = np.sqrt(np.maximum(np.diag(curvature), 1.0e-20))
     values, vectors = np.linalg.eigh(curvature / size / size[:, None])
     return np.asarray(vectors / np.sqrt(np.maximum(values, 1.0e-14)) / size[:, None])
 
