@@ -83,7 +83,7 @@ class Fit:
 
     ``low`` and ``high`` are intervals at the confidence, ``noise`` standard deviations and ``correlation`` orders of
     the autoregression by channel, ``residuals`` measured less model. ``unidentified`` are combinations, as weights of
-    numbers in units of their scale, that the recordings do not fix; ``shares`` has for each number that is sought the
+    numbers in units of their scale, that the recordings do not fix; ``shares`` has for each number the
     tolerances that widen its interval, largest first, as fractions of the variance. ``jacobian`` is whitened [1/SI].
     """
 
@@ -369,7 +369,6 @@ def _whitened(work: _Work, point: Floats, settled: bool, confidence: float) -> F
     wide = float(student.ppf(0.5 + 0.5 * confidence, freedom)) * np.sqrt(np.diag(covariance))
     touching = _touches(work, point, errors @ whitened + np.square(work.prior) * (point - work.mean))
     names = [one.name for one in work.numbers]
-    sought = [place for place, one in enumerate(work.numbers) if not math.isfinite(one.deviation)]
     fractions = np.square(covariance * work.prior) / np.diag(covariance)[:, None]
     return Fit(
         numbers=work.numbers,
@@ -388,7 +387,7 @@ def _whitened(work: _Work, point: Floats, settled: bool, confidence: float) -> F
                 for at in np.argsort(-fractions[place]).tolist()
                 if fractions[place, at] >= _SHOWN
             )
-            for place in sought
+            for place in range(len(names))
         },
         evaluations=work.evaluations,
         has_converged=settled,

@@ -235,7 +235,9 @@ def told_of_readings(sources: tuple[Source, ...]) -> tuple[str, ...]:
                 continue
             step = float(np.median(np.diff(levels)) / (levels[-1] - levels[0]))
             if step > _COARSE:
-                found.append(f"{source.name}: values of '{name}' are {step:.0%} of their range apart, a coarse converter")
+                found.append(
+                    f"{source.name}: values of '{name}' are {step:.0%} of their range apart, a coarse converter"
+                )
     return tuple(found)
 
 

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 
 from ppafo.constants import STANDARD_ATMOSPHERE, UNIVERSAL_GAS_CONSTANT
-from ppafo.identification.bench.law import DEFAULTS, Tolerances, Values, tolerance
+from ppafo.identification.bench.law import Tolerances, Values, tolerance
 from ppafo.identification.fit import Free
 from ppafo.model.gas import choked_flow_constant, critical_pressure_ratio, specific_gas_constant
 from ppafo.model.orifice import sonic_conductance_mass

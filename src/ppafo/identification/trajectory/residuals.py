@@ -29,10 +29,10 @@ from ppafo.identification.trajectory.problem import (
     TIME_OFFSET,
     ZERO_OF,
     Experiment,
-    Range,
     scenario_of,
     with_numbers,
 )
+from ppafo.identification.trajectory.problem import Number as Range
 from ppafo.model.catalog import VALVES
 from ppafo.model.columns import at, over_runs
 from ppafo.parameters.plant import effect_rows, plant_parameters, switches_of

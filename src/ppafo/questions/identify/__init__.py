@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from ppafo.questions.question import Argument, Question, counting_number
+from ppafo.questions.question import Argument, Question
 
 QUESTION = Question(
     name="identify",
@@ -11,15 +11,5 @@ QUESTION = Question(
     solve="ppafo.questions.identify.solve:identify",
     arguments=(
         Argument(("PROBLEM",), "problem", "a problem file (.toml); see 'ppafo schema identification'", "PROBLEM", Path),
-        Argument(
-            ("--next",),
-            "following",
-            "also propose the next experiment, or a batch of N, within what the table [bench.can] allows",
-            "N",
-            counting_number,
-            0,
-            nargs="?",
-            const=1,
-        ),
     ),
 )

@@ -1,0 +1,422 @@
+"""Experiments made ready for fitting, and their runs: residuals of all recordings at many points, as one batch.
+
+Each experiment is one block of lanes, each lane one set of numbers. One clock serves all columns: the step stays as it
+is during the search. Runs of a fit are allowed so little error that differences hardly see it.
+"""
+
+import math
+import os
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ppafo.engine.lanes import StepInputs, replay, run_batch
+from ppafo.engine.program import Program
+from ppafo.engine.rows import leaves, rebuilt, row_numbers
+from ppafo.engine.run import NEVER_FAILED, Run, batches_of
+from ppafo.engine.scheme.actuators import pressures_of
+from ppafo.engine.scheme.pneumatics import supply_range
+from ppafo.errors import IdentificationError
+from ppafo.identification.fit import Block
+from ppafo.identification.trajectory.problem import (
+    GAIN_OF,
+    TIME_OFFSET,
+    ZERO_OF,
+    Experiment,
+    Number,
+    scenario_of,
+    with_numbers,
+)
+from ppafo.model.catalog import VALVES
+from ppafo.model.columns import at, over_runs
+from ppafo.parameters.plant import effect_rows, plant_parameters, switches_of
+from ppafo.signals.faults import MINIMUM_SAMPLES, is_at_limit, noise_of, plateaus
+from ppafo.simulation.plan import (
+    exact_orifice,
+    initial_lines,
+    initial_state,
+    led_leg,
+    outside_torque,
+    plan_run,
+    plant_behind_lines,
+    thermal_parameters,
+    valve_parameters,
+    with_load,
+)
+from ppafo.simulation.recorded import (
+    ANGLE,
+    DORSIFLEXION_SUPPLY,
+    SUPPLY,
+    RecordedInputs,
+    step_inputs,
+    with_prescribed_angle,
+)
+from ppafo.simulation.scenario import FreeMotion, Scenario, vane_motion
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+FIT_TOLERANCE = 0.02
+"""Error that a run of a fit is allowed over that of any other run; columns of differences keep to 1e-3 with it."""
+_FINER = 0.25
+_FITS = 1.0e-6
+
+_READ_INTERVAL = 5.0e-5
+"""Seconds between two records that samples lie in between: a chamber fills within milliseconds ..."""
+_MAXIMUM_RECORDS = 100_000
+"""... and more where a recording is so long that memory would run out."""
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """One channel of an experiment: samples [rad] or [Pa] and the least noise that they are thought to have."""
+
+    name: str
+    values: Floats
+    floor: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Samples:
+    """What a run is compared with: times [s] of the run, channels, and how far [s] a fitted offset may move them."""
+
+    time: Floats
+    channels: tuple[Measured, ...]
+    reach: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class PreparedExperiment:
+    """An experiment by its label, with its scenario completed and its samples placed in the record of a run.
+
+    ``run`` has the step and the clock of all columns; a sample is ``fraction`` [-] of the way from record ``place`` to
+    the next. ``inputs`` are what the run follows at each step, made of what ``recorded`` has; None where it follows
+    nothing.
+    """
+
+    label: str
+    scenario: Scenario
+    run: Run
+    samples: Samples
+    place: Indices
+    fraction: Floats
+    recorded: RecordedInputs | None = None
+    inputs: StepInputs | None = None
+
+    @property
+    def time(self) -> Floats:
+        """Times of the samples in the time of the run [s]."""
+        return self.samples.time
+
+    @property
+    def channels(self) -> tuple[Measured, ...]:
+        """The channels that are compared."""
+        return self.samples.channels
+
+    @property
+    def record_interval(self) -> float:
+        """Time between two records of the run [s]."""
+        return self.run.step * self.run.record_every
+
+
+def prepare(experiment: Experiment, numbers: Mapping[str, float], reach: float = 0.0) -> PreparedExperiment:
+    """Return the experiment made ready.
+
+    ``numbers`` by path are the start values; ``reach`` [s] is the largest time offset that is tried.
+    IdentificationError for a recording with too few samples or a sensor at its limit.
+    """
+    recording, said = experiment.recording, f"experiment '{experiment.label}'"
+    inside = recording.time >= experiment.start - _FITS
+    time = np.maximum(recording.time[inside] - experiment.start, 0.0)
+    if time.size < MINIMUM_SAMPLES:
+        raise IdentificationError(
+            f"{said}: {recording.label} has {time.size} samples after {experiment.start:g} s, "
+            f"at least {MINIMUM_SAMPLES} are needed"
+        )
+    channels = [
+        Measured(name, recording[name][inside], experiment.noise.get(name, 0.0)) for name in experiment.channels
+    ]
+    for channel in channels:
+        clipped = max(plateaus(channel.values), key=lambda item: item.count)
+        if channel.floor == 0.0 and is_at_limit(channel.values, clipped) and not noise_of(channel.values) > 0.0:
+            raise IdentificationError(
+                f"{said}: channel '{channel.name}' is exactly its {clipped.word} value for {clipped.count} of "
+                f"{channel.values.size} samples: its sensor is at its limit; end the recording before it, or give the "
+                "standard deviation of the sensor in noise"
+            )
+    scenario = replace(scenario_of(experiment), duration=float(time[-1]) + reach)
+    recorded = RecordedInputs(recording, experiment.inputs, experiment.start) if experiment.inputs else None
+    return prepare_samples(experiment.label, scenario, Samples(time, tuple(channels), reach), numbers, recorded)
+
+
+def prepare_samples(
+    label: str,
+    scenario: Scenario,
+    samples: Samples,
+    numbers: Mapping[str, float],
+    recorded: RecordedInputs | None = None,
+) -> PreparedExperiment:
+    """Return samples of a scenario's run made ready, at ``numbers`` [SI] by path."""
+    run = replace(plan_run(with_numbers(scenario, numbers)), tolerance=FIT_TOLERANCE)
+    nowhere = np.zeros(samples.time.size)
+    unplaced = PreparedExperiment(label, scenario, run, samples, nowhere.astype(np.intp), nowhere, recorded)
+    return _place_samples(unplaced, run)
+
+
+def _place_samples(prepared: PreparedExperiment, run: Run) -> PreparedExperiment:
+    """Return the samples placed in a record of a run that is no finer than they need."""
+    samples, recorded = prepared.samples, prepared.recorded
+    every = _steps_between_samples(samples, run.step)
+    records = math.ceil((float(samples.time[-1]) + samples.reach) / (run.step * every) - _FITS)
+    position = samples.time / (run.step * every)
+    place = np.minimum(np.floor(position + _FITS), records).astype(np.intp)
+    fraction = np.maximum(position - place, 0.0)
+    fraction[fraction < _FITS] = 0.0
+    frozen = replace(run, record_every=every, step_count=math.ceil(records * every - _FITS), needs_parts=True)
+    if recorded is not None and recorded.has(ANGLE) and isinstance(prepared.scenario.motion, FreeMotion):
+        frozen = with_prescribed_angle(frozen, prepared.scenario.motion.angle)
+    inputs = None if recorded is None else step_inputs(recorded, prepared.scenario.device, frozen)
+    return replace(prepared, run=frozen, place=place, fraction=fraction, inputs=inputs)
+
+
+def _steps_between_samples(samples: Samples, step: float) -> float:
+    """Return the steps between two records: as many as between two samples, fewer where these are read in between.
+
+    A fraction of a step where a whole one is too long to be read in between.
+    """
+    every = max(1, round(float(np.min(np.diff(samples.time))) / step))
+    position = samples.time / (step * every)
+    is_aligned = bool(np.all(np.abs(position - np.round(position)) < _FITS * np.maximum(position, 1.0)))
+    if is_aligned and samples.reach == 0.0:
+        return every
+    read_interval = max(_READ_INTERVAL, float(samples.time[-1]) / _MAXIMUM_RECORDS)
+    most = read_interval / step * (1.0 + _FITS)
+    if most < 1.0:
+        return 1.0 / math.ceil(1.0 / most)
+    return max(count for count in range(1, int(most) + 1) if every % count == 0) if is_aligned else int(most)
+
+
+def columns_in(label: str, numbers: Sequence[Number], points: Floats) -> dict[str, Floats]:
+    """Return the numbers [SI] by path that act in the experiment with a label, at points [SI] (numbers, points)."""
+    return {item.path: row for item, row in zip(numbers, points, strict=True) if item.acts_in(label)}
+
+
+def signals_of(
+    experiments: Sequence[PreparedExperiment], numbers: Sequence[Number], points: Floats
+) -> list[dict[str, Floats]]:
+    """Return, for each experiment, its channels [SI] (samples, points) at many points [SI] (numbers, points).
+
+    A run that leaves what is possible is NaN throughout. Experiments run side by side, one thread each.
+    """
+
+    def one(prepared: PreparedExperiment) -> dict[str, Floats]:
+        return signals_at(prepared, columns_in(prepared.label, numbers, points), points.shape[1])
+
+    workers = min(len(experiments), os.cpu_count() or 1)
+    if workers == 1:
+        return [one(prepared) for prepared in experiments]
+    with ThreadPoolExecutor(workers) as pool:
+        return list(pool.map(one, experiments))
+
+
+def residuals_of(experiments: Sequence[PreparedExperiment], numbers: Sequence[Number], points: Floats) -> Floats:
+    """Return measured less model [SI] (samples of all channels, points) at points [SI] (numbers, points)."""
+    signals = signals_of(experiments, numbers, points)
+    return np.concatenate(
+        [
+            channel.values[:, None] - of_one[channel.name]
+            for prepared, of_one in zip(experiments, signals, strict=True)
+            for channel in prepared.channels
+        ]
+    )
+
+
+def blocks_of(experiments: Sequence[PreparedExperiment], numbers: Sequence[Number], point: Floats) -> tuple[Block, ...]:
+    """Return the place of each channel of each recording among the residuals.
+
+    Its floor is the given noise or the error of the engine, which half as long steps with a quarter of the error show.
+    """
+    blocks, first = [], 0
+    coarse = signals_of(experiments, numbers, point[:, None])
+    fine = signals_of([_with_half_steps(one, numbers, point) for one in experiments], numbers, point[:, None])
+    for prepared, before, after in zip(experiments, coarse, fine, strict=True):
+        for channel in prepared.channels:
+            error = float(np.sqrt(np.mean(np.square(after[channel.name] - before[channel.name]))))
+            floor = max(channel.floor, error if math.isfinite(error) else 0.0)
+            last = first + len(channel.values)
+            blocks.append(Block(prepared.label, channel.name, slice(first, last), floor))
+            first = last
+    return tuple(blocks)
+
+
+def _with_half_steps(prepared: PreparedExperiment, numbers: Sequence[Number], point: Floats) -> PreparedExperiment:
+    scenario = replace(prepared.scenario, time_step=0.5 * prepared.run.step)
+    given = {path: float(row[0]) for path, row in columns_in(prepared.label, numbers, point[:, None]).items()}
+    run = plan_run(with_numbers(scenario, given))
+    return _place_samples(prepared, replace(run, tolerance=_FINER * prepared.run.tolerance))
+
+
+def run_with(prepared: PreparedExperiment, numbers: Mapping[str, Any]) -> Run:
+    """Return the run of an experiment with other numbers [SI], on its program and clock.
+
+    A number may be an array (runs,), one for each of many runs. IdentificationError where a setting of the valve goes
+    to or from 0.
+    """
+    base = prepared.run
+    scenario = with_numbers(prepared.scenario, numbers)
+    device, motion = scenario.device, vane_motion(scenario)
+    settings: Mapping[str, Any] = device.valve.settings
+    delay = base.program.valve.command_delay(settings)
+    counts = [value.size for value in settings.values() if isinstance(value, np.ndarray)]
+    for run in range(max(counts, default=1)):
+        own = {name: at(value, run) for name, value in settings.items()}
+        valve = VALVES[device.valve.kind].choose(own)
+        if valve != base.program.valve or (valve.command_delay(own) > 0.0) != base.program.late_commands:
+            raise IdentificationError(
+                f"experiment '{prepared.label}': a setting of the valve went to or from 0, which is another "
+                f"model of the valve; start above 0 and give a lower bound above 0"
+            )
+    if any(np.any(is_on != (effect in base.program.effects)) for effect, is_on in switches_of(device).items()):
+        raise IdentificationError(
+            f"experiment '{prepared.label}': an effect went on or off, which is another model; start above 0 and give "
+            "a lower bound above 0"
+        )
+    bare = plant_behind_lines(plant_parameters(device, outside_torque(motion)), scenario.supply_lines)
+    of_leg = motion.leg if isinstance(motion, FreeMotion) else None
+    leg = None if of_leg is None else led_leg(bare, of_leg)
+    plant = bare if leg is None else with_load(bare, leg.load)
+    # The engine allows a fraction of the supply pressure. Where that is fitted, the error in pascals must stay.
+
+    def range_of_supply(first: float, second: float, atmosphere: float) -> float:
+        return supply_range(
+            plant._replace(supply_pressure=first, dorsiflexion_pressure=second, atmospheric_pressure=atmosphere)
+        )
+
+    pressures = plant.supply_pressure, plant.dorsiflexion_pressure, plant.atmospheric_pressure
+    allowed = supply_range(base.plant) / over_runs(range_of_supply, *pressures)
+    return replace(
+        base,
+        plant=plant,
+        tolerance=base.tolerance * allowed,
+        thermal=thermal_parameters(scenario.thermal, device),
+        valve_orifice=exact_orifice(device.valve.orifice, device),
+        leak_orifice=exact_orifice(device.actuator.leak, device),
+        initial=initial_state(scenario, plant),
+        valve=valve_parameters(base.program.valve, settings),
+        command_delay=delay,
+        lines=initial_lines(plant, scenario.supply_lines),
+        effects=effect_rows(device, scenario.effect_sections),
+        leg=leg,
+    )
+
+
+def signals_at(prepared: PreparedExperiment, columns: Mapping[str, Floats], count: int) -> dict[str, Floats]:
+    """Return the channels [SI] (samples, runs) of one experiment with other numbers [SI] in each of ``count`` runs.
+
+    What differs only in zeros and gains of compared sensors is run once. A pressure sensor reads gauge pressure.
+    """
+    compared = [channel.name for channel in prepared.channels]
+    errors = {
+        path: column
+        for path, column in columns.items()
+        if path.removeprefix(ZERO_OF).removeprefix(GAIN_OF) in compared and path.startswith((ZERO_OF, GAIN_OF))
+    }
+    running = {path: column for path, column in columns.items() if path not in errors}
+    together = np.array([np.broadcast_to(column, (count,)) for column in running.values()]).reshape(-1, count)
+    _, first, place = np.unique(together, axis=1, return_index=True, return_inverse=True)
+    fewer = {path: np.broadcast_to(column, (count,))[first] for path, column in running.items()}
+    found = _with_inputs(prepared, fewer, len(first))
+    atmosphere = prepared.scenario.device.supply.atmospheric_pressure
+    for name, values in found.items():
+        rest = 0.0 if name == ANGLE else atmosphere
+        gain, zero = (np.asarray(errors.get(f"{path}{name}", 0.0)) for path in (GAIN_OF, ZERO_OF))
+        found[name] = rest + (1.0 + gain) * (values[:, place.ravel()] - rest) + zero
+    return found
+
+
+def _with_inputs(prepared: PreparedExperiment, columns: Mapping[str, Floats], count: int) -> dict[str, Floats]:
+    """Return ideal signals; runs whose recorded inputs have other zeros are groups of their own."""
+    zeros = {path: column for path, column in columns.items() if path.startswith(ZERO_OF)}
+    rest = {path: column for path, column in columns.items() if path not in zeros}
+    if not zeros or prepared.inputs is None:
+        return _run_signals(prepared, rest, count)
+    table = np.array(list(zeros.values()))
+    kinds, group = np.unique(table, axis=1, return_inverse=True)
+    found: dict[str, Floats] = {}
+    for number, kind in enumerate(kinds.T):
+        members = np.flatnonzero(group.ravel() == number)
+        zero_of = {path.removeprefix(ZERO_OF): float(one) for path, one in zip(zeros, kind, strict=True)}
+        own = {path: column[members] for path, column in rest.items()}
+        part = _run_signals(replace(prepared, inputs=_moved(prepared.inputs, zero_of)), own, len(members))
+        for name, values in part.items():
+            found.setdefault(name, np.empty((len(values), count)))[:, members] = values
+    return found
+
+
+def _moved(inputs: StepInputs, zero_of: Mapping[str, float]) -> StepInputs:
+    """Return what a run follows less the zeros [rad], [Pa] of the sensors that recorded it."""
+    both = zero_of.get(SUPPLY, 0.0)
+    zeros = {
+        "path.level": zero_of.get(ANGLE, 0.0),
+        "plant.supply_pressure": both,
+        "plant.dorsiflexion_pressure": zero_of.get(DORSIFLEXION_SUPPLY, both),
+    }
+    moved = {path: values - zeros.get(path, 0.0) for path, values in inputs.parameters.items()}
+    return StepInputs(inputs.command, moved)
+
+
+def _run_signals(prepared: PreparedExperiment, columns: Mapping[str, Floats], count: int) -> dict[str, Floats]:
+    """Return what ideal sensors would say."""
+    run = run_with(prepared, columns)
+    kept, failure = _rows_of(run.program)
+    records: Floats | None = None
+    failed = np.zeros(count, dtype=np.bool_)
+    for members, batch in batches_of(run, count):
+        outcome = run_batch(batch, threads=1) if prepared.inputs is None else replay(batch, prepared.inputs)
+        ends = outcome.states
+        failed[members] = (ends[failure] < NEVER_FAILED) | ~np.isfinite(ends).all(axis=0)
+        if records is None:
+            records = np.empty((len(kept), len(outcome.record), count))
+        for place, row in enumerate(kept):
+            records[place][:, members] = outcome.record[:, row]
+    assert records is not None
+    offsets = np.broadcast_to(columns.get(TIME_OFFSET, np.array(0.0)), (count,))
+    angle, mass_1, mass_2 = (_at_samples(one, prepared, offsets) for one in records)
+    found = {name: np.full(angle.shape, np.nan) for name in ("angle", "pressure_1", "pressure_2")}
+    numbers = leaves(run.plant)
+    for lane in np.flatnonzero(~failed).tolist():
+        plant = rebuilt(run.program.actuator.plant, [at(number, lane) for number in numbers])
+        own = angle[:, lane], mass_1[:, lane], mass_2[:, lane]
+        pressures = pressures_of(run.program.actuator, plant, *own)
+        for name, values in zip(found, (own[0], *pressures), strict=True):
+            found[name][:, lane] = values
+    return {channel.name: found[channel.name] for channel in prepared.channels}
+
+
+@lru_cache(maxsize=16)
+def _rows_of(program: Program) -> tuple[tuple[int, ...], int]:
+    """Return the rows of the state that channels are made of, and that of the time of a failure."""
+    rows = row_numbers(program.state_rows())
+    return tuple(rows[f"state.{name}"] for name in ("angle", "mass_1", "mass_2")), rows["result.failure_time"]
+
+
+def _at_samples(values: Floats, prepared: PreparedExperiment, offsets: Floats) -> Floats:
+    """Return a state at the times of the samples, by straight lines between records; each run with its offset [s]."""
+    if offsets.any():
+        # Before the first record the device stands still.
+        position = np.clip((prepared.time[:, None] - offsets) / prepared.record_interval, 0.0, len(values) - 1.0)
+        place = np.minimum(position.astype(np.intp), len(values) - 2)
+        lanes = np.arange(len(offsets))
+        here, following = values[place, lanes], values[place + 1, lanes]
+        return np.asarray(here + (position - place) * (following - here))
+    place, fraction = prepared.place, prepared.fraction
+    here = values[place]
+    if not fraction.any():
+        return here
+    following = values[np.minimum(place + 1, len(values) - 1)]
+    return np.asarray(here + fraction[:, None] * (following - here))
