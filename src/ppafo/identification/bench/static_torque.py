@@ -142,14 +142,14 @@ def _straight_line(readings: "Readings", sources: tuple[Source, ...]) -> tuple[F
 
 
 def _groups(readings: "Readings") -> tuple[list[str], list[str]]:
-    """Return a label of repetition (or recording) and one of branch and half of the pressures, for each reading."""
-    clusters = readings.clusters if readings.clusters.max() < _MOST_REPETITIONS else readings.files
-    word = "repetition" if readings.clusters.max() < _MOST_REPETITIONS else "recording"
+    """Return a label of repetition and half of the pressures (or of the recording) and one of branch, for each reading."""
+    branches = np.where(readings.branch > 0.0, "rising branch", "falling branch").tolist()
+    if readings.clusters.max() >= _MOST_REPETITIONS:
+        return [f"recording {number + 1}" for number in readings.files.tolist()], branches
     middle = 0.5 * float(readings.pressure.max() + readings.pressure.min())
-    halves = np.where(readings.pressure > middle, "higher", "lower")
-    branches = np.where(readings.branch > 0.0, "rising", "falling")
-    channels = [f"{branch} branch at {half} pressures" for branch, half in zip(branches, halves, strict=True)]
-    return [f"{word} {number + 1}" for number in clusters.tolist()], channels
+    halves = np.where(readings.pressure > middle, "higher", "lower").tolist()
+    numbers = (readings.clusters + 1).tolist()
+    return [f"{half} pressures of repetition {n}" for half, n in zip(halves, numbers, strict=True)], branches
 
 
 @dataclass(frozen=True, slots=True)
