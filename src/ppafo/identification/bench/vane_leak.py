@@ -286,7 +286,9 @@ def _decaying_leak(
     for item in closed:
         count = item.time.size
         readings.append(item.first - item.second)
-        fitted.append(model[place : place + count] - (item.second if item.is_a_room else model[place + count :][:count]))
+        fitted.append(
+            model[place : place + count] - (item.second if item.is_a_room else model[place + count :][:count])
+        )
         place += item.fitted * count
     shown = (("measured", readings, "measured"), (opening.law, fitted, "law"))
     series = tuple(
