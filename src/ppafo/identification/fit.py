@@ -6,6 +6,7 @@ estimated from them. Each difference of the Jacobian is as long as changes the r
 """
 
 import math
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -150,7 +151,7 @@ def fit(
     found = _whitened(work, *_search(work, work.start), confidence)
     if found.conflict is None and found.has_converged:
         return found
-    report(Progress("fit: other starts, for the recordings do not agree at the first"))
+    report(Progress("fit: other starts, for the first does not explain the recordings"))
     for start in _other_starts(work, found):
         other = _whitened(work, *_search(work, start), confidence)
         if _likelihood(work, other) > _likelihood(work, found) + 1.0:
@@ -179,7 +180,6 @@ class _Work:
     def at(self, points: Floats) -> Floats:
         """Return residuals [SI] (rows, points) at scaled points (numbers, points)."""
         self.evaluations += points.shape[1]
-        self.report(Progress(f"fit: run {self.evaluations}"))
         return self.residuals(points * self.scale[:, None])
 
     def one(self, point: Floats) -> Floats:
@@ -247,7 +247,9 @@ def _search(work: _Work, start: Floats) -> tuple[Floats, bool]:
     if not np.isfinite(left).all():
         raise IdentificationError("no run succeeds at the start values; give others, or check the recordings")
     noise = work.deviations(left[:, None])
+    begun = time.monotonic()
     for number in range(_PASSES):
+        work.report(Progress("fit", number, _PASSES, noun="passes", elapsed=time.monotonic() - begun))
         weight = 1.0 / noise
 
         def weighted(x: Floats, weight: Floats = weight) -> Floats:

@@ -13,8 +13,8 @@ from ppafo.identification.trajectory.problem import FITTED_CHANNELS, reach_of
 from ppafo.identification.trajectory.runs import Measured, Samples, columns_in, prepare_samples, signals_at
 from ppafo.simulation.scenario import Scenario
 
-_STEP = 1.0e-3
-"""Difference over the scale of a number."""
+_STEPS, _UNITS_OF_NOISE = (1.0e-7, 1.0e-3), 3.0
+"""Shortest and longest difference over the scale of a number, and the change of the samples that one makes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,14 +69,22 @@ def _expect(fit: TrajectoryFit, candidate: Candidate) -> Expected:
     given = {path: float(row[0]) for path, row in columns_in("", acting, point[:, None]).items()}
     prepared = prepare_samples(candidate.label, candidate.scenario, samples, given)
     low, high = (np.array([getattr(item.free, end) for item in acting]) for end in ("low", "high"))
-    above, below = np.minimum(point + _STEP * scale, high), np.maximum(point - _STEP * scale, low)
-    moved = point[:, None] + np.concatenate([np.diag(above - point), np.diag(below - point)], axis=1)
-    signals = signals_at(prepared, columns_in("", acting, moved), moved.shape[1])
+    step = _STEPS[1] * scale
+    # As in the fit, the second differences are as long as changes the samples by three units of noise in all.
+    for _ in range(2):
+        above, below = np.minimum(point + step, high), np.maximum(point - step, low)
+        moved = point[:, None] + np.concatenate([np.diag(above - point), np.diag(below - point)], axis=1)
+        signals = signals_at(prepared, columns_in("", acting, moved), moved.shape[1])
+        slopes = {
+            name: np.nan_to_num((values[:, : len(place)] - values[:, len(place) :]) / (above - below))
+            for name, values in signals.items()
+        }
+        size = np.sqrt(sum(np.square(slopes[name] / deviation).sum(axis=0) for name, deviation in noise.items()))
+        step = np.clip(_UNITS_OF_NOISE / np.maximum(size * scale, 1.0e-300), *_STEPS) * scale
     rows = []
     for name, deviation in noise.items():
-        slopes = (signals[name][:, : len(place)] - signals[name][:, len(place) :]) / (above - below)
         known = fit.fit.sensors.get(name)
-        rows.append(whiten(np.nan_to_num(slopes), Noise(deviation, known.reflection if known else ())))
+        rows.append(whiten(slopes[name], Noise(deviation, known.reflection if known else ())))
     whole = fit.fit.covariance
     sizes = np.sqrt(np.diag(whole))
     jacobian = np.concatenate(rows) * sizes[place]

@@ -247,6 +247,9 @@ LONGEST_TIME_OFFSET = 0.02
 _FURTHEST = 100.0
 """Factor from its start by which a number is moved at most where no bounds are given."""
 
+_SCALE = 100.0
+"""Typical size of a number with a prior over its standard deviation; differences are a thousandth of it at most."""
+
 _STATE = frozenset({"motion", "initial"})
 """Sections that say how a run begins, which the recording may say better."""
 
@@ -327,7 +330,7 @@ def number_of(parameter: FreeParameter, experiments: Sequence[Experiment]) -> Nu
         )
     scale = abs(start) or 0.5 * (high - low)
     if math.isfinite(parameter.deviation):
-        scale = parameter.deviation
+        scale = _SCALE * parameter.deviation
     name = full_path(parameter.name, scenarios[0])
     free = Free(name, start, low, high, scale, parameter.deviation)
     unit = quantity.unit.removesuffix("_a").removesuffix("_d") or "-"

@@ -30,11 +30,10 @@ from ppafo.identification.trajectory.problem import (
     FreeParameter,
     TrajectoryProblem,
     declaration_of,
-    declared_numbers,
     full_path,
     use_of,
 )
-from ppafo.identification.trajectory.tolerances import Tolerances, tolerance_parameters
+from ppafo.identification.trajectory.tolerances import Tolerances, stated_by, tolerance_parameters
 from ppafo.parameters import apply_overrides, build_device
 from ppafo.parameters.device import Device
 from ppafo.parameters.overrides import over
@@ -56,7 +55,7 @@ from ppafo.simulation.recorded import (
 )
 from ppafo.simulation.scenario import Scenario
 from ppafo.storage.comma_separated import read_csv
-from ppafo.units import parse_quantity, to_si
+from ppafo.units import parse_quantity
 
 _Label = Annotated[str, Field(pattern=NAME, max_length=60, description="its name, also in the names of files")]
 _Noise = dict[str, Text]
@@ -272,20 +271,10 @@ def trajectory_problem(section: TrajectorySection, setting: Setting) -> Trajecto
     parameters = [_parameter(item, scenarios, setting) for item in section.parameters]
     offsets = [one for item in section.experiments for one in _time_offset(item, setting)]
     fitted = (*parameters, *offsets)
-    held = tolerance_parameters(setting.tolerances, experiments, fitted, _stated(experiments[0].scenario, setting))
+    chosen = setting.parameter_set
+    stated = {} if chosen is None else stated_by(chosen, experiments[0].scenario)
+    held = tolerance_parameters(setting.tolerances, experiments, fitted, stated)
     return TrajectoryProblem((*fitted, *held), experiments, section.confidence)
-
-
-def _stated(scenario: Scenario, setting: Setting) -> dict[str, float]:
-    """Return half widths of the 95 % intervals that the set states [SI], by path."""
-    entries = {} if setting.parameter_set is None else setting.parameter_set.numbers
-    found = {}
-    for path, quantity in declared_numbers(scenario).items():
-        entry = entries.get(path)
-        if entry is not None and entry.uncertainty:
-            ends = (to_si(one, entry.unit, quantity.unit) for one in (entry.value + entry.uncertainty, entry.value))
-            found[path] = next(ends) - next(ends)
-    return found
 
 
 def candidates_of(section: TrajectorySection, setting: Setting) -> tuple[Candidate, ...]:

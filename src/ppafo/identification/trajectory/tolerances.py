@@ -27,11 +27,11 @@ from ppafo.identification.trajectory.problem import (
     number_at,
     scenario_of,
 )
-from ppafo.parameters.parameter_set import CONFIDENCE
+from ppafo.parameters.parameter_set import CONFIDENCE, ParameterSet
 from ppafo.signals.faults import noise_of
 from ppafo.simulation.recorded import ANGLE, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY
-from ppafo.simulation.scenario import PYTHON_CONTROLLER, FreeMotion
-from ppafo.units import parse_quantity
+from ppafo.simulation.scenario import PYTHON_CONTROLLER, FreeMotion, Scenario
+from ppafo.units import parse_quantity, to_si
 
 _WIDEST = 12.0
 """Standard deviations of its prior that a tolerance may be off at most in the search."""
@@ -155,6 +155,17 @@ def tolerances_of(section: BenchSection | None, file: str) -> Tolerances:
             most = f" and at most {_LARGEST_FRACTION:.0%}" if unit == "1" else ""
             raise IdentificationError(f"{said}: must be 0 or above{most}")
     return Tolerances(**limits, each_recording=() if section is None else section.each_recording)
+
+
+def stated_by(parameter_set: ParameterSet, scenario: Scenario) -> dict[str, float]:
+    """Return half widths of the 95 % intervals that a set states [SI], by path."""
+    found = {}
+    for path, quantity in declared_numbers(scenario).items():
+        entry = parameter_set.numbers.get(path)
+        if entry is not None and entry.uncertainty:
+            ends = (to_si(one, entry.unit, quantity.unit) for one in (entry.value + entry.uncertainty, entry.value))
+            found[path] = next(ends) - next(ends)
+    return found
 
 
 def tolerance_parameters(
