@@ -117,6 +117,9 @@ _STEPS = (1.0e-7, 1.0e-3)
 """Shortest and longest difference over the scale of a number."""
 
 _HIGHEST_ORDER = 12
+_LARGEST_REFLECTION = 1.0 - 1.0e-9
+"""Of residuals that follow a law exactly, such as those of a constant: no innovation would be left."""
+
 _PASSES = 6
 _ROUNDS = 20
 _SETTLED = 0.03
@@ -273,18 +276,19 @@ def _search(work: _Work, start: Floats) -> tuple[Floats, bool]:
 def burg(series: Sequence[Floats], highest: int = _HIGHEST_ORDER) -> tuple[float, ...]:
     """Return the reflection coefficients [-] of one autoregression of several series (Burg), as many as AIC wants.
 
-    Columns of a series (samples, columns) add up, as its residuals and their error do.
+    Columns of a series (samples, columns) add up, as its residuals and their error do. Of 100 samples AIC would take
+    noise for an autoregression in a third of all cases: there is at most one coefficient for each 100.
     """
     forward, backward = list(series), list(series)
     count = sum(len(one) for one in series)
     power, found, best = 1.0, [], (0.0, 0)
-    for order in range(1, min(highest, count // 10, min(len(one) for one in series) - 2) + 1):
+    for order in range(1, min(highest, count // 100, min(len(one) for one in series) - 2) + 1):
         ahead, behind = [one[1:] for one in forward], [one[:-1] for one in backward]
         across = sum(float(np.sum(a * b)) for a, b in zip(ahead, behind, strict=True))
         size = sum(float(np.sum(a * a + b * b)) for a, b in zip(ahead, behind, strict=True))
         if size <= 0.0:
             break
-        found.append(2.0 * across / size)
+        found.append(max(-_LARGEST_REFLECTION, min(_LARGEST_REFLECTION, 2.0 * across / size)))
         forward = [a - found[-1] * b for a, b in zip(ahead, behind, strict=True)]
         backward = [b - found[-1] * a for a, b in zip(ahead, behind, strict=True)]
         power *= 1.0 - found[-1] ** 2

@@ -137,8 +137,9 @@ def conflict_of(found: Fit, remedy: str) -> str:
     one = found.conflict
     if one is None:
         return ""
-    text = f"the law misses some readings: {one.group} alone would move {one.number} by {one.standard_errors:.1f} "
-    return f"{text}standard errors; {remedy}"
+    is_sought = not math.isfinite(found.numbers[found.index(one.number)].deviation)
+    moved = f", {one.number} by {one.standard_errors:.1f} standard errors" if is_sought else ""
+    return f"{one.group} alone want other numbers than all readings together{moved}; {remedy}"
 
 
 _SIZE = (8.4, 3.7)

@@ -78,7 +78,7 @@ def static_torque(sources: tuple[Source, ...], settings: StaticTorqueSettings | 
     chosen = settings or StaticTorqueSettings()
     readings = readings_of(sources)
     names, tolerances = readings.names, chosen.tolerances
-    pressure, torque, branch = readings.pressure, readings.torque, readings.branch
+    pressure, torque, branch, weight = readings.pressure, readings.torque, readings.branch, readings.weight
     rough, deviation = _straight_line(readings, sources)
     slope, zero, friction = map(float, rough)
     span = float(np.abs(pressure).max())
@@ -102,9 +102,10 @@ def static_torque(sources: tuple[Source, ...], settings: StaticTorqueSettings | 
         true = (pressure - at["zero of the pressure sensor"]) / (1.0 + at["gain of the pressure sensor"])
         held = branch * (at[names.friction_path] + at[names.growth_path] * np.abs(true))
         shown = (1.0 + at[f"gain of the {names.load} sensor"]) * (at[names.slope_path] * true - held)
-        return np.asarray(shown + at[names.zero_path])
+        return np.asarray(weight * (shown + at[names.zero_path]))
 
-    found, model = solve(law, torque, numbers, _groups(readings), chosen.confidence)
+    found, weighted = solve(law, weight * torque, numbers, _groups(readings), chosen.confidence)
+    model = weighted / weight
     reported = (
         Reported(names.slope_path, names.slope_unit, f"{names.slope.capitalize()}, the common slope of both branches"),
         Reported(names.friction_path, names.unit, f"{names.friction.capitalize()} without a pressure difference"),
@@ -141,14 +142,14 @@ def _straight_line(readings: "Readings", sources: tuple[Source, ...]) -> tuple[F
 
 
 def _groups(readings: "Readings") -> tuple[list[str], list[str]]:
-    """Return a label of repetition (or recording) and one of branch and half of the pressures, for each reading."""
-    clusters = readings.clusters if readings.clusters.max() < _MOST_REPETITIONS else readings.files
-    word = "repetition" if readings.clusters.max() < _MOST_REPETITIONS else "recording"
+    """Return a label of repetition and half of the pressures (or of the recording) and one of branch, for each reading."""
+    branches = np.where(readings.branch > 0.0, "rising branch", "falling branch").tolist()
+    if readings.clusters.max() >= _MOST_REPETITIONS:
+        return [f"recording {number + 1}" for number in readings.files.tolist()], branches
     middle = 0.5 * float(readings.pressure.max() + readings.pressure.min())
-    halves = np.where(readings.pressure > middle, "higher", "lower")
-    branches = np.where(readings.branch > 0.0, "rising", "falling")
-    channels = [f"{branch} branch at {half} pressures" for branch, half in zip(branches, halves, strict=True)]
-    return [f"{word} {number + 1}" for number in clusters.tolist()], channels
+    halves = np.where(readings.pressure > middle, "higher", "lower").tolist()
+    numbers = (readings.clusters + 1).tolist()
+    return [f"{half} pressures of repetition {n}" for half, n in zip(halves, numbers, strict=True)], branches
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,11 +182,15 @@ def names_of(load: str, slides: bool) -> Names:
 
 @dataclass(frozen=True, slots=True)
 class Readings:
-    """All readings of a branch: pressure difference [Pa], load [N m or N], branch (+1, -1), repetition and recording."""
+    """Readings of both branches: pressure difference [Pa], load [N m or N], branch (+1, -1), repetition, recording.
+
+    ``weight`` is one over the noise of each, that of a usual reading being 1: the mean of many samples has less.
+    """
 
     pressure: Floats
     torque: Floats
     branch: Floats
+    weight: Floats
     clusters: Labels
     files: Labels
     names: Names
@@ -272,8 +277,28 @@ def readings_of(sources: tuple[Source, ...]) -> Readings:
     repetitions = [one["repetition"] if "repetition" in one else np.zeros(len(one)) for one in recordings]
     pairs = np.stack([files, np.concatenate(repetitions)[used]])
     _, clusters = np.unique(pairs, axis=1, return_inverse=True)
+    clusters = clusters.reshape(-1)
+    runs = _runs(pressure, np.stack([direction, clusters]))
+    counts = np.bincount(runs)
+    first = np.concatenate(([0], np.cumsum(counts)[:-1]))
+    pressure, torque = (np.bincount(runs, weights=values) / counts for values in (pressure, torque))
     names = names_of(load, slides(sources))
-    return Readings(pressure, torque, direction, clusters.reshape(-1), files, names)
+    weight = np.sqrt(counts / counts.mean())
+    return Readings(pressure, torque, direction[first], weight, clusters[first], files[first], names)
+
+
+def _runs(pressure: Floats, labels: NDArray[np.float64]) -> Labels:
+    """Return which reading each sample belongs to: samples in a row of one branch at one pressure are one reading.
+
+    Within a stroke the friction follows the place, so that its samples are no independent readings of the law.
+    """
+    widest = np.ptp(pressure) / _PARTS / 2.0
+    begun, places = 0, np.zeros(pressure.size, dtype=np.int64)
+    for place in range(1, pressure.size):
+        is_new = abs(pressure[place] - pressure[begun]) > widest or (labels[:, place] != labels[:, place - 1]).any()
+        begun = place if is_new else begun
+        places[place] = places[place - 1] + is_new
+    return places
 
 
 def _panel(readings: Readings, slope: float, zero: float) -> Panel:

@@ -70,13 +70,14 @@ def valve_map(sources: tuple[Source, ...], settings: ValveMapSettings) -> BenchR
     highest, largest = float(np.abs(command).max()), float(np.abs(areas).max())
     is_two_way = bool((branch > 0).any() and (branch < 0).any())
     band = f"{settings.path}.dead_band"
-    # Rough values: the dead band from commands with a twentieth of the largest area.
+    # The valve is neither shut nor fully open where it has half of the largest area.
+    half = float(np.abs(command[np.abs(areas) > 0.5 * largest]).min())
     shut = np.abs(command[np.abs(areas) < 0.05 * largest])
-    start = float(np.clip(np.median(shut) if shut.size else 0.0, 0.01, 0.6 * highest))
+    start = float(np.clip(np.median(shut) if shut.size else 0.0, 0.01 * half, 0.9 * half))
     numbers = (
-        sought(band, start, 0.0, 0.9 * highest, highest),
-        sought(_GAIN, largest / (highest - start), 0.0),
-        sought(_SATURATION, 0.98 * highest, 0.1 * highest, highest),
+        sought(band, start, 0.0, half, highest),
+        sought(_GAIN, 0.5 * largest / (half - start), 0.0),
+        sought(_SATURATION, 0.02 * half + 0.98 * highest, half, highest * (1.0 + 1e-9), highest),
         *((sought(_PLAY, 0.02, 0.0, 0.5, 0.1),) if is_two_way else ()),
         *flow_tolerances(gas, settings.tolerances, names, float(np.abs(flow).max())),
     )
@@ -172,11 +173,11 @@ def _branch(source: Source) -> Floats:
 
 
 def _groups(command: Floats, branch: Floats, highest: float) -> tuple[list[str], list[str]]:
-    """Return a label of the side of the valve and one of branch and size of the command, for each reading."""
-    sides = np.where(command > 0.0, "flow into chamber 1", "flow into chamber 2")
+    """Return a label of side and branch of the command and one of its size, for each reading."""
+    sides = np.where(command > 0.0, "to chamber 1", "to chamber 2")
     ways = np.where(branch < 0.0, "falling", "rising")
-    halves = np.where(np.abs(command) > 0.5 * highest, "large", "small")
-    return sides.tolist(), [f"{way} {half} commands" for way, half in zip(ways, halves, strict=True)]
+    sizes = np.where(np.abs(command) > 0.5 * highest, "large commands", "small commands")
+    return [f"{way} commands {side}" for way, side in zip(ways, sides, strict=True)], sizes.tolist()
 
 
 def _panel(command: Floats, branch: Floats, flow: Floats, model: Floats) -> Panel:

@@ -6,12 +6,14 @@
 g is the mass flow [kg/s] of a law of ``flow``, equations (6), (7): Cd A_leak of an orifice, C of ISO 6358 or a laminar
 coefficient; P_1 and P_2 the absolute pressures [Pa] of the fuller chamber and the other, V_1 and V_2 their volumes
 [m^3], equation (3) at constant temperature. The time to fall from one D to another is an integral over D, computed once
-for a law. A chamber whose pressure stands still is taken for a room. Volumes, temperature and law of the gas, zeros of
-the sensors are tolerances, of steady flow the gains too: one common to both sensors does not change how fast D falls.
+for a law. A chamber whose pressure stands still is taken for a room. Just filled, gas and
+walls come to rest: each pressure is off by P r exp(-t / tau) at first. Volumes, temperature and law of the gas, r and
+tau, zeros of the sensors are tolerances, of steady flow the gains too: one common to both sensors does not change how
+fast D falls.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -64,7 +66,9 @@ EDGE = 20
 STANDS_STILL = 0.02
 """Change of a pressure over that of the other, up to which a chamber counts as a room."""
 _NEARLY_EQUAL = 0.01
-_RATIO, _VOLUME = "ratio of the volumes", "volume"
+_RATIO, _VOLUME, _RELAXATION = "ratio of the volumes", "volume", "time of the relaxation"
+_RELAXED, _MOST_RELAXED = 5.0, 0.02
+"""Times that a relaxation usually fits into a recording, and how far it moves a pressure at most."""
 _REMEDY = "try law = {}, or give start and end; gas may leak elsewhere, or relax with its walls"
 
 
@@ -145,6 +149,11 @@ class ClosedChambers(NamedTuple):
         """Whether the second pressure stands still."""
         fall, rise = self.changes
         return abs(rise) <= STANDS_STILL * abs(fall)
+
+    @property
+    def fitted(self) -> int:
+        """How many of the pressures are fitted: that of a room is not."""
+        return 1 if self.is_a_room else 2
 
     @property
     def is_early(self) -> list[bool]:
@@ -234,32 +243,42 @@ def _decaying_leak(
         opening = Opening(gas, opening.law, 1.0, settings.critical_ratio)
     emptied, constant = volumes[0] or 1.0, gas.specific_gas_constant
     names = [f"pressure_{item}" for item in (fuller, 3 - fuller)]
+    longest = max(float(item.time[-1]) for item in closed)
 
     def law(at: Values) -> Floats:
         # Flow goes with 1 / sqrt(T), the pressure that it makes with T.
         warm = constant * np.sqrt(gas.temperature * (gas.temperature + at[TEMPERATURE])) * (1.0 + at[GAS_LAW])
         rate, parts = warm / (emptied * (1.0 + at[_VOLUME])), []
+        lasting = longest / _RELAXED * math.exp(at[_RELAXATION])
         for number, item in enumerate(closed, start=1):
             starts = (at[f"start of {name}, decay {number}"] for name in names)
             falls = fall_of_difference(opening, at[size.path], *starts, 0.0 if item.is_a_room else at[_RATIO], rate)
-            parts += [one + at[f"zero of {name}"] for name, one in zip(names, falls.pressures(item.time), strict=True)]
+            faded = np.exp(-item.time / lasting)
+            for name, true in list(zip(names, falls.pressures(item.time), strict=True))[: item.fitted]:
+                parts.append(true * (1.0 + at[f"relaxation of {name}, decay {number}"] * faded) + at[f"zero of {name}"])
         return np.concatenate(parts)
 
     numbers = (
         sought(size.path, _rough_size(closed, opening, constant * gas.temperature / emptied), 0.0),
         *_ratio_numbers(closed, volumes, settings.volume_limit),
-        *(_start(name, number, item, one) for number, item in enumerate(closed, start=1) for name, one in (
-            (names[0], item.first), (names[1], item.second))),
+        *(one for number, item in enumerate(closed, start=1) for one in _starts(names, number, item)),
+        *(
+            one
+            for number, item in enumerate(closed, start=1)
+            for name in names[: item.fitted]
+            for one in tolerance(f"relaxation of {name}, decay {number}", _MOST_RELAXED)
+        ),
+        Free(_RELAXATION, 0.0, -5.0, math.log(_RELAXED), 1.0, 1.5),
         *gas_tolerances(gas, tolerances),
         *tolerance(_VOLUME, settings.volume_limit if volumes[0] else 0.0),
         *(one for name in names for one in tolerance(f"zero of {name}", tolerances.zero_of_pressure)),
-    )  # fmt: skip
-    measured = np.concatenate([one for item in closed for one in (item.first, item.second)])
+    )
+    measured = np.concatenate([one for item in closed for one in (item.first, item.second)[: item.fitted]])
     labels, channels = [], []
     for number, item in enumerate(closed, start=1):
-        labels += [f"decay {number}"] * 2 * item.time.size
+        labels += [f"decay {number}"] * item.fitted * item.time.size
         early = ["early" if is_early else "late" for is_early in item.is_early]
-        channels += [f"{name}, {word} in the fall" for name in names for word in early]
+        channels += [f"{name}, {word} in the fall" for name in names[: item.fitted] for word in early]
     found, model = solve(law, measured, numbers, (labels, channels), settings.confidence)
     estimates = estimates_of(found, (size,), sources, settings.confidence)
     time = np.concatenate([item.time for item in closed])
@@ -267,8 +286,10 @@ def _decaying_leak(
     for item in closed:
         count = item.time.size
         readings.append(item.first - item.second)
-        fitted.append(model[place : place + count] - model[place + count : place + 2 * count])
-        place += 2 * count
+        fitted.append(
+            model[place : place + count] - (item.second if item.is_a_room else model[place + count :][:count])
+        )
+        place += item.fitted * count
     shown = (("measured", readings, "measured"), (opening.law, fitted, "law"))
     series = tuple(
         Series(name if number == 0 else "", item.time, values[number], role)
@@ -290,9 +311,17 @@ def _decaying_leak(
     )
 
 
-def _start(name: str, number: int, item: ClosedChambers, values: Floats) -> Free:
-    size = max(abs(item.changes[0]), float(np.std(np.diff(values))), 1.0)
-    return sought(f"start of {name}, decay {number}", float(values[:EDGE].mean()), 1.0, scale=size)
+def _starts(names: list[str], number: int, item: ClosedChambers) -> list[Free]:
+    """Return the pressures [Pa] at the start of a decay, sought; of a room it is what was read, to its noise."""
+    found = []
+    for name, values in zip(names, (item.first, item.second), strict=True):
+        size = max(abs(item.changes[0]), float(np.std(np.diff(values))), 1.0)
+        label, start = f"start of {name}, decay {number}", float(values[:EDGE].mean())
+        found.append(sought(label, start, 1.0, scale=size))
+    if item.is_a_room:
+        known, deviation = float(item.second.mean()), max(float(item.second.std()), 1.0)
+        found[1] = replace(found[1], start=known, deviation=deviation)
+    return found
 
 
 def _rough_size(closed: tuple[ClosedChambers, ...], opening: Opening, rate: float) -> float:
