@@ -32,9 +32,10 @@ AGREES, DIFFERS, NOT_RUN, OPEN = "agrees", "differs", "not run", "stated"
 """``OPEN`` is a result that no limit was set for."""
 
 LEAST = 0.90
+"""Least share of 95 % intervals that may hold."""
+
 RIGHT_MODELS = ("ideal", "white", "AR(1)", "random walk", "Student t", "hum")
 """Cells of ``scripts/interval_coverage.py`` whose device is the fitted model."""
-"""Shares of 95 % intervals that may hold."""
 
 MISSING = 2
 """Skipped tests that are named."""

@@ -1,4 +1,4 @@
-"""Recordings whose truth is known, by the virtual rig and by the model: the fit finds it, or says what it cannot hold."""
+"""Recordings of the rig and of the model, whose truth is known: the fit finds it, or says that it does not hold."""
 
 import re
 from pathlib import Path
