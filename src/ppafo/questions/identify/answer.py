@@ -153,7 +153,7 @@ def _draw_trajectory(one: _ChannelPanel, panels: "tuple[Axes, Axes]", measuremen
     left.locator_params(axis="y", nbins=3)
 
 
-_FAR, _SHOWN = 2.0, 0.01
+_FAR, _SHOWN = 2.0, 0.05
 """Standard deviations from which a tolerance is said to be contradicted; least share of a variance that is shown."""
 _MINIMUM_DIGITS, _MAXIMUM_DIGITS = 4, 9
 
