@@ -1,107 +1,237 @@
-"""Counts how often intervals of a trajectory fit hold under ten kinds of noise; resumes after a stop.
+"""Counts how often intervals of the trajectory fit hold, on recordings that are synthetic and whose truth is known.
 
-    python scripts/interval_coverage.py --draws 44 --seed 2026 --out out/coverage
+    python scripts/interval_coverage.py --seed 5 --fits 40 --cell ideal --cell white
 
-Finished fits are kept line by line in the folder, so that the same command resumes, also in a folder that
-``ppafo coverage`` began when it was a command of the package. One that other code began is not continued. Exit code 1
-where a cell of the table is outside of what it should be.
+Two step responses of 501 samples, there and back; four numbers of the device are sought beside all tolerances.
+``ideal`` and ``default`` are recorded by the virtual rig (presets ideal-laboratory and paper-bench), which has a solver
+and physics of its own. The kinds of noise are runs of the model, whose truth, tolerances included, is drawn anew for
+each fit. Departures are runs of a device that the fitted model is not. A seed is given, so that no fit was tuned to it.
 """
 
 import argparse
-import os
+import json
+import math
 import sys
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
 
 if not __package__:
     # The first place is this folder, in which this file would pass for the package of the same name.
     sys.path[0] = str(Path(__file__).parents[1])
 
-from benchmarks.command import run_command
-from ppafo.cli.arguments import counting_number, whole_number
-from ppafo.cli.output import (
-    EXIT_CHECK_FAILED,
-    EXIT_GOOD,
-    EXIT_INTERRUPTED,
-    add_output_arguments,
-    check_output,
-    print_result,
-    tell,
-    write_files,
+from ppafo.identification.trajectory import (
+    Experiment,
+    FreeParameter,
+    Tolerances,
+    TrajectoryFit,
+    TrajectoryProblem,
+    fit,
+    tolerance_parameters,
 )
+from ppafo.identification.trajectory.problem import FITTED_CHANNELS, number_at, numbers_of
+from ppafo.identification.trajectory.runs import Floats, columns_in, prepare, signals_of
+from ppafo.identification.trajectory.tolerances import stated_by
+from ppafo.parameters.loading import load_parameter_set
+from ppafo.rig.experiments import record
+from ppafo.running import simulate
+from ppafo.signals.recording import Channel, Recording
+from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.scenario import Scenario
 
-COMMAND = "coverage"
-"""What the mark of a result folder calls it."""
-FITS, FIGURE = "fits-{truths}-{seed}.jsonl", "ranks"
+COMMON = ("motion.kind=free", "run.duration=0.5 s")
+BACK = (
+    "controller.command=-1", "motion.angle=130 deg", "supply.pressure=40 psi_g",
+    "supply.dorsiflexion_pressure=40 psi_g", "initial.pressure_1=40 psi_g", "initial.pressure_2=atmosphere",
+)  # fmt: skip
+SOUGHT = {
+    "valve.discharge_coefficient": 0.13,
+    "foot_plate.inertia": 0.010,
+    "friction.viscous_damping": 0.025,
+    "friction.static_torque": 0.45,
+}
+UNITS = ("", " kg m^2", " N m s/rad", " N m")
+NOISE = {"angle": math.radians(0.05), "pressure_1": 400.0, "pressure_2": 400.0}
+PRESETS = {"ideal": "ideal-laboratory", "default": "paper-bench"}
+DEPARTURES = {
+    "stribeck": ("effects.stribeck.velocity=0.3 rad/s",),
+    "dead volume": ("actuator.dead_volume_1=35 cm^3", "actuator.dead_volume_2=35 cm^3"),
+    "volume per angle": ("actuator.volume_per_angle=28 cm^3/rad",),
+    "leak that opens": ("effects.leak_opening.pressure=150 kPa_d",),
+    "slew limit": ("valve.slew_limit=40 1/s",),
+}
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of this command."""
-    parser.add_argument("--noise", metavar="KIND", action="append", help="kind of noise; default: all ten")
-    parser.add_argument(
-        "--draws", type=whole_number, default=200, metavar="N", help="fits for each kind of noise; default 200"
+def white(random: np.random.Generator, count: int) -> Floats:
+    """White noise of size 1, as all below."""
+    return random.standard_normal(count)
+
+
+def autoregression(random: np.random.Generator, count: int) -> Floats:
+    """AR(1) of 0.9."""
+    values = random.standard_normal(count)
+    for place in range(1, count):
+        values[place] = 0.9 * values[place - 1] + math.sqrt(0.19) * values[place]
+    return values
+
+
+def walk(random: np.random.Generator, count: int) -> Floats:
+    """White noise and a random walk that ends as far away."""
+    return random.standard_normal(count) + np.cumsum(random.standard_normal(count)) / math.sqrt(count)
+
+
+def heavy(random: np.random.Generator, count: int) -> Floats:
+    """Student t of 3 degrees of freedom."""
+    return np.asarray(random.standard_t(3.0, count) / math.sqrt(3.0))
+
+
+def hum(random: np.random.Generator, count: int) -> Floats:
+    """White noise and a hum of 50 Hz of the same size, at 1 kHz."""
+    phase = 2.0 * math.pi * (0.05 * np.arange(count) + random.random())
+    return random.standard_normal(count) + math.sqrt(2.0) * np.sin(phase)
+
+
+KINDS: dict[str, Callable[[np.random.Generator, int], Floats]] = {
+    "white": white, "AR(1)": autoregression, "random walk": walk, "Student t": heavy, "hum": hum,
+}  # fmt: skip
+CELLS = (*PRESETS, *KINDS, *DEPARTURES)
+
+
+def scenarios(more: Sequence[str] = ()) -> tuple[Scenario, Scenario]:
+    """Return the two step responses, of the device of the set but for overrides."""
+    there = load_scenario("step-response", [*COMMON, *more])
+    return there, load_scenario("step-response", [*COMMON, *BACK, *more])
+
+
+def problem_of(recordings: Sequence[Recording], random: np.random.Generator, states: bool = True) -> TrajectoryProblem:
+    """Return what a user writes: four numbers from other starts, all tolerances by default.
+
+    Without ``states`` the uncertainties that the set states of its volumes (25 %) are left out.
+    """
+    labels = ("there", "back")
+    experiments = tuple(
+        Experiment(label, scenario, recording)
+        for label, scenario, recording in zip(labels, scenarios(), recordings, strict=True)
     )
-    parser.add_argument(
-        "--from-prior",
-        action="store_true",
-        help="draw the truth of each fit from the prior that it is given (simulation-based calibration)",
+    sought = tuple(
+        FreeParameter(path, start=value * math.exp(random.uniform(-0.3, 0.3)), low=value / 10.0, high=value * 10.0)
+        for path, value in SOUGHT.items()
     )
-    parser.add_argument(
-        "--seed", type=whole_number, default=2026, metavar="N", help="random seed of truths and noise; default 2026"
+    stated = stated_by(load_parameter_set("ppafo2011"), experiments[0].scenario) if states else {}
+    return TrajectoryProblem((*sought, *tolerance_parameters(Tolerances(), experiments, sought, stated)), experiments)
+
+
+def truth_in_words() -> list[str]:
+    """Return the truth as overrides."""
+    return [f"{path}={value}{unit}" for (path, value), unit in zip(SOUGHT.items(), UNITS, strict=True)]
+
+
+def of_model(kind: str, random: np.random.Generator) -> tuple[Recording, ...]:
+    """Return recordings of the model with noise of a kind, whose tolerances are drawn from their priors."""
+    clean = [noisy(simulate(one).recording, white, random) for one in scenarios(truth_in_words())]
+    problem = problem_of(clean, random)
+    numbers = numbers_of(problem)
+    truth = np.array([item.free.start for item in numbers])
+    for place, item in enumerate(numbers):
+        if item.is_tolerance:
+            moved = truth[place] + item.free.deviation * math.sqrt(3.0) * random.uniform(-1.0, 1.0)
+            truth[place] = min(max(moved, item.free.low), item.free.high)
+        else:
+            truth[place] = SOUGHT[item.path.replace("valves.proportional.", "valve.")]
+    prepared = [
+        prepare(one, {path: float(row[0]) for path, row in columns_in(one.label, numbers, truth[:, None]).items()})
+        for one in problem.experiments
+    ]
+    return tuple(
+        noisy(Recording(one.label, one.time, {name: Channel(column[:, 0], clean[0].unit(name))
+                                             for name, column in signals.items()}, "synthetic"), KINDS[kind], random)
+        for one, signals in zip(prepared, signals_of(prepared, numbers, truth[:, None]), strict=True)
+    )  # fmt: skip
+
+
+def noisy(
+    clean: Recording, kind: Callable[[np.random.Generator, int], Floats], random: np.random.Generator
+) -> Recording:
+    """Return a recording with noise."""
+    channels = {
+        name: Channel(clean[name] + NOISE[name] * kind(random, len(clean)), clean.unit(name))
+        for name in FITTED_CHANNELS
+    }
+    return Recording(clean.label, clean.time, channels, "synthetic")
+
+
+def recordings_of(cell: str, random: np.random.Generator) -> tuple[Recording, ...]:
+    """Return two step responses of a cell of the table."""
+    if cell in KINDS:
+        return of_model(cell, random)
+    if cell in DEPARTURES:
+        found = (simulate(one).recording for one in scenarios([*truth_in_words(), *DEPARTURES[cell]]))
+        return tuple(noisy(one, white, random) for one in found)
+    seeds = random.integers(2**31, size=2).tolist()
+    return tuple(
+        record("step-response", PRESETS[cell], seed, overrides=[*COMMON, *more, *truth_in_words()]).recording
+        for seed, more in zip(seeds, ((), BACK), strict=True)
     )
-    parser.add_argument("--threads", type=counting_number, metavar="N", help="number of processes; default: all cores")
-    add_output_arguments(parser)
-    parser.set_defaults(command=COMMAND)
+
+
+class Row(NamedTuple):
+    """A line of the table: intervals that hold, by number, fits that are flagged, and what a fit costs."""
+
+    cell: str
+    fits: int
+    held: list[int]
+    flagged: int
+    wrong_and_identified: int
+    half_widths: list[float]
+    seconds: float
+
+    def text(self) -> str:
+        """Return it as a line of a table of Markdown."""
+        counts, widths = ", ".join(map(str, self.held)), ", ".join(f"{100.0 * one:.2g}" for one in self.half_widths)
+        others = f"{self.flagged} | {self.wrong_and_identified} | {widths} | {self.seconds:.1f}"
+        return f"| {self.cell} | {self.fits} | {counts} | {others} |"
+
+
+def row_of(cell: str, fits: int, seed: int) -> Row:
+    """Return what some fits of a cell come to."""
+    random = np.random.default_rng([seed, CELLS.index(cell)])
+    truth = [number_at(scenarios(truth_in_words())[0], path) for path in SOUGHT]
+    held, wrong, flagged, seconds, half = np.zeros(len(SOUGHT), dtype=int), 0, 0, [], []
+    for _ in range(fits):
+        recordings = recordings_of(cell, random)
+        begun = time.process_time()
+        found: TrajectoryFit = fit(problem_of(recordings, random, cell not in DEPARTURES))
+        seconds.append(time.process_time() - begun)
+        holds = [one.low <= true <= one.high for one, true in zip(found.estimates, truth, strict=True)]
+        held += holds
+        flagged += bool(found.conflict)
+        wrong += sum(not hold and one.is_identified for hold, one in zip(holds, found.estimates, strict=True))
+        half.append([one.half_width / true for one, true in zip(found.estimates, truth, strict=True)])
+    widths = np.median(half, axis=0).tolist()
+    return Row(cell, fits, held.tolist(), flagged, wrong, widths, float(np.median(seconds)))
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    """Return the exit code of the command with these words."""
-    summary = "How often the intervals of a trajectory fit hold, under ten kinds of noise."
-    return run_command("coverage", summary, add_arguments, run, words)
-
-
-def run(parsed: argparse.Namespace) -> int:
-    """Fit, count and print; 1 where a cell of the table is outside of what it should be."""
-    from benchmarks.intervals.calibration import run_tasks, tasks_of
-    from benchmarks.intervals.noise_kinds import NOISE_KINDS
-    from benchmarks.intervals.report import coverage_document, coverage_text, is_good, ranks_figure
-    from ppafo.documents.json_text import json_text
-
-    draws, seed, processes = parsed.draws, parsed.seed, parsed.threads
-    fits = FITS.format(truths="drawn" if parsed.from_prior else "fixed", seed=seed)
-    tasks = tasks_of(parsed.noise or tuple(NOISE_KINDS), draws, seed, parsed.from_prior)
-    check_output(parsed.out, COMMAND, _files_to_keep(parsed.out) if parsed.out is not None else None)
+    """Fit, count and print; the exit code is 0."""
+    parser = argparse.ArgumentParser(description="How often intervals of the trajectory fit hold.")
+    parser.add_argument("--seed", type=int, required=True, help="random seed of truths, noise and starts")
+    parser.add_argument("--fits", type=int, default=40, help="fits for each cell; default 40")
+    parser.add_argument("--cell", action="append", choices=CELLS, help="a line of the table; default: all")
+    parser.add_argument("--out", type=Path, help="write the table as JSON into this file, too")
+    parsed = parser.parse_args(words)
+    print(f"synthetic recordings; held and half width are those of {', '.join(SOUGHT)}")
+    print("| cell | fits | held | flagged | wrong, yet identified | half width, % | CPU s a fit |")
+    print("|---|---|---|---|---|---|---|")
+    rows = []
+    for cell in parsed.cell or CELLS:
+        rows.append(row_of(cell, parsed.fits, parsed.seed))
+        print(rows[-1].text(), flush=True)
     if parsed.out is not None:
-        # The folder is marked as ours before the first fit is kept in it.
-        write_files(parsed.out, {fits: b""} | _files_to_keep(parsed.out), COMMAND)
-    file = None if parsed.out is None else parsed.out / fits
-    try:
-        lines = run_tasks(tasks, file, processes or os.cpu_count() or 1, tell, _warn)
-    except KeyboardInterrupt:
-        print("\ncoverage: interrupted; with --out finished fits are kept: run the same command again", file=sys.stderr)
-        return EXIT_INTERRUPTED
-    text, document = coverage_text(lines, parsed.from_prior), coverage_document(lines, parsed.from_prior)
-    if parsed.out is not None:
-        from ppafo.answers.drawing import load_drawing
-
-        load_drawing()
-        from ppafo.answers.style import render_figure
-
-        figures = render_figure(ranks_figure(lines), ("png", "svg"))
-        contents = {f"{FIGURE}.{ending}": content for ending, content in figures.items()}
-        contents |= {"coverage.txt": f"{text}\n".encode(), "coverage.json": f"{json_text(document)}\n".encode()}
-        write_files(parsed.out, contents | _files_to_keep(parsed.out), COMMAND)
-    print_result(text, document, parsed.json)
-    return EXIT_GOOD if is_good(lines, parsed.from_prior) else EXIT_CHECK_FAILED
-
-
-def _warn(text: str) -> None:
-    print(f"{COMMAND}: {text}", file=sys.stderr)
-
-
-def _files_to_keep(folder: Path) -> dict[str, bytes]:
-    """Return the finished fits in a folder by file, of this and of other seeds, which all resume from there."""
-    return {path.name: path.read_bytes() for path in sorted(folder.glob(FITS.format(truths="*", seed="*")))}
+        parsed.out.write_text(json.dumps([row._asdict() for row in rows], indent=1), encoding="utf-8")
+    return 0
 
 
 if __name__ == "__main__":

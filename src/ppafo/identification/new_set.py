@@ -27,8 +27,8 @@ _FORMS = ((_AREA_NAMES, _SONIC_NAMES), (_SONIC_NAMES, _AREA_NAMES))
 class NewSet:
     """A set with new values, and what is wrong with it as a device (an empty text if nothing).
 
-    ``written`` are the paths of the identified ones. ``fitted`` are those of values that are weak or hold for this
-    model only: the set has them, with the origin ``fitted``, and they do not count as identified.
+    ``written`` are the paths of the identified ones. ``fitted`` are those of values that hold for this model
+    only: the set has them, with the origin ``fitted``, and they do not count as identified.
     """
 
     parameter_set: ParameterSet
@@ -69,14 +69,13 @@ def _with_estimate(parameter_set: ParameterSet, estimate: Estimate, quantity: Qu
         if before is None
         else f"the set had {number_text(before)} ({before.origin}: {before.source})"
     )
-    beside = " to ".join(f"{from_si(end, unit, si_unit, atmosphere):.6g}" for end in estimate.beside or ())
     interval = f"{100.0 * estimate.confidence:g}% interval {low:.6g} to {high:.6g} {unit}".rstrip()
     entry = Entry(
         value=value,
         unit=unit,
         origin="identified" if estimate.is_identified else "fitted",
         source="; ".join(estimate.recordings),
-        note=f"{estimate.verdict_with(f'{beside} {unit}'.rstrip())}, {interval}. {estimate.explanation} Before, {was}.",
+        note=f"{estimate.verdict}, {interval}; {estimate.explanation.rstrip('.')}. Before, {was}.",
         uncertainty=half_width_for(CONFIDENCE, max(high - value, value - low), estimate.confidence),
     )
     # An orifice that is given as an area has no sonic conductance any more, and the other way round.

@@ -17,19 +17,19 @@ from pydantic import Field
 from ppafo.documents.models import NAME, StrictTable, Text, make_schema, validate
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import IdentificationError, UnitError, nearest_name, refused_as
-from ppafo.identification.bench.flow_laws import GasAt
-from ppafo.identification.bench.free_decay import FreeDecaySettings, decay_prospects, free_decay
-from ppafo.identification.bench.open_valve_flow import OpenValveFlowSettings, flow_prospects, open_valve_flow
+from ppafo.identification.bench.flow import GasAt, Law
+from ppafo.identification.bench.free_decay import FreeDecaySettings, free_decay
+from ppafo.identification.bench.law import DEFAULTS, Tolerances
+from ppafo.identification.bench.open_valve_flow import OpenValveFlowSettings, open_valve_flow
 from ppafo.identification.bench.result import BenchResult
-from ppafo.identification.bench.static_torque import StaticTorqueSettings, static_prospects, static_torque
-from ppafo.identification.bench.valve_map import ValveMapSettings, map_prospects, valve_map
-from ppafo.identification.bench.vane_leak import VaneLeakSettings, leak_prospects, vane_leak
-from ppafo.identification.estimate import Prospect, half_width_for
-from ppafo.identification.source import Source, data_prospects
-from ppafo.identification.trajectory.section import TrajectorySection
+from ppafo.identification.bench.static_torque import StaticTorqueSettings, static_torque
+from ppafo.identification.bench.valve_map import ValveMapSettings, valve_map
+from ppafo.identification.bench.vane_leak import VaneLeakSettings, vane_leak
+from ppafo.identification.source import Source
+from ppafo.identification.trajectory.section import TrajectorySection, refuse_removed
 from ppafo.identification.trajectory.tolerances import BenchSection
 from ppafo.model.gas import SPECIES
-from ppafo.parameters.parameter_set import CONFIDENCE, ParameterSet, chosen_valve, number_in_si
+from ppafo.parameters.parameter_set import ParameterSet, chosen_valve, number_in_si
 from ppafo.storage.foreign import ColumnMap
 from ppafo.units import parse_quantity, to_si
 
@@ -38,9 +38,6 @@ _Columns = Annotated[
     Text | None, Field(description="name of a column map; without one the file has units in its header")
 ]
 _Confidence = Annotated[float, Field(gt=0.5, lt=1.0, description="confidence of the intervals; default 0.95")]
-_Calibration = Annotated[
-    float, Field(ge=0.0, lt=0.5, description="relative uncertainty of the sensors' gain, at the same confidence")
-]
 _Start = Annotated[Text | None, Field(description="first time to use, such as '2 s'")]
 _End = Annotated[Text | None, Field(description="last time to use, such as '8 s'")]
 _Gas = Annotated[Text | None, Field(description="species of the gas on the bench; default: that of the set")]
@@ -51,6 +48,8 @@ _Valve = Annotated[Text | None, Field(description="name of a valve of the set; d
 
 UNKNOWN = "unknown"
 _COLDEST, _HOTTEST = 150.0, 600.0
+_THERMOMETER = 1.0
+"""Limit [K] of a temperature that the problem states."""
 
 _FILE = TomlKind(
     "identification problem", "identification", resources.files("ppafo.identification"), IdentificationError
@@ -59,11 +58,12 @@ _FILE = TomlKind(
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """What a procedure may lean on: the set as it stands, the chosen valve, and what messages call the place."""
+    """What a procedure may lean on: the set as it stands, the chosen valve, the bench, what messages call the place."""
 
     parameter_set: ParameterSet
     valve: str
     place: str
+    tolerances: Tolerances = DEFAULTS
 
     def number(self, path: str) -> float:
         """Return the value at a path [SI]; IdentificationError where the set lacks it."""
@@ -82,36 +82,35 @@ class Setting:
         with refused_as(IdentificationError, f"{self.place}: {name} = {text!r}", UnitError):
             return parse_quantity(text, unit)
 
-    def gas(self, species: str | None, text: str | None, confidence: float) -> GasAt:
+    def gas(self, species: str | None, text: str | None) -> GasAt:
         """Return the gas of the bench; species and temperature are the set's where none is named.
 
         IdentificationError for an unknown species.
         """
-        temperature, half_width = self.quantity("temperature", text, "K"), 0.0
+        temperature, limit = self.quantity("temperature", text, "K"), _THERMOMETER
         if temperature is None:
             temperature = self.number("gas.temperature")
-            half_width = self.half_width("gas.temperature", "K", confidence)
+            limit = self.limit("gas.temperature", "K") or self.tolerances.temperature
         elif not _COLDEST <= temperature <= _HOTTEST:
             raise IdentificationError(
                 f"{self.place}: temperature = {text!r} must be from {_COLDEST:g} to {_HOTTEST:g} K"
             )
         if species is None:
             own = self.number("gas.molar_mass"), self.number("gas.heat_capacity_ratio")
-            return GasAt(*own, temperature, half_width)
+            return GasAt(*own, temperature, limit)
         if species not in SPECIES:
             hint = nearest_name(species, SPECIES)
             known = ", ".join(SPECIES)
             raise IdentificationError(f"{self.place}: gas = {species!r} is unknown{hint}; available: {known}")
         known_gas = SPECIES[species]
-        return GasAt(known_gas.molar_mass, known_gas.heat_capacity_ratio, temperature, half_width)
+        return GasAt(known_gas.molar_mass, known_gas.heat_capacity_ratio, temperature, limit)
 
-    def half_width(self, path: str, unit: str, confidence: float) -> float:
-        """Return half the interval of a value in the set [unit], for some confidence; 0 where it has none."""
+    def limit(self, path: str, unit: str) -> float:
+        """Return half the interval of a value in the set [unit]; 0 where it states none."""
         entry = self.parameter_set.numbers.get(path)
         if entry is None or not entry.uncertainty:
             return 0.0
-        stated = to_si(entry.value + entry.uncertainty, entry.unit, unit) - to_si(entry.value, entry.unit, unit)
-        return half_width_for(confidence, stated, CONFIDENCE)
+        return to_si(entry.value + entry.uncertainty, entry.unit, unit) - to_si(entry.value, entry.unit, unit)
 
     def valve_path(self, name: str | None) -> str:
         """Return the path of a valve in the set, ``valves.main``."""
@@ -125,11 +124,10 @@ class StaticTorqueProblem(StrictTable):
     recordings: _Recordings
     columns: _Columns = None
     confidence: _Confidence = 0.95
-    calibration: _Calibration = 0.0
 
-    def settings(self, _setting: Setting) -> StaticTorqueSettings:
+    def settings(self, setting: Setting) -> StaticTorqueSettings:
         """Return the settings of the procedure."""
-        return StaticTorqueSettings(self.confidence, self.calibration)
+        return StaticTorqueSettings(self.confidence, setting.tolerances)
 
 
 class FreeDecayProblem(StrictTable):
@@ -139,7 +137,6 @@ class FreeDecayProblem(StrictTable):
     recordings: _Recordings
     columns: _Columns = None
     confidence: _Confidence = 0.95
-    calibration: _Calibration = 0.0
     start: _Start = None
     end: _End = None
     inertia: Annotated[
@@ -149,16 +146,18 @@ class FreeDecayProblem(StrictTable):
     def settings(self, setting: Setting) -> FreeDecaySettings:
         """Return the settings of the procedure [SI]; the inertia is the set's where none is named, if it has one."""
         start, end = setting.quantity("start", self.start, "s"), setting.quantity("end", self.end, "s")
-        entry = setting.parameter_set.numbers.get("foot_plate.inertia")
-        inertia, half_width, source = None, 0.0, ""
-        if self.inertia is not None and self.inertia != UNKNOWN:
-            inertia, source = setting.quantity("inertia", self.inertia, "kg m^2"), "given in the problem"
-            if inertia is None or inertia <= 0.0:
-                raise IdentificationError(f"{setting.place}: inertia = {self.inertia!r} must be above zero")
-        elif self.inertia is None and entry is not None:
-            inertia, source = setting.number("foot_plate.inertia"), f"{entry.origin} in {setting.parameter_set.name}"
-            half_width = setting.half_width("foot_plate.inertia", "kg m^2", self.confidence)
-        return FreeDecaySettings(start, end, inertia, half_width, source, self.confidence, self.calibration)
+        inertia = setting.quantity("inertia", None if self.inertia == UNKNOWN else self.inertia, "kg m^2")
+        if inertia is not None and inertia <= 0.0:
+            raise IdentificationError(f"{setting.place}: inertia = {self.inertia!r} must be above zero")
+        limit = 0.0
+        if self.inertia is None:
+            inertia = number_in_si(setting.parameter_set, "foot_plate.inertia")
+            limit = setting.limit("foot_plate.inertia", "kg m^2")
+        limit = limit or setting.tolerances.held * (inertia or 0.0)
+        paths = ("friction.static_torque", "friction.dynamic_torque")
+        static, dynamic = (number_in_si(setting.parameter_set, path) for path in paths)
+        rise = max(static / dynamic - 1.0, 0.0) if static and dynamic else 1.0
+        return FreeDecaySettings(start, end, inertia, limit, rise, self.confidence, setting.tolerances)
 
 
 class OpenValveFlowProblem(StrictTable):
@@ -168,35 +167,34 @@ class OpenValveFlowProblem(StrictTable):
     recordings: _Recordings
     columns: _Columns = None
     confidence: _Confidence = 0.95
-    calibration: _Calibration = 0.0
     gas: _Gas = None
     temperature: _Temperature = None
     valve: _Valve = None
-    law: Annotated[Literal["orifice", "iso6358"], Field(description="form in which it is written into the set")] = (
-        "orifice"
-    )
+    law: Annotated[Law, Field(description="law of the flow; it is written into the set in this form")] = "orifice"
 
     def settings(self, setting: Setting) -> OpenValveFlowSettings:
         """Return the settings of the procedure [SI]."""
         path = setting.valve_path(self.valve)
         area = number_in_si(setting.parameter_set, f"{path}.area")
-        gas = setting.gas(self.gas, self.temperature, self.confidence)
-        return OpenValveFlowSettings(gas, self.law, area, path, self.confidence, self.calibration)
+        gas = setting.gas(self.gas, self.temperature)
+        return OpenValveFlowSettings(gas, self.law, area, path, self.confidence, setting.tolerances)
 
 
 class VaneLeakProblem(StrictTable):
-    """Closed chambers losing pressure: the law of the leak, and its area where it is an orifice."""
+    """Closed chambers losing pressure, or a steady flow: area, conductance or laminar coefficient of the leak."""
 
     kind: Literal["vane-leak"]
     recordings: _Recordings
     columns: _Columns = None
     confidence: _Confidence = 0.95
-    calibration: _Calibration = 0.0
     gas: _Gas = None
     temperature: _Temperature = None
     start: _Start = None
     end: _End = None
     angle: Annotated[Text | None, Field(description="vane angle, from which the set's volumes follow")] = None
+    law: Annotated[
+        Literal["orifice", "laminar"], Field(description="law of the leak; an orifice is written as the set has it")
+    ] = "orifice"
     volume_1: Annotated[Text | None, Field(description="volume of chamber 1 with its line, such as '40 cm^3'")] = None
     volume_2: Annotated[Text | None, Field(description="volume of chamber 2 with its line")] = None
 
@@ -212,7 +210,7 @@ class VaneLeakProblem(StrictTable):
             volume = volumes[name] = setting.quantity(name, text, "m^3")
             if volume is not None and volume <= 0.0:
                 raise IdentificationError(f"{setting.place}: {name} = {text!r} must be above zero")
-        angle = setting.quantity("angle", self.angle, "rad")
+        angle, limit = setting.quantity("angle", self.angle, "rad"), setting.tolerances.held
         if angle is not None:
             names = ("angle_min", "angle_max", "volume_per_angle", "dead_volume_1", "dead_volume_2")
             lower, upper, per_angle, dead_1, dead_2 = (setting.number(f"actuator.{name}") for name in names)
@@ -220,18 +218,28 @@ class VaneLeakProblem(StrictTable):
                 raise IdentificationError(f"{setting.place}: angle = {self.angle!r} lies beyond the stops of the set")
             volumes["volume_1"] = volumes["volume_1"] or dead_1 + per_angle * (angle - lower)
             volumes["volume_2"] = volumes["volume_2"] or dead_2 + per_angle * (upper - angle)
+            limit = _volume_limit(setting, dead_1 + per_angle * (angle - lower), angle - lower) or limit
         forms = ("discharge_coefficient", "critical_ratio")
         coefficient, ratio = (number_in_si(setting.parameter_set, f"actuator.leak.{name}") for name in forms)
         return VaneLeakSettings(
-            gas=setting.gas(self.gas, self.temperature, self.confidence),
+            gas=setting.gas(self.gas, self.temperature),
             discharge_coefficient=coefficient,
             start=start,
             end=end,
             confidence=self.confidence,
-            calibration=self.calibration,
             critical_ratio=ratio,
+            is_laminar=self.law == "laminar",
+            tolerances=setting.tolerances,
+            volume_limit=limit,
             **volumes,
         )
+
+
+def _volume_limit(setting: Setting, volume: float, swept: float) -> float:
+    """Return how well a volume [m^3] of a set is known [-] that an angle [rad] has swept; 0 where it states nothing."""
+    of_volume = setting.limit("actuator.dead_volume_1", "m^3")
+    of_angle = swept * setting.limit("actuator.volume_per_angle", "m^3/rad")
+    return math.hypot(of_volume, of_angle) / volume
 
 
 class ValveMapProblem(StrictTable):
@@ -241,15 +249,14 @@ class ValveMapProblem(StrictTable):
     recordings: _Recordings
     columns: _Columns = None
     confidence: _Confidence = 0.95
-    calibration: _Calibration = 0.0
     gas: _Gas = None
     temperature: _Temperature = None
     valve: _Valve = None
 
     def settings(self, setting: Setting) -> ValveMapSettings:
         """Return the settings of the procedure [SI]."""
-        gas = setting.gas(self.gas, self.temperature, self.confidence)
-        return ValveMapSettings(gas, setting.valve_path(self.valve), self.confidence, self.calibration)
+        gas = setting.gas(self.gas, self.temperature)
+        return ValveMapSettings(gas, setting.valve_path(self.valve), self.confidence, setting.tolerances)
 
 
 class DeviceProblem(StrictTable):
@@ -265,20 +272,12 @@ class DeviceProblem(StrictTable):
 ProcedureProblem = StaticTorqueProblem | FreeDecayProblem | OpenValveFlowProblem | VaneLeakProblem | ValveMapProblem
 
 
-@dataclass(frozen=True, slots=True)
-class _Procedure:
-    """How a procedure runs, and what it can give before it runs."""
-
-    run: Callable[..., BenchResult]
-    prospects: Callable[..., tuple[Prospect, ...]]
-
-
-_PROCEDURES = {
-    "static-torque": _Procedure(static_torque, static_prospects),
-    "free-decay": _Procedure(free_decay, decay_prospects),
-    "open-valve-flow": _Procedure(open_valve_flow, flow_prospects),
-    "valve-map": _Procedure(valve_map, map_prospects),
-    "vane-leak": _Procedure(vane_leak, leak_prospects),
+_PROCEDURES: dict[str, Callable[..., BenchResult]] = {
+    "static-torque": static_torque,
+    "free-decay": free_decay,
+    "open-valve-flow": open_valve_flow,
+    "valve-map": valve_map,
+    "vane-leak": vane_leak,
 }
 PROCEDURES = tuple(_PROCEDURES)
 """Kinds of procedures in the recommended order."""
@@ -286,13 +285,7 @@ PROCEDURES = tuple(_PROCEDURES)
 
 def run_procedure(sources: tuple[Source, ...], problem: ProcedureProblem, setting: Setting) -> BenchResult:
     """Return what a procedure of a problem makes of its recordings."""
-    return _PROCEDURES[problem.kind].run(sources, problem.settings(setting))
-
-
-def prospects_of(sources: tuple[Source, ...], problem: ProcedureProblem, setting: Setting) -> tuple[Prospect, ...]:
-    """Return what a procedure can have of its recordings and what not, before it runs."""
-    found = _PROCEDURES[problem.kind].prospects(sources, problem.settings(setting))
-    return (*found, *data_prospects(sources))
+    return _PROCEDURES[problem.kind](sources, problem.settings(setting))
 
 
 def window_of(problem: ProcedureProblem, setting: Setting) -> tuple[float, float]:
@@ -324,6 +317,34 @@ class ProblemFile(StrictTable):
     ] = None
 
 
+_OF_THE_BENCH = {
+    "gas_temperature": ("temperature", "K"),
+    "gas_law": ("gas_law", "1"),
+    "zero_of_pressure": ("zero_of_pressure", "Pa_d"),
+    "gain": ("gain", "1"),
+    "zero_of_flow": ("zero_of_flow", "1"),
+    "held": ("held", "1"),
+}
+"""Of each key of [bench]: the tolerance of the procedures, and its unit."""
+
+
+def bench_tolerances(section: BenchSection | None, file: str) -> Tolerances:
+    """Return what a bench does not know exactly, the defaults where a problem states nothing.
+
+    IdentificationError for a limit below 0 or in another unit.
+    """
+    stated = {}
+    for key, (name, unit) in _OF_THE_BENCH.items():
+        text = None if section is None else getattr(section, key)
+        if text is None:
+            continue
+        with refused_as(IdentificationError, f"{file}: bench.{key} = {text!r}", UnitError):
+            stated[name] = parse_quantity(text, unit)
+        if stated[name] < 0.0:
+            raise IdentificationError(f"{file}: bench.{key} = {text!r} must not be below 0")
+    return Tolerances(**stated)
+
+
 def load_problem(path: str | Path) -> ProblemFile:
     """Return the problem in a TOML file; paths in it begin in its folder.
 
@@ -344,6 +365,7 @@ def parse_problem(content: bytes, file: str) -> ProblemFile:
         kind = item.get("kind") if isinstance(item, dict) else None
         if isinstance(kind, str) and kind.replace("_", "-") in PROCEDURES:
             item["kind"] = kind.replace("_", "-")
+    refuse_removed(document, file)
     problem = validate(ProblemFile, document, file, IdentificationError)
     if not problem.procedure and problem.trajectory is None:
         raise IdentificationError(f"{file}: has nothing to do: neither a [[procedure]] nor a [trajectory]")

@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 
 from ppafo.errors import IdentificationError, nearest_name
-from ppafo.identification.estimate import Prospect
 from ppafo.signals import CHANNELS, Recording, RecordingKind
 from ppafo.signals.faults import is_at_limit, longest_gap, plateaus
 from ppafo.signals.recording import Floats
@@ -197,17 +196,6 @@ def check_no_gap(source: Source, procedure: str, part: Recording) -> int:
     return skipped
 
 
-def pauses(sources: tuple[Source, ...]) -> tuple[str, ...]:
-    """Return a remark on times without readings; steady readings lose nothing by them."""
-    found = [(source, gap) for source in sources if (gap := longest_gap(source.recording.time)) is not None]
-    if not found:
-        return ()
-    listed = [
-        f"{source.name} has no reading for {gap.duration:.4g} s after sample {gap.index + 1}" for source, gap in found
-    ]
-    return (f"pauses: {'; '.join(listed)}; steady readings are not affected",)
-
-
 def window(recording: Recording, start: float | None, end: float | None) -> Recording:
     """Return the part of a recording between two times [s]; None is its own start or end."""
     if start is None and end is None:
@@ -223,32 +211,34 @@ def kind_of(sources: tuple[Source, ...]) -> RecordingKind:
     return next(kind for kind in _KINDS if kind in kinds)
 
 
-def data_prospects(sources: tuple[Source, ...]) -> tuple[Prospect, ...]:
-    """Return what the sensors did not show: values beyond a limit, and what is finer than a converter's steps."""
+def told_of_readings(sources: tuple[Source, ...]) -> tuple[str, ...]:
+    """Return remarks on what the sensors did not show: pauses, values beyond a limit, steps of a coarse converter."""
     found = []
     for source in sources:
+        gap = longest_gap(source.recording.time)
+        if gap is not None:
+            found.append(f"{source.name} has no reading for {gap.duration:.4g} s after sample {gap.index + 1}")
         for name in source.recording.names:
             if name in _NO_SENSORS:
                 continue
             values = source.recording[name]
             limits = [item for item in plateaus(values) if is_at_limit(values, item)]
-            for item in limits:
-                text = f"{source.name}: it stays there for {item.count} samples, from sample {item.first + 1}: a limit"
-                found.append(Prospect(f"'{name}' beyond {item.value:.6g}", False, text))
+            unit = source.recording.unit(name)
+            found += [
+                f"{source.name}: '{name}' stays at {item.value:.6g} {unit} for {item.count} samples, from sample "
+                f"{item.first + 1}: a limit of the sensor?"
+                for item in limits
+            ]
             # A converter is coarse where many samples share few values, far apart.
             levels = np.unique(values)
             if limits or levels.size < 2 or levels.size > values.size / 10:
                 continue
             step = float(np.median(np.diff(levels)) / (levels[-1] - levels[0]))
             if step > _COARSE:
-                text = f"{source.name}: its values are {step:.0%} of their range apart, a coarse converter"
-                found.append(Prospect(f"'{name}' at a finer resolution", False, text))
-    if found:
-        return tuple(found)
-    count = sum(len(source.recording) for source in sources)
-    gaps = [gap.duration for source in sources if (gap := longest_gap(source.recording.time)) is not None]
-    pause = f"the longest pause is {max(gaps):.3g} s" if gaps else "no pause"
-    return (Prospect("all samples", True, f"{count}; no sensor at its limit, no coarse converter, {pause}"),)
+                found.append(
+                    f"{source.name}: values of '{name}' are {step:.0%} of their range apart, a coarse converter"
+                )
+    return tuple(found)
 
 
 def pool(sources: tuple[Source, ...], name: str) -> Floats:

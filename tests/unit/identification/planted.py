@@ -1,7 +1,6 @@
 """Recordings with known values planted, for the tests of the bench procedures."""
 
 import numpy as np
-
 from ppafo.identification.bench.flow_laws import (
     LAMINAR,
     LINEAR,
@@ -11,6 +10,7 @@ from ppafo.identification.bench.flow_laws import (
     difference_in_time,
     orifice_shape,
 )
+
 from ppafo.identification.bench.free_decay import angle_of_decay
 from ppafo.identification.bench.valve_map import area_of_command
 from ppafo.identification.source import Source

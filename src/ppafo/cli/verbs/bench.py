@@ -14,7 +14,6 @@ from ppafo.cli.arguments import (
     Volume,
     Whole,
     Word,
-    counting_number,
 )
 from ppafo.progress import Report, report_nothing
 
@@ -25,7 +24,6 @@ if TYPE_CHECKING:
     from ppafo.storage.foreign import ColumnMap
 
 Problem = Annotated["str | Path", Word("PROBLEM", Path)]
-Batch = Annotated[int, Word("N", counting_number, option="--next", const=1)]
 Set = Annotated["str | Path", Word("PARAMETERS")]
 Recording = Annotated["str | Path", Word("RECORDING")]
 Motion = Annotated[str, Word("free|measured|held|leg")]
@@ -69,7 +67,6 @@ def rig_simulate(
 def identify(
     problem: Problem,
     *,
-    following: Batch = 0,
     progress: Report = report_nothing,
 ) -> Identification:
     """Identify a parameter set, with uncertainty, from bench recordings.
@@ -79,11 +76,10 @@ def identify(
     set that does not, and DataError for a recording that cannot be read; each in one line that begins with the file.
 
     problem: a problem file (.toml); see 'ppafo doctor --schema identification'
-    following: also propose the next experiment, or a batch of N, within what the table [bench.can] allows
     """
     from ppafo.questions.identify.solve import identify
 
-    return identify(problem, progress, following)
+    return identify(problem, progress)
 
 
 def validate(

@@ -1,4 +1,4 @@
-"""What a bench procedure returns: estimates with verdicts, checks of the residuals, and what to draw, in SI units.
+"""What a bench procedure returns: estimates with one verdict each, a table and two panels, in SI units.
 
 The figures have the paper's style; figure 3 is the static torque beside the free decay.
 """
@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from ppafo.answers.style import BLACK, BLUE, GREY, ORANGE, VERMILION, house_style, mark_kind
+from ppafo.answers.style import BLACK, BLUE, VERMILION, house_style, mark_kind
 from ppafo.constants import PASCALS_PER_PSI
-from ppafo.identification.estimate import WORTH_TELLING, Check, Estimate, Prospect, Verdict
+from ppafo.identification.estimate import Estimate, Verdict
+from ppafo.identification.fit import Fit
+from ppafo.identification.source import Source, traces
 from ppafo.signals import RecordingKind
 from ppafo.signals.recording import Floats
 
@@ -20,8 +22,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Role = Literal["rising", "falling", "measured", "second", "law", "other law"]
-"""How a series looks: crosses, circles, dots in one or another colour, a line, a thin line."""
+Role = Literal["rising", "falling", "measured", "law"]
+"""How a series looks: crosses, circles, dots, a line."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,26 +48,27 @@ class Panel:
     series: tuple[Series, ...]
 
 
-IDENTIFIED_WITHIN = 0.25
-"""Half width over value up to which a value is called identified."""
-
-WEAK_WITHIN = 1.0
-"""Half width over value from which the interval reaches zero: such a value is not identifiable."""
+def with_residuals(panel: Panel, x: Floats, residuals: Floats) -> tuple[Panel, Panel]:
+    """Return a panel and the one of its residuals, in the units of its axes."""
+    zero = Series("", np.array([x.min(), x.max()]), np.zeros(2), "law")
+    left = Series("", x, residuals, "measured")
+    axes = panel.x_name, panel.x_unit, "Measured minus fitted", panel.y_unit
+    return panel, Panel("Residuals", *axes, (left, zero))
 
 
 @dataclass(frozen=True, slots=True)
 class BenchResult:
     """Result of one procedure. ``kind`` is that of its recordings; figures say so where nobody measured them.
 
-    ``checks`` can fail; ``remarks`` are what else is to be known, and nothing is tested by them.
+    ``conflict`` is the sentence on readings that want other numbers than all together, empty where they agree.
     """
 
     procedure: str
     summary: str
     estimates: tuple[Estimate, ...]
-    checks: tuple[Check, ...]
     panels: tuple[Panel, ...]
     kind: RecordingKind
+    conflict: str = ""
     remarks: tuple[str, ...] = ()
 
     def __getitem__(self, path: str) -> Estimate:
@@ -75,121 +78,68 @@ class BenchResult:
                 return estimate
         raise KeyError(path)
 
-    @property
-    def failed(self) -> tuple[Check, ...]:
-        """The checks that did not hold."""
-        return tuple(check for check in self.checks if not check.holds)
-
-
-def verdict_of(value: float, low: float, high: float, scale: float | None = None, is_capped: bool = False) -> Verdict:
-    """Return the verdict on a value and its interval, all in one unit; ``scale`` replaces a value that may be zero.
-
-    ``is_capped`` says that the model does not explain the recordings, so that the value belongs to this model only.
-    """
-    size = abs(value) if scale is None else scale
-    half_width = (high - low) / 2.0
-    if not math.isfinite(half_width) or half_width >= WEAK_WITHIN * size:
-        return "not identifiable"
-    if half_width > IDENTIFIED_WITHIN * size:
-        return "weak"
-    return "holds for this model only" if is_capped else "identified"
-
 
 def count_of(number: int, noun: str) -> str:
     """Return a number with its noun, ``1 decay`` or ``3 decays``."""
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
-_ANY = -math.inf
-_NOTHING = 1.0e-9
-_CAPPED: Verdict = "holds for this model only"
-_MISSED = "The law misses the readings by more than they scatter: another law of the same device has another value."
-
-
 @dataclass(frozen=True, slots=True)
-class Number:
-    """A fitted number: where it belongs, its SI unit, half the width of its interval, its explanation.
+class Reported:
+    """A number of a fit that is reported: its name there, which is its path, SI unit, and what it is in a sentence.
 
-    ``scale`` stands in for the size of a value that may be zero; ``lowest`` is where its interval ends at the latest;
-    ``widened`` is how much wider than the scatter's the interval is, because the law misses the readings. ``condition``
-    says where the value holds, if the device has another one elsewhere.
+    ``size`` stands in for the size of a value that may be zero, in that unit.
     """
 
     path: str
     unit: str
-    value: float
-    half_width: float
-    explanation: str
-    scale: float | None = None
-    lowest: float = _ANY
-    widened: float = 1.0
-    condition: str = ""
+    text: str
+    size: float | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Evidence:
-    """Recordings, confidence of the intervals, and the relative uncertainty of the sensors' gain, same confidence [-].
-
-    A gain that is wrong shows in no residual: it can only be stated.
-    """
-
-    recordings: tuple[str, ...]
-    confidence: float = 0.95
-    calibration: float = 0.0
-
-    def with_calibration(self, number: Number) -> Estimate:
-        """Return the estimate of a number to which a wrong gain would pass on, with the calibration in its interval."""
-        return self.estimate(number, math.hypot(number.half_width, self.calibration * number.value))
-
-    def without_calibration(self, number: Number) -> Estimate:
-        """Return the estimate of a number that no gain touches, such as a time constant."""
-        return self.estimate(number, number.half_width)
-
-    def at_or_above_zero(self, number: Number) -> Estimate:
-        """Return the estimate of a number that the fit could not bring below zero, and whether it stopped there."""
-        bounded = replace(number, lowest=0.0)
-        if number.value > _NOTHING * (number.value + number.half_width):
-            return self.without_calibration(bounded)
-        text = f"The fit would put it below zero, so it is held at zero. {number.explanation}"
-        return self.estimate(replace(bounded, explanation=text), number.half_width, "at its bound")
-
-    def estimate(self, number: Number, half_width: float, verdict: Verdict | None = None) -> Estimate:
-        """Return the estimate of a number with an interval of a half width of its own, in its unit."""
-        value, half = float(number.value), float(half_width)
-        low, high = value - half, value + half
-        is_missed = float(number.widened) >= WORTH_TELLING
-        final = verdict or verdict_of(value, low, high, number.scale, is_missed or bool(number.condition))
-        missed = f" {_MISSED}" if is_missed and final == _CAPPED else ""
-        return Estimate(
-            path=number.path,
-            value=value,
-            unit=number.unit,
-            low=max(number.lowest, low),
-            high=high,
-            verdict=final,
-            explanation=f"{number.explanation}{missed}",
-            recordings=self.recordings,
-            confidence=self.confidence,
-            widened=float(number.widened),
-            condition=number.condition,
-        )
-
-    @property
-    def calibration_text(self) -> str:
-        """The statement about the calibration, as the end of a sentence."""
-        if self.calibration:
-            return f"the interval includes {self.calibration:.2%} for the calibration of the sensors"
-        return "the interval does not include the calibration of the sensors"
+_AT_BOUND = 1.0e-6
+_SHOWN = 0.05
+"""Smallest fraction of the variance for which a tolerance is named."""
 
 
-def prospect_of(name: str, half_width: float, size: float, where: str) -> Prospect:
-    """Return whether a number can be identified, from half the width [in its unit] that scatter and design alone give.
+def estimates_of(
+    found: Fit, reported: Sequence[Reported], sources: tuple[Source, ...], confidence: float
+) -> tuple[Estimate, ...]:
+    """Return the estimates of a fit, each with its verdict and the tolerances that widen its interval."""
+    made = []
+    for item in reported:
+        place = found.index(item.path)
+        value, low, high = (float(one[place]) for one in (found.values, found.low, found.high))
+        number = found.numbers[place]
+        size, half = abs(value) if item.size is None else item.size, 0.5 * (high - low)
+        is_at_bound = any(abs(value - end) <= _AT_BOUND * number.scale for end in (number.low, number.high))
+        verdict: Verdict = "identified"
+        sentence = f"{item.text}{_widened_by(found, item.path)}."
+        if is_at_bound:
+            verdict = "at its bound"
+            sentence = f"{sentence} The readings want a value at or beyond {value:.4g}; the interval ends there."
+        elif half >= size:
+            verdict, sentence = "not identifiable", f"{sentence} The interval is as wide as the value."
+        elif found.conflict is not None:
+            verdict = "holds for this model only"
+        made.append(Estimate(item.path, value, item.unit, low, high, verdict, sentence, traces(sources), confidence))
+    return tuple(made)
 
-    Slow disturbances and a law that misses widen an interval later; nothing makes it narrower.
-    """
-    fraction = float(half_width) / abs(size) if size else math.inf
-    width = f"{fraction:.2g} times its size" if fraction >= 0.1 else f"{fraction:.2%}"
-    return Prospect(name, fraction < WEAK_WITHIN, f"expected within {width} at best; {where}")
+
+def _widened_by(found: Fit, path: str) -> str:
+    """Return the tolerances that widen an interval, largest first, as the end of a sentence."""
+    named = [f"{name} ({share:.0%})" for name, share in found.shares.get(path, ()) if share >= _SHOWN]
+    return f"; variance from {', '.join(named)}" if named else "; interval from the scatter of the readings"
+
+
+def conflict_of(found: Fit, remedy: str) -> str:
+    """Return which readings want other numbers than all together, and what to do; an empty text where none do."""
+    one = found.conflict
+    if one is None:
+        return ""
+    is_sought = not math.isfinite(found.numbers[found.index(one.number)].deviation)
+    moved = f", {one.number} by {one.standard_errors:.1f} standard errors" if is_sought else ""
+    return f"{one.group} alone want other numbers than all readings together{moved}; {remedy}"
 
 
 _SIZE = (8.4, 3.7)
@@ -198,8 +148,7 @@ _LEFT, _RIGHT, _TOP, _BOTTOM, _BETWEEN = 0.72, 0.15, 0.62, 0.55, 0.85
 
 _SHOWN_IN = {
     "Pa_d": ("psi", 1.0 / PASCALS_PER_PSI),
-    "Pa": ("kPa", 1.0e-3),
-    "rad": ("deg", 180.0 / np.pi),
+    "rad": ("deg", 180.0 / math.pi),
     "m^2": ("mm$^2$", 1.0e6),
     "kg/s": ("g/s", 1.0e3),
     "kg/(s Pa)": ("g/s per bar", 1.0e8),
@@ -217,9 +166,7 @@ _LOOKS: dict[Role, dict[str, Any]] = {
         "markeredgewidth": 1.1,
     },
     "measured": {"marker": ".", "color": BLUE, "linestyle": "none", "markersize": 4},
-    "second": {"marker": ".", "color": ORANGE, "linestyle": "none", "markersize": 4},
     "law": {"color": BLACK, "linewidth": 1.4},
-    "other law": {"color": ORANGE, "linewidth": 1.4, "linestyle": "--"},
 }
 _MAXIMUM_POINTS = 1200
 
@@ -274,16 +221,13 @@ def _figure(panels: tuple[Panel, ...], kinds: tuple[str, ...]) -> "Figure":
 
 def _draw(axes: "Axes", letter: str, panel: Panel) -> None:
     (x_unit, x_scale), (y_unit, y_scale) = (_SHOWN_IN.get(unit, (unit, 1.0)) for unit in (panel.x_unit, panel.y_unit))
-    drawn = [*(item for item in panel.series if "law" not in item.role), *(i for i in panel.series if "law" in i.role)]
-    for item in drawn:
-        thin = slice(None, None, 1 if "law" in item.role else max(1, item.x.size // _MAXIMUM_POINTS))
+    for item in sorted(panel.series, key=lambda one: one.role == "law"):
+        thin = slice(None, None, 1 if item.role == "law" else max(1, item.x.size // _MAXIMUM_POINTS))
         axes.plot(x_scale * item.x[thin], y_scale * item.y[thin], label=item.name, **_LOOKS[item.role])
     axes.set_title(f"$\\bf{{{letter}}}$   {panel.title}", pad=20)
     axes.set_xlabel(f"{panel.x_name} ({x_unit})" if x_unit else panel.x_name)
     axes.set_ylabel(f"{panel.y_name} ({y_unit})" if y_unit else panel.y_name)
     axes.margins(0.04)
-    if panel.y_name.startswith("Measured less"):
-        axes.axhline(0.0, color=GREY, linewidth=0.8)
     named = [item for item in panel.series if item.name]
     if len(named) > 1:
         axes.legend(

@@ -1,7 +1,15 @@
-"""Leak across the vane, of two closed chambers or in steady flow: which law it follows, and A_leak where an orifice's.
+"""Leak across the vane or the piston, of two closed chambers or in steady flow: its area, conductance or coefficient.
 
-An area is reported only where the orifice law describes the readings; a smooth curve without physics shows how closely
-a law could come. A chamber whose pressure stands still is taken for a room, the atmosphere for example.
+    steady     m = g(P_1, P_2)
+    closed     D' = -(1 + V_1/V_2) (R T / V_1) g(P_1, P_2),   D = P_1 - P_2,   V_1 P_1 + V_2 P_2 = constant
+
+g is the mass flow [kg/s] of a law of ``flow``, equations (6), (7): Cd A_leak of an orifice, C of ISO 6358 or a laminar
+coefficient; P_1 and P_2 the absolute pressures [Pa] of the fuller chamber and the other, V_1 and V_2 their volumes
+[m^3], equation (3) at constant temperature. The time to fall from one D to another is an integral over D, computed once
+for a law. A chamber whose pressure stands still is taken for a room. Just filled, gas and
+walls come to rest: each pressure is off by P r exp(-t / tau) at first. Volumes, temperature and law of the gas, r and
+tau, zeros of the sensors are tolerances, of steady flow the gains too: one common to both sensors does not change how
+fast D falls.
 """
 
 import math
@@ -11,23 +19,28 @@ from typing import NamedTuple
 import numpy as np
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.bench.curve_fit import CLEARLY_WORSE, effective_samples, fit_curve, solve_curve
-from ppafo.identification.bench.flow_laws import LAMINAR, LINEAR, Chambers, GasAt, Law, Opening, decay_times
-from ppafo.identification.bench.leak_fits import (
-    EDGE,
-    NOT_DESCRIBED,
-    Decay,
-    FittedLaw,
-    best_law,
-    condition_of,
-    fit_law,
-    fit_relaxation,
-    judge,
-    law_checks,
-    leak_or_relaxation,
+from ppafo.identification.bench.flow import (
+    GAS_LAW,
+    TEMPERATURE,
+    GasAt,
+    Opening,
+    flow_tolerances,
+    gas_tolerances,
+    read_flow,
+    true_pressure,
 )
-from ppafo.identification.bench.result import IDENTIFIED_WITHIN, BenchResult, Evidence, Number, Panel, Series, count_of
-from ppafo.identification.estimate import Check, Prospect
+from ppafo.identification.bench.law import DEFAULTS, Tolerances, Values, solve, sought, tolerance
+from ppafo.identification.bench.result import (
+    BenchResult,
+    Panel,
+    Reported,
+    Series,
+    conflict_of,
+    count_of,
+    estimates_of,
+    with_residuals,
+)
+from ppafo.identification.fit import Free
 from ppafo.identification.source import (
     Source,
     check_absolute,
@@ -36,9 +49,8 @@ from ppafo.identification.source import (
     check_not_clipped,
     check_sources,
     kind_of,
-    pauses,
     pool,
-    traces,
+    told_of_readings,
     window,
 )
 from ppafo.signals.faults import plateaus, stands_out
@@ -48,25 +60,25 @@ PROCEDURE = "vane-leak"
 CHANNELS = ("pressure_1", "pressure_2")
 STEADY = (*CHANNELS, "mass_flow")
 MINIMUM_SAMPLES, _FEWEST_STEADY = 20, 8
-_DEGREE, _STEADY_DEGREE = 5, 3
-"""Of the polynomials without physics through a decay, and through steady readings: what any smooth law could reach."""
+EDGE = 20
+"""Samples at either end that are averaged for a first guess."""
 
 STANDS_STILL = 0.02
 """Change of a pressure over that of the other, up to which a chamber counts as a room."""
 _NEARLY_EQUAL = 0.01
-_LOST_ALLOWED = 0.05
-
-_STEADY_UNITS = {"orifice": "kg/(s Pa)", "laminar": "kg/(s Pa^2)", "linear": "kg/(s Pa)"}
-_SPREAD_FOR_A_ZERO = 0.3
-"""Range of the law's course over its largest value, from which the zero of the meter can be separated from the leak."""
+_RATIO, _VOLUME, _RELAXATION = "ratio of the volumes", "volume", "time of the relaxation"
+_RELAXED, _MOST_RELAXED = 5.0, 0.02
+"""Times that a relaxation usually fits into a recording, and how far it moves a pressure at most."""
+_REMEDY = "try law = {}, or give start and end; gas may leak elsewhere, or relax with its walls"
 
 
 @dataclass(frozen=True, slots=True)
 class VaneLeakSettings:
-    """The gas, chamber volumes [m^3] where known, the leak's discharge coefficient [-], and the times to use [s].
+    """The gas, chamber volumes [m^3] where known, what the set has of the leak, and the times to use [s].
 
-    Without ``volume_1`` there is no area, only a rate. A ``critical_ratio`` [-] asks for a sonic conductance.
-    ``calibration`` is the relative uncertainty of the flow meter's gain [-], for steady readings.
+    Without the volume of the chamber that empties there is no area, only one over the volume. A
+    ``discharge_coefficient`` [-] makes an area of the product, a ``critical_ratio`` [-] asks for a sonic conductance,
+    ``is_laminar`` for a laminar coefficient. ``volume_limit`` [-] is how well the volumes are known.
     """
 
     gas: GasAt
@@ -76,135 +88,79 @@ class VaneLeakSettings:
     start: float | None = None
     end: float | None = None
     confidence: float = 0.95
-    calibration: float = 0.0
     critical_ratio: float | None = None
+    is_laminar: bool = False
+    tolerances: Tolerances = DEFAULTS
+    volume_limit: float = 0.02
 
     @property
     def opening(self) -> Opening:
-        """The leak in the form in which the set has it."""
-        return Opening(self.gas, self.discharge_coefficient, self.critical_ratio)
+        """The leak in the form in which it is sought."""
+        law: str = "laminar" if self.is_laminar else "orifice" if self.critical_ratio is None else "iso6358"
+        return Opening(self.gas, law, self.discharge_coefficient or 1.0, self.critical_ratio)
 
     @property
-    def laws(self) -> tuple[Law, Law, Law]:
-        """The law of the opening, and those that it is compared with."""
-        return self.opening.law(), LAMINAR, LINEAR
-
-    def volume_of(self, chamber: int) -> float | None:
-        """Return the volume [m^3] of chamber 1 or 2, None where it is not known."""
-        return self.volume_1 if chamber == 1 else self.volume_2
+    def size(self) -> Reported:
+        """The number that is sought: where a set has it, its unit, and what it is."""
+        if self.is_laminar:
+            return Reported("vane_leak.laminar_coefficient", "kg/(s Pa^2)", "Laminar coefficient of the leak")
+        if self.critical_ratio is not None:
+            text = f"Sonic conductance of the leak with the set's b = {self.critical_ratio:g}"
+            return Reported("actuator.leak.sonic_conductance", "m^3/(s Pa)", text)
+        if self.discharge_coefficient:
+            text = f"Area of the leak with Cd = {self.discharge_coefficient:g}, of which only the product counts"
+            return Reported("actuator.leak.area", "m^2", text)
+        return Reported("vane_leak.effective_area", "m^2", "Effective area Cd A of the leak")
 
 
 def vane_leak(sources: tuple[Source, ...], settings: VaneLeakSettings) -> BenchResult:
-    """Return A_leak [m^2] where the orifice law (6), (7) describes the decay, else the law that does, and no area.
+    """Return the leak: A_leak [m^2], C [m^3/(s Pa)] or a laminar coefficient [kg/(s Pa^2)]; equations (6), (7).
 
-    With D = P1 - P2 the difference falls by D' = -(1 + V1/V2) k g(P1, P2); for the orifice k = Cd A_leak C1 R T / V1.
     Recordings with a ``mass_flow`` are steady: the flow that keeps up the pressure, at several pressures.
     IdentificationError for recordings that cannot say it, with the file, the sample and the remedy.
     """
     if sources and all("mass_flow" in source.recording for source in sources):
         return _steady_leak(sources, settings)
-    if settings.calibration:
-        raise IdentificationError(
-            f"{PROCEDURE}: calibration = {settings.calibration:g}: it does not apply to a decay, because a gain common "
-            f"to both sensors does not change its rate; what matters is the volume. Leave it out"
-        )
     check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES)
     closed = tuple(closed_chambers(source, settings) for source in sources)
-    if not any(item.falls for item in closed):
-        return _tight_leak(sources, closed, settings)
-    for source, item in zip(sources, closed, strict=True):
-        if not item.falls:
-            raise IdentificationError(
-                f"{source.name}: {PROCEDURE}: no leak is visible: the pressure difference falls by {item.drop:.3g} Pa "
-                f"with a noise of {item.noise:.3g} Pa, while it falls in the other recordings; give it a procedure of "
-                f"its own, which finds an upper bound of the leak"
-            )
-    return _decaying_leak(sources, tuple(item.decay(settings) for item in closed), settings)
-
-
-def leak_prospects(sources: tuple[Source, ...], settings: VaneLeakSettings) -> tuple[Prospect, ...]:
-    """Return whether an area can be found, and whether the laws of a leak can be distinguished over these pressures."""
-    if all("mass_flow" in source.recording for source in sources):
-        check_sources(sources, PROCEDURE, STEADY, 1)
-        pressures = pool(sources, "pressure_1")
-        span = float(np.ptp(pressures) / pressures.max())
-        return (Prospect("law of the leak", span > IDENTIFIED_WITHIN, f"steady flow over {span:.0%} of the pressure"),)
-    check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES)
-    closed = [item for item in (closed_chambers(source, settings) for source in sources) if item.falls]
-    decays = [item.decay(settings) for item in closed]
-    known = settings.volume_of(decays[0].emptying if decays else 1) is not None
-    volume = "the volume is known" if known else "the volume is not known: only its ratio to the volume"
-    area = Prospect("area of the leak", known, volume)
-    if not decays:
-        none = "no pressure difference falls by more than the noise: an upper bound only"
-        return (area, Prospect("leak", False, none))
-    gain = min(_least_gain(decay, item.noise, settings) for decay, item in zip(decays, closed, strict=True))
-    fell = max(1.0 - float(decay.difference[-1] / decay.difference[0]) for decay in decays)
-    text = f"the difference falls by {fell:.1%}; AIC between the laws is expected at {gain:.3g}, "
-    text += f"{CLEARLY_WORSE:g} is clear"
-    several = len(decays) > 1
-    more = "several decays" if several else "one decay: a sensor offset gives a linear leak the same curve"
-    return (area, Prospect("law of the leak", gain >= CLEARLY_WORSE, text), Prospect("plateau or leak", several, more))
-
-
-def _least_gain(decay: Decay, noise: float, settings: VaneLeakSettings) -> float:
-    """Return the least AIC expected between the opening's law and others, with start and rate free."""
-    start, end = float(decay.difference[0]), decay.ends[1]
-    curves = []
-    for law in settings.laws:
-        lasting, difference = decay_times(law, decay.chambers, start, 0.9 * end)
-        whole = float(np.interp(-end, -difference, lasting))
-        curves.append(np.interp(decay.time / decay.time[-1] * whole, lasting, difference))
-    free = np.stack([np.ones_like(decay.time), decay.time], axis=1)
-    gains = []
-    for other in curves[1:]:
-        apart = other - curves[0]
-        left = apart - free @ np.linalg.lstsq(free, apart, rcond=None)[0]
-        gains.append(left.size * float(np.log1p(np.mean(left**2) / max(noise, 1e-9) ** 2)))
-    return float(min(gains))
+    if len({item.fuller for item in closed}) > 1:
+        raise IdentificationError(
+            f"{PROCEDURE}: chamber 1 empties in some recordings and chamber 2 in others; give each its own procedure"
+        )
+    return _decaying_leak(sources, closed, settings)
 
 
 class ClosedChambers(NamedTuple):
-    """Two closed chambers: time [s], pressures [Pa] of the fuller and the other, which is the fuller, noise [Pa]."""
+    """Two closed chambers: time [s], pressures [Pa] of the fuller and the other, which is the fuller."""
 
     time: Floats
     first: Floats
     second: Floats
     fuller: int
-    noise: float
 
     @property
-    def difference(self) -> Floats:
-        """Pressure of the fuller chamber less that of the other [Pa]."""
-        return self.first - self.second
+    def changes(self) -> tuple[float, float]:
+        """Fall of the first and rise of the second pressure [Pa]."""
+        fall, rise = (float(np.mean(one[-EDGE:]) - np.mean(one[:EDGE])) for one in (self.first, self.second))
+        return -fall, rise
 
     @property
-    def drop(self) -> float:
-        """How far the difference falls from start to end [Pa]."""
-        return float(np.mean(self.difference[:EDGE]) - np.mean(self.difference[-EDGE:]))
+    def is_a_room(self) -> bool:
+        """Whether the second pressure stands still."""
+        fall, rise = self.changes
+        return abs(rise) <= STANDS_STILL * abs(fall)
 
     @property
-    def falls(self) -> bool:
-        """Whether the difference falls by more than the noise of the samples at both ends."""
-        return self.drop > 3.0 * self.noise / math.sqrt(EDGE)
+    def fitted(self) -> int:
+        """How many of the pressures are fitted: that of a room is not."""
+        return 1 if self.is_a_room else 2
 
-    def volume_ratio(self, settings: VaneLeakSettings) -> float:
-        """Return the volume of the fuller chamber over that of the other [-]; 0 where one of them is not known."""
-        if settings.volume_1 is None or settings.volume_2 is None:
-            return 0.0
-        ratio = settings.volume_1 / settings.volume_2
-        return ratio if self.fuller == 1 else 1.0 / ratio
-
-    def decay(self, settings: VaneLeakSettings) -> Decay:
-        """Return the decay of the pressure difference."""
-        change = float(np.mean(self.first[:EDGE]) - np.mean(self.first[-EDGE:]))
-        rise = float(np.mean(self.second[-EDGE:]) - np.mean(self.second[:EDGE]))
-        is_room = abs(rise) <= STANDS_STILL * abs(change)
-        ratio = 0.0 if is_room else self.volume_ratio(settings) or max(rise / change, 0.0)
-        total = ratio * self.first + self.second
-        lost = abs(float(np.mean(total[-EDGE:]) - np.mean(total[:EDGE]))) / (1.0 + ratio)
-        chambers, difference = Chambers(ratio, float(np.mean(total))), self.difference
-        return Decay(self.time, difference, chambers, lost / self.drop, float(difference.min()), self.fuller)
+    @property
+    def is_early(self) -> list[bool]:
+        """Whether the difference is still in the upper half of its fall, for each sample."""
+        difference = self.first - self.second
+        half = int(np.argmax(difference < 0.5 * (difference[:EDGE].mean() + difference[-EDGE:].mean())))
+        return [place < half for place in range(self.time.size)]
 
 
 def closed_chambers(source: Source, settings: VaneLeakSettings) -> ClosedChambers:
@@ -235,161 +191,164 @@ def closed_chambers(source: Source, settings: VaneLeakSettings) -> ClosedChamber
             f"{source.name}: {PROCEDURE}: only {last} samples lie between start and equal pressures, "
             f"{MINIMUM_SAMPLES} are needed; record faster, or give start"
         )
-    noise = float(np.std(np.diff(difference[:last]))) / np.sqrt(2.0)
-    time = part.time[:last] - part.time[0]
-    return ClosedChambers(time=time, first=first[:last], second=second[:last], fuller=fuller, noise=noise)
+    return ClosedChambers(part.time[:last] - part.time[0], first[:last], second[:last], fuller)
 
 
-def _decaying_leak(sources: tuple[Source, ...], decays: tuple[Decay, ...], settings: VaneLeakSettings) -> BenchResult:
-    smooth = (np.polynomial.Chebyshev.fit(decay.time, decay.difference, _DEGREE) for decay in decays)
-    residuals = np.concatenate([item.difference - curve(item.time) for item, curve in zip(decays, smooth, strict=True)])
-    noise, count = float(np.sqrt(np.mean(residuals**2))), effective_samples(residuals)
-    fitted = [fit_law(law, decays, count, settings.confidence, solve_curve) for law in settings.laws]
-    relaxation = fit_relaxation(decays, count, settings.confidence)
-    fitted.append(relaxation)
-    best, orifice = best_law(fitted), fitted[0]
-    drop = max(float(np.ptp(decay.difference)) for decay in decays)
-    judged = judge(fitted, best, noise, drop, "Pa")
-    checks = [*law_checks(fitted, best, judged, "Pa")]
-    is_a_room = all(decay.chambers.volume_ratio == 0.0 for decay in decays)
-    if not is_a_room:
-        # What one chamber loses the other gains.
-        lost = max(decay.lost_share for decay in decays)
-        text = f"{lost:.1%} of the change in pressure difference is not passed from chamber to chamber"
-        is_kept = lost <= _LOST_ALLOWED
-        checks.append(Check("gas is kept", is_kept, text if is_kept else f"{text}: it leaks outside"))
-    # Only what is reported needs the intervals of a law that may miss, which take long.
-    wanted = {best.name, *(() if judged.verdict == NOT_DESCRIBED else ("orifice",))}
-    reported = {
-        law.name: fit_law(law, decays, count, settings.confidence) for law in settings.laws if law.name in wanted
-    }
-    orifice, best = reported.get(orifice.name, orifice), reported.get(best.name, best)
-    evidence = Evidence(traces(sources), settings.confidence, settings.gas.flow_uncertainty())
-    numbers = _numbers(settings, {decay.emptying for decay in decays}, orifice, f"{judged.reason}.")
-    estimates = [*judged.estimates(evidence, settings.opening, numbers)]
-    path, text = f"vane_leak.{best.name}_rate", f"Rate of the law that fits best: {best.formula}."
-    rate = Number(path, best.rate_unit, best.rate, best.half_width, text, lowest=0.0, widened=best.widened)
-    if best is relaxation:
-        check, leak = leak_or_relaxation(decays, relaxation, count, settings.confidence)
-        checks.append(check)
-        if leak is not None:
-            text = f"Rate of a linear leak: {LINEAR.formula}."
-            linear = Number("vane_leak.linear_rate", "1/s", *leak.rate, text, lowest=0.0)
-            text = "Difference that the sensors show at equal pressures, from several decays."
-            course = [linear, Number("vane_leak.sensor_offset", "Pa", *leak.offset, text)]
-        else:
-            text = "Pressure difference towards which the decay goes."
-            ends = (
-                ["vane_leak.plateau"]
-                if len(decays) == 1
-                else [f"vane_leak.plateau_{i + 1}" for i in range(len(decays))]
-            )
-            plateaus_found = zip(ends, relaxation.plateaus, strict=True)
-            course = [rate, *(Number(end, "Pa", *at, text, widened=relaxation.widened) for end, at in plateaus_found)]
-        estimates += [evidence.without_calibration(number) for number in course]
-    elif best.name != orifice.name:
-        estimates.append(evidence.without_calibration(replace(rate, condition=condition_of(best, checks[1]))))
-    return BenchResult(
-        PROCEDURE,
-        f"{count_of(len(decays), 'decay')}; best law: {best.name} ({best.formula}); orifice: {judged.verdict}",
-        tuple(estimates),
-        tuple(checks),
-        _panels(decays, orifice, best),
-        kind_of(sources),
-        ("the pressure in chamber 2 is constant, so it is treated as a room",) if is_a_room else (),
-    )
+_POINTS = 1200
+_LOWEST = 1.0e-3
+"""Difference at the end of a computed fall over that at its start."""
 
 
-def _numbers(settings: VaneLeakSettings, emptying: set[int], orifice: FittedLaw, reason: str) -> list[Number]:
-    """Return the leak's size; its ratio to the volume of the emptying chamber where that is not known."""
-    if len(emptying) > 1:
-        raise IdentificationError(
-            f"{PROCEDURE}: chamber 1 empties in some recordings and chamber 2 in others; give each its own procedure"
-        )
-    chamber = min(emptying)
-    volume, gas = settings.volume_of(chamber), settings.gas
-    per_volume = 1.0 / (gas.specific_gas_constant * gas.temperature)
-    if volume is None:
-        per_rate = per_volume / gas.choked_flow_constant
-        text = f"Cd A over the volume of chamber {chamber}, which is not known: no area. "
-        text += f"{reason[:1].upper()}{reason[1:]}"
-        value, half = orifice.rate * per_rate, orifice.half_width * per_rate
-        path = "vane_leak.area_over_volume"
-        return [Number(path, "1/m", value, half, text, lowest=0.0, widened=orifice.widened)]
-    conductance, half = (item * per_volume * volume for item in (orifice.rate, orifice.half_width))
-    text = f"From a volume of {volume * 1e6:.4g} cm^3, taken as exact. {gas.temperature_text}; {reason}"
-    return settings.opening.numbers(conductance, half, text, orifice.widened)
+class Falls(NamedTuple):
+    """Times [s], pressure difference [Pa], V1/V2 [-] and P1 V1/V2 + P2 [Pa] of two closed chambers."""
+
+    time: Floats
+    difference: Floats
+    ratio: float
+    conserved: float
+
+    def pressures(self, times: Floats) -> tuple[Floats, Floats]:
+        """Return both pressures [Pa] at times [s]; no gas is lost to the outside."""
+        difference = np.exp(np.interp(times, self.time, np.log(self.difference)))
+        second = (self.conserved - self.ratio * difference) / (1.0 + self.ratio)
+        return second + difference, second
 
 
-def _panels(decays: tuple[Decay, ...], orifice: FittedLaw, best: FittedLaw) -> tuple[Panel, ...]:
-    shown: list[Series] = []
-    rest: list[Series] = []
-    other = best if best.name != orifice.name else None
-    for number, decay in enumerate(decays):
-        named = number == 0
-        thin = slice(None, None, max(1, decay.time.size // 400))
-        shown.append(Series("measured" if named else "", decay.time[thin], decay.difference[thin], "measured"))
-        shown.append(Series("orifice" if named else "", decay.time, orifice.curves[number], "law"))
-        misses = (decay.difference - orifice.curves[number])[thin]
-        rest.append(Series("orifice" if named else "", decay.time[thin], misses, "measured"))
-        if other is not None:
-            shown.append(Series(other.name if named else "", decay.time, other.curves[number], "other law"))
-            misses = (decay.difference - other.curves[number])[thin]
-            rest.append(Series(other.name if named else "", decay.time[thin], misses, "second"))
-    return (
-        Panel("Closed chambers", "Time", "s", "Pressure difference", "Pa_d", tuple(shown)),
-        Panel("Residuals", "Time", "s", "Measured minus fitted", "Pa_d", tuple(rest)),
-    )
+def fall_of_difference(opening: Opening, size: float, first: float, second: float, ratio: float, rate: float) -> Falls:
+    """Return times [s] and the difference [Pa] as it falls from two pressures [Pa] to a thousandth.
+
+    ``size`` is that of the opening, ``ratio`` V1/V2 [-], 0 beside a room, ``rate`` R T / V1 [Pa/kg].
+    """
+    start, conserved = max(first - second, 1.0), ratio * first + second
+    logs = np.linspace(0.0, -math.log(_LOWEST), _POINTS)
+    difference = start * np.exp(-logs)
+    lower = (conserved - ratio * difference) / (1.0 + ratio)
+    flow = opening.flow(max(size, 1.0e-300), 0.0, lower + difference, lower)
+    slowness = difference / np.maximum((1.0 + ratio) * rate * flow, 1.0e-300)
+    steps = 0.5 * (slowness[1:] + slowness[:-1]) * np.diff(logs)
+    return Falls(np.concatenate(([0.0], np.cumsum(steps))), difference, ratio, conserved)
 
 
-def _tight_leak(
+def _decaying_leak(
     sources: tuple[Source, ...], closed: tuple[ClosedChambers, ...], settings: VaneLeakSettings
 ) -> BenchResult:
-    """Return how large a leak may be that does not show: as large as the fall that the samples allow."""
+    gas, opening, size, tolerances = settings.gas, settings.opening, settings.size, settings.tolerances
+    fuller = closed[0].fuller
+    volumes = (settings.volume_1, settings.volume_2)[:: 1 if fuller == 1 else -1]
+    if volumes[0] is None:
+        what = size.text.partition(" with")[0]
+        text = f"{what} over the volume of chamber {fuller}, which is not known"
+        path = "vane_leak.area_over_volume" if opening.law == "orifice" else f"{size.path}_over_volume"
+        size = Reported(path, "1/m" if opening.law == "orifice" else f"{size.unit[:-1]} m^3)", text)
+        opening = Opening(gas, opening.law, 1.0, settings.critical_ratio)
+    emptied, constant = volumes[0] or 1.0, gas.specific_gas_constant
+    names = [f"pressure_{item}" for item in (fuller, 3 - fuller)]
     longest = max(float(item.time[-1]) for item in closed)
-    scale = max(float(np.mean(item.difference)) for item in closed)
-    shape = settings.opening.law().shape
-    falls = [
-        (1.0 + item.volume_ratio(settings)) * float(shape(*(np.array([np.mean(p)]) for p in item[1:3]))[0]) / scale
-        for item in closed
-    ]
 
-    def residuals(values: Floats) -> Floats:
-        lines = zip(closed, values[1:], falls, strict=True)
-        return np.concatenate(
-            [item.difference / scale - start + values[0] * fall * item.time / longest for item, start, fall in lines]
+    def law(at: Values) -> Floats:
+        # Flow goes with 1 / sqrt(T), the pressure that it makes with T.
+        warm = constant * np.sqrt(gas.temperature * (gas.temperature + at[TEMPERATURE])) * (1.0 + at[GAS_LAW])
+        rate, parts = warm / (emptied * (1.0 + at[_VOLUME])), []
+        lasting = longest / _RELAXED * math.exp(at[_RELAXATION])
+        for number, item in enumerate(closed, start=1):
+            starts = (at[f"start of {name}, decay {number}"] for name in names)
+            falls = fall_of_difference(opening, at[size.path], *starts, 0.0 if item.is_a_room else at[_RATIO], rate)
+            faded = np.exp(-item.time / lasting)
+            for name, true in list(zip(names, falls.pressures(item.time), strict=True))[: item.fitted]:
+                parts.append(true * (1.0 + at[f"relaxation of {name}, decay {number}"] * faded) + at[f"zero of {name}"])
+        return np.concatenate(parts)
+
+    numbers = (
+        sought(size.path, _rough_size(closed, opening, constant * gas.temperature / emptied), 0.0),
+        *_ratio_numbers(closed, volumes, settings.volume_limit),
+        *(one for number, item in enumerate(closed, start=1) for one in _starts(names, number, item)),
+        *(
+            one
+            for number, item in enumerate(closed, start=1)
+            for name in names[: item.fitted]
+            for one in tolerance(f"relaxation of {name}, decay {number}", _MOST_RELAXED)
+        ),
+        Free(_RELAXATION, 0.0, -5.0, math.log(_RELAXED), 1.0, 1.5),
+        *gas_tolerances(gas, tolerances),
+        *tolerance(_VOLUME, settings.volume_limit if volumes[0] else 0.0),
+        *(one for name in names for one in tolerance(f"zero of {name}", tolerances.zero_of_pressure)),
+    )
+    measured = np.concatenate([one for item in closed for one in (item.first, item.second)[: item.fitted]])
+    labels, channels = [], []
+    for number, item in enumerate(closed, start=1):
+        labels += [f"decay {number}"] * item.fitted * item.time.size
+        early = ["early" if is_early else "late" for is_early in item.is_early]
+        channels += [f"{name}, {word} in the fall" for name in names[: item.fitted] for word in early]
+    found, model = solve(law, measured, numbers, (labels, channels), settings.confidence)
+    estimates = estimates_of(found, (size,), sources, settings.confidence)
+    time = np.concatenate([item.time for item in closed])
+    readings, fitted, place = [], [], 0
+    for item in closed:
+        count = item.time.size
+        readings.append(item.first - item.second)
+        fitted.append(
+            model[place : place + count] - (item.second if item.is_a_room else model[place + count :][:count])
         )
+        place += item.fitted * count
+    shown = (("measured", readings, "measured"), (opening.law, fitted, "law"))
+    series = tuple(
+        Series(name if number == 0 else "", item.time, values[number], role)
+        for name, values, role in shown
+        for number, item in enumerate(closed)
+    )
+    panel = Panel("Closed chambers", "Time", "s", "Pressure difference", "Pa_d", series)
+    room = all(item.is_a_room for item in closed)
+    remark = (f"the pressure in chamber {3 - fuller} is constant, so it is treated as a room",) if room else ()
+    fall = max(1.0 - float(one[-EDGE:].mean() / one[:EDGE].mean()) for one in readings)
+    return BenchResult(
+        PROCEDURE,
+        f"{count_of(len(closed), 'decay')} of up to {float(time.max()):.3g} s; the pressure difference falls by {fall:.1%}",
+        estimates,
+        with_residuals(panel, time, np.concatenate(readings) - np.concatenate(fitted)),
+        kind_of(sources),
+        conflict_of(found, _REMEDY.format("'orifice'" if settings.is_laminar else "'laminar'")),
+        (*remark, *told_of_readings(sources)),
+    )
 
-    wide = np.full(1 + len(closed), np.inf)
-    start = np.array([0.0, *(float(np.mean(item.difference)) / scale for item in closed)])
-    # A bound on one side at this confidence is the end of a two-sided interval at 2 c - 1.
-    fit = fit_curve(residuals, start, -wide, wide, 2.0 * settings.confidence - 1.0)
-    slope, half = float(fit.values[0]) / longest, float(fit.half_widths[0]) / longest
-    rate = max(slope, 0.0)
-    most = FittedLaw("orifice", "", rate, max(slope + half, 0.0) - rate, "1/s", fit.rms * scale, 0.0, (), 1.0)
-    sure = f"with {100.0 * settings.confidence:g}% confidence"
-    text = f"No leak is visible in {longest:.4g} s; {sure} it is below the upper end."
-    evidence = Evidence(traces(sources), settings.confidence, settings.gas.flow_uncertainty())
-    estimates = tuple(
-        replace(evidence.estimate(number, number.half_width * (1.0 + evidence.calibration), "upper bound"), low=0.0)
-        for number in _numbers(settings, {item.fuller for item in closed}, most, text)
-    )
-    rises = slope + half < 0.0
-    slope_text = "the pressure difference rises" if rises else "the pressure difference does not rise either"
-    check = Check("nothing flows in", not rises, f"{slope_text}: {-slope * falls[0] * scale:+.3g} Pa/s at first sight")
-    summary = (
-        f"{count_of(len(closed), 'recording')} of closed chambers; no leak is visible, so there is only an upper bound"
-    )
-    shown = tuple(Series("measured", item.time, item.difference, "measured") for item in closed[:1])
-    panel = Panel("Closed chambers", "Time", "s", "Pressure difference", "Pa_d", shown)
-    return BenchResult(PROCEDURE, summary, estimates, (check,), (panel,), kind_of(sources))
+
+def _starts(names: list[str], number: int, item: ClosedChambers) -> list[Free]:
+    """Return the pressures [Pa] at the start of a decay, sought; of a room it is what was read, to its noise."""
+    found = []
+    for name, values in zip(names, (item.first, item.second), strict=True):
+        size = max(abs(item.changes[0]), float(np.std(np.diff(values))), 1.0)
+        label, start = f"start of {name}, decay {number}", float(values[:EDGE].mean())
+        found.append(sought(label, start, 1.0, scale=size))
+    if item.is_a_room:
+        known, deviation = float(item.second.mean()), max(float(item.second.std()), 1.0)
+        found[1] = replace(found[1], start=known, deviation=deviation)
+    return found
+
+
+def _rough_size(closed: tuple[ClosedChambers, ...], opening: Opening, rate: float) -> float:
+    """Return a first guess of the opening from how fast the first pressure falls on average; above 0."""
+    found = []
+    for item in closed:
+        flow = float(np.mean(opening.flow(1.0, 0.0, item.first, item.second)))
+        scatter = float(np.std(np.diff(item.first)))
+        found.append(max(item.changes[0], 0.01 * scatter, 1.0e-9) / (rate * flow * float(item.time[-1])))
+    return float(np.mean(found))
+
+
+def _ratio_numbers(
+    closed: tuple[ClosedChambers, ...], volumes: tuple[float | None, ...], limit: float
+) -> tuple[Free, ...]:
+    """Return the ratio of the volumes as a tolerance where both are known, else as a number that is sought."""
+    shut = [item.changes for item in closed if not item.is_a_room]
+    if not shut:
+        return ()
+    if volumes[0] and volumes[1]:
+        ratio = volumes[0] / volumes[1]
+        return tolerance(_RATIO, math.sqrt(2.0) * limit * ratio, ratio)
+    return (sought(_RATIO, max(float(np.mean([rise / fall for fall, rise in shut])), 1.0e-3), 1.0e-6),)
 
 
 def _steady_leak(sources: tuple[Source, ...], settings: VaneLeakSettings) -> BenchResult:
-    """Return the leak's size [SI] where the law of an opening describes flow over pressures, else the law that does.
-
-    Where the pressures differ enough, the zero of the flow meter is fitted with the law and reported.
-    """
+    """Return the leak from flow over pressures; the zero of the flow meter shows where the pressures differ."""
     check_sources(sources, PROCEDURE, STEADY, _FEWEST_STEADY)
     for source in sources:
         check_moves(source, PROCEDURE, "mass_flow")
@@ -402,68 +361,33 @@ def _steady_leak(sources: tuple[Source, ...], settings: VaneLeakSettings) -> Ben
         raise IdentificationError(
             f"{sources[0].name}: {PROCEDURE}: the flow runs from the lower to the higher pressure; reverse its sign"
         )
-    fitted = [_fit_steady(law, first, second, flow, settings.confidence) for law in settings.laws]
-    laws, zero = [law for law, _ in fitted], fitted[0][1]
-    orifice, best = laws[0], best_law(laws)
-    smooth = np.polynomial.Chebyshev.fit(difference, flow, _STEADY_DEGREE)(difference)
-    noise = float(np.sqrt(np.mean((flow - smooth) ** 2) * flow.size / (flow.size - _STEADY_DEGREE)))
-    judged = judge(laws, best, noise, float(np.ptp(flow)), "kg/s")
-    opening = settings.opening
-    evidence = Evidence(traces(sources), settings.confidence, opening.gas.flow_uncertainty(settings.calibration))
-    checks = law_checks(laws, best, judged, "kg/s")
-    text = f"In steady flow. {opening.gas.temperature_text}; {evidence.calibration_text}. {judged.sentence}"
-    numbers = opening.numbers(orifice.rate, orifice.half_width, text, orifice.widened)
-    estimates = [*judged.estimates(evidence, opening, numbers)]
-    estimates += [] if zero is None else [evidence.without_calibration(zero)]
+    gas, opening, size = settings.gas, settings.opening, settings.size
+
+    def law(at: Values) -> Floats:
+        pressures = (true_pressure(at, name, shown) for name, shown in zip(CHANNELS, (first, second), strict=True))
+        return read_flow(at, gas, opening.flow(at[size.path], 0.0, *pressures))
+
+    unit, largest = opening.flow(1.0, 0.0, first, second), float(np.abs(flow).max())
+    numbers = (
+        sought(size.path, float(unit @ flow / (unit @ unit)), 0.0),
+        *flow_tolerances(gas, settings.tolerances, CHANNELS, largest),
+    )
+    halves = np.where(difference > np.median(difference), "higher", "lower")
+    channels = [f"flow at {half} pressures" for half in halves]
+    labels = [f"recording {number}" for number, one in enumerate(sources, start=1) for _ in range(len(one.recording))]
+    found, model = solve(law, flow, numbers, (labels, channels), settings.confidence)
     order = np.argsort(difference)
-    shown = [Series("measured", difference, flow, "measured")]
-    shown.append(Series("orifice", difference[order], orifice.curves[0][order], "law"))
-    rest = [Series("orifice", difference, flow - orifice.curves[0], "measured")]
-    if best is not orifice:
-        path, text = f"vane_leak.{best.name}_coefficient", f"Coefficient of the law that fits best: {best.formula}."
-        where = condition_of(best, checks[1])
-        number = Number(path, best.rate_unit, best.rate, best.half_width, text, None, 0.0, best.widened, where)
-        estimates.append(judged.weaken(evidence.with_calibration(number)))
-        shown.append(Series(best.name, difference[order], best.curves[0][order], "other law"))
-        rest.append(Series(best.name, difference, flow - best.curves[0], "second"))
-    axis = ("Pressure difference", "Pa_d")
+    series = (
+        Series("measured", difference, flow, "measured"),
+        Series(opening.law, difference[order], model[order], "law"),
+    )
+    panel = Panel("Steady leak", "Pressure difference", "Pa_d", "Flow", "kg/s", series)
     return BenchResult(
         PROCEDURE,
-        f"{flow.size} steady readings; best law: {best.name} ({best.formula}); orifice: {judged.verdict}",
-        tuple(estimates),
-        checks,
-        (
-            Panel("Steady leak", *axis, "Flow", "kg/s", tuple(shown)),
-            Panel("Residuals", *axis, "Measured minus fitted", "kg/s", tuple(rest)),
-        ),
+        f"{flow.size} steady readings; scatter {np.std(flow - model) / largest:.2%} of the largest flow",
+        estimates_of(found, (size,), sources, settings.confidence),
+        with_residuals(panel, difference, flow - model),
         kind_of(sources),
-        pauses(sources),
+        conflict_of(found, _REMEDY.format("'orifice'" if settings.is_laminar else "'laminar'")),
+        told_of_readings(sources),
     )
-
-
-def _fit_steady(
-    law: Law, first: Floats, second: Floats, flow: Floats, confidence: float
-) -> tuple[FittedLaw, Number | None]:
-    """Fit the law's coefficient and, where the pressures differ enough to tell them apart, the meter's zero."""
-    shape = law.shape(first, second)
-    guess, scale = float(shape @ flow / (shape @ shape)), float(np.abs(flow).max())
-    has_zero = float(np.ptp(shape)) > _SPREAD_FOR_A_ZERO * float(np.abs(shape).max())
-    count = 2 if has_zero else 1
-
-    def residuals(values: Floats) -> Floats:
-        zero = values[1] if has_zero else 0.0
-        return np.asarray((flow - guess * values[0] * shape) / scale - zero)
-
-    lower, upper = np.array([0.0, -1.0])[:count], np.array([1e3, 1.0])[:count]
-    fit = fit_curve(residuals, np.array([1.0, 0.0])[:count], lower, upper, confidence, (first - second,))
-    zero = None
-    if has_zero:
-        value, half = float(fit.values[1]) * scale, float(fit.half_widths[1]) * scale
-        text = "Reading of the flow meter without flow, from the shape of the law over pressure."
-        path, widened = "vane_leak.flow_zero", float(fit.widened[1])
-        zero = Number(path, "kg/s", value, half, text, scale=scale, widened=widened)
-    rms = fit.rms * scale
-    criterion = 2.0 * flow.size * float(np.log(max(rms, 1e-300))) + 2.0 * count
-    value, half = float(fit.values[0]) * guess, float(fit.half_widths[0]) * guess
-    curves, unit, widened = (flow - fit.residuals * scale,), _STEADY_UNITS[law.name], float(fit.widened[0])
-    return FittedLaw(law.name, law.formula, value, half, unit, rms, criterion, curves, widened), zero

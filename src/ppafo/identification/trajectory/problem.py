@@ -1,4 +1,4 @@
-"""A trajectory fit as values: recordings with the scenarios that are to explain them, free numbers, how to search."""
+"""A trajectory fit as values: recordings with the scenarios that are to explain them, and the numbers that it moves."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -8,14 +8,15 @@ from typing import Literal
 import numpy as np
 
 from ppafo.errors import IdentificationError, first_twice, nearest_name
+from ppafo.identification.fit import Free
 from ppafo.identification.source import Use, double_use
-from ppafo.model.catalog import VALVES, device_effects, find_effects
+from ppafo.model.catalog import find_effects
 from ppafo.model.declaration import Quantity
-from ppafo.parameters.declaration import AREA_FORM, SECTIONS, SONIC_FORM
-from ppafo.parameters.device import Device, Orifice
+from ppafo.parameters.device import Device
 from ppafo.signals import Recording
 from ppafo.simulation import numbers
 from ppafo.simulation.declaration import FREE, INITIAL, LEG, shank_settings
+from ppafo.simulation.numbers import other_form
 from ppafo.simulation.recorded import (
     ANGLE,
     COMMAND,
@@ -49,12 +50,12 @@ InitialState = Literal["scenario", "recording"]
 class Experiment:
     """A recording and the scenario that is to explain it; time ``start`` [s] of the recording is time 0 of the run.
 
-    ``noise`` is the standard deviation by channel [rad], [Pa]; channels without one have it estimated from the
-    recording. ``channels`` are those that are compared, to the end of the recording. ``inputs`` names measured channels
-    that the run follows sample by sample: ``command``, in place of the scenario's controller, ``supply_pressure`` (of
-    both inlets where they have one pressure), ``dorsiflexion_pressure``, ``external_torque``, ``angle``.
-    ``initial_state`` takes angle and pressures at the start from the scenario or, by the samples up to the start, from
-    the recording: their mean, or where a line through them ends if they move. ``source`` names the file and its hash.
+    ``noise`` is the least standard deviation by channel [rad], [Pa]; it is estimated from what the fit leaves.
+    ``channels`` are those that are compared, to the end of the recording. ``inputs`` names measured channels that the
+    run follows sample by sample: ``command``, in place of the scenario's controller, ``supply_pressure`` (of both
+    inlets where they have one pressure), ``dorsiflexion_pressure``, ``external_torque``, ``angle``. ``initial_state``
+    takes angle and pressures at the start from the scenario or, by the samples up to the start, from the recording:
+    their mean, or where a line through them ends if they move. ``source`` names the file and its hash.
     """
 
     label: str
@@ -165,7 +166,6 @@ def scenario_of(experiment: Experiment) -> Scenario:
     return scenario
 
 
-_DEVICE_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow")
 TIME_OFFSET = "recording.time_offset"
 """Path of a number that no scenario has: the time by which the samples of a recording are later than the run."""
 
@@ -176,7 +176,10 @@ RECORDING = (
     Quantity("time_offset", "s", "time by which the samples are later than the run, a late trigger", 0.0, -1.0, 1.0),
     *(
         Quantity(f"zero_of_{name}", unit, f"what the sensor of {name} adds to its samples", 0.0, -size, size)
-        for name, unit, size in (("angle", "rad", 1.0), ("pressure_1", "Pa_d", 1.0e6), ("pressure_2", "Pa_d", 1.0e6))
+        for name, unit, size in (
+            ("angle", "rad", 1.0),
+            *((one, "Pa_d", 1.0e6) for one in ("pressure_1", "pressure_2", SUPPLY, DORSIFLEXION_SUPPLY)),
+        )
     ),
     *(
         Quantity(f"gain_of_{name}", "1", f"gain of the sensor of {name} less 1", 0.0, -0.5, 0.5)
@@ -195,13 +198,10 @@ def full_path(path: str, scenario: Scenario) -> str:
 def declared_numbers(scenario: Scenario) -> dict[str, Quantity]:
     """Return every number that can be fitted in this scenario, with its declaration, by path."""
     device = scenario.device
-    found = {f"{section}.{item.name}": item for section in _DEVICE_SECTIONS for item in SECTIONS[section]}
-    found |= {f"{effect.section}.{item.name}": item for effect in device_effects() for item in effect.quantities}
-    orifices = device.actuator.leak, device.valve.orifice
-    leak, opening = (AREA_FORM if isinstance(orifice, Orifice) else SONIC_FORM for orifice in orifices)
-    found |= {f"actuator.leak.{item.name}": item for item in leak}
-    valve = (*opening, *VALVES[device.valve.kind].quantities)
-    found |= {f"valves.{device.valve_name}.{item.name}": item for item in valve}
+    other = {f"{section}.{name}" for section in ("actuator.leak", "valve") for name in other_form(device, section)}
+    found = {
+        full_path(path, scenario): item for path, item in numbers.device_numbers(device).items() if path not in other
+    }
     if isinstance(scenario.motion, FreeMotion):
         leg = scenario.motion.leg
         found |= {f"motion.{item.name}": item for item in (FREE if leg is None else LEG)}
@@ -241,35 +241,14 @@ def broken_rule(device: Device) -> str:
     return ""
 
 
-_STARTS = tuple(f"initial.{item.name}" for item in INITIAL)
-_BELOW_ATMOSPHERE = 0.02
-"""Fraction of the atmosphere by which a fitted start may lie below it: its sensor's zero, and no vacuum."""
-
-
-def impossible_start(ranges: "Sequence[Range]", highest: Sequence[float], atmosphere: float) -> str:
-    """Return why a fitted start cannot be, empty where it can; ``highest`` are the upper ends of intervals [SI].
-
-    A chamber that its valve vents into a room of ``atmosphere`` [Pa] never starts below it: only a vane that is drawn
-    makes a vacuum.
-    """
-    for item, most in zip(ranges, highest, strict=True):
-        if item.path in _STARTS and most < (1.0 - _BELOW_ATMOSPHERE) * atmosphere:
-            return (
-                f"{item.name} would be at most {most:.4g} Pa absolute, below the atmosphere of {atmosphere:.6g} Pa "
-                "into which the chamber is vented, which cannot be; check the zero and the unit of its sensor, whether "
-                "a gauge pressure is read as an absolute one, the atmosphere, and whether the run starts too late"
-            )
-    return ""
-
-
-Scale = Literal["log", "linear"]
-
 LONGEST_TIME_OFFSET = 0.02
 """Bounds [s] of a fitted time offset where none are given: a trigger or a sensor, not another experiment."""
 
 _FURTHEST = 100.0
-_ADDED = frozenset({"friction", "motion", "initial", "supply"})
-"""Sections whose numbers add up in the equations: their likelihood is normal in themselves, not in their logarithms."""
+"""Factor from its start by which a number is moved at most where no bounds are given."""
+
+_SCALE = 100.0
+"""Typical size of a number with a prior over its standard deviation; differences are a thousandth of it at most."""
 
 _STATE = frozenset({"motion", "initial"})
 """Sections that say how a run begins, which the recording may say better."""
@@ -278,31 +257,20 @@ _SUPPLIES = {"supply.pressure": "plant.supply_pressure", "supply.dorsiflexion_pr
 
 
 @dataclass(frozen=True, slots=True)
-class Prior:
-    """What is known of a number beforehand: a normal distribution, in SI units."""
-
-    mean: float
-    standard_deviation: float
-
-
-@dataclass(frozen=True, slots=True)
 class FreeParameter:
-    """A number to be fitted, by its path such as ``friction.viscous_damping`` or ``initial.pressure_1``; SI units.
+    """A number that the fit moves, by its path such as ``friction.viscous_damping`` or ``initial.pressure_1``; SI.
 
-    ``start`` None begins at the value of the scenario. On the ``log`` scale, for positive numbers, steps and intervals
-    are ratios; ``scale`` None takes it for volumes, conductances, areas and the inertia, and ``linear`` for friction,
-    pressures and motion. Bounds left out are the declared ones, at most a factor of 100 from the start. ``recordings``
-    limits the number to some experiments, by label: an initial pressure belongs to one, and so does
-    ``recording.time_offset`` [s], by which its samples are later than the run. One that ``is_tolerance`` is a tolerance
-    of the bench: fitted because nobody knows it better, and never a value of the device.
+    ``start`` None begins at the value of the scenario. ``deviation`` is the standard deviation of its prior about
+    ``mean``, which is the start where it is None; infinite for none. Bounds left out are the declared ones, at most a
+    factor of 100 from the start. ``recordings`` limits the number to some experiments, by label: an initial pressure
+    belongs to one. One that ``is_tolerance`` is known within a tolerance, and no value of the device that is sought.
     """
 
     path: str
     start: float | None = None
     low: float | None = None
     high: float | None = None
-    scale: Scale | None = None
-    prior: Prior | None = None
+    deviation: float = math.inf
     recordings: tuple[str, ...] = ()
     is_tolerance: bool = False
 
@@ -313,43 +281,22 @@ class FreeParameter:
 
 
 @dataclass(frozen=True, slots=True)
-class Range:
-    """A parameter with everything settled: full path, unit, scale, start and bounds, SI units.
-
-    ``size`` is what one unit of the coordinate of a linear parameter stands for.
-    """
+class Number:
+    """A number with everything settled: full path, SI unit, and what the estimator moves."""
 
     path: str
-    name: str
     unit: str
-    scale: Scale
-    start: float
-    low: float
-    high: float
-    size: float
-    prior: Prior | None
+    free: Free
     recordings: tuple[str, ...]
-    is_tolerance: bool = False
+    is_tolerance: bool
 
     def acts_in(self, label: str) -> bool:
         """Return whether the number acts in the experiment with this label."""
         return not self.recordings or label in self.recordings
 
-    def coordinate(self, number: float) -> float:
-        """Return the coordinate [-] in which the search goes: a logarithm, or the number over its size."""
-        return math.log(number) if self.scale == "log" else number / self.size
 
-    def number(self, coordinate: float) -> float:
-        """Return the number in SI units at a coordinate."""
-        return math.exp(coordinate) if self.scale == "log" else float(coordinate * self.size)
-
-    def slope(self, coordinate: float) -> float:
-        """Return the change of the number [SI] per change of its coordinate."""
-        return math.exp(coordinate) if self.scale == "log" else self.size
-
-
-def range_of(parameter: FreeParameter, experiments: Sequence[Experiment]) -> Range:
-    """Return a parameter with all of it settled; ``experiments`` are those it acts in. Refuses what contradicts.
+def number_of(parameter: FreeParameter, experiments: Sequence[Experiment]) -> Number:
+    """Return a parameter with all of it settled; ``experiments`` are those it acts in.
 
     IdentificationError for a contradiction.
     """
@@ -361,51 +308,39 @@ def range_of(parameter: FreeParameter, experiments: Sequence[Experiment]) -> Ran
         )
     path = paths.pop()
     quantity = [declaration_of(path, scenario) for scenario in scenarios][-1]
-    section = path.partition(".")[0]
     for experiment in experiments:
         _refuse_followed(parameter, path, experiment)
     start = parameter.start
     if start is None:
         # Of how a run begins the recording may say more than the scenario.
         first = experiments[0]
-        start = number_at(scenario_of(first) if section in _STATE else first.scenario, path)
-    is_ratio = start > 0.0 and quantity.minimum >= 0.0 and section not in _ADDED
-    scale = parameter.scale or ("log" if is_ratio else "linear")
+        is_state = path.partition(".")[0] in _STATE
+        start = number_at(scenario_of(first) if is_state else first.scenario, path)
     if path == TIME_OFFSET:
         low, high = -LONGEST_TIME_OFFSET, LONGEST_TIME_OFFSET
     else:
-        low = max(quantity.minimum, start / _FURTHEST) if scale == "log" and start > 0.0 else quantity.minimum
+        low = max(quantity.minimum, start / _FURTHEST) if start > 0.0 <= quantity.minimum else quantity.minimum
         high = min(quantity.maximum, start * _FURTHEST) if start > 0.0 else quantity.maximum
     low, high = (low if parameter.low is None else parameter.low), (high if parameter.high is None else parameter.high)
-    _refuse_nonsense(parameter, scale, start, low, high)
+    _refuse_nonsense(parameter, start, low, high)
     if low < quantity.minimum or high > quantity.maximum:
         raise IdentificationError(
             f"{parameter.name}: bounds {low:.6g} to {high:.6g} exceed what is allowed, "
             f"{quantity.minimum:.6g} to {quantity.maximum:.6g} {quantity.unit}".rstrip()
         )
-    unit = quantity.unit.removesuffix("_a") or "-"
-    size = 0.5 * (high - low) if start == 0.0 or path == TIME_OFFSET else abs(start)
+    scale = abs(start) or 0.5 * (high - low)
+    if math.isfinite(parameter.deviation):
+        scale = _SCALE * parameter.deviation
     name = full_path(parameter.name, scenarios[0])
-    return Range(
-        path, name, unit, scale, start, low, high, size, parameter.prior, parameter.recordings, parameter.is_tolerance
-    )
+    free = Free(name, start, low, high, scale, parameter.deviation)
+    unit = quantity.unit.removesuffix("_a").removesuffix("_d") or "-"
+    return Number(path, unit, free, parameter.recordings, parameter.is_tolerance)
 
 
-def is_nuisance(item: Range) -> bool:
-    """Return whether a number is fitted only because nobody knows it: one recording's beginning, or the bench's."""
-    is_beginning = bool(item.recordings) and (item.path == TIME_OFFSET or item.path.startswith("initial."))
-    return item.is_tolerance or is_beginning
-
-
-def is_of_sensor(item: Range) -> bool:
-    """Return whether a number changes what a sensor says, in a straight line, and nothing that runs."""
-    return item.path.startswith((ZERO_OF, GAIN_OF))
-
-
-def reach_of(ranges: Sequence[Range]) -> float:
-    """Return the largest time offset [s] among the bounds of parameters; 0 where none is fitted."""
-    reaches = [max(abs(item.low), abs(item.high)) for item in ranges if item.path == TIME_OFFSET]
-    return max(reaches, default=0.0)
+def reach_of(chosen: Sequence[Number]) -> float:
+    """Return the largest time offset [s] among the bounds of numbers; 0 where none is fitted."""
+    ends = [end for item in chosen if item.path == TIME_OFFSET for end in (item.free.low, item.free.high)]
+    return max(map(abs, ends), default=0.0)
 
 
 def _refuse_followed(parameter: FreeParameter, path: str, experiment: Experiment) -> None:
@@ -421,47 +356,19 @@ def _refuse_followed(parameter: FreeParameter, path: str, experiment: Experiment
         )
 
 
-def _refuse_nonsense(parameter: FreeParameter, scale: Scale, start: float, low: float, high: float) -> None:
-    if not all(math.isfinite(number) for number in (start, low)) or math.isnan(high):
+def _refuse_nonsense(parameter: FreeParameter, start: float, low: float, high: float) -> None:
+    if not math.isfinite(start) or math.isnan(low) or math.isnan(high):
         raise IdentificationError(f"{parameter.name}: start and bounds must be finite numbers")
     if not low < high or not low <= start <= high:
         raise IdentificationError(
             f"{parameter.name}: start {start:.6g} must lie between the bounds {low:.6g} and {high:.6g}"
         )
-    if scale == "log" and low <= 0.0:
-        raise IdentificationError(
-            f"{parameter.name}: the log scale needs a start and bounds above 0; give them, or scale 'linear'"
-        )
-    if start == 0.0 and ((parameter.high is None and parameter.path != TIME_OFFSET) or not math.isfinite(high - low)):
+    if start == 0.0 and not (math.isfinite(high - low) or math.isfinite(parameter.deviation)):
         raise IdentificationError(
             f"{parameter.name}: a start at 0 needs bounds, because they define what a small step is"
         )
-    if parameter.prior is not None and not parameter.prior.standard_deviation > 0.0:
+    if not parameter.deviation > 0.0:
         raise IdentificationError(f"{parameter.name}: the standard deviation of a prior must be above 0")
-    if parameter.prior is not None and scale == "log" and parameter.prior.mean <= 0.0:
-        raise IdentificationError(f"{parameter.name}: on the log scale the mean of a prior must be above 0")
-
-
-Loss = Literal["linear", "soft_l1", "huber"]
-
-
-@dataclass(frozen=True, slots=True)
-class Search:
-    """How to look for the optimum: loss, number of starts besides the first, seed of their draws, and limits.
-
-    With ``directions`` what is left is searched for what a bench may have and the model not. A robust loss counts
-    residuals beyond 1.345 standard deviations less. ``identified`` and ``weak`` are the half
-    widths of an interval, relative to the number, up to which it is called so.
-    """
-
-    loss: Loss = "linear"
-    other_starts: int = 0
-    seed: int = 1
-    maximum_evaluations: int = 60
-    confidence: float = 0.95
-    identified: float = 0.2
-    weak: float = 1.0
-    directions: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -470,7 +377,7 @@ class TrajectoryProblem:
 
     parameters: tuple[FreeParameter, ...]
     experiments: tuple[Experiment, ...]
-    search: Search = Search()
+    confidence: float = 0.95
 
     def __post_init__(self) -> None:
         if not self.parameters or not self.experiments:
@@ -487,7 +394,7 @@ class TrajectoryProblem:
                 if label not in labels:
                     hint = nearest_name(label, labels)
                     raise IdentificationError(f"{parameter.path}: there is no experiment '{label}'{hint}")
-        _refuse_twice("parameter", [item.name for item in ranges_of(self)])
+        _refuse_twice("parameter", [item.free.name for item in numbers_of(self)])
 
     def experiments_with(self, parameter: FreeParameter) -> tuple[Experiment, ...]:
         """Return the experiments in which a parameter acts."""
@@ -496,9 +403,9 @@ class TrajectoryProblem:
         )
 
 
-def ranges_of(problem: TrajectoryProblem) -> tuple[Range, ...]:
-    """Return all parameters of a problem with start, bounds and scale settled; refuses those that contradict."""
-    return tuple(range_of(parameter, problem.experiments_with(parameter)) for parameter in problem.parameters)
+def numbers_of(problem: TrajectoryProblem) -> tuple[Number, ...]:
+    """Return all parameters of a problem with start and bounds settled; refuses those that contradict."""
+    return tuple(number_of(parameter, problem.experiments_with(parameter)) for parameter in problem.parameters)
 
 
 def use_of(item: Experiment) -> Use:

@@ -1,10 +1,11 @@
 """The section [trajectory] of a problem file: its layout, the problem that it makes, and the outcome of that.
 
 Texts have units, scenarios and recordings go by name; the problem is in SI units. Everything that can be refused is
-refused before the search begins, and what the recordings can give is said before it.
+refused before the search begins.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -14,15 +15,12 @@ import numpy as np
 from pydantic import Field
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.documents.models import NAME, StrictTable, Text, Texts, validate
+from ppafo.documents.models import NAME, StrictTable, Text, Texts
 from ppafo.errors import DataError, IdentificationError, ScenarioError, UnitError, nearest_name, refused_as
-from ppafo.identification.bench.result import count_of
-from ppafo.identification.estimate import BENCH_VERDICTS, Check, Estimate, Prospect, interval_factor
-from ppafo.identification.source import Source, Use, common_use, source_of
-from ppafo.identification.trajectory.fitting import TrajectoryFit, fit, noise_in, residuals_of
-from ppafo.identification.trajectory.follow_up import Candidate, Expected, Profile, expected_information, profile
-from ppafo.identification.trajectory.information import correlation, covariance, directions_for, precision
-from ppafo.identification.trajectory.next_experiment import NextExperiments, propose
+from ppafo.identification.estimate import Estimate, interval_factor
+from ppafo.identification.source import Source, Use, common_use, told_of_readings
+from ppafo.identification.trajectory.expected import Candidate, Expected, expected_information
+from ppafo.identification.trajectory.fitting import TrajectoryFit, fit
 from ppafo.identification.trajectory.problem import (
     ALL_INPUTS,
     FITTED_CHANNELS,
@@ -30,27 +28,17 @@ from ppafo.identification.trajectory.problem import (
     TIME_OFFSET,
     Experiment,
     FreeParameter,
-    Loss,
-    Prior,
-    Scale,
-    Search,
     TrajectoryProblem,
-    broken_rule,
     declaration_of,
     full_path,
-    ranges_of,
     use_of,
 )
-from ppafo.identification.trajectory.residuals import FIRST_STEP, Floats, Residuals, prior_coordinates
-from ppafo.identification.trajectory.search import moved_alone
-from ppafo.identification.trajectory.tolerances import Ability, Tolerances, tolerance_parameters
-from ppafo.identification.trajectory.uncertainty import FROM_PRIOR, STRONG, relative_to_number
-from ppafo.identification.trajectory.unseen import unseen_in_words
+from ppafo.identification.trajectory.tolerances import Tolerances, stated_by, tolerance_parameters
 from ppafo.parameters import apply_overrides, build_device
 from ppafo.parameters.device import Device
 from ppafo.parameters.overrides import over
 from ppafo.parameters.parameter_set import ParameterSet
-from ppafo.progress import Progress, Report
+from ppafo.progress import Report
 from ppafo.signals import Recording
 from ppafo.simulation.loading import list_scenarios, load_scenario
 from ppafo.simulation.recorded import (
@@ -66,8 +54,7 @@ from ppafo.simulation.recorded import (
     with_fixed_volume,
 )
 from ppafo.simulation.scenario import Scenario
-from ppafo.storage.comma_separated import read_csv
-from ppafo.units import parse_quantity, percentage
+from ppafo.units import parse_quantity
 
 _Label = Annotated[str, Field(pattern=NAME, max_length=60, description="its name, also in the names of files")]
 _Noise = dict[str, Text]
@@ -92,7 +79,6 @@ class ParameterSection(StrictTable):
     ] = None
     low: Annotated[Text | None, Field(description="lower bound")] = None
     high: Annotated[Text | None, Field(description="upper bound")] = None
-    scale: Annotated[Scale | None, Field(description="whether steps are ratios")] = None
     prior: Annotated[
         PriorSection | Literal["bench"] | None,
         Field(description="what is known beforehand; 'bench': the interval of a bench procedure of this file"),
@@ -124,9 +110,9 @@ class ExperimentSection(StrictTable):
         Texts | None,
         Field(description="channels to compare; default: angle and both pressures, without what is held or followed"),
     ] = None
-    noise: Annotated[_Noise, Field(description="standard deviation by channel, '0.1 deg', '500 Pa_d'")] = Field(
-        default={}
-    )
+    noise: Annotated[
+        _Noise, Field(description="least standard deviation by channel, '0.1 deg', '500 Pa_d'; default: none")
+    ] = Field(default={})
     inputs: Annotated[
         Texts | None, Field(description=f"what the run follows in the recording: {', '.join(ALL_INPUTS)}")
     ] = None
@@ -139,9 +125,8 @@ class ExperimentSection(StrictTable):
     initial_state: Annotated[
         Literal["scenario", "recording", "fitted"] | None,
         Field(
-            description="where the state at the start comes from; 'fitted': from the recording, and its pressures are "
-            "fitted too. Default: the scenario, if there is one; else 'fitted' where two samples or more precede the "
-            "first command, and 'recording' where they do not"
+            description="where the state at the start comes from; 'recording' and 'fitted', which are one: from its "
+            "samples, to their noise. Default: the scenario, if there is one, else the recording"
         ),
     ] = None
     time_offset: Annotated[
@@ -155,7 +140,7 @@ class CandidateSection(StrictTable):
     label: _Label
     scenario: Annotated[Text, Field(description="name of a scenario, or a file relative to this one")]
     overrides: Annotated[Texts, Field(description="changes to the scenario")] = ()
-    noise: Annotated[_Noise, Field(description="by channel; default: that of the first recording")] = Field(default={})
+    noise: Annotated[_Noise, Field(description="by channel; default: what the fit finds")] = Field(default={})
     interval: Annotated[Text, Field(description="time between two samples")] = "1 ms"
 
 
@@ -168,18 +153,35 @@ class TrajectorySection(StrictTable):
     experiments: Annotated[
         tuple[ExperimentSection, ...], Field(strict=False, min_length=1, description="recordings to be explained")
     ]
-    loss: Annotated[Loss, Field(description="how outliers are weighted")] = "linear"
-    other_starts: Annotated[int, Field(ge=0, le=100, description="number of starts besides the first")] = 0
-    seed: Annotated[int, Field(ge=0, description="random seed of the draws of starts")] = 1
     confidence: Annotated[float, Field(gt=0.5, lt=1.0, description="confidence of the intervals")] = 0.95
-    directions: Annotated[
-        bool, Field(description="search what is left for effects that the model does not have, and say what is hidden")
-    ] = True
-    profiles: Annotated[Texts, Field(description="parameters whose profile likelihood is wanted, by path")] = ()
     candidates: Annotated[
         tuple[CandidateSection, ...],
         Field(strict=False, description="experiments to rank by the information that they would bring"),
     ] = ()
+
+
+_REMOVED = {
+    "loss": "the first pass is robust by itself; omit it",
+    "other_starts": "other starts are tried where the first does not explain the recordings; omit it",
+    "seed": "nothing is drawn; omit it",
+    "directions": "recordings that want other numbers are found by themselves; omit it",
+    "profiles": "intervals are those of the table; omit it",
+    "scale": "the search scales numbers by itself; omit it",
+}
+_CAN = "proposals within limits of the bench are not made; write [[trajectory.candidates]], which are ranked"
+
+
+def refuse_removed(document: Mapping[str, Any], file: str) -> None:
+    """Refuse keys that earlier versions had, with what to write instead; IdentificationError."""
+    section, bench = document.get("trajectory"), document.get("bench")
+    if isinstance(bench, dict) and "can" in bench:
+        raise IdentificationError(f"{file}: bench.can: {_CAN}")
+    if isinstance(section, dict):
+        parameters = section.get("parameters")
+        tables = [item for item in (section, *(parameters if isinstance(parameters, list) else ()))]
+        for key, instead in _REMOVED.items():
+            if any(isinstance(table, dict) and key in table for table in tables):
+                raise IdentificationError(f"{file}: trajectory: {key}: {instead}")
 
 
 _NOISE_UNITS = {"angle": "rad", "pressure_1": "Pa_d", "pressure_2": "Pa_d"}
@@ -192,7 +194,7 @@ class Setting:
     ``read`` gives the recording of an experiment, ``folder`` is where paths of scenarios begin, ``file`` what messages
     call the section. ``parameter_set`` takes the place of the sets that scenarios name, ``valve`` that of their valves.
     ``bench`` are estimates that came before, by path; ``used`` are the recordings from which they came. ``tolerances``
-    are those of the bench, ``ability`` is what it can do, and ``following`` how many next experiments are wanted.
+    are those of the bench.
     """
 
     read: Callable[[ExperimentSection], Source]
@@ -203,8 +205,6 @@ class Setting:
     bench: Mapping[str, Estimate] = field(default_factory=dict)
     used: tuple[Use, ...] = ()
     tolerances: Tolerances = field(default_factory=Tolerances)
-    ability: Ability | None = None
-    following: int = 0
 
 
 @contextmanager
@@ -243,22 +243,6 @@ SHORTEST_STEP = 1.0e-6
 """Seconds; a shorter step would only cost time."""
 
 
-def trajectory_from_dict(
-    content: Mapping[str, Any], folder: Path | None = None, file: str = "trajectory"
-) -> TrajectoryProblem:
-    """Return the problem in nested dictionaries laid out as the section of a file; paths in it begin in ``folder``.
-
-    Texts have their units, the problem is in SI. IdentificationError or DataError, one line that names ``file``.
-    """
-    section = validate(TrajectorySection, dict(content), file, IdentificationError)
-    home = folder or Path()
-
-    def read(item: ExperimentSection) -> Source:
-        return source_of(home / item.recording, read_csv(home / item.recording))
-
-    return trajectory_problem(section, Setting(read, home, file))
-
-
 def trajectory_problem(section: TrajectorySection, setting: Setting) -> TrajectoryProblem:
     """Return the problem of a section. IdentificationError where it repeats what the bench settles."""
     experiments = tuple(_experiment(item, setting) for item in section.experiments)
@@ -267,26 +251,16 @@ def trajectory_problem(section: TrajectorySection, setting: Setting) -> Trajecto
     if twice:
         raise IdentificationError(f"{setting.file}: {twice}; bench values are where the fit starts and what it holds")
     parameters = [_parameter(item, scenarios, setting) for item in section.parameters]
-    nuisances = [
-        one
-        for item, made in zip(section.experiments, experiments, strict=True)
-        for one in _nuisances(item, made, parameters, setting)
-    ]
-    search = Search(
-        loss=section.loss,
-        other_starts=section.other_starts,
-        seed=section.seed,
-        confidence=section.confidence,
-        directions=section.directions,
-    )
-    fitted = (*parameters, *nuisances)
-    return TrajectoryProblem(
-        (*fitted, *tolerance_parameters(setting.tolerances, experiments, fitted)), experiments, search
-    )
+    offsets = [one for item in section.experiments for one in _time_offset(item, setting)]
+    fitted = (*parameters, *offsets)
+    chosen = setting.parameter_set
+    stated = {} if chosen is None else stated_by(chosen, experiments[0].scenario)
+    held = tolerance_parameters(setting.tolerances, experiments, fitted, stated)
+    return TrajectoryProblem((*fitted, *held), experiments, section.confidence)
 
 
-def candidates_of(section: TrajectorySection, setting: Setting, noise: Mapping[str, float]) -> tuple[Candidate, ...]:
-    """Return the experiments that could be done next; ``noise`` [rad], [Pa] by channel where none is given."""
+def candidates_of(section: TrajectorySection, setting: Setting) -> tuple[Candidate, ...]:
+    """Return the experiments that could be done next."""
     found = []
     for item in section.candidates:
         said = f"{setting.file}: candidate '{item.label}'"
@@ -294,7 +268,7 @@ def candidates_of(section: TrajectorySection, setting: Setting, noise: Mapping[s
         if interval <= 0.0:
             raise IdentificationError(f"{said}: interval = '{item.interval}' must be above 0")
         scenario = _scenario(item.scenario, item.overrides, setting)
-        found.append(Candidate(item.label, scenario, noise_of_channels(item.noise, said) or noise, interval))
+        found.append(Candidate(item.label, scenario, noise_of_channels(item.noise, said), interval))
     return tuple(found)
 
 
@@ -336,27 +310,16 @@ def _scenario(name: str, overrides: tuple[str, ...], setting: Setting) -> Scenar
     return load_scenario(found, over(chosen, overrides, ScenarioError), setting.parameter_set)
 
 
-def _nuisances(
-    item: ExperimentSection, made: Experiment, parameters: Sequence[FreeParameter], setting: Setting
-) -> list[FreeParameter]:
-    """Return the numbers that are fitted to one recording only because nobody knows them exactly."""
-    starts: tuple[str, ...] = FITTED_CHANNELS[1:] if item.initial_state == "fitted" else ()
-    if item.initial_state is None and item.scenario is None and setting.tolerances.start_of_pressure == 0.0:
-        # Samples at rest say where a run begins no better than their noise. They are compared: a prior would count
-        # them twice.
-        begun = made.recording.between(made.start, float(made.recording.time[-1]))
-        is_at_rest = not begun[COMMAND][:2].any()
-        starts = tuple(name for name in FITTED_CHANNELS[1:] if is_at_rest and name in made.channels)
-    given = {one.path for one in parameters if not one.recordings or item.label in one.recordings}
-    paths = [path for name in starts if (path := f"initial.{name}") not in given]
-    found = [FreeParameter(path, recordings=(item.label,)) for path in paths]
-    if item.time_offset is not None:
-        said = f"{setting.file}: experiment '{item.label}': time_offset"
-        longest = quantity_of(said, item.time_offset, "s")
-        if longest <= 0.0:
-            raise IdentificationError(f"{said} = '{item.time_offset}' must be above 0")
-        found.append(FreeParameter(TIME_OFFSET, low=-longest, high=longest, recordings=(item.label,)))
-    return found
+def _time_offset(item: ExperimentSection, setting: Setting) -> list[FreeParameter]:
+    """Return the delay of the samples of one recording, as a tolerance, where it may have one."""
+    if item.time_offset is None:
+        return []
+    said = f"{setting.file}: experiment '{item.label}': time_offset"
+    longest = quantity_of(said, item.time_offset, "s")
+    if longest <= 0.0:
+        raise IdentificationError(f"{said} = '{item.time_offset}' must be above 0")
+    deviation = longest / math.sqrt(3.0)
+    return [FreeParameter(TIME_OFFSET, 0.0, -longest, longest, deviation, (item.label,), is_tolerance=True)]
 
 
 def _parameter(item: ParameterSection, scenarios: Mapping[str, Scenario], setting: Setting) -> FreeParameter:
@@ -369,7 +332,7 @@ def _parameter(item: ParameterSection, scenarios: Mapping[str, Scenario], settin
     def number(name: str, text: str | None) -> float | None:
         return None if text is None else quantity_of(f"{said}: {name}", text, quantity.unit, atmosphere)
 
-    prior: Prior | None = None
+    start, deviation = number("start", item.start), math.inf
     if item.prior == "bench":
         estimate = setting.bench.get(full_path(item.path, acting))
         if estimate is None or not estimate.is_usable:
@@ -377,17 +340,16 @@ def _parameter(item: ParameterSection, scenarios: Mapping[str, Scenario], settin
             raise IdentificationError(
                 f"{said}: prior = 'bench': no procedure of this problem identified it; identified: {have}"
             )
-        prior = Prior(estimate.value, estimate.wider_half_width / interval_factor(estimate.confidence))
+        start, deviation = estimate.value, estimate.wider_half_width / interval_factor(estimate.confidence)
     elif item.prior is not None:
-        mean = quantity_of(f"{said}: prior.mean", item.prior.mean, quantity.unit, atmosphere)
-        prior = Prior(mean, abs(mean) * item.prior.relative)
+        start = quantity_of(f"{said}: prior.mean", item.prior.mean, quantity.unit, atmosphere)
+        deviation = abs(start) * item.prior.relative
     return FreeParameter(
         path=item.path,
-        start=number("start", item.start),
+        start=start,
         low=number("low", item.low),
         high=number("high", item.high),
-        scale=item.scale,
-        prior=prior,
+        deviation=deviation,
         recordings=item.recordings,
     )
 
@@ -468,148 +430,31 @@ def _start_of(recording: Recording, device: Device, known: Mapping[str, float], 
     return Start(float(between_stops(np.array([angle]), device, said)[0]), rate, pressure_1, pressure_2)
 
 
-EXCITED = 5.0
-"""Range of a channel over its noise below which nothing happens in it."""
-
-_HELD_SAMPLES = 20
-_GAP = 1.5
-
-
-def prospects_of(residuals: Residuals, search: Search) -> tuple[Prospect, ...]:
-    """Return what the recordings can give and what not, from the samples and the slopes at the start of the search."""
-    found = []
-    for prepared in residuals.experiments:
-        gaps = np.diff(prepared.time)
-        usual, longest = float(np.median(gaps)), float(gaps.max())
-        if longest > _GAP * usual:
-            text = f"a gap of {longest:.3g} s at {float(prepared.time[int(np.argmax(gaps))]):.3g} s, where samples are "
-            text += f"{usual:.3g} s apart; what lies in it is not used"
-            found.append(Prospect(f"clock of {prepared.label}", True, text))
-        for channel in prepared.channels:
-            # Whether a channel moves, and is not cut off at the limit of its sensor.
-            size, held = float(np.ptp(channel.values)) / channel.noise, _samples_at_limit(channel.values)
-            is_held, text = held > _HELD_SAMPLES, f"its range is {size:.3g} times its noise"
-            if is_held:
-                text = f"{held} consecutive samples are exactly its maximum or minimum: "
-                text += "the sensor is at its limit or stuck"
-            elif size < EXCITED:
-                text = f"its range is {size:.2g} times its noise: nothing happens in it"
-            found.append(Prospect(f"{channel.name} of {prepared.label}", size >= EXCITED and not is_held, text))
-    return (*found, *_numbers(residuals, search))
-
-
-def _samples_at_limit(values: Floats) -> int:
-    """Return the longest run of samples that all have the greatest or all have the least value."""
-    longest = 0
-    for limit in (float(values.max()), float(values.min())):
-        is_there = np.concatenate([[False], values == limit, [False]])
-        changes = np.flatnonzero(np.diff(is_there.astype(np.int8)))
-        longest = max(longest, int(np.max(changes[1::2] - changes[::2], initial=0)))
-    return longest
-
-
-def _numbers(residuals: Residuals, search: Search) -> list[Prospect]:
-    """Return for each number how well white noise of the estimated size would let it be known, at the start values."""
-    ranges, point = residuals.ranges, residuals.start
-    if not np.isfinite(residuals.of_data(point[None, :])).all():
-        return [Prospect("numbers", False, "the model diverges at the start values, so nothing can be predicted")]
-    known = precision(residuals.around(point, np.diag(np.full(len(point), FIRST_STEP))), "linear")
-    known = precision(residuals.around(point, directions_for(known, moved_alone(point, ranges))), "linear")
-    errors, together = np.sqrt(np.diag(covariance(known))), correlation(covariance(known))
-    _, priors, _ = prior_coordinates(ranges)
-    found = []
-    for index, item in enumerate(ranges):
-        if item.is_tolerance:
-            continue
-        error, row = float(errors[index]), together[index]
-        fraction = relative_to_number(item, item.coordinate(item.start), interval_factor(search.confidence) * error)
-        is_prior = error > FROM_PRIOR * priors[index]
-        partners = [other.name for at, other in enumerate(ranges) if at != index and abs(row[at]) >= STRONG]
-        if is_prior:
-            text = "the recordings add little to its prior"
-        elif fraction <= search.weak:
-            text = f"with white noise alone it would be known to {percentage(fraction, 2)}"
-        else:
-            text = (
-                f"it trades off against {', '.join(partners)}"
-                if partners
-                else "the recordings are hardly sensitive to it"
-            )
-            text += "; fix it, give it a prior, or record something else"
-        found.append(Prospect(item.name, not is_prior and fraction <= search.weak, text))
-    return found
-
-
-ACCEPTABLE_FRACTION = 0.10
-"""RMS of what is left, over the range of the samples, that the paper calls acceptable (page with figure 7)."""
-
-
 @dataclass(frozen=True, slots=True)
 class TrajectoryOutcome:
-    """The fit, the requested profiles, candidates by what they would bring, the best first, and checks.
-
-    ``beforehand`` is what the recordings could give and what not, known before the search, ``unseen`` what they leave
-    open of effects that the model lacks, ``following`` the next experiments that were wanted. ``remarks`` are about the
-    fit as a whole, also about where it contradicts a bench procedure.
-    """
+    """The fit, candidates by what they would bring, the best first, and remarks on recordings and on the fit."""
 
     fit: TrajectoryFit
-    profiles: tuple[Profile, ...]
     expected: tuple[Expected, ...]
-    checks: tuple[Check, ...]
     remarks: tuple[str, ...]
-    beforehand: tuple[Prospect, ...] = ()
-    unseen: tuple[str, ...] = ()
-    following: NextExperiments | None = None
 
     @property
-    def failed(self) -> tuple[Check, ...]:
-        """The checks that did not hold."""
-        return tuple(check for check in self.checks if not check.holds)
+    def is_good(self) -> bool:
+        """Whether the search converged on a device that keeps its rules, and no recording wants other numbers."""
+        return not self.fit.conflict and not self.fit.remarks
 
 
 def solve_section(section: TrajectorySection, setting: Setting, report: Report) -> TrajectoryOutcome:
     """Return the outcome of a section; everything that can be refused is refused before the search begins."""
     with name_in_refusals(setting.file):
         problem = trajectory_problem(section, setting)
-        names = [item.name for item in ranges_of(problem)]
-        paths = [full_path(path, problem.experiments[0].scenario) for path in section.profiles]
-        for typed, path in zip(section.profiles, paths, strict=True):
-            if path not in names:
-                raise IdentificationError(
-                    f"{setting.file}: profiles: '{typed}' is not fitted{nearest_name(path, names)}; fitted: "
-                    f"{', '.join(names)}"
-                )
-        candidates = candidates_of(section, setting, noise_in(problem))
-        beforehand = prospects_of(residuals_of(problem), problem.search)
-        for one in beforehand:
-            if not one.can_be_had:
-                report(Progress(f"trajectory: insufficient data: {one.name}: {one.statement}"))
+        candidates = candidates_of(section, setting)
         found = fit(problem, report)
-        profiles = []
-        for number, path in enumerate(paths, start=1):
-            report(Progress(f"profile likelihood {number} of {len(paths)}: {path}"))
-            profiles.append(profile(found, path))
-        if candidates:
-            report(Progress(f"expected information of {count_of(len(candidates), 'further experiment')}"))
         expected = expected_information(found, candidates)
-        following = None
-        if setting.ability is not None and setting.following:
-            following = propose(
-                found,
-                setting.ability,
-                setting.tolerances,
-                setting.following,
-                lambda name, changes: _scenario(name, changes, setting),
-                report,
-            )
-    remarks = (*found.remarks, *_contradictions(found, setting.bench))
-    unseen: tuple[str, ...] = ()
-    if found.doubt is not None:
-        half_widths = 0.5 * (found.uncertainty.high - found.uncertainty.low)
-        ranges, point = found.optimum.residuals.ranges, found.uncertainty.centre
-        unseen = unseen_in_words(found.doubt, ranges, point, half_widths, found.scenarios)
-    return TrajectoryOutcome(found, tuple(profiles), expected, _checks(found), remarks, beforehand, unseen, following)
+    sources = tuple(Source(item.recording, item.source) for item in problem.experiments)
+    return TrajectoryOutcome(
+        found, expected, (*told_of_readings(sources), *found.remarks, *_contradictions(found, setting.bench))
+    )
 
 
 def _contradictions(found: TrajectoryFit, bench: Mapping[str, Estimate]) -> list[str]:
@@ -625,33 +470,3 @@ def _contradictions(found: TrajectoryFit, bench: Mapping[str, Estimate]) -> list
                 f"gave {other.low:.4g} to {other.high:.4g}: one of the two models is incomplete"
             )
     return remarks
-
-
-def _checks(found: TrajectoryFit) -> tuple[Check, ...]:
-    worst = max(found.channels, key=lambda channel: channel.fraction)
-    left, good = percentage(worst.fraction, 2), f"{100.0 * ACCEPTABLE_FRACTION:g} %"
-    description = f"RMS at most {left} of the range in {worst.channel} of {worst.experiment}; {good} is good"
-    broken = next((text for text in (broken_rule(item.device) for item in found.scenarios) if text), "")
-    settled = found.optimum.has_converged
-    wrong = found.misfit
-    return (
-        Check(
-            "search",
-            settled,
-            f"{found.evaluations} evaluations, {'converged' if settled else 'stopped before it converged'}",
-        ),
-        Check("what is left", worst.fraction <= ACCEPTABLE_FRACTION, description),
-        Check("one model for all", not wrong, wrong or found.uncertainty.misfit.in_words),
-        *_bench_check(found),
-        Check("numbers agree", not broken, broken or "no rule of a device is broken"),
-    )
-
-
-def _bench_check(found: TrajectoryFit) -> tuple[Check, ...]:
-    """Return whether all tolerances of the bench are kept, nothing where it states none."""
-    stated = [item for item in found.estimates if item.verdict in BENCH_VERDICTS]
-    if not stated:
-        return ()
-    broken = [item for item in stated if item.verdict == "beyond its tolerance"]
-    text = "; ".join(f"{item.path}: {item.explanation}" for item in broken)
-    return (Check("bench", not broken, text or f"{count_of(len(stated), 'number')} within the stated tolerances"),)

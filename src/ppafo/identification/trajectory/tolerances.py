@@ -1,34 +1,38 @@
-"""The table [bench] of a problem file: what a bench does not know exactly, and what it can do.
+"""What a bench and a set do not know exactly, as numbers of the fit with priors: the table [bench], and its defaults.
 
-A tolerance is a limit, as data sheets state it. It makes a number of the fit that nobody asks for: a supply, a load or
-a start of one recording, a zero or a gain of a sensor. Of these only the limits are known, so each has a prior of
-limit / sqrt(3), the standard deviation of an even distribution between the limits (GUM, JCGM 100:2008, 4.3.7).
+A tolerance is a limit, as data sheets state it. Only the limits are known, so each has a prior of limit / sqrt(3), the
+standard deviation of an even distribution between the limits (GUM, JCGM 100:2008, 4.3.7). A number of the set that is
+held has the uncertainty that the set states, at 95 %, or else a limit of ``HELD``.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from pydantic import Field
 
-from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.constants import PASCALS_PER_PSI
 from ppafo.documents.models import StrictTable, Text
 from ppafo.errors import IdentificationError, UnitError, refused_as
+from ppafo.identification.estimate import interval_factor
+from ppafo.identification.new_set import fitting_unit
 from ppafo.identification.trajectory.problem import (
     FITTED_CHANNELS,
     GAIN_OF,
     ZERO_OF,
     Experiment,
     FreeParameter,
-    Prior,
+    declared_numbers,
     full_path,
     number_at,
     scenario_of,
 )
+from ppafo.parameters.parameter_set import CONFIDENCE, ParameterSet
+from ppafo.signals.faults import noise_of
 from ppafo.simulation.recorded import ANGLE, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY
-from ppafo.simulation.scenario import FreeMotion
-from ppafo.units import parse_quantity
+from ppafo.simulation.scenario import PYTHON_CONTROLLER, FreeMotion, Scenario
+from ppafo.units import parse_quantity, to_si
 
 _WIDEST = 12.0
 """Standard deviations of its prior that a tolerance may be off at most in the search."""
@@ -36,93 +40,92 @@ _WIDEST = 12.0
 Sensed = Literal["zero", "gain"]
 
 
-class AbilitySection(StrictTable):
-    """What the bench can do in its next experiment: the lowest and the highest of each."""
-
-    supply_pressure: Annotated[
-        tuple[Text, Text], Field(strict=False, description="of each of the two regulators, ['20 psi_g', '90 psi_g']")
-    ]
-    load: Annotated[
-        tuple[Text, Text],
-        Field(strict=False, description="constant torque on the vane, above 0 against plantarflexion"),
-    ] = ("0 N m", "0 N m")
-    command: Annotated[
-        tuple[float, float], Field(strict=False, description="of the valve, from -1 to 1; both signs where it can")
-    ] = (-1.0, 1.0)
-    torque: Annotated[
-        tuple[Text, Text] | None,
-        Field(strict=False, description="amplitude of a sine that a torque controller follows; default: it has none"),
-    ] = None
-    frequency: Annotated[tuple[Text, Text], Field(strict=False, description="of that sine")] = ("0.5 Hz", "5 Hz")
-    angle: Annotated[
-        tuple[Text, Text] | None, Field(strict=False, description="where the vane starts; default: at a stop")
-    ] = None
-    duration: Annotated[tuple[Text, Text], Field(strict=False, description="length of a recording")] = (
-        "0.3 s",
-        "1 s",
-    )
-    sample_rate: Annotated[Text, Field(description="samples per second of all channels")] = "1 kHz"
-    candidates: Annotated[int, Field(ge=4, le=2000, description="experiments that are drawn to choose from")] = 80
-    seed: Annotated[int, Field(ge=0, description="random seed of the draws")] = 1
-
-
 class BenchSection(StrictTable):
-    """What the bench does not know exactly: limits on either side; and what it can do."""
+    """What the bench does not know exactly: limits on either side; 0 is known exactly."""
 
-    load: Annotated[Text | None, Field(description="of the external torque, of each recording: '2 %'")] = None
-    supply: Annotated[Text | None, Field(description="of each supply pressure, of each recording: '1 psi_d'")] = None
-    zero_of_angle: Annotated[Text | None, Field(description="of the zero of the angle sensor: '0.3 deg'")] = None
-    zero_of_pressure: Annotated[Text | None, Field(description="of each pressure sensor: '0.15 psi_d'")] = None
-    gain: Annotated[Text | None, Field(description="of the gain of each sensor: '0.3 %'")] = None
-    start_of_angle: Annotated[Text | None, Field(description="of the angle at the start of each recording")] = None
-    start_of_pressure: Annotated[Text | None, Field(description="of both pressures at the start of each")] = None
+    load: Annotated[Text | None, Field(description="of the external torque, of each recording; default 2 %")] = None
+    supply: Annotated[Text | None, Field(description="of each supply pressure, of each recording; 1 psi_d")] = None
+    zero_of_angle: Annotated[Text | None, Field(description="of the zero of the angle sensor; 0.5 deg")] = None
+    zero_of_pressure: Annotated[Text | None, Field(description="of each pressure sensor; 0.3 psi_d")] = None
+    gain: Annotated[
+        Text | None, Field(description="of the gain of each sensor; 0.5 % of pressures, 0 % of the angle")
+    ] = None
+    start_of_angle: Annotated[
+        Text | None, Field(description="of the angle at the start of each recording; 0.05 deg where it is read there")
+    ] = None
+    start_of_pressure: Annotated[
+        Text | None,
+        Field(description="of both pressures at the start; the noise of a sample where they are read there"),
+    ] = None
     each_recording: Annotated[
         tuple[Sensed, ...],
         Field(strict=False, description="'zero', 'gain': anew in each recording; default: the same in all of them"),
     ] = ()
-    can: Annotated[AbilitySection | None, Field(description="what the bench can do, for the next experiment")] = None
-
-
-@dataclass(frozen=True, slots=True)
-class Ability:
-    """What a bench can do, lowest and highest of each, in SI units.
-
-    ``angle`` None starts at a stop, ``torque`` None has no torque controller. ``interval`` [s] is the time between
-    two samples.
-    """
-
-    supply_pressure: tuple[float, float]
-    load: tuple[float, float]
-    command: tuple[float, float]
-    torque: tuple[float, float] | None
-    frequency: tuple[float, float]
-    angle: tuple[float, float] | None
-    duration: tuple[float, float]
-    interval: float
-    candidates: int = 80
-    seed: int = 1
+    gas_temperature: Annotated[Text | None, Field(description="of the temperature of the gas; 15 K")] = None
+    gas_law: Annotated[Text | None, Field(description="departure of the gas from the ideal gas law; 1 %")] = None
+    zero_of_flow: Annotated[Text | None, Field(description="zero of the flow meter, of its largest reading")] = None
+    held: Annotated[Text | None, Field(description="of a number of the set that states no uncertainty of its own")] = (
+        None
+    )
 
 
 @dataclass(frozen=True, slots=True)
 class Tolerances:
     """Limits on either side of what a bench does not know exactly, in SI units; 0 is known. ``load`` is a fraction.
 
-    ``zeros`` are those of a sensor by channel. Those ``each_recording`` names are others in each recording.
+    None takes the default of the channel or number. Those ``each_recording`` names are others in each recording.
     """
 
-    load: float = 0.0
-    supply: float = 0.0
-    zero_of_angle: float = 0.0
-    zero_of_pressure: float = 0.0
-    gain: float = 0.0
-    start_of_angle: float = 0.0
-    start_of_pressure: float = 0.0
+    load: float = 0.02
+    supply: float = PASCALS_PER_PSI
+    zero_of_angle: float = math.radians(0.5)
+    zero_of_pressure: float = 0.3 * PASCALS_PER_PSI
+    gain: float | None = None
+    start_of_angle: float | None = None
+    start_of_pressure: float | None = None
+    gas_temperature: float | None = None
+    gas_law: float | None = None
+    held: float | None = None
     each_recording: tuple[Sensed, ...] = ()
 
     def zero_of(self, channel: str) -> float:
         """Return the limit of the zero of a channel [rad], [Pa]."""
         return self.zero_of_angle if channel == ANGLE else self.zero_of_pressure
 
+    def gain_of(self, channel: str) -> float:
+        """Return the limit of the gain of a channel [-]."""
+        usual = 0.0 if channel == ANGLE else 0.005
+        return usual if self.gain is None else self.gain
+
+
+HELD = {
+    "gas.molar_mass": 0.01,
+    "gas.heat_capacity_ratio": 0.02,
+    "actuator.torque_constant": 0.02,
+    "actuator.volume_per_angle": 0.02,
+    "actuator.dead_volume_1": 0.05,
+    "actuator.dead_volume_2": 0.05,
+    "actuator.leak.discharge_coefficient": 0.3,
+    "actuator.leak.sonic_conductance": 0.3,
+    "actuator.restitution": 0.2,
+    "friction.static_torque": 0.3,
+    "friction.dynamic_torque": 0.5,
+    "friction.viscous_damping": 0.3,
+    "foot_plate.inertia": 0.05,
+    "foot_plate.gravity_torque": 0.1,
+    "valve.discharge_coefficient": 0.1,
+    "valve.sonic_conductance": 0.1,
+}
+"""Limits [-] of numbers of a set that is silent about them, over the number."""
+
+_TEMPERATURE = 15.0
+_OTHER_SETTING = 0.1
+"""Limit [-] of a setting of the valve, an effect or an actuator of another kind."""
+
+_EXACT = ("area", "angle_min", "angle_max", "linear_ratio", "critical_ratio", "atmospheric_pressure")
+"""Names of numbers that only go with another one, or that the zero of a sensor moves as well."""
+
+_START_OF_ANGLE = math.radians(0.05)
 
 _UNITS = {
     "load": "1",
@@ -132,124 +135,135 @@ _UNITS = {
     "gain": "1",
     "start_of_angle": "rad",
     "start_of_pressure": "Pa_d",
+    "gas_temperature": "K",
+    "gas_law": "1",
+    "held": "1",
 }
 _LARGEST_FRACTION = 0.5
 
 
-def tolerances_of(section: BenchSection, file: str) -> Tolerances:
-    """Return the tolerances of a table [SI]; IdentificationError for one that is not above 0, or a fraction of 1."""
+def tolerances_of(section: BenchSection | None, file: str) -> Tolerances:
+    """Return the tolerances of a table [SI], defaults without one; IdentificationError for one below 0."""
     limits = {}
     for name, unit in _UNITS.items():
-        text = getattr(section, name)
+        text = None if section is None else getattr(section, name)
         if text is None:
             continue
-        said = f"{file}: bench: {name}"
-        limit = limits[name] = _quantity(said, text, unit)
-        if not 0.0 < limit < math.inf or (unit == "1" and limit > _LARGEST_FRACTION):
+        said = f"{file}: bench: {name} = '{text}'"
+        with refused_as(IdentificationError, said, UnitError):
+            limit = limits[name] = parse_quantity(text, unit)
+        if not 0.0 <= limit < math.inf or (unit == "1" and limit > _LARGEST_FRACTION):
             most = f" and at most {_LARGEST_FRACTION:.0%}" if unit == "1" else ""
-            raise IdentificationError(
-                f"{said} = '{text}': must be above 0{most}; leave it out where the bench knows it exactly"
+            raise IdentificationError(f"{said}: must be 0 or above{most}")
+    return Tolerances(**limits, each_recording=() if section is None else section.each_recording)
+
+
+def stated_by(parameter_set: ParameterSet, scenario: Scenario) -> dict[str, float]:
+    """Return half widths of the 95 % intervals that a set states [SI], by path."""
+    found = {}
+    for path, quantity in declared_numbers(scenario).items():
+        entry = parameter_set.numbers.get(path)
+        if entry is not None and entry.uncertainty:
+            unit = fitting_unit(entry.unit, quantity)
+            found[path] = to_si(entry.value + entry.uncertainty, entry.unit, unit) - to_si(
+                entry.value, entry.unit, unit
             )
-    return Tolerances(**limits, each_recording=section.each_recording)
-
-
-def ability_of(section: AbilitySection, atmosphere: float, file: str) -> Ability:
-    """Return what a bench can do [SI]; IdentificationError where the lowest is above the highest."""
-    said = f"{file}: bench.can"
-
-    def ends(name: str, unit: str) -> tuple[float, float]:
-        low, high = (_quantity(f"{said}: {name}", text, unit, atmosphere) for text in getattr(section, name))
-        return _in_order(f"{said}: {name}", low, high)
-
-    rate = _quantity(f"{said}: sample_rate", section.sample_rate, "Hz")
-    command = _in_order(f"{said}: command", *section.command)
-    frequency, duration = ends("frequency", "Hz"), ends("duration", "s")
-    for name, is_possible, rule in (
-        ("sample_rate", 10.0 <= rate <= 1.0e5, "10 Hz to 100 kHz"),
-        ("command", command[0] >= -1.0 and command[1] <= 1.0, "-1 to 1"),
-        ("frequency", frequency[0] > 0.0 and frequency[1] <= 100.0, "above 0 Hz and at most 100 Hz"),
-        ("duration", duration[0] > 0.0 and duration[1] <= 100.0, "above 0 s and at most 100 s"),
-    ):
-        if not is_possible:
-            raise IdentificationError(f"{said}: {name} = {getattr(section, name)!r}: must be {rule}")
-    return Ability(
-        supply_pressure=ends("supply_pressure", "Pa_a"),
-        load=ends("load", "N m"),
-        command=command,
-        torque=None if section.torque is None else ends("torque", "N m"),
-        frequency=frequency,
-        angle=None if section.angle is None else ends("angle", "rad"),
-        duration=duration,
-        interval=1.0 / rate,
-        candidates=section.candidates,
-        seed=section.seed,
-    )
-
-
-def _in_order(said: str, low: float, high: float) -> tuple[float, float]:
-    if not low <= high:
-        raise IdentificationError(f"{said}: the first must not be above the second")
-    return low, high
-
-
-def _quantity(said: str, text: str, unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
-    with refused_as(IdentificationError, f"{said} = '{text}'", UnitError):
-        return parse_quantity(text, unit, atmosphere)
+    return found
 
 
 def tolerance_parameters(
-    tolerances: Tolerances, experiments: Sequence[Experiment], fitted: Sequence[FreeParameter]
+    tolerances: Tolerances,
+    experiments: Sequence[Experiment],
+    fitted: Sequence[FreeParameter],
+    stated: Mapping[str, float] | None = None,
 ) -> tuple[FreeParameter, ...]:
-    """Return what the tolerances add to a fit. What is ``fitted`` anyway, or followed by a run, is left as it is."""
-    found = []
+    """Return what is not known exactly and not ``fitted`` anyway, as numbers of the fit with priors.
+
+    ``stated`` are half widths of the 95 % intervals [SI] that the set states, by path.
+    """
+    found: list[FreeParameter] = []
     for experiment in experiments:
         free = {
             full_path(item.path, experiment.scenario)
             for item in fitted
             if not item.recordings or experiment.label in item.recordings
         }
-        for path, limit in _of_run(tolerances, experiment).items():
-            if path not in free:
-                mean = number_at(scenario_of(experiment), path)
-                found.append(_parameter(path, mean, limit, (experiment.label,)))
-    for channel in FITTED_CHANNELS:
-        labels = tuple(item.label for item in experiments if channel in item.channels)
-        for kind, prefix, limit in (("zero", ZERO_OF, tolerances.zero_of(channel)), ("gain", GAIN_OF, tolerances.gain)):
-            if limit > 0.0 and labels:
-                groups = [(label,) for label in labels] if kind in tolerances.each_recording else [()]
-                found += [_parameter(f"{prefix}{channel}", 0.0, limit, group) for group in groups]
-    return tuple(found)
+        for path, (start, deviation) in _of_run(tolerances, experiment).items():
+            if path not in free and deviation > 0.0:
+                found.append(_parameter(path, start, deviation, (experiment.label,)))
+    given = {full_path(item.path, experiments[0].scenario) for item in fitted}
+    for kind, prefix, limit_of in (("zero", ZERO_OF, tolerances.zero_of), ("gain", GAIN_OF, tolerances.gain_of)):
+        for channel in (*FITTED_CHANNELS, *((SUPPLY, DORSIFLEXION_SUPPLY) if kind == "zero" else ())):
+            labels = [
+                item.label
+                for item in experiments
+                if channel in item.channels or (kind == "zero" and channel in item.inputs)
+            ]
+            path, limit = f"{prefix}{channel}", limit_of(channel)
+            if not labels or not limit > 0.0 or path in given:
+                continue
+            groups = [(label,) for label in labels] if kind in tolerances.each_recording else [tuple(labels)]
+            for group in groups:
+                whole = len(group) == len(experiments) and kind not in tolerances.each_recording
+                found.append(_parameter(path, 0.0, limit / math.sqrt(3.0), () if whole else group))
+    return (*found, *_of_set(tolerances, experiments, given, stated or {}))
 
 
-def _of_run(tolerances: Tolerances, experiment: Experiment) -> dict[str, float]:
-    """Return the limits of what one run is done with, by path [SI]."""
-    scenario, inputs = experiment.scenario, experiment.inputs
+def _of_run(tolerances: Tolerances, experiment: Experiment) -> dict[str, tuple[float, float]]:
+    """Return start and standard deviation of what one run is done with and how it begins, by path [SI]."""
+    scenario, inputs, recording = scenario_of(experiment), experiment.inputs, experiment.recording
     free = scenario.motion if isinstance(scenario.motion, FreeMotion) and scenario.motion.leg is None else None
-    limits = {}
-    if free is not None and EXTERNAL_TORQUE not in inputs:
-        limits["motion.external_torque"] = tolerances.load * abs(free.external_torque)
+    found = {}
+    if free is not None and EXTERNAL_TORQUE not in inputs and free.external_torque != 0.0:
+        found["motion.external_torque"] = tolerances.load * abs(free.external_torque) / math.sqrt(3.0)
     if SUPPLY not in inputs:
         # Two regulators are set one by one, to one pressure too.
-        limits["supply.pressure"] = tolerances.supply
+        found["supply.pressure"] = tolerances.supply / math.sqrt(3.0)
         if DORSIFLEXION_SUPPLY not in inputs:
-            limits["supply.dorsiflexion_pressure"] = tolerances.supply
+            found["supply.dorsiflexion_pressure"] = tolerances.supply / math.sqrt(3.0)
+    is_read = experiment.initial_state == "recording" or experiment.scenario.control.kind == PYTHON_CONTROLLER
     stops = scenario.device.actuator.angle_min, scenario.device.actuator.angle_max
     # Where the vane lies at a stop, the stop says where it starts.
     if free is not None and ANGLE not in inputs and not any(math.isclose(free.angle, stop) for stop in stops):
-        limits["motion.angle"] = tolerances.start_of_angle
-    limits |= dict.fromkeys(("initial.pressure_1", "initial.pressure_2"), tolerances.start_of_pressure)
-    return {path: limit for path, limit in limits.items() if limit > 0.0}
+        stated = tolerances.start_of_angle
+        usual = _START_OF_ANGLE if is_read else 0.0
+        found["motion.angle"] = usual if stated is None else stated / math.sqrt(3.0)
+    for name in ("pressure_1", "pressure_2"):
+        noise = noise_of(recording[name]) if is_read and name in recording else 0.0
+        stated = tolerances.start_of_pressure
+        found[f"initial.{name}"] = noise if stated is None else stated / math.sqrt(3.0)
+    return {path: (number_at(scenario, path), deviation) for path, deviation in found.items()}
 
 
-def _parameter(path: str, mean: float, limit: float, recordings: tuple[str, ...]) -> FreeParameter:
-    deviation = limit / math.sqrt(3.0)
-    low, high = (mean - _WIDEST * deviation, mean + _WIDEST * deviation)
-    return FreeParameter(
-        path=path,
-        low=low,
-        high=high,
-        scale="linear",
-        prior=Prior(mean, deviation),
-        recordings=recordings,
-        is_tolerance=True,
-    )
+def _of_set(
+    tolerances: Tolerances, experiments: Sequence[Experiment], given: set[str], stated: Mapping[str, float]
+) -> Iterator[FreeParameter]:
+    """Return the numbers of the device that are held, each with its own uncertainty, as the fit moves them."""
+    scenario = experiments[0].scenario
+    for path, quantity in declared_numbers(scenario).items():
+        section, _, name = path.rpartition(".")
+        if path in given or section in ("motion", "initial", "recording", "motion.shank") or path.startswith("supply."):
+            continue
+        value, own = number_at(scenario, path), stated.get(path, 0.0) / interval_factor(CONFIDENCE)
+        if value == 0.0 or (own == 0.0 and name in _EXACT):
+            continue
+        usual = HELD.get(path.replace(f"valves.{scenario.device.valve_name}.", "valve."), _OTHER_SETTING)
+        limit = abs(value) * (usual if tolerances.held is None else tolerances.held)
+        if path == "gas.temperature":
+            limit, own = _TEMPERATURE, 0.0 if tolerances.gas_temperature is not None else own
+            limit = limit if tolerances.gas_temperature is None else tolerances.gas_temperature
+        if path == "gas.molar_mass" and tolerances.gas_law is not None:
+            limit, own = abs(value) * tolerances.gas_law, 0.0
+        deviation = own or limit / math.sqrt(3.0)
+        if deviation > 0.0:
+            low, high = (
+                max(quantity.minimum, value - _WIDEST * deviation),
+                min(quantity.maximum, value + _WIDEST * deviation),
+            )
+            low = max(low, 0.05 * value) if quantity.minimum >= 0.0 else low
+            yield FreeParameter(path, value, low, high, deviation, is_tolerance=True)
+
+
+def _parameter(path: str, start: float, deviation: float, recordings: tuple[str, ...]) -> FreeParameter:
+    width = _WIDEST * deviation
+    return FreeParameter(path, start, start - width, start + width, deviation, recordings, is_tolerance=True)

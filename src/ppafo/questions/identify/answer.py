@@ -4,8 +4,6 @@ import math
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,11 +12,9 @@ from ppafo.answers import Answer, Figure, Section, Table
 from ppafo.answers.style import (
     ACTUAL,
     BLACK,
-    BLUE,
     CHAMBER_1,
     CHAMBER_2,
     GREY,
-    VERMILION,
     Margins,
     figure_of_panels,
     house_style,
@@ -27,17 +23,15 @@ from ppafo.answers.style import (
 from ppafo.constants import PASCALS_PER_PSI, STANDARD_ATMOSPHERE
 from ppafo.errors import DataError
 from ppafo.identification.bench.result import BenchResult, count_of, figure_3, procedure_figure
-from ppafo.identification.estimate import BENCH_VERDICTS, Check, Estimate, Prospect
+from ppafo.identification.estimate import Estimate
 from ppafo.identification.new_set import NewSet, in_set_unit
-from ppafo.identification.trajectory.fitting import TrajectoryFit
-from ppafo.identification.trajectory.follow_up import Expected, Profile
+from ppafo.identification.trajectory.expected import Expected
+from ppafo.identification.trajectory.fitting import Known, TrajectoryFit
 from ppafo.identification.trajectory.section import TrajectoryOutcome
 from ppafo.parameters.loading import parameter_set_toml
 from ppafo.parameters.parameter_set import ParameterSet
-from ppafo.questions.identify.plan import PLAN_FIGURE, Plan, bench_file, plan_figure, plan_section, rig_requests
 from ppafo.questions.question import Solved
 from ppafo.signals import Recording, RecordingKind
-from ppafo.signals.recording import Floats
 from ppafo.simulation.scenario import plain
 
 if TYPE_CHECKING:
@@ -45,37 +39,27 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-@dataclass(frozen=True, slots=True)
-class Beforehand:
-    """What the recordings of a procedure can give and what not, said before anything was fitted."""
-
-    procedure: str
-    prospects: tuple[Prospect, ...]
-
-
 @dataclass(frozen=True, slots=True, repr=False)
 class Identification(Solved):
     """The outcome of a problem: what could be had, results in the order of making, the set before and after."""
 
     name: str
-    beforehand: tuple[Beforehand, ...]
     results: tuple[BenchResult, ...]
     trajectory: TrajectoryOutcome | None
     before: ParameterSet
     new_set: NewSet
-    plan: Plan | None = None
 
     @property
     def estimates(self) -> tuple[Estimate, ...]:
         """All estimates of all procedures, those of the trajectory fit last."""
         fitted = () if self.trajectory is None else self.trajectory.fit.estimates
-        return (*_bench_estimates(self.results), *fitted)
+        return (*bench_estimates(self.results), *fitted)
 
     @property
     def is_good(self) -> bool:
-        """Whether every check holds and the new set makes a device where the old one did."""
-        fitted = () if self.trajectory is None else self.trajectory.failed
-        return not self.new_set.problem and not fitted and not any(result.failed for result in self.results)
+        """Whether recordings agree on their numbers and the new set makes a device."""
+        is_fitted = self.trajectory is None or self.trajectory.is_good
+        return is_fitted and not self.new_set.problem and not any(result.conflict for result in self.results)
 
     @property
     def kind(self) -> RecordingKind:
@@ -84,87 +68,13 @@ class Identification(Solved):
         return kind_of_all([*kinds, *(() if self.trajectory is None else (kind_of_fit(self.trajectory.fit),))])
 
 
-_COLUMNS = 3
-_PROFILE_WIDTH, _HEIGHT = 2.75, 2.35
-_LEFT, _RIGHT, _TOP, _BOTTOM, _COLUMN_GAP, _ROW_GAP = 0.62, 0.25, 0.82, 0.55, 0.5, 0.85
-"""Inches."""
-_MAXIMUM_SHOWN = 1.9
-"""Largest rise that a panel shows, in thresholds."""
-
-
-def profile_figure(outcome: TrajectoryOutcome, before: ParameterSet, kind: RecordingKind) -> "matplotlib.figure.Figure":
-    """Return a panel for each profile, numbers in the units of the set that the fit started from."""
-    import matplotlib.figure
-
-    profiles = outcome.profiles
-    columns = min(_COLUMNS, len(profiles))
-    rows = -(-len(profiles) // columns)
-    width = max(_LEFT + _RIGHT + columns * _PROFILE_WIDTH + (columns - 1) * _COLUMN_GAP, 6.2)
-    height = _TOP + _BOTTOM + rows * _HEIGHT + (rows - 1) * _ROW_GAP
-    with house_style():
-        figure = matplotlib.figure.Figure(figsize=(width, height))
-        for index, one in enumerate(profiles):
-            row, column = divmod(index, columns)
-            left = _LEFT + column * (_PROFILE_WIDTH + _COLUMN_GAP)
-            bottom = height - _TOP - _HEIGHT - row * (_HEIGHT + _ROW_GAP)
-            axes = figure.add_axes((left / width, bottom / height, _PROFILE_WIDTH / width, _HEIGHT / height))
-            _draw_profile(axes, one, outcome.fit.estimate(one.path), before)
-            if column == 0:
-                axes.set_ylabel("Rise of the misfit (-)")
-        confidence = outcome.fit.problem.search.confidence
-        _label(figure, confidence)
-        mark_kind(figure, kind)
-        return figure
-
-
-def _draw_profile(axes: "Axes", one: Profile, estimate: Estimate, before: ParameterSet) -> None:
-    numbers = np.array([in_set_unit(float(number), one.path, one.unit, before)[0] for number in one.numbers])
-    value, unit = in_set_unit(estimate.value, one.path, one.unit, before)
-    axes.plot(*_smooth(numbers, one.rises), color=BLUE, linewidth=1.4)
-    axes.plot(numbers, one.rises, "o", color=BLUE, markersize=4)
-    axes.axhline(one.threshold, color=GREY, linewidth=1.0, linestyle=(0, (4, 3)))
-    for side in (one.low, one.high):
-        if side is not None:
-            axes.axvline(in_set_unit(side, one.path, one.unit, before)[0], color=VERMILION, linewidth=1.0)
-    axes.plot([value], [0.0], "|", color=BLACK, markersize=12)
-    axes.set_ylim(0.0, _MAXIMUM_SHOWN * one.threshold)
-    axes.set_title(one.path, fontsize=9.5)
-    axes.set_xlabel(f"({unit})" if unit not in ("", "-") else "")
-    axes.locator_params(axis="x", nbins=3)
-    axes.ticklabel_format(axis="x", useOffset=False)
-
-
-def _smooth(numbers: "np.ndarray", rises: "np.ndarray") -> "tuple[np.ndarray, np.ndarray]":
-    """Return a curve through the points whose signed square root is piecewise straight: a parabola stays one."""
-    roots = np.sqrt(rises) * np.where(np.arange(len(rises)) < int(np.argmin(rises)), -1.0, 1.0)
-    fine = np.linspace(numbers[0], numbers[-1], 200)
-    return fine, np.square(np.interp(fine, numbers, roots))
-
-
-def _label(figure: "matplotlib.figure.Figure", confidence: float) -> None:
-    from matplotlib.lines import Line2D
-
-    height, width = figure.get_figheight(), figure.get_figwidth()
-    figure.text(0.12 / width, 1.0 - 0.12 / height, "Profile likelihood", ha="left", va="top", fontweight="bold")
-    handles = [
-        Line2D([], [], color=BLUE, marker="o", markersize=4, label="all other numbers refitted"),
-        Line2D([], [], color=GREY, linestyle=(0, (4, 3)), linewidth=1.0, label=f"threshold of {100.0 * confidence:g}%"),
-        Line2D([], [], color=VERMILION, linewidth=1.0, label="interval"),
-    ]
-    place = (0.02 / width, 1.0 - 0.3 / height)
-    figure.legend(handles=handles, loc="upper left", bbox_to_anchor=place, ncols=3, handlelength=1.6)
-
-
 _TRAJECTORY_WIDTH, _VALUES, _LEFT_OVER = 7.2, 1.5, 0.62
 _MARGINS = Margins(left=0.78, right=0.2, top=0.62, bottom=0.52, row_gap=0.36, label=0.58)
-_MATRIX_CELL, _LETTER, _MATRIX_TOP = 0.62, 0.08, 0.5
 """Inches."""
 _DOT, _SAMPLE = 1.6, 3.6
 _MAXIMUM_DOTS = 90
 """Samples shown beside the line; what is left is shown of all."""
 _KIND_WORDS = {"measured": "measured", "simulated": "simulated samples", "synthetic": "synthetic measurement"}
-_NAMED = 0.3
-"""Correlations from this size on are written into their cell."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,38 +119,6 @@ def trajectory_fit_figure(
         return figure
 
 
-def correlation_figure(
-    names: Sequence[str], correlation: Floats, kind: RecordingKind = "measured"
-) -> "matplotlib.figure.Figure":
-    """Return the correlation matrix of estimates as a picture; strong colours are numbers that trade off.
-
-    ``kind`` is that of the recordings.
-    """
-    import matplotlib.figure
-
-    count = len(names)
-    name_width = 0.45 + _LETTER * max(len(name) for name in names)
-    width, height = name_width + count * _MATRIX_CELL + 0.2, _MATRIX_TOP + count * _MATRIX_CELL + 0.35
-    with house_style():
-        figure = matplotlib.figure.Figure(figsize=(width, height))
-        place = (name_width / width, 0.35 / height, count * _MATRIX_CELL / width, count * _MATRIX_CELL / height)
-        axes = figure.add_axes(place)
-        axes.imshow(correlation, cmap="RdBu_r", vmin=-1.0, vmax=1.0)
-        axes.grid(visible=False)
-        axes.set_yticks(range(count), [f"{name}  {index + 1}" for index, name in enumerate(names)])
-        axes.set_xticks(range(count), [str(index + 1) for index in range(count)])
-        for row, column in np.argwhere(np.abs(correlation) >= _NAMED):
-            if row != column:
-                number = float(correlation[row, column])
-                colour = "white" if abs(number) > 0.6 else BLACK
-                axes.text(int(column), int(row), f"{number:+.2f}", ha="center", va="center", fontsize=8.5, color=colour)
-        figure.text(
-            0.12 / width, 1.0 - 0.12 / height, "Correlation of the estimates", ha="left", va="top", fontweight="bold"
-        )
-        mark_kind(figure, kind)
-        return figure
-
-
 def _channels(atmosphere: float) -> tuple[_ChannelPanel, ...]:
     degrees, gauge = float(np.degrees(1.0)), 1.0 / PASCALS_PER_PSI
     return (
@@ -275,34 +153,24 @@ def _draw_trajectory(one: _ChannelPanel, panels: "tuple[Axes, Axes]", measuremen
     left.locator_params(axis="y", nbins=3)
 
 
-_NO_VALUE = "no value"
+_FAR, _SHOWN = 2.0, 0.05
+"""Standard deviations from which a tolerance is said to be contradicted; least share of a variance that is shown."""
 _MINIMUM_DIGITS, _MAXIMUM_DIGITS = 4, 9
-POSTERIOR = "posterior.nc"
 
 
 def answer_of(identification: Identification) -> Answer:
-    """Return the answer; it has passed where every check holds and the new set makes a device."""
+    """Return the answer; it has passed where recordings agree and the new set makes a device."""
     name, new_set, fitted = identification.name, identification.new_set, identification.trajectory
     problem = (f"it makes no device yet: {new_set.problem}",) if new_set.problem else ()
     files = {f"{name}.toml": lambda: parameter_set_toml(new_set.parameter_set).encode()}
-    if fitted is not None:
-        files[POSTERIOR] = partial(_posterior, fitted.fit)
-    plan = identification.plan
-    if plan is not None:
-        files |= {
-            "next-bench.toml": lambda: bench_file(plan).encode(),
-            "next-rig.sh": lambda: rig_requests(plan).encode(),
-        }
     return Answer(
         name="identify",
         kicker="Identification",
         title=f"The parameter set {name}",
         lead=(),
         sections=(
-            *(_beforehand_section(item) for item in identification.beforehand),
             *(_procedure_section(result, identification.before) for result in identification.results),
             *((_trajectory_section(fitted, identification.before),) if fitted else ()),
-            *((plan_section(plan),) if plan else ()),
             Section(paragraphs=(f"new set '{name}': {_count_sentence(identification)}", *problem)),
             *(Section(figure=figure, is_detail=True) for figure in _figures(identification)),
         ),
@@ -310,7 +178,6 @@ def answer_of(identification: Identification) -> Answer:
             "problem": identification.name,
             "started_from": identification.before.name,
             "is_good": identification.is_good,
-            "beforehand": [plain(item) for item in identification.beforehand],
             "procedures": [_procedure_data(result) for result in identification.results],
             **_trajectory_data(identification.trajectory),
             "new_set": {
@@ -330,15 +197,8 @@ def _count_sentence(identification: Identification) -> str:
     """Return how many values are identified, and apart from them which are fitted only."""
     written, fitted = identification.new_set.written, identification.new_set.fitted
     found = f"{count_of(len(written), 'value')} identified: {', '.join(written)}" if written else "no value identified"
-    rest = f"; fitted only, weak or for this model only: {', '.join(fitted)}" if fitted else ""
+    rest = f"; for this model only: {', '.join(fitted)}" if fitted else ""
     return f"{found}{rest}"
-
-
-def _beforehand_section(item: Beforehand) -> Section:
-    """Return what was known of a procedure before anything was fitted."""
-    words = {True: "sufficient", False: "INSUFFICIENT"}
-    remarks = tuple(f"{words[one.can_be_had]}: {one.name}: {one.statement}" for one in item.prospects)
-    return Section(f"before {item.procedure}, from the recordings alone:", remarks=remarks)
 
 
 def _procedure_section(result: BenchResult, before: ParameterSet) -> Section:
@@ -346,55 +206,65 @@ def _procedure_section(result: BenchResult, before: ParameterSet) -> Section:
     return Section(
         f"{result.procedure}{kind}: {result.summary}",
         table=Table((), tuple(estimate_row(item, before) for item in result.estimates)),
-        remarks=(*_checks(result.checks), *(f"remark: {remark}" for remark in result.remarks)),
+        remarks=(
+            *((f"holds for this model only: {result.conflict}",) if result.conflict else ()),
+            *(f"{item.path}: {item.explanation}" for item in result.estimates),
+            *(f"remark: {remark}" for remark in result.remarks),
+        ),
     )
 
 
 def _trajectory_section(outcome: TrajectoryOutcome, before: ParameterSet) -> Section:
-    """Return estimates, each that is not simply identified with its sentence, then checks, profiles and candidates."""
+    """Return estimates, each with its sentence, then tolerances that matter, what is left, and candidates."""
     kind, fit = kind_of_fit(outcome.fit), outcome.fit
     origin = "" if kind == "measured" else f" ({kind})"
-    missing = [one for one in outcome.beforehand if not one.can_be_had]
-    values = [item for item in fit.estimates if item.verdict not in BENCH_VERDICTS]
-    doubtful = [item for item in values if item.verdict != "identified"]
-    of_bench = [item for item in fit.estimates if item.verdict in BENCH_VERDICTS]
     candidates = enumerate(outcome.expected, start=1)
     return Section(
-        f"trajectory{origin}: {count_of(len(values), 'number')} fitted to "
-        f"{count_of(len(fit.measurements), 'recording')}",
-        paragraphs=tuple(f"beforehand: INSUFFICIENT: {one.name}: {one.statement}" for one in missing),
-        table=Table((), tuple(estimate_row(item, before) for item in values)),
+        f"trajectory{origin}: {count_of(len(fit.estimates), 'number')} fitted to "
+        f"{count_of(len(fit.measurements), 'recording')}, {count_of(len(fit.known), 'tolerance')}",
+        table=Table((), tuple(estimate_row(item, before) for item in fit.estimates)),
         remarks=(
-            *(f"{item.path}: {item.explanation}" for item in doubtful),
-            *(f"bench: {item.path}: {item.explanation}" for item in of_bench),
-            *_checks(outcome.checks),
+            *((f"holds for this model only: {fit.conflict}",) if fit.conflict else ()),
+            *(f"{item.path}: {item.explanation}" for item in fit.estimates if item.explanation != fit.conflict),
+            *_tolerances(fit.known, before),
             *(f"remark: {remark}" for remark in outcome.remarks),
-            *(f"cannot see: {sentence}" for sentence in outcome.unseen),
-            *(f"profile: {_profile(curve, before)}" for curve in outcome.profiles),
             *(f"next experiment {number}: {_candidate(candidate)}" for number, candidate in candidates),
         ),
     )
 
 
-def _checks(checks: Iterable[Check]) -> list[str]:
-    return [f"{'holds' if check.holds else 'FAILS'}: {check.name}: {check.statement}" for check in checks]
+def _tolerances(known: Sequence[Known], before: ParameterSet) -> list[str]:
+    """Return the tolerances that widen an interval or that the recordings contradict, largest first."""
+    is_far = {one.name: abs(one.after - one.before) > _FAR * one.before_error for one in known}
+    shown = sorted((one for one in known if one.share >= _SHOWN or is_far[one.name]), key=lambda one: -one.share)
+    found = []
+    for one in shown:
+        numbers = (one.before, one.before_error, one.after, one.after_error)
+        start, error, after, after_error = (_shown(number, one, before)[0] for number in numbers)
+        zero, unit = _shown(0.0, one, before)
+        text = f"tolerance: {one.name}: stated {start:.4g} +- {error - zero:.2g}, fitted {after:.4g} +- "
+        text = f"{text}{after_error - zero:.2g} {unit}".rstrip(" -")
+        found.append(f"{text}; {one.share:.0%} of the variance of {one.widens}" if one.share >= _SHOWN else text)
+    rest = len(known) - len(shown)
+    return [*found, f"tolerances that widen no interval: {rest}"] if rest else found
+
+
+def _shown(number: float, one: Known, before: ParameterSet) -> tuple[float, str]:
+    """Return a number of a tolerance in the unit of the set, an angle in degrees."""
+    if one.unit == "rad":
+        return math.degrees(number), "deg"
+    return in_set_unit(number, one.name.partition(" of ")[0], one.unit, before)
 
 
 def estimate_row(item: Estimate, before: ParameterSet) -> tuple[str, ...]:
-    """Return path, value, interval and verdict of an estimate of a trajectory fit, in the unit of the set."""
-    path, value, unit, interval = _row(item, before)
-    beside = "" if item.beside is None else f"{_in_set_unit(item, item.beside, before)[2]} {unit}".rstrip()
-    return path, f"{value} {unit}".rstrip(), interval, item.verdict_with(beside)
-
-
-def _profile(one: Profile, before: ParameterSet) -> str:
-    """Return the interval of a profile in words."""
-    sides = [None if side is None else in_set_unit(side, one.path, one.unit, before) for side in (one.low, one.high)]
-    known = [side[0] for side in sides if side is not None]
-    digits = _digits(known[0], 0.5 * (known[-1] - known[0])) if known else _MINIMUM_DIGITS
-    low, high = ("not bounded" if side is None else f"{side[0]:#.{digits}g}" for side in sides)
-    unit = next((side[1] for side in sides if side is not None), "")
-    return f"{one.path}: {low} to {high} {unit}".rstrip()
+    """Return path, value, interval and verdict of an estimate in the unit of the set, digits that tell its ends."""
+    if math.isnan(item.value):
+        return item.path, "no value", "", item.verdict
+    shown = [in_set_unit(one, item.path, item.unit, before) for one in (item.value, item.low, item.high)]
+    (value, unit), (low, _), (high, _) = shown
+    digits = _digits(value, 0.5 * abs(high - low))
+    text = f"{value:#.{digits}g} {unit}".removesuffix(" -").rstrip()
+    return item.path, text, f"{low:#.{digits}g} to {high:#.{digits}g}", item.verdict
 
 
 def _candidate(one: Expected) -> str:
@@ -403,21 +273,6 @@ def _candidate(one: Expected) -> str:
         f"{one.label}: gain {one.gain:.2f}; largest for {one.most_helped}, "
         f"whose interval would shrink by {fraction:.0%}"
     )
-
-
-def _row(estimate: Estimate, before: ParameterSet) -> tuple[str, str, str, str]:
-    """Return path, value, unit and interval."""
-    if math.isnan(estimate.value):
-        return estimate.path, _NO_VALUE, "", ""
-    return estimate.path, *_in_set_unit(estimate, (estimate.low, estimate.high), before)
-
-
-def _in_set_unit(estimate: Estimate, ends: tuple[float, float], before: ParameterSet) -> tuple[str, str, str]:
-    """Return value, unit and interval of an estimate as the set would write them, with digits that tell its ends."""
-    shown = [in_set_unit(one, estimate.path, estimate.unit, before) for one in (estimate.value, *ends)]
-    value, low, high = (number for number, _ in shown)
-    digits = _digits(value, 0.5 * abs(high - low))
-    return f"{value:#.{digits}g}", shown[0][1], f"{low:#.{digits}g} to {high:#.{digits}g}"
 
 
 def _digits(value: float, half_width: float) -> int:
@@ -438,27 +293,16 @@ def _figures(identification: Identification) -> list[Figure]:
         name = result.procedure if number == 1 else f"{result.procedure}-{number}"
         figures.append(Figure(name, result.summary, partial(procedure_figure, result)))
     if identification.trajectory is not None:
-        figures += _trajectory_figures(identification.trajectory, identification.before)
-    if identification.plan is not None:
-        figures.append(
-            Figure(PLAN_FIGURE, "What the next experiments promise.", partial(plan_figure, identification.plan))
-        )
+        figures += _trajectory_figures(identification.trajectory)
     both = figure_3(identification.results)
     return figures if both is None else [*figures, Figure("figure-3", "Like figure 3 of the paper.", lambda: both)]
 
 
-def _trajectory_figures(outcome: TrajectoryOutcome, before: ParameterSet) -> list[Figure]:
-    fit, kind = outcome.fit, kind_of_fit(outcome.fit)
-    figures = []
+def _trajectory_figures(outcome: TrajectoryOutcome) -> list[Figure]:
+    figures, fit = [], outcome.fit
     for measurement, model, scenario in zip(fit.measurements, fit.models, fit.scenarios, strict=True):
         draw = partial(trajectory_fit_figure, measurement, model, scenario.device.supply.atmospheric_pressure)
         figures.append(Figure(f"trajectory-fit-{measurement.label}", f"{measurement.label} and the fit.", draw))
-    if len(fit.estimates) > 1:
-        draw = partial(correlation_figure, [item.path for item in fit.estimates], fit.correlation, kind)
-        figures.append(Figure("trajectory-correlation", "Correlations of the estimates.", draw))
-    if outcome.profiles:
-        draw = partial(profile_figure, outcome, before, kind)
-        figures.append(Figure("trajectory-profiles", "Profile likelihoods.", draw))
     return figures
 
 
@@ -478,7 +322,7 @@ def _procedure_data(result: BenchResult) -> dict[str, Any]:
         "summary": result.summary,
         "recordings_are": result.kind,
         "estimates": [plain(item) for item in result.estimates],
-        "checks": [plain(item) for item in result.checks],
+        "conflict": result.conflict,
         "remarks": list(result.remarks),
     }
 
@@ -492,40 +336,20 @@ def _trajectory_data(outcome: TrajectoryOutcome | None) -> dict[str, Any]:
         "trajectory": {
             "recordings_are": kind_of_fit(fit),
             "recordings": [_recording(fit, index) for index in range(len(fit.measurements))],
-            "parameters": [plain(item) for item in fit.optimum.residuals.ranges],
-            "search": plain(fit.problem.search),
-            "evaluations": fit.evaluations,
-            "cost": fit.cost,
-            "variance_inflation": fit.uncertainty.inflation,
+            "confidence": fit.problem.confidence,
+            "evaluations": fit.fit.evaluations,
+            "has_converged": fit.fit.has_converged,
             "estimates": [plain(item) for item in fit.estimates],
             "covariance": fit.covariance.tolist(),
             "correlation": fit.correlation.tolist(),
+            "tolerances": [plain(item) for item in fit.known],
             "channels": [plain(item) for item in fit.channels],
-            "noise": [{"channel": one.channel, "is_like": one.in_words} for one in fit.uncertainty.sensors],
-            "misfit": {
-                "reason": fit.misfit,
-                "comparisons": [plain(item) for item in fit.uncertainty.misfit.comparisons],
-            },
-            "beforehand": [plain(item) for item in outcome.beforehand],
+            "conflict": None if fit.fit.conflict is None else plain(fit.fit.conflict),
+            "not_identifiable": [dict(item) for item in fit.fit.unidentified],
             "remarks": list(outcome.remarks),
-            "checks": [plain(item) for item in outcome.checks],
-            "profiles": [
-                {**plain(item), "numbers": item.numbers.tolist(), "rises": item.rises.tolist()}
-                for item in outcome.profiles
-            ],
             "next_experiments": [plain(item) for item in outcome.expected],
-            "cannot_see": list(outcome.unseen),
-            **({} if outcome.following is None else {"proposal": plain(outcome.following)}),
         }
     }
-
-
-def _posterior(fit: TrajectoryFit) -> bytes:
-    """Return the draws of a trajectory fit as a NetCDF file that ArviZ and xarray read."""
-    with TemporaryDirectory() as folder:
-        path = Path(folder) / POSTERIOR
-        fit.posterior().to_netcdf(path, engine="h5netcdf")
-        return path.read_bytes()
 
 
 def _recording(fit: TrajectoryFit, index: int) -> dict[str, Any]:
@@ -540,5 +364,6 @@ def _recording(fit: TrajectoryFit, index: int) -> dict[str, Any]:
     }
 
 
-def _bench_estimates(results: Iterable[BenchResult]) -> list[Estimate]:
+def bench_estimates(results: Iterable[BenchResult]) -> list[Estimate]:
+    """Return the estimates of all procedures, in their order."""
     return [estimate for result in results for estimate in result.estimates]

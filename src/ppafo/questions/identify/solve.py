@@ -11,55 +11,42 @@ from ppafo.identification.problem import (
     ProblemFile,
     ProcedureProblem,
     Setting,
+    bench_tolerances,
     load_problem,
-    prospects_of,
     run_procedure,
     window_of,
 )
 from ppafo.identification.source import Source, Use, double_use, source_of
 from ppafo.identification.trajectory.section import Setting as FitSetting
 from ppafo.identification.trajectory.section import solve_section
-from ppafo.identification.trajectory.tolerances import AbilitySection, Tolerances, ability_of, tolerances_of
-from ppafo.parameters.device import VANE
+from ppafo.identification.trajectory.tolerances import tolerances_of
 from ppafo.parameters.loading import list_sets, load_parameter_set
 from ppafo.parameters.overrides import check_valve
 from ppafo.parameters.parameter_set import ParameterSet, apply_overrides, atmospheric_pressure, chosen_valve
-from ppafo.progress import Progress, Report, report_nothing
-from ppafo.questions.identify.answer import Beforehand, Identification, _bench_estimates
-from ppafo.questions.identify.plan import Plan, planted_device
+from ppafo.progress import Report, report_nothing
+from ppafo.questions.identify.answer import Identification, bench_estimates
 from ppafo.storage.foreign import read_foreign
 from ppafo.storage.result_folder import read_recording
 
 
-def identify(problem: str | Path, progress: Report = report_nothing, following: int = 0) -> Identification:
+def identify(problem: str | Path, progress: Report = report_nothing) -> Identification:
     """Return what the procedures of a problem file make of its recordings, in the recommended order.
 
-    ``following`` is how many next experiments are proposed, of those that the table [bench.can] allows. The trajectory
-    fit comes last and starts from what they found. ``progress`` hears what is being done. Estimates are in SI units.
-    IdentificationError for a problem that makes no sense, ParameterError for a set that does not, and DataError for a
-    recording that cannot be read; each in one line that begins with the file.
+    The trajectory fit comes last and starts from what they found. ``progress`` hears what is being done. Estimates are
+    in SI units. IdentificationError for a problem that makes no sense, ParameterError for a set that does not, and
+    DataError for a recording that cannot be read; each in one line that begins with the file.
     """
     path = Path(problem)
-    return solve_problem(load_problem(path), path.parent, path.name, progress, following)
+    return solve_problem(load_problem(path), path.parent, path.name, progress)
 
 
-def solve_problem(
-    problem: ProblemFile, folder: Path, file: str, progress: Report = report_nothing, following: int = 0
-) -> Identification:
+def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Report = report_nothing) -> Identification:
     """Return the outcome of a problem whose paths begin in ``folder``; ``file`` is what messages call it.
 
     Errors are those of ``identify``.
     """
-    can = None if problem.bench is None else problem.bench.can
-    if following and (can is None or problem.trajectory is None):
-        missing = "[bench.can], which says what the bench can do" if can is None else "[trajectory]"
-        raise IdentificationError(f"{file}: --next needs a table {missing}")
     before = _base_set(problem, folder)
     valve = chosen_valve(before, problem.device.valve)
-    if before.actuator_kind != VANE:
-        raise IdentificationError(
-            f"{file}: identification is made for a vane, and '{before.name}' has an actuator '{before.actuator_kind}'"
-        )
     current, results = before, list[BenchResult]()
     tasks = [
         _Task(
@@ -85,12 +72,12 @@ def solve_problem(
             raise IdentificationError(f"{file}: {twice}")
         found += uses
     used = tuple(found)
-    beforehand = tuple(_look(task, Setting(before, valve, task.place), progress) for task in tasks)
+    known = bench_tolerances(problem.bench, file)
     for task in tasks:
-        result = run_procedure(task.sources, task.item, Setting(current, valve, task.place))
+        result = run_procedure(task.sources, task.item, Setting(current, valve, task.place, known))
         results.append(result)
         current = with_estimates(current, result.estimates).parameter_set
-    bench = {estimate.path: estimate for estimate in _bench_estimates(results)}
+    bench = {estimate.path: estimate for estimate in bench_estimates(results)}
     setting = FitSetting(
         lambda item: _source(folder, item.recording, item.columns, problem, current),
         folder,
@@ -99,24 +86,13 @@ def solve_problem(
         problem.device.valve,
         bench,
         used,
-        Tolerances() if problem.bench is None else tolerances_of(problem.bench, file),
-        None if can is None else ability_of(can, atmospheric_pressure(current), file),
-        following,
+        tolerances_of(problem.bench, file),
     )
     fitted = None if problem.trajectory is None else solve_section(problem.trajectory, setting, progress)
-    estimates = (*_bench_estimates(results), *(() if fitted is None else fitted.fit.estimates))
+    estimates = (*bench_estimates(results), *(() if fitted is None else fitted.fit.estimates))
     new_set = with_estimates(before, estimates, valve)
     named = replace(new_set, parameter_set=_name_set(new_set, problem))
-    plan = None
-    if fitted is not None and fitted.following is not None:
-        earlier = () if problem.trajectory is None else problem.trajectory.experiments
-        planted = planted_device(folder / one.recording for one in earlier)
-        plan = Plan(fitted.following, file, f"{problem.name}.toml", problem.device.valve, _rate(can), planted)
-    return Identification(problem.name, beforehand, tuple(results), fitted, before, named, plan)
-
-
-def _rate(can: AbilitySection | None) -> str:
-    return "" if can is None else can.sample_rate
+    return Identification(problem.name, tuple(results), fitted, before, named)
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,14 +102,6 @@ class _Task:
     item: ProcedureProblem
     sources: tuple[Source, ...]
     place: str
-
-
-def _look(task: _Task, setting: Setting, report: Report) -> Beforehand:
-    found = Beforehand(task.item.kind, prospects_of(task.sources, task.item, setting))
-    missing = [prospect for prospect in found.prospects if not prospect.can_be_had]
-    for prospect in missing:
-        report(Progress(f"{found.procedure}: insufficient data: {prospect.name}: {prospect.statement}"))
-    return found
 
 
 def _base_set(problem: ProblemFile, folder: Path) -> ParameterSet:
@@ -160,7 +128,7 @@ def _name_set(new_set: NewSet, problem: ProblemFile) -> ParameterSet:
     old = new_set.parameter_set
     origins = (
         f"Values with origin 'identified' or 'fitted' come from the problem '{problem.name}', the fitted ones being "
-        f"weak or true for this model only; the others are those of '{old.name}'."
+        f"true for this model only; the others are those of '{old.name}'."
     )
     return replace(
         old,

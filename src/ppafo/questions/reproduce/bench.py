@@ -146,7 +146,7 @@ def synthetic_evidence(
 @cache
 def bench_figure() -> tuple[BenchResult, BenchResult]:
     """Identify torque constant and damping as figure 3 does, from synthetic recordings; SimulationError."""
-    inertia = FreeDecaySettings(inertia=load_device(PLANTED_SET).foot_plate.inertia, inertia_source="as in the set")
+    inertia = FreeDecaySettings(inertia=load_device(PLANTED_SET).foot_plate.inertia)
     torque, decay = (
         Source(record(experiment, BENCH_PRESET, RIG_SEED, PLANTED_SET).recording)
         for experiment in ("static-torque", "free-decay")

@@ -6,6 +6,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from ppafo.identification.bench.flow_laws import LINEAR, Chambers, Opening, difference_in_time, orifice_shape
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench import (
@@ -16,7 +17,6 @@ from ppafo.identification.bench import (
     valve_map,
     vane_leak,
 )
-from ppafo.identification.bench.flow_laws import LINEAR, Chambers, Opening, difference_in_time, orifice_shape
 from ppafo.identification.source import Source
 
 VOLUME = 60e-6

@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 import pytest
-
 from ppafo.identification.bench.curve_fit import CurveFit, fit_curve, jackknife, lack_of_fit
 from ppafo.identification.bench.flow_laws import GasAt
+
 from ppafo.identification.bench.result import Evidence, Number
 from ppafo.identification.bench.static_torque import labels_of, regress
 

@@ -1,17 +1,16 @@
-"""Experiments made ready for fitting, their runs, and the weighted residuals of these with their Jacobian.
+"""Experiments made ready for fitting, and their runs: residuals of all recordings at many points, as one batch.
 
 Each experiment is one block of lanes, each lane one set of numbers. One clock serves all columns: the step stays as it
-is during the search. The parts in which the engine does it follow the numbers, though, and any other choice of them
-moves a run a little. Runs of a fit are allowed so little error that differences hardly see it.
+is during the search. Runs of a fit are allowed so little error that differences hardly see it.
 """
 
 import math
 import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,13 +22,13 @@ from ppafo.engine.run import NEVER_FAILED, Run, batches_of
 from ppafo.engine.scheme.actuators import pressures_of
 from ppafo.engine.scheme.pneumatics import supply_range
 from ppafo.errors import IdentificationError
-from ppafo.identification.linear_systems import inverse_of_steps
+from ppafo.identification.fit import Block
 from ppafo.identification.trajectory.problem import (
     GAIN_OF,
     TIME_OFFSET,
     ZERO_OF,
     Experiment,
-    Range,
+    Number,
     scenario_of,
     with_numbers,
 )
@@ -49,12 +48,18 @@ from ppafo.simulation.plan import (
     valve_parameters,
     with_load,
 )
-from ppafo.simulation.recorded import ANGLE, RecordedInputs, step_inputs, with_prescribed_angle
+from ppafo.simulation.recorded import (
+    ANGLE,
+    DORSIFLEXION_SUPPLY,
+    SUPPLY,
+    RecordedInputs,
+    step_inputs,
+    with_prescribed_angle,
+)
 from ppafo.simulation.scenario import FreeMotion, Scenario, vane_motion
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
-Mask = NDArray[np.bool_]
 
 FIT_TOLERANCE = 0.02
 """Error that a run of a fit is allowed over that of any other run; columns of differences keep to 1e-3 with it."""
@@ -69,11 +74,11 @@ _MAXIMUM_RECORDS = 100_000
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """One channel of an experiment: samples [rad] or [Pa] and the standard deviation of their noise."""
+    """One channel of an experiment: samples [rad] or [Pa] and the least noise that they are thought to have."""
 
     name: str
     values: Floats
-    noise: float
+    floor: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,8 +96,7 @@ class PreparedExperiment:
 
     ``run`` has the step and the clock of all columns; a sample is ``fraction`` [-] of the way from record ``place`` to
     the next. ``inputs`` are what the run follows at each step, made of what ``recorded`` has; None where it follows
-    nothing. ``time_offset`` [s] is how much later the samples are than the run, where it is not fitted; ``of_sensors``
-    has zeros and gains by path, where they are not.
+    nothing.
     """
 
     label: str
@@ -103,8 +107,6 @@ class PreparedExperiment:
     fraction: Floats
     recorded: RecordedInputs | None = None
     inputs: StepInputs | None = None
-    time_offset: float = 0.0
-    of_sensors: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def time(self) -> Floats:
@@ -126,7 +128,7 @@ def prepare(experiment: Experiment, numbers: Mapping[str, float], reach: float =
     """Return the experiment made ready.
 
     ``numbers`` by path are the start values; ``reach`` [s] is the largest time offset that is tried.
-    IdentificationError for a recording with too few samples or a channel whose noise is unknown.
+    IdentificationError for a recording with too few samples or a sensor at its limit.
     """
     recording, said = experiment.recording, f"experiment '{experiment.label}'"
     inside = recording.time >= experiment.start - _FITS
@@ -136,23 +138,17 @@ def prepare(experiment: Experiment, numbers: Mapping[str, float], reach: float =
             f"{said}: {recording.label} has {time.size} samples after {experiment.start:g} s, "
             f"at least {MINIMUM_SAMPLES} are needed"
         )
-    channels = []
-    for name in experiment.channels:
-        values = recording[name][inside]
-        noise = experiment.noise[name] if name in experiment.noise else noise_of(values)
-        clipped = max(plateaus(values), key=lambda item: item.count)
-        if not noise > 0.0 and is_at_limit(values, clipped):
+    channels = [
+        Measured(name, recording[name][inside], experiment.noise.get(name, 0.0)) for name in experiment.channels
+    ]
+    for channel in channels:
+        clipped = max(plateaus(channel.values), key=lambda item: item.count)
+        if channel.floor == 0.0 and is_at_limit(channel.values, clipped) and not noise_of(channel.values) > 0.0:
             raise IdentificationError(
-                f"{said}: channel '{name}' is exactly its {clipped.word} value for {clipped.count} of {values.size} "
-                "samples: its sensor is at its limit, and shows no noise there; end the recording before it, or give "
-                "the standard deviation of the sensor in noise"
+                f"{said}: channel '{channel.name}' is exactly its {clipped.word} value for {clipped.count} of "
+                f"{channel.values.size} samples: its sensor is at its limit; end the recording before it, or give the "
+                "standard deviation of the sensor in noise"
             )
-        if not noise > 0.0:
-            raise IdentificationError(
-                f"{said}: channel '{name}' shows no noise from sample to sample, so its weight is "
-                f"unknown: give its standard deviation in noise, for example from the sensor's data sheet"
-            )
-        channels.append(Measured(name, values, noise))
     scenario = replace(scenario_of(experiment), duration=float(time[-1]) + reach)
     recorded = RecordedInputs(recording, experiment.inputs, experiment.start) if experiment.inputs else None
     return prepare_samples(experiment.label, scenario, Samples(time, tuple(channels), reach), numbers, recorded)
@@ -170,13 +166,6 @@ def prepare_samples(
     nowhere = np.zeros(samples.time.size)
     unplaced = PreparedExperiment(label, scenario, run, samples, nowhere.astype(np.intp), nowhere, recorded)
     return _place_samples(unplaced, run)
-
-
-def with_half_steps(prepared: PreparedExperiment, numbers: Mapping[str, float]) -> PreparedExperiment:
-    """Return the experiment at ``numbers`` [SI] with steps half as long and a quarter of the allowed error."""
-    scenario = replace(prepared.scenario, time_step=0.5 * prepared.run.step)
-    run = plan_run(with_numbers(scenario, numbers))
-    return _place_samples(prepared, replace(run, tolerance=_FINER * prepared.run.tolerance))
 
 
 def _place_samples(prepared: PreparedExperiment, run: Run) -> PreparedExperiment:
@@ -212,33 +201,64 @@ def _steps_between_samples(samples: Samples, step: float) -> float:
     return max(count for count in range(1, int(most) + 1) if every % count == 0) if is_aligned else int(most)
 
 
-def numbers_in(label: str, ranges: Sequence[Range], point: Floats) -> dict[str, float]:
-    """Return the numbers in SI units, by path, that a point of coordinates gives to the experiment with a label."""
-    return {path: float(column[0]) for path, column in columns_in(label, ranges, point[None, :]).items()}
+def columns_in(label: str, numbers: Sequence[Number], points: Floats) -> dict[str, Floats]:
+    """Return the numbers [SI] by path that act in the experiment with a label, at points [SI] (numbers, points)."""
+    return {item.path: row for item, row in zip(numbers, points, strict=True) if item.acts_in(label)}
 
 
-def columns_in(label: str, ranges: Sequence[Range], points: Floats) -> dict[str, Floats]:
-    """Return the same as columns, one number for each of many points (points, coordinates)."""
-    acting = [pair for pair in zip(ranges, points.T, strict=True) if pair[0].acts_in(label)]
-    return {item.path: np.array([item.number(z) for z in column.tolist()]) for item, column in acting}
-
-
-def trajectories(
-    experiments: Sequence[PreparedExperiment], ranges: Sequence[Range], points: Floats
+def signals_of(
+    experiments: Sequence[PreparedExperiment], numbers: Sequence[Number], points: Floats
 ) -> list[dict[str, Floats]]:
-    """Return, for each experiment, its channels [SI] (samples, points) at many points (points, coordinates).
+    """Return, for each experiment, its channels [SI] (samples, points) at many points [SI] (numbers, points).
 
     A run that leaves what is possible is NaN throughout. Experiments run side by side, one thread each.
     """
 
     def one(prepared: PreparedExperiment) -> dict[str, Floats]:
-        return signals_at(prepared, columns_in(prepared.label, ranges, points), len(points))
+        return signals_at(prepared, columns_in(prepared.label, numbers, points), points.shape[1])
 
     workers = min(len(experiments), os.cpu_count() or 1)
     if workers == 1:
         return [one(prepared) for prepared in experiments]
     with ThreadPoolExecutor(workers) as pool:
         return list(pool.map(one, experiments))
+
+
+def residuals_of(experiments: Sequence[PreparedExperiment], numbers: Sequence[Number], points: Floats) -> Floats:
+    """Return measured less model [SI] (samples of all channels, points) at points [SI] (numbers, points)."""
+    signals = signals_of(experiments, numbers, points)
+    return np.concatenate(
+        [
+            channel.values[:, None] - of_one[channel.name]
+            for prepared, of_one in zip(experiments, signals, strict=True)
+            for channel in prepared.channels
+        ]
+    )
+
+
+def blocks_of(experiments: Sequence[PreparedExperiment], numbers: Sequence[Number], point: Floats) -> tuple[Block, ...]:
+    """Return the place of each channel of each recording among the residuals.
+
+    Its floor is the given noise or the error of the engine, which half as long steps with a quarter of the error show.
+    """
+    blocks, first = [], 0
+    coarse = signals_of(experiments, numbers, point[:, None])
+    fine = signals_of([_with_half_steps(one, numbers, point) for one in experiments], numbers, point[:, None])
+    for prepared, before, after in zip(experiments, coarse, fine, strict=True):
+        for channel in prepared.channels:
+            error = float(np.sqrt(np.mean(np.square(after[channel.name] - before[channel.name]))))
+            floor = max(channel.floor, error if math.isfinite(error) else 0.0)
+            last = first + len(channel.values)
+            blocks.append(Block(prepared.label, channel.name, slice(first, last), floor))
+            first = last
+    return tuple(blocks)
+
+
+def _with_half_steps(prepared: PreparedExperiment, numbers: Sequence[Number], point: Floats) -> PreparedExperiment:
+    scenario = replace(prepared.scenario, time_step=0.5 * prepared.run.step)
+    given = {path: float(row[0]) for path, row in columns_in(prepared.label, numbers, point[:, None]).items()}
+    run = plan_run(with_numbers(scenario, given))
+    return _place_samples(prepared, replace(run, tolerance=_FINER * prepared.run.tolerance))
 
 
 def run_with(prepared: PreparedExperiment, numbers: Mapping[str, Any]) -> Run:
@@ -298,23 +318,56 @@ def run_with(prepared: PreparedExperiment, numbers: Mapping[str, Any]) -> Run:
 def signals_at(prepared: PreparedExperiment, columns: Mapping[str, Floats], count: int) -> dict[str, Floats]:
     """Return the channels [SI] (samples, runs) of one experiment with other numbers [SI] in each of ``count`` runs.
 
-    What differs only in zeros and gains of sensors is run once. A pressure sensor reads gauge pressure.
+    What differs only in zeros and gains of compared sensors is run once. A pressure sensor reads gauge pressure.
     """
-    of_sensors = {path: column for path, column in columns.items() if path.startswith((ZERO_OF, GAIN_OF))}
-    running = {path: column for path, column in columns.items() if path not in of_sensors}
-    errors = {**prepared.of_sensors, **of_sensors}
-    if not errors:
-        return _run_signals(prepared, running, count)
+    compared = [channel.name for channel in prepared.channels]
+    errors = {
+        path: column
+        for path, column in columns.items()
+        if path.removeprefix(ZERO_OF).removeprefix(GAIN_OF) in compared and path.startswith((ZERO_OF, GAIN_OF))
+    }
+    running = {path: column for path, column in columns.items() if path not in errors}
     together = np.array([np.broadcast_to(column, (count,)) for column in running.values()]).reshape(-1, count)
     _, first, place = np.unique(together, axis=1, return_index=True, return_inverse=True)
     fewer = {path: np.broadcast_to(column, (count,))[first] for path, column in running.items()}
-    found = _run_signals(prepared, fewer, len(first))
+    found = _with_inputs(prepared, fewer, len(first))
     atmosphere = prepared.scenario.device.supply.atmospheric_pressure
     for name, values in found.items():
         rest = 0.0 if name == ANGLE else atmosphere
         gain, zero = (np.asarray(errors.get(f"{path}{name}", 0.0)) for path in (GAIN_OF, ZERO_OF))
         found[name] = rest + (1.0 + gain) * (values[:, place.ravel()] - rest) + zero
     return found
+
+
+def _with_inputs(prepared: PreparedExperiment, columns: Mapping[str, Floats], count: int) -> dict[str, Floats]:
+    """Return ideal signals; runs whose recorded inputs have other zeros are groups of their own."""
+    zeros = {path: column for path, column in columns.items() if path.startswith(ZERO_OF)}
+    rest = {path: column for path, column in columns.items() if path not in zeros}
+    if not zeros or prepared.inputs is None:
+        return _run_signals(prepared, rest, count)
+    table = np.array(list(zeros.values()))
+    kinds, group = np.unique(table, axis=1, return_inverse=True)
+    found: dict[str, Floats] = {}
+    for number, kind in enumerate(kinds.T):
+        members = np.flatnonzero(group.ravel() == number)
+        zero_of = {path.removeprefix(ZERO_OF): float(one) for path, one in zip(zeros, kind, strict=True)}
+        own = {path: column[members] for path, column in rest.items()}
+        part = _run_signals(replace(prepared, inputs=_moved(prepared.inputs, zero_of)), own, len(members))
+        for name, values in part.items():
+            found.setdefault(name, np.empty((len(values), count)))[:, members] = values
+    return found
+
+
+def _moved(inputs: StepInputs, zero_of: Mapping[str, float]) -> StepInputs:
+    """Return what a run follows less the zeros [rad], [Pa] of the sensors that recorded it."""
+    both = zero_of.get(SUPPLY, 0.0)
+    zeros = {
+        "path.level": zero_of.get(ANGLE, 0.0),
+        "plant.supply_pressure": both,
+        "plant.dorsiflexion_pressure": zero_of.get(DORSIFLEXION_SUPPLY, both),
+    }
+    moved = {path: values - zeros.get(path, 0.0) for path, values in inputs.parameters.items()}
+    return StepInputs(inputs.command, moved)
 
 
 def _run_signals(prepared: PreparedExperiment, columns: Mapping[str, Floats], count: int) -> dict[str, Floats]:
@@ -332,7 +385,7 @@ def _run_signals(prepared: PreparedExperiment, columns: Mapping[str, Floats], co
         for place, row in enumerate(kept):
             records[place][:, members] = outcome.record[:, row]
     assert records is not None
-    offsets = np.broadcast_to(columns.get(TIME_OFFSET, np.array(prepared.time_offset)), (count,))
+    offsets = np.broadcast_to(columns.get(TIME_OFFSET, np.array(0.0)), (count,))
     angle, mass_1, mass_2 = (_at_samples(one, prepared, offsets) for one in records)
     found = {name: np.full(angle.shape, np.nan) for name in ("angle", "pressure_1", "pressure_2")}
     numbers = leaves(run.plant)
@@ -367,151 +420,3 @@ def _at_samples(values: Floats, prepared: PreparedExperiment, offsets: Floats) -
         return here
     following = values[np.minimum(place + 1, len(values) - 1)]
     return np.asarray(here + fraction[:, None] * (following - here))
-
-
-FIRST_STEP = 1.0e-3
-"""Step of a difference before standard errors are known: the fraction of a number by which it is moved."""
-
-_TOUCH = 1.0e-9
-
-
-class Whitens(Protocol):
-    """A linear map that makes columns of residuals white."""
-
-    def of(self, values: Floats) -> Floats:
-        """Return columns (samples, columns) whitened [-]."""
-        ...
-
-
-@dataclass(frozen=True, slots=True)
-class Residuals:
-    """What is to be made small: (model - sample) / noise of all channels, then (coordinate - prior) / deviation.
-
-    With ``whitening`` the former are made white by what is known of the noise of each sensor.
-    """
-
-    experiments: tuple[PreparedExperiment, ...]
-    ranges: tuple[Range, ...]
-    whitening: Whitens | None = None
-
-    @property
-    def start(self) -> Floats:
-        """The coordinates at which the search begins, in their units."""
-        return np.array([item.coordinate(item.start) for item in self.ranges])
-
-    def of_data(self, points: Floats) -> Floats:
-        """Return the samples' residuals [-] (samples, points) at points (points, coordinates); NaN if a run fails."""
-        signals = trajectories(self.experiments, self.ranges, points)
-        parts = [
-            (of_one[channel.name] - channel.values[:, None]) / channel.noise
-            for prepared, of_one in zip(self.experiments, signals, strict=True)
-            for channel in prepared.channels
-        ]
-        values = np.concatenate(parts)
-        return values if self.whitening is None else self.whitening.of(values)
-
-    def of_priors(self, point: Floats) -> Floats:
-        """Return the residuals [-] of the priors, one for each parameter that has one."""
-        mean, deviation, has = prior_coordinates(self.ranges)
-        return (point[has] - mean[has]) / deviation[has]
-
-    def quick(self) -> "Residuals":
-        """Return the same from runs that are allowed the usual error [-]: a third of the time, far from an optimum."""
-        experiments = (
-            replace(one, run=replace(one.run, tolerance=max(1.0, one.run.tolerance))) for one in self.experiments
-        )
-        return replace(self, experiments=tuple(experiments))
-
-    def channel_slices(self) -> tuple[slice, ...]:
-        """Return the place of each channel among the residuals of the samples."""
-        lengths = [len(channel.values) for item in self.experiments for channel in item.channels]
-        ends = np.cumsum(lengths).tolist()
-        return tuple(slice(end - length, end) for end, length in zip(ends, lengths, strict=True))
-
-    def around(self, point: Floats, directions: Floats) -> "Neighbourhood":
-        """Return the residuals [-] at a point and a step away from it along each direction (column), all at once."""
-        values = self.of_data(np.vstack([point + directions.T, point - directions.T, point]))
-        return Neighbourhood(self, point, directions, values)
-
-    def hold(self, held: Mapping[int, float]) -> "Residuals":
-        """Return the residuals [-] of the other parameters, some (by place) being held at a coordinate."""
-        names = {self.ranges[index]: self.ranges[index].number(at) for index, at in held.items()}
-
-        def hold_in(prepared: PreparedExperiment) -> PreparedExperiment:
-            acting = {item.path: number for item, number in names.items() if item.acts_in(prepared.label)}
-            offset = acting.pop(TIME_OFFSET, prepared.time_offset)
-            errors = {path: number for path, number in acting.items() if path.startswith((ZERO_OF, GAIN_OF))}
-            return replace(
-                prepared,
-                scenario=with_numbers(prepared.scenario, acting),
-                time_offset=offset,
-                of_sensors={**prepared.of_sensors, **errors},
-            )
-
-        ranges = tuple(item for place, item in enumerate(self.ranges) if place not in held)
-        return replace(self, experiments=tuple(hold_in(one) for one in self.experiments), ranges=ranges)
-
-
-@dataclass(frozen=True, slots=True)
-class Neighbourhood:
-    """Residuals of the samples one step after a point along each direction, one step before it, and (last) at it."""
-
-    residuals: Residuals
-    point: Floats
-    directions: Floats
-    values: Floats
-
-    @property
-    def of_data(self) -> Floats:
-        """Residuals [-] of the samples at the point."""
-        return self.values[:, -1]
-
-    def all_residuals(self) -> Floats:
-        """Return all residuals [-] at the point, those of the priors last."""
-        return np.concatenate([self.of_data, self.residuals.of_priors(self.point)])
-
-    def jacobian_of_data(self) -> Floats:
-        """Return the derivative of the samples' residuals [-] with respect to the coordinates, by central differences.
-
-        Where a step leaves the bounds on one side, or the run there fails, the difference is one-sided.
-        """
-        count = self.directions.shape[1]
-        above, below, centre = self.values[:, :count], self.values[:, count:-1], self.values[:, -1:]
-        use_above = self._is_inside(self.directions) & np.isfinite(above).all(axis=0)
-        use_below = self._is_inside(-self.directions) & np.isfinite(below).all(axis=0)
-        for direction in self.directions.T[~(use_above | use_below)]:
-            index = int(np.argmax(np.abs(direction)))
-            item = self.residuals.ranges[index]
-            raise IdentificationError(
-                f"{item.name}: no run succeeds near {item.number(float(self.point[index])):.6g}, so it cannot be "
-                f"determined; give other bounds or another start"
-            )
-        change = np.where(use_above, above, centre) - np.where(use_below, below, centre)
-        return np.asarray((change / (1.0 * use_above + use_below)) @ inverse_of_steps(self.directions))
-
-    def jacobian(self) -> Floats:
-        """Return the derivative of ``all_residuals`` [-] with respect to the coordinates."""
-        _, deviation, has = prior_coordinates(self.residuals.ranges)
-        return np.concatenate([self.jacobian_of_data(), np.diag(1.0 / deviation)[has]])
-
-    def _is_inside(self, directions: Floats) -> Mask:
-        low, high = coordinate_bounds(self.residuals.ranges)
-        reached, touch = self.point[:, None] + directions, _TOUCH * np.abs(directions)
-        inside = (reached <= high[:, None] + touch) & (reached >= low[:, None] - touch)
-        return np.asarray(inside.all(axis=0))
-
-
-def coordinate_bounds(ranges: Sequence[Range]) -> tuple[Floats, Floats]:
-    """Return the lower and upper bounds of all coordinates, in their units."""
-    low = np.array([item.coordinate(item.low) for item in ranges])
-    return low, np.array([item.coordinate(item.high) for item in ranges])
-
-
-def prior_coordinates(ranges: Sequence[Range]) -> tuple[Floats, Floats, Mask]:
-    """Return mean and deviation of the priors [unit], infinitely wide without one, and which coordinates have one."""
-    mean, deviation = np.zeros(len(ranges)), np.full(len(ranges), np.inf)
-    for index, item in enumerate(ranges):
-        if item.prior is not None:
-            mean[index] = item.coordinate(item.prior.mean)
-            deviation[index] = item.prior.standard_deviation / abs(item.slope(float(mean[index])))
-    return mean, deviation, np.isfinite(deviation)

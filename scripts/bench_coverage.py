@@ -1,0 +1,116 @@
+"""Counts how often the intervals of the bench procedures hold the truth, on recordings of the virtual rig.
+
+    python scripts/bench_coverage.py --first 5101 --count 40 --preset paper-bench
+
+Each seed is one recording for each procedure, with sensors of its own; all are synthetic. The problem is that of the
+how-to page: no tolerance is stated, so the defaults count. For each number: how many intervals hold the truth of
+rig.json, how many of the others are flagged ("holds for this model only"), and the median half width.
+"""
+
+import argparse
+import statistics
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from ppafo.errors import PpafoError
+from ppafo.identification.bench import BenchResult
+from ppafo.identification.problem import PROCEDURES, Setting, parse_problem, run_procedure
+from ppafo.identification.source import Source
+from ppafo.parameters import load_parameter_set
+from ppafo.rig import record
+
+DEVICE = "ppafo2011"
+EXPERIMENTS = {**{kind: kind for kind in PROCEDURES}, "vane-leak-steady": "vane-leak"}
+"""Experiments of the rig, and the procedure for each."""
+
+EXTRA = {"vane-leak": 'angle = "90 deg"\n'}
+HEAD = f'schema_version = 1\nname = "bench"\ndevice.set = "{DEVICE}"\n'
+
+
+def truths(truth: Mapping[str, Any]) -> dict[str, float]:
+    """Return the true value [SI] of every number that the procedures report, by path."""
+    device, preset = truth["device"], truth["preset"]["values"]
+    valve, actuator = device["valve"], device["actuator"]
+    return {
+        "actuator.torque_constant": actuator["torque_constant"],
+        "friction.static_torque": device["friction"]["static_torque"],
+        "effects.seal_friction.static_per_pressure": preset["friction.static_per_pressure"],
+        "friction.viscous_damping": device["friction"]["viscous_damping"],
+        "friction.dynamic_torque": device["friction"]["dynamic_torque"],
+        "valves.proportional.discharge_coefficient": valve["orifice"]["discharge_coefficient"],
+        "valves.proportional.dead_band": preset["valve.dead_band"],
+        "valve_map.hysteresis": preset["valve.hysteresis"],
+        "actuator.leak.area": actuator["leak"]["area"],
+    }
+
+
+@dataclass
+class Count:
+    """Of one number: intervals, those that hold, those that miss and are flagged, half widths over the truth."""
+
+    total: int = 0
+    held: int = 0
+    flagged: int = 0
+    missed_flagged: int = 0
+    widths: list[float] = field(default_factory=list)
+
+
+def identified(experiment: str, preset: str, seed: int) -> tuple[BenchResult, dict[str, float]]:
+    """Return what the procedure makes of a recording, and the truth."""
+    kind = EXPERIMENTS[experiment]
+    made = record(experiment, preset, seed, DEVICE)
+    text = f'{HEAD}[[procedure]]\nkind = "{kind}"\nrecordings = ["made.csv"]\n{EXTRA.get(experiment, "")}'
+    problem = parse_problem(text.encode(), "bench").procedure[0]
+    setting = Setting(load_parameter_set(DEVICE), "proportional", experiment)
+    return run_procedure((Source(made.recording),), problem, setting), truths(made.truth)
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--first", type=int, required=True, help="first seed")
+    parser.add_argument("--count", type=int, default=40, help="seeds in a row")
+    parser.add_argument("--preset", default="paper-bench")
+    parser.add_argument("--only", choices=tuple(EXPERIMENTS), nargs="*", default=tuple(EXPERIMENTS))
+    words = parser.parse_args()
+    print(f"{words.preset}, seeds {words.first} to {words.first + words.count - 1}, synthetic\n")
+    print("| experiment | number | hold | miss, flagged | miss, not flagged | flagged | half width | CPU ms a fit |")
+    print("|---|---|---|---|---|---|---|---|")
+    for experiment in words.only:
+        counts: dict[str, Count] = {}
+        refused, spent = 0, 0.0
+        for seed in range(words.first, words.first + words.count):
+            begun = time.process_time()
+            try:
+                result, true = identified(experiment, words.preset, seed)
+            except PpafoError as error:
+                refused += 1
+                print(f"refused: {error}")
+                continue
+            spent += time.process_time() - begun
+            for estimate in result.estimates:
+                if estimate.path not in true:
+                    continue
+                count, value = counts.setdefault(estimate.path, Count()), true[estimate.path]
+                holds, is_flagged = estimate.low <= value <= estimate.high, estimate.verdict != "identified"
+                count.total += 1
+                count.held += holds
+                count.flagged += is_flagged
+                count.missed_flagged += is_flagged and not holds
+                count.widths.append(0.5 * (estimate.high - estimate.low) / (abs(value) or abs(estimate.value) or 1.0))
+        for path, count in counts.items():
+            silent = count.total - count.held - count.missed_flagged
+            width = statistics.median(count.widths)
+            print(
+                f"| {experiment} | `{path}` | {count.held} of {count.total} | {count.missed_flagged} | {silent} | "
+                f"{count.flagged} | {width:.1%} | {1000.0 * spent / words.count:.0f} |",
+                flush=True,
+            )
+        if refused:
+            print(f"| {experiment} | refused {refused} | | | | | | |")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,145 @@
+"""Laws of flow, on arrays: orifice, ISO 6358 and laminar; all antisymmetric. With the tolerances of gas and sensors.
+
+With r the downstream over the upstream pressure and k the heat capacity ratio, mass flow [kg/s] is
+
+    orifice    Cd A C1 P_up psi(r),   C1 = sqrt(k / (R T) (2 / (k + 1))^((k + 1) / (k - 1)))       equations (6), (7)
+               psi = 1 up to the critical ratio, then sqrt(2 k / (k - 1) r^(2/k) (1 - r^((k - 1)/k))) over C1 sqrt(R T)
+    ISO 6358   C rho_0 sqrt(T_0 / T) P_up phi(r),   phi = 1 up to b, then sqrt(1 - ((r - b) / (1 - b))^2)
+    laminar    c (P_a^2 - P_b^2)
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ppafo.constants import STANDARD_ATMOSPHERE, UNIVERSAL_GAS_CONSTANT
+from ppafo.identification.bench.law import Tolerances, Values, tolerance
+from ppafo.identification.fit import Free
+from ppafo.model.gas import choked_flow_constant, critical_pressure_ratio, specific_gas_constant
+from ppafo.model.orifice import sonic_conductance_mass
+from ppafo.signals.recording import Floats
+
+Law = Literal["orifice", "iso6358", "laminar"]
+
+LINEAR_RATIO = 0.999
+"""Pressure ratio from which flow falls on a straight line to zero."""
+
+
+@dataclass(frozen=True, slots=True)
+class GasAt:
+    """A gas at one temperature: molar mass [kg/mol], heat capacity ratio [-], temperature [K] and its limit [K]."""
+
+    molar_mass: float
+    heat_capacity_ratio: float
+    temperature: float
+    temperature_limit: float = 0.0
+
+    @property
+    def specific_gas_constant(self) -> float:
+        """Specific gas constant R/M [J/(kg K)]; equation (3)."""
+        return specific_gas_constant(UNIVERSAL_GAS_CONSTANT, self.molar_mass)
+
+    @property
+    def choked_flow_constant(self) -> float:
+        """C1 [s/m] of equation (6)."""
+        return choked_flow_constant(self.heat_capacity_ratio, self.specific_gas_constant, self.temperature)
+
+    @property
+    def flow_per_sonic_conductance(self) -> float:
+        """Choked mass flow over C times upstream pressure [kg/m^3], rho_0 sqrt(T_0 / T) of ISO 6358-1:2013."""
+        return sonic_conductance_mass(1.0, self.specific_gas_constant, self.temperature)
+
+
+TEMPERATURE, GAS_LAW, METER, SENSORS = "gas temperature", "gas law", "gain of the flow meter", "gain of the pressures"
+ZERO = "zero of the flow meter"
+
+
+def gas_tolerances(gas: GasAt, tolerances: Tolerances) -> tuple[Free, ...]:
+    """Return what is not known exactly of the gas: its temperature [K] and its law [-]."""
+    return (*tolerance(TEMPERATURE, gas.temperature_limit), *tolerance(GAS_LAW, tolerances.gas_law))
+
+
+def flow_tolerances(gas: GasAt, tolerances: Tolerances, names: tuple[str, str], largest: float) -> tuple[Free, ...]:
+    """Return what is not known exactly of a flow bench; ``names`` are the channels of the pressures.
+
+    ``largest`` is the largest reading of the flow meter [kg/s].
+    """
+    return (
+        *gas_tolerances(gas, tolerances),
+        *tolerance(METER, tolerances.gain),
+        *tolerance(SENSORS, tolerances.gain),
+        *tolerance(ZERO, tolerances.zero_of_flow * largest),
+        *(item for name in names for item in tolerance(f"zero of {name}", tolerances.zero_of_pressure)),
+    )
+
+
+def read_flow(at: Values, gas: GasAt, flow: Floats) -> Floats:
+    """Return what a flow meter shows [kg/s] of a flow of gas as it is stated [kg/s]."""
+    warm = np.sqrt(gas.temperature / (gas.temperature + at[TEMPERATURE]))
+    return np.asarray((1.0 + at[GAS_LAW]) * (1.0 + at[METER]) * warm * flow + at[ZERO])
+
+
+def true_pressure(at: Values, name: str, shown: Floats) -> Floats:
+    """Return the pressure [Pa] behind the reading of a sensor [Pa], whose gain counts from the atmosphere."""
+    return np.asarray(shown - at[f"zero of {name}"] - at[SENSORS] * (shown - STANDARD_ATMOSPHERE))
+
+
+def orifice_shape(first: Floats, second: Floats, heat_capacity_ratio: float) -> Floats:
+    """Return upstream pressure times flow function [Pa], positive from first to second; (6), (7) over Cd A C1."""
+    k = heat_capacity_ratio
+    ratio, inside, upstream = _ratio(first, second)
+    inside = np.maximum(inside, critical_pressure_ratio(k))
+    curve = np.sqrt(2.0 * k / (k - 1.0)) * inside ** (1.0 / k) * np.sqrt(1.0 - inside ** ((k - 1.0) / k))
+    curve = curve / np.sqrt(k * (2.0 / (k + 1.0)) ** ((k + 1.0) / (k - 1.0)))
+    return _signed(first, second, ratio, upstream * curve)
+
+
+def iso6358_shape(first: Floats, second: Floats, critical_ratio: float) -> Floats:
+    """Return upstream pressure times flow function [Pa], positive from first to second; ISO 6358 over C rho_0."""
+    ratio, inside, upstream = _ratio(first, second)
+    position = np.maximum(inside - critical_ratio, 0.0) / (1.0 - critical_ratio)
+    return _signed(first, second, ratio, upstream * np.sqrt(1.0 - position**2))
+
+
+def laminar_shape(first: Floats, second: Floats) -> Floats:
+    """Return the difference of squared pressures [Pa^2], positive from first to second."""
+    return np.asarray(first**2 - second**2)
+
+
+def _ratio(first: Floats, second: Floats) -> tuple[Floats, Floats, Floats]:
+    upstream = np.maximum(np.maximum(first, second), 1.0)
+    ratio = np.maximum(np.minimum(first, second), 0.0) / upstream
+    return ratio, np.minimum(ratio, LINEAR_RATIO), upstream
+
+
+def _signed(first: Floats, second: Floats, ratio: Floats, flow: Floats) -> Floats:
+    """Return a flow with its sign, on a straight line to zero near equal pressures."""
+    return np.asarray(np.sign(first - second) * flow * np.minimum((1.0 - ratio) / (1.0 - LINEAR_RATIO), 1.0))
+
+
+@dataclass(frozen=True, slots=True)
+class Opening:
+    """What flows through an opening: the law, and what is known of it.
+
+    For an orifice the area [m^2] or the discharge coefficient [-] that ``known`` multiplies; for ISO 6358 ``known`` is
+    not used, and the critical ratio [-] is sought where it is not given.
+    """
+
+    gas: GasAt
+    law: Law
+    known: float = 1.0
+    critical_ratio: float | None = None
+
+    def flow(self, size: float, critical_ratio: float, first: Floats, second: Floats) -> Floats:
+        """Return the mass flow [kg/s], positive from first to second [Pa], for the size that is sought.
+
+        The size is Cd, A or Cd A, C [m^3/(s Pa)], or c [kg/(s Pa^2)].
+        """
+        if self.law == "laminar":
+            return size * laminar_shape(first, second)
+        if self.law == "iso6358":
+            ratio = critical_ratio if self.critical_ratio is None else self.critical_ratio
+            return size * self.gas.flow_per_sonic_conductance * iso6358_shape(first, second, ratio)
+        per_size = self.known * self.gas.choked_flow_constant
+        return size * per_size * orifice_shape(first, second, self.gas.heat_capacity_ratio)

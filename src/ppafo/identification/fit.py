@@ -1,0 +1,515 @@
+"""The one estimator: bounded least squares with whitened residuals, and what the residuals say against the model.
+
+Bench procedures and the trajectory fit are residuals of the same ``fit``; what nobody knows exactly is a number with a
+prior. Numbers are moved in units of their scale; residuals are in units of the noise of their channel, which is
+estimated from them. Each difference of the Jacobian is as long as changes the residuals by three units of noise in all.
+"""
+
+import math
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares, lsq_linear
+from scipy.stats import f as fisher
+from scipy.stats import qmc
+from scipy.stats import t as student
+
+from ppafo.errors import IdentificationError
+from ppafo.progress import Progress, Report, report_nothing
+from ppafo.signals.recording import Floats
+
+Mask = NDArray[np.bool_]
+Residuals = Callable[[Floats], Floats]
+"""Measured less model [SI] (rows, points) at points [SI] (numbers, points), as one batch; NaN where a run fails."""
+
+
+@dataclass(frozen=True, slots=True)
+class Free:
+    """A number that the fit moves: start, bounds and typical size ``scale``, SI units.
+
+    ``deviation`` is the standard deviation of its prior about its start; infinite for a number that is sought, finite
+    for a tolerance.
+    """
+
+    name: str
+    start: float
+    low: float
+    high: float
+    scale: float
+    deviation: float = math.inf
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """Rows of the residuals that are one channel of one recording, in the order of time.
+
+    ``floor`` is the error of the engine, or the resolution [SI], below which no residual says anything.
+    """
+
+    recording: str
+    channel: str
+    rows: slice
+    floor: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Noise:
+    """Noise of a channel: standard deviation [SI] and reflection coefficients [-] of its autoregression (Burg)."""
+
+    deviation: float
+    reflection: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Conflict:
+    """A sensor, a recording, a channel of one or a stated value that alone wants other numbers than all together.
+
+    It is Hausman's test. ``group`` is "pressure_1", "back", "pressure_1 of back" or "what is stated of it".
+    ``number`` is the one that parts most, by so many ``standard_errors``; ``p`` is the chance, over all groups, that a
+    model that holds shows as much.
+    """
+
+    group: str
+    number: str
+    standard_errors: float
+    p: float
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """What recordings say of numbers, SI units, in the order of ``numbers``.
+
+    ``low`` and ``high`` are intervals at the confidence, ``noise`` standard deviations and ``correlation`` orders of
+    the autoregression by channel, ``residuals`` measured less model. ``unidentified`` are combinations, as weights of
+    numbers in units of their scale, that the recordings do not fix; ``shares`` has for each number the
+    tolerances that widen its interval, largest first, as fractions of the variance. ``jacobian`` is whitened [1/SI].
+    """
+
+    numbers: tuple[Free, ...]
+    values: Floats
+    covariance: Floats
+    low: Floats
+    high: Floats
+    noise: Mapping[str, float]
+    correlation: Mapping[str, int]
+    residuals: Floats
+    conflict: Conflict | None
+    unidentified: tuple[Mapping[str, float], ...]
+    shares: Mapping[str, tuple[tuple[str, float], ...]]
+    evaluations: int
+    has_converged: bool
+    sensors: Mapping[str, Noise]
+    jacobian: Floats
+
+    def index(self, name: str) -> int:
+        """Return the place of a number."""
+        return [one.name for one in self.numbers].index(name)
+
+
+_UNITS_OF_NOISE = 3.0
+"""Change of all residuals together, in units of noise, that a difference makes."""
+
+_STEPS = (1.0e-7, 1.0e-3)
+"""Shortest and longest difference over the scale of a number."""
+
+_HIGHEST_ORDER = 12
+_LARGEST_REFLECTION = 1.0 - 1.0e-9
+"""Of residuals that follow a law exactly, such as those of a constant: no innovation would be left."""
+
+_PASSES = 6
+_ROUNDS = 20
+_SETTLED = 0.03
+_EVALUATIONS = 40
+_SIGNIFICANCE = 0.01
+_PARTING = 0.05
+"""Fraction of the covariance of all by which that of a group alone must be larger for its direction to be tested."""
+
+_RANK = 1.0e-13
+"""Eigenvalue [-] of scaled numbers from which they are seen."""
+
+_UNKNOWN = 0.5
+"""Standard error of a combination over the scales of its numbers from which it is not identifiable."""
+
+_SHOWN = 0.01
+_OTHER_STARTS = 32
+
+
+def fit(
+    residuals: Residuals,
+    numbers: Sequence[Free],
+    blocks: Sequence[Block],
+    confidence: float = 0.95,
+    report: Report = report_nothing,
+) -> Fit:
+    """Return the numbers that explain recordings best, their covariance and whether the recordings agree on them.
+
+    Squares are minimised within bounds, at first with a loss that is robust (soft L1); weights follow from what is left
+    in each channel. Then residuals are whitened by one autoregression per channel and the numbers take one more step.
+    Other starts are tried only where the recordings disagree. IdentificationError where no run succeeds.
+    """
+    work = _Work(residuals, tuple(numbers), tuple(blocks), report)
+    found = _whitened(work, *_search(work, work.start), confidence)
+    if found.conflict is None and found.has_converged:
+        return found
+    report(Progress("fit: other starts, for the first does not explain the recordings"))
+    for start in _other_starts(work, found):
+        other = _whitened(work, *_search(work, start), confidence)
+        if _likelihood(work, other) > _likelihood(work, found) + 1.0:
+            found = other
+    return found
+
+
+class _Work:
+    """Runs of a fit in scaled numbers, with the last one kept."""
+
+    def __init__(
+        self, residuals: Residuals, numbers: tuple[Free, ...], blocks: tuple[Block, ...], report: Report
+    ) -> None:
+        self.residuals, self.numbers, self.blocks, self.report = residuals, numbers, blocks, report
+        self.scale = np.array([one.scale for one in numbers])
+        self.start, self.low, self.high, deviation = (
+            np.array([getattr(one, name) for one in numbers]) / self.scale
+            for name in ("start", "low", "high", "deviation")
+        )
+        self.prior = 1.0 / deviation
+        self.mean = self.start
+        self.evaluations = 0
+        self.step = np.full(len(numbers), _STEPS[1])
+        self._last: tuple[bytes, Floats] | None = None
+
+    def at(self, points: Floats) -> Floats:
+        """Return residuals [SI] (rows, points) at scaled points (numbers, points)."""
+        self.evaluations += points.shape[1]
+        return self.residuals(points * self.scale[:, None])
+
+    def one(self, point: Floats) -> Floats:
+        """Return residuals [SI] at a scaled point, which is run once."""
+        key = point.tobytes()
+        if self._last is None or self._last[0] != key:
+            self._last = key, self.at(point[:, None])[:, 0]
+        return self._last[1]
+
+    def jacobian(self, point: Floats, weight: Floats) -> Floats:
+        """Return the derivative of the residuals [SI] by scaled numbers, central differences of one batch.
+
+        ``weight`` [1/SI] by row sets the lengths of the differences of the next one.
+        """
+        above, below = np.minimum(point + self.step, self.high), np.maximum(point - self.step, self.low)
+        moved = np.concatenate([np.diag(above - point), np.diag(below - point)], axis=1)
+        values = self.at(point[:, None] + moved)
+        centre, count = self.one(point), len(point)
+        slopes = np.empty((len(centre), count))
+        for place in range(count):
+            (last, up), (first, down) = (
+                (values[:, at], end) if np.isfinite(values[:, at]).all() else (centre, float(point[place]))
+                for at, end in ((place, float(above[place])), (count + place, float(below[place])))
+            )
+            if not up > down:
+                number = self.numbers[place]
+                raise IdentificationError(
+                    f"{number.name}: no run succeeds near {point[place] * number.scale:.6g}; give other bounds or "
+                    "another start"
+                )
+            slopes[:, place] = (last - first) / (up - down)
+        sizes = np.linalg.norm(slopes * weight[:, None], axis=0)
+        self.step = np.clip(_UNITS_OF_NOISE / np.maximum(sizes, 1.0e-300), *_STEPS)
+        return slopes
+
+    def rows_of(self, channel: str) -> list[slice]:
+        """Return the rows of a channel in each recording."""
+        return [one.rows for one in self.blocks if one.channel == channel]
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The channels, each once."""
+        return tuple(dict.fromkeys(one.channel for one in self.blocks))
+
+    def deviations(self, series: Floats) -> Floats:
+        """Return the noise [SI] of each row, pooled over the recordings of its channel, no less than the floor.
+
+        ``series`` are residuals, and in further columns what the error of the numbers may hide of them.
+        """
+        found = np.empty(len(series))
+        least = max(1.0e-12 * float(np.abs(series[:, 0]).max()), 1.0e-300)
+        for channel in self.channels:
+            own = np.concatenate([series[rows] for rows in self.rows_of(channel)])
+            pooled = math.sqrt(float(np.square(own).sum()) / len(own))
+            for one in self.blocks:
+                if one.channel == channel:
+                    found[one.rows] = max(pooled, one.floor, least)
+        return found
+
+
+def _search(work: _Work, start: Floats) -> tuple[Floats, bool]:
+    """Return the least squares and whether they converged: weights and squares in turn until both stay."""
+    point, settled = np.clip(start, work.low, work.high), False
+    left = work.one(point)
+    if not np.isfinite(left).all():
+        raise IdentificationError("no run succeeds at the start values; give others, or check the recordings")
+    noise = work.deviations(left[:, None])
+    begun = time.monotonic()
+    for number in range(_PASSES):
+        work.report(Progress("fit", number, _PASSES, noun="passes", elapsed=time.monotonic() - begun))
+        weight = 1.0 / noise
+
+        def weighted(x: Floats, weight: Floats = weight) -> Floats:
+            return np.concatenate([work.one(x) * weight, (x - work.mean) * work.prior])
+
+        def slopes(x: Floats, weight: Floats = weight) -> Floats:
+            return np.concatenate([work.jacobian(x, weight) * weight[:, None], np.diag(work.prior)])
+
+        result = least_squares(
+            weighted, point, slopes, (work.low, work.high), method="trf", x_scale="jac", ftol=1.0e-6, xtol=1.0e-9,
+            gtol=None, loss="linear" if number else "soft_l1", max_nfev=_EVALUATIONS,
+        )  # fmt: skip
+        point, settled = np.asarray(result.x), bool(result.status > 0)
+        before, noise = noise, work.deviations(work.one(point)[:, None])
+        if number and settled and float(np.abs(np.log(noise / before)).max()) < _SETTLED:
+            break
+    return point, settled
+
+
+def burg(series: Sequence[Floats], highest: int = _HIGHEST_ORDER) -> tuple[float, ...]:
+    """Return the reflection coefficients [-] of one autoregression of several series (Burg), as many as AIC wants.
+
+    Columns of a series (samples, columns) add up, as its residuals and their error do. Of 100 samples AIC would take
+    noise for an autoregression in a third of all cases: there is at most one coefficient for each 100.
+    """
+    forward, backward = list(series), list(series)
+    count = sum(len(one) for one in series)
+    power, found, best = 1.0, [], (0.0, 0)
+    for order in range(1, min(highest, count // 100, min(len(one) for one in series) - 2) + 1):
+        ahead, behind = [one[1:] for one in forward], [one[:-1] for one in backward]
+        across = sum(float(np.sum(a * b)) for a, b in zip(ahead, behind, strict=True))
+        size = sum(float(np.sum(a * a + b * b)) for a, b in zip(ahead, behind, strict=True))
+        if size <= 0.0:
+            break
+        found.append(max(-_LARGEST_REFLECTION, min(_LARGEST_REFLECTION, 2.0 * across / size)))
+        forward = [a - found[-1] * b for a, b in zip(ahead, behind, strict=True)]
+        backward = [b - found[-1] * a for a, b in zip(ahead, behind, strict=True)]
+        power *= 1.0 - found[-1] ** 2
+        best = min(best, (count * math.log(max(power, 1.0e-300)) + 2.0 * order, order))
+    return tuple(found[: best[1]])
+
+
+def whiten(values: Floats, noise: Noise) -> Floats:
+    """Return columns (samples, columns) [SI] of one recording as innovations [-] of the noise of their channel."""
+    forward = values / noise.deviation
+    backward, power = forward.copy(), 1.0
+    done = forward.copy()
+    for order, one in enumerate(noise.reflection, start=1):
+        forward, backward = forward[1:] - one * backward[:-1], backward[:-1] - one * forward[1:]
+        power *= 1.0 - one * one
+        done[order:] = forward / math.sqrt(power)
+    return done
+
+
+class _Linear(NamedTuple):
+    """Residuals and Jacobian whitened [-] side by side, root and covariance of scaled numbers, noise by channel."""
+
+    rows: Floats
+    root: Floats
+    noise: Floats
+    sensors: dict[str, Noise]
+
+
+def _linear(work: _Work, point: Floats, left: Floats, slopes: Floats) -> tuple[_Linear, Floats]:
+    """Return the problem whitened at a point, and the step to its least squares within the bounds.
+
+    What the numbers absorb of the noise is missing in the residuals; its expectation J C J' is added until both agree
+    (expectation and maximisation), so that slow noise is not taken for little noise.
+    """
+    step, hidden = np.zeros(len(point)), np.zeros((len(left), 0))
+    limits = work.low - point - 1.0e-300, work.high - point + 1.0e-300
+    for _ in range(_ROUNDS):
+        series = np.column_stack([left + slopes @ step, hidden])
+        noise = work.deviations(series)
+        known, rows = {}, np.column_stack([left, slopes]) / noise[:, None]
+        for channel in work.channels:
+            own = work.rows_of(channel)
+            reflection = burg([series[one] / noise[one, None] for one in own])
+            known[channel] = Noise(float(noise[own[0]][0]), reflection)
+            for one in own:
+                rows[one] = whiten(rows[one], Noise(1.0, reflection))
+        root, _ = _root_of_inverse(rows[:, 1:].T @ rows[:, 1:] + np.diag(np.square(work.prior)))
+        hidden = slopes @ root
+        before = step
+        solved = lsq_linear(
+            np.concatenate([rows[:, 1:], np.diag(work.prior)]),
+            -np.concatenate([rows[:, 0], (point - work.mean) * work.prior]),
+            limits,
+            method="bvls",
+        )
+        step = np.asarray(solved.x)
+        if np.abs((step - before) @ np.linalg.pinv(root)).max() < 0.01 and series.shape[1] > 1:
+            break
+    return _Linear(rows=rows, root=root, noise=noise, sensors=known), step
+
+
+def _root_of_inverse(curvature: Floats) -> tuple[Floats, Mask]:
+    """Return a matrix whose product with its transpose is the inverse, and which of its columns are seen at all.
+
+    The others are large, of numbers or combinations that nothing fixes.
+    """
+    sizes = np.sqrt(np.maximum(np.diag(curvature), 0.0))
+    size = np.where(sizes > 1.0e-9 * sizes.max(initial=0.0), sizes, sizes.max(initial=1.0e-9) or 1.0)
+    values, vectors = np.linalg.eigh(curvature / size / size[:, None])
+    return np.asarray(vectors / np.sqrt(np.maximum(values, _RANK)) / size[:, None]), np.asarray(values > _RANK)
+
+
+def _whitened(work: _Work, point: Floats, settled: bool, confidence: float) -> Fit:
+    """Return the fit after whitening and one more Gauss-Newton step from the least squares."""
+    left = work.one(point)
+    slopes = work.jacobian(point, 1.0 / work.deviations(left[:, None]))
+    linear, step = _linear(work, point, left, slopes)
+    reached = np.clip(point + step, work.low, work.high)
+    after = work.one(reached)
+    if np.isfinite(after).all() and _cost(work, after, reached, linear) <= _cost(work, left, point, linear):
+        point, left = reached, after
+        slopes = work.jacobian(point, 1.0 / linear.noise)
+        linear, _ = _linear(work, point, left, slopes)
+    known, rows = linear.sensors, linear.rows
+    whitened, errors = rows[:, 1:], rows[:, 0]
+    covariance = linear.root @ linear.root.T
+    freedom = max(len(left) - float(np.sum(whitened * (whitened @ covariance))), 1.0)
+    wide = float(student.ppf(0.5 + 0.5 * confidence, freedom)) * np.sqrt(np.diag(covariance))
+    touching = _touches(work, point, errors @ whitened + np.square(work.prior) * (point - work.mean))
+    names = [one.name for one in work.numbers]
+    fractions = np.square(covariance * work.prior) / np.diag(covariance)[:, None]
+    return Fit(
+        numbers=work.numbers,
+        values=point * work.scale,
+        covariance=covariance * np.outer(work.scale, work.scale),
+        low=np.maximum(point - wide, work.low) * work.scale,
+        high=np.minimum(point + wide, work.high) * work.scale,
+        noise={channel: one.deviation for channel, one in known.items()},
+        correlation={channel: len(one.reflection) for channel, one in known.items()},
+        residuals=left,
+        conflict=_conflict(work, rows, point, ~touching, freedom),
+        unidentified=tuple(_unidentified(covariance, names)),
+        shares={
+            names[place]: tuple(
+                (names[at], float(fractions[place, at]))
+                for at in np.argsort(-fractions[place]).tolist()
+                if fractions[place, at] >= _SHOWN
+            )
+            for place in range(len(names))
+        },
+        evaluations=work.evaluations,
+        has_converged=settled,
+        sensors=known,
+        jacobian=whitened / work.scale,
+    )
+
+
+def _cost(work: _Work, left: Floats, point: Floats, linear: _Linear) -> float:
+    """Return the sum of squares [-] of whitened residuals and priors."""
+    scaled = (left / linear.noise)[:, None]
+    parts = [whiten(scaled[one.rows], Noise(1.0, linear.sensors[one.channel].reflection)) for one in work.blocks]
+    return sum(float(np.square(one).sum()) for one in parts) + float(np.square((point - work.mean) * work.prior).sum())
+
+
+def _touches(work: _Work, point: Floats, gradient: Floats) -> Mask:
+    """Return which numbers lie at a bound that the squares would leave."""
+    near = 1.0e-6 * np.maximum(1.0, np.abs(point))
+    return np.asarray(((point - work.low < near) & (gradient > 0.0)) | ((work.high - point < near) & (gradient < 0.0)))
+
+
+def _groups(work: _Work) -> Iterator[tuple[str, list[slice]]]:
+    """Return sensors, recordings and channels of recordings, none of them twice nor the whole."""
+    recordings = tuple(dict.fromkeys(one.recording for one in work.blocks))
+    named = [(channel, work.rows_of(channel)) for channel in work.channels]
+    named += [(label, [one.rows for one in work.blocks if one.recording == label]) for label in recordings]
+    named += [(f"{one.channel} of {one.recording}", [one.rows]) for one in work.blocks]
+    seen = {tuple((one.rows.start, one.rows.stop) for one in work.blocks)}
+    for name, rows in named:
+        key = tuple((one.start, one.stop) for one in rows)
+        if key not in seen:
+            seen.add(key)
+            yield name, rows
+
+
+def _conflict(work: _Work, rows: Floats, point: Floats, free: Mask, freedom: float) -> Conflict | None:
+    """Return the group of rows that wants other numbers most, None where no group does (Hausman's test).
+
+    A group alone would go by d = -H_g^-1 (J_g' r_g + P (z - m)), whose covariance is H_g^-1 - C. With C = L L' and the
+    eigenvalues a of L' H_g L, both are diagonal: d'(H_g^-1 - C)^-1 d is the sum of q^2 / (a (1 - a)).
+    """
+    errors, slopes = rows[:, 0], rows[:, 1:][:, free]
+    prior, shift = np.square(work.prior[free]), (point - work.mean)[free]
+    root, seen = _root_of_inverse(slopes.T @ slopes + np.diag(prior))
+    root = root[:, seen]
+    groups, found = list(_groups(work)), None
+    names = np.array([one.name for one in work.numbers])[free]
+    count_of_tests = len(groups) + int((prior > 0.0).sum())
+    for name, own in groups:
+        part = np.concatenate([slopes[one] for one in own])
+        pull = part.T @ np.concatenate([errors[one] for one in own]) + prior * shift
+        alone, turned = np.linalg.eigh(root.T @ (part.T @ part + np.diag(prior)) @ root)
+        tested = (alone > 1.0e-6) & (alone < 1.0 / (1.0 + _PARTING))
+        count = int(tested.sum())
+        if not count:
+            continue
+        alone, axes = alone[tested], root @ turned[:, tested]
+        along = axes.T @ pull
+        statistic = float(np.sum(np.square(along) / (alone * (1.0 - alone))))
+        p = min(float(fisher.sf(statistic / count, count, freedom)) * count_of_tests, 1.0)
+        if p < _SIGNIFICANCE and (found is None or p < found.p):
+            moved = np.abs(axes @ (along / alone))
+            spread = np.sqrt(np.square(axes) @ (1.0 / alone - 1.0))
+            ratio = moved / np.maximum(spread, 1.0e-300)
+            most = int(np.argmax(ratio))
+            found = Conflict(group=name, number=str(names[most]), standard_errors=float(ratio[most]), p=p)
+    # What is stated of a tolerance is a group of its own: its mean parts from the fit by deviation^2 - C.
+    variance = np.square(root).sum(axis=1)
+    own_variance = 1.0 / np.maximum(prior, 1.0e-300) - variance
+    for place in np.flatnonzero((prior > 0.0) & (own_variance >= _PARTING * variance)).tolist():
+        ratio = abs(float(shift[place])) / math.sqrt(float(own_variance[place]))
+        p = min(2.0 * float(student.sf(ratio, freedom)) * count_of_tests, 1.0)
+        if p < _SIGNIFICANCE and (found is None or p < found.p):
+            found = Conflict(group="what is stated of it", number=str(names[place]), standard_errors=ratio, p=p)
+    return found
+
+
+def _unidentified(covariance: Floats, names: Sequence[str]) -> Iterator[dict[str, float]]:
+    """Return combinations of scaled numbers whose standard error is above half their scale, as weights."""
+    variances, vectors = np.linalg.eigh(covariance)
+    for variance, vector in zip(variances[::-1].tolist(), vectors.T[::-1], strict=True):
+        if math.sqrt(max(variance, 0.0)) > _UNKNOWN:
+            largest = float(vector[np.argmax(np.abs(vector))])
+            weights = {name: float(one) / largest for name, one in zip(names, vector, strict=True)}
+            yield {name: one for name, one in weights.items() if abs(one) >= 0.1}
+
+
+def _likelihood(work: _Work, found: Fit) -> float:
+    """Return the logarithm of the likelihood [-] of whitened residuals and priors, but for a constant."""
+    size = 0.0
+    for one in work.blocks:
+        noise, count = found.sensors[one.channel], one.rows.stop - one.rows.start
+        size += count * (math.log(noise.deviation) + 0.5 * sum(math.log(1.0 - k * k) for k in noise.reflection))
+    return -size - 0.5 * float(np.square((found.values / work.scale - work.mean) * work.prior).sum())
+
+
+def _other_starts(work: _Work, found: Fit) -> Iterator[Floats]:
+    """Return scaled starts for the numbers that are sought: the best two of a batch within the bounds."""
+    sought = ~(work.prior > 0.0)
+    point = found.values / work.scale
+    low, high = np.maximum(work.low, -1.0e3)[sought], np.minimum(work.high, 1.0e3)[sought]
+    is_ratio = (low > 0.0) & (high > 10.0 * low)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        ends = [np.where(is_ratio, np.log(end), end) for end in (low, high)]
+    drawn = qmc.Sobol(int(sought.sum()), seed=1).random(_OTHER_STARTS).T
+    drawn = ends[0][:, None] + drawn * (ends[1] - ends[0])[:, None]
+    points = np.repeat(point[:, None], _OTHER_STARTS, axis=1)
+    points[sought] = np.where(is_ratio[:, None], np.exp(np.where(is_ratio[:, None], drawn, 0.0)), drawn)
+    left = work.at(points)
+    noise = np.concatenate([np.full(one.rows.stop - one.rows.start, found.noise[one.channel]) for one in work.blocks])
+    costs = np.sum(np.log1p(np.square(left / noise[:, None])), axis=0)
+    costs[~np.isfinite(costs)] = np.inf
+    for place in np.argsort(costs)[:2].tolist():
+        if math.isfinite(float(costs[place])):
+            yield points[:, place]

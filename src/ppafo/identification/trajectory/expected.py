@@ -1,0 +1,99 @@
+"""Which further experiment would say most: the information of its samples, added to what a fit has found."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ppafo.errors import IdentificationError
+from ppafo.identification.fit import Noise, whiten
+from ppafo.identification.trajectory.fitting import TrajectoryFit
+from ppafo.identification.trajectory.problem import FITTED_CHANNELS, reach_of
+from ppafo.identification.trajectory.runs import Measured, Samples, columns_in, prepare_samples, signals_at
+from ppafo.simulation.scenario import Scenario
+
+_STEPS, _UNITS_OF_NOISE = (1.0e-7, 1.0e-3), 3.0
+"""Shortest and longest difference over the scale of a number, and the change of the samples that one makes."""
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """An experiment that could be done: its scenario, the noise of each channel [rad], [Pa], time between samples [s].
+
+    The devices of candidates are those of their scenarios with the fitted numbers put in. Channels without ``noise``
+    have the one that the fit found, and no others are compared.
+    """
+
+    label: str
+    scenario: Scenario
+    noise: Mapping[str, float]
+    interval: float = 1.0e-3
+
+
+@dataclass(frozen=True, slots=True)
+class Expected:
+    """What a candidate would bring.
+
+    ``gain`` is half the growth of the logarithm of the determinant of the information on the numbers sought [-]
+    (D-optimality): the volume of their region shrinks by exp(gain). ``shrinkage`` is, by number, the standard error
+    afterwards over the one now. ``most_helped`` names the number that gains most.
+    """
+
+    label: str
+    gain: float
+    shrinkage: Mapping[str, float]
+    most_helped: str
+
+
+def expected_information(fit: TrajectoryFit, candidates: Sequence[Candidate]) -> tuple[Expected, ...]:
+    """Return what each candidate would bring, the most informative first.
+
+    IdentificationError for a candidate without noise in a channel that can be fitted.
+    """
+    return tuple(sorted((_expect(fit, one) for one in candidates), key=lambda one: -one.gain))
+
+
+def _expect(fit: TrajectoryFit, candidate: Candidate) -> Expected:
+    noise = dict(candidate.noise) or dict(fit.fit.noise)
+    if not noise or any(name not in FITTED_CHANNELS or not one > 0.0 for name, one in noise.items()):
+        raise IdentificationError(
+            f"candidate '{candidate.label}': noise must be above 0 for at least one of {', '.join(FITTED_CHANNELS)}"
+        )
+    place = [index for index, item in enumerate(fit.numbers) if not item.recordings]
+    acting = [fit.numbers[index] for index in place]
+    point, scale = fit.fit.values[place], np.array([item.free.scale for item in acting])
+    count = math.floor(candidate.scenario.duration / candidate.interval + 1.0e-6)
+    times = candidate.interval * np.arange(count + 1, dtype=np.float64)
+    samples = Samples(times, tuple(Measured(name, np.zeros(times.size)) for name in noise), reach_of(acting))
+    given = {path: float(row[0]) for path, row in columns_in("", acting, point[:, None]).items()}
+    prepared = prepare_samples(candidate.label, candidate.scenario, samples, given)
+    low, high = (np.array([getattr(item.free, end) for item in acting]) for end in ("low", "high"))
+    step = _STEPS[1] * scale
+    # As in the fit, the second differences are as long as changes the samples by three units of noise in all.
+    for _ in range(2):
+        above, below = np.minimum(point + step, high), np.maximum(point - step, low)
+        moved = point[:, None] + np.concatenate([np.diag(above - point), np.diag(below - point)], axis=1)
+        signals = signals_at(prepared, columns_in("", acting, moved), moved.shape[1])
+        slopes = {
+            name: np.nan_to_num((values[:, : len(place)] - values[:, len(place) :]) / (above - below))
+            for name, values in signals.items()
+        }
+        size = np.sqrt(sum(np.square(slopes[name] / deviation).sum(axis=0) for name, deviation in noise.items()))
+        step = np.clip(_UNITS_OF_NOISE / np.maximum(size * scale, 1.0e-300), *_STEPS) * scale
+    rows = []
+    for name, deviation in noise.items():
+        known = fit.fit.sensors.get(name)
+        rows.append(whiten(slopes[name], Noise(deviation, known.reflection if known else ())))
+    whole = fit.fit.covariance
+    sizes = np.sqrt(np.diag(whole))
+    jacobian = np.concatenate(rows) * sizes[place]
+    before = whole / np.outer(sizes, sizes)
+    information = np.linalg.inv(before)
+    information[np.ix_(place, place)] += jacobian.T @ jacobian
+    after = np.linalg.inv(information)
+    sought = [index for index, item in enumerate(fit.numbers) if not item.is_tolerance]
+    shrinkage = {fit.numbers[index].free.name: math.sqrt(max(after[index, index], 0.0)) for index in sought}
+    part = np.ix_(sought, sought)
+    gain = 0.5 * float(np.linalg.slogdet(before[part])[1] - np.linalg.slogdet(after[part])[1])
+    return Expected(candidate.label, gain, shrinkage, min(shrinkage, key=lambda name: shrinkage[name]))

@@ -1,0 +1,134 @@
+"""The estimator on an analytic law, where truth and noise are known."""
+
+import math
+
+import numpy as np
+import pytest
+
+from ppafo.identification.fit import Block, Fit, Free, Noise, burg, fit, whiten
+from ppafo.signals.recording import Floats
+
+_COUNT = 300
+_TIME = np.linspace(0.0, 1.0, _COUNT)
+_TRUTH = {"rate": 4.0, "level": 2.0, "zero_1": 0.01, "gain_2": -0.01, "start of rise": 0.3, "start of fall": 1.2}
+_BLOCKS = tuple(
+    Block(label, channel, slice(place * _COUNT, (place + 1) * _COUNT))
+    for place, (label, channel) in enumerate(
+        [("rise", "first"), ("rise", "second"), ("fall", "first"), ("fall", "second")]
+    )
+)
+_NUMBERS = (
+    Free("rate", 2.0, 0.1, 50.0, 2.0),
+    Free("level", 1.0, 0.1, 10.0, 1.0),
+    Free("zero_1", 0.0, -1.0, 1.0, 0.02, 0.02),
+    Free("gain_2", 0.0, -0.5, 0.5, 0.02, 0.02),
+    Free("start of rise", 0.32, -1.0, 3.0, 0.05, 0.05),
+    Free("start of fall", 1.15, -1.0, 3.0, 0.05, 0.05),
+)
+
+
+def _law(rate: Floats, level: Floats, zero: Floats, gain: Floats, *starts: Floats, slower: float = 1.0) -> Floats:
+    """An exponential from its start to half the level and back, seen by one sensor, and its rate by another."""
+    rows = []
+    for start, end, own in zip(starts, (level, 0.5 * level), (rate, slower * rate), strict=True):
+        away = (start - end) * np.exp(-own * _TIME[:, None])
+        rows += [end + away + zero, (1.0 + gain) * own * away]
+    return np.concatenate(rows)
+
+
+def _noise(kind: str, generator: np.random.Generator) -> Floats:
+    white = generator.normal(size=_COUNT)
+    if kind == "AR(1)":
+        found = np.empty(_COUNT)
+        found[0] = white[0]
+        for place in range(1, _COUNT):
+            found[place] = 0.9 * found[place - 1] + math.sqrt(1.0 - 0.81) * white[place]
+        return found
+    if kind == "random walk":
+        return 0.1 * np.cumsum(generator.normal(size=_COUNT))
+    if kind == "Student t":
+        return generator.standard_t(3.0, _COUNT) / math.sqrt(3.0)
+    if kind == "hum":
+        return white + math.sqrt(2.0) * np.sin(2.0 * math.pi * (23.0 * _TIME + generator.random()))
+    return white
+
+
+def _fit(kind: str, generator: np.random.Generator, size: float = 0.02, slower: float = 1.0) -> Fit:
+    truth = dict(_TRUTH)
+    for one in _NUMBERS:
+        if math.isfinite(one.deviation):
+            truth[one.name] = one.start + one.deviation * generator.normal()
+    clean = _law(*(np.array([one]) for one in truth.values()), slower=slower)[:, 0]
+    measured = clean + size * np.concatenate([_noise(kind, generator) for _ in _BLOCKS])
+    return fit(lambda points: measured[:, None] - _law(*points), _NUMBERS, _BLOCKS)
+
+
+def _coverage(kind: str, fits: int, seed: int) -> tuple[float, int]:
+    """Fraction of intervals of the two numbers that are sought which hold, and how many fits are flagged."""
+    generator, held, flagged = np.random.default_rng(seed), 0, 0
+    for _ in range(fits):
+        found = _fit(kind, generator)
+        held += sum(found.low[at] <= _TRUTH[_NUMBERS[at].name] <= found.high[at] for at in (0, 1))
+        flagged += found.conflict is not None
+    return held / (2.0 * fits), flagged
+
+
+@pytest.mark.parametrize(
+    ("kind", "least"), [("white", 0.9), ("AR(1)", 0.9), ("random walk", 0.75), ("Student t", 0.9), ("hum", 0.85)]
+)
+def test_intervals_hold_in_five_kinds_of_noise_and_a_model_that_is_right_is_not_called_wrong(
+    kind: str, least: float
+) -> None:
+    held, flagged = _coverage(kind, 20, seed=7)
+
+    assert held >= least
+    assert flagged <= 1
+
+
+def test_a_model_whose_two_recordings_want_two_rates_holds_for_itself_only() -> None:
+    found = _fit("white", np.random.default_rng(3), slower=0.9)
+
+    assert found.conflict is not None
+    assert found.conflict.number == "rate"
+    assert found.conflict.p < 0.01
+
+
+def test_numbers_that_act_only_as_their_product_are_not_identifiable() -> None:
+    measured = 6.0 * _TIME + 0.01 * np.random.default_rng(1).normal(size=_COUNT)
+    numbers = (Free("one", 2.0, 0.1, 10.0, 2.0), Free("other", 3.0, 0.1, 10.0, 3.0))
+
+    found = fit(
+        lambda points: measured[:, None] - points[0] * points[1] * _TIME[:, None],
+        numbers,
+        (Block("only", "first", slice(0, _COUNT)),),
+    )
+
+    assert len(found.unidentified) == 1
+    assert found.unidentified[0]["one"] == pytest.approx(-found.unidentified[0]["other"], rel=0.2)
+    assert found.values[0] * found.values[1] == pytest.approx(6.0, rel=0.01)
+
+
+def test_the_tolerance_that_widens_an_interval_is_named_with_its_share_of_the_variance() -> None:
+    measured = 2.0 + 0.001 * np.random.default_rng(1).normal(size=_COUNT)
+    numbers = (Free("value", 1.0, 0.1, 10.0, 1.0), Free("zero", 0.0, -1.0, 1.0, 0.1, 0.1))
+
+    found = fit(
+        lambda points: measured[:, None] - (points[0] + points[1]) * np.ones((_COUNT, 1)),
+        numbers,
+        (Block("only", "first", slice(0, _COUNT)),),
+    )
+
+    (name, share), *_ = found.shares["value"]
+    assert name == "zero"
+    assert share > 0.99
+    assert found.high[0] - found.low[0] == pytest.approx(2.0 * 1.96 * 0.1, rel=0.02)
+
+
+def test_whitening_by_the_autoregression_that_was_found_leaves_white_noise() -> None:
+    series = _noise("AR(1)", np.random.default_rng(5))
+    reflection = burg([series])
+
+    white = whiten(series[:, None], Noise(1.0, reflection))[:, 0]
+
+    assert reflection[0] == pytest.approx(0.9, abs=0.06)
+    assert abs(np.corrcoef(white[1:], white[:-1])[0, 1]) < 0.12
