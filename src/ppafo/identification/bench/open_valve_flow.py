@@ -1,6 +1,6 @@
 """Flow through the fully open valve: Cd of equations (6), (7), C and b of ISO 6358, or a laminar coefficient.
 
-    m = Cd A C1 P_up psi(r)   or   C rho_0 sqrt(T_0 / T) P_up phi(r; b)   or   c (P_up^2 - P_down^2),   r = P_down / P_up
+    m = Cd A C1 P_up psi(r)  or  C rho_0 sqrt(T_0 / T) P_up phi(r; b)  or  c (P_up^2 - P_down^2),   r = P_down / P_up
 
 m is the mass flow [kg/s], P_up and P_down the absolute pressures before and behind the valve [Pa]; flow functions and
 constants are those of ``flow``. Temperature and law of the gas, gains of the sensors, the zero of each of them are
@@ -22,25 +22,8 @@ from ppafo.identification.bench.flow import (
     true_pressure,
 )
 from ppafo.identification.bench.law import DEFAULTS, Tolerances, Values, solve, sought
-from ppafo.identification.bench.result import (
-    BenchResult,
-    Panel,
-    Reported,
-    Series,
-    conflict_of,
-    estimates_of,
-    with_residuals,
-)
-from ppafo.identification.source import (
-    Source,
-    check_absolute,
-    check_moves,
-    check_not_clipped,
-    check_sources,
-    kind_of,
-    pool,
-    told_of_readings,
-)
+from ppafo.identification.bench.result import BenchResult, Panel, Reported, Series, result_of, with_residuals
+from ppafo.identification.source import Source, check_absolute, check_moves, check_not_clipped, check_sources, pool
 from ppafo.model.gas import critical_pressure_ratio
 from ppafo.signals.recording import Floats
 
@@ -95,7 +78,6 @@ def open_valve_flow(sources: tuple[Source, ...], settings: OpenValveFlowSettings
     ratio = downstream / upstream
     found, model = solve(law, flow, numbers, (labels, _levels(ratio, gas)), settings.confidence)
     reported = (size, *((Reported(_RATIO, "", "Critical ratio b of ISO 6358"),) if is_standard else ()))
-    estimates = estimates_of(found, reported, sources, settings.confidence)
     order = np.argsort(ratio)
     panel = Panel(
         "Open-valve flow",
@@ -109,15 +91,16 @@ def open_valve_flow(sources: tuple[Source, ...], settings: OpenValveFlowSettings
         ),
     )
     others = " or ".join(f"'{item}'" for item in ("orifice", "iso6358", "laminar") if item != settings.law)
-    return BenchResult(
+    return result_of(
         PROCEDURE,
+        sources,
+        found,
+        reported,
+        settings.confidence,
         f"{flow.size} readings at pressure ratios from {ratio.min():.2f} to {ratio.max():.2f}; "
         f"scatter {np.std(flow - model) / largest:.2%} of the largest flow",
-        estimates,
         with_residuals(panel, ratio, (flow - model) / upstream),
-        kind_of(sources),
-        conflict_of(found, f"try law = {others}, or leave those readings out"),
-        told_of_readings(sources),
+        f"try law = {others}, or leave those readings out",
     )
 
 

@@ -24,20 +24,11 @@ from ppafo.identification.bench.result import (
     Reported,
     Role,
     Series,
-    conflict_of,
     count_of,
-    estimates_of,
+    result_of,
     with_residuals,
 )
-from ppafo.identification.source import (
-    Source,
-    check_moves,
-    check_not_clipped,
-    check_sources,
-    kind_of,
-    pool,
-    told_of_readings,
-)
+from ppafo.identification.source import Source, check_moves, check_not_clipped, check_sources, pool
 from ppafo.signals.recording import Floats
 
 Labels = NDArray[np.int64]
@@ -112,18 +103,18 @@ def static_torque(sources: tuple[Source, ...], settings: StaticTorqueSettings | 
         Reported(names.growth_path, names.slope_unit, f"Growth of the {names.friction} with the pressure difference"),
         Reported(names.zero_path, names.unit, f"Zero of the {names.load} sensor", float(np.ptp(torque))),
     )
-    estimates = estimates_of(found, reported, sources, chosen.confidence)
-    scatter = float(np.std(torque - model))
+    values = found.values.tolist()
     count = count_of(int(readings.clusters.max()) + 1, "repetition")
-    return BenchResult(
+    return result_of(
         PROCEDURE,
-        f"{pressure.size} readings, {count}; {names.slope} {estimates[0].value:.4g} {names.slope_unit}, {names.friction} "
-        f"{estimates[1].value:.3g} {names.unit}; scatter {scatter:.3g} {names.unit}",
-        estimates,
-        with_residuals(_panel(readings, estimates[0].value, estimates[3].value), pressure, torque - model),
-        kind_of(sources),
-        conflict_of(found, f"one {names.slope} and a {names.friction} linear in pressure do not describe them"),
-        told_of_readings(sources),
+        sources,
+        found,
+        reported,
+        chosen.confidence,
+        f"{pressure.size} readings, {count}; {names.slope} {values[0]:.4g} {names.slope_unit}, {names.friction} "
+        f"{values[1]:.3g} {names.unit}; scatter {np.std(torque - model):.3g} {names.unit}",
+        with_residuals(_panel(readings, values[0], values[3]), pressure, torque - model),
+        f"one {names.slope} and a {names.friction} linear in pressure do not describe them",
     )
 
 
@@ -142,7 +133,7 @@ def _straight_line(readings: "Readings", sources: tuple[Source, ...]) -> tuple[F
 
 
 def _groups(readings: "Readings") -> tuple[list[str], list[str]]:
-    """Return a label of repetition and half of the pressures (or of the recording) and one of branch, for each reading."""
+    """Return a label of repetition and half of the pressures, or of the recording, and one of the branch."""
     branches = np.where(readings.branch > 0.0, "rising branch", "falling branch").tolist()
     if readings.clusters.max() >= _MOST_REPETITIONS:
         return [f"recording {number + 1}" for number in readings.files.tolist()], branches
