@@ -36,7 +36,7 @@ Solve = Callable[[str], Identification]
 @pytest.fixture
 def bench(tmp_path: Path, planted: ModuleType) -> Path:
     """A folder with one recording for each procedure."""
-    leak = planted.leak("orifice", planted.orifice_rate(0.3e-6 * 0.113, 60e-6))
+    leak = planted.leak("orifice", 0.3e-6 * 0.113)
     growing = planted.static(growth=8.0e-7)
     write_csv(tmp_path / "growing.csv", growing.recording)
     sources = (planted.static(), planted.decay(), planted.flow(), planted.sweep(), leak)

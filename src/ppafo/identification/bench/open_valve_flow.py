@@ -31,10 +31,11 @@ PROCEDURE = "open-valve-flow"
 CHANNELS = ("upstream_pressure", "downstream_pressure", "mass_flow")
 MINIMUM_SAMPLES = 5
 _FULLY_OPEN = 0.99
-_RATIO = "open_valve_flow.critical_ratio"
 _RATIOS = 0.2, 0.01, 0.95
 """Critical ratio of ISO 6358: start, lowest, highest."""
 _NEARLY_EQUAL = 0.9
+_SPAN, _SUBSONIC = 0.15, 0.6
+"""Span of the pressure ratios, and the largest of them, from which both numbers of ISO 6358 can be fitted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,23 +62,28 @@ def open_valve_flow(sources: tuple[Source, ...], settings: OpenValveFlowSettings
     upstream, downstream, flow, labels = open_readings(sources, gas)
     size = _size(settings)
     opening = Opening(gas, settings.law, settings.area or 1.0)
-    names = CHANNELS[:2]
+    names, critical = CHANNELS[:2], f"{settings.path}.critical_ratio"
     largest = float(flow.max())
 
     def law(at: Values) -> Floats:
         pressures = (true_pressure(at, name, shown) for name, shown in zip(names, (upstream, downstream), strict=True))
-        return read_flow(at, gas, opening.flow(at[size.path], at[_RATIO], *pressures))
+        return read_flow(at, gas, opening.flow(at[size.path], at[critical], *pressures))
 
     unit = opening.flow(1.0, _RATIOS[0], upstream, downstream)
     is_standard = settings.law == "iso6358"
     numbers = (
         sought(size.path, float(unit @ flow / (unit @ unit)), 0.0),
-        *((sought(_RATIO, *_RATIOS),) if is_standard else ()),
+        *((sought(critical, *_RATIOS),) if is_standard else ()),
         *flow_tolerances(gas, settings.tolerances, names, largest),
     )
     ratio = downstream / upstream
+    if is_standard and (np.ptp(ratio) < _SPAN or ratio.max() < _SUBSONIC):
+        raise IdentificationError(
+            f"{sources[0].name}: {PROCEDURE}: C and b need choked and subsonic flow, pressure ratios that span "
+            f"{_SPAN:g} or more and go beyond {_SUBSONIC:g}; these go from {ratio.min():.3g} to {ratio.max():.3g}"
+        )
     found, model = solve(law, flow, numbers, (labels, _levels(ratio, gas)), settings.confidence)
-    reported = (size, *((Reported(_RATIO, "", "Critical ratio b of ISO 6358"),) if is_standard else ()))
+    reported = (size, *((Reported(critical, "", "Critical ratio b of ISO 6358"),) if is_standard else ()))
     order = np.argsort(ratio)
     panel = Panel(
         "Open-valve flow",

@@ -133,14 +133,17 @@ def _straight_line(readings: "Readings", sources: tuple[Source, ...]) -> tuple[F
 
 
 def _groups(readings: "Readings") -> tuple[list[str], list[str]]:
-    """Return a label of repetition and half of the pressures, or of the recording, and one of the branch."""
-    branches = np.where(readings.branch > 0.0, "rising branch", "falling branch").tolist()
+    """Return a label of branch and half of the pressures and one of the repetition, for each reading.
+
+    Of many repetitions it is the recording and the branch.
+    """
+    branches = np.where(readings.branch > 0.0, "the rising branch", "the falling branch").tolist()
     if readings.clusters.max() >= _MOST_REPETITIONS:
         return [f"recording {number + 1}" for number in readings.files.tolist()], branches
     middle = 0.5 * float(readings.pressure.max() + readings.pressure.min())
     halves = np.where(readings.pressure > middle, "higher", "lower").tolist()
-    numbers = (readings.clusters + 1).tolist()
-    return [f"{half} pressures of repetition {n}" for half, n in zip(halves, numbers, strict=True)], branches
+    levels = [f"{branch} at {half} pressures" for branch, half in zip(branches, halves, strict=True)]
+    return levels, [f"repetition {number + 1}" for number in readings.clusters.tolist()]
 
 
 @dataclass(frozen=True, slots=True)
@@ -222,9 +225,7 @@ def readings_of(sources: tuple[Source, ...]) -> Readings:
     load = load_of(sources)
     for source in sources:
         check_moves(source, PROCEDURE, load)
-        pressure, torque = source.recording["pressure_difference"], source.recording[load]
-        check_not_clipped(source, PROCEDURE, load, "pressure_difference", pressure)
-        check_not_clipped(source, PROCEDURE, "pressure_difference", load, torque, _MORE_THAN_FRICTION)
+        check_not_clipped(source, PROCEDURE, load, "pressure_difference", source.recording["pressure_difference"])
         values = source.recording["direction"]
         wrong = np.flatnonzero(~np.isin(values, (-1.0, 0.0, 1.0)))
         if wrong.size:
@@ -262,6 +263,9 @@ def readings_of(sources: tuple[Source, ...]) -> Readings:
             f"{sources[0].name}: {PROCEDURE} needs readings at {_MINIMUM_LEVELS} different pressures or more, "
             f"there are {levels}"
         )
+    for source in sources:
+        driving = source.recording[load]
+        check_not_clipped(source, PROCEDURE, "pressure_difference", load, driving, _MORE_THAN_FRICTION)
     # A repetition of a recording is one cluster; so is a recording without repetitions.
     recordings = [source.recording for source in sources]
     files = np.concatenate([np.full(len(one), number) for number, one in enumerate(recordings)])[used]

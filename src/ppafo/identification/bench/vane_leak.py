@@ -184,7 +184,7 @@ def closed_chambers(source: Source, settings: VaneLeakSettings) -> ClosedChamber
     return ClosedChambers(part.time[:last] - part.time[0], first[:last], second[:last], fuller)
 
 
-_POINTS = 1200
+_POINTS = 400
 _LOWEST = 1.0e-3
 """Difference at the end of a computed fall over that at its start."""
 
