@@ -1,144 +1,178 @@
-"""Plants mistakes of a record and of a set, and prints what `ppafo validate` says of each.
+"""Plants 14 faults in recordings, and prints what `ppafo validate` names; then how often right recordings disagree.
 
-    python scripts/planted_disagreements.py --seed 77
-    python scripts/planted_disagreements.py --right 20 --seed 77
+    python scripts/planted_disagreements.py --seeds 4711 4712 --right 100
 
-The recordings are those of an integration with scipy that shares no code with the package (tests/judge/bench.py): a
-step response of 0.4 s at 1 kHz, white noise of 0.1 deg and 0.5 kPa. ``--right`` plants nothing, as often as it says.
+Recordings are step responses of the virtual rig's ideal laboratory, a simulator that shares no equation of motion and
+no integrator with the model: 1 kHz, free vane, its own noise. Each fault is one of the record or one number of the
+device. `right`: the fault is named first, or among those that the recordings cannot tell from the first; `wrong`:
+another is named; `none`: none is. ``--right`` plants nothing, as often as it says, with seeds from the first on.
 """
 
 import argparse
-import math
-import sys
 import tempfile
 import time
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
-
 import ppafo
+from ppafo.constants import PASCALS_PER_PSI
 from ppafo.errors import PpafoError
 from ppafo.questions.validate.solve import Validation, in_words
-from ppafo.signals.recording import Channel, Recording
-from ppafo.simulation.loading import load_scenario
-from ppafo.simulation.numbers import number_at, with_numbers
+from ppafo.rig.experiments import record
+from ppafo.signals.recording import Recording
 from ppafo.storage import write_csv
-from tests.judge.bench import Extra, bench
 
-TIMES = np.arange(401, dtype=np.float64) * 1e-3
-OPENS, PSI = 0.02, 6.894757
-NOISE = {"angle": (math.radians(0.1), "rad"), "pressure_1": (500.0, "Pa"), "pressure_2": (500.0, "Pa")}
-SUPPLY = ["supply.pressure=55 psi_g", "supply.dorsiflexion_pressure=55 psi_g"]
-ROOM = "supply.atmospheric_pressure"
+ROOM = 101325.0
+SUPPLY = ("supply.pressure=55 psi_g", "supply.dorsiflexion_pressure=55 psi_g")
+GAUGES = ("pressure_1", "pressure_2")
+KEPT = ("command", "supply_pressure", "angle", *GAUGES)
+
+
+def changed(recording: Recording, **values: np.ndarray) -> Recording:
+    """The recording with other values in some channels."""
+    for name, series in values.items():
+        recording = recording.with_channel(name, series, recording.unit(name))
+    return recording
+
+
+def read_with_gain(recording: Recording, gain: float, *names: str) -> Recording:
+    """Gauge pressures that are read too large by a factor."""
+    return changed(recording, **{name: ROOM + gain * (recording[name] - ROOM) for name in names})
+
+
+def with_outliers(recording: Recording) -> Recording:
+    """Five samples that a bad contact made."""
+    places = [len(recording) * part // 13 for part in (2, 5, 7, 10, 12)]
+    values = recording["pressure_1"].copy()
+    values[places] += 4.0e4 * np.array([1.0, -1.0, 1.0, 1.0, -1.0])
+    return changed(recording, pressure_1=values)
+
+
+def clipped(recording: Recording) -> Recording:
+    """A sensor whose range ends below what it should measure."""
+    values = recording["pressure_1"]
+    return changed(recording, pressure_1=np.minimum(values, 0.75 * float(values.max())))
 
 
 @dataclass(frozen=True)
-class Planted:
-    """What is planted: factors of numbers of the set (the atmosphere [Pa]), a mistake of the record, physics, its name.
-
-    ``named`` is the begin of the words that name it.
-    """
+class Fault:
+    """A fault: the record that it makes, numbers of the device by path, and how the words that name it begin."""
 
     title: str
-    named: str
-    factors: Mapping[str, float] = field(default_factory=dict)
-    mistake: str = ""
-    extra: Extra = field(default_factory=Extra)
+    named: tuple[str, ...]
+    record: Callable[[Recording], Recording] = lambda one: one
+    device: tuple[str, ...] = ()
 
 
-PLANTED = (
-    Planted("leak 3 times", "actuator.leak.", {"actuator.leak.area": 3.0}),
-    Planted("no leak", "actuator.leak.", {"actuator.leak.area": 1e-6}),
-    Planted("damping twice", "friction.viscous_damping", {"friction.viscous_damping": 2.0}),
-    Planted("damping a tenth", "friction.viscous_damping", {"friction.viscous_damping": 0.1}),
-    Planted("torque constant 10 % low", "actuator.torque_constant", {"actuator.torque_constant": 0.9}),
-    Planted("atmosphere of 83 kPa", ROOM, {ROOM: 83e3}),
-    Planted("atmosphere of 83 kPa under sensors of gauge pressure", ROOM, {ROOM: 83e3}, mistake="gauge"),
-    Planted("kPa read as psi", "all pressures seem to be kPa read as psi", mistake="psi"),
-    Planted("pressures swapped", "pressure_1 and pressure_2 seem to be swapped", mistake="swap"),
-    Planted("angle from the other end", "the angle seems to be counted from the other end", mistake="end"),
-    Planted("pressure_1 3 ms late", "pressure_1 seems to be later", mistake="late"),
-    Planted("inertia 30 % high", "foot_plate.inertia", {"foot_plate.inertia": 1.3}),
-    Planted("leak opens at 20 kPa", "the leak seems to open", extra=Extra(leak_opens=2e4)),
+FAULTS = (
+    Fault(
+        "pressures swapped",
+        ("pressure_1 and pressure_2 seem to be swapped",),
+        lambda one: changed(one, pressure_1=one["pressure_2"], pressure_2=one["pressure_1"]),
+    ),
+    Fault(
+        "gain of pressure_1 4 % high",
+        ("pressure_1 seems to be read",),
+        lambda one: read_with_gain(one, 1.04, "pressure_1"),
+    ),
+    Fault(
+        "gain of both chambers 4 % high",
+        ("pressure_1 and pressure_2 seem to be read",),
+        lambda one: read_with_gain(one, 1.04, *GAUGES),
+    ),
+    Fault(
+        "zero of pressure_2 at 8 kPa",
+        ("the zero of pressure_2 seems",),
+        lambda one: changed(one, pressure_2=one["pressure_2"] + 8e3),
+    ),
+    Fault(
+        "kPa read as psi",
+        ("all pressures seem to be kPa read as psi",),
+        lambda one: read_with_gain(one, PASCALS_PER_PSI / 1e3, *GAUGES, "supply_pressure"),
+    ),
+    Fault("pressure_1 clipped", ("pressure_1 is clipped",), clipped),
+    Fault(
+        "pressure_2 dead", ("pressure_2 never changes",), lambda one: changed(one, pressure_2=np.full(len(one), ROOM))
+    ),
+    Fault("five outliers in pressure_1", ("pressure_1 has 5 isolated outliers",), with_outliers),
+    Fault(
+        "clock 3 % fast", ("the clock of the recording seems to run",), lambda one: replace(one, time=1.03 * one.time)
+    ),
+    Fault(
+        "command with the wrong sign",
+        ("command seems to have the wrong sign",),
+        lambda one: changed(one, command=-one["command"]),
+    ),
+    Fault(
+        "gain of the angle 5 % high", ("angle seems to be read",), lambda one: changed(one, angle=1.05 * one["angle"])
+    ),
+    Fault("leak 3 times", ("actuator.leak.",), device=("actuator.leak.area=0.9 mm^2",)),
+    Fault("Cd of the valve 10 % low", ("valve.discharge_coefficient",), device=("valve.discharge_coefficient=0.1017",)),
+    Fault("inertia 30 % high", ("foot_plate.inertia",), device=("foot_plate.inertia=0.01092 kg m^2",)),
 )
+NOTHING = Fault("nothing", ())
 
 
-def recorded(planted: Planted, seed: int) -> Recording:
-    """A recording of what is planted."""
-    base = load_scenario("step-response", ["motion.kind=free"])
-    numbers = {path: by if path == ROOM else by * number_at(base, path) for path, by in planted.factors.items()}
-    scenario = with_numbers(base, numbers)
-    room = scenario.device.supply.atmospheric_pressure
-    scenario = replace(scenario, initial_pressure_1=room)
-    values = bench(scenario, [(0.0, 0.0), (OPENS, 1.0)], TIMES, planted.extra)
-    random = np.random.default_rng(seed)
-    channels = {
-        name: Channel(one + size * random.standard_normal(TIMES.size), unit)
-        for one, (name, (size, unit)) in zip(values, NOISE.items(), strict=True)
-    }
-    supply = scenario.device.supply.pressure + 500.0 * random.standard_normal(TIMES.size)
-    channels |= {
-        "command": Channel(np.where(TIMES > OPENS - 1e-9, 1.0, 0.0), "-"),
-        "supply_pressure": Channel(supply, "Pa"),
-    }
-    if planted.mistake == "swap":
-        channels["pressure_1"], channels["pressure_2"] = channels["pressure_2"], channels["pressure_1"]
-    if planted.mistake == "end":
-        ends = number_at(base, "actuator.angle_min") + number_at(base, "actuator.angle_max")
-        channels["angle"] = Channel(ends - channels["angle"].values, "rad")
-    if planted.mistake == "late":
-        late = np.interp(TIMES - 0.003, TIMES, channels["pressure_1"].values)
-        channels["pressure_1"] = Channel(late, "Pa")
-    if planted.mistake == "gauge":
-        for name in ("pressure_1", "pressure_2", "supply_pressure"):
-            channels[name] = Channel(channels[name].values + number_at(base, ROOM) - room, "Pa")
-    if planted.mistake == "psi":
-        for name in ("pressure_1", "pressure_2", "supply_pressure"):
-            channels[name] = Channel(room + PSI * (channels[name].values - room), "Pa")
-    return Recording("planted", TIMES, channels, "synthetic")
+def recorded(fault: Fault, seed: int) -> Recording:
+    """A recording of the rig with a fault."""
+    words = ("motion.kind=free", *SUPPLY, *fault.device)
+    made = record("step-response", preset="ideal-laboratory", seed=seed, overrides=words).recording
+    return fault.record(replace(made, channels={name: made.channels[name] for name in KEPT if name in made}))
 
 
-def said_of(planted: Planted, seed: int) -> Validation:
-    """What `ppafo validate` says of a recording."""
+def validated(fault: Fault, seed: int) -> Validation:
+    """What `ppafo validate` says of a recording with a fault."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "planted.csv"
-        write_csv(file, recorded(planted, seed))
+        write_csv(file, recorded(fault, seed))
         return ppafo.validate("ppafo2011", [file], overrides=SUPPLY)
+
+
+def judged(fault: Fault, found: Validation) -> str:
+    """`right`, `wrong` or `none`."""
+    best = found.causes.found
+    if best is None:
+        return "none"
+    return "right" if any(in_words(one).startswith(fault.named) for one in (best, *best.same)) else "wrong"
 
 
 def main() -> None:
     """Print the table, a row when it is done."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seed", type=int, default=77)
+    parser.add_argument("--seeds", type=int, nargs="+", required=True)
     parser.add_argument("--right", type=int, default=0, metavar="COUNT", help="nothing planted, COUNT times")
     words = parser.parse_args()
+    print("| planted | named | verdict | G | error over noise without, with | CPU s |\n|---|---|---|---|---|---|")
+    total: Counter[str] = Counter()
+    for seed in words.seeds:
+        for fault in FAULTS:
+            begun = time.process_time()
+            try:
+                found = validated(fault, seed)
+            except PpafoError as error:
+                said = str(error).partition("planted.csv: ")[2] or str(error)
+                total["refused"] += 1
+                print(f"| {fault.title} | {said} | refused | | | {time.process_time() - begun:.1f} |", flush=True)
+                continue
+            verdict, best, spent = judged(fault, found), found.causes.found, time.process_time() - begun
+            total[verdict] += 1
+            worst = max(one.in_noise for item in found.recordings for one in item.channels)
+            said, gain, left = "none", "", ""
+            if best is not None:
+                names = [in_words(best), *(one.name for one in best.same)]
+                said, gain, left = " or ".join(names), f"{best.gain:.0f}", f", {best.left:.2g}"
+            elif found.causes.nearest is not None:
+                said, left = f"none; nearest: {in_words(found.causes.nearest)}", f", {found.causes.nearest.left:.2g}"
+            print(f"| {fault.title} | {said} | {verdict} | {gain} | {worst:.2g}{left} | {spent:.1f} |", flush=True)
+    print(f"\n{', '.join(f'{count} {word}' for word, count in total.most_common())}", flush=True)
     if words.right:
-        nothing = Planted("nothing", "")
-        failed = [said_of(nothing, seed) for seed in range(words.seed, words.seed + words.right)]
-        print(f"{sum(not one.passes for one in failed)} of {words.right} recordings of the right set do not agree")
-        return
-    print(
-        "| planted | agrees | largest error over noise | of full range | named | gain | next best | its gain | CPU s |"
-    )
-    print("|---|---|---|---|---|---|---|---|---|")
-    for planted in PLANTED:
-        begun = time.process_time()
-        try:
-            found = said_of(planted, words.seed)
-        except PpafoError as error:
-            print(f"| {planted.title} | refused: {error} | | | | | | | |", flush=True)
-            continue
-        channels = [channel for one in found.recordings for channel in one.channels]
-        worst = max(channels, key=lambda one: one.in_noise)
-        best = [(in_words(one), f"{one.gain:.0f}") for one in found.explanations.found[:2]]
-        cells = [cell for pair in [*best, ("", ""), ("", "")][:2] for cell in pair]
-        size = f"{worst.in_noise:.2g} | {100.0 * worst.fraction:.2g} %"
-        agrees, spent = "yes" if found.passes else "no", time.process_time() - begun
-        print(f"| {planted.title} | {agrees} | {size} | {' | '.join(cells)} | {spent:.1f} |", flush=True)
+        right = [validated(NOTHING, words.seeds[0] + number) for number in range(words.right)]
+        alarms = sum(not one.passes for one in right)
+        print(f"{alarms} of {words.right} right recordings do not agree")
 
 
 if __name__ == "__main__":

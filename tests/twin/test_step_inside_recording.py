@@ -81,7 +81,7 @@ def test_the_right_model_is_no_misfit_where_its_step_lies_inside_the_recording(f
     (folder / "problem.toml").write_text(PROBLEM)
     outcome = identify(folder / "problem.toml").trajectory
     assert outcome is not None
-    assert outcome.fit.misfit == ""
+    assert outcome.fit.conflict == ""
     for path, truth in TRUTH.items():
         found = outcome.fit.estimate(path)
         assert found.verdict == "identified"

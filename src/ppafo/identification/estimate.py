@@ -23,11 +23,6 @@ def interval_factor(confidence: float) -> float:
     return NormalDist().inv_cdf(0.5 + 0.5 * confidence)
 
 
-def limit_for(chance: float) -> float:
-    """Return the standard errors [-] that normal noise exceeds, on either side, with this chance."""
-    return -NormalDist().inv_cdf(0.5 * chance)
-
-
 def half_width_for(confidence: float, half_width: float, stated: float) -> float:
     """Return half the width of an interval for some confidence, from that of one ``stated`` for another."""
     return half_width * interval_factor(confidence) / interval_factor(stated)

@@ -66,8 +66,9 @@ class Noise:
 
 @dataclass(frozen=True, slots=True)
 class Conflict:
-    """A sensor, a recording or a channel of one that alone wants other numbers than all together (Hausman's test).
+    """A sensor, a recording, a channel of one or a stated value that alone wants other numbers than all together.
 
+    It is Hausman's test. ``group`` is "pressure_1", "back", "pressure_1 of back" or "what is stated of it".
     ``number`` is the one that parts most, by so many ``standard_errors``; ``p`` is the chance, over all groups, that a
     model that holds shows as much.
     """
@@ -126,6 +127,9 @@ _EVALUATIONS = 40
 _SIGNIFICANCE = 0.01
 _PARTING = 0.05
 """Fraction of the covariance of all by which that of a group alone must be larger for its direction to be tested."""
+
+_RANK = 1.0e-13
+"""Eigenvalue [-] of scaled numbers from which they are seen."""
 
 _UNKNOWN = 0.5
 """Standard error of a combination over the scales of its numbers from which it is not identifiable."""
@@ -331,7 +335,7 @@ def _linear(work: _Work, point: Floats, left: Floats, slopes: Floats) -> tuple[_
             known[channel] = Noise(float(noise[own[0]][0]), reflection)
             for one in own:
                 rows[one] = whiten(rows[one], Noise(1.0, reflection))
-        root = _root_of_inverse(rows[:, 1:].T @ rows[:, 1:] + np.diag(np.square(work.prior)))
+        root, _ = _root_of_inverse(rows[:, 1:].T @ rows[:, 1:] + np.diag(np.square(work.prior)))
         hidden = slopes @ root
         before = step
         solved = lsq_linear(
@@ -346,11 +350,15 @@ def _linear(work: _Work, point: Floats, left: Floats, slopes: Floats) -> tuple[_
     return _Linear(rows, root, noise, known), step
 
 
-def _root_of_inverse(curvature: Floats) -> Floats:
-    """Return a matrix whose product with its transpose is the inverse; large along what is not seen."""
-    size = np.sqrt(np.maximum(np.diag(curvature), 1.0e-20))
+def _root_of_inverse(curvature: Floats) -> tuple[Floats, Mask]:
+    """Return a matrix whose product with its transpose is the inverse, and which of its columns are seen at all.
+
+    The others are large, of numbers or combinations that nothing fixes.
+    """
+    sizes = np.sqrt(np.maximum(np.diag(curvature), 0.0))
+    size = np.where(sizes > 1.0e-9 * sizes.max(initial=0.0), sizes, sizes.max(initial=1.0e-9) or 1.0)
     values, vectors = np.linalg.eigh(curvature / size / size[:, None])
-    return np.asarray(vectors / np.sqrt(np.maximum(values, 1.0e-14)) / size[:, None])
+    return np.asarray(vectors / np.sqrt(np.maximum(values, _RANK)) / size[:, None]), np.asarray(values > _RANK)
 
 
 def _whitened(work: _Work, point: Floats, settled: bool, confidence: float) -> Fit:
@@ -433,8 +441,11 @@ def _conflict(work: _Work, rows: Floats, point: Floats, free: Mask, freedom: flo
     """
     errors, slopes = rows[:, 0], rows[:, 1:][:, free]
     prior, shift = np.square(work.prior[free]), (point - work.mean)[free]
-    root = _root_of_inverse(slopes.T @ slopes + np.diag(prior))
+    root, seen = _root_of_inverse(slopes.T @ slopes + np.diag(prior))
+    root = root[:, seen]
     groups, found = list(_groups(work)), None
+    names = np.array([one.name for one in work.numbers])[free]
+    count_of_tests = len(groups) + int((prior > 0.0).sum())
     for name, own in groups:
         part = np.concatenate([slopes[one] for one in own])
         pull = part.T @ np.concatenate([errors[one] for one in own]) + prior * shift
@@ -446,13 +457,21 @@ def _conflict(work: _Work, rows: Floats, point: Floats, free: Mask, freedom: flo
         alone, axes = alone[tested], root @ turned[:, tested]
         along = axes.T @ pull
         statistic = float(np.sum(np.square(along) / (alone * (1.0 - alone))))
-        p = min(float(fisher.sf(statistic / count, count, freedom)) * len(groups), 1.0)
+        p = min(float(fisher.sf(statistic / count, count, freedom)) * count_of_tests, 1.0)
         if p < _SIGNIFICANCE and (found is None or p < found.p):
             moved = np.abs(axes @ (along / alone))
             spread = np.sqrt(np.square(axes) @ (1.0 / alone - 1.0))
             ratio = moved / np.maximum(spread, 1.0e-300)
             most = int(np.argmax(ratio))
-            found = Conflict(name, np.array([one.name for one in work.numbers])[free][most], float(ratio[most]), p)
+            found = Conflict(name, str(names[most]), float(ratio[most]), p)
+    # What is stated of a tolerance is a group of its own: its mean parts from the fit by deviation^2 - C.
+    variance = np.square(root).sum(axis=1)
+    own_variance = 1.0 / np.maximum(prior, 1.0e-300) - variance
+    for place in np.flatnonzero((prior > 0.0) & (own_variance >= _PARTING * variance)).tolist():
+        ratio = abs(float(shift[place])) / math.sqrt(float(own_variance[place]))
+        p = min(2.0 * float(student.sf(ratio, freedom)) * count_of_tests, 1.0)
+        if p < _SIGNIFICANCE and (found is None or p < found.p):
+            found = Conflict("what is stated of it", str(names[place]), ratio, p)
     return found
 
 

@@ -30,7 +30,7 @@ from ppafo.validation.measured import (
     parse_thresholds,
     supply_gauge,
 )
-from ppafo.validation.replay import Motion, Replayed, initial_in_fixed_volume, replay_recording, start_of
+from ppafo.validation.replay import Motion, Replay, Replayed, initial_in_fixed_volume, replay_recording, start_of
 
 DEFAULT_LIMIT = 0.02
 """Largest delay [s] that is looked for; sensors, filters and valves are late by less, and a model by more is wrong."""
@@ -287,16 +287,23 @@ def _rms(error: Floats, weights: Floats) -> float:
     return float(np.sqrt(weights @ error**2))
 
 
-def compare_recording(measured: Measured, device: Device, settings: ReplaySettings) -> RecordingAgreement:
-    """Return how far the model of a device is from one recording, on the inputs of that recording."""
+def replay_of(measured: Measured, device: Device, settings: ReplaySettings) -> Replay:
+    """Return the replay of a recording on a device, or on a fixed volume in its place."""
+    motion, initial = settings.motion, settings.initial
     if settings.volume is not None:
         device = with_fixed_volume(device, settings.volume)
-        settings = replace(settings, motion="held", initial=initial_in_fixed_volume(device, settings.initial))
-    if settings.motion == "measured" and not measured.has(ANGLE):
+        motion, initial = "held", initial_in_fixed_volume(device, initial)
+    if motion == "measured" and not measured.has(ANGLE):
         raise DataError(f"{measured.file}: there is no channel '{ANGLE}' to prescribe (--motion measured)")
-    start = start_of(measured, device, settings.initial)
-    replayed = replay_recording(measured, device, start, settings.motion, settings.longest_delay, settings.leg)
-    items = _comparisons(measured, replayed, device, settings)
+    start = start_of(measured, device, initial)
+    return Replay(measured, device, start, motion, settings.longest_delay, settings.leg)
+
+
+def compare_recording(measured: Measured, device: Device, settings: ReplaySettings) -> RecordingAgreement:
+    """Return how far the model of a device is from one recording, on the inputs of that recording."""
+    wanted = replay_of(measured, device, settings)
+    replayed = replay_recording(wanted)
+    items = _comparisons(measured, replayed, wanted.device, settings)
     delay = common_delay(items, settings.longest_delay)
     channels = tuple(channel_agreement(item, delay.correction, settings.longest_delay) for item in items)
     late, longest = [], settings.longest_delay
@@ -311,7 +318,7 @@ def compare_recording(measured: Measured, device: Device, settings: ReplaySettin
         sha256=measured.sha256,
         measured=measured.recording,
         model=replayed.recording,
-        motion=settings.motion,
+        motion=wanted.motion,
         inputs=replayed.inputs,
         step=replayed.step,
         delay=delay,

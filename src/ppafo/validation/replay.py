@@ -3,14 +3,14 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
-from ppafo.engine.lanes import Floats, replay
+from ppafo.engine.lanes import Batch, Floats, StepInputs, replay
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, batch_of
 from ppafo.engine.scheme.actuators import pressures_of, torque_of
-from ppafo.errors import DataError, SimulationError, UnitError, nearest_name, one_line, refused_as
+from ppafo.errors import DataError, PpafoError, SimulationError, UnitError, nearest_name, one_line, refused_as
 from ppafo.parameters.device import Device
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.loading import load_scenario
@@ -55,28 +55,73 @@ class Replayed:
     inputs: tuple[str, ...]
 
 
-def replay_recording(
-    measured: Measured, device: Device, start: Start, motion: Motion, extra: float, leg: Leg | None = None
-) -> Replayed:
-    """Run the model on the inputs of a recording and ``extra`` seconds longer, with the last inputs.
+@dataclass(frozen=True, slots=True)
+class Replay:
+    """What is to be replayed: a recording on a device, ``extra`` [s] longer with the last inputs.
 
     The motion ``leg`` is that with ``leg``, or on the fixture of figure 7.
     """
-    run = _plan(measured, device, start, motion, extra, leg)
-    if motion == "measured":
-        run = with_prescribed_angle(run, start.angle)
-    followed = followed_channels(measured, motion)
-    inputs = RecordedInputs(measured.recording, followed, float(measured.recording.time[0]))
-    outcome = replay(batch_of(run), step_inputs(inputs, device, run))
-    rows = state_row_numbers(run)
-    failed = float(outcome.states[rows["result.failure_time"], 0])
-    if failed < NEVER_FAILED or not np.isfinite(outcome.record).all():
+
+    measured: Measured
+    device: Device
+    start: Start
+    motion: Motion
+    extra: float
+    leg: Leg | None = None
+
+
+def replay_recording(wanted: Replay) -> Replayed:
+    """Return the model on the inputs of a recording; SimulationError where it diverges."""
+    found = replay_together([wanted])[0]
+    if isinstance(found, PpafoError):
+        raise found
+    return found
+
+
+def replay_together(wanted: Sequence[Replay]) -> list[Replayed | PpafoError]:
+    """Return many replays, or why one cannot be made; those of one program, clock and inputs are one batch."""
+    found: dict[int, Replayed | PpafoError] = {}
+    planned: dict[int, tuple[Run, StepInputs, Batch]] = {}
+    groups: dict[tuple[Any, ...], list[int]] = {}
+    for place, one in enumerate(wanted):
+        try:
+            run = _plan(one)
+        except PpafoError as error:
+            found[place] = error
+            continue
+        followed = followed_channels(one.measured, one.motion)
+        inputs = RecordedInputs(one.measured.recording, followed, float(one.measured.recording.time[0]))
+        steps, batch = step_inputs(inputs, one.device, run), batch_of(run)
+        planned[place] = run, steps, batch
+        table = [(name, series.tobytes()) for name, series in steps.parameters.items()]
+        command = b"" if steps.command is None else steps.command.tobytes()
+        groups.setdefault((batch.program, batch.clock, command, tuple(table)), []).append(place)
+    for places in groups.values():
+        first, steps, batch = planned[places[0]]
+        parameters = np.concatenate([planned[place][2].parameters for place in places], axis=1)
+        states = np.concatenate([planned[place][2].states for place in places], axis=1)
+        outcome = replay(replace(batch, parameters=parameters, states=states), steps)
+        rows = state_row_numbers(first)
+        for lane, place in enumerate(places):
+            record, ends = outcome.record[:, :, lane], outcome.states[:, lane]
+            found[place] = _replayed(wanted[place], planned[place][0], rows, record, ends)
+    return [found[place] for place in range(len(wanted))]
+
+
+def _replayed(
+    one: Replay, run: Run, rows: Mapping[str, int], record: Floats, ends: Floats
+) -> Replayed | SimulationError:
+    failed = float(ends[rows["result.failure_time"]])
+    if failed < NEVER_FAILED or not np.isfinite(record).all():
         until = min(failed, run.step * run.step_count)
         remedy = "check the volumes, the inertia and the valve of the set (ppafo audit)"
-        if outcome.states[rows["result.too_many_parts"], 0]:
+        if ends[rows["result.too_many_parts"]]:
             remedy = TOO_MANY_PARTS
-        raise SimulationError(f"{measured.file}: the model diverged {until:.6g} s after the first sample; {remedy}")
-    return Replayed(_recording(measured, run, outcome.record[:, :, 0]), run.step, inputs.names)
+        return SimulationError(
+            f"{one.measured.file}: the model diverged {until:.6g} s after the first sample; {remedy}"
+        )
+    inputs = followed_channels(one.measured, one.motion)
+    return Replayed(_recording(one.measured, run, record), run.step, inputs)
 
 
 def followed_channels(measured: Measured, motion: Motion) -> tuple[str, ...]:
@@ -86,36 +131,34 @@ def followed_channels(measured: Measured, motion: Motion) -> tuple[str, ...]:
     return (COMMAND, *followed, *([ANGLE] if motion == "measured" else []))
 
 
-def replayed_scenario(
-    measured: Measured, device: Device, start: Start, motion: Motion, extra: float, leg: Leg | None
-) -> Scenario:
-    """Return the run of a recording and ``extra`` seconds more: of a vane that is free, held or on a leg."""
-    recording = measured.recording
-    duration = recording.duration + max(extra, sample_period(recording.time))
-    highest = with_highest_supply(device, recording, recording.names)
-    given: FreeMotion | PrescribedMotion | None = held_vane(start.angle) if motion == "held" else None
-    if motion == "leg":
-        given = FreeMotion(start.angle, start.angular_velocity, leg=leg or leg_of_fixture())
-    return replay_scenario(recording, highest, start, duration, measured.file, given)
+def replayed_scenario(one: Replay) -> Scenario:
+    """Return the run of a recording: of a vane that is free, held or on a leg."""
+    recording, start = one.measured.recording, one.start
+    duration = recording.duration + max(one.extra, sample_period(recording.time))
+    highest = with_highest_supply(one.device, recording, recording.names)
+    given: FreeMotion | PrescribedMotion | None = held_vane(start.angle) if one.motion == "held" else None
+    if one.motion == "leg":
+        given = FreeMotion(start.angle, start.angular_velocity, leg=one.leg or leg_of_fixture())
+    return replay_scenario(recording, highest, start, duration, one.measured.file, given)
 
 
-def _plan(measured: Measured, device: Device, start: Start, motion: Motion, extra: float, leg: Leg | None) -> Run:
+def _plan(one: Replay) -> Run:
     """The run of a vane that is free, held or on a leg; a free one's steps are fine enough for a prescribed one too."""
-    scenario = replayed_scenario(measured, device, start, motion, extra, leg)
-    duration = scenario.duration
+    scenario = replayed_scenario(one)
     run = plan_run(scenario)
     if run.step_count > MAXIMUM_STEPS:
         raise DataError(
-            f"{measured.file}: {duration:.4g} s would take {run.step_count} steps of {run.step:.2g} s, at most "
-            f"{MAXIMUM_STEPS} are allowed; split the recording into parts"
+            f"{one.measured.file}: {scenario.duration:.4g} s would take {run.step_count} steps of {run.step:.2g} s, at "
+            f"most {MAXIMUM_STEPS} are allowed; split the recording into parts"
         )
-    supply = device.supply
+    supply = one.device.supply
     plant = run.plant._replace(supply_pressure=supply.pressure, dorsiflexion_pressure=supply.dorsiflexion_pressure)
     samples = math.ceil(run.step_count / run.steps_per_sample)
     # Steps between two records divide a sample, so that the model is known at every regular sample.
     most = max(1, int(_RECORD_INTERVAL / run.step * (1.0 + _WHOLE)))
     every = max(count for count in range(1, most + 1) if run.steps_per_sample % count == 0)
-    return replace(run, plant=plant, record_every=every, step_count=samples * run.steps_per_sample)
+    run = replace(run, plant=plant, record_every=every, step_count=samples * run.steps_per_sample)
+    return with_prescribed_angle(run, one.start.angle) if one.motion == "measured" else run
 
 
 def leg_of_fixture() -> Leg | None:

@@ -16,6 +16,7 @@ from ppafo.constants import PASCALS_PER_PSI
 from ppafo.documents.models import StrictTable, Text
 from ppafo.errors import IdentificationError, UnitError, refused_as
 from ppafo.identification.estimate import interval_factor
+from ppafo.identification.new_set import fitting_unit
 from ppafo.identification.trajectory.problem import (
     FITTED_CHANNELS,
     GAIN_OF,
@@ -165,8 +166,10 @@ def stated_by(parameter_set: ParameterSet, scenario: Scenario) -> dict[str, floa
     for path, quantity in declared_numbers(scenario).items():
         entry = parameter_set.numbers.get(path)
         if entry is not None and entry.uncertainty:
-            ends = (to_si(one, entry.unit, quantity.unit) for one in (entry.value + entry.uncertainty, entry.value))
-            found[path] = next(ends) - next(ends)
+            unit = fitting_unit(entry.unit, quantity)
+            found[path] = to_si(entry.value + entry.uncertainty, entry.unit, unit) - to_si(
+                entry.value, entry.unit, unit
+            )
     return found
 
 

@@ -16,15 +16,6 @@ QUESTION = Question(
             "RECORDING",
             nargs="+",
         ),
-        Argument(
-            ("--against",),
-            "against",
-            "another set, or a set with other values or another level of the model, to be compared by log predictive "
-            "density: 'fitted.toml', 'ppafo2011:friction.static_torque=0 N m'; may be repeated",
-            metavar="SET[:PATH=VALUE,...]",
-            action="append",
-            default=(),
-        ),
         Argument(("--valve",), "valve", "valve of the parameter set; default: its default valve", "NAME"),
         SET,
         Argument(

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -30,24 +30,11 @@ from ppafo.answers.style import (
     mark_kind,
 )
 from ppafo.errors import DataError, nearest_name, one_line
-from ppafo.identification.trajectory.explanations import Explanation, Explanations, explanations_of
-from ppafo.identification.trajectory.prediction import Ranking
-from ppafo.identification.trajectory.problem import FITTED_CHANNELS, Experiment
 from ppafo.parameters import load_device
 from ppafo.parameters.device import Device
-from ppafo.parameters.overrides import over
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.questions.question import Solved
-from ppafo.questions.validate.several import (
-    parse_sets,
-    ranking_data,
-    ranking_of,
-    ranking_section,
-    ranking_sentence,
-    seen_by,
-)
 from ppafo.signals.recording import Floats
-from ppafo.simulation.recorded import with_fixed_volume
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.foreign import ColumnMap, load_column_map
 from ppafo.validation import ChannelAgreement
@@ -58,25 +45,15 @@ from ppafo.validation.agreement import (
     compare_recording,
     measured_values,
 )
+from ppafo.validation.causes import Cause, Causes, causes_of
 from ppafo.validation.measured import (
-    ANGLE,
     COMPARED,
     PRESSURE_1,
     PRESSURE_2,
-    Measured,
     parse_thresholds,
     read_measured,
-    shows_nothing,
 )
-from ppafo.validation.replay import (
-    MOTIONS,
-    Motion,
-    followed_channels,
-    initial_in_fixed_volume,
-    parse_initial,
-    replayed_scenario,
-    start_of,
-)
+from ppafo.validation.replay import MOTIONS, Motion, parse_initial
 from ppafo.version import __version__
 
 if TYPE_CHECKING:
@@ -96,16 +73,15 @@ class Validation(Solved):
     overrides: tuple[str, ...]
     settings: ReplaySettings
     recordings: tuple[RecordingAgreement, ...]
-    explanations: Explanations
+    causes: Causes
     has_limits: bool
-    ranking: Ranking | None = None
-    seen: tuple[str, ...] = ()
 
     @property
     def passes(self) -> bool:
-        """True where every error is within its limit and, unless limits were given, no change explains more."""
+        """True where every error is within its limit and, unless limits were given, no cause that no bench has is found."""
         within = all(recording.passes for recording in self.recordings)
-        return within and (self.has_limits or not self.explanations.found)
+        found = self.causes.found
+        return within and (self.has_limits or found is None or found.is_usual)
 
 
 def validate(
@@ -119,7 +95,6 @@ def validate(
     thresholds: Sequence[str] = (),
     longest_delay: float = DEFAULT_LIMIT,
     columns: ColumnMap | str | Path | None = None,
-    against: Sequence[str] = (),
     progress: Report | None = None,
 ) -> Validation:
     """Return the errors (model less measured) of the model with a parameter set against each recording.
@@ -129,11 +104,10 @@ def validate(
     ``volume`` [m^3] there is no vane and chamber 1 is a fixed volume. ``initial`` are texts such as
     ``pressure_2=0 psi_g`` for channels that were not recorded, ``thresholds`` texts such as ``5%`` or ``angle=2 deg``:
     the largest RMS errors that pass, of the full range or in a unit. Without any it is 10 % of full range, at
-    least half of the variance of a signal beside its noise is explained, and no single change of record, set or model
-    may explain the recordings better than noise of the sensors could. ``longest_delay`` [s], at
+    least half of the variance of a signal beside its noise is explained, and no single cause in record, set or model
+    is found (``causes``) that is larger than those of any bench. ``longest_delay`` [s], at
     most 1 s, limits the delay of the measurement that is taken out. ``columns`` is a column map or
-    ``FILE.toml[:NAME]``. ``against`` are other sets, ``NAME`` or ``NAME:PATH=VALUE,PATH=VALUE`` (after ``overrides``,
-    which hold for all of them), with which the set is compared by log predictive density: ``ranking``, else None.
+    ``FILE.toml[:NAME]``.
 
     The result has ``passes`` and, in ``recordings``, one ``RecordingAgreement`` each: ``measured`` and ``model`` are
     recordings, their channels of shape (samples,) in SI; ``channels`` has RMS error, bias, largest error and delay [s]
@@ -143,10 +117,7 @@ def validate(
     override, SimulationError where the model diverges.
     """
     report = progress or report_nothing
-    sets = parse_sets(str(parameter_set), against)
     device = load_device(parameter_set, valve, overrides)
-    words = [over(overrides, one.overrides, valve=valve or "") for one in sets[1:]]
-    others = [load_device(one.parameter_set, valve, own) for one, own in zip(sets[1:], words, strict=True)]
     if volume is not None and not volume > 0.0:
         raise DataError(f"volume of {volume:g} m^3: must be above 0")
     if not 0.0 <= longest_delay <= LARGEST_DELAY:
@@ -166,65 +137,15 @@ def validate(
     for measured in read:
         report(Progress(f"replaying {measured.file}"))
         agreements.append(compare_recording(measured, device, settings))
-    report(Progress("searching what would explain the recordings better"))
-    explanations = _explanations(read, device, settings, agreements)
-    ranking = None
-    if others:
-        report(Progress("comparing the sets"))
-        theirs = [[compare_recording(measured, other, settings) for measured in read] for other in others]
-        ranking = ranking_of(sets, [agreements, *theirs])
     return Validation(
         parameter_set=str(parameter_set),
         device=device,
         overrides=tuple(overrides),
         settings=settings,
         recordings=tuple(agreements),
-        explanations=explanations,
+        causes=causes_of(read, agreements, device, settings, report),
         has_limits=bool(thresholds),
-        ranking=ranking,
-        seen=seen_by(sets, agreements) if others else (),
     )
-
-
-def _explanations(
-    read: Sequence[Measured], device: Device, settings: ReplaySettings, agreements: Sequence[RecordingAgreement]
-) -> Explanations:
-    """Return what single change would explain all recordings better than the set does.
-
-    Recordings that were compared in no channel of a fit are left out, and channels of sensors that are dead or clipped.
-    Where the vane follows the recorded angle nothing is searched: a delay of the sensors is then one of an input as
-    well.
-    """
-    if settings.motion == "measured":
-        return Explanations((), 0.0, 0)
-    if settings.volume is not None:
-        device = with_fixed_volume(device, settings.volume)
-        settings = replace(settings, motion="held", initial=initial_in_fixed_volume(device, settings.initial))
-    experiments, delays = [], []
-    for number, (measured, agreement) in enumerate(zip(read, agreements, strict=True), start=1):
-        noise = {
-            one.channel: one.noise
-            for one in agreement.channels
-            if one.channel in FITTED_CHANNELS and not shows_nothing(measured.recording, one.channel)
-        }
-        if not noise or (tuple(noise) == (ANGLE,) and settings.motion == "held"):
-            continue
-        start = start_of(measured, device, settings.initial)
-        experiments.append(
-            Experiment(
-                label=f"{measured.file} ({number})",
-                scenario=replayed_scenario(
-                    measured, device, start, settings.motion, settings.longest_delay, settings.leg
-                ),
-                recording=measured.recording,
-                start=float(measured.recording.time[0]),
-                channels=tuple(noise),
-                noise=noise,
-                inputs=followed_channels(measured, settings.motion),
-            )
-        )
-        delays.append(agreement.delay.correction)
-    return explanations_of(experiments, delays) if experiments else Explanations((), 0.0, 0)
 
 
 def _motion(text: str) -> Motion:
@@ -345,8 +266,6 @@ def _level_in_display_unit(values: Floats, name: str, atmosphere: float) -> Floa
 
 
 _MILLISECONDS = 1.0e3
-_NOISE = 2.0
-"""RMS error over the noise from sample to sample up to which what is left is called noise."""
 _HEAD = tuple(
     map(
         Column,
@@ -361,7 +280,7 @@ _UNUSUAL = re.compile(r"[^A-Za-z0-9_.-]+")
 
 def answer_of(validation: Validation) -> Answer:
     """Return the answer of a validation; it has passed where every error is within its limit."""
-    count, ranking = len(validation.recordings), validation.ranking
+    count = len(validation.recordings)
     names = recording_names([agreement.file for agreement in validation.recordings])
     kinds = {agreement.measured.kind for agreement in validation.recordings}
     pairs = list(zip(names, validation.recordings, strict=True))
@@ -372,12 +291,9 @@ def answer_of(validation: Validation) -> Answer:
         title=f"{validation.device.name} against {count} recording{'' if count == 1 else 's'}",
         lead=(
             verdict(validation),
-            *([ranking_sentence(ranking)] if ranking else []),
             *_departures(validation, sorted(kinds - {"measured"})),
         ),
         sections=(
-            ranking_section(ranking, validation.seen) if ranking else Section(),
-            _explained(validation),
             Section(paragraphs=(_method(validation),), is_detail=True),
             *(_section(validation, name, agreement) for name, agreement in pairs),
             (Section("Files", table=Table((), rows), is_detail=True) if rows else Section()),
@@ -392,16 +308,11 @@ def answer_of(validation: Validation) -> Answer:
             "longest_delay": validation.settings.longest_delay,
             "passes": validation.passes,
             "summary": verdict(validation),
-            "explanations": {
-                "tried": validation.explanations.tried,
-                "chance": validation.explanations.limit,
-                "found": [
-                    {"name": one.name, "same": list(one.others), "words": in_words(one), "gain": one.gain}
-                    | {"numbers": {path: number for path, (number, _) in one.numbers.items()}}
-                    for one in validation.explanations.found
-                ],
+            "causes": {
+                "tried": validation.causes.tried,
+                "found": _cause_data(validation.causes.found),
+                "nearest": _cause_data(validation.causes.nearest),
             },
-            **({"ranking": ranking_data(ranking, validation.seen)} if ranking else {}),
             "recordings": [_recording_data(agreement) for agreement in validation.recordings],
             "versions": {"ppafo": __version__},
         },
@@ -422,72 +333,60 @@ def recording_names(files: Sequence[str]) -> list[str]:
 def verdict(validation: Validation) -> str:
     """Return in one sentence whether the set agrees and, if not, by what it is off and what would explain it."""
     count, name = len(validation.recordings), validation.device.name
-    noun = "recording" if count == 1 else "recordings"
     pairs = [(channel, agreement) for agreement in validation.recordings for channel in agreement.channels]
     worst = max((channel for channel, _ in pairs), key=lambda one: one.in_noise)
     size = (
         f"{worst.channel} is off by {worst.in_noise:.2g} times its noise ({100 * worst.fraction:.2g} % of full range)"
     )
-    failed = [
+    failed = ", ".join(
         f"{channel.channel} in {agreement.file} ({100 * channel.fraction:.3g} %, limit {100 * channel.limit:.3g} %)"
         for channel, agreement in pairs
         if not channel.passes
-    ]
-    found = validation.explanations.found
-    if not validation.passes:
-        which = ", ".join(failed)
-        if not found:
-            return f"{name} does not agree: {which}; {size}"
-        return f"{name} does not agree: {in_words(found[0])}; {size}{f'; beyond the limit: {which}' if failed else ''}"
-    if found:
-        return (
-            f"{name} agrees with {count} {noun} to the limits given: every RMS error is within its limit, but {size}, "
-            f"and {in_words(found[0])}"
-        )
-    is_noise = worst.in_noise < _NOISE
-    why = ", and no single change explains more" if validation.explanations.tried else ""
-    rest = "nothing but noise is left" if is_noise else f"{size}{why}"
-    return f"{name} agrees with {count} {noun}: every RMS error is within its limit; {rest}"
-
-
-def in_words(one: Explanation) -> str:
-    """Return a change in words, one of the set with its value in the unit in which people see it."""
-    values = []
-    for number, unit in one.numbers.values():
-        # An atmosphere in gauge pressure says nothing.
-        is_pressure = unit == "Pa_a"
-        values.append(
-            f"{1e-3 * number:.4g} kPa" if is_pressure else quantity_text(number, quantity_of_unit(unit), ".4g")
-        )
-        if not is_pressure and not quantity_of_unit(unit):
-            values[-1] = f"{values[-1]} {unit}".rstrip()
-    return f"{one.in_words} ({', '.join(values)})" if values else one.in_words
-
-
-def _explained(validation: Validation) -> Section:
-    """Return what would explain the recordings better, with the margin, beside the next best."""
-    found = validation.explanations
-    if not found.tried:
-        return Section()
-    tried = f"{found.tried} single changes of record, set and model were tried"
-    if not found.found:
-        return Section("What would explain more", paragraphs=(f"{tried}: none explains more than noise could.",))
-    alike, rest = found.alike, [one for one in found.found if one not in found.alike]
-    rows = tuple((in_words(one), ", ".join(one.others), f"{one.gain:.3g}") for one in found.found)
-    if len(alike) > 1:
-        margin = f"The first {len(alike)} cannot be told apart for certain: another experiment would."
-    elif rest:
-        margin = f"The first is ahead of the next by {alike[0].gain - rest[0].gain:.3g}."
-    else:
-        margin = "No other comes near."
-    return Section(
-        "What would explain more",
-        paragraphs=(
-            f"{tried}, each with the size that leaves least. Gain: what a change adds to twice the logarithm of the "
-            f"likelihood, with noise of any kind estimated anew; chance makes less than {found.limit:.2g}. {margin}",
-        ),
-        table=Table((Column("change"), Column("the same would do"), Column("gain")), rows),
     )
+    why = _why(validation.causes)
+    if not validation.passes:
+        parts = [part for part in (why, size, failed and f"beyond the limit: {failed}") if part]
+        return f"{name} does not agree: {'; '.join(parts)}"
+    agrees = f"{name} agrees with {count} recording{'s' * (count > 1)}: every RMS error is within its limit"
+    return f"{agrees}; {size}; {why}" if why else f"{agrees}; nothing but noise is left"
+
+
+def _why(causes: Causes) -> str:
+    """Return what explains a disagreement, or what comes nearest; empty where nothing but noise is left."""
+    if causes.found is not None:
+        others = f" (or, the same for these recordings: {', '.join(one.name for one in causes.found.same)})"
+        usual = ", as on any bench" if causes.found.is_usual else ""
+        return f"{in_words(causes.found)}{usual}{others if causes.found.same else ''}"
+    if not causes.tried:
+        return ""
+    nearest = causes.nearest
+    near = "" if nearest is None else f"; nearest: {in_words(nearest)}, which leaves {nearest.left:.2g} times the noise"
+    return f"no single change explains it{near}"
+
+
+def in_words(one: Cause) -> str:
+    """Return a cause in words, numbers of the set in the unit in which people see them."""
+    if len(one.numbers) != 1:
+        return one.in_words
+    ((value, unit),) = one.numbers.values()
+    # An atmosphere in gauge pressure says nothing.
+    absolute, quantity = unit == "Pa_a", quantity_of_unit(unit)
+    shown = f"{1e-3 * value:.4g} kPa" if absolute else quantity_text(value, quantity, ".4g")
+    return f"{one.in_words} ({shown if absolute or quantity else f'{shown} {unit}'.removesuffix(' -')})"
+
+
+def _cause_data(one: Cause | None) -> dict[str, Any] | None:
+    if one is None:
+        return None
+    return {
+        "name": one.name,
+        "words": in_words(one),
+        "same": [other.name for other in one.same],
+        "gain": one.gain,
+        "left": one.left,
+        "numbers": {path: value for path, (value, _) in one.numbers.items()},
+        "is_usual": one.is_usual,
+    }
 
 
 def _departures(validation: Validation, kinds: Sequence[str]) -> list[str]:
