@@ -13,7 +13,7 @@ import numpy as np
 
 from ppafo.errors import IdentificationError, nearest_name
 from ppafo.signals import CHANNELS, Recording, RecordingKind
-from ppafo.signals.faults import is_at_limit, longest_gap, plateaus
+from ppafo.signals.faults import FEWEST_AT_LIMIT, Plateau, is_at_limit, longest_gap, plateaus, scatters
 from ppafo.signals.recording import Floats
 from ppafo.storage.files import read_bytes
 
@@ -211,6 +211,11 @@ def kind_of(sources: tuple[Source, ...]) -> RecordingKind:
     return next(kind for kind in _KINDS if kind in kinds)
 
 
+def _is_held(values: Floats, plateau: Plateau) -> bool:
+    """Whether values that scatter elsewhere stay at an extreme for long."""
+    return plateau.count >= FEWEST_AT_LIMIT and scatters(values)
+
+
 def told_of_readings(sources: tuple[Source, ...]) -> tuple[str, ...]:
     """Return remarks on what the sensors did not show: pauses, values beyond a limit, steps of a coarse converter."""
     found = []
@@ -222,7 +227,7 @@ def told_of_readings(sources: tuple[Source, ...]) -> tuple[str, ...]:
             if name in _NO_SENSORS:
                 continue
             values = source.recording[name]
-            limits = [item for item in plateaus(values) if is_at_limit(values, item)]
+            limits = [item for item in plateaus(values) if is_at_limit(values, item) or _is_held(values, item)]
             unit = source.recording.unit(name)
             found += [
                 f"{source.name}: '{name}' stays at {item.value:.6g} {unit} for {item.count} samples, from sample "

@@ -100,7 +100,7 @@ def static_torque(sources: tuple[Source, ...], settings: StaticTorqueSettings | 
     reported = (
         Reported(names.slope_path, names.slope_unit, f"{names.slope.capitalize()}, the common slope of both branches"),
         Reported(names.friction_path, names.unit, f"{names.friction.capitalize()} without a pressure difference"),
-        Reported(names.growth_path, names.slope_unit, f"Growth of the {names.friction} with the pressure difference"),
+        Reported(names.growth_path, f"{names.unit}/Pa", f"Growth of the {names.friction} with the pressure difference"),
         Reported(names.zero_path, names.unit, f"Zero of the {names.load} sensor", float(np.ptp(torque))),
     )
     values = found.values.tolist()
