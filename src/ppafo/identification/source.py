@@ -100,7 +100,6 @@ def _digest(recording: Recording) -> str:
 
 
 _NO_SENSORS = ("command", "direction", "repetition")
-_COARSE = 0.02
 _SHARE_THAT_IS_CLIPPED = 0.05
 _FEWEST_CLIPPED = 4
 _FRACTION_THAT_MOVES = 0.02
@@ -217,7 +216,7 @@ def _is_held(values: Floats, plateau: Plateau) -> bool:
 
 
 def told_of_readings(sources: tuple[Source, ...]) -> tuple[str, ...]:
-    """Return remarks on what the sensors did not show: pauses, values beyond a limit, steps of a coarse converter."""
+    """Return remarks on what the sensors did not show: pauses, and values beyond a limit."""
     found = []
     for source in sources:
         gap = longest_gap(source.recording.time)
@@ -234,15 +233,6 @@ def told_of_readings(sources: tuple[Source, ...]) -> tuple[str, ...]:
                 f"{item.first + 1}: a limit of the sensor?"
                 for item in limits
             ]
-            # A converter is coarse where many samples share few values, far apart.
-            levels = np.unique(values)
-            if limits or levels.size < 2 or levels.size > values.size / 10:
-                continue
-            step = float(np.median(np.diff(levels)) / (levels[-1] - levels[0]))
-            if step > _COARSE:
-                found.append(
-                    f"{source.name}: values of '{name}' are {step:.0%} of their range apart, a coarse converter"
-                )
     return tuple(found)
 
 

