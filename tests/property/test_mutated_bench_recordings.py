@@ -19,6 +19,7 @@ from ppafo.identification.bench import (
     valve_map,
     vane_leak,
 )
+from ppafo.identification.bench.flow import GasAt
 from ppafo.identification.source import Source
 from ppafo.storage import read_csv
 from ppafo.storage.foreign import ColumnMap, read_foreign
