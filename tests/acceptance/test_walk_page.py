@@ -82,3 +82,13 @@ def test_the_segments_of_the_page_are_rows_of_what_the_command_prints(capsys: py
         (found,) = re.findall(rf"^\*? +{re.escape(name)} +(.*)$", printed, re.MULTILINE)
         cells = re.split(r" {2,}", found)
         assert re.split(r" {2,}", numbers) == [*cells[:7], cells[-1]]
+
+
+def test_the_walk_on_its_bottle_ends_as_the_page_shows(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    command, _, after = PAGE.partition("    ppafo walk solenoid-regulators ")[2].partition("\n")
+    shown = [line.strip() for line in after.lstrip("\n").partition("\n\n")[0].splitlines()]
+    words = ["walk", "solenoid-regulators", *shlex.split(command)[:-1], str(tmp_path / "on-bottle")]
+    assert main(words) == 0
+    printed = capsys.readouterr().out.splitlines()
+    assert len(shown) == 10
+    assert [line for line in shown if line not in printed] == []
