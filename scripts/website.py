@@ -95,7 +95,7 @@ def _linked(text: str, page: str, files: set[str]) -> str:
         return os.path.relpath(f"files/{place}.md", here)
 
     text = _LINK.sub(led, text)
-    if page == "docs/how-to/workbench.md":
+    if page == "docs/how-to/export.md":
         text = text.replace(f"Open `out/{WORKBENCH}`", f'Open <a href="../../{WORKBENCH}">{WORKBENCH}</a>')
     return text
 

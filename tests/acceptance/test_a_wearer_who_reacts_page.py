@@ -1,4 +1,4 @@
-"""What the page on a wearer who reacts shows is found: its table of strengths, pressures and gas, and its commands."""
+"""Pressures and gas of the neuromuscular gait model on the page of evidence are found, and its study is shipped."""
 
 import re
 from pathlib import Path
@@ -12,7 +12,7 @@ from ppafo.units import to_si
 from ppafo.walking import load_walk
 from ppafo.walking.motion import walk_of
 
-PAGE = (Path(__file__).parents[2] / "docs" / "how-to" / "a-wearer-who-reacts.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[2] / "docs" / "evidence.md").read_text(encoding="utf-8")
 ROOM = 2.0
 """Pressures [psi] by which the condition is surely met, or surely not: about the limit it changes several times."""
 

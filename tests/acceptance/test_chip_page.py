@@ -1,4 +1,4 @@
-"""What the page on chips shows is run as it stands there."""
+"""What the pages say of firmware and the processor in the loop is run as it stands there."""
 
 import re
 import shlex
@@ -16,11 +16,18 @@ from ppafo.exports.firmware.simulators import missing_tools
 from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 
-PAGE = (Path(__file__).parents[2] / "docs" / "how-to" / "run-on-a-chip.md").read_text(encoding="utf-8")
-COMMANDS = [
-    line for block in re.findall(r"^```sh\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE) for line in block.splitlines()
-]
-BLOCKS = {block.split()[0]: block.splitlines() for block in re.findall(r"^    (\w.*(?:\n    .*)*)", PAGE, re.MULTILINE)}
+DOCS = Path(__file__).parents[2] / "docs"
+SECTION = (
+    (DOCS / "how-to" / "export.md").read_text(encoding="utf-8").partition("\n## Firmware\n")[2].partition("\n## ")[0]
+)
+COMMANDS = re.findall(r"^ppafo .*$", SECTION, re.MULTILINE)
+EVIDENCE = (
+    (DOCS / "evidence.md")
+    .read_text(encoding="utf-8")
+    .partition("\n## Processor in the loop\n")[2]
+    .partition("\n## ")[0]
+)
+FIGURE_8 = re.findall(r"^    (flash .*(?:\n    .*)*)", EVIDENCE, re.MULTILINE)[0].splitlines()
 OF_PAGE = {"msp430f2013": "14.0.6", "cortex": "12.2.1"}
 """Versions of the compilers that the table of the page was made with."""
 
@@ -56,7 +63,7 @@ def test_the_simulated_chip_decides_as_the_page_says(
         check_table(said)
     else:
         # Another clang may need other bytes and cycles; decisions and what they come to are the same.
-        wanted = [line.strip() for line in BLOCKS["flash"]]
+        wanted = [line.strip() for line in FIGURE_8]
         solenoid, proportional = (lines.splitlines() for lines in text.split("\n\n")[1::2])
         assert proportional[-4:] == wanted[-4:]
         assert [line.split()[0] for line in proportional] == [line.split()[0] for line in wanted]
@@ -66,7 +73,7 @@ def test_the_simulated_chip_decides_as_the_page_says(
 
 def check_table(said: list[str]) -> None:
     """The table is that of the page, where the compilers are; targets without their tools are left out."""
-    shown = re.findall(r"^\|(?: target| msp| cortex|---).*$", PAGE, re.MULTILINE)
+    shown = re.findall(r"^\|(?: target| msp| cortex|---).*$", EVIDENCE, re.MULTILINE)
     table = [line for line in shown if line.count("|") == said[0].count("|")]
     assert len(said) == len(table) == 2 + 4 * len(CATALOG)
     assert said[:2] == table[:2]
@@ -86,13 +93,13 @@ def compiler_of(target: str) -> str:
     return subprocess.run([tool, "-dumpversion"], capture_output=True, text=True, check=True).stdout.strip()
 
 
-def test_what_whole_numbers_cost_is_as_in_the_table() -> None:
-    rows = dict(re.findall(r"^\| (.*?) \| ([\d.]+ N m \| [\d.]+ g) \|$", PAGE, re.MULTILINE))
+def test_what_fixed_point_costs_is_as_in_the_table() -> None:
+    rows = dict(re.findall(r"^\| (.*?) \| ([\d.]+ N m \| [\d.]+ g) \|$", EVIDENCE, re.MULTILINE))
     fixed = "controller.kind=pid_on_chip"
     for row, overrides in {
-        "floats": (),
-        "whole numbers, 12 bits": (fixed,),
-        "whole numbers, 8 bits": (fixed, "controller.converter_bits=8"),
+        "floating point": (),
+        "fixed point, 12 bits": (fixed,),
+        "fixed point, 8 bits": (fixed, "controller.converter_bits=8"),
     }.items():
         metrics = simulate(load_scenario("torque-task-proportional", overrides)).metrics
         found = f"{metrics['rms_error'].value:.4f} N m | {metrics['gas_supplied'].value * 1e3:.4f} g"

@@ -1,4 +1,4 @@
-"""What the pages on designing and sizing show is run as it stands there."""
+"""What the page on sizing shows is run as it stands there."""
 
 import re
 import shlex
@@ -37,7 +37,7 @@ def test_the_sizing_of_the_page_prints_what_the_page_shows(
     assert (tmp_path / written).exists()
 
 
-def test_the_file_and_the_python_of_the_page_on_sizing_run(
+def test_the_file_and_the_python_of_a_profile_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -47,18 +47,18 @@ def test_the_file_and_the_python_of_the_page_on_sizing_run(
     assert capsys.readouterr().out.startswith("enfield-ls-v05s pipeline-jacpac-9oz ")
 
 
-def test_the_file_and_the_python_of_the_page_on_designs_run(
+def test_the_file_and_the_python_of_tasks_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    text = blocks("choose-a-design.md", "toml")[0].replace("screening = 1024", "screening = 128\ngenerations = 1")
+    text = blocks("size-a-device.md", "toml")[1].replace("screening = 1024", "screening = 128\ngenerations = 1")
     (tmp_path / "my-device.toml").write_text(text)
     names: dict[str, Any] = {}
-    exec(blocks("choose-a-design.md", "python")[0], names)
+    exec(blocks("size-a-device.md", "python")[1], names)
     assert capsys.readouterr().out.strip().endswith("smc-crb2bw40-90d 2")
 
 
 def test_the_commands_about_parts_run(capsys: pytest.CaptureFixture[str]) -> None:
-    commands = blocks("choose-a-design.md", "sh")[1].splitlines()
+    commands = blocks("size-a-device.md", "sh")[4].splitlines()[:2]
     assert [main(shlex.split(command)[1:]) for command in commands] == [0, 0]
     assert "festo-mpye-5-m5-010-b" in capsys.readouterr().out

@@ -1,4 +1,4 @@
-"""The page on the gas path for a weak leg: its table of gas, toes and minutes, and the study that it shows."""
+"""The gas path for a weak leg on the page of evidence: its table of gas, toes and minutes, and its study."""
 
 import re
 from pathlib import Path
@@ -9,7 +9,7 @@ import ppafo
 from ppafo.studies.loading import load_study
 from ppafo.walking import load_walk, walk
 
-PAGE = (Path(__file__).parents[2] / "docs" / "how-to" / "gas-path-for-a-weak-leg.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[2] / "docs" / "evidence.md").read_text(encoding="utf-8")
 ROWS = re.findall(
     r"^\| [^|]+ \| (`[^|]+`)? ?\| ([\d.]+) cm \| ([\d.]+) g \| ([\d.]+) s \| ([\d.]+) min \|$", PAGE, re.M
 )

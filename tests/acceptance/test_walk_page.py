@@ -9,11 +9,12 @@ import pytest
 
 from ppafo.cli.main import main
 from ppafo.walking import load_walk
+from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import gait_sensors_of, has_ideal_sensors
 
 pytestmark = pytest.mark.thorough
 
-PAGE = (Path(__file__).parents[2] / "docs" / "how-to" / "let-it-walk.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[2] / "docs" / "how-to" / "walk.md").read_text(encoding="utf-8")
 
 
 def blocks(language: str) -> list[str]:
@@ -25,7 +26,7 @@ def test_the_commands_and_the_python_of_the_page_run(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     commands = [line for block in blocks("sh") for line in block.splitlines()]
-    assert [main(shlex.split(command)[1:]) for command in commands] == [0] * 16
+    assert [main(shlex.split(command)[1:]) for command in commands] == [0] * 17
     table = PAGE.partition("| In the folder |")[2].partition("\n\n")[0]
     listed = {
         name for cell in re.findall(r"^\| (`.*?`) \|", table, re.MULTILINE) for name in re.findall(r"`(.*?)`", cell)
@@ -37,15 +38,18 @@ def test_the_commands_and_the_python_of_the_page_run(
     exec(blocks("python")[0], names)
     printed = capsys.readouterr().out.splitlines()
     assert printed[0].startswith("completed 0.")
-    assert printed[2] == "100 wearers, (100,)"
-    assert (tmp_path / "out" / "walk.sto").stat().st_size > 10_000
+    assert printed[2:] == ["100 wearers, (100,)", "9 strides, (9, 101)"]
+    assert {path.name for path in (tmp_path / "out" / "my-gait").iterdir()} == {
+        *("my-gait.toml", "gait.json", "gait.txt", "gait.png", "gait.svg"),
+        *("report.html", "ppafo.json"),
+    }
 
 
 def test_the_table_of_the_page_is_what_the_command_prints(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    shown = [line.split() for line in PAGE.partition("    ppafo walk")[2].splitlines()[2:13]]
+    shown = [line.split() for line in PAGE.partition("\nprints\n")[2].splitlines()[1:12]]
     assert main(["walk", "solenoid", "--minutes", "0.2"]) == 0
     assert [line.split() for line in capsys.readouterr().out.splitlines()[2:13]] == shown
     assert len(shown) == 11
@@ -58,3 +62,33 @@ def test_the_walk_file_of_the_page_loads(tmp_path: Path) -> None:
     assert configuration.control.settings["push_off_start"] == pytest.approx(0.42)
     assert gait_sensors_of(configuration).heel_fault.time == pytest.approx(3.0)
     assert not has_ideal_sensors(configuration)
+
+
+def test_the_task_sequence_and_the_bottle_of_the_page_load(tmp_path: Path) -> None:
+    (tmp_path / "door.toml").write_text(blocks("toml")[1])
+    walk_file = tmp_path / "own.toml"
+    walk_file.write_text(blocks("toml")[0] + blocks("toml")[2])
+    assert walk_of(load_walk(walk_file)).bottle is not None
+    walk_file.write_text(blocks("toml")[0])
+    assert walk_of(load_walk(walk_file, [f"course={tmp_path / 'door.toml'}"])).course is not None
+
+
+def test_the_segments_of_the_page_are_rows_of_what_the_command_prints(capsys: pytest.CaptureFixture[str]) -> None:
+    rows = re.findall(r"^    \*? +(rest|start, 0.4 m/s|ramp, 1 m/s|whole course) +(.*)$", PAGE, re.MULTILINE)
+    assert len(rows) == 4
+    assert main(["walk", "solenoid", "--course", "first-steps"]) == 0
+    printed = capsys.readouterr().out
+    for name, numbers in rows:
+        (found,) = re.findall(rf"^\*? +{re.escape(name)} +(.*)$", printed, re.MULTILINE)
+        cells = re.split(r" {2,}", found)
+        assert re.split(r" {2,}", numbers) == [*cells[:7], cells[-1]]
+
+
+def test_the_walk_on_its_bottle_ends_as_the_page_shows(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    command, _, after = PAGE.partition("    ppafo walk solenoid-regulators ")[2].partition("\n")
+    shown = [line.strip() for line in after.lstrip("\n").partition("\n\n")[0].splitlines()]
+    words = ["walk", "solenoid-regulators", *shlex.split(command)[:-1], str(tmp_path / "on-bottle")]
+    assert main(words) == 0
+    printed = capsys.readouterr().out.splitlines()
+    assert len(shown) == 10
+    assert [line for line in shown if line not in printed] == []

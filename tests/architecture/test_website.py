@@ -23,9 +23,9 @@ def test_every_public_name_is_described_once() -> None:
     assert "``proportional_gain``" in pages["kinds"]
 
 
-def test_the_page_on_workbenches_leads_to_the_one_that_the_site_has(tmp_path: Path) -> None:
+def test_the_page_on_exports_leads_to_the_one_that_the_site_has(tmp_path: Path) -> None:
     stage(tmp_path)
-    text = (tmp_path / "docs" / "how-to" / "workbench.md").read_text(encoding="utf-8")
+    text = (tmp_path / "docs" / "how-to" / "export.md").read_text(encoding="utf-8")
     assert f'<a href="../../{WORKBENCH}">' in text
 
 

@@ -27,7 +27,7 @@ from tests.judge.wearer_comparison import STEPS, Columns, by_judge, by_package, 
 
 pytestmark = pytest.mark.long
 
-PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "a-wearer-who-reacts.md"
+PAGE = Path(__file__).parents[2] / "docs" / "evidence.md"
 WEARER = wearer_of(find_wearer("healthy-128"))
 ROUNDING = 1e-6
 """Torque [N m] that antagonists of up to 10 kN m each, who cancel, leave of their rounding."""

@@ -14,16 +14,14 @@ from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.controllers.switching import CONSTANT, ConstantParameters
 from ppafo.model.sensors import Measurement
 
-PAGES = Path(__file__).parents[3] / "docs" / "how-to"
-PAGE = (PAGES / "export-to-c.md").read_text(encoding="utf-8")
-PAGE_OF_UNITS = (PAGES / "export-to-fmu.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[3] / "docs" / "how-to" / "export.md").read_text(encoding="utf-8")
 
 
 def test_the_commands_of_the_page_write_libraries(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    commands = re.findall(r"^ppafo (.*)$", PAGE, re.MULTILINE)
+    commands = re.findall(r"^ppafo (export c .*)$", PAGE, re.MULTILINE)
     for command in commands:
         assert main([*shlex.split(command), "--json"]) == 0
     documents = capsys.readouterr().out.split("\n}\n")
@@ -46,10 +44,10 @@ def test_the_commands_of_the_page_write_units(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("ppafo.exports.fmu.build", lambda *given: str(given[0]).encode())
-    for command in re.findall(r"^ppafo (.*)$", PAGE_OF_UNITS, re.MULTILINE):
+    for command in re.findall(r"^ppafo (export fmu .*)$", PAGE, re.MULTILINE):
         assert main(shlex.split(command)) == 0
     (unit,) = (tmp_path / "out" / "unit").glob("*.fmu")
-    assert str(unit.relative_to(tmp_path)) in PAGE_OF_UNITS
+    assert str(unit.relative_to(tmp_path)) in PAGE
     assert (tmp_path / "out" / "plant" / "torque_task_proportional_plant.fmu").exists()
     with zipfile.ZipFile(unit) as archive:
         names = archive.namelist()

@@ -33,7 +33,7 @@ from ppafo.translation.c99 import program_source
 from ppafo.translation.native import build, run_native
 from tests.built_once import shared_library
 
-PAGE = Path(__file__).parents[3] / "docs" / "how-to" / "export-to-c.md"
+PAGE = Path(__file__).parents[3] / "docs" / "how-to" / "export.md"
 WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-Werror")
 EVERYTHING = (
     "run.duration=0.2 s",

@@ -21,7 +21,7 @@ FREE = (
     ("motion.kind=free", "run.duration=0.3 s", "reference.ramp_time=0.1 s", "motion.external_torque=3 N m"),
 )
 MOVED = ("torque-task-moving-ankle", ("run.duration=0.3 s",))
-PAGE = (Path(__file__).parents[3] / "docs" / "how-to" / "export-to-c.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[3] / "docs" / "how-to" / "export.md").read_text(encoding="utf-8")
 STRICT = ("-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror", "-fsanitize=address,undefined", "-static-libasan")
 
 

@@ -26,7 +26,7 @@ from ppafo.exports.hil.wire import (
 )
 from ppafo.signals import CHANNELS as KNOWN
 
-PAGE = (Path(__file__).parents[3] / "docs" / "how-to" / "hardware-in-the-loop.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[3] / "docs" / "wire-protocol.md").read_text(encoding="utf-8")
 WORDS = st.integers(0, 2**32 - 1)
 HALVES = st.integers(0, 2**16 - 1)
 FLAGS = st.integers(0, 255)

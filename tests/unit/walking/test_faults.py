@@ -1,4 +1,4 @@
-"""Every fault of every sensor, in every part of the stride, against the table of the page on walking."""
+"""Every fault of every sensor, in every part of the stride, against the table of the page of evidence."""
 
 import re
 from dataclasses import dataclass, replace
@@ -25,8 +25,8 @@ from ppafo.walking.motion import walk_of, with_duration
 from ppafo.walking.planning import gait_sensors_of, plan_walk
 from ppafo.walking.walk import walk
 
-PAGE = (Path(__file__).parents[3] / "docs" / "how-to" / "let-it-walk.md").read_text(encoding="utf-8")
-SECTION = PAGE.partition("## When a sensor fails")[2].partition("\n## ")[0]
+PAGE = (Path(__file__).parents[3] / "docs" / "evidence.md").read_text(encoding="utf-8")
+SECTION = PAGE.partition("## Sensor faults")[2].partition("\n## ")[0]
 CONFIGURATIONS = (
     *("solenoid", "proportional"),
     *(pytest.param(f"{valve}-regulators", marks=pytest.mark.thorough) for valve in ("solenoid", "proportional")),

@@ -1,6 +1,6 @@
 """The wire between a plant and a controller: packets, what is found in bytes of anybody, and where they come and go.
 
-The page ``docs/how-to/hardware-in-the-loop.md`` has the protocol as a table. Whatever comes in is judged here: a packet
+The page ``docs/wire-protocol.md`` has the protocol as a table. Whatever comes in is judged here: a packet
 is good to its last bit, or it is counted and dropped. A port is a UDP socket or a serial device, opened from a text
 such as ``udp:127.0.0.1:5000``.
 """

@@ -6,7 +6,7 @@
     one = gymnasium.make("ppafo/TorqueTask-v0")
     many = gymnasium.make_vec("ppafo/TorqueTask-v0", num_envs=4096)
 
-Needs the extra ``gym``. How to learn a controller with them: docs/how-to/learn-a-controller.md.
+Needs the extra ``gym``. How to learn a controller with them: docs/how-to/export.md.
 """
 
 try:

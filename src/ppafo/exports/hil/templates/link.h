@@ -1,5 +1,5 @@
 /* The protocol of "ppafo hil", for any board: packets out of bytes, answers into bytes. No memory is allocated, nothing is
- * waited for. docs/how-to/hardware-in-the-loop.md of ppafo has the bytes as a table. */
+ * waited for. docs/wire-protocol.md of ppafo has the bytes as a table. */
 #ifndef PPAFO_LINK_H
 #define PPAFO_LINK_H
 
