@@ -47,22 +47,21 @@ if TYPE_CHECKING:
     from ppafo.questions.tune.answer import Tuning
     from ppafo.questions.tune.problem import Problem
     from ppafo.simulation.scenario import Scenario
-    from ppafo.studies.study import Configurations
-    from ppafo.studies.study import Study as StudyObject
+    from ppafo.studies.study import Configurations, Study
 
-Study = Annotated["StudyObject | str | Path | Mapping[str, Any]", Word("STUDY")]
-Distributed = Annotated[
-    "StudyObject | str | Path | Mapping[str, Any]",
+StudyLike = Annotated["Study | str | Path | Mapping[str, Any]", Word("STUDY")]
+DistributedStudy = Annotated[
+    "Study | str | Path | Mapping[str, Any]",
     Word("STUDY", help="a study with distributions: a name, or a .toml file"),
 ]
-Simulated = Annotated["Scenario | str | Path", Word("SCENARIO", help="name of a scenario, or a .toml file")]
-Compared = Annotated["Sequence[str] | Configurations", Word("SCENARIO", is_repeated=True)]
+ScenarioLike = Annotated["Scenario | str | Path", Word("SCENARIO", help="name of a scenario, or a .toml file")]
+ConfigurationsLike = Annotated["Sequence[str] | Configurations", Word("SCENARIO", is_repeated=True)]
 Tasks = Annotated[
     "Mapping[str, Sequence[str]] | Sequence[tuple[str, Sequence[str]]]",
     Word("NAME:PATH=VALUE[,PATH=VALUE]", task, option="--task", is_repeated=True),
 ]
-Designed = Annotated["DesignProblem | SizingProblem | str | Path", Word("DESIGN")]
-Tuned = Annotated["Problem | str | Path | Mapping[str, Any]", Word("TUNING")]
+DesignLike = Annotated["DesignProblem | SizingProblem | str | Path", Word("DESIGN")]
+TuningLike = Annotated["Problem | str | Path | Mapping[str, Any]", Word("TUNING")]
 Place = Annotated["str | Path", Word("DIR")]
 Address = Annotated[str, Word("ADDRESS")]
 Bottle = Annotated["str | Path", Word("BOTTLE")]
@@ -74,9 +73,9 @@ Highest = Annotated[bool, Word(off="--lowest", help="find the lowest value (defa
 Point = Annotated[float | str, Word("TIME", point)]
 Metric = Annotated[str, Word("NAME", option="--metric")]
 Statistic = Annotated[str, Word("WORDS", option="--statistic")]
-OneStudy = Annotated["StudyObject | str | Path | Mapping[str, Any]", Word("STUDY", option="--study")]
+OneStudy = Annotated["Study | str | Path | Mapping[str, Any]", Word("STUDY", option="--study")]
 Agreed = Annotated[bool, Word(option="--yes")]
-Used = Annotated["GasUse | Sequence[GasUse]", Word("RECORDING", Path, is_repeated=True)]
+GasUseLike = Annotated["GasUse | Sequence[GasUse]", Word("RECORDING", Path, is_repeated=True)]
 
 
 @overload
@@ -108,7 +107,7 @@ def reproduce(
 
 
 def sweep(
-    study: Study,
+    study: StudyLike,
     *,
     out: Place | None = None,
     overrides: Overrides = (),
@@ -135,7 +134,7 @@ def sweep(
 
 
 def compare(
-    configurations: Compared | None = None,
+    configurations: ConfigurationsLike | None = None,
     study: OneStudy | None = None,
     *,
     tasks: Tasks = (),
@@ -171,7 +170,7 @@ def compare(
 
 
 def sensitivity(
-    study: Distributed,
+    study: DistributedStudy,
     *,
     method: Method | None = None,
     metrics: Metrics = (),
@@ -215,7 +214,7 @@ def sensitivity(
 
 
 def monte_carlo(
-    study: Distributed,
+    study: DistributedStudy,
     metric: Metric,
     statistic: Statistic = "mean",
     *,
@@ -266,7 +265,7 @@ def monte_carlo(
 
 
 def find(
-    scenario: Simulated,
+    scenario: ScenarioLike,
     vary: Range,
     such_that: Condition,
     *,
@@ -294,7 +293,7 @@ def find(
 
 
 def tune(
-    tuning: Tuned,
+    tuning: TuningLike,
     *,
     overrides: Overrides = (),
     seed: Seed | None = None,
@@ -314,7 +313,7 @@ def tune(
 
 
 def linearise(
-    scenario: Simulated,
+    scenario: ScenarioLike,
     *,
     at: Point = "equilibrium",
     overrides: Overrides = (),
@@ -334,7 +333,7 @@ def linearise(
 
 
 def design(
-    problem: Designed | None = None,
+    problem: DesignLike | None = None,
     *,
     seed: Seed | None = None,
     threads: Threads | None = None,
@@ -363,7 +362,7 @@ def design(
 
 
 def bottle(
-    recordings: Used = (),
+    recordings: GasUseLike = (),
     *,
     gas_per_stride: Mass | None = None,
     stride_time: Time | None = None,
