@@ -112,10 +112,11 @@ def estimates_of(
         value, low, high = (float(one[place]) for one in (found.values, found.low, found.high))
         number = found.numbers[place]
         size, half = abs(value) if item.size is None else item.size, 0.5 * (high - low)
-        is_at_bound = any(abs(value - end) <= _AT_BOUND * number.scale for end in (number.low, number.high))
+        bound = next((end for end in (number.low, number.high) if abs(value - end) <= _AT_BOUND * number.scale), None)
+        value = value if bound is None else bound
         verdict: Verdict = "identified"
         sentence = f"{item.text}{_widened_by(found, item.path)}."
-        if is_at_bound:
+        if bound is not None:
             verdict = "at its bound"
             sentence = f"{sentence} The readings want a value at or beyond {value:.4g}; the interval ends there."
         elif half >= size:
