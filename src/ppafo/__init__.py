@@ -54,7 +54,6 @@ if TYPE_CHECKING:
     from ppafo.questions.endurance.answer import Endurance as Endurance
     from ppafo.questions.endurance.solve import endurance as endurance
     from ppafo.questions.endurance.solve import endurance_of_walk as endurance_of_walk
-    from ppafo.questions.find.solve import Found as Found
     from ppafo.questions.find.solve import find as find
     from ppafo.questions.identify.answer import Identification as Identification
     from ppafo.questions.identify.solve import identify as identify
@@ -89,6 +88,7 @@ if TYPE_CHECKING:
     from ppafo.storage import read_result as read_result
     from ppafo.studies.loading import list_studies as list_studies
     from ppafo.studies.loading import load_study as load_study
+    from ppafo.study.finding import Finding as Finding
     from ppafo.walking import compare_walks as compare_walks
     from ppafo.walking import list_walks as list_walks
     from ppafo.walking import load_walk as load_walk
@@ -125,7 +125,7 @@ _HOMES = {
     "ppafo.questions.design.solve": ("design",),
     "ppafo.questions.endurance.answer": ("Endurance",),
     "ppafo.questions.endurance.solve": ("endurance", "endurance_of_walk"),
-    "ppafo.questions.find.solve": ("Found", "find"),
+    "ppafo.questions.find.solve": ("find",),
     "ppafo.questions.identify.answer": ("Identification",),
     "ppafo.questions.identify.solve": ("identify",),
     "ppafo.questions.linearise.answer": ("LinearModel",),
@@ -149,6 +149,7 @@ _HOMES = {
     "ppafo.simulation.simulate": ("Result", "Status", "simulate_many"),
     "ppafo.storage": ("read_recording", "read_result"),
     "ppafo.studies.loading": ("list_studies", "load_study"),
+    "ppafo.study.finding": ("Finding",),
     "ppafo.walking": ("compare_walks", "list_walks", "load_walk", "walk_population"),
     "ppafo.walking.walk": ("walk",),
 }
