@@ -45,7 +45,6 @@ if TYPE_CHECKING:
     from ppafo.parameters.parts import Catalogue as Catalogue
     from ppafo.parameters.parts import Part as Part
     from ppafo.parameters.parts import load_catalogue as load_catalogue
-    from ppafo.questions.compare.answer import Comparison as Comparison
     from ppafo.questions.compare.solve import compare as compare
     from ppafo.questions.design.front.answer import Design as Design
     from ppafo.questions.design.loading import load_design as load_design
@@ -117,7 +116,6 @@ _HOMES = {
     "ppafo.parameters.audit": ("audit",),
     "ppafo.parameters.device": ("Device",),
     "ppafo.parameters.parts": ("Catalogue", "Part", "load_catalogue"),
-    "ppafo.questions.compare.answer": ("Comparison",),
     "ppafo.questions.compare.solve": ("compare",),
     "ppafo.questions.design.front.answer": ("Design",),
     "ppafo.questions.design.loading": ("load_design",),

@@ -9,7 +9,6 @@ from typing import Any, Generic, TypeVar
 
 from ppafo.answers import Answer, Cell, Figure, LivePart, Section, Table
 from ppafo.answers import Column as Head
-from ppafo.answers.display_units import display_difference
 from ppafo.answers.solved import Solved
 from ppafo.simulation.scenario import plain
 from ppafo.studies.distributions import Interval
@@ -31,11 +30,7 @@ class Column:
     def _cell(self, value: Cell | Interval) -> Cell:
         if not isinstance(value, Interval):
             return value
-        if not self.is_change:
-            return self.kind.interval(value)
-        ends = (display_difference(each, self.kind.quantity) for each in (value.value, value.low, value.high))
-        first, low, high = (f"{each:{self.kind.form}}" for each in ends)
-        return f"{first} [{low}, {high}]"
+        return self.kind.change_interval(value) if self.is_change else self.kind.interval(value)
 
     @property
     def head(self) -> Head:

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from ppafo.answers.display_units import (
     axis_unit,
     change_text,
+    display_difference,
     display_unit,
     display_value,
     display_values,
@@ -61,9 +62,15 @@ class Kind:
         value, low, high = (self.number(each, form) for each in (found.value, found.low, found.high))
         return f"{value} [{low}, {high}]"
 
+    def change_interval(self, found: Interval, form: str = "") -> str:
+        """Return a difference and the ends of its interval as text without unit."""
+        ends = (display_difference(each, self.quantity) for each in (found.value, found.low, found.high))
+        value, low, high = (f"{each:{form or self.form}}" for each in ends)
+        return f"{value} [{low}, {high}]"
 
-PLAIN, NAME = Kind(), Kind()
-"""A plain number; a text."""
+
+PLAIN = Kind()
+"""A plain number, or a text."""
 TIME = Kind("Time", "s", "time")
 
 

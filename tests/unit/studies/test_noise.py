@@ -41,15 +41,16 @@ def changed(**changes: Any) -> dict[str, Any]:
 def test_scenarios_that_differ_in_nothing_but_their_seed_are_equal_in_every_draw(with_study: bool) -> None:
     one, other = (ppafo.load_scenario("torque-task-proportional", [*NOISY, f"sensors.seed={seed}"]) for seed in (1, 9))
     found = compare({"one": one, "other": other}, changed() if with_study else None, draws=64)
-    error = next(item for item in found.pairs("as written", "other") if item.metric == "rms_error")
+    (task,) = found.found.tasks
+    error = next(item for item in task.pairs["other"] if item.metric == "rms_error")
     assert error.equal == 1.0
     assert error.better is not None
     assert error.better.value == 0.0
-    outcomes = found.cases[0].outcomes
-    assert outcomes is not None
-    assert np.unique(outcomes.metrics["rms_error"]).size == 64, "every draw has its own noise"
+    rows = task.cases[0].rows
+    assert rows is not None
+    assert np.unique(rows["rms_error"]).size == 64, "every draw has its own noise"
     drawn = "1 uncertain value and of the sensor noise" if with_study else "64 draws of the sensor noise"
-    assert drawn in found.answer().lead[0]
+    assert drawn in found.said[0]
 
 
 def test_without_noise_nothing_is_drawn_for_it() -> None:
@@ -58,7 +59,9 @@ def test_without_noise_nothing_is_drawn_for_it() -> None:
         item["overrides"] = [text for text in item["overrides"] if "noise" not in text]
     assert NOISE not in load_study(quiet).paths
     assert NOISE in load_study(changed()).paths
-    assert not compare({"a": ppafo.load_scenario("step-response"), "b": ppafo.load_scenario("step-response")}).draws
+    assert not compare(
+        {"a": ppafo.load_scenario("step-response"), "b": ppafo.load_scenario("step-response")}
+    ).found.draws
 
 
 def test_the_noise_is_independent_of_what_is_correlated_and_leaves_its_correlation() -> None:
