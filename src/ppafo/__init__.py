@@ -66,8 +66,8 @@ if TYPE_CHECKING:
     from ppafo.questions.reproduce.solve import reproduce as reproduce
     from ppafo.questions.sensitivity.solve import Sensitivity as Sensitivity
     from ppafo.questions.sensitivity.solve import sensitivity as sensitivity
-    from ppafo.questions.sweep.answer import StudyResults as StudyResults
-    from ppafo.questions.sweep.results import load_study_results as load_study_results
+    from ppafo.questions.sweep.answer import load_study_results as load_study_results
+    from ppafo.questions.sweep.results import StudyResults as StudyResults
     from ppafo.questions.sweep.solve import sweep as sweep
     from ppafo.questions.tune.answer import Tuning as Tuning
     from ppafo.questions.tune.problem import list_tunings as list_tunings
@@ -133,8 +133,8 @@ _HOMES = {
     "ppafo.questions.reproduce.answer": ("Reproduction",),
     "ppafo.questions.reproduce.solve": ("reproduce",),
     "ppafo.questions.sensitivity.solve": ("Sensitivity", "sensitivity"),
-    "ppafo.questions.sweep.answer": ("StudyResults",),
-    "ppafo.questions.sweep.results": ("load_study_results",),
+    "ppafo.questions.sweep.answer": ("load_study_results",),
+    "ppafo.questions.sweep.results": ("StudyResults",),
     "ppafo.questions.sweep.solve": ("sweep",),
     "ppafo.questions.tune.answer": ("Tuning",),
     "ppafo.questions.tune.problem": ("list_tunings", "load_tuning"),

@@ -86,6 +86,7 @@ class Part:
 class Finding(Solved, Generic[T]):
     """What an analysis found: ``found`` are the numbers in SI, which are also its JSON; the rest says and shows them.
 
+    A ``found`` that lies on the disk says its JSON itself, as ``json_document()``.
     ``name`` is the stem of its files and its command, unless ``command`` says another. ``passed`` is false where a
     check failed. ``live`` makes the part of the page that simulates.
     """
@@ -103,7 +104,7 @@ class Finding(Solved, Generic[T]):
 
     def answer(self) -> Answer:
         """Return the finding as the writer of text, pages and folders takes it."""
-        document = getattr(self.found, "document", None)
+        document = getattr(self.found, "json_document", None)
         return Answer(
             name=self.name,
             kicker=self.kicker,

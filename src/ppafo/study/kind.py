@@ -57,6 +57,10 @@ class Kind:
         """Return a difference of two values in SI as text with the unit in which it is shown."""
         return change_text(value, self.quantity, form) if self.quantity else self.text(value, form)
 
+    def change_number(self, value: float, form: str = ".3g") -> str:
+        """Return a difference of two values in SI as text in the unit in which it is shown, without that unit."""
+        return f"{display_difference(value, self.quantity):{form}}"
+
     def interval(self, found: Interval, form: str = "") -> str:
         """Return an estimate and the ends of its interval as text without unit."""
         value, low, high = (self.number(each, form) for each in (found.value, found.low, found.high))
@@ -64,8 +68,8 @@ class Kind:
 
     def change_interval(self, found: Interval, form: str = "") -> str:
         """Return a difference and the ends of its interval as text without unit."""
-        ends = (display_difference(each, self.quantity) for each in (found.value, found.low, found.high))
-        value, low, high = (f"{each:{form or self.form}}" for each in ends)
+        ends = (found.value, found.low, found.high)
+        value, low, high = (self.change_number(each, form or self.form) for each in ends)
         return f"{value} [{low}, {high}]"
 
 
@@ -82,3 +86,8 @@ def of_metric(name: str, form: str = ".4g") -> Kind:
 def of_path(path: str, unit: str, form: str = ".6g") -> Kind:
     """Return what the number at a path is, from its unit in SI."""
     return Kind(label_of(path), unit, quantity_of_unit(unit), form)
+
+
+def of_channel(name: str, unit: str) -> Kind:
+    """Return what a channel of a recording is, from its unit in SI."""
+    return Kind(name.replace("_", " ").capitalize(), unit, quantity_of_unit(unit))

@@ -42,7 +42,7 @@ class Panel:
     title: str = ""
     scale: Kind | None = None
     legend: str = "above"
-    then: "Callable[[Axes], None] | None" = None
+    then: "Callable[[Axes], object] | None" = None
 
 
 _TOP = 0.28

@@ -13,12 +13,12 @@ from ppafo.errors import StudyError
 from ppafo.questions.find import solve as find_module
 from ppafo.questions.montecarlo import solve as montecarlo_module
 from ppafo.questions.montecarlo.solve import Statistic, parse_statistic
-from ppafo.questions.sweep.manifest import drawn_values, varied_columns
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.numbers import check_columns
 from ppafo.studies.draws import atmosphere_of, level_of, uncertainty_of
 from ppafo.studies.loading import load_study
 from ppafo.studies.study import Study
+from ppafo.study.blocks import drawn_values, varied_columns
 from ppafo.units import to_si
 
 ROOMS = {"path": "supply.atmospheric_pressure", "kind": "list", "values": ["90 kPa_a", "101.325 kPa_a"]}

@@ -12,12 +12,12 @@ import ppafo
 from ppafo.errors import StudyError
 from ppafo.questions.compare.solve import compare
 from ppafo.questions.montecarlo.solve import Statistic, StoppingRule, draw_until, mean_of, quantile_of
-from ppafo.questions.sweep.manifest import drawn_values
 from ppafo.studies.distributions import Floats, NormalAround, noise_interval
 from ppafo.studies.draws import Outcomes, Uncertainty, uncertainty_of
 from ppafo.studies.loading import load_study
 from ppafo.studies.sampling import NOISE, other_noise, with_noise
 from ppafo.studies.study import Drawn
+from ppafo.study.blocks import drawn_values
 
 NOISY = ["run.duration=0.3 s", "sensors.pressure_noise=5 kPa_d"]
 DOCUMENT: dict[str, Any] = {

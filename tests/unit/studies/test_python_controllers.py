@@ -95,7 +95,7 @@ def test_it_is_swept_chunk_by_chunk(tmp_path: Path) -> None:
     (configuration,) = study.configurations
     own = replace(configuration, scenario=configuration.scenario.controlled_by(Integral()))
     heard: list[Progress] = []
-    results = ppafo.sweep(replace(study, configurations=(own,)), tmp_path / "out", progress=heard.append)
+    results = ppafo.sweep(replace(study, configurations=(own,)), tmp_path / "out", progress=heard.append).found
     assert heard[-1].done == 70
     assert results.document["chunks"] == 2
     table = results.table()
