@@ -58,8 +58,6 @@ if TYPE_CHECKING:
     from ppafo.questions.identify.solve import identify as identify
     from ppafo.questions.linearise.answer import LinearModel as LinearModel
     from ppafo.questions.linearise.solve import linearise as linearise
-    from ppafo.questions.montecarlo.solve import MonteCarlo as MonteCarlo
-    from ppafo.questions.montecarlo.solve import monte_carlo as monte_carlo
     from ppafo.questions.parts.solve import Parts as Parts
     from ppafo.questions.parts.solve import parts as parts
     from ppafo.questions.reproduce.answer import Reproduction as Reproduction
@@ -69,6 +67,7 @@ if TYPE_CHECKING:
     from ppafo.questions.sweep.answer import load_study_results as load_study_results
     from ppafo.questions.sweep.results import StudyResults as StudyResults
     from ppafo.questions.sweep.solve import sweep as sweep
+    from ppafo.questions.sweep.statistic import estimate as estimate
     from ppafo.questions.tune.answer import Tuning as Tuning
     from ppafo.questions.tune.problem import list_tunings as list_tunings
     from ppafo.questions.tune.problem import load_tuning as load_tuning
@@ -128,7 +127,6 @@ _HOMES = {
     "ppafo.questions.identify.solve": ("identify",),
     "ppafo.questions.linearise.answer": ("LinearModel",),
     "ppafo.questions.linearise.solve": ("linearise",),
-    "ppafo.questions.montecarlo.solve": ("MonteCarlo", "monte_carlo"),
     "ppafo.questions.parts.solve": ("Parts", "parts"),
     "ppafo.questions.reproduce.answer": ("Reproduction",),
     "ppafo.questions.reproduce.solve": ("reproduce",),
@@ -136,6 +134,7 @@ _HOMES = {
     "ppafo.questions.sweep.answer": ("load_study_results",),
     "ppafo.questions.sweep.results": ("StudyResults",),
     "ppafo.questions.sweep.solve": ("sweep",),
+    "ppafo.questions.sweep.statistic": ("estimate",),
     "ppafo.questions.tune.answer": ("Tuning",),
     "ppafo.questions.tune.problem": ("list_tunings", "load_tuning"),
     "ppafo.questions.tune.solve": ("tune",),
@@ -157,6 +156,7 @@ _HOME_OF = dict(sorted((name, module) for module, names in _HOMES.items() for na
 __all__ = list(_HOME_OF)
 
 _RENAMED = {
+    "monte_carlo": "estimate",
     "run_design": "design",
     "run_sizing": "design",
     "run_study": "sweep",

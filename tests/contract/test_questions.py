@@ -31,7 +31,7 @@ NO_VERB_OF_ITS_OWN = {
 def solved_types(name: str) -> list[type]:
     """The classes that solving a question may return."""
     returned = typing.get_type_hints(QUESTIONS[name].solver())["return"]
-    kinds = typing.get_args(returned) if isinstance(returned, types.UnionType) else (returned,)
+    kinds = typing.get_args(returned) if typing.get_origin(returned) in (typing.Union, types.UnionType) else (returned,)
     return [typing.get_origin(kind) or kind for kind in kinds]
 
 

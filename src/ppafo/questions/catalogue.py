@@ -18,7 +18,6 @@ QUESTIONS: Kinds[Question] = Kinds(
         "sweep": "ppafo.questions.sweep:QUESTION",
         "compare": "ppafo.questions.compare:QUESTION",
         "sensitivity": "ppafo.questions.sensitivity:QUESTION",
-        "montecarlo": "ppafo.questions.montecarlo:QUESTION",
         "find": "ppafo.questions.find:QUESTION",
         "tune": "ppafo.questions.tune:QUESTION",
         "linearise": "ppafo.questions.linearise:QUESTION",

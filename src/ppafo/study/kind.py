@@ -36,6 +36,11 @@ class Kind:
         return display_unit(self.quantity) if self.quantity else self.unit.removeprefix("-")
 
     @property
+    def title(self) -> str:
+        """Words and unit for a table."""
+        return f"{self.words} ({self.shown_unit})" if self.shown_unit else self.words
+
+    @property
     def axis(self) -> str:
         """Words and unit for an axis."""
         unit = axis_unit(self.quantity) if self.quantity else self.shown_unit

@@ -27,10 +27,13 @@ from ppafo.metrics import METRICS
 from ppafo.progress import Progress, Report
 from ppafo.questions.sweep.answer import finding_of, write_report
 from ppafo.questions.sweep.results import BANDS, SUMMARY, Columns, StudyResults
+from ppafo.questions.sweep.statistic import MOST_DRAWS, Estimate, estimate
 from ppafo.signals.recording import CHANNELS
 from ppafo.storage.parquet import TableColumn, encode_texts, matrix_of, parquet_bytes, table_of
 from ppafo.storage.places import place_at
+from ppafo.storage.result_folder import check_owned_folder, marked_folder
 from ppafo.studies.distributions import Floats
+from ppafo.studies.draws import study_of
 from ppafo.studies.loading import list_studies, load_study
 from ppafo.studies.study import Study
 from ppafo.study.blocks import chunk_count, samples_of
@@ -241,17 +244,58 @@ def sweep_into_folder(
     threads: int | None = None,
     scheduler: str | None = None,
     agreed: bool = False,
+    statistic: str | None = None,
+    metric: str | None = None,
+    width: str | None = None,
+    also: Sequence[str] = (),
+    configuration: str | None = None,
+    first_draws: int | None = None,
+    confidence: float | None = None,
+    maximum_failed: float | None = None,
     progress: Report | None = None,
-) -> Finding[StudyResults]:
-    """Return the results of ``sweep`` in ``out``, ``out/NAME`` by default, with figure, page and text beside them."""
-    chosen = _study_of(study, overrides, draws, seed)
-    place = out or Path("out") / chosen.name
-    try:
-        swept = sweep(chosen, place, threads=threads, scheduler=scheduler, agreed=agreed, progress=progress)
-        write_report(swept.found)
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt(_INTERRUPTED) from None
-    return swept
+) -> Finding[StudyResults] | Finding[Estimate]:
+    """Return the rows of ``sweep``, or with a statistic the ``estimate``, written into ``out`` with figure and page.
+
+    The folder is ``out/NAME`` by default, of a statistic ``out/NAME-METRIC``.
+    """
+    of_statistic: dict[str, Any] = {
+        "width": width,
+        "also": tuple(also) or None,
+        "configuration": configuration,
+        "first_draws": first_draws,
+        "confidence": confidence,
+        "maximum_failed": maximum_failed,
+    }
+    given = {name: value for name, value in of_statistic.items() if value is not None}
+    if statistic is None:
+        unused = [*(["metric"] if metric is not None else []), *given]
+        if unused:
+            raise StudyError(f"{unused[0]}: needs a statistic, for example --statistic mean --metric rms_error")
+        chosen = _study_of(study, overrides, draws, seed)
+        try:
+            swept = sweep(
+                chosen,
+                out or Path("out") / chosen.name,
+                threads=threads,
+                scheduler=scheduler,
+                agreed=agreed,
+                progress=progress,
+            )
+            write_report(swept.found)
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt(_INTERRUPTED) from None
+        return swept
+    if metric is None:
+        raise StudyError(f"statistic '{statistic}': needs the metric that it is of, for example --metric rms_error")
+    if scheduler is not None:
+        raise StudyError(f"--scheduler {scheduler}: a statistic is computed here; omit it")
+    chosen = study_of(study, overrides)
+    folder = Path(out or Path("out") / f"{chosen.name}-{metric}")
+    check_owned_folder(folder, marked_folder("sweep"))
+    most = MOST_DRAWS if draws is None else draws
+    found = estimate(chosen, metric, statistic, seed=seed, draws=most, threads=threads, progress=progress, **given)
+    found.save(folder)
+    return replace(found, found=replace(found.found, folder=str(folder)))
 
 
 def _study_of(
