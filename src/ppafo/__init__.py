@@ -62,7 +62,6 @@ if TYPE_CHECKING:
     from ppafo.questions.parts.solve import parts as parts
     from ppafo.questions.reproduce.answer import Reproduction as Reproduction
     from ppafo.questions.reproduce.solve import reproduce as reproduce
-    from ppafo.questions.sensitivity.solve import Sensitivity as Sensitivity
     from ppafo.questions.sensitivity.solve import sensitivity as sensitivity
     from ppafo.questions.sweep.answer import load_study_results as load_study_results
     from ppafo.questions.sweep.results import StudyResults as StudyResults
@@ -130,7 +129,7 @@ _HOMES = {
     "ppafo.questions.parts.solve": ("Parts", "parts"),
     "ppafo.questions.reproduce.answer": ("Reproduction",),
     "ppafo.questions.reproduce.solve": ("reproduce",),
-    "ppafo.questions.sensitivity.solve": ("Sensitivity", "sensitivity"),
+    "ppafo.questions.sensitivity.solve": ("sensitivity",),
     "ppafo.questions.sweep.answer": ("load_study_results",),
     "ppafo.questions.sweep.results": ("StudyResults",),
     "ppafo.questions.sweep.solve": ("sweep",),
