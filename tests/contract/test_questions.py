@@ -121,7 +121,7 @@ def test_a_question_of_another_package_is_a_command_that_answers_what_its_page_s
     assert capsys.readouterr().out == shown
     assert main(["my_questions.pressures:QUESTION", *WORDS, "--json", "--out", str(tmp_path / "out")]) == 0
     runs = json.loads(capsys.readouterr().out)["runs"]
-    assert [run["supply"] for run in runs] == ["30 psi_g", "60 psi_g"]
+    assert [run["supply.pressure"] for run in runs] == pytest.approx([308167.7, 515010.5])
     assert {"pressures.png", "pressures.json", "report.html"} <= {path.name for path in (tmp_path / "out").iterdir()}
 
 

@@ -3,6 +3,7 @@
 A ``Finding`` is all that an analysis returns. Text, JSON, page, figures and folder are made of it in one place.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
@@ -28,6 +29,8 @@ class Column:
     is_change: bool = False
 
     def _cell(self, value: Cell | Interval) -> Cell:
+        if isinstance(value, float) and math.isnan(value):
+            return None
         if not isinstance(value, Interval):
             return value
         return self.kind.change_interval(value) if self.is_change else self.kind.interval(value)
