@@ -67,7 +67,6 @@ if TYPE_CHECKING:
     from ppafo.questions.sweep.results import StudyResults as StudyResults
     from ppafo.questions.sweep.solve import sweep as sweep
     from ppafo.questions.sweep.statistic import estimate as estimate
-    from ppafo.questions.tune.answer import Tuning as Tuning
     from ppafo.questions.tune.problem import list_tunings as list_tunings
     from ppafo.questions.tune.problem import load_tuning as load_tuning
     from ppafo.questions.tune.solve import tune as tune
@@ -134,7 +133,6 @@ _HOMES = {
     "ppafo.questions.sweep.results": ("StudyResults",),
     "ppafo.questions.sweep.solve": ("sweep",),
     "ppafo.questions.sweep.statistic": ("estimate",),
-    "ppafo.questions.tune.answer": ("Tuning",),
     "ppafo.questions.tune.problem": ("list_tunings", "load_tuning"),
     "ppafo.questions.tune.solve": ("tune",),
     "ppafo.questions.validate.solve": ("Validation", "validate"),

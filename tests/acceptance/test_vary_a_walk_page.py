@@ -70,7 +70,7 @@ def test_the_push_off_is_tuned_for_the_bad_end_of_people() -> None:
     assert (problem.spread.fraction, problem.spread.study) == (0.9, "wearers")
     effort = problem.effort.model_copy(update={"starts": 1, "generations": 2, "candidates_per_gain": 2})
     quick = replace(problem, spread=replace(problem.spread, draws=4), effort=effort)
-    tuned = tune(quick)
+    tuned = tune(quick).found
     alone = walk(with_overrides(problem.scenario, problem.lines(tuned.after.gains)))
     assert tuned.after.result.metrics["net_push_off_work"].value == alone.metrics["net_push_off_work"].value
 

@@ -134,8 +134,11 @@ def test_a_question_of_another_package_is_in_the_help_and_in_hints_and_is_refuse
     assert "  pressures    show what a lower supply pressure costs" in build_parser(None).format_help()
     for words, said in (
         (["pressures", "torque-task"], "the following arguments are required: --pressure"),
-        (["pressures", "torque-task", "--pressure", "40"], "there is no scenario or walk 'torque-task'"),
-        (["pressures", "torque-task-solenoid", "--presure", "40"], "no option '--presure', did you mean '--pressure'"),
+        (["pressures", "torque-task", "--pressure", "40 psi_g"], "there is no scenario or walk 'torque-task'"),
+        (
+            ["pressures", "torque-task-solenoid", "--presure", "40 psi_g"],
+            "no option '--presure', did you mean '--pressure'",
+        ),
         (["broken"], "question 'broken' of package 'my-questions' cannot be loaded: ModuleNotFoundError"),
     ):
         assert main(words) == 2

@@ -115,7 +115,7 @@ def test_the_device_around_it_is_tuned_and_gains_that_it_does_not_declare_are_re
         "effort": {"starts": 1, "generations": 2, "candidates_per_gain": 4},
     }
     problem = ppafo.load_tuning(document)
-    tuned = ppafo.tune(replace(problem, scenario=problem.scenario.controlled_by(Integral())))
+    tuned = ppafo.tune(replace(problem, scenario=problem.scenario.controlled_by(Integral()))).found
     assert tuned.after.objective <= tuned.before.objective
     gain = {"path": "controller.proportional_gain", "minimum": "0.05 1/(N m)", "maximum": "1 1/(N m)"}
     problem = ppafo.load_tuning(document | {"search": [gain]})
