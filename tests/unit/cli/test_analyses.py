@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 
 from ppafo.cli.main import main
-from ppafo.studies import draws
 from ppafo.study import runs
 
 STUDY = "torque-task-uncertainty"
@@ -141,7 +140,6 @@ def test_an_interruption_leaves_nothing(
     def interrupted(*_words: object, **_more: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(draws, "run_ensemble", interrupted)
     monkeypatch.setattr(runs, "run_ensemble", interrupted)
     for words in commands(tuning).values():
         assert main([*words, "--out", str(tmp_path / "out")]) == 130

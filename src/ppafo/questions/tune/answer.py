@@ -169,7 +169,7 @@ def finding_of(
                 panels=lambda: _task(before, after),
                 name="task",
                 caption="The nominal device.",
-                size=(6.9, 1.9),
+                size=(6.9, 2.1),
             ),
             Part(
                 "The search",
@@ -357,8 +357,8 @@ def _limit(item: Limit) -> str:
 
 
 _SHOWN = (
-    ("torque", Kind("Actuator torque", "N m", "torque")),
-    ("command", Kind("Valve command (-1 to 1)")),
+    ("torque", Kind("Torque", "N m", "torque")),
+    ("command", Kind("Valve command")),
     ("supplied_mass", Kind("Gas supplied", "kg", "gas mass")),
 )
 
