@@ -38,7 +38,6 @@ from ppafo.live.workbench import page_content, program_content
 from ppafo.loading import load_scenario
 from ppafo.model.catalog import ACTUATORS, EFFECTS, VALVES
 from ppafo.parameters.graph import ATMOSPHERE_PATH, counts_from
-from ppafo.questions.sweep.manifest import drawn_values, varied_columns
 from ppafo.simulation.ensemble.planning import plan_ensemble
 from ppafo.simulation.loading import list_scenarios
 from ppafo.simulation.numbers import TIMES, check_columns, with_numbers
@@ -46,6 +45,7 @@ from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.loading import load_study
 from ppafo.studies.varying import varied_path
+from ppafo.study.blocks import drawn_values, varied_columns
 from ppafo.units import parse_quantity
 from ppafo.walking import list_walks
 from ppafo.worlds.gym.environments import TARGETS

@@ -43,7 +43,8 @@ LINES: dict[str, str] = {
     "gait": "gait show falisse2019-subject1",
     "compare": "compare torque-task-solenoid torque-task-proportional --study torque-task-uncertainty --draws 256",
     "sensitivity": "sensitivity torque-task-uncertainty --configuration proportional --metric gas_supplied",
-    "montecarlo": "montecarlo torque-task-uncertainty --configuration proportional --metric rms_error --draws 2048",
+    "sweep-statistic": "sweep torque-task-uncertainty --configuration proportional --statistic mean --metric rms_error "
+    "--draws 2048 --out {out}",
     "endurance": "bottle --gas-per-stride '0.3 g'",
     "design": "design push-off",
     "tune": "tune pid-gains",

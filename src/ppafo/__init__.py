@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from ppafo.cli.verbs.analyses import design as design
     from ppafo.cli.verbs.analyses import find as find
     from ppafo.cli.verbs.analyses import linearise as linearise
-    from ppafo.cli.verbs.analyses import monte_carlo as monte_carlo
     from ppafo.cli.verbs.analyses import reproduce as reproduce
     from ppafo.cli.verbs.analyses import sensitivity as sensitivity
     from ppafo.cli.verbs.analyses import tune as tune
@@ -56,24 +55,20 @@ if TYPE_CHECKING:
     from ppafo.parameters.parts import Catalogue as Catalogue
     from ppafo.parameters.parts import Part as Part
     from ppafo.parameters.parts import load_catalogue as load_catalogue
-    from ppafo.questions.compare.answer import Comparison as Comparison
     from ppafo.questions.design.front.answer import Design as Design
     from ppafo.questions.design.loading import load_design as load_design
     from ppafo.questions.design.profile.answer import Sizing as Sizing
     from ppafo.questions.endurance.answer import Endurance as Endurance
     from ppafo.questions.endurance.solve import endurance_of_walk as endurance_of_walk
-    from ppafo.questions.find.solve import Found as Found
     from ppafo.questions.identify.answer import Identification as Identification
     from ppafo.questions.linearise.answer import LinearModel as LinearModel
-    from ppafo.questions.montecarlo.solve import MonteCarlo as MonteCarlo
     from ppafo.questions.parts.solve import Parts as Parts
     from ppafo.questions.parts.solve import parts as parts
     from ppafo.questions.reproduce.answer import Reproduction as Reproduction
-    from ppafo.questions.sensitivity.solve import Sensitivity as Sensitivity
-    from ppafo.questions.sweep.answer import StudyResults as StudyResults
-    from ppafo.questions.sweep.results import load_study_results as load_study_results
+    from ppafo.questions.sweep.answer import load_study_results as load_study_results
+    from ppafo.questions.sweep.results import StudyResults as StudyResults
     from ppafo.questions.sweep.solve import sweep as sweep
-    from ppafo.questions.tune.answer import Tuning as Tuning
+    from ppafo.questions.sweep.statistic import estimate as estimate
     from ppafo.questions.tune.problem import list_tunings as list_tunings
     from ppafo.questions.tune.problem import load_tuning as load_tuning
     from ppafo.questions.validate.solve import Validation as Validation
@@ -89,6 +84,7 @@ if TYPE_CHECKING:
     from ppafo.storage import read_result as read_result
     from ppafo.studies.loading import list_studies as list_studies
     from ppafo.studies.loading import load_study as load_study
+    from ppafo.study.finding import Finding as Finding
     from ppafo.walking import compare_walks as compare_walks
     from ppafo.walking import list_walks as list_walks
     from ppafo.walking import load_walk as load_walk
@@ -102,7 +98,6 @@ _HOMES = {
         "design",
         "find",
         "linearise",
-        "monte_carlo",
         "reproduce",
         "sensitivity",
         "tune",
@@ -129,23 +124,19 @@ _HOMES = {
     "ppafo.parameters.audit": ("audit",),
     "ppafo.parameters.device": ("Device",),
     "ppafo.parameters.parts": ("Catalogue", "Part", "load_catalogue"),
-    "ppafo.questions.compare.answer": ("Comparison",),
     "ppafo.questions.design.front.answer": ("Design",),
     "ppafo.questions.design.loading": ("load_design",),
     "ppafo.questions.design.profile.answer": ("Sizing",),
     "ppafo.questions.endurance.answer": ("Endurance",),
     "ppafo.questions.endurance.solve": ("endurance_of_walk",),
-    "ppafo.questions.find.solve": ("Found",),
     "ppafo.questions.identify.answer": ("Identification",),
     "ppafo.questions.linearise.answer": ("LinearModel",),
-    "ppafo.questions.montecarlo.solve": ("MonteCarlo",),
     "ppafo.questions.parts.solve": ("Parts", "parts"),
     "ppafo.questions.reproduce.answer": ("Reproduction",),
-    "ppafo.questions.sensitivity.solve": ("Sensitivity",),
-    "ppafo.questions.sweep.answer": ("StudyResults",),
-    "ppafo.questions.sweep.results": ("load_study_results",),
+    "ppafo.questions.sweep.answer": ("load_study_results",),
+    "ppafo.questions.sweep.results": ("StudyResults",),
     "ppafo.questions.sweep.solve": ("sweep",),
-    "ppafo.questions.tune.answer": ("Tuning",),
+    "ppafo.questions.sweep.statistic": ("estimate",),
     "ppafo.questions.tune.problem": ("list_tunings", "load_tuning"),
     "ppafo.questions.validate.solve": ("Validation",),
     "ppafo.running": ("simulate",),
@@ -155,6 +146,7 @@ _HOMES = {
     "ppafo.simulation.simulate": ("Result", "Status", "simulate_many"),
     "ppafo.storage": ("read_recording", "read_result"),
     "ppafo.studies.loading": ("list_studies", "load_study"),
+    "ppafo.study.finding": ("Finding",),
     "ppafo.walking": ("compare_walks", "list_walks", "load_walk", "walk_population"),
     "ppafo.walking.walk": ("walk",),
 }
@@ -164,6 +156,7 @@ _HOME_OF = dict(sorted((name, module) for module, names in _HOMES.items() for na
 __all__ = list(_HOME_OF)
 
 _RENAMED = {
+    "monte_carlo": "estimate",
     "run_design": "design",
     "run_sizing": "design",
     "run_study": "sweep",

@@ -1,4 +1,4 @@
-"""What the pages on comparing, sensitivity, Monte Carlo and tuning show is run as it stands there."""
+"""What the pages on comparing, sensitivity, searching and tuning show is run as it stands there."""
 
 import math
 import re
@@ -15,7 +15,6 @@ NUMBER = r"[+-]?\d[\d,]*\.?\d*(?:e[+-]?\d+)?"
 PRINTED_BY_PYTHON = {
     "compare.md": "256 True\n",
     "sensitivity.md": "['supply.pressure', 'actuator.torque_constant']\n",
-    "monte-carlo.md": "True True\n",
     "find-a-value.md": "495000.0 1\n",
     "tune.md": "True True {}\n",
 }

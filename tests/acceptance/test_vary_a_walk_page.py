@@ -10,7 +10,7 @@ import pytest
 import ppafo
 from ppafo.loading import load_scenario
 from ppafo.questions.find.solve import find
-from ppafo.questions.montecarlo.solve import monte_carlo
+from ppafo.questions.sweep.statistic import estimate
 from ppafo.questions.tune.problem import load_tuning
 from ppafo.questions.tune.solve import tune
 from ppafo.simulation.ensemble import run_ensemble
@@ -25,13 +25,13 @@ def test_the_pressure_of_the_page_lifts_the_foot_as_the_walk_alone_says() -> Non
     given = ["run.duration=20 s"]
     found = find(
         "proportional", "supply.dorsiflexion_pressure=20..48 psi_g", "toe_clearance >= -18 mm", False, 16, given
-    )
+    ).found
     assert found.value is not None
     shown = re.search(r"dorsiflexion_pressure = ([\d.]+) psi_g", PAGE)
     assert shown is not None
     assert (found.value - 101325.0) / 6894.757 == pytest.approx(float(shown[1]), abs=1.0e-3)
     alone = walk("proportional", overrides=[*given, f"supply.dorsiflexion_pressure={found.value!r} Pa_a"])
-    assert alone.metrics["toe_clearance"].value == pytest.approx(found.metric_at(found.value), rel=1.0e-12)
+    assert alone.metrics["toe_clearance"].value == pytest.approx(found.metric_at_value, rel=1.0e-12)
 
 
 def test_a_point_of_the_sweep_is_the_single_walk() -> None:
@@ -58,9 +58,9 @@ def test_a_person_of_a_study_is_the_one_of_that_number() -> None:
 
 
 def test_the_probability_over_wearers_is_that_of_the_draws_below_the_limit() -> None:
-    found = monte_carlo("wearers", "toe_clearance", "probability above -18 mm", "0.5", first_draws=64, draws=64)
-    above = found.outcomes.metrics["toe_clearance"] > -0.018
-    assert found.last.interval.value == pytest.approx(above.mean(), abs=0.02)
+    found = estimate("wearers", "toe_clearance", "probability above -18 mm", "0.5", first_draws=64, draws=64).found
+    above = found.values > -0.018
+    assert found.interval.value == pytest.approx(above.mean(), abs=0.02)
     assert 0.3 < above.mean() < 0.9
 
 
@@ -70,7 +70,7 @@ def test_the_push_off_is_tuned_for_the_bad_end_of_people() -> None:
     assert (problem.spread.fraction, problem.spread.study) == (0.9, "wearers")
     effort = problem.effort.model_copy(update={"starts": 1, "generations": 2, "candidates_per_gain": 2})
     quick = replace(problem, spread=replace(problem.spread, draws=4), effort=effort)
-    tuned = tune(quick)
+    tuned = tune(quick).found
     alone = walk(with_overrides(problem.scenario, problem.lines(tuned.after.gains)))
     assert tuned.after.result.metrics["net_push_off_work"].value == alone.metrics["net_push_off_work"].value
 

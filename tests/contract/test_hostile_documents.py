@@ -20,7 +20,7 @@ from ppafo.parameters.parts import load_catalogue
 from ppafo.questions.design.loading import read_design_file
 from ppafo.questions.endurance.draw import read_walk_gas
 from ppafo.questions.reproduce.publication import load_publication
-from ppafo.questions.sweep.results import load_study_results
+from ppafo.questions.sweep.answer import load_study_results
 from ppafo.questions.tune.problem import load_tuning
 from ppafo.rig.experiments import check_rig_folder
 from ppafo.rig.preset import load_preset
@@ -153,13 +153,12 @@ JSON_CONTENTS = {
 }
 STUDY_DOCUMENT = {
     "format": "ppafo study results",
-    "schema_version": 1,
+    "schema_version": 2,
     "study": {"name": "task", "configurations": [{"name": "one"}], "outputs": {}},
     "runs": 1,
     "chunks": 1,
     "varied": {},
     "metrics": {},
-    "bins": {},
 }
 
 
@@ -199,7 +198,6 @@ def test_what_is_no_document_of_a_folder_is_refused_in_one_line(
         ("study", {"name": 1}),
         ("runs", "many"),
         ("chunks", 1e400),
-        ("bins", {"a": {"angle": []}}),
         ("metrics", 3),
     ],
 )

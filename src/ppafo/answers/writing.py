@@ -1,6 +1,7 @@
 """The one writer of answers: as text, as a page, and every file by name in a folder that holds exactly these."""
 
 import base64
+import html
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -246,6 +247,12 @@ def _files_of_figure(figure: Figure) -> dict[str, bytes]:
     """Return the contents of a figure by the ending of their names."""
     drawn = figure.draw()
     return {"gif": drawn} if isinstance(drawn, bytes) else render_figure(drawn, FORMATS)
+
+
+def notebook_of(answer: Answer) -> str:
+    """Return the page of an answer as a frame, which a notebook shows."""
+    page = files_of(answer)[REPORT].decode()
+    return f'<iframe srcdoc="{html.escape(page)}" width="100%" height="700" style="border: 0"></iframe>'
 
 
 def write_answer(answer: Answer, folder: Path) -> None:

@@ -74,11 +74,11 @@ def _names(folder: Path) -> list[str]:
 def _draw_folder(folder: Path, names: list[str]) -> "dict[str, Figure]":
     """Return figures by the stem of their files: of a run, a walk, a study or recordings of the rig; none of others."""
     from ppafo.answers.recording_figure import draw_stored_result
-    from ppafo.questions.sweep.manifest import MANIFEST
-    from ppafo.questions.sweep.results import load_study_results
+    from ppafo.questions.sweep.answer import load_study_results
     from ppafo.rig.experiments import RIG_FILE
     from ppafo.storage import read_result
     from ppafo.storage.result_folder import MARK, NETCDF_FILE, RUN_FILE
+    from ppafo.study.manifest import MANIFEST
 
     if RUN_FILE in names:
         return {_FIGURE: draw_stored_result(read_result(folder))}

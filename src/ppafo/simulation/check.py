@@ -92,7 +92,7 @@ class Check:
             (
                 by_move,
                 f"a {what} moved by {MOVE:.0e} of its range, far less than anybody can measure, changes them. One run "
-                f"says nothing about them; give the spread over many (ppafo montecarlo).",
+                f"says nothing about them; give the spread over many (ppafo sweep --statistic).",
             ),
             (
                 by_error,

@@ -77,6 +77,24 @@ def read_parquet(file: io.BufferedIOBase, name: str, columns: Sequence[str] | No
         raise DataError(f"{name}: is not a whole Parquet file: {one_line(error)[:120]}") from error
 
 
+def column_names(file: io.BufferedIOBase, name: str) -> list[str]:
+    """Return the names of the columns of a table; DataError where the file is damaged."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        with file, pq.ParquetFile(file) as opened:
+            return list(opened.schema_arrow.names)
+    except (pa.ArrowException, OSError, ValueError) as error:
+        raise DataError(f"{name}: is not a whole Parquet file: {one_line(error)[:120]}") from error
+
+
+def matrix_of(column: "pa.ChunkedArray") -> "np.ndarray[Any, Any]":
+    """Return a column of lists of one length as a matrix, a row for each list."""
+    values = column.combine_chunks().flatten().to_numpy(zero_copy_only=False)
+    return np.asarray(values.reshape(len(column), -1))
+
+
 def _check_size(metadata: Any, name: str) -> None:
     """Refuse, before memory is taken, a table of more values than any of ours: a constant takes no room in the file."""
     values = sum(

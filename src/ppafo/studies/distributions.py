@@ -264,6 +264,20 @@ def fraction_interval(hits: int, draws: int, confidence: float) -> Interval:
     return Interval(hits / draws, low, high)
 
 
+def share_interval(hits: Floats, replicates: int, confidence: float) -> Interval:
+    """Return the fraction of draws with a property, and its interval from the spread between replicates.
+
+    ``hits`` (draws,) is 1 where a draw has it, 0 where not, nan where that is not known. Where fewer than two draws for
+    each replicate have it, or have it not, the spread says too little: the interval is that of independent draws.
+    """
+    known = hits[np.isfinite(hits)]
+    count = int(np.count_nonzero(known))
+    if min(count, known.size - count) < 2 * replicates:
+        return fraction_interval(count, known.size, confidence)
+    found = replicates_interval(hits, replicates, confidence)
+    return Interval(found.value, max(0.0, found.low), min(1.0, found.high))
+
+
 def quantile_interval(values: Floats, share: float, confidence: float) -> Interval:
     """Return a quantile with the interval of two order statistics, which holds for any distribution.
 

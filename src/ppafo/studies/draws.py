@@ -1,22 +1,17 @@
-"""Draws from the distributions of a study, as columns of values for an ensemble, and what comes of their runs."""
+"""Draws from the distributions of a study, as columns of values for runs; levels and limits that texts state."""
 
-import time
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, final
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.errors import ScenarioError, StudyError, UnitError, first_twice, nearest_name, refused_as
+from ppafo.errors import StudyError, UnitError, first_twice, nearest_name, refused_as
 from ppafo.metrics import METRICS
-from ppafo.metrics.tracking import ONE_INSTANT, settled_error
 from ppafo.parameters.graph import ATMOSPHERE_PATH
-from ppafo.progress import Progress, Report
-from ppafo.simulation.ensemble import run_ensemble
-from ppafo.simulation.ensemble.running import lacking, offered, reacts
+from ppafo.simulation.ensemble.running import lacking, offered
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import Floats
 from ppafo.studies.loading import load_study
@@ -158,88 +153,6 @@ def _factor_of_some(
 
 _OUTCOME_LEVELS = {"Pa": "Pa_a", "-": ""}
 _DIFFERENCES = {"Pa": "Pa_d", "-": ""}
-_RUNS_AT_ONCE = 16_384
-"""Between two pieces of this size progress is reported and an interruption is heard."""
-_SLOW_RUNS_AT_ONCE = 32
-"""The same where a Python object controls: about a second."""
-_REACTING_RUNS_AT_ONCE = 64
-"""The same where the wearer reacts."""
-
-
-@dataclass(frozen=True, slots=True)
-class Outcomes:
-    """Metrics by name, values (runs,) in SI units, nan where a run failed or has no such metric.
-
-    ``failed`` (runs,) is true where a run diverged or was refused; ``reason`` states why the first of them did.
-    """
-
-    metrics: Mapping[str, Floats]
-    failed: NDArray[np.bool_]
-    reason: str
-
-    @property
-    def runs(self) -> int:
-        """Number of all runs."""
-        return int(self.failed.size)
-
-    @property
-    def failures(self) -> int:
-        """Number of runs that failed."""
-        return int(np.count_nonzero(self.failed))
-
-
-Model = Callable[[Mapping[str, Floats]], Outcomes]
-"""Columns of values [SI] (runs,) by path in, outcomes out; what every analysis here is done on."""
-
-
-def scenario_model(
-    scenario: Scenario,
-    metrics: Sequence[str],
-    threads: int | None = None,
-    on_piece: Callable[[int, int], None] | None = None,
-    gauge: Collection[str] = (),
-) -> Model:
-    """Return the model that runs a scenario on the lanes; ``on_piece(runs, failed)`` is called after every piece.
-
-    Columns of the paths in ``gauge`` count from the atmosphere of their run.
-    StudyError for a metric that does not exist or that the scenario cannot have.
-    """
-    check_metrics(metrics, scenario)
-
-    at_once = _REACTING_RUNS_AT_ONCE if reacts(scenario) else _RUNS_AT_ONCE
-    at_once = at_once if scenario.control.custom is None else _SLOW_RUNS_AT_ONCE
-
-    def outcomes(columns: Mapping[str, Floats]) -> Outcomes:
-        runs = len(next(iter(columns.values())))
-        pieces = []
-        for first in range(0, runs, at_once):
-            part = {path: values[first : first + at_once] for path, values in columns.items()}
-            pieces.append(_piece(scenario, part, metrics, threads, gauge))
-            if on_piece is not None:
-                on_piece(pieces[-1].runs, pieces[-1].failures)
-        return join(pieces)
-
-    return outcomes
-
-
-OSCILLATES = ("rms_error_hold", "oscillations_hold")
-"""What says whether a metric at one instant can be believed."""
-
-
-def with_companions(metrics: Sequence[str], scenario: Scenario) -> tuple[str, ...]:
-    """Return metrics with those that a metric at one instant needs beside it, where the scenario offers them."""
-    if ONE_INSTANT not in metrics or any(lacking(scenario, METRICS[name]) for name in OSCILLATES):
-        return tuple(metrics)
-    return tuple(dict.fromkeys((*metrics, *OSCILLATES)))
-
-
-def settled(outcomes: Outcomes, metrics: Sequence[str]) -> Outcomes:
-    """Return the outcomes of some metrics for a judgement: no instant of a loop that oscillates counts as its error."""
-    found = {name: outcomes.metrics[name] for name in metrics}
-    if ONE_INSTANT in found and set(OSCILLATES) <= set(outcomes.metrics):
-        on_hold, reversals = (outcomes.metrics[name] for name in OSCILLATES)
-        found[ONE_INSTANT] = settled_error(found[ONE_INSTANT], on_hold, reversals)
-    return replace(outcomes, metrics=found)
 
 
 def check_metrics(metrics: Sequence[str], scenario: Scenario) -> None:
@@ -254,26 +167,6 @@ def check_metrics(metrics: Sequence[str], scenario: Scenario) -> None:
     repeated = first_twice(metrics)
     if repeated is not None:
         raise StudyError(f"the metric '{repeated}' is named twice")
-
-
-def join(pieces: Sequence[Outcomes]) -> Outcomes:
-    """Return outcomes one after the other."""
-    names = pieces[0].metrics
-    return Outcomes(
-        {name: np.concatenate([piece.metrics[name] for piece in pieces]) for name in names},
-        np.concatenate([piece.failed for piece in pieces]),
-        next((piece.reason for piece in pieces if piece.reason), ""),
-    )
-
-
-def check_failures(outcomes: Outcomes, maximum_failed: float, what: str) -> None:
-    """Refuse to continue where more than a fraction of the runs failed; ``what`` names them in the message."""
-    fraction = outcomes.failures / outcomes.runs
-    if fraction > maximum_failed:
-        raise StudyError(
-            f"{what}: {outcomes.failures:,} of {outcomes.runs:,} runs failed ({100.0 * fraction:.3g} %), more than the "
-            f"{100.0 * maximum_failed:.3g} % allowed; the first: {outcomes.reason}"
-        )
 
 
 def check_fraction(value: float, name: str) -> float:
@@ -295,42 +188,6 @@ def check_draws(draws: int, fewest: int) -> int:
     if not fewest <= draws <= MAXIMUM_DRAWS:
         raise StudyError(f"draws = {draws!r}: must be at least {fewest} and at most {MAXIMUM_DRAWS:,}")
     return draws
-
-
-@final
-class Tally:
-    """Counts runs for whoever watches: ``runs`` is how many there will be, doubled where there are more after all."""
-
-    def __init__(self, runs: int, progress: Report | None) -> None:
-        self._runs, self._report, self._started = max(1, runs), progress, 0.0
-        self.done = self.failed = self._first = 0
-
-    def add(self, runs: int, failed: int) -> None:
-        """Count runs that are done; the rate leaves out the first ones, before which models may be compiled."""
-        if self.done == 0:
-            self._first, self._started = runs, time.monotonic()
-        self.done += runs
-        self.failed += failed
-        while self._runs < self.done:
-            self._runs *= 2
-        if self._report is not None:
-            elapsed = time.monotonic() - self._started
-            self._report(Progress("", self.done, self._runs, self.failed, self._first, elapsed))
-
-
-def _piece(
-    scenario: Scenario,
-    columns: Mapping[str, Floats],
-    metrics: Sequence[str],
-    threads: int | None,
-    gauge: Collection[str],
-) -> Outcomes:
-    with refused_as(StudyError, f"scenario '{scenario.name}'", ScenarioError):
-        result = run_ensemble(scenario, columns, metrics, threads=threads, gauge=gauge)
-    runs = result.status.size
-    values = {name: result.metrics.get(name, np.full(runs, np.nan)) for name in metrics}
-    reason = result.reasons[min(result.reasons)] if result.reasons else ""
-    return Outcomes(values, result.status != 0, reason)
 
 
 def atmosphere_of(scenario: Scenario, varied: Collection[str]) -> float | None:

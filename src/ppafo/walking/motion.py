@@ -87,7 +87,7 @@ def check_led(scenario: Scenario, doing: str) -> None:
     if walk_of(scenario).reacts is not None:
         raise ScenarioError(
             f"{scenario.name}: {doing} needs a prescribed gait, and its wearer reacts; leave wearer.reacts out "
-            "(simulate, walk, find, sweep, sensitivity, montecarlo and tune take a wearer who reacts)"
+            "(simulate, walk, find, sweep, sensitivity and tune take a wearer who reacts)"
         )
 
 

@@ -1,4 +1,4 @@
-"""``ppafo compare``, ``sensitivity``, ``montecarlo`` and ``tune``: text, JSON, files, and what is refused."""
+"""``ppafo compare``, ``sensitivity``, ``sweep --statistic`` and ``tune``: text, JSON, files, and what is refused."""
 
 import json
 import shlex
@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from ppafo.cli.main import main
-from ppafo.studies import draws
+from ppafo.study import runs
 
 STUDY = "torque-task-uncertainty"
 SHORT = ["--set", "run.duration=0.3 s"]
@@ -34,8 +34,8 @@ def commands(tuning: Path) -> dict[str, list[str]]:
     """A quick run of each command."""
     return {
         "compare": ["compare", "--study", STUDY, "--baseline", "solenoid", "--draws", "64", *SHORT],
-        "montecarlo": [
-            *("montecarlo", STUDY, "--metric", "rms_error", "--configuration", "proportional"),
+        "statistic": [
+            *("sweep", STUDY, "--statistic", "mean", "--metric", "rms_error", "--configuration", "proportional"),
             *("--width", "20 %", "--first-draws", "64", "--draws", "512", *SHORT),
         ],
         "sensitivity": [
@@ -46,7 +46,7 @@ def commands(tuning: Path) -> dict[str, list[str]]:
     }
 
 
-@pytest.mark.parametrize("command", ["compare", "montecarlo", "sensitivity", "tune"])
+@pytest.mark.parametrize("command", ["compare", "statistic", "sensitivity", "tune"])
 def test_each_command_prints_and_leaves_a_report_with_its_figures(
     command: str, tuning: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -62,10 +62,11 @@ def test_each_command_prints_and_leaves_a_report_with_its_figures(
     assert text.splitlines()[0] == printed.splitlines()[0]
 
 
-@pytest.mark.parametrize("command", ["compare", "montecarlo", "sensitivity", "tune"])
+@pytest.mark.parametrize("command", ["compare", "statistic", "sensitivity", "tune"])
 def test_each_command_prints_one_json_document_the_same_every_time(
-    command: str, tuning: Path, capsys: pytest.CaptureFixture[str]
+    command: str, tuning: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    monkeypatch.chdir(tmp_path)
     printed = []
     for _ in range(2):
         assert main([*commands(tuning)[command], "--json"]) == 0
@@ -119,8 +120,11 @@ effort = { starts = 1, generations = 1, candidates_per_gain = 4 }
     assert "the torque ceiling is the cause" in capsys.readouterr().out.splitlines()[0]
 
 
-def test_an_interval_that_stays_too_wide_is_exit_code_1(capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["montecarlo", STUDY, "--metric", "rms_error", "--configuration", "proportional", *SHORT]
+def test_an_interval_that_stays_too_wide_is_exit_code_1(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    words = ["sweep", STUDY, "--statistic", "mean", "--metric", "rms_error", "--configuration", "proportional", *SHORT]
     assert main([*words, "--width", "0.001 %", "--first-draws", "32", "--draws", "64"]) == 1
     assert "the target width was not reached with the maximum of 64 draws" in capsys.readouterr().out
 
@@ -136,19 +140,19 @@ def test_an_interruption_leaves_nothing(
     def interrupted(*_words: object, **_more: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(draws, "run_ensemble", interrupted)
+    monkeypatch.setattr(runs, "run_ensemble", interrupted)
     for words in commands(tuning).values():
         assert main([*words, "--out", str(tmp_path / "out")]) == 130
         assert not (tmp_path / "out").exists()
     assert "interrupted; nothing is half written" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("command", ["compare", "montecarlo", "sensitivity", "tune"])
+@pytest.mark.parametrize("command", ["compare", "statistic", "sensitivity", "tune"])
 def test_an_output_that_cannot_be_written_is_refused_before_anything_runs(
     command: str, tuning: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "out").write_text("a file")
     assert main([*commands(tuning)[command], "--out", str(tmp_path / "out")]) == 2
     said = capsys.readouterr().err
-    assert "--out" in said
+    assert str(tmp_path / "out") in said
     assert "runs" not in said

@@ -129,8 +129,8 @@ interrupts.listen = ready
 
 COMMANDS = {
     "simulate": ("simulate torque-task-solenoid", 2.0),
-    "montecarlo": (
-        "montecarlo torque-task-uncertainty --configuration proportional --metric gas_supplied --width 1%",
+    "sweep --statistic": (
+        "sweep torque-task-uncertainty --statistic mean --configuration proportional --metric gas_supplied --width 1%",
         2.0,
     ),
     "sweep": ("sweep torque-task-uncertainty --draws 32", 2.4),

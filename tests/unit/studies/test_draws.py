@@ -7,19 +7,11 @@ import numpy as np
 import pytest
 
 from ppafo.errors import StudyError
-from ppafo.progress import Progress
-from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 from ppafo.studies.distributions import effective_sample_size, fraction_interval, quantile_interval, replicates_interval
 from ppafo.studies.draws import (
-    Outcomes,
-    Tally,
-    check_failures,
     check_metrics,
     choose_configuration,
-    join,
-    scenario_model,
-    settled,
     study_of,
     uncertainty_in,
     uncertainty_of,
@@ -102,29 +94,6 @@ def test_a_study_that_is_loaded_takes_no_overrides() -> None:
         study_of(load_study(study()), ["valve.area=11 mm^2"])
 
 
-SHORT = ("run.duration=0.2 s",)
-
-
-def test_each_run_gives_what_it_gives_alone() -> None:
-    scenario = load_scenario("torque-task-proportional", SHORT)
-    outcomes = scenario_model(scenario, ["rms_error", "gas_supplied"])({"valve.area": np.array([10e-6, 12e-6])})
-    alone = simulate("torque-task-proportional", [*SHORT, "valve.area=12 mm^2"]).metrics
-    assert outcomes.metrics["rms_error"][1] == pytest.approx(alone["rms_error"].value, rel=1e-9)
-    assert outcomes.metrics["gas_supplied"][1] == pytest.approx(alone["gas_supplied"].value, rel=1e-9)
-    assert outcomes.failures == 0
-
-
-def test_a_run_that_is_refused_is_a_failure_with_its_reason() -> None:
-    scenario = load_scenario("torque-task-proportional", SHORT)
-    outcomes = scenario_model(scenario, ["rms_error"])({"valve.area": np.array([10e-6, -1.0, 12e-6])})
-    assert outcomes.failed.tolist() == [False, True, False]
-    assert np.isnan(outcomes.metrics["rms_error"][1])
-    assert "valve.area" in outcomes.reason
-    with pytest.raises(StudyError, match=r"trial: 1 of 3 runs failed \(33.3 %\), more than the 10 %.*valve.area"):
-        check_failures(outcomes, 0.1, "trial")
-    check_failures(outcomes, 0.34, "trial")
-
-
 def test_metrics_are_checked_before_anything_runs() -> None:
     closed, opened = load_scenario("torque-task-proportional"), load_scenario("step-response")
     with pytest.raises(StudyError, match="no metric 'rms_eror', did you mean 'rms_error'"):
@@ -133,22 +102,6 @@ def test_metrics_are_checked_before_anything_runs() -> None:
         check_metrics(["rms_error"], opened)
     with pytest.raises(StudyError, match="'peak_error' is named twice"):
         check_metrics(["peak_error", "peak_error"], closed)
-
-
-def test_pieces_are_joined_with_the_first_reason() -> None:
-    def piece(failed: bool, reason: str) -> Outcomes:
-        return Outcomes({"x": np.array([1.0])}, np.array([failed]), reason)
-
-    whole = join([piece(False, ""), piece(True, "first"), piece(True, "second")])
-    assert (whole.runs, whole.failures, whole.reason) == (3, 2, "first")
-
-
-def test_progress_grows_where_there_are_more_runs_than_were_thought() -> None:
-    seen: list[Progress] = []
-    tally = Tally(100, seen.append)
-    for runs in (100, 100, 200):
-        tally.add(runs, 1)
-    assert [(item.total, item.done, item.failed) for item in seen] == [(100, 100, 1), (200, 200, 2), (400, 400, 3)]
 
 
 def test_the_interval_of_a_mean_is_the_one_of_student_over_replicates() -> None:
@@ -194,14 +147,3 @@ def test_a_quantile_that_few_draws_cannot_bound_has_an_open_end() -> None:
     interval = quantile_interval(np.arange(20.0), 0.99, 0.95)
     assert interval.high == math.inf
     assert interval.width == math.inf
-
-
-def test_only_a_loop_that_oscillates_on_the_hold_has_its_last_error_replaced() -> None:
-    metrics = {
-        "final_error": np.array([0.1, 0.1, 0.5]),
-        "rms_error_hold": np.array([0.4, 0.4, 0.4]),
-        "oscillations_hold": np.array([20.0, 2.0, 20.0]),
-    }
-    found = settled(Outcomes(metrics, np.zeros(3, bool), ""), ["final_error"])
-    assert found.metrics["final_error"].tolist() == [0.4, 0.1, 0.5]
-    assert list(found.metrics) == ["final_error"]

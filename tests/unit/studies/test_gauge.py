@@ -11,14 +11,14 @@ import pytest
 import ppafo
 from ppafo.errors import StudyError
 from ppafo.questions.find import solve as find_module
-from ppafo.questions.montecarlo import solve as montecarlo_module
-from ppafo.questions.montecarlo.solve import Statistic, parse_statistic
-from ppafo.questions.sweep.manifest import drawn_values, varied_columns
+from ppafo.questions.sweep import statistic as statistic_module
+from ppafo.questions.sweep.statistic import Statistic, parse_statistic
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.numbers import check_columns
 from ppafo.studies.draws import atmosphere_of, level_of, uncertainty_of
 from ppafo.studies.loading import load_study
 from ppafo.studies.study import Study
+from ppafo.study.blocks import drawn_values, varied_columns
 from ppafo.units import to_si
 
 ROOMS = {"path": "supply.atmospheric_pressure", "kind": "list", "values": ["90 kPa_a", "101.325 kPa_a"]}
@@ -175,11 +175,11 @@ def test_a_condition_of_find_counts_from_the_atmosphere_of_the_scenario(monkeypa
 
 def test_a_probability_counts_from_the_atmosphere_of_the_scenario(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[Statistic] = []
-    monkeypatch.setattr(montecarlo_module, "draw_until", lambda *given: asked.append(given[3]))
-    ppafo.monte_carlo(high_study("supply.pressure", "300 kPa_a", "400 kPa_a"), METRIC, "probability above 50 kPa_g")
+    monkeypatch.setattr(statistic_module, "draw_until", lambda *given: asked.append(given[3]))
+    ppafo.estimate(high_study("supply.pressure", "300 kPa_a", "400 kPa_a"), METRIC, "probability above 50 kPa_g")
     assert asked == [parse_statistic("probability above 50 kPa_g", METRIC, 80.0e3)]
     with pytest.raises(StudyError, match=REFUSED):
-        ppafo.monte_carlo(high_study(ATMOSPHERE, "70 kPa_a", "90 kPa_a"), METRIC, "probability above 50 kPa_g")
+        ppafo.estimate(high_study(ATMOSPHERE, "70 kPa_a", "90 kPa_a"), METRIC, "probability above 50 kPa_g")
 
 
 def test_a_constraint_of_a_tuning_counts_from_the_atmosphere_of_the_scenario() -> None:

@@ -11,13 +11,14 @@ import pytest
 import ppafo
 from ppafo.errors import StudyError
 from ppafo.questions.compare.solve import compare
-from ppafo.questions.montecarlo.solve import Statistic, StoppingRule, draw_until, mean_of, quantile_of
-from ppafo.questions.sweep.manifest import drawn_values
-from ppafo.studies.distributions import Floats, NormalAround, noise_interval
-from ppafo.studies.draws import Outcomes, Uncertainty, uncertainty_of
+from ppafo.questions.sweep.statistic import Statistic, StoppingRule, draw_until, mean_of, quantile_of
+from ppafo.studies.distributions import Floats, Interval, NormalAround, noise_interval
+from ppafo.studies.draws import Uncertainty, uncertainty_of
 from ppafo.studies.loading import load_study
 from ppafo.studies.sampling import NOISE, other_noise, with_noise
 from ppafo.studies.study import Drawn
+from ppafo.study.blocks import drawn_values
+from ppafo.study.runs import Runs
 
 NOISY = ["run.duration=0.3 s", "sensors.pressure_noise=5 kPa_d"]
 DOCUMENT: dict[str, Any] = {
@@ -41,15 +42,16 @@ def changed(**changes: Any) -> dict[str, Any]:
 def test_scenarios_that_differ_in_nothing_but_their_seed_are_equal_in_every_draw(with_study: bool) -> None:
     one, other = (ppafo.load_scenario("torque-task-proportional", [*NOISY, f"sensors.seed={seed}"]) for seed in (1, 9))
     found = compare({"one": one, "other": other}, changed() if with_study else None, draws=64)
-    error = next(item for item in found.pairs("as written", "other") if item.metric == "rms_error")
+    (task,) = found.found.tasks
+    error = next(item for item in task.pairs["other"] if item.metric == "rms_error")
     assert error.equal == 1.0
     assert error.better is not None
     assert error.better.value == 0.0
-    outcomes = found.cases[0].outcomes
-    assert outcomes is not None
-    assert np.unique(outcomes.metrics["rms_error"]).size == 64, "every draw has its own noise"
+    rows = task.cases[0].rows
+    assert rows is not None
+    assert np.unique(rows["rms_error"]).size == 64, "every draw has its own noise"
     drawn = "1 uncertain value and of the sensor noise" if with_study else "64 draws of the sensor noise"
-    assert drawn in found.answer().lead[0]
+    assert drawn in found.said[0]
 
 
 def test_without_noise_nothing_is_drawn_for_it() -> None:
@@ -58,7 +60,9 @@ def test_without_noise_nothing_is_drawn_for_it() -> None:
         item["overrides"] = [text for text in item["overrides"] if "noise" not in text]
     assert NOISE not in load_study(quiet).paths
     assert NOISE in load_study(changed()).paths
-    assert not compare({"a": ppafo.load_scenario("step-response"), "b": ppafo.load_scenario("step-response")}).draws
+    assert not compare(
+        {"a": ppafo.load_scenario("step-response"), "b": ppafo.load_scenario("step-response")}
+    ).found.draws
 
 
 def test_the_noise_is_independent_of_what_is_correlated_and_leaves_its_correlation() -> None:
@@ -126,30 +130,24 @@ def test_a_share_of_noise_and_both_ends_are_between_nothing_and_all() -> None:
 
 
 @pytest.mark.parametrize("statistic", [mean_of("N m"), quantile_of("N m", 0.5)])
-def test_monte_carlo_says_how_much_is_noise(statistic: Statistic) -> None:
+def test_a_statistic_says_how_much_is_noise(statistic: Statistic) -> None:
     from scipy import stats
 
-    def model(columns: Mapping[str, Floats]) -> Outcomes:
-        noise = stats.norm.ppf((columns[NOISE] + 0.5) / 2.0**32)
-        return Outcomes({"rms_error": columns["x"] + 0.5 * noise}, np.zeros(noise.size, bool), "")
+    def model(columns: Mapping[str, Floats]) -> dict[str, Floats]:
+        noise = stats.norm.ppf((columns.get(NOISE, np.zeros(columns["x"].size)) + 0.5) / 2.0**32)
+        return {"rms_error": columns["x"] + 0.5 * noise}
+
+    def share_in(uncertainty: Uncertainty) -> Interval | None:
+        runs = Runs.of_model(model, ["rms_error"])
+        return draw_until(runs, uncertainty, "rms_error", statistic, rule, 1).found.share_of_noise
 
     drawn = (Drawn("x", NormalAround(0.0, 1.0)),)
     heard = Uncertainty(*with_noise(drawn, None, [ppafo.load_scenario("torque-task-proportional", NOISY)], ["x"]))
     rule = StoppingRule(0.2, False, first=1024, maximum=4096)
-    share = draw_until(model, heard, "rms_error", statistic, rule, 1).noise
+    share = share_in(heard)
     assert share is not None
     assert share.value == pytest.approx(0.2, abs=0.04)
-    assert (
-        draw_until(
-            lambda columns: model({**columns, NOISE: np.zeros(columns["x"].size)}),
-            Uncertainty(drawn),
-            "rms_error",
-            statistic,
-            rule,
-            1,
-        ).noise
-        is None
-    )
+    assert share_in(Uncertainty(drawn)) is None
 
 
 def test_another_stream_is_another_seed_for_every_seed() -> None:

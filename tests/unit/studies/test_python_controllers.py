@@ -71,10 +71,11 @@ def test_it_is_compared_over_an_uncertain_device_with_progress_and_overrides() -
     level = ["reference.level=2 N m"]
     found = ppafo.compare(pair, "torque-task-uncertainty", overrides=level, draws=64, progress=heard.append)
     assert [item.done for item in heard] == [32, 64, 96, 128]
-    (better,) = [item.better for item in found.pairs("as written", "stronger") if item.metric == "rms_error"]
+    (task,) = found.found.tasks
+    (better,) = [item.better for item in task.pairs["stronger"] if item.metric == "rms_error"]
     assert better is not None
     assert better.value == 1.0
-    assert {case.scenario.reference.settings["level"] for case in found.cases} == {2.0}
+    assert {case.scenario.reference.settings["level"] for case in task.cases} == {2.0}
     with pytest.raises(StudyError, match=r"gain=1': scenario '.*' is controlled by a Python object"):
         ppafo.compare(pair, overrides=["controller.proportional_gain=1"])
 
@@ -94,7 +95,7 @@ def test_it_is_swept_chunk_by_chunk(tmp_path: Path) -> None:
     (configuration,) = study.configurations
     own = replace(configuration, scenario=configuration.scenario.controlled_by(Integral()))
     heard: list[Progress] = []
-    results = ppafo.sweep(replace(study, configurations=(own,)), tmp_path / "out", progress=heard.append)
+    results = ppafo.sweep(replace(study, configurations=(own,)), tmp_path / "out", progress=heard.append).found
     assert heard[-1].done == 70
     assert results.document["chunks"] == 2
     table = results.table()
@@ -114,7 +115,7 @@ def test_the_device_around_it_is_tuned_and_gains_that_it_does_not_declare_are_re
         "effort": {"starts": 1, "generations": 2, "candidates_per_gain": 4},
     }
     problem = ppafo.load_tuning(document)
-    tuned = ppafo.tune(replace(problem, scenario=problem.scenario.controlled_by(Integral())))
+    tuned = ppafo.tune(replace(problem, scenario=problem.scenario.controlled_by(Integral()))).found
     assert tuned.after.objective <= tuned.before.objective
     gain = {"path": "controller.proportional_gain", "minimum": "0.05 1/(N m)", "maximum": "1 1/(N m)"}
     problem = ppafo.load_tuning(document | {"search": [gain]})

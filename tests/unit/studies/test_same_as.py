@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from ppafo.errors import StudyError
-from ppafo.questions.sweep.manifest import drawn_values, varied_columns
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.numbers import with_numbers
 from ppafo.studies.draws import uncertainty_in
 from ppafo.studies.loading import load_study
+from ppafo.study.blocks import drawn_values, varied_columns
 
 STUDY: dict[str, Any] = {
     "schema_version": 1,

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ppafo.questions.sweep.manifest import chunk, chunk_count, drawn_values
 from ppafo.studies.distributions import (
     Distribution,
     LogNormalAround,
@@ -21,6 +20,7 @@ from ppafo.studies.distributions import (
 from ppafo.studies.loading import load_study
 from ppafo.studies.sampling import cholesky_factor, permute, uniform_numbers
 from ppafo.studies.study import Sample
+from ppafo.study.blocks import chunk, chunk_count, drawn_values
 
 SHARES = np.linspace(1e-6, 1.0 - 1e-6, 201)
 METHODS = ("random", "latin_hypercube", "sobol")

@@ -161,7 +161,7 @@ def test_a_study_counts_nothing_that_comes_after_a_fall_as_a_single_walk_does(
     single = {name: item["value"] for name, item in printed["metrics"].items()}
     assert printed["status"]["message"] == f"completed: the wearer fell at t = {single['fall_time']:.4g} s"
     assert single["walked_time"] < 6.0
-    study = ppafo.load_study_results(tmp_path / "study")
+    study = ppafo.load_study_results(tmp_path / "study").found
     row = study.table()
     assert {name: float(row[name][0]) for name in single} == pytest.approx(single, rel=1e-9)
     assert {"gas_supplied", "gas_vented", "work_per_gas"} < set(single)

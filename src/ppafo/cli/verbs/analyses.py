@@ -24,13 +24,20 @@ from ppafo.cli.arguments import (
     Torque,
     Whole,
     Word,
+    fraction,
     point,
     task,
 )
 
 if TYPE_CHECKING:
+    from ppafo.questions.compare.answer import Compared
+    from ppafo.questions.find.solve import Threshold
+    from ppafo.questions.sensitivity.solve import Influences
+    from ppafo.questions.sweep.results import StudyResults
+    from ppafo.questions.sweep.statistic import Estimate
+    from ppafo.questions.tune.answer import Tuned
+    from ppafo.study.finding import Finding
     from ppafo.progress import Report
-    from ppafo.questions.compare.answer import Comparison
     from ppafo.questions.design.front.answer import Design
     from ppafo.questions.design.front.problem import DesignProblem
     from ppafo.questions.design.profile.answer import Sizing
@@ -38,13 +45,8 @@ if TYPE_CHECKING:
     from ppafo.questions.design.wearer.solve import WearerSizing
     from ppafo.questions.endurance.answer import Endurance, Endurances
     from ppafo.questions.endurance.solve import GasUse
-    from ppafo.questions.find.solve import Found
     from ppafo.questions.linearise.answer import LinearModel
-    from ppafo.questions.montecarlo.solve import MonteCarlo
     from ppafo.questions.reproduce.answer import Reproduction, Studies
-    from ppafo.questions.sensitivity.solve import Sensitivity
-    from ppafo.questions.sweep.answer import StudyResults
-    from ppafo.questions.tune.answer import Tuning
     from ppafo.questions.tune.problem import Problem
     from ppafo.simulation.scenario import Scenario
     from ppafo.studies.study import Configurations, Study
@@ -71,6 +73,7 @@ Range = Annotated[str, Word("PATH=LOW..HIGH", option="--vary")]
 Condition = Annotated[str, Word("CONDITION", option="--such-that")]
 Highest = Annotated[bool, Word(off="--lowest", help="find the lowest value (default)")]
 Point = Annotated[float | str, Word("TIME", point)]
+Fraction = Annotated[float, Word("FRACTION", fraction)]
 Metric = Annotated[str, Word("NAME", option="--metric")]
 Statistic = Annotated[str, Word("WORDS", option="--statistic")]
 OneStudy = Annotated["Study | str | Path | Mapping[str, Any]", Word("STUDY", option="--study")]
@@ -116,21 +119,56 @@ def sweep(
     threads: Threads | None = None,
     scheduler: Address | None = None,
     agreed: Agreed = False,
+    statistic: Statistic | None = None,
+    metric: Metric | None = None,
+    width: Width | None = None,
+    also: Sequence[Name] = (),
+    configuration: Name | None = None,
+    first_draws: Count | None = None,
+    confidence: Fraction | None = None,
+    maximum_failed: Fraction | None = None,
     progress: Report | None = None,
-) -> StudyResults:
-    """Run a study: many runs, one row each, resumable.
+) -> Finding[StudyResults] | Finding[Estimate]:
+    """Run a study: many runs, one row each, resumable; or a statistic to a wanted precision.
 
     study: name of a study, or a .toml file
     out: folder or address for the results; default out/NAME with the name of the study
-    draws: number of draws, instead of the number in the file
+    draws: number of draws, instead of the number in the file; of a statistic the maximum, default 1,048,576
     scheduler: address of a Dask scheduler whose workers compute the chunks
     agreed: start even if the results will fill much of the disk
+    statistic: draw until the interval of a statistic is narrow enough, and keep no rows: mean, 'quantile 0.95',
+        'probability above 1.2 N m', 'probability below 0.5 g'
+    metric: with --statistic: name of a metric, such as rms_error
+    width: target width of the interval: '1 %' of the value (default), or '0.01 N m'; of a probability, 0.02
+    also: a further metric, whose mean over the same draws is given; may be repeated
+    configuration: configuration of the study, needed if it has several
+    first_draws: draws before the first estimate; default 256
+    confidence: confidence of the interval; default 95%
+    maximum_failed: fraction of the runs that may fail before the statistic is refused; default 1%
     """
     from ppafo.answers.drawing import load_drawing
     from ppafo.questions.sweep.solve import sweep_into_folder
 
     load_drawing()
-    return sweep_into_folder(study, out, overrides, draws, seed, threads, scheduler, agreed, progress)
+    return sweep_into_folder(
+        study,
+        out,
+        overrides,
+        draws,
+        seed,
+        threads,
+        scheduler,
+        agreed,
+        statistic,
+        metric,
+        width,
+        also,
+        configuration,
+        first_draws,
+        confidence,
+        maximum_failed,
+        progress,
+    )
 
 
 def compare(
@@ -146,7 +184,7 @@ def compare(
     maximum_failed: MaximumFailed = 0.01,
     threads: Threads | None = None,
     progress: Report | None = None,
-) -> Comparison:
+) -> Finding[Compared]:
     """Compare configurations, also over an uncertain device.
 
     All have common random numbers. ``configurations`` are scenarios by name (or a list of names, files or Scenario
@@ -183,7 +221,7 @@ def sensitivity(
     maximum_failed: MaximumFailed = 0.02,
     threads: Threads | None = None,
     progress: Report | None = None,
-) -> Sensitivity:
+) -> Finding[Influences]:
     """Rank uncertain values by their influence: Sobol or Shapley indices, signed changes.
 
     Noise of the sensors is one of the values. StudyError for bad input, and where more than the fraction
@@ -213,57 +251,6 @@ def sensitivity(
     )
 
 
-def monte_carlo(
-    study: DistributedStudy,
-    metric: Metric,
-    statistic: Statistic = "mean",
-    *,
-    width: Width | None = None,
-    also: Sequence[Name] = (),
-    configuration: Name | None = None,
-    first_draws: Whole = 256,
-    draws: Whole = 2**20,
-    overrides: Overrides = (),
-    seed: Seed | None = None,
-    confidence: Confidence = 0.95,
-    maximum_failed: MaximumFailed = 0.01,
-    threads: Threads | None = None,
-    progress: Report | None = None,
-) -> MonteCarlo:
-    """Draw until the interval of a statistic is narrow enough.
-
-    Draws are those that the interval needs, whatever the study's sampling method: randomised Sobol replicates for a
-    mean, else independent ones. StudyError for bad input and where more than the fraction ``maximum_failed`` of the
-    runs fails.
-
-    metric: name of a metric, such as rms_error
-    statistic: mean (default), 'quantile 0.95', 'probability above 1.2 N m', 'probability below 0.5 g'
-    width: target width of the interval: '1 %' of the value (default), or '0.01 N m'; of a probability, 0.02
-    also: a further metric, whose mean over the same draws is given; may be repeated
-    configuration: configuration of the study, needed if it has several
-    first_draws: draws before the first estimate; default 256
-    draws: maximum number of draws; default 1,048,576
-    """
-    from ppafo.questions.montecarlo.solve import monte_carlo
-
-    return monte_carlo(
-        study,
-        metric,
-        statistic,
-        width,
-        configuration,
-        overrides,
-        seed,
-        first_draws,
-        draws,
-        confidence,
-        maximum_failed,
-        threads,
-        progress,
-        also,
-    )
-
-
 def find(
     scenario: ScenarioLike,
     vary: Range,
@@ -274,7 +261,7 @@ def find(
     overrides: Overrides = (),
     threads: Threads | None = None,
     progress: Report | None = None,
-) -> Found:
+) -> Finding[Threshold]:
     """Find the lowest or highest value that meets a condition on a metric.
 
     A grid of values over the range is run side by side; between the last one that does not meet the condition and the
@@ -299,7 +286,7 @@ def tune(
     seed: Seed | None = None,
     threads: Threads | None = None,
     progress: Report | None = None,
-) -> Tuning:
+) -> Finding[Tuned]:
     """Tune gains for an objective under constraints, optionally robust.
 
     Every generation is one ensemble, and every candidate sees the same draws. StudyError for bad input, and where a

@@ -1,7 +1,7 @@
 """Configurations side by side: each as it is, and all of them over the same uncertain values."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -10,20 +10,18 @@ import numpy as np
 from ppafo.errors import StudyError
 from ppafo.metrics import METRICS
 from ppafo.progress import Report
-from ppafo.questions.compare.answer import COMPARED, Case, Comparison
+from ppafo.questions.compare.answer import Case, Compared, OnTask, finding_of, front_of, remarks_of
+from ppafo.questions.compare.pairs import COMPARED, Paired, best_probabilities, compare_pairs
 from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate_many
+from ppafo.studies.distributions import Interval
 from ppafo.studies.draws import (
-    Outcomes,
-    Tally,
     Uncertainty,
     check_confidence,
     check_draws,
-    check_failures,
     check_fraction,
-    scenario_model,
     study_of,
     uncertainty_of,
     with_new_noise,
@@ -37,6 +35,8 @@ from ppafo.studies.study import (
     valid_baseline,
     with_overrides,
 )
+from ppafo.study.finding import Finding
+from ppafo.study.runs import Rows, Runs, Tally, failures_of
 
 AS_WRITTEN = "as written"
 """What the task of a configuration is called where no other is requested."""
@@ -60,7 +60,7 @@ def compare(
     maximum_failed: float = 0.01,
     threads: int | None = None,
     progress: Report | None = None,
-) -> Comparison:
+) -> Finding[Compared]:
     """Compare configurations on tasks, and over the distributions of a study with common random numbers.
 
     ``configurations`` are scenarios by name (or a list of names, files or Scenario objects); those of the study by
@@ -87,24 +87,71 @@ def compare(
     scenarios = [place.scenario for place in placed]
     metrics = tuple(name for name in COMPARED if not any(lacking(scenario, METRICS[name]) for scenario in scenarios))
     drawing = _drawing(known, placed, draws, seed, check_fraction(maximum_failed, "maximum_failed"))
-    outcomes = (
-        _outcomes(placed, metrics, drawing, threads, progress) if drawing is not None else [_UNDRAWN] * len(placed)
-    )
+    drawn = [_UNDRAWN] * len(placed)
+    if drawing is not None:
+        drawn = _runs(placed, metrics, drawing, threads, progress)
     results = simulate_many([place.scenario for place in placed], threads)
-    return Comparison(
-        metrics=metrics,
-        configurations=names,
+    cases = [
+        (
+            place.task,
+            Case(
+                place.configuration,
+                result.status,
+                {name: metric for name, metric in result.metrics.items() if name in COMPARED},
+                0 if rows is None else failures_of(rows),
+                reason,
+                place.scenario,
+                rows,
+                renoised,
+            ),
+        )
+        for place, result, (rows, renoised, reason) in zip(placed, results, drawn, strict=True)
+    ]
+    found = Compared(
+        units="SI: N m, kg, J; fractions from 0 to 1",
+        configurations=list(names),
         baseline=reference,
-        tasks=wanted,
-        cases=tuple(
-            Case(place.task, place.configuration, place.scenario, result.metrics, result.status, *runs)
-            for place, result, runs in zip(placed, results, outcomes, strict=True)
-        ),
         draws=drawing.draws if drawing is not None else 0,
         seed=drawing.seed if drawing is not None else 0,
-        varied=tuple(path for path in drawing.uncertainty.paths if path != NOISE) if drawing is not None else (),
+        remarks=[],
+        varied=[path for path in drawing.uncertainty.paths if path != NOISE] if drawing is not None else [],
         confidence=confidence,
+        tasks=[
+            _on_task(task, texts, [case for name, case in cases if name == task], reference, metrics, confidence)
+            for task, texts in wanted.items()
+        ],
+        metrics=metrics,
     )
+    return finding_of(replace(found, remarks=remarks_of(found, found.tasks)))
+
+
+def _on_task(
+    task: str, overrides: Sequence[str], cases: list[Case], baseline: str, metrics: Sequence[str], confidence: float
+) -> OnTask:
+    """Return the cases of a task with their statistics."""
+    first = next(case for case in cases if case.configuration == baseline)
+    others = [case for case in cases if case is not first]
+    pairs = {case.configuration: _pairs(first, case, metrics, confidence) for case in others}
+    best: dict[str, dict[str, Interval]] = {}
+    rows = [case.rows for case in cases if case.rows is not None]
+    for name in metrics if rows else ():
+        if COMPARED[name]:
+            shares = best_probabilities([each[name] for each in rows], COMPARED[name], confidence)
+            best[name] = dict(zip([case.configuration for case in cases], shares, strict=False))
+    return OnTask(task, list(overrides), cases, front_of(cases), pairs, best)
+
+
+def _pairs(first: Case, other: Case, metrics: Sequence[str], confidence: float) -> list[Paired]:
+    """Return the statistics of a configuration against the baseline; none without draws."""
+    if first.rows is None or other.rows is None:
+        return []
+    found = []
+    for name in metrics:
+        again = None
+        if first.renoised is not None and other.renoised is not None:
+            again = (first.renoised[name], other.renoised[name])
+        found.append(compare_pairs(name, first.rows[name], other.rows[name], COMPARED[name], confidence, again))
+    return [item for item in found if item is not None]
 
 
 def _tasks(tasks: Mapping[str, Sequence[str]] | Sequence[tuple[str, Sequence[str]]]) -> dict[str, tuple[str, ...]]:
@@ -119,7 +166,9 @@ def _tasks(tasks: Mapping[str, Sequence[str]] | Sequence[tuple[str, Sequence[str
 
 _SAME = 1.0e-9
 """Values that differ by less than this fraction are one."""
-_UNDRAWN = (None, None)
+Drawn = tuple[Rows | None, Rows | None, str]
+"""The runs of a case over the draws, the first of them again with other noise, and why the first failed."""
+_UNDRAWN: Drawn = (None, None, "")
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,13 +205,13 @@ def _value_at(path: str, scenario: Scenario) -> float | None:
         return None
 
 
-def _outcomes(
+def _runs(
     placed: Sequence[ConfiguredTask],
     metrics: Sequence[str],
     drawing: _Drawing,
     threads: int | None,
     progress: Report | None,
-) -> list[tuple[Outcomes, Outcomes | None]]:
+) -> list[Drawn]:
     """Return the runs of every case, all over the same draws, and the first of them again with other noise."""
     if drawing.study is not None:
         # Refuse cases that differ in a value that the study draws for all of them: the difference would not count.
@@ -179,13 +228,14 @@ def _outcomes(
     columns = drawing.uncertainty.replicated_columns(0, drawing.draws, drawing.seed)
     again = with_new_noise(columns, NOISE_DRAWS) if drawing.uncertainty.has_noise else {}
     tally = Tally((drawing.draws + (min(NOISE_DRAWS, drawing.draws) if again else 0)) * len(placed), progress)
-    found: list[tuple[Outcomes, Outcomes | None]] = []
+    found: list[Drawn] = []
     for place in placed:
         name = place.configuration
-        model = scenario_model(place.scenario, metrics, threads, tally.add, drawing.uncertainty.gauge)
+        runs = Runs(place.scenario, metrics, tally, drawing.uncertainty.gauge, threads)
         own = {path: column for path, column in columns.items() if drawing.varies(path, name)}
         unchanged = {"supply.pressure": np.full(drawing.draws, place.scenario.device.supply.pressure)}
-        outcomes = model(own or unchanged)
-        check_failures(outcomes, drawing.maximum_failed, f"configuration '{name}', task '{place.task}'")
-        found.append((outcomes, model({path: again[path] for path in own}) if again else None))
+        rows = runs.run(own or unchanged)
+        runs.check(rows, drawing.maximum_failed, f"configuration '{name}', task '{place.task}'")
+        reason = runs.reason
+        found.append((rows, runs.run({path: again[path] for path in own}) if again else None, reason))
     return found

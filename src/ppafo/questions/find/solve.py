@@ -1,62 +1,29 @@
-"""The lowest or highest value that meets a condition on a metric: a grid, then ever smaller brackets; the answer."""
+"""The lowest or highest value that meets a condition on a metric: a grid, then ever smaller brackets."""
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.answers import Answer, Column, Figure, Section, Table
-from ppafo.answers.display_units import (
-    axis_unit,
-    change_text,
-    display_value,
-    display_values,
-    metric_quantity,
-    metric_title,
-    quantity_of_unit,
-    quantity_text,
-)
-from ppafo.answers.setting_names import label_of
-from ppafo.answers.style import (
-    BLACK,
-    BLUE,
-    GREEN,
-    VERMILION,
-    Margins,
-    figure_of_panels,
-    house_style,
-    label_lines,
-    mark_kind,
-)
+from ppafo.answers.style import BLACK, GREEN, VERMILION
 from ppafo.errors import ScenarioError, StudyError, UnitError, one_line, refused_as
 from ppafo.loading import scenario_or_load
 from ppafo.progress import Report
-from ppafo.questions.question import Solved
-from ppafo.simulation.scenario import Scenario, plain
-from ppafo.studies.draws import (
-    Outcomes,
-    Tally,
-    Uncertainty,
-    atmosphere_of,
-    check_metrics,
-    level_of,
-    scenario_model,
-    settled,
-    with_companions,
-)
+from ppafo.simulation.scenario import Scenario
+from ppafo.studies.distributions import Floats
+from ppafo.studies.draws import Uncertainty, atmosphere_of, check_metrics, level_of
 from ppafo.studies.sampling import NOISE, with_noise
 from ppafo.studies.study import with_overrides
 from ppafo.studies.varying import VariedPath, varied_path
+from ppafo.study.finding import Column, Finding, Part
+from ppafo.study.kind import of_metric, of_path
+from ppafo.study.panels import Mark, Panel
+from ppafo.study.runs import Runs, Tally, settled, with_companions
 from ppafo.units import split_quantity
 
-if TYPE_CHECKING:
-    import matplotlib.figure
-
-Floats = NDArray[np.float64]
 DEFAULT_GRID, FEWEST, MOST = 64, 3, 100_000
 PARTS = 32
 """Parts into which a bracket is divided: that many runs side by side take little longer than one."""
@@ -83,51 +50,43 @@ class Condition:
         return values <= self.limit if self.is_upper_limit else values >= self.limit
 
 
-@dataclass(frozen=True, slots=True, repr=False)
-class Found(Solved):
-    """The value that was looked for, None where no value of the grid meets the condition.
+@dataclass(frozen=True, slots=True)
+class Tried:
+    """A value [SI] that was tried, and the metric there [SI], nan where the run failed."""
 
-    ``value`` meets the condition and ``beyond`` does not, the next one that was tried; None where the range ends there.
-    ``values`` and ``metrics`` [SI] (runs,) are all that were tried, in ascending order, nan where a run failed;
-    ``grid`` (runs,) is true for those of the first grid. ``changes`` counts how often neighbours among them differ in
-    meeting the condition: more than once says that the condition is met in several stretches. Where sensors are noisy
-    metrics are means over ``streams`` streams of noise, and ``spread`` (runs,) is the standard deviation from one to
-    another; else there are no streams and no spread. ``unsettled`` counts the runs whose loop oscillates at the instant
-    of the metric, so that their RMS error on the hold was taken in its place.
+    value: float
+    metric: float
+    is_of_grid: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Threshold:
+    """The lowest, or highest, value that meets a condition on a metric; numbers in SI.
+
+    ``value`` is None where none does, and ``not_met_at`` the next value on its outer side that was tried and does not,
+    None at the end of the range. ``changes`` counts how often the condition begins or ceases to be met along the values
+    that were tried, ``met`` are the ends of each stretch where it is. ``unsettled`` counts the runs whose loop
+    oscillates at the instant of the metric, so that their RMS error on the hold was taken in its place.
     """
 
-    scenario: Scenario
-    path: VariedPath
-    condition: Condition
-    is_highest: bool
+    scenario: str
+    path: str
+    unit: str
+    condition: str
+    metric: str
+    limit: float
+    wanted: str
     value: float | None
-    beyond: float | None
-    values: Floats
-    metrics: Floats
-    grid: NDArray[np.bool_]
-    failures: int
-    reason: str
-    streams: int
-    spread: Floats
-    unsettled: int = 0
-
-    @property
-    def is_met(self) -> NDArray[np.bool_]:
-        """Where the condition is met, of the values that were tried."""
-        return self.condition.is_met(self.metrics)
-
-    @property
-    def changes(self) -> int:
-        """How often the condition begins or ceases to be met along the values that were tried."""
-        return int(np.count_nonzero(np.diff(self.is_met)))
-
-    def metric_at(self, value: float) -> float:
-        """Return the metric [SI] at a value that was tried."""
-        return float(self.metrics[np.searchsorted(self.values, value)])
-
-    def spread_at(self, value: float) -> float:
-        """Return the standard deviation of the metric [SI] from one stream of noise to another, at a value tried."""
-        return float(self.spread[np.searchsorted(self.values, value)])
+    metric_at_value: float | None
+    not_met_at: float | None
+    changes: int
+    met: list[list[float]]
+    remarks: list[str]
+    noise_streams: int
+    runs: int
+    failed: int
+    unsettled: int
+    tried: list[Tried]
 
 
 def find(
@@ -139,7 +98,7 @@ def find(
     overrides: Sequence[str] = (),
     threads: int | None = None,
     progress: Report | None = None,
-) -> Found:
+) -> Finding[Threshold]:
     """Return the lowest value (or the ``highest``) [SI] of a number of a scenario that meets a condition on a metric.
 
     ``vary`` is the number with its range, ``"supply.pressure=20..90 psi_g"``; ``such_that`` the condition,
@@ -148,8 +107,7 @@ def find(
     range. What happens between two values of the grid on one side of the condition is not seen. StudyError or
     ScenarioError for bad input, and where every run fails.
     """
-    base = scenario_or_load(scenario)
-    base = with_overrides(base, overrides)
+    base = with_overrides(scenario_or_load(scenario), overrides)
     path, low, high = _range(vary, base)
     parts = _CONDITION.fullmatch(such_that)
     if parts is None:
@@ -169,70 +127,51 @@ def find(
     noise = Uncertainty(with_noise((), None, [base], [path.path])[0])
     seeds = noise.random_columns(0, STREAMS, _SEED)[NOISE] if noise.has_noise else np.zeros(0)
     tally = Tally(grid * max(1, seeds.size), progress)
-    metrics = with_companions([condition.metric], base)
-    search = _Search(path.path, condition, scenario_model(base, metrics, threads, tally.add), seeds)
+    search = _Search(
+        path.path, condition, Runs(base, with_companions([condition.metric], base), tally, (), threads), seeds
+    )
     search.run(np.linspace(low, high, grid))
     if not np.isfinite(search.metrics).any():
+        reason = search.runs.reason
         raise StudyError(
             f"scenario '{base.name}': no run from {path.quote(low)} to {path.quote(high)} has a "
-            f"'{condition.metric}'{search.reason and '; the first: '}{search.reason}"
+            f"'{condition.metric}'{reason and '; the first: '}{reason}"
         )
     value, beyond = search.ends(highest)
     while value is not None and beyond is not None and abs(value - beyond) > ACCURACY * (high - low):
-        inside = np.linspace(value, beyond, PARTS + 1)[1:-1]
-        search.run(inside)
+        search.run(np.linspace(value, beyond, PARTS + 1)[1:-1])
         value, beyond = search.ends(highest)
-    order = np.argsort(search.values)
-    return Found(
-        base,
-        path,
-        condition,
-        highest,
-        value,
-        beyond,
-        search.values[order],
-        search.metrics[order],
-        order < grid,
-        search.failures,
-        search.reason,
-        seeds.size,
-        search.spread[order],
-        search.unsettled,
-    )
+    return _finding(base.name, path, search, highest, grid)
 
 
 class _Search:
-    """What was tried so far."""
+    """What was tried so far: values, the metric of each and its standard deviation over the noise, in that order."""
 
-    def __init__(
-        self, path: str, condition: Condition, model: Callable[[dict[str, Floats]], Outcomes], seeds: Floats
-    ) -> None:
-        self._path, self._condition, self._model, self._seeds = path, condition, model, seeds
+    def __init__(self, path: str, condition: Condition, runs: Runs, seeds: Floats) -> None:
+        self._path, self.condition, self.runs, self.seeds = path, condition, runs, seeds
         self.values: Floats = np.empty(0)
         self.metrics: Floats = np.empty(0)
         self.spread: Floats = np.empty(0)
-        self.failures, self.unsettled, self.reason = 0, 0, ""
+        self.unsettled = 0
 
     def run(self, values: Floats) -> None:
         """Try values, each over all streams of noise."""
-        streams = max(1, self._seeds.size)
+        streams = max(1, self.seeds.size)
         columns = {self._path: np.tile(values, streams)}
-        if self._seeds.size:
-            columns[NOISE] = np.repeat(self._seeds, values.size)
-        outcomes = self._model(columns)
-        judged = settled(outcomes, [self._condition.metric]).metrics[self._condition.metric]
-        self.unsettled += int(np.count_nonzero(judged > outcomes.metrics[self._condition.metric]))
+        if self.seeds.size:
+            columns[NOISE] = np.repeat(self.seeds, values.size)
+        rows = self.runs.run(columns)
+        judged = settled(rows, self.condition.metric)
+        self.unsettled += int(np.count_nonzero(judged > rows[self.condition.metric]))
         found = judged.reshape(streams, values.size)
         self.values = np.concatenate([self.values, values])
         self.metrics = np.concatenate([self.metrics, found.mean(axis=0)])
         self.spread = np.concatenate([self.spread, found.std(axis=0, ddof=min(1, streams - 1))])
-        self.failures += outcomes.failures
-        self.reason = self.reason or outcomes.reason
 
     def ends(self, highest: bool) -> tuple[float | None, float | None]:
         """Return the outermost value that meets the condition, and its neighbour on the outer side."""
         order = np.argsort(-self.values if highest else self.values)
-        met = np.flatnonzero(self._condition.is_met(self.metrics[order]))
+        met = np.flatnonzero(self.condition.is_met(self.metrics[order]))
         if met.size == 0:
             return None, None
         values = self.values[order]
@@ -255,166 +194,126 @@ def _range(text: str, base: Scenario) -> tuple[VariedPath, float, float]:
     return path, low, high
 
 
-_SIZE = (7.0, 3.8)
-_MARGINS = Margins(left=0.85, right=0.25, top=0.6, bottom=0.55, row_gap=0.0)
-_CAPTION = "The metric over the value; dashed: the limit; shaded: where the condition is met."
+def stretches(values: Floats, is_met: NDArray[np.bool_]) -> list[list[float]]:
+    """Return the first and last value [SI] of each stretch of neighbours that meet the condition."""
+    padded = np.concatenate([[False], is_met, [False]]).astype(int)
+    first, after = np.flatnonzero(np.diff(padded) > 0), np.flatnonzero(np.diff(padded) < 0)
+    return [[float(values[low]), float(values[high - 1])] for low, high in zip(first, after, strict=True)]
 
 
-def answer_of(found: Found) -> Answer:
-    """Return the answer of a search; it has passed where a value was found."""
-    drawn = Figure("find", _CAPTION, lambda: find_figure(found))
-    rows = tuple((_text(found, low), _text(found, high)) for low, high in stretches(found))
-    table = Table((Column("from"), Column("to")), rows)
-    title = f"The {_side(found)} {found.path.path} such that {found.condition.text}"
-    return Answer(
+def _finding(scenario: str, path: VariedPath, search: _Search, highest: bool, grid: int) -> Finding[Threshold]:
+    """Return the search in words, a table of where the condition is met, and the metric over the value."""
+    condition, order = search.condition, np.argsort(search.values)
+    values, metrics, spread, of_grid = search.values[order], search.metrics[order], search.spread[order], order < grid
+    value, beyond = search.ends(highest)
+    is_met = condition.is_met(metrics)
+    changes = int(np.count_nonzero(np.diff(is_met)))
+    kind, of_condition = of_path(path.path, path.quantity.unit), of_metric(condition.metric)
+    at_value = None if value is None else float(metrics[np.searchsorted(values, value)])
+    ends = f"{kind.text(values[0])} to {kind.text(values[-1])}"
+    wanted, further = ("highest", "higher") if highest else ("lowest", "lower")
+    if value is None or at_value is None:
+        row = int((np.nanargmin if condition.is_upper_limit else np.nanargmax)(metrics))
+        verdict = (
+            f"no {path.path} from {ends} meets {condition.text}; the nearest is {of_condition.text(metrics[row])} at "
+            f"{kind.text(values[row])}"
+        )
+    else:
+        verdict = (
+            f"{path.path} = {kind.text(value)} is the {wanted} value that meets {condition.text}"
+            f"{', and the end of the range' if beyond is None else ''}: {condition.metric} is "
+            f"{of_condition.text(at_value)} there"
+            + (
+                f"; a wider range may have a {further} one"
+                if beyond is None
+                else f" (bracketed to {kind.change(abs(value - beyond), '.1g')})"
+            )
+        )
+    where = "everywhere" if is_met.all() else "nowhere" if value is None else f"at {np.count_nonzero(is_met)} of them"
+    remarks = [
+        f"{np.count_nonzero(of_grid)} values from {ends}, evenly, then {np.count_nonzero(~of_grid)} more in the "
+        f"bracket; the condition is met {where}"
+    ]
+    if changes > 1:
+        remarks.append(
+            f"the condition changes {changes} times over the range, so it is not met everywhere "
+            f"{'below' if highest else 'above'} this value; see the table and the figure"
+        )
+    if search.seeds.size:
+        noise = (
+            f"sensors are noisy: the metric is the mean over {search.seeds.size} noise streams, the same for all values"
+        )
+        if value is not None:
+            varies = of_condition.change(float(spread[np.searchsorted(values, value)]))
+            noise += (
+                f"; at the value that was found it varies by {varies} (standard deviation) from stream to stream, so a "
+                "single run may miss the condition there"
+            )
+        remarks.append(noise)
+    if search.unsettled:
+        remarks.append(
+            f"in {search.unsettled} runs the loop oscillates on the hold, and {condition.metric} is one instant of "
+            "that: their rms_error_hold was taken in its place"
+        )
+    if search.runs.failures:
+        remarks.append(
+            f"{search.runs.failures} of {search.runs.count} runs failed and count as not met; the first: "
+            f"{search.runs.reason}"
+        )
+    met = stretches(values, is_met)
+    panel = Panel(
+        kind,
+        of_condition,
+        (
+            Mark("line", values, metrics),
+            Mark("line", values[of_grid], metrics[of_grid], style={"linestyle": "", "marker": "o", "markersize": 3}),
+            Mark(
+                "level", (), condition.limit, label="limit", colour=BLACK, style={"linestyle": "--", "linewidth": 1.0}
+            ),
+            *(Mark("span", each, label="" if row else "condition met", colour=GREEN) for row, each in enumerate(met)),
+            *(
+                ()
+                if value is None
+                else (Mark("at", value, label=f"found: {kind.text(value, '.4g')}", colour=VERMILION),)
+            ),
+        ),
+    )
+    return Finding(
         name="find",
         kicker="Search",
-        title=title,
-        lead=(verdict(found), *remarks(found)),
-        sections=(
-            Section("Met in the range that was tried", table=table),
-            Section("Metric over the value", figure=drawn),
+        title=f"The {wanted} {path.path} such that {condition.text}",
+        said=(verdict, *remarks),
+        parts=(
+            Part(
+                "Met in the range that was tried",
+                [Column(title, [kind.text(each[end]) for each in met]) for end, title in enumerate(("from", "to"))],
+            ),
+            Part(
+                "Metric over the value",
+                panels=(panel,),
+                name="find",
+                caption="The metric over the value; dashed: the limit; shaded: where the condition is met.",
+            ),
         ),
-        data=_data(found),
-        passed=found.value is not None,
+        found=Threshold(
+            scenario=scenario,
+            path=path.path,
+            unit=path.quantity.unit,
+            condition=condition.text,
+            metric=condition.metric,
+            limit=condition.limit,
+            wanted=wanted,
+            value=value,
+            metric_at_value=at_value,
+            not_met_at=beyond,
+            changes=changes,
+            met=met,
+            remarks=remarks,
+            noise_streams=search.seeds.size,
+            runs=search.runs.count,
+            failed=search.runs.failures,
+            unsettled=search.unsettled,
+            tried=list(map(Tried, values.tolist(), metrics.tolist(), of_grid.tolist())),
+        ),
+        passed=value is not None,
     )
-
-
-def verdict(found: Found) -> str:
-    """Return the result in a sentence, with how accurate it is."""
-    path, condition = found.path.path, found.condition.text
-    if found.value is None:
-        row = int((np.nanargmin if found.condition.is_upper_limit else np.nanargmax)(found.metrics))
-        nearest = f"{_metric(found, found.metrics[row])} at {_text(found, found.values[row])}"
-        return f"no {path} from {_ends(found)} meets {condition}; the nearest is {nearest}"
-    further = "higher" if found.is_highest else "lower"
-    value = f"{path} = {_text(found, found.value)} is the {_side(found)} value that meets {condition}"
-    there = f"{found.condition.metric} is {_metric(found, found.metric_at(found.value))} there"
-    if found.beyond is None:
-        return f"{value}, and the end of the range: {there}; a wider range may have a {further} one"
-    return f"{value}: {there}; the next {further} one that was tried, by {_width(found)}, does not"
-
-
-def remarks(found: Found) -> list[str]:
-    """Return how sure the result is: what was tried, where the condition changes again, which runs failed."""
-    tried = (
-        f"{np.count_nonzero(found.grid)} values from {_ends(found)}, evenly, then {np.count_nonzero(~found.grid)} more"
-    )
-    said = [f"{tried} in the bracket; the condition is met {_where(found)}"]
-    if found.changes > 1:
-        said.append(
-            f"the condition changes {found.changes} times over the range, so it is not met everywhere "
-            f"{'below' if found.is_highest else 'above'} this value; see the table and the figure"
-        )
-    if found.streams:
-        said.append(_noise(found))
-    if found.unsettled:
-        said.append(
-            f"in {found.unsettled} runs the loop oscillates on the hold, and {found.condition.metric} is one instant "
-            "of that: their rms_error_hold was taken in its place"
-        )
-    if found.failures:
-        runs = found.values.size * max(1, found.streams)
-        said.append(f"{found.failures} of {runs} runs failed and count as not met; the first: {found.reason}")
-    return said
-
-
-def _noise(found: Found) -> str:
-    said = f"sensors are noisy: the metric is the mean over {found.streams} noise streams, the same for all values"
-    if found.value is None:
-        return said
-    change = change_text(found.spread_at(found.value), metric_quantity(found.condition.metric))
-    return (
-        f"{said}; at the value that was found it varies by {change} (standard deviation) from stream to stream, so a "
-        "single run may miss the condition there"
-    )
-
-
-def stretches(found: Found) -> list[tuple[float, float]]:
-    """Return the first and last value [SI] of each stretch of neighbours that meet the condition."""
-    padded = np.concatenate([[False], found.is_met, [False]]).astype(int)
-    first, after = np.flatnonzero(np.diff(padded) > 0), np.flatnonzero(np.diff(padded) < 0)
-    return [(float(found.values[low]), float(found.values[high - 1])) for low, high in zip(first, after, strict=True)]
-
-
-def find_figure(found: Found) -> "matplotlib.figure.Figure":
-    """Return the metric over the value, with the limit and the value that was found."""
-    quantity, metric = quantity_of_unit(found.path.quantity.unit), metric_quantity(found.condition.metric)
-    name, unit = label_of(found.path.path), axis_unit(quantity) if quantity else found.path.quantity.unit
-    with house_style():
-        figure, ((axes,),) = figure_of_panels(_SIZE, _MARGINS, 1)
-        values = display_values(found.values, quantity)
-        axes.plot(values, display_values(found.metrics, metric), color=BLUE)
-        axes.plot(values[found.grid], display_values(found.metrics[found.grid], metric), "o", color=BLUE, markersize=3)
-        limit = display_value(found.condition.limit, metric)
-        axes.axhline(limit, color=BLACK, linestyle="--", linewidth=1.0, label="limit")
-        for number, (low, high) in enumerate(stretches(found)):
-            label = "" if number else "condition met"
-            ends = display_value(low, quantity), display_value(high, quantity)
-            axes.axvspan(*ends, color=GREEN, alpha=0.12, linewidth=0, label=label)
-        if found.value is not None:
-            value = display_value(found.value, quantity)
-            axes.axvline(value, color=VERMILION, linewidth=1.4, label=f"found: {value:.4g} {unit}".rstrip())
-        axes.set_xlabel(name if unit in ("", "1") else f"{name} ({unit})")
-        label_lines(axes)
-        axes.set_ylabel(metric_title(found.condition.metric))
-        mark_kind(figure, "simulated")
-        return figure
-
-
-def _data(found: Found) -> dict[str, Any]:
-    return {
-        "scenario": found.scenario.name,
-        "path": found.path.path,
-        "unit": found.path.quantity.unit,
-        "condition": found.condition.text,
-        "metric": found.condition.metric,
-        "limit": found.condition.limit,
-        "wanted": _side(found),
-        "value": found.value,
-        "metric_at_value": None if found.value is None else found.metric_at(found.value),
-        "not_met_at": found.beyond,
-        "changes": found.changes,
-        "met": [list(ends) for ends in stretches(found)],
-        "remarks": remarks(found),
-        "noise_streams": found.streams,
-        "runs": found.values.size * max(1, found.streams),
-        "failed": found.failures,
-        "unsettled": found.unsettled,
-        "tried": [
-            {"value": value, "metric": metric, "is_of_grid": bool(on_grid)}
-            for value, metric, on_grid in zip(
-                found.values.tolist(), plain(found.metrics.tolist()), found.grid.tolist(), strict=True
-            )
-        ],
-    }
-
-
-def _side(found: Found) -> str:
-    return "highest" if found.is_highest else "lowest"
-
-
-def _where(found: Found) -> str:
-    if found.is_met.all():
-        return "everywhere"
-    return "nowhere" if found.value is None else f"at {np.count_nonzero(found.is_met)} of them"
-
-
-def _ends(found: Found) -> str:
-    return f"{_text(found, found.values[0])} to {_text(found, found.values[-1])}"
-
-
-def _text(found: Found, value: float) -> str:
-    quantity = quantity_of_unit(found.path.quantity.unit)
-    return quantity_text(value, quantity, ".6g") if quantity else f"{value:.6g} {found.path.quantity.unit}".rstrip()
-
-
-def _width(found: Found) -> str:
-    """Return how accurate the value is: the width of the bracket."""
-    width = abs((found.value or 0.0) - (found.beyond or 0.0))
-    quantity = quantity_of_unit(found.path.quantity.unit)
-    return change_text(width, quantity, ".1g") if quantity else f"{width:.1g} {found.path.quantity.unit}".rstrip()
-
-
-def _metric(found: Found, value: float) -> str:
-    return quantity_text(float(value), metric_quantity(found.condition.metric), ".4g")

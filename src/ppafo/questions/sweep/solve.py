@@ -12,7 +12,7 @@ import os
 import platform
 import tempfile
 import time
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -25,44 +25,31 @@ from ppafo.documents.json_text import json_text
 from ppafo.errors import StudyError
 from ppafo.metrics import METRICS
 from ppafo.progress import Progress, Report
-from ppafo.questions.sweep.answer import BANDS, SUMMARY, Columns, StudyResults
-from ppafo.questions.sweep.manifest import (
-    BINS,
-    COUNTS_FOLDER,
-    MANIFEST,
-    RUNS_FOLDER,
-    STUDY_COPY,
-    Bins,
-    BinsOf,
-    Counts,
-    check_room,
-    check_same_study,
-    manifest,
-    manifest_bytes,
-    outside_fraction,
-    quantiles_of,
-    read_manifest,
-    stored_bins,
-)
-from ppafo.questions.sweep.results import (
-    STATUSES,
-    Finished,
-    Task,
-    all_chunks,
-    bins_of_trials,
-    completed_rows,
-    compute_chunk,
-    finished_chunk,
-    note_file,
-    stored_unit,
-    write_chunk,
-)
+from ppafo.questions.sweep.answer import finding_of, write_report
+from ppafo.questions.sweep.results import BANDS, SUMMARY, Columns, StudyResults
+from ppafo.questions.sweep.statistic import MOST_DRAWS, Estimate, estimate
 from ppafo.signals.recording import CHANNELS
-from ppafo.storage.parquet import TableColumn, encode_texts, parquet_bytes, table_of
-from ppafo.storage.places import Place, place_at
+from ppafo.storage.parquet import TableColumn, encode_texts, matrix_of, parquet_bytes, table_of
+from ppafo.storage.places import place_at
+from ppafo.storage.result_folder import check_owned_folder, marked_folder
 from ppafo.studies.distributions import Floats
+from ppafo.studies.draws import study_of
 from ppafo.studies.loading import list_studies, load_study
 from ppafo.studies.study import Study
+from ppafo.study.blocks import chunk_count, samples_of
+from ppafo.study.finding import Finding
+from ppafo.study.manifest import read_manifest
+from ppafo.study.store import (
+    STATUSES,
+    Finished,
+    Store,
+    Task,
+    completed_rows,
+    compute_chunk,
+    note_file,
+    stored_unit,
+    trace_column,
+)
 from ppafo.version import __version__
 
 _EXAMPLES = 5
@@ -70,15 +57,13 @@ QUANTILE_DEFINITION = (
     "value at place (n - 1) q of the n sorted values, on a line between neighbours (Hyndman and Fan 1996, definition 7)"
 )
 MAXIMUM_IN_MEMORY = 16_000_000
-"""Values up to which a column is sorted in memory; beyond, order statistics are looked up digit by digit."""
-_DIGIT_BITS, _DIGITS = 16, 4
-_SIGN = np.uint64(1 << 63)
+"""Values of a channel over time from which bands are made at once."""
 Parts = Callable[[], Iterator[Floats]]
 """Gives the finite values of a column anew each time, in parts whose order is always the same."""
 
 
 def _completed_runs(results: StudyResults, configuration: str) -> int:
-    parts = results.chunks(RUNS_FOLDER, ["status"], configuration)
+    parts = results.chunks(["status"], configuration)
     return sum(int(np.count_nonzero(completed_rows(part))) for part in parts)
 
 
@@ -91,7 +76,7 @@ def _metric(study: Study, results: StudyResults, configuration: str, metric: str
 def _failures(results: StudyResults) -> list[dict[str, Any]]:
     """Return the first few runs that failed, with their reasons."""
     found: list[dict[str, Any]] = []
-    for part in results.chunks(RUNS_FOLDER, ["run", "configuration", "status", "reason"]):
+    for part in results.chunks(["run", "configuration", "status", "reason"]):
         rows = [row for row in part.to_pylist() if row["status"] != STATUSES[0]]
         found += rows[: _EXAMPLES - len(found)]
         if len(found) == _EXAMPLES:
@@ -99,24 +84,23 @@ def _failures(results: StudyResults) -> list[dict[str, Any]]:
     return found
 
 
-def bands_file(study: Study, results: StudyResults, bins: BinsOf) -> tuple[bytes, float]:
-    """Return the content of ``bands.parquet``, and the fraction of values that lay beyond the bins."""
-    # The counts over all chunks by configuration and channel, shape (times, BINS + 2).
-    merged: dict[str, dict[str, Counts]] = {}
-    for item in study.configurations:
-        samples = int(item.scenario.duration / study.outputs.every + 1.0e-9) + 1
-        merged[item.name] = {name: np.zeros((samples, BINS + 2), dtype=np.int64) for name in study.outputs.bands}
-        for part in results.chunks(COUNTS_FOLDER, configuration=item.name):
-            channels = part.column("channel").cast("string").to_numpy()
-            sample, place, count = (part.column(key).to_numpy() for key in ("sample", "bin", "count"))
-            for channel, total in merged[item.name].items():
-                own = channels == channel
-                total[sample[own], place[own]] += count[own]
-    parts = [
-        _band(study, number, channel, bins[item.name][channel], merged[item.name][channel])
-        for number, item in enumerate(study.configurations)
-        for channel in study.outputs.bands
-    ]
+def bands_file(study: Study, results: StudyResults) -> bytes:
+    """Return the content of ``bands.parquet``: quantiles over the runs at each time, exact."""
+    fractions = study.outputs.quantiles
+    parts: list[Columns] = []
+    for number, item in enumerate(study.configurations):
+        samples = samples_of(study, item)
+        for place, channel in enumerate(study.outputs.bands):
+            counts, levels = _band(study, results, item.name, channel, samples)
+            parts.append(
+                {
+                    "configuration": np.full(samples, number),
+                    "channel": np.full(samples, place),
+                    "time": study.outputs.every * np.arange(samples),
+                    "runs": counts,
+                    **{f"q{fraction:g}": level for fraction, level in zip(fractions, levels, strict=True)},
+                }
+            )
     joined = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     names = [item.name for item in study.configurations]
     columns = {
@@ -128,25 +112,38 @@ def bands_file(study: Study, results: StudyResults, bins: BinsOf) -> tuple[bytes
         "runs": TableColumn(joined.pop("runs"), "-", "completed runs, without a fall so far"),
         **{name: TableColumn(values, _si_of_channel(study), "quantile over runs") for name, values in joined.items()},
     }
-    beyond = max(outside_fraction(counts) for counts in merged.values())
-    return parquet_bytes(table_of(columns, {"study": study.name, "bins": str(BINS)})), beyond
+    return parquet_bytes(table_of(columns, {"study": study.name}))
+
+
+def _band(
+    study: Study, results: StudyResults, configuration: str, channel: str, samples: int
+) -> tuple[NDArray[np.int64], Floats]:
+    """Return how many runs there are at each time, and each quantile over them (quantiles, times).
+
+    As many times are read at once as fit into the memory together with all runs.
+    """
+    column, at_once = trace_column(channel), max(1, MAXIMUM_IN_MEMORY // study.runs_of_configuration)
+    counts, levels = [], []
+    for first in range(0, samples, at_once):
+        parts = results.chunks([column], configuration)
+        values = np.concatenate([matrix_of(part.column(column))[:, first : first + at_once] for part in parts])
+        counts.append(np.count_nonzero(np.isfinite(values), axis=0))
+        levels.append(sorted_quantiles(np.sort(values, axis=0), counts[-1], study.outputs.quantiles))
+    return np.concatenate(counts), np.concatenate(levels, axis=1)
+
+
+def sorted_quantiles(ordered: Floats, counts: NDArray[np.int64], fractions: Sequence[float]) -> Floats:
+    """Return quantiles (fractions, columns) of the first ``counts`` values of sorted columns; nan without values."""
+    places = np.maximum(counts - 1, 0) * np.asarray(fractions)[:, None]
+    low = places.astype(np.int64)
+    columns = np.arange(counts.size)
+    below, above = ordered[low, columns], ordered[np.minimum(low + 1, np.maximum(counts - 1, 0)), columns]
+    return np.asarray(below + (places - low) * (above - below), dtype=np.float64)
 
 
 def _si_of_channel(study: Study) -> str:
     units = {stored_unit(CHANNELS[name].unit) for name in study.outputs.bands}
     return units.pop() if len(units) == 1 else "SI unit of the channel"
-
-
-def _band(study: Study, configuration: int, channel: str, bins: Bins, counts: Counts) -> Columns:
-    rows = counts.shape[0]
-    quantiles = quantiles_of(counts, bins, study.outputs.quantiles)
-    return {
-        "configuration": np.full(rows, configuration),
-        "channel": np.full(rows, study.outputs.bands.index(channel)),
-        "time": study.outputs.every * np.arange(rows),
-        "runs": counts.sum(axis=1),
-        **{f"q{fraction:g}": values for fraction, values in quantiles.items()},
-    }
 
 
 def describe(parts: Parts, fractions: Sequence[float]) -> dict[str, Any]:
@@ -156,6 +153,7 @@ def describe(parts: Parts, fractions: Sequence[float]) -> dict[str, Any]:
     if count == 0:
         return {"count": 0}
     mean = math.fsum(item[1] for item in sums) / count
+    levels = np.quantile(np.concatenate(list(parts())), fractions, method="linear", overwrite_input=True)
     squares = math.fsum(float(np.sum((part - mean) ** 2)) for part in parts())
     return {
         "count": count,
@@ -163,57 +161,8 @@ def describe(parts: Parts, fractions: Sequence[float]) -> dict[str, Any]:
         **({"sd": math.sqrt(squares / (count - 1))} if count > 1 else {}),
         "minimum": min(item[2] for item in sums),
         "maximum": max(item[3] for item in sums),
-        "quantiles": {f"{fraction:g}": value for fraction, value in quantiles(parts, count, fractions).items()},
+        "quantiles": dict(zip((f"{fraction:g}" for fraction in fractions), levels.tolist(), strict=True)),
     }
-
-
-def quantiles(parts: Parts, count: int, fractions: Sequence[float]) -> dict[float, float]:
-    """Return the quantile of each fraction."""
-    if count <= MAXIMUM_IN_MEMORY:
-        values = np.quantile(np.concatenate(list(parts())), fractions, method="linear", overwrite_input=True)
-        return dict(zip(fractions, values.tolist(), strict=True))
-    places = {fraction: divmod((count - 1) * fraction, 1.0) for fraction in fractions}
-    ranks = sorted({min(int(low) + up, count - 1) for low, _ in places.values() for up in (0, 1)})
-    sorted_values = order_statistics(parts, ranks)
-    found = {}
-    for fraction, (low, inside) in places.items():
-        below, above = sorted_values[int(low)], sorted_values[min(int(low) + 1, count - 1)]
-        found[fraction] = below + inside * (above - below)
-    return found
-
-
-def order_statistics(parts: Parts, ranks: Sequence[int]) -> dict[int, float]:
-    """Return the values at ranks (from 0) of the sorted column, by a radix selection: four passes over the parts."""
-    known = dict.fromkeys(ranks, (0, 0))
-    for digit in range(_DIGITS):
-        counts = _digit_counts(parts, digit, {prefix for prefix, _ in known.values()})
-        for rank, (prefix, below) in known.items():
-            cumulated = np.cumsum(counts[prefix])
-            place = int(np.searchsorted(cumulated, rank - below, side="right"))
-            before = int(cumulated[place - 1]) if place else 0
-            known[rank] = ((prefix << _DIGIT_BITS) | place, below + before)
-    return {rank: _number(key) for rank, (key, _) in known.items()}
-
-
-def _digit_counts(parts: Parts, digit: int, prefixes: set[int]) -> dict[int, NDArray[np.int64]]:
-    """Return how often each value of a digit comes behind each prefix of higher digits."""
-    shift = np.uint64(_DIGIT_BITS * (_DIGITS - 1 - digit))
-    size = 1 << _DIGIT_BITS
-    counts = {prefix: np.zeros(size, dtype=np.int64) for prefix in prefixes}
-    for part in parts():
-        # Whole numbers in the same order as the values.
-        bits = np.ascontiguousarray(part).view(np.uint64)
-        keys = np.where(bits & _SIGN != 0, ~bits, bits | _SIGN) >> shift
-        for prefix in prefixes:
-            own = keys if digit == 0 else keys[(keys >> np.uint64(_DIGIT_BITS)) == np.uint64(prefix)]
-            counts[prefix] += np.bincount((own & np.uint64(size - 1)).astype(np.int64), minlength=size)
-    return counts
-
-
-def _number(key: int) -> float:
-    """Return the value that has a key."""
-    bits = key ^ (1 << 63) if key >> 63 else key ^ (2**64 - 1)
-    return float(np.array(bits, dtype=np.uint64).view(np.float64))
 
 
 LOG = "log.jsonl"
@@ -241,7 +190,7 @@ def sweep(
     scheduler: str | None = None,
     agreed: bool = False,
     progress: Report | None = None,
-) -> StudyResults:
+) -> Finding[StudyResults]:
     """Return the results of a study: a name, a TOML file, data laid out as one, or a Study.
 
     ``out`` is a folder, or an address that fsspec knows; a study that was begun there resumes. Without it the results
@@ -258,8 +207,8 @@ def sweep(
     chosen = _study_of(study, overrides, draws, seed)
     kept = tempfile.TemporaryDirectory(prefix="ppafo-study-") if out is None else None
     place = place_at(kept.name if kept is not None else str(out))
-    bins = _claim(chosen, place, means)
-    _work(Task(chosen, bins, place.address, means.threads), place, means)
+    store = Store.claim(chosen, place, means.agreed, means.threads)
+    _work(Task(chosen, place.address, means.threads), store, means)
     # Write summary and bands of a study all of whose chunks are there, and return its results.
     results = StudyResults(place, read_manifest(place), {})
     # The content of ``summary.json``.
@@ -281,14 +230,9 @@ def sweep(
         },
     }
     if chosen.outputs.bands:
-        content, beyond = bands_file(chosen, results, bins)
-        place.write(BANDS, content)
-        summary["bands"] = {
-            "share_beyond_bins": beyond,
-            "definition": "uniformly distributed inside each of the equal bins",
-        }
+        place.write(BANDS, bands_file(chosen, results))
     place.write(SUMMARY, f"{json_text(summary)}\n".encode())
-    return replace(replace(results, summary=summary), kept=kept)
+    return finding_of(replace(results, summary=summary, kept=kept))
 
 
 def sweep_into_folder(
@@ -300,19 +244,58 @@ def sweep_into_folder(
     threads: int | None = None,
     scheduler: str | None = None,
     agreed: bool = False,
+    statistic: str | None = None,
+    metric: str | None = None,
+    width: str | None = None,
+    also: Sequence[str] = (),
+    configuration: str | None = None,
+    first_draws: int | None = None,
+    confidence: float | None = None,
+    maximum_failed: float | None = None,
     progress: Report | None = None,
-) -> StudyResults:
-    """Return the results of ``sweep`` in ``out``, ``out/NAME`` by default, with figure, page and text beside them."""
-    chosen = _study_of(study, overrides, draws, seed)
-    place = out or Path("out") / chosen.name
-    try:
-        results = sweep(chosen, place, threads=threads, scheduler=scheduler, agreed=agreed, progress=progress)
-        from ppafo.questions.sweep.answer import write_report
+) -> Finding[StudyResults] | Finding[Estimate]:
+    """Return the rows of ``sweep``, or with a statistic the ``estimate``, written into ``out`` with figure and page.
 
-        write_report(results)
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt(_INTERRUPTED) from None
-    return results
+    The folder is ``out/NAME`` by default, of a statistic ``out/NAME-METRIC``.
+    """
+    of_statistic: dict[str, Any] = {
+        "width": width,
+        "also": tuple(also) or None,
+        "configuration": configuration,
+        "first_draws": first_draws,
+        "confidence": confidence,
+        "maximum_failed": maximum_failed,
+    }
+    given = {name: value for name, value in of_statistic.items() if value is not None}
+    if statistic is None:
+        unused = [*(["metric"] if metric is not None else []), *given]
+        if unused:
+            raise StudyError(f"{unused[0]}: needs a statistic, for example --statistic mean --metric rms_error")
+        chosen = _study_of(study, overrides, draws, seed)
+        try:
+            swept = sweep(
+                chosen,
+                out or Path("out") / chosen.name,
+                threads=threads,
+                scheduler=scheduler,
+                agreed=agreed,
+                progress=progress,
+            )
+            write_report(swept.found)
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt(_INTERRUPTED) from None
+        return swept
+    if metric is None:
+        raise StudyError(f"statistic '{statistic}': needs the metric that it is of, for example --metric rms_error")
+    if scheduler is not None:
+        raise StudyError(f"--scheduler {scheduler}: a statistic is computed here; omit it")
+    chosen = study_of(study, overrides)
+    folder = Path(out or Path("out") / f"{chosen.name}-{metric}")
+    check_owned_folder(folder, marked_folder("sweep"))
+    most = MOST_DRAWS if draws is None else draws
+    found = estimate(chosen, metric, statistic, seed=seed, draws=most, threads=threads, progress=progress, **given)
+    found.save(folder)
+    return replace(found, found=replace(found.found, folder=str(folder)))
 
 
 def _study_of(
@@ -332,45 +315,15 @@ def studies_of_the_package() -> list[dict[str, Any]]:
     return [{"name": study.name, "runs": study.runs, "description": study.description} for study in studies]
 
 
-def _claim(study: Study, place: Place, means: Means) -> BinsOf:
-    """Make the folder that of this study, or refuse it; returns the bins of its bands."""
-    names = place.names()
-    if MANIFEST in names:
-        stored = read_manifest(place)
-        check_same_study(place, stored, manifest(study, {}))
-        place.tidy()
-        _keep_copy(study, place, names)
-        return stored_bins(stored)
-    if names:
-        raise StudyError(
-            f"{place.address}: is not empty and contains no study results (it has no {MANIFEST}); choose another folder"
-        )
-    check_room(study, place, means.agreed)
-    bins = bins_of_trials(study, means.threads)
-    place.write(MANIFEST, manifest_bytes(manifest(study, bins)))
-    place.tidy()
-    _keep_copy(study, place, names)
-    return bins
-
-
-def _keep_copy(study: Study, place: Place, names: Collection[str]) -> None:
-    """Put the study file beside its results; after study.json, by which the folder is known to be ours."""
-    if study.text and STUDY_COPY not in names:
-        place.write(STUDY_COPY, study.text)
-
-
-def _work(task: Task, place: Place, means: Means) -> None:
-    study, started = task.study, time.monotonic()
-    there = place.names()
-    noted = [number for number in all_chunks(study) if note_file(number) in there]
-    found = {number: finished_chunk(place, study, number) for number in noted}
-    known = [item for item in found.values() if item is not None]
+def _work(task: Task, store: Store, means: Means) -> None:
+    study, place, started = store.study, store.place, time.monotonic()
+    known = store.finished()
     tally = _Tally(study, means.progress, started, known)
-    missing = [number for number in all_chunks(study) if found.get(number) is None]
-    if missing and SUMMARY in there:
+    missing = sorted(set(range(chunk_count(study))) - {item.number for item in known})
+    if missing and SUMMARY in place.names():
         place.remove(SUMMARY)
     if means.scheduler is not None:
-        from ppafo.questions.sweep.results import compute_on_cluster
+        from ppafo.questions.sweep.cluster import compute_on_cluster
 
         compute_on_cluster(means.scheduler, task, missing, tally.add)
         place.tidy()
@@ -381,7 +334,7 @@ def _work(task: Task, place: Place, means: Means) -> None:
                 "--out must be a folder that they share with this machine, or an address such as s3://bucket/study"
             )
     else:
-        _compute_here(task, place, missing, tally.add)
+        _compute_here(task, store, missing, tally.add)
     # Add a line on this session to the log.
     elapsed = time.monotonic() - started
     line = {
@@ -403,16 +356,16 @@ def _work(task: Task, place: Place, means: Means) -> None:
     place.write(LOG, before + f"{json.dumps(line)}\n".encode())
 
 
-def _compute_here(task: Task, place: Place, numbers: Iterable[int], finish: Callable[[Finished], None]) -> None:
+def _compute_here(task: Task, store: Store, numbers: Iterable[int], finish: Callable[[Finished], None]) -> None:
     """Compute chunks one after the other; while one is written, the next one is computed."""
     with ThreadPoolExecutor(1, "ppafo-writing") as writer:
         writing: tuple[Finished, Future[None]] | None = None
         for number in numbers:
-            finished, files = compute_chunk(task, number)
+            finished, content = compute_chunk(task, number)
             if writing is not None:
                 writing[1].result()
                 finish(writing[0])
-            writing = finished, writer.submit(write_chunk, place, finished, files)
+            writing = finished, writer.submit(store.write, finished, content)
         if writing is not None:
             writing[1].result()
             finish(writing[0])

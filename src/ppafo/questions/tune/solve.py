@@ -16,22 +16,33 @@ from ppafo.errors import StudyError
 from ppafo.metrics import METRICS
 from ppafo.parameters.device import VANE
 from ppafo.progress import Report
-from ppafo.questions.tune.answer import FRESH_DRAWS, INFEASIBLE, Ceiling, Setting, Start, Tuning, keeps
+from ppafo.questions.tune.answer import (
+    FRESH_DRAWS,
+    INFEASIBLE,
+    Ceiling,
+    Setting,
+    Start,
+    Tuned,
+    finding_of,
+    keeps,
+)
 from ppafo.questions.tune.problem import Effort, Gains, Limit, Problem, Spread, Term, load_tuning
 from ppafo.simulation.numbers import TIMES, absolute, with_numbers
 from ppafo.simulation.plan import profile_bounds
 from ppafo.simulation.scenario import Scenario, worn_kind
 from ppafo.simulation.simulate import OPEN_LOOP, simulate
 from ppafo.studies.distributions import Floats, Interval, noise_interval
-from ppafo.studies.draws import Model, Outcomes, Tally, scenario_model, settled, with_companions, with_new_noise
+from ppafo.studies.draws import with_new_noise
 from ppafo.studies.study import with_overrides
+from ppafo.study.finding import Finding
+from ppafo.study.runs import FAILED, Runs, Tally, settled, with_companions
 
-FAILED = 1.0e12
+UNUSABLE = 1.0e12
 """Where the costs of candidates begin of which a run fails; the fraction of such runs is added."""
 
 
 @dataclass(frozen=True, slots=True)
-class Runs:
+class Crossed:
     """Metrics by name and failures of candidates, each (candidates, draws); one draw without uncertainty."""
 
     metrics: Mapping[str, Floats]
@@ -56,7 +67,7 @@ class Judgement:
     def cost(self) -> Floats:
         """One number by which candidates are compared."""
         usual = np.where(self.violation > 0.0, INFEASIBLE + self.violation, self.objective)
-        return np.where(self.without_value > 0.0, FAILED * (1.0 + self.without_value), usual)
+        return np.where(self.without_value > 0.0, UNUSABLE * (1.0 + self.without_value), usual)
 
     @property
     def is_feasible(self) -> NDArray[np.bool_]:
@@ -84,7 +95,7 @@ def bad_ends(values: Floats, spread: Spread | None, is_high: bool) -> Floats:
     return values[:, 0] if spread is None else spread.bad_end(values, is_high)
 
 
-def judge(runs: Runs, problem: Problem, scales: Mapping[str, float]) -> Judgement:
+def judge(runs: Crossed, problem: Problem, scales: Mapping[str, float]) -> Judgement:
     """Return objective and violation of candidates; ``scales`` are the sizes of the goals by metric [SI]."""
     failing = runs.without_value
     known = {name: np.where(failing[:, None] > 0.0, 0.0, values) for name, values in runs.metrics.items()}
@@ -162,7 +173,7 @@ def _start(costs: Costs, before: Sequence[float], effort: Effort, random: np.ran
 
 def have_come_together(costs: Floats) -> bool:
     """Tell whether candidates cost the same; where all break a constraint, by how much they break it."""
-    if np.max(costs) >= FAILED or np.min(costs) < INFEASIBLE <= np.max(costs):
+    if np.max(costs) >= UNUSABLE or np.min(costs) < INFEASIBLE <= np.max(costs):
         return False
     beyond = costs - INFEASIBLE if np.min(costs) >= INFEASIBLE else costs
     return float(np.std(beyond)) <= _TOLERANCE * abs(float(np.mean(beyond)))
@@ -181,7 +192,7 @@ def tune(
     seed: int | None = None,
     threads: int | None = None,
     progress: Report | None = None,
-) -> Tuning:
+) -> Finding[Tuned]:
     """Search the best values of a tuning: a name, a TOML file, data laid out as one, or a Problem.
 
     ``overrides`` change the scenario, ``seed`` is that of the search, of the file by default. Every generation is one
@@ -198,24 +209,20 @@ def tune(
     noise = _NOISE_DRAWS if problem.spread is not None and problem.spread.uncertainty.has_noise else 0
     tally = Tally(draws * (candidates + 3) + (2 * (FRESH_DRAWS + noise) if problem.spread is not None else 0), progress)
     metrics = with_companions(problem.metrics, problem.scenario)
-    whole = scenario_model(problem.scenario, metrics, threads, tally.add, problem.gauge)
-
-    def model(columns: Mapping[str, Floats]) -> Outcomes:
-        return settled(whole(columns), problem.metrics)
-
+    runs = Runs(problem.scenario, metrics, tally, problem.gauge, threads)
     fixed = _draws(problem, 0, 1 if problem.spread is None else problem.spread.draws)
-    scales = _scales(problem, _runs(model, problem, [problem.before], fixed))
+    scales = _scales(problem, _of_gains(runs, problem, [problem.before], fixed))
 
     def costs(fractions: Floats) -> Floats:
         values = {item.path: item.value(fractions[:, column]) for column, item in enumerate(problem.searched)}
-        return judge(_run_crossed(model, values, fixed), problem, scales).cost
+        return judge(_crossed(runs, problem, values, fixed), problem, scales).cost
 
     before = [item.fraction(item.before) for item in problem.searched]
-    starts = tuple(search(costs, before, problem.effort))
-    settings = [
-        _setting(model, problem, scales, gains) for gains in (problem.before, problem.gains(starts[0].fractions))
-    ]
-    return Tuning(problem, scales, settings[0], settings[1], starts, tally.done)
+    starts = search(costs, before, problem.effort)
+    first, last = (
+        _setting(runs, problem, scales, gains) for gains in (problem.before, problem.gains(starts[0].fractions))
+    )
+    return finding_of(problem, scales, first, last, starts, runs.count)
 
 
 def _problem_of(tuning: Problem | str | Path | Mapping[str, Any] | None, overrides: Sequence[str]) -> Problem:
@@ -234,24 +241,23 @@ def _draws(problem: Problem, first: int, count: int) -> dict[str, Floats]:
     return {} if spread is None else spread.uncertainty.random_columns(first, count, spread.seed)
 
 
-def _runs(model: Model, problem: Problem, gains: Sequence[Gains], draws: Mapping[str, Floats]) -> Runs:
+def _of_gains(runs: Runs, problem: Problem, gains: Sequence[Gains], draws: Mapping[str, Floats]) -> Crossed:
     values = {item.path: np.array([one[item.path] for one in gains]) for item in problem.searched}
-    return _run_crossed(model, values, draws)
+    return _crossed(runs, problem, values, draws)
 
 
-def _run_crossed(model: Model, values: Mapping[str, Floats], draws: Mapping[str, Floats]) -> Runs:
+def _crossed(runs: Runs, problem: Problem, values: Mapping[str, Floats], draws: Mapping[str, Floats]) -> Crossed:
     """Run every candidate (values, each (candidates,)) with every draw (columns, each (draws,))."""
     candidates = len(next(iter(values.values())))
     count = len(next(iter(draws.values()))) if draws else 1
     columns = {path: np.repeat(column, count) for path, column in values.items()}
     columns |= {path: np.tile(column, candidates) for path, column in draws.items()}
-    outcomes: Outcomes = model(columns)
-    shape = (candidates, count)
-    metrics = {name: found.reshape(shape) for name, found in outcomes.metrics.items()}
-    return Runs(metrics, outcomes.failed.reshape(shape))
+    rows = runs.run(columns)
+    metrics = {name: settled(rows, name).reshape(candidates, count) for name in problem.metrics}
+    return Crossed(metrics, rows[FAILED].reshape(candidates, count))
 
 
-def _scales(problem: Problem, before: Runs) -> dict[str, float]:
+def _scales(problem: Problem, before: Crossed) -> dict[str, float]:
     """Return the size of each goal: the given one, or its value before tuning."""
     scales = {}
     for goal in problem.goals:
@@ -267,31 +273,35 @@ def _scales(problem: Problem, before: Runs) -> dict[str, float]:
     return scales
 
 
-def _setting(model: Model, problem: Problem, scales: Mapping[str, float], gains: Gains) -> Setting:
+def _setting(runs: Runs, problem: Problem, scales: Mapping[str, float], gains: Gains) -> Setting:
     spread = problem.spread
-    runs = _runs(model, problem, [gains], _draws(problem, 0, 1 if spread is None else spread.draws))
-    judged: Judgement = judge(runs, problem, scales)
+    seen = _of_gains(runs, problem, [gains], _draws(problem, 0, 1 if spread is None else spread.draws))
+    judged: Judgement = judge(seen, problem, scales)
     columns = {} if spread is None else _draws(problem, spread.draws, FRESH_DRAWS)
-    again = runs if spread is None else _runs(model, problem, [gains], columns)
+    again = seen if spread is None else _of_gains(runs, problem, [gains], columns)
     rejudged: Judgement = judge(again, problem, scales)
     noise: dict[str, Interval] = {}
     if spread is not None and spread.uncertainty.has_noise:
-        other = _runs(model, problem, [gains], with_new_noise(columns, _NOISE_DRAWS))
+        other = _of_gains(runs, problem, [gains], with_new_noise(columns, _NOISE_DRAWS))
         noise = _noise(again, other)
+    result = simulate(scenario_with(problem, gains))
     return Setting(
         gains=gains,
-        values=_values(runs, problem),
+        values=_values(seen, problem),
         fresh={} if spread is None else _values(again, problem),
         objective=float(judged.objective[0]),
-        violation=(float(judged.violation[0]), float(rejudged.violation[0])),
-        without_value=(float(judged.without_value[0]), float(rejudged.without_value[0])),
-        ceiling=_ceiling(problem, gains, columns, again),
-        noise=noise,
-        result=simulate(scenario_with(problem, gains)),
+        violation=float(judged.violation[0]),
+        share_without_value=float(judged.without_value[0]),
+        fresh_violation=float(rejudged.violation[0]),
+        fresh_share_without_value=float(rejudged.without_value[0]),
+        torque_ceiling=_ceiling(problem, gains, columns, again),
+        share_of_noise=noise,
+        metrics=result.metrics,
+        result=result,
     )
 
 
-def _noise(runs: Runs, other: Runs) -> dict[str, Interval]:
+def _noise(runs: Crossed, other: Crossed) -> dict[str, Interval]:
     """Return the fraction of noise in each metric of the first candidate, where it varies."""
     pairs = {name: (runs.metrics[name][0], values[0]) for name, values in other.metrics.items()}
     found = {
@@ -300,7 +310,7 @@ def _noise(runs: Runs, other: Runs) -> dict[str, Interval]:
     return {name: fraction for name, fraction in found.items() if fraction is not None}
 
 
-def _ceiling(problem: Problem, gains: Gains, draws: Mapping[str, Floats], runs: Runs) -> Ceiling:
+def _ceiling(problem: Problem, gains: Gains, draws: Mapping[str, Floats], runs: Crossed) -> Ceiling:
     """Return in how many draws the supply cannot hold the reference, and which violated constraints that explains."""
     base = scenario_with(problem, gains)
     given = {path: column for path, column in absolute(base, draws, problem.gauge).items() if path not in TIMES}
@@ -336,7 +346,7 @@ def scenario_with(problem: Problem, gains: Gains) -> Scenario:
     return with_overrides(problem.scenario, problem.lines(gains))
 
 
-def _values(runs: Runs, problem: Problem) -> dict[str, float]:
+def _values(runs: Crossed, problem: Problem) -> dict[str, float]:
     """Return every metric of the problem as the first candidate is judged by it; nan where a run has none."""
     less = {goal.metric: goal.weight > 0.0 for goal in problem.goals}
     less |= {item.metric: item.is_most for item in problem.constraints if item.metric not in less}

@@ -8,7 +8,7 @@ import pytest
 
 import ppafo
 from ppafo.errors import StudyError
-from ppafo.questions.compare.answer import all_remarks, best_probabilities, compare_pairs, pareto_front
+from ppafo.questions.compare.pairs import best_probabilities, compare_pairs, pareto_front
 from ppafo.questions.compare.solve import compare
 from ppafo.studies.distributions import NormalAround
 from ppafo.studies.draws import Uncertainty
@@ -53,7 +53,7 @@ def test_configurations_that_are_equally_good_are_called_different_no_more_often
         differs.append(not item.difference.low <= 0.0 <= item.difference.high)
         is_better.append(not item.better.low <= 0.5 <= item.better.high)
     assert 0.01 <= np.mean(differs) <= 0.08
-    assert np.mean(is_better) <= 0.05
+    assert 0.01 <= np.mean(is_better) <= 0.08
 
 
 def test_common_draws_see_a_difference_that_separate_draws_do_not() -> None:
@@ -93,14 +93,14 @@ STUDY = "torque-task-uncertainty"
 
 
 def test_the_paper_comes_out_and_holds_over_the_uncertainty_of_the_device() -> None:
-    comparison = compare(study=STUDY, baseline="solenoid", draws=400)
-    solenoid = next(case for case in comparison.cases if case.configuration == "solenoid")
-    proportional = next(case for case in comparison.cases if case.configuration == "proportional")
+    comparison = compare(study=STUDY, baseline="solenoid", draws=400).found
+    solenoid = next(case for case in comparison.tasks[0].cases if case.configuration == "solenoid")
+    proportional = next(case for case in comparison.tasks[0].cases if case.configuration == "proportional")
     less_error = 1.0 - proportional.metrics["rms_error"].value / solenoid.metrics["rms_error"].value
     less_gas = 1.0 - proportional.metrics["gas_supplied"].value / solenoid.metrics["gas_supplied"].value
     assert less_error == pytest.approx(0.15, abs=0.01)
     assert less_gas == pytest.approx(0.63, abs=0.02)
-    pairs = {item.metric: item for item in comparison.pairs("as written", "proportional")}
+    pairs = {item.metric: item for item in comparison.tasks[0].pairs["proportional"]}
     for name in ("rms_error", "gas_supplied"):
         assert pairs[name].pairs == 400
         assert pairs[name].difference.high < 0.0
@@ -111,33 +111,34 @@ def test_the_paper_comes_out_and_holds_over_the_uncertainty_of_the_device() -> N
 
 def test_all_configurations_see_the_same_draws() -> None:
     scenario = ppafo.load_scenario("torque-task-proportional", ["run.duration=0.3 s"])
-    comparison = compare({"one": scenario, "same": scenario}, STUDY, draws=64)
-    one, same = (case.outcomes for case in comparison.cases)
+    comparison = compare({"one": scenario, "same": scenario}, STUDY, draws=64).found
+    one, same = (case.rows for case in comparison.tasks[0].cases)
     assert one is not None
     assert same is not None
-    assert np.ptp(one.metrics["rms_error"]) > 0.0
-    assert np.array_equal(one.metrics["rms_error"], same.metrics["rms_error"])
-    assert all(item.equal == 1.0 for item in comparison.pairs("as written", "same"))
+    assert np.ptp(one["rms_error"]) > 0.0
+    assert np.array_equal(one["rms_error"], same["rms_error"])
+    assert all(item.equal == 1.0 for item in comparison.tasks[0].pairs["same"])
 
 
 def test_tasks_change_every_configuration() -> None:
     tasks = {"slow": ["reference.ramp_time=2 s"], "low": ["reference.level=3 N m"]}
-    comparison = compare(["torque-task-solenoid", "torque-task-proportional"], tasks=tasks)
-    assert [(case.task, case.configuration) for case in comparison.cases] == [
+    comparison = compare(["torque-task-solenoid", "torque-task-proportional"], tasks=tasks).found
+    assert [(task.task, case.configuration) for task in comparison.tasks for case in task.cases] == [
         ("slow", "torque-task-solenoid"),
         ("slow", "torque-task-proportional"),
         ("low", "torque-task-solenoid"),
         ("low", "torque-task-proportional"),
     ]
-    assert {case.scenario.reference.settings["ramp_time"] for case in comparison.of_task("slow")} == {2.0}
-    assert {case.scenario.reference.settings["level"] for case in comparison.of_task("low")} == {3.0}
+    slow, low = (task.cases for task in comparison.tasks)
+    assert {case.scenario.reference.settings["ramp_time"] for case in slow} == {2.0}
+    assert {case.scenario.reference.settings["level"] for case in low} == {3.0}
     alone = ppafo.simulate("torque-task-solenoid", ["reference.level=3 N m"])
-    assert comparison.of_task("low")[0].metrics["rms_error"].value == alone.metrics["rms_error"].value
+    assert low[0].metrics["rms_error"].value == alone.metrics["rms_error"].value
 
 
 def test_without_a_reference_there_is_gas_and_no_error() -> None:
     slow = ppafo.load_scenario("step-response", ["valve.area=5 mm^2"])
-    comparison = compare({"as it is": ppafo.load_scenario("step-response"), "small valve": slow})
+    comparison = compare({"as it is": ppafo.load_scenario("step-response"), "small valve": slow}).found
     assert comparison.metrics == ("gas_supplied", "mechanical_work", "gas_per_work", "switchings")
 
 
@@ -167,7 +168,7 @@ def test_configurations_that_do_another_thing_are_said_to() -> None:
     base = ppafo.load_scenario("torque-task-proportional")
     lower = ppafo.load_scenario("torque-task-proportional", ["reference.level=3 N m"])
     wider = ppafo.load_scenario("torque-task-proportional", ["valve.area=12 mm^2"])
-    remarks = all_remarks(compare({"base": base, "lower": lower, "wider": wider}))
+    remarks = compare({"base": base, "lower": lower, "wider": wider}).found.remarks
     assert len(remarks) == 1
     assert "lower follow a different reference" in remarks[0]
-    assert all_remarks(compare({"base": base, "wider": wider})) == []
+    assert compare({"base": base, "wider": wider}).found.remarks == []

@@ -13,11 +13,11 @@ import pytest
 
 from ppafo.errors import StudyError
 from ppafo.progress import Progress
-from ppafo.questions.sweep import results
-from ppafo.questions.sweep.results import Finished, Task, work_on_chunk
+from ppafo.questions.sweep import cluster
 from ppafo.questions.sweep.solve import LOG, sweep
 from ppafo.storage.files import LEFT_ASIDE
 from ppafo.storage.places import place_at
+from ppafo.study.store import Finished, Task, work_on_chunk
 
 pytestmark = pytest.mark.skipif(not find_spec("distributed"), reason="needs the extra 'cluster'")
 
@@ -55,7 +55,7 @@ def test_a_worker_that_dies_in_the_middle_changes_nothing(small: Any, tmp_path: 
         if len(told) == 3:
             os.kill(victim, signal.SIGKILL)
 
-    found = sweep(small, there, threads=1, scheduler=two_workers.scheduler_address, progress=watch)
+    found = sweep(small, there, threads=1, scheduler=two_workers.scheduler_address, progress=watch).found
     assert [progress.done for progress in told][-1] == found.document["runs"] == 256
     assert len(told) == found.document["chunks"] == 52
     assert victim not in {nanny.process.pid for nanny in two_workers.workers.values()}
@@ -84,7 +84,7 @@ def test_workers_that_write_elsewhere_are_noticed(
     small: Any, tmp_path: Path, two_workers: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     elsewhere = tmp_path / "elsewhere"
-    monkeypatch.setattr(results, "work_on_chunk", partial(_written_elsewhere, str(elsewhere)))
+    monkeypatch.setattr(cluster, "work_on_chunk", partial(_written_elsewhere, str(elsewhere)))
     with pytest.raises(StudyError, match="must be a folder that they share"):
         sweep(small, tmp_path / "out", scheduler=two_workers.scheduler_address)
 
@@ -94,7 +94,7 @@ def _written_elsewhere(address: str, task: Task, number: int) -> Finished:
 
 
 def test_a_scheduler_that_is_not_there_is_one_line(small: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(results, "_SECONDS_TO_CONNECT", 1)
+    monkeypatch.setattr(cluster, "_SECONDS_TO_CONNECT", 1)
     with pytest.raises(StudyError, match=r"--scheduler tcp://127\.0\.0\.1:9: cannot be reached"):
         sweep(small, tmp_path / "out", scheduler="tcp://127.0.0.1:9")
 

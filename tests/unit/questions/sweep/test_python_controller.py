@@ -15,8 +15,8 @@ import pytest
 import ppafo
 from ppafo.errors import StudyError
 from ppafo.model.sensors import Measurement
-from ppafo.questions.sweep.manifest import controller_document
 from ppafo.studies.study import Study
+from ppafo.study.manifest import controller_document
 
 LAW = """
 class Law:
@@ -74,12 +74,12 @@ def test_a_study_goes_on_with_the_same_law_and_is_refused_with_any_other(
     written: Callable[[str], ModuleType], tmp_path: Path
 ) -> None:
     out, law = tmp_path / "out", written(LAW).Law()
-    first = ppafo.sweep(controlled_by(law), out).table()["rms_error"]
+    first = ppafo.sweep(controlled_by(law), out).found.table()["rms_error"]
     assert law.sum != 0.0
     for note in (out / "finished").iterdir():
         note.unlink()
     for same in (law, written(LAW).Law()):
-        assert np.array_equal(ppafo.sweep(controlled_by(same), out).table()["rms_error"], first)
+        assert np.array_equal(ppafo.sweep(controlled_by(same), out).found.table()["rms_error"], first)
     with pytest.raises(StudyError, match=r"control\.custom\.settings\.gain was 0\.2 and is now 0\.3; undo the change"):
         ppafo.sweep(controlled_by(written(LAW).Law(0.3)), out)
     with pytest.raises(StudyError, match=r"control\.custom\.source was '.*' and is now '.*'; undo the change"):
@@ -138,11 +138,11 @@ KIND = replace(ON_OFF, update=update)
 
 def test_a_law_that_was_edited_in_its_module_makes_another_study(tmp_path: Path) -> None:
     asked = f"""
-from ppafo.questions.sweep.manifest import manifest
+from ppafo.study.manifest import manifest
 from ppafo.studies.loading import load_study
 document = {DOCUMENT!r}
 document["configurations"][0]["overrides"] += ["controller.kind=beside:KIND"]
-print(manifest(load_study(document), {{}})["programs"])
+print(manifest(load_study(document))["programs"])
 """
     told = []
     for text in (COMPOSED, f"# A remark.\n{COMPOSED}", COMPOSED.replace("0.5 *", "0.6 *")):

@@ -11,11 +11,9 @@ import pytest
 import ppafo
 from ppafo.answers.style import render_figure
 from ppafo.errors import DataError, StudyError
-from ppafo.questions.sweep import solve as statistics
-from ppafo.questions.sweep.answer import StudyResults, study_figure
-from ppafo.questions.sweep.manifest import BINS, Bins, bins_around, counts_of, outside_fraction, quantiles_of
-from ppafo.questions.sweep.results import load_study_results
-from ppafo.questions.sweep.solve import describe, order_statistics, sweep
+from ppafo.questions.sweep.answer import finding_of, load_study_results
+from ppafo.questions.sweep.results import StudyResults
+from ppafo.questions.sweep.solve import describe, sorted_quantiles, sweep
 
 SHARES = (0.0, 0.05, 0.25, 0.5, 0.777, 0.95, 1.0)
 RANDOM = np.random.default_rng(6)
@@ -30,10 +28,8 @@ COLUMNS = {
 
 
 @pytest.mark.parametrize("name", COLUMNS)
-@pytest.mark.parametrize("in_memory", [0, 16_000_000])
-def test_statistics_are_those_of_numpy(name: str, in_memory: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_statistics_are_those_of_numpy(name: str) -> None:
     values = COLUMNS[name]
-    monkeypatch.setattr(statistics, "MAXIMUM_IN_MEMORY", in_memory)
     said = describe(lambda: iter(np.array_split(values, 7)), SHARES)
     assert said["count"] == values.size
     assert said["mean"] == pytest.approx(values.mean(), rel=1e-12)
@@ -43,12 +39,6 @@ def test_statistics_are_those_of_numpy(name: str, in_memory: int, monkeypatch: p
         assert said["sd"] == pytest.approx(values.std(ddof=1), rel=1e-9, abs=1e-15)
     for share in SHARES:
         assert said["quantiles"][f"{share:g}"] == pytest.approx(np.quantile(values, share), rel=1e-9)
-
-
-def test_every_rank_is_found() -> None:
-    values = COLUMNS["both signs"][:300]
-    found = order_statistics(lambda: iter(np.array_split(values, 3)), range(300))
-    assert list(found.values()) == np.sort(values).tolist()
 
 
 def test_nothing_has_a_count_only() -> None:
@@ -66,7 +56,7 @@ def test_a_thinned_column_has_every_so_many_runs_across_chunks(small_results: St
 
 
 def test_results_load_again_from_their_folder(small_results: StudyResults) -> None:
-    again = load_study_results(small_results.place.address)
+    again = load_study_results(small_results.place.address).found
     assert again.summary == small_results.summary
     assert again.name == "small"
     assert again.configurations == ("proportional", "solenoid")
@@ -85,16 +75,17 @@ def test_a_folder_without_results_is_refused(tmp_path: Path) -> None:
 
 
 def test_results_do_what_everything_solved_does(small_results: StudyResults, tmp_path: Path) -> None:
-    small_results.save(tmp_path / "saved")
+    finding = finding_of(small_results)
+    finding.save(tmp_path / "saved")
     names = {path.name for path in (tmp_path / "saved").iterdir()}
     assert names == {"figure.png", "figure.svg", "ppafo.json", "report.html", "sweep.json", "sweep.txt"}
     stored = json.loads((tmp_path / "saved" / "sweep.json").read_text(encoding="utf-8"))
-    assert stored == small_results.to_dict() == {**small_results.summary, "folder": small_results.place.address}
+    assert stored == finding.to_dict() == {**small_results.summary, "folder": small_results.place.address}
     page = (tmp_path / "saved" / "report.html").read_text(encoding="utf-8")
     assert "of their normal scores" in page
     assert "Sampled by sobol: 8 draws, seed 3." in page
     with pytest.raises(LookupError, match="there is no figure 'pareto'; available: figure"):
-        small_results.plot("pareto")
+        finding.plot("pareto")
 
 
 def test_the_name_of_an_earlier_version_says_the_new_one() -> None:
@@ -105,57 +96,16 @@ def test_the_name_of_an_earlier_version_says_the_new_one() -> None:
 BAND_SHARES = (0.0, 0.05, 0.25, 0.5, 0.9, 1.0)
 
 
-@pytest.fixture
-def traces() -> np.ndarray:
-    """Three times, 5000 runs: a normal, a skew and a constant one, some of them failed."""
+def test_quantiles_over_time_are_those_of_numpy_wherever_runs_failed() -> None:
     random = np.random.default_rng(2)
-    values = np.stack([random.normal(3.0, 1.0, 5000), random.exponential(2.0, 5000), np.full(5000, 1.0)])
-    values[:, ::50] = np.nan
-    return values
-
-
-def test_counts_of_parts_add_up_to_those_of_the_whole(traces: np.ndarray) -> None:
-    bins = bins_around(traces[:, :200])
-    parts = [counts_of(part, bins) for part in np.array_split(traces, 7, axis=1)]
-    np.testing.assert_array_equal(sum(reversed(parts)), counts_of(traces, bins))
-    assert counts_of(traces, bins).sum(axis=1).tolist() == [4900] * 3
-
-
-def test_quantiles_are_within_a_bin_of_those_of_the_values(traces: np.ndarray) -> None:
-    bins = bins_around(traces)
-    found = quantiles_of(counts_of(traces, bins), bins, BAND_SHARES)
-    for share in BAND_SHARES:
-        exact = np.nanquantile(traces, share, axis=1, method="inverted_cdf")
-        assert np.all(np.abs(found[share] - exact) <= bins.width * 1.000001)
-
-
-def test_values_beyond_the_bins_are_counted_at_their_ends(traces: np.ndarray) -> None:
-    bins = Bins(2.0, 3.0)
-    counts = counts_of(traces, bins)
-    known = traces[0][np.isfinite(traces[0])]
-    assert counts[0, 0] == np.count_nonzero(known < 2.0)
-    assert counts[0, -1] == np.count_nonzero(known >= 3.0)
-    assert counts.shape == (3, BINS + 2)
-    found = quantiles_of(counts, bins, (0.001, 0.999))
-    assert found[0.001][0] == 2.0
-    assert found[0.999][0] == 3.0
-    assert 0.0 < outside_fraction({"torque": counts}) < 1.0
-
-
-def test_a_time_without_any_run_has_no_quantile() -> None:
-    counts = counts_of(np.full((2, 4), np.nan), Bins(0.0, 1.0))
-    assert np.isnan(quantiles_of(counts, Bins(0.0, 1.0), (0.5,))[0.5]).all()
-    assert outside_fraction({"torque": counts}) == 0.0
-
-
-@pytest.mark.parametrize("value", [0.0, 5.0, -1e5, 1e-9])
-def test_bins_around_a_constant_hold_it_inside(value: float) -> None:
-    bins = bins_around(np.full((3, 4), value))
-    assert bins.low < value < bins.high
-
-
-def test_bins_around_nothing_exist() -> None:
-    assert bins_around(np.full((3, 4), np.nan)).width > 0.0
+    values = np.stack([random.normal(3.0, 1.0, 500), random.exponential(2.0, 500), np.full(500, 1.0), np.ones(500)], 1)
+    values[::50, 0] = np.nan
+    values[:499, 1] = np.nan
+    values[:, 3] = np.nan
+    counts = np.count_nonzero(np.isfinite(values), axis=0)
+    found = sorted_quantiles(np.sort(values, axis=0), counts, BAND_SHARES)
+    np.testing.assert_allclose(found[:, :3], np.nanquantile(values[:, :3], BAND_SHARES, axis=0), rtol=1e-14)
+    assert np.isnan(found[:, 3]).all()
 
 
 AXIS = {"path": "reference.level", "kind": "grid", "first": "2 N m", "last": "5 N m", "count": 3}
@@ -199,7 +149,7 @@ BOTH = ("proportional", "solenoid")
     ],
 )
 def test_there_is_a_panel_for_everything_that_was_asked(document: dict[str, Any], panels: list[str]) -> None:
-    figure = study_figure(sweep(document))
+    figure = sweep(document).plot()
     shown = [axes for axes in figure.axes if axes.axison and axes.get_label() != "<colorbar>"]
     assert [axes.get_xlabel() for axes in shown] == panels
     assert render_figure(figure, ["png"])["png"].startswith(b"\x89PNG")
@@ -207,17 +157,17 @@ def test_there_is_a_panel_for_everything_that_was_asked(document: dict[str, Any]
 
 
 def test_two_values_that_were_drawn_are_the_axes_of_each_panel() -> None:
-    figure = study_figure(sweep(study(DRAWN, LEAK, metrics=["gas_supplied"])))
+    figure = sweep(study(DRAWN, LEAK, metrics=["gas_supplied"])).plot()
     assert (figure.axes[0].get_xlabel(), figure.axes[0].get_ylabel()) == (
         "Supply pressure (psig)",
         "Leak area (mm$^2$)",
     )
-    assert figure.axes[0].get_title(loc="left") == "Gas supplied (g)"
+    assert figure.axes[1].get_ylabel() == "Gas supplied (g)"
 
 
 def test_maps_of_several_configurations_have_one_scale_of_colours_for_a_metric() -> None:
     levels = {"path": "reference.level", "kind": "list", "values": ["2 N m", "5 N m", "6 N m"]}
-    figure = study_figure(sweep(study(levels, OTHER, names=BOTH, metrics=["rms_error", "gas_supplied"])))
+    figure = sweep(study(levels, OTHER, names=BOTH, metrics=["rms_error", "gas_supplied"])).plot()
     panels = [axes for axes in figure.axes if axes.get_label() != "<colorbar>"]
     assert len(panels) == 4
     for row in (panels[:2], panels[2:]):
@@ -233,7 +183,7 @@ def test_a_map_shows_the_mean_over_the_draws_where_it_belongs() -> None:
     results = sweep(study(AXIS, OTHER, DRAWN, metrics=["gas_supplied"]))
     figure = results.plot()
     mesh = figure.axes[0].collections[0]
-    table = results.table()
+    table = results.found.table()
     for row, area in enumerate((4e-6, 10e-6, 16e-6)):
         for column, level in enumerate((2.0, 3.5, 5.0)):
             own = (abs(table["valve.area"] - area) < 1e-12) & (abs(table["reference.level"] - level) < 1e-9)

@@ -14,14 +14,16 @@ import ppafo
 from ppafo.errors import DataError, StudyError
 from ppafo.metrics import METRICS
 from ppafo.progress import Progress
-from ppafo.questions.sweep import manifest as chunks_module
-from ppafo.questions.sweep.answer import StudyResults
-from ppafo.questions.sweep.manifest import estimate_bytes, stored_bins
-from ppafo.questions.sweep.results import Task, compute_chunk, load_study_results, stored_unit
+from ppafo.questions.sweep import solve
+from ppafo.questions.sweep.answer import load_study_results
+from ppafo.questions.sweep.results import StudyResults
 from ppafo.questions.sweep.solve import LOG, sweep
 from ppafo.signals.recording import CHANNELS
 from ppafo.storage.places import DiskFolder
 from ppafo.studies.loading import load_study
+from ppafo.study import store
+from ppafo.study.blocks import chunk_size
+from ppafo.study.store import Task, chunk_file, compute_chunk, estimate_bytes, stored_unit
 
 AREA = {"path": "valve.area", "kind": "uniform", "minimum": "10 mm^2", "maximum": "12 mm^2"}
 
@@ -57,7 +59,7 @@ def test_noise_has_a_column_with_which_a_row_is_run_again(varying: Callable[...,
     document["configurations"] = [
         {"name": name, "scenario": "torque-task-proportional", "overrides": noisy} for name in ("one", "other")
     ]
-    results = sweep(document)
+    results = sweep(document).found
     table, seeds = results.table(), results.by_configuration("sensors.seed")
     assert np.unique(seeds["one"]).size == 4
     assert seeds["one"].tolist() == seeds["other"].tolist()
@@ -68,9 +70,9 @@ def test_noise_has_a_column_with_which_a_row_is_run_again(varying: Callable[...,
 
 def test_a_row_has_the_estimated_error_of_each_metric_where_the_study_keeps_it(varying: Callable[..., Any]) -> None:
     document = varying({"path": "valve.area", "kind": "uniform", "minimum": "8 mm^2", "maximum": "16 mm^2"})
-    plain = sweep(document)
+    plain = sweep(document).found
     document["outputs"] = document["outputs"] | {"metrics": ["rms_error", "largest_pressure"], "errors": True}
-    results = sweep(document)
+    results = sweep(document).found
     table = results.table()
     assert np.array_equal(table["rms_error"], plain.table()["rms_error"])
     assert "rms_error_error" not in plain.table()
@@ -108,14 +110,11 @@ def test_the_folder_opens_as_it_is_with_units_in_the_columns(small_results: Stud
     frame = table.select(["configuration", "status", "rms_error"]).to_pylist()[0]
     assert frame["status"] == "completed"
     assert sorted(contents(folder)) == [
-        "band-counts/chunk-0000000.parquet",
-        *(f"band-counts/chunk-000000{number}.parquet" for number in range(1, 8)),
         "bands.parquet",
         *(f"finished/chunk-000000{number}.json" for number in range(8)),
         *(f"runs/chunk-000000{number}.parquet" for number in range(8)),
         "study.json",
         "summary.json",
-        *(f"trajectories/chunk-000000{number}.parquet" for number in range(8)),
     ]
 
 
@@ -131,29 +130,30 @@ def test_the_summary_says_what_numpy_says_of_the_rows(small_results: StudyResult
     assert small_results.summary["failures"] == []
 
 
-def test_bands_are_quantiles_over_the_runs_within_a_bin(small_results: StudyResults) -> None:
+def test_bands_are_the_quantiles_over_the_runs(small_results: StudyResults) -> None:
     bands = small_results.bands()
     own = (bands["configuration"] == "solenoid") & (bands["channel"] == "torque")
-    bins = stored_bins(small_results.document)["solenoid"]["torque"]
     traces = small_results.trajectories("torque")[16:]
     assert bands["time"][own].tolist() == pytest.approx((0.02 * np.arange(11)).tolist())
     assert bands["runs"][own].tolist() == [16] * 11
     for share in (0.05, 0.5, 0.95):
-        low, high = (
-            np.quantile(traces, share, axis=0, method=method) for method in ("inverted_cdf", "closest_observation")
-        )
-        found = bands[f"q{share:g}"][own]
-        assert np.all(found >= np.minimum(low, high) - bins.width - 1e-6)
-        assert np.all(found <= np.maximum(low, high) + bins.width + 1e-6)
+        np.testing.assert_allclose(bands[f"q{share:g}"][own], np.quantile(traces, share, axis=0), rtol=1e-14)
+
+
+def test_bands_read_a_few_times_at_once_are_the_same(
+    small: Any, small_results: StudyResults, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(solve, "MAXIMUM_IN_MEMORY", 40)
+    again = sweep(small).found.bands()
+    for name, values in small_results.bands().items():
+        np.testing.assert_array_equal(again[name], values)
 
 
 def test_chunks_are_the_same_in_any_order_and_on_any_number_of_threads(small_results: StudyResults, small: Any) -> None:
-    bins = stored_bins(small_results.document)
     written = contents(small_results.place.address)
     for number in (7, 2, 0, 5):
-        _, files = compute_chunk(Task(load_study(small), bins, "nowhere", 1 + number % 2), number)
-        assert files == {name: written[name] for name in files}
-        assert len(files) == 3
+        _, content = compute_chunk(Task(load_study(small), "nowhere", 1 + number % 2), number)
+        assert content == written[chunk_file(number)]
 
 
 class StoppedError(Exception):
@@ -216,7 +216,7 @@ def nothing(content: bytes) -> bytes:
     return content[:0]
 
 
-@pytest.mark.parametrize("folder", ["runs", "trajectories", "band-counts", "finished"])
+@pytest.mark.parametrize("folder", ["runs", "finished"])
 @pytest.mark.parametrize("damage", [cut, flipped, nothing])
 def test_damaged_chunks_are_found_and_computed_again(
     small_results: StudyResults, small: Any, tmp_path: Path, folder: str, damage: Callable[[bytes], bytes]
@@ -242,7 +242,7 @@ def test_damage_is_named_where_results_are_read(small_results: StudyResults, tmp
     path = out / "runs" / "chunk-0000003.parquet"
     path.write_bytes(cut(path.read_bytes()))
     with pytest.raises(DataError, match=r"chunk-0000003\.parquet: is missing or damaged; run the study again"):
-        load_study_results(out).table()
+        load_study_results(out).found.table()
 
 
 def copied(results: StudyResults, tmp_path: Path) -> Path:
@@ -320,17 +320,17 @@ def test_more_disk_than_there_is_is_refused_before_anything_is_written(
 
 
 def test_a_large_study_asks_for_consent(small: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(chunks_module, "ASKED_ABOVE", 1000)
+    monkeypatch.setattr(store, "ASKED_ABOVE", 1000)
     with pytest.raises(StudyError, match="give --yes to start it anyway"):
         sweep(small, tmp_path / "out")
-    assert sweep(small, tmp_path / "out", agreed=True).summary["completed"] == 32
+    assert sweep(small, tmp_path / "out", agreed=True).found.summary["completed"] == 32
 
 
 def test_the_estimate_of_the_disk_is_near_and_above_what_is_written(
     varying: Callable[..., Any], tmp_path: Path
 ) -> None:
     study = load_study(varying(AREA, AREA | {"path": "actuator.leak.area"}, runs=600))
-    study_results = sweep(study, tmp_path / "out")
+    study_results = sweep(study, tmp_path / "out").found
     written = sum(len(content) for name, content in contents(tmp_path / "out").items() if name.startswith("runs/"))
     assert written <= estimate_bytes(study) <= 4 * written + 10_000 * study_results.document["chunks"]
 
@@ -339,7 +339,7 @@ def test_runs_that_fail_are_rows_with_status_and_reason(varying: Callable[..., A
     stops = {"path": "actuator.angle_min", "kind": "list", "values": ["20 deg", "140 deg"]}
     document = varying(stops)
     del document["sample"]
-    results = sweep(document, tmp_path / "out")
+    results = sweep(document, tmp_path / "out").found
     table = results.table()
     assert table["status"].tolist() == ["completed", "refused"] * 2
     assert np.isnan(table["rms_error"][[1, 3]]).all()
@@ -356,13 +356,13 @@ def test_a_path_that_varies_in_one_configuration_has_no_value_in_the_others(
 ) -> None:
     gain = {"path": "controller.proportional_gain", "kind": "uniform", "minimum": "0.05 1/(N m)"}
     document = varying(gain | {"maximum": "0.2 1/(N m)", "only": ["proportional"]}, runs=3)
-    values = sweep(document, tmp_path / "out").by_configuration("controller.proportional_gain")
+    values = sweep(document, tmp_path / "out").found.by_configuration("controller.proportional_gain")
     assert np.isfinite(values["proportional"]).all()
     assert np.isnan(values["solenoid"]).all()
 
 
 def test_without_a_folder_the_results_live_as_long_as_their_object(varying: Callable[..., Any]) -> None:
-    results = sweep(varying(AREA, runs=4))
+    results = sweep(varying(AREA, runs=4)).found
     folder = Path(results.place.address)
     rows = results.table(["run"])["run"].size
     del results
@@ -384,26 +384,26 @@ def test_the_log_has_a_line_for_every_session_and_nothing_else_tells_the_time(sm
 def test_results_go_to_any_address_of_fsspec(small_results: StudyResults, small: Any) -> None:
     fsspec = pytest.importorskip("fsspec")
     address = "memory://ppafo-test/study"
-    results = sweep(small, address)
+    results = sweep(small, address).found
     try:
         system = fsspec.filesystem("memory")
         names = [name for name in system.find("/ppafo-test/study") if not name.endswith(LOG)]
         found = {name.removeprefix("/ppafo-test/study/"): system.cat_file(name) for name in names}
         assert found == contents(small_results.place.address)
-        assert load_study_results(address).table(["run"])["run"].size == 32
+        assert load_study_results(address).found.table(["run"])["run"].size == 32
         assert results.place.address == address
     finally:
         system.rm("/ppafo-test", recursive=True)
 
 
 def test_a_study_object_can_be_run_as_it_is(small: Any, small_results: StudyResults) -> None:
-    assert sweep(load_study(small)).summary == small_results.summary
+    assert sweep(load_study(small)).found.summary == small_results.summary
 
 
 def test_a_seed_takes_the_place_of_that_of_the_file(varying: Callable[..., Any]) -> None:
     document = varying(AREA, runs=4)
     seeds = (None, document["sample"]["seed"], document["sample"]["seed"] + 1)
-    first, same, other = (sweep(document, seed=seed).table(["valve.area"])["valve.area"] for seed in seeds)
+    first, same, other = (sweep(document, seed=seed).found.table(["valve.area"])["valve.area"] for seed in seeds)
     assert (first == same).all()
     assert (first != other).all()
 
@@ -416,4 +416,4 @@ def test_a_loaded_study_is_not_changed_by_what_stands_beside_it(small: Any) -> N
 def test_a_thousand_wearers_who_react_are_kept_in_pieces_of_seconds() -> None:
     study = load_study("weak-wearers-who-react", draws=1000)
     assert study.runs == 3000
-    assert chunks_module.chunk_size(study) == 64
+    assert chunk_size(study) == 64

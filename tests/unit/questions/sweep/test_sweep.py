@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 
 from ppafo.cli.main import main
-from ppafo.questions.sweep import answer as answer_module
 from ppafo.questions.sweep import solve as solve_module
 
 STUDY = """
@@ -130,7 +129,7 @@ def test_interruption_after_the_last_chunk_says_that_the_chunks_are_kept(
     def interrupted(*words: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(answer_module, "write_report", interrupted)
+    monkeypatch.setattr(solve_module, "write_report", interrupted)
     assert swept(study, tmp_path / "out") == 130
     assert "finished chunks are kept" in capsys.readouterr().err
     assert list((tmp_path / "out" / "runs").iterdir())

@@ -7,7 +7,7 @@ import pytest
 
 from ppafo.questions.tune.answer import INFEASIBLE, agreement
 from ppafo.questions.tune.problem import Effort, Limit, Problem, Searched, Spread, Term
-from ppafo.questions.tune.solve import FAILED, Runs, judge, search
+from ppafo.questions.tune.solve import UNUSABLE, Crossed, judge, search
 from ppafo.simulation.loading import load_scenario
 from ppafo.studies.distributions import Floats, NormalAround
 from ppafo.studies.draws import Uncertainty
@@ -34,10 +34,10 @@ def problem(**changes: Any) -> Problem:
     return Problem(**(given | changes))
 
 
-def runs(error: list[list[float]], gas: list[list[float]], failed: list[list[bool]] | None = None) -> Runs:
+def runs(error: list[list[float]], gas: list[list[float]], failed: list[list[bool]] | None = None) -> Crossed:
     """Runs of candidates (rows) over draws (columns)."""
     shape = np.shape(error)
-    return Runs(
+    return Crossed(
         {"rms_error": np.array(error), "gas_supplied": np.array(gas)},
         np.zeros(shape, bool) if failed is None else np.array(failed),
     )
@@ -111,7 +111,7 @@ def test_feasible_comes_before_infeasible_and_both_before_failed() -> None:
     assert judged.is_feasible.tolist() == [True, False, False, False]
     assert judged.cost[0] == 4.5
     assert judged.violation[:3] == pytest.approx([0.0, 0.2, 0.8])
-    assert judged.cost[0] < INFEASIBLE < judged.cost[1] < judged.cost[2] < FAILED < judged.cost[3]
+    assert judged.cost[0] < INFEASIBLE < judged.cost[1] < judged.cost[2] < UNUSABLE < judged.cost[3]
 
 
 def test_a_run_without_the_metric_counts_as_failed() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 import ppafo
 from ppafo.errors import StudyError
-from ppafo.questions.tune.answer import Tuning, remarks, search_figure, verdict
+from ppafo.questions.tune.answer import Tuned, verdict
 from ppafo.questions.tune.problem import json_schema, list_tunings, load_tuning, present_value
 from ppafo.questions.tune.solve import tune
 
@@ -37,37 +37,38 @@ def changed(**changes: Any) -> dict[str, Any]:
 
 
 def test_gains_are_found_that_are_better_and_can_be_pasted() -> None:
-    tuning = tune(DOCUMENT)
+    finding = tune(DOCUMENT)
+    tuning = finding.found
     assert tuning.before.objective == pytest.approx(1.0)
     assert tuning.after.objective < 0.5
     pasted = ppafo.simulate("torque-task-proportional", [*DOCUMENT["overrides"], *tuning.lines])
     assert pasted.metrics["rms_error"].value == pytest.approx(tuning.after.values["rms_error"], rel=1e-9)
     assert tuning.before.result.metrics["rms_error"].value == pytest.approx(tuning.before.values["rms_error"], rel=1e-9)
     assert tuning.bounds_reached["controller.proportional_gain"] == "maximum"  # no delay: any gain is taken
-    assert tune(DOCUMENT).lines == tuning.lines
-    _, places = search_figure(tuning).axes
+    assert tune(DOCUMENT).found.lines == tuning.lines
+    _, places = finding.plot("search").axes
     assert [label.get_text() for label in places.get_yticklabels()] == ["Proportional gain", "Integral gain"]
 
 
 def test_a_constraint_is_kept_or_said_to_be_out_of_reach() -> None:
-    free = tune(DOCUMENT)
+    free = tune(DOCUMENT).found
     least = free.before.result.metrics["peak_error"].value * 0.8
     kept = tune(
         changed(
             objective=[{"metric": "gas_supplied"}], constraints=[{"metric": "peak_error", "at_most": f"{least} N m"}]
         )
-    )
+    ).found
     assert kept.after.is_feasible
     assert kept.after.values["peak_error"] <= least
     assert not kept.before.is_feasible
-    never = tune(changed(constraints=[{"metric": "gas_supplied", "at_most": "0.001 g"}]))
+    never = tune(changed(constraints=[{"metric": "gas_supplied", "at_most": "0.001 g"}])).found
     assert not never.after.is_feasible
-    assert never.after.violation[0] > 1.0
+    assert never.after.violation > 1.0
 
 
 def test_a_robust_tuning_judges_every_candidate_over_the_same_draws() -> None:
     robust = {"study": "torque-task-uncertainty", "measure": "quantile", "share": 0.9, "draws": 16}
-    tuning = tune(changed(robust=robust, effort={"starts": 1, "generations": 3, "candidates_per_gain": 4}))
+    tuning = tune(changed(robust=robust, effort={"starts": 1, "generations": 3, "candidates_per_gain": 4})).found
     assert tuning.after.objective < tuning.before.objective
     assert tuning.after.fresh["rms_error"] < tuning.before.fresh["rms_error"]
     assert tuning.before.values["rms_error"] > tuning.before.result.metrics["rms_error"].value
@@ -77,7 +78,7 @@ def test_a_robust_tuning_judges_every_candidate_over_the_same_draws() -> None:
 CEILING = "the torque ceiling is the cause"
 
 
-def held_by(level: str, share: float) -> Tuning:
+def held_by(level: str, share: float) -> Tuned:
     """A robust tuning that asks an uncertain device to hold a torque."""
     robust = {"study": "torque-task-uncertainty", "measure": "quantile", "share": share, "draws": 16}
     return tune(
@@ -87,37 +88,38 @@ def held_by(level: str, share: float) -> Tuning:
             robust=robust,
             effort={"starts": 1, "generations": 5, "candidates_per_gain": 4},
         )
-    )
+    ).found
 
 
 def test_a_goal_above_the_ceiling_of_some_draws_is_missed_and_the_ceiling_is_named() -> None:
     never, always = held_by("5 N m", 0.9), held_by("3.5 N m", 0.9)
     assert not never.after.is_feasible
-    assert 0.3 < never.after.ceiling.fraction < 0.7
-    assert never.after.ceiling.explains == ("rms_error_hold",)
-    assert CEILING in verdict(never)
+    assert 0.3 < never.after.torque_ceiling.fraction < 0.7
+    assert never.after.torque_ceiling.explains == ("rms_error_hold",)
+    assert CEILING in never.verdict
     assert always.after.is_feasible
-    assert always.after.ceiling.fraction == 0.0
-    assert CEILING not in verdict(always)
+    assert always.after.torque_ceiling.fraction == 0.0
+    assert CEILING not in always.verdict
 
 
 def test_what_only_the_draws_of_the_search_keep_is_not_kept() -> None:
     found = held_by("3.5 N m", 0.9)
-    lucky = replace(found, after=replace(found.after, violation=(0.0, 0.02)))
-    assert lucky.after.is_feasible_in_search
-    assert not lucky.after.is_feasible
-    assert "over the draws of the search, but not over 1,024 fresh ones" in verdict(lucky)
+    lucky = replace(found.after, violation=0.0, fresh_violation=0.02)
+    assert lucky.is_feasible_in_search
+    assert not lucky.is_feasible
+    said = verdict(found.problem, found.before, lucky)
+    assert "over the draws of the search, but not over 1,024 fresh ones" in said
 
 
 def test_noise_is_drawn_for_every_candidate_alike_and_judged_on_fresh_draws() -> None:
     overrides = [*DOCUMENT["overrides"], "sensors.pressure_noise=3 kPa_d"]
     quick = {"starts": 1, "generations": 1, "candidates_per_gain": 4}
-    one, other = (tune(changed(overrides=[*overrides, f"sensors.seed={seed}"], effort=quick)) for seed in (1, 2))
+    one, other = (tune(changed(overrides=[*overrides, f"sensors.seed={seed}"], effort=quick)).found for seed in (1, 2))
     assert one.after.values == other.after.values, "the seed of the scenario does not decide"
     assert one.after.values["rms_error"] != one.after.result.metrics["rms_error"].value
     assert one.after.fresh["rms_error"] == pytest.approx(one.after.values["rms_error"], rel=0.1)
-    assert one.after.noise["rms_error"].high == pytest.approx(1.0)
-    assert any("due to sensor noise" in line for line in remarks(one))
+    assert one.after.share_of_noise["rms_error"].high == pytest.approx(1.0)
+    assert any("due to sensor noise" in line for line in one.remarks)
     with pytest.raises(StudyError, match="all candidates get the same noise"):
         load_tuning(changed(search=[{"path": "sensors.seed", "minimum": 1, "maximum": 5}]))
 

@@ -8,21 +8,22 @@ import numpy as np
 import pytest
 
 from ppafo.errors import StudyError
-from ppafo.questions.montecarlo.solve import (
+from ppafo.questions.sweep.statistic import (
+    Estimate,
     Statistic,
     StoppingRule,
     draw_until,
+    estimate,
     mean_of,
-    monte_carlo,
     parse_statistic,
     probability_of,
     quantile_of,
-    remarks,
     stopping_rule,
 )
 from ppafo.studies.distributions import Floats, LogNormalAround, NormalAround, UniformBetween, replicates_interval
-from ppafo.studies.draws import REPLICATES, Model, Outcomes, Uncertainty
+from ppafo.studies.draws import REPLICATES, Uncertainty
 from ppafo.studies.study import Drawn
+from ppafo.study.runs import Runs
 
 METRIC = "rms_error"
 SIGMA = 0.5
@@ -32,35 +33,43 @@ NORMAL = NormalDist(sigma=SIGMA)
 STUDY = "torque-task-uncertainty"
 
 
-def value(columns: Mapping[str, Floats]) -> Outcomes:
+Model = Callable[[Mapping[str, Floats]], Mapping[str, Floats]]
+
+
+def value(columns: Mapping[str, Floats]) -> dict[str, Floats]:
     """The uncertain value itself."""
-    return Outcomes({METRIC: columns["x"]}, np.zeros(columns["x"].size, bool), "")
+    return {METRIC: columns["x"]}
+
+
+def drawn_until(model: Model, uncertain: Uncertainty, statistic: Statistic, rule: StoppingRule, seed: int) -> Estimate:
+    """What is found on a formula in place of a simulation."""
+    return draw_until(Runs.of_model(model, [METRIC]), uncertain, METRIC, statistic, rule, seed).found
 
 
 def failing(share: float) -> Model:
     """The same, of which the largest fail."""
 
-    def run(columns: Mapping[str, Floats]) -> Outcomes:
+    def run(columns: Mapping[str, Floats]) -> dict[str, Floats]:
         failed = columns["x"] > math.exp(NORMAL.inv_cdf(1.0 - share))
-        return Outcomes({METRIC: np.where(failed, np.nan, columns["x"])}, failed, "diverged")
+        return {METRIC: np.where(failed, np.nan, columns["x"])}
 
     return run
 
 
 def test_it_stops_at_the_first_look_that_is_narrow_enough() -> None:
     rule = StoppingRule(0.05, is_relative=False, first=64, maximum=2**16)
-    found = draw_until(value, UNCERTAIN, METRIC, mean_of("N m"), rule, 1)
+    found = drawn_until(value, UNCERTAIN, mean_of("N m"), rule, 1)
     widths = [look.interval.width for look in found.looks]
     assert found.is_met
     assert widths[-1] <= 0.05 < min(widths[:-1])
     assert [look.draws for look in found.looks] == [64 * 2**number for number in range(len(widths))]
-    assert found.values.size == found.last.draws
-    assert np.array_equal(found.values, UNCERTAIN.replicated_columns(0, found.last.draws, 1)["x"])
+    assert found.values.size == found.draws
+    assert np.array_equal(found.values, UNCERTAIN.replicated_columns(0, found.draws, 1)["x"])
 
 
 def test_a_width_that_is_out_of_reach_is_said_and_not_hidden() -> None:
     rule = StoppingRule(1e-6, is_relative=True, first=64, maximum=200)
-    found = draw_until(value, UNCERTAIN, METRIC, mean_of("N m"), rule, 1)
+    found = drawn_until(value, UNCERTAIN, mean_of("N m"), rule, 1)
     assert not found.is_met
     assert [look.draws for look in found.looks] == [64, 128, 200]
 
@@ -77,7 +86,7 @@ def test_all_looks_together_hold_the_truth_as_often_as_is_said(
     statistic: Statistic, truth: float, width: float
 ) -> None:
     rule = StoppingRule(width, is_relative=False, first=64, maximum=8192, confidence=0.9)
-    found = [draw_until(value, UNCERTAIN, METRIC, statistic, rule, seed) for seed in range(300)]
+    found = [drawn_until(value, UNCERTAIN, statistic, rule, seed) for seed in range(300)]
     held = [all(look.interval.low <= truth <= look.interval.high for look in item.looks) for item in found]
     assert all(item.is_met for item in found)
     assert np.mean(held) >= 0.9
@@ -88,7 +97,7 @@ def test_without_the_correction_they_would_not() -> None:
     rule = StoppingRule(0.08, is_relative=False, first=64, maximum=8192, confidence=0.9)
     held = []
     for seed in range(300):
-        looks = draw_until(value, UNCERTAIN, METRIC, mean_of("N m"), rule, seed).looks
+        looks = drawn_until(value, UNCERTAIN, mean_of("N m"), rule, seed).looks
         values = UNCERTAIN.random_columns(0, looks[-1].draws, seed)["x"]
         intervals = [mean_of("N m").estimate(values[: look.draws], 0.9) for look in looks]
         held.append(all(interval.low <= MEAN <= interval.high for interval in intervals))
@@ -99,22 +108,22 @@ NORMALS = Uncertainty(tuple(Drawn(f"x{number}", NormalAround(0.0, 1.0)) for numb
 
 
 def test_a_mean_that_a_few_draws_carry_is_not_believed_and_drawn_on() -> None:
-    def heavy(columns: Mapping[str, Floats]) -> Outcomes:
+    def heavy(columns: Mapping[str, Floats]) -> dict[str, Floats]:
         values = np.exp(2.0 * sum(columns[path] for path in NORMALS.paths) / math.sqrt(6.0))
-        return Outcomes({METRIC: values}, np.zeros(values.size, bool), "")
+        return {METRIC: values}
 
     rule = StoppingRule(0.5, is_relative=True, first=64, maximum=4096)
-    found = [draw_until(heavy, NORMALS, METRIC, mean_of("N m"), rule, seed) for seed in range(60)]
-    wrong = [not item.last.interval.low <= math.exp(2.0) <= item.last.interval.high for item in found]
+    found = [drawn_until(heavy, NORMALS, mean_of("N m"), rule, seed) for seed in range(60)]
+    wrong = [not item.interval.low <= math.exp(2.0) <= item.interval.high for item in found]
     narrow = [any(rule.is_narrow(look.interval) for look in item.looks) for item in found]
     assert np.mean(narrow) > 0.3, "an interval that is narrow enough comes often"
     assert np.mean([item.is_met and is_wrong for item, is_wrong in zip(found, wrong, strict=True)]) <= 0.05
-    warned = [item for item in found if not item.last.is_carried]
+    warned = [item for item in found if not item.looks[-1].is_carried]
     assert len(warned) > 50
-    assert "do not trust this interval" in remarks(warned[0])[0]
-    quiet = draw_until(value, UNCERTAIN, METRIC, mean_of("N m"), StoppingRule(0.05, False, first=512), 1)
+    assert "do not trust this interval" in warned[0].remarks[0]
+    quiet = drawn_until(value, UNCERTAIN, mean_of("N m"), StoppingRule(0.05, False, first=512), 1)
     assert quiet.is_met
-    (unseen,) = remarks(quiet)
+    (unseen,) = quiet.remarks
     assert "fewer than 0.037 % of the runs may be missing" in unseen
 
 
@@ -122,23 +131,23 @@ def test_equal_values_are_no_known_mean_before_a_rare_one_could_have_come() -> N
     rare = Uncertainty((Drawn("x0", UniformBetween(0.0, 1.0)),))
 
     def outcomes(share: float) -> Model:
-        def run(columns: Mapping[str, Floats]) -> Outcomes:
+        def run(columns: Mapping[str, Floats]) -> dict[str, Floats]:
             values = 100.0 * (columns["x0"] < share)
-            return Outcomes({METRIC: values}, np.zeros(values.size, bool), "")
+            return {METRIC: values}
 
         return run
 
     rule = StoppingRule(0.2, is_relative=False, first=64, maximum=4096)
-    found = [draw_until(outcomes(0.001), rare, METRIC, mean_of("N m"), rule, seed) for seed in range(60)]
-    wrong = [not item.last.interval.low <= 0.1 <= item.last.interval.high for item in found]
+    found = [drawn_until(outcomes(0.001), rare, mean_of("N m"), rule, seed) for seed in range(60)]
+    wrong = [not item.interval.low <= 0.1 <= item.interval.high for item in found]
     # Each of these was met at its first look, with an interval from 0 to 0.
     assert np.mean([item.is_met and is_wrong for item, is_wrong in zip(found, wrong, strict=True)]) <= 0.05
-    few = draw_until(outcomes(0.0), rare, METRIC, mean_of("N m"), StoppingRule(0.2, False, 64, 1024), 1)
+    few = drawn_until(outcomes(0.0), rare, mean_of("N m"), StoppingRule(0.2, False, 64, 1024), 1)
     assert not few.is_met
-    assert "all 1,024 values are equal" in remarks(few)[0]
-    many = draw_until(outcomes(0.0), rare, METRIC, mean_of("N m"), rule, 1)
+    assert "all 1,024 values are equal" in few.remarks[0]
+    many = drawn_until(outcomes(0.0), rare, mean_of("N m"), rule, 1)
     assert many.is_met
-    (unseen,) = remarks(many)
+    (unseen,) = many.remarks
     assert "would move the mean by up to 0.00073 times its distance" in unseen
 
 
@@ -177,11 +186,11 @@ def test_replicates_in_pieces_are_those_of_the_whole() -> None:
 
 def test_failed_draws_are_left_out_and_counted_or_refused() -> None:
     rule = StoppingRule(0.1, is_relative=False, first=1024, maximum=2048, maximum_failed=0.02)
-    found = draw_until(failing(0.005), UNCERTAIN, METRIC, mean_of("N m"), rule, 1)
-    assert 0 < found.last.missing <= 0.02 * found.last.draws
-    assert found.values.size == found.last.draws - found.last.missing
+    found = drawn_until(failing(0.005), UNCERTAIN, mean_of("N m"), rule, 1)
+    assert 0 < found.looks[-1].missing <= 0.02 * found.draws
+    assert found.values.size == found.draws - found.looks[-1].missing
     with pytest.raises(StudyError, match=r"runs failed .* more than the 2 % .*diverged"):
-        draw_until(failing(0.1), UNCERTAIN, METRIC, mean_of("N m"), rule, 1)
+        drawn_until(failing(0.1), UNCERTAIN, mean_of("N m"), rule, 1)
 
 
 @pytest.mark.parametrize(
@@ -220,26 +229,26 @@ def test_widths_are_read_in_the_unit_of_the_metric() -> None:
 
 
 def test_a_scenario_is_drawn_until_its_error_is_known() -> None:
-    found = monte_carlo(STUDY, METRIC, width="10 %", configuration="proportional", first_draws=64, draws=1024)
+    found = estimate(STUDY, METRIC, width="10 %", configuration="proportional", first_draws=64, draws=1024).found
     assert found.is_met
-    assert found.last.interval.low < 0.875 < found.last.interval.high
-    again = monte_carlo(STUDY, METRIC, width="10 %", configuration="proportional", first_draws=64, draws=1024)
-    assert again.last == found.last
+    assert found.interval.low < 0.875 < found.interval.high
+    again = estimate(STUDY, METRIC, width="10 %", configuration="proportional", first_draws=64, draws=1024).found
+    assert again == found
 
 
 def test_further_metrics_are_means_over_the_same_draws_that_have_a_value() -> None:
-    def model(columns: Mapping[str, Floats]) -> Outcomes:
+    def model(columns: Mapping[str, Floats]) -> dict[str, Floats]:
         x = columns["x"]
-        half = np.where(x > 1.0, 2.0 * x, np.nan)
-        return Outcomes({METRIC: x, "final_error": half}, np.zeros(x.size, bool), "")
+        return {METRIC: x, "final_error": np.where(x > 1.0, 2.0 * x, np.nan)}
 
     rule = StoppingRule(10.0, is_relative=False, first=256, maximum=256)
-    found = draw_until(model, UNCERTAIN, METRIC, mean_of("N m"), rule, 1, ["final_error"])
-    count, mean = found.also["final_error"]
+    runs = Runs.of_model(model, [METRIC, "final_error"])
+    finding = draw_until(runs, UNCERTAIN, METRIC, mean_of("N m"), rule, 1, ["final_error"])
+    found, mean = finding.found, finding.found.also["final_error"]
     above = found.values[found.values > 1.0]
-    assert count == above.size < 256
+    assert mean.draws == above.size < 256
     assert mean.value == pytest.approx(2.0 * above.mean())
     truth = 2.0 * MEAN * NORMAL.cdf(SIGMA**2) / 0.5
     assert mean.low < truth < mean.high
-    assert found.to_dict()["also"]["final_error"]["draws"] == count
-    assert "Further metrics" in [section.heading for section in found.answer().sections]
+    assert finding.to_dict()["also"]["final_error"]["draws"] == mean.draws
+    assert "Further metrics" in [section.heading for section in finding.answer().sections]

@@ -1,4 +1,4 @@
-"""A statistic over the distributions of a study, drawn until its interval is narrow enough, and the answer.
+"""A statistic over the distributions of a study, drawn until its interval is narrow enough.
 
 A mean is estimated from randomised Sobol replicates, which know that of a smooth function far better than as many
 independent draws; its interval is never narrower than theirs, as nobody knows beforehand that no rare value decides.
@@ -14,25 +14,14 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from ppafo.answers import Answer, Column, Figure, Section, Table
-from ppafo.answers.display_units import (
-    change_text,
-    display_difference,
-    display_unit,
-    display_value,
-    display_values,
-    metric_quantity,
-    metric_title,
-)
-from ppafo.answers.style import BLUE, GREY, VERMILION, Margins, figure_of_free_panels, house_style, mark_kind
+from ppafo.answers.style import GREY, VERMILION
 from ppafo.errors import StudyError, UnitError, refused_as
 from ppafo.metrics import METRICS
 from ppafo.progress import Report
-from ppafo.questions.question import Solved
 from ppafo.simulation.scenario import plain
 from ppafo.studies.distributions import (
     FEWEST_EFFECTIVE,
@@ -49,29 +38,24 @@ from ppafo.studies.draws import (
     MAXIMUM_DRAWS,
     REPLICATES,
     Columns,
-    Model,
-    Outcomes,
-    Tally,
     Uncertainty,
     atmosphere_of,
     check_confidence,
-    check_failures,
     check_fraction,
     check_metrics,
     choose_configuration,
     difference_of,
-    join,
     level_of,
-    scenario_model,
     study_of,
     uncertainty_in,
     with_new_noise,
 )
 from ppafo.studies.study import Study
+from ppafo.study.finding import Column, Finding, Part
+from ppafo.study.kind import Kind, of_metric
+from ppafo.study.panels import Mark, Panel
+from ppafo.study.runs import Rows, Runs, Tally
 from ppafo.units import number_text, parse_quantity
-
-if TYPE_CHECKING:
-    import matplotlib.figure
 
 GRAMMAR = "'mean', 'quantile 0.95', 'probability above VALUE' or 'probability below VALUE'"
 _QUANTILE = re.compile(r"quantile\s+([0-9]*\.?[0-9]+)")
@@ -225,54 +209,55 @@ class Look:
         return self.effective_size >= min(FEWEST_EFFECTIVE, 0.5 * (self.draws - self.missing))
 
 
-@dataclass(frozen=True, slots=True, repr=False)
-class MonteCarlo(Solved):
-    """The looks one after the other, whether the last one met the rule, and the values of the metric (draws,) [SI].
+@dataclass(frozen=True, slots=True)
+class OfMean:
+    """The mean of a further metric [SI] over the same draws, with its interval, and how many draws have it."""
 
-    ``noise`` is the fraction of the variance that is due to sensor noise; None where there is none. ``also`` has the
-    means [SI] of further metrics over the same draws, and how many draws have each.
+    draws: int
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """A statistic of a metric, with its interval [SI] and the looks one after the other.
+
+    ``is_met`` is true where the last interval is narrow enough and can be believed. ``share_of_noise`` is the fraction
+    of the variance that is due to sensor noise, None where there is none; ``values`` are those of the metric [SI].
     """
 
     metric: str
-    statistic: Statistic
-    rule: StoppingRule
+    statistic: str
+    unit: str
+    is_met: bool
+    draws: int
+    failed: int
+    interval: Interval
+    remarks: list[str]
+    also: dict[str, OfMean]
+    share_of_noise: Interval | None
     seed: int
-    looks: tuple[Look, ...]
-    outcomes: Outcomes
-    noise: Interval | None
-    also: Mapping[str, tuple[int, Interval]] = field(default_factory=dict)
+    rule: dict[str, float | str]
+    looks: list[Look]
+    values: Floats = field(compare=False, repr=False)
+    folder: str = field(default="", compare=False)
 
-    @property
-    def last(self) -> Look:
-        """The look at which it stopped."""
-        return self.looks[-1]
-
-    @property
-    def is_met(self) -> bool:
-        """Tell whether the interval became narrow enough, and can be believed."""
-        return self.rule.is_narrow(self.last.interval) and self.last.is_carried
-
-    @property
-    def quantity(self) -> str:
-        """The kind of quantity of the statistic; none for a plain number."""
-        return "" if self.statistic.unit == "-" else metric_quantity(self.metric)
-
-    @property
-    def values(self) -> Floats:
-        """The values that there are [SI]."""
-        found = self.outcomes.metrics[self.metric]
-        return found[np.isfinite(found)]
+    def json_document(self) -> dict[str, Any]:
+        """Return the numbers, and the folder in which they are written."""
+        document: dict[str, Any] = plain(self)
+        return document | ({"folder": self.folder} if self.folder else {})
 
 
 def draw_until(
-    model: Model,
+    runs: Runs,
     uncertainty: Uncertainty,
     metric: str,
     statistic: Statistic,
     rule: StoppingRule,
     seed: int,
     also: Sequence[str] = (),
-) -> MonteCarlo:
+) -> Finding[Estimate]:
     """Draw from one stream until the rule is met or there are no more looks.
 
     An interval that few draws determine is not trusted, however narrow it is: drawing continues.
@@ -280,49 +265,67 @@ def draw_until(
     StudyError.
     """
     looks: list[Look] = []
-    pieces: list[Outcomes] = []
     drawn: Columns = {}
     for size in rule.sizes:
         done = looks[-1].draws if looks else 0
         columns = statistic.columns(uncertainty, done, size - done, seed)
         drawn = drawn or columns
-        pieces.append(model(columns))
-        looks.append(_look(join(pieces), metric, statistic, rule))
+        runs.run(columns)
+        looks.append(_look(runs, metric, statistic, rule))
         if rule.is_narrow(looks[-1].interval) and looks[-1].is_carried:
             break
-    outcomes = join(pieces)
+    rows, failures, last = runs.table, runs.failures, looks[-1]
     noise = None
     if uncertainty.has_noise:
-        again = model(with_new_noise(drawn, NOISE_DRAWS)).metrics[metric]
-        noise = noise_interval(outcomes.metrics[metric][: again.size], again, rule.confidence)
-    further = {name: _mean(outcomes.metrics[name], rule.confidence_of_look) for name in also}
-    return MonteCarlo(metric, statistic, rule, seed, tuple(looks), outcomes, noise, further)
+        again = runs.run(with_new_noise(drawn, NOISE_DRAWS))[metric]
+        noise = noise_interval(rows[metric][: again.size], again, rule.confidence)
+    values = rows[metric][np.isfinite(rows[metric])]
+    estimate = Estimate(
+        metric=metric,
+        statistic=statistic.label,
+        unit=statistic.unit,
+        is_met=rule.is_narrow(last.interval) and last.is_carried,
+        draws=last.draws,
+        failed=failures,
+        interval=last.interval,
+        remarks=_remarks(last, values, statistic, _kind(metric, statistic), noise),
+        also={name: _mean(rows[name], rule.confidence_of_look) for name in also},
+        share_of_noise=noise,
+        seed=seed,
+        rule={**plain(rule), "looks": len(rule.sizes), "correction": "Bonferroni"},
+        looks=looks,
+        values=values,
+    )
+    return _finding(estimate, statistic, rule)
 
 
-def _mean(values: Floats, level: float) -> tuple[int, Interval]:
-    """How many draws have a value, and their mean; its interval is infinite where few do."""
+def _mean(values: Floats, level: float) -> OfMean:
+    """Return how many draws have a value, and their mean; its interval is infinite where few do."""
     count = int(np.count_nonzero(np.isfinite(values)))
-    return count, floored_interval(values, REPLICATES, level) if count else Interval(math.nan, -math.inf, math.inf)
+    mean = floored_interval(values, REPLICATES, level) if count else Interval(math.nan, -math.inf, math.inf)
+    return OfMean(count, mean.value, mean.low, mean.high)
 
 
-def _look(outcomes: Outcomes, metric: str, statistic: Statistic, rule: StoppingRule) -> Look:
-    check_failures(outcomes, rule.maximum_failed, "Monte Carlo")
-    found = outcomes.metrics[metric]
-    values = found[np.isfinite(found)]
-    missing = outcomes.runs - values.size
-    if missing > rule.maximum_failed * outcomes.runs:
+def _look(runs: Runs, metric: str, statistic: Statistic, rule: StoppingRule) -> Look:
+    rows: Rows = runs.table
+    runs.check(rows, rule.maximum_failed, "sweep --statistic")
+    found = rows[metric]
+    missing = int(np.count_nonzero(~np.isfinite(found)))
+    if missing > rule.maximum_failed * found.size:
         raise StudyError(
-            f"Monte Carlo: {missing:,} of {outcomes.runs:,} runs have no '{metric}'; choose another metric"
+            f"sweep --statistic: {missing:,} of {found.size:,} runs have no '{metric}'; choose another metric"
         )
-    interval = statistic.estimate(found, rule.confidence_of_look)
-    return Look(outcomes.runs, missing, interval, statistic.effective_size(found))
+    return Look(
+        found.size, missing, statistic.estimate(found, rule.confidence_of_look), statistic.effective_size(found)
+    )
 
 
 DEFAULT_WIDTH = "1 %"
 PROBABILITY_WIDTH = "0.02"
+FIRST_DRAWS, MOST_DRAWS = 256, 2**20
 
 
-def monte_carlo(
+def estimate(
     study: Study | str | Path | Mapping[str, Any],
     metric: str,
     statistic: str = "mean",
@@ -330,15 +333,15 @@ def monte_carlo(
     configuration: str | None = None,
     overrides: Sequence[str] = (),
     seed: int | None = None,
-    first_draws: int = 256,
-    draws: int = 2**20,
+    first_draws: int = FIRST_DRAWS,
+    draws: int = MOST_DRAWS,
     confidence: float = 0.95,
     maximum_failed: float = 0.01,
     threads: int | None = None,
     progress: Report | None = None,
     also: Sequence[str] = (),
-) -> MonteCarlo:
-    """Estimate a statistic of a metric over the distributions of a study until its interval is ``width`` wide.
+) -> Finding[Estimate]:
+    """Return a statistic of a metric over the distributions of a study, drawn until its interval is ``width`` wide.
 
     ``statistic`` is ``mean``, ``quantile 0.95`` or ``probability above 3 N m``; ``width`` a fraction of its value
     (default ``1 %``) or a difference with its unit (``0.01 N m``; for a probability a number, 0.02). Draws are
@@ -351,13 +354,11 @@ def monte_carlo(
     uncertainty = uncertainty_in(chosen, base).with_noise_of([base.scenario])
     wanted = tuple(dict.fromkeys((metric, *also)))
     check_metrics(wanted, base.scenario)
-    atmosphere = atmosphere_of(base.scenario, {*uncertainty.paths, *uncertainty.same})
-    what = parse_statistic(statistic, metric, atmosphere)
+    what = parse_statistic(statistic, metric, atmosphere_of(base.scenario, {*uncertainty.paths, *uncertainty.same}))
     asked = width or (PROBABILITY_WIDTH if what.threshold is not None else DEFAULT_WIDTH)
     rule = stopping_rule(what, metric, asked, StoppingRule(1.0, False, first_draws, draws, confidence, maximum_failed))
-    tally = Tally(rule.first, progress)
-    model = scenario_model(base.scenario, wanted, threads, tally.add, uncertainty.gauge)
-    return draw_until(model, uncertainty, metric, what, rule, chosen.sample.seed if seed is None else seed, wanted[1:])
+    runs = Runs(base.scenario, wanted, Tally(rule.first, progress), uncertainty.gauge, threads)
+    return draw_until(runs, uncertainty, metric, what, rule, chosen.sample.seed if seed is None else seed, wanted[1:])
 
 
 def stopping_rule(statistic: Statistic, metric: str, width: str, like: StoppingRule) -> StoppingRule:
@@ -384,158 +385,143 @@ def _plain(text: str) -> float:
         raise StudyError(f"width = '{text}': for a probability give a plain number, such as 0.01") from error
 
 
-_SIZE = (8.4, 3.5)
-_MARGINS = Margins(left=0.85, right=0.2, top=0.55, bottom=0.55, row_gap=0.0, column_gap=0.95)
-_MAXIMUM_BINS = 80
+def _kind(metric: str, statistic: Statistic) -> Kind:
+    return Kind("Probability", form=".5g") if statistic.unit == "-" else of_metric(metric, ".5g")
 
 
-def monte_carlo_figure(estimate: MonteCarlo) -> "matplotlib.figure.Figure":
-    """Return trace and histogram side by side."""
-    with house_style():
-        figure, ((trace, drawn),) = figure_of_free_panels(_SIZE, _MARGINS, 1, 2)
-        draws = [look.draws for look in estimate.looks]
-        rows = [(look.interval.value, look.interval.low, look.interval.high) for look in estimate.looks]
-        values = display_values(np.array(rows), estimate.quantity)
-        known = np.isfinite(values).all(axis=1)
-        trace.vlines(np.array(draws)[known], values[known, 1], values[known, 2], color=BLUE, linewidth=3, alpha=0.45)
-        trace.plot(draws, values[:, 0], "o-", color=BLUE, markersize=5, linewidth=1.0)
-        one = abs(values[-1, 0]) if estimate.rule.is_relative else display_difference(1.0, estimate.quantity)
-        reach = 0.5 * estimate.rule.width * one
-        trace.axhspan(values[-1, 0] - reach, values[-1, 0] + reach, color=GREY, alpha=0.18, linewidth=0)
-        trace.set_xscale("log", base=2)
-        trace.set_xlabel("Draws")
-        trace.set_title(f"{estimate.statistic.label[:1].upper()}{estimate.statistic.label[1:]}")
-        trace.set_ylabel("Probability" if estimate.statistic.unit == "-" else metric_title(estimate.metric))
-        values = display_values(estimate.values, metric_quantity(estimate.metric))
-        drawn.hist(values, bins=min(_MAXIMUM_BINS, max(10, int(np.sqrt(values.size)))), color=BLUE, alpha=0.55)
-        threshold = estimate.statistic.threshold
-        marked = estimate.last.interval.value if threshold is None else threshold
-        drawn.axvline(display_value(marked, metric_quantity(estimate.metric)), color=VERMILION, linewidth=1.4)
-        drawn.set_xlabel(metric_title(estimate.metric))
-        drawn.set_ylabel("Draws")
-        drawn.set_title(f"{values.size:,} values")
-        mark_kind(figure, "simulated")
-        return figure
-
-
-_HEAD = ("draws", "without value", "estimate", "low", "high", "width", "")
-_CAPTION = "Left: estimate and interval at each look; grey: the target width. Right: the values of all draws."
-
-
-def answer_of(estimate: MonteCarlo) -> Answer:
-    """Return the answer of an estimate; it has passed where the interval became narrow enough."""
-    title = f"{estimate.statistic.label} of {estimate.metric}"
-    table = Table(tuple(map(Column, _HEAD)), tuple(look_row(estimate, look) for look in estimate.looks))
-    figure = Figure("trace", _CAPTION, lambda: monte_carlo_figure(estimate))
-    return Answer(
-        name="montecarlo",
-        kicker="Monte Carlo",
-        title=title[:1].upper() + title[1:],
-        lead=(verdict(estimate), *remarks(estimate)),
-        sections=(*_further(estimate), Section("Trace", (policy(estimate),), table, figure=figure)),
-        data={
-            "metric": estimate.metric,
-            "statistic": estimate.statistic.label,
-            "unit": estimate.statistic.unit,
-            "is_met": estimate.is_met,
-            "draws": estimate.last.draws,
-            "failed": estimate.outcomes.failures,
-            "interval": plain(estimate.last.interval),
-            "remarks": remarks(estimate),
-            "also": {name: {"draws": count, **plain(mean)} for name, (count, mean) in estimate.also.items()},
-            "share_of_noise": None if estimate.noise is None else plain(estimate.noise),
-            "seed": estimate.seed,
-            "rule": {**plain(estimate.rule), "looks": len(estimate.rule.sizes), "correction": "Bonferroni"},
-            "looks": [plain(look) for look in estimate.looks],
-        },
-        passed=estimate.is_met,
-    )
-
-
-def _further(estimate: MonteCarlo) -> tuple[Section, ...]:
-    """The means of further metrics, where some were requested."""
-    rows = []
-    for name, (count, mean) in estimate.also.items():
-        quantity = metric_quantity(name)
-        shown = (f"{display_value(value, quantity):.4g}" for value in (mean.value, mean.low, mean.high))
-        rows.append((metric_title(name), f"{count:,}", *shown))
-    if not rows:
-        return ()
-    head = tuple(map(Column, ("mean over the same draws", "with a value", "estimate", "low", "high")))
-    said = f"Each with {100.0 * estimate.rule.confidence_of_look:.4g} % confidence, of the draws that have a value."
-    return (Section("Further metrics", (said,), Table(head, tuple(rows))),)
-
-
-def verdict(estimate: MonteCarlo) -> str:
-    """Return the result in a sentence."""
-    interval, rule = estimate.last.interval, estimate.rule
-    numbers = [_level(estimate, value) for value in (interval.value, interval.low, interval.high)]
-    is_narrow = rule.is_narrow(interval)
-    ending = "" if is_narrow else f"; the target width was not reached with the maximum of {rule.maximum:,} draws"
-    what = "" if estimate.statistic.unit == "-" else f" {display_unit(metric_quantity(estimate.metric))}"
-    return (
-        f"{estimate.statistic.label} of {estimate.metric}: {numbers[0]} [{numbers[1]}, {numbers[2]}]{what} "
-        f"after {estimate.last.draws:,} draws, {100.0 * rule.confidence:g} % confidence{ending}"
-    )
-
-
-def remarks(estimate: MonteCarlo) -> list[str]:
+def _remarks(last: Look, values: Floats, statistic: Statistic, kind: Kind, noise: Interval | None) -> list[str]:
     """Return what the number must not be read without: draws that decide alone, and noise."""
     said = []
-    last = estimate.last
-    are_equal = estimate.values.size > 0 and float(np.ptp(estimate.values)) == 0.0
+    are_equal = values.size > 0 and float(np.ptp(values)) == 0.0
+    known = last.draws - last.missing
     if not last.is_carried and are_equal:
         said.append(
-            f"do not trust this interval: all {last.draws - last.missing:,} values are equal, which do not show how "
-            f"far a rare one lies; draw at least {FEWEST_EQUAL:,}"
+            f"do not trust this interval: all {known:,} values are equal, which do not show how far a rare one lies; "
+            f"draw at least {FEWEST_EQUAL:,}"
         )
     elif not last.is_carried:
         said.append(
             f"do not trust this interval: the mean has an effective sample size of {last.effective_size:.3g} of "
-            f"{last.draws - last.missing:,} draws, so that the true value lies outside more often than stated; request "
-            "a quantile or a probability"
+            f"{known:,} draws, so that the true value lies outside more often than stated; request a quantile or a "
+            "probability"
         )
-    known = last.draws - last.missing
-    if estimate.statistic.is_of_replicates and known:
-        share, span = _RULE_OF_THREE / known, float(np.ptp(estimate.values))
+    if statistic.is_of_replicates and known:
+        share, span = _RULE_OF_THREE / known, float(np.ptp(values))
         moved = (
-            f"if it lay beyond the others by their range, {_difference(estimate, span)}, the mean would move by up to "
-            f"{_difference(estimate, share * span)}, and more the further it lies"
+            f"if it lay beyond the others by their range, {kind.change(span)}, the mean would move by up to "
+            f"{kind.change(share * span)}, and more the further it lies"
         )
         said.append(
             f"what happens in fewer than {100.0 * share:.2g} % of the runs may be missing among these draws (95 %): "
             f"{f'it would move the mean by up to {share:.2g} times its distance' if are_equal else moved}"
         )
-    if estimate.noise is not None:
-        said.append(f"sensor noise causes {fraction_text(estimate.noise)} of the variance over the draws")
+    if noise is not None:
+        said.append(f"sensor noise causes {fraction_text(noise)} of the variance over the draws")
     return said
 
 
-def policy(estimate: MonteCarlo) -> str:
-    """Return the target width, what corrects for the looks, and what was left out."""
-    rule = estimate.rule
-    width = f"{100.0 * rule.width:g} % of the value" if rule.is_relative else _difference(estimate, rule.width)
-    return (
+_MAXIMUM_BINS = 80
+_CAPTION = "Left: estimate and interval at each look; grey: the target width. Right: the values of all draws."
+
+
+def _finding(found: Estimate, statistic: Statistic, rule: StoppingRule) -> Finding[Estimate]:
+    """Return an estimate in words, its looks as a table, the trace and the histogram of the values."""
+    kind, of_values, looks = _kind(found.metric, statistic), of_metric(found.metric), found.looks
+    intervals = np.array([(look.interval.value, look.interval.low, look.interval.high) for look in looks])
+    unit = kind.shown_unit if kind.quantity else ""
+    ending = "" if rule.is_narrow(found.interval) else "; the target width was not reached with the maximum of "
+    ending += f"{rule.maximum:,} draws" if ending else ""
+    verdict = (
+        f"{found.statistic} of {found.metric}: {kind.interval(found.interval)} {unit}".rstrip()
+        + f" after {found.draws:,} draws, {100.0 * rule.confidence:g} % confidence{ending}"
+    )
+    width = f"{100.0 * rule.width:g} % of the value" if rule.is_relative else _difference(kind, rule.width)
+    policy = (
         f"target width: {width}; at most {len(rule.sizes)} looks at doubling numbers of draws, each with "
-        f"{100.0 * rule.confidence_of_look:.4g} % confidence (Bonferroni), so that all of them hold "
-        f"simultaneously; {estimate.last.missing:,} draws have no value and are left out"
+        f"{100.0 * rule.confidence_of_look:.4g} % confidence (Bonferroni), so that all of them hold simultaneously; "
+        f"{looks[-1].missing:,} draws have no value and are left out"
+    )
+    levels = [
+        Column(title, [kind.number(value) for value in column])
+        for title, column in zip(("estimate", "low", "high"), intervals.T, strict=True)
+    ]
+    title = f"{found.statistic} of {found.metric}"
+    return Finding(
+        name="statistic",
+        command="sweep",
+        kicker="Statistic of a study",
+        title=title[:1].upper() + title[1:],
+        said=(verdict, *found.remarks),
+        parts=(
+            *_further(found, rule),
+            Part(
+                "Trace",
+                [
+                    Column("draws", [f"{look.draws:,}" for look in looks]),
+                    Column("without value", [f"{look.missing:,}" for look in looks]),
+                    *levels,
+                    Column("width", [_difference(kind, look.interval.width) for look in looks]),
+                    Column("", [_met(look, rule) for look in looks]),
+                ],
+                said=[policy],
+                panels=lambda: [_trace(found, kind, rule), _histogram(found, statistic, of_values)],
+                name="trace",
+                caption=_CAPTION,
+                across=2,
+                size=(4.1, 3.3),
+            ),
+        ),
+        found=found,
+        passed=found.is_met,
     )
 
 
-def look_row(estimate: MonteCarlo, look: Look) -> tuple[str, ...]:
-    """Return the row of a look."""
-    interval = look.interval
-    met = "narrow enough" if estimate.rule.is_narrow(interval) else ""
-    met = met if look.is_carried else f"{met}{', but ' if met else ''}its effective sample size is small"
-    levels = [_level(estimate, value) for value in (interval.value, interval.low, interval.high)]
-    return (f"{look.draws:,}", f"{look.missing:,}", *levels, _difference(estimate, interval.width), met)
+def _difference(kind: Kind, value: float) -> str:
+    return kind.change(value) if math.isfinite(value) else f"{value:.3g}"
 
 
-def _level(estimate: MonteCarlo, value: float) -> str:
-    return f"{display_value(value, estimate.quantity):.5g}"
+def _met(look: Look, rule: StoppingRule) -> str:
+    met = "narrow enough" if rule.is_narrow(look.interval) else ""
+    return met if look.is_carried else f"{met}{', but ' if met else ''}its effective sample size is small"
 
 
-def _difference(estimate: MonteCarlo, value: float) -> str:
-    if estimate.statistic.unit == "-" or not (abs(value) < float("inf")):
-        return f"{value:.3g}"
-    return change_text(value, metric_quantity(estimate.metric))
+def _further(found: Estimate, rule: StoppingRule) -> list[Part]:
+    """Return the means of further metrics, where some were requested."""
+    kinds = [of_metric(name) for name in found.also]
+    means = list(found.also.values())
+    head = ("estimate", "low", "high")
+    numbers = [[getattr(mean, key) for mean in means] for key in ("value", "low", "high")]
+    columns = [
+        Column("mean over the same draws", [kind.title for kind in kinds]),
+        Column("with a value", [f"{mean.draws:,}" for mean in means]),
+        *(
+            Column(title, [kind.number(value) for kind, value in zip(kinds, values, strict=True)])
+            for title, values in zip(head, numbers, strict=True)
+        ),
+    ]
+    said = f"Each with {100.0 * rule.confidence_of_look:.4g} % confidence, of the draws that have a value."
+    return [Part("Further metrics", columns, said=[said])] * bool(means)
+
+
+def _trace(found: Estimate, kind: Kind, rule: StoppingRule) -> Panel:
+    """Return estimate and interval at each look, and the target width."""
+    draws = np.array([look.draws for look in found.looks])
+    values = np.array([(look.interval.value, look.interval.low, look.interval.high) for look in found.looks]).T
+    known, last = np.isfinite(values).all(axis=0), float(values[0, -1])
+    reach = 0.5 * rule.width * (abs(last) if rule.is_relative else 1.0)
+    label = f"{found.statistic[:1].upper()}{found.statistic[1:]}"
+    marks = (
+        Mark("upright", draws[known], values[1:, known], style={"linewidth": 3, "alpha": 0.45}),
+        Mark("line", draws, values[0], style={"marker": "o", "markersize": 5, "linewidth": 1.0}),
+        Mark("strip", (), (last - reach, last + reach), colour=GREY, style={"alpha": 0.18}),
+    )
+    return Panel(Kind("Draws"), kind, marks, label, then=lambda axes: axes.set_xscale("log", base=2))
+
+
+def _histogram(found: Estimate, statistic: Statistic, kind: Kind) -> Panel:
+    """Return the values of all draws, and the estimate or the value that a probability is about."""
+    bins = min(_MAXIMUM_BINS, max(10, int(np.sqrt(found.values.size))))
+    counts, edges = np.histogram(found.values, bins)
+    at = found.interval.value if statistic.threshold is None else statistic.threshold
+    marks = (Mark("bars", edges, counts), Mark("at", at, colour=VERMILION, style={"linewidth": 1.4}))
+    return Panel(kind, Kind("Draws"), marks, f"{found.values.size:,} values")

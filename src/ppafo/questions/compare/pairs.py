@@ -1,0 +1,127 @@
+"""Two configurations in the same draws: differences, probabilities, and what no other dominates."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ppafo.studies.distributions import (
+    Floats,
+    Interval,
+    effective_sample_size,
+    noise_interval,
+    replicates_interval,
+    share_interval,
+)
+from ppafo.studies.draws import REPLICATES
+
+Masks = NDArray[np.bool_]
+OUTER_QUANTILES = (0.05, 0.95)
+"""The quantiles over the draws that tables show beside a median."""
+COMPARED: dict[str, int] = {
+    "rms_error": -1,
+    "rms_error_ramp": -1,
+    "rms_error_hold": -1,
+    "peak_error": -1,
+    "gas_supplied": -1,
+    "mechanical_work": 0,
+    "gas_per_work": -1,
+    "switchings": -1,
+    "gas": -1,
+    "positive_push_off_work": 1,
+    "net_push_off_work": 1,
+    "push_off_error": -1,
+    "toe_clearance": 1,
+    "stays_up": 1,
+    "lowest_toes": 1,
+    "muscle_work": -1,
+}
+"""Metrics of the table: -1 where less is better, 1 where more is, 0 where neither is better as such."""
+
+
+@dataclass(frozen=True, slots=True)
+class Paired:
+    """One metric of a configuration against that of the baseline, over the pairs in which both have it.
+
+    ``difference`` is the mean of configuration less baseline [SI] with its confidence interval; ``change`` the median
+    over the draws of the same as a fraction of the baseline (nan where that is 0), ``change_low`` and ``change_high``
+    its 5 and 95 % quantiles: how uncertain the change is, however many draws are made. ``better`` is the probability
+    that the configuration is better in a draw, with its confidence interval: how well that is known from these draws;
+    None where neither end of the metric is better. ``equal`` is the fraction of draws in which both are the same.
+    ``effective_size`` is how many pairs determine the mean difference, ``noise`` the fraction of the variance of the
+    difference that is due to sensor noise, None where there is none.
+    """
+
+    metric: str
+    pairs: int
+    difference: Interval
+    change: float
+    change_low: float
+    change_high: float
+    better: Interval | None
+    equal: float
+    effective_size: float
+    noise: Interval | None = None
+
+
+def pareto_front(points: Floats) -> Masks:
+    """Return which points (points, goals) are not dominated: no other is at least as low in all goals, lower in one."""
+    front = np.zeros(len(points), dtype=np.bool_)
+    for row, point in enumerate(points):
+        if np.all(np.isfinite(point)):
+            is_dominating = np.all(points <= point, axis=1) & np.any(points < point, axis=1)
+            front[row] = not bool(np.any(is_dominating))
+    return front
+
+
+def compare_pairs(
+    metric: str,
+    baseline: Floats,
+    other: Floats,
+    better: int,
+    confidence: float,
+    other_noise: tuple[Floats, Floats] | None = None,
+) -> Paired | None:
+    """Return the statistics of values (draws,) [SI], nan where there is none; None without any pair.
+
+    The draws are dealt out to replicates in turn. ``other_noise`` are both again, for the first draws with other noise.
+    ``better`` is -1 where less is better, 1 where more is, 0 where neither is. A draw in which both are the same counts
+    for neither.
+    """
+    both = np.isfinite(baseline) & np.isfinite(other)
+    first, second = baseline[both], other[both]
+    if first.size == 0:
+        return None
+    change = (second - first)[first != 0.0] / np.abs(first[first != 0.0])
+    low, middle, high = (
+        np.quantile(change, (OUTER_QUANTILES[0], 0.5, OUTER_QUANTILES[1])) if change.size else (np.nan,) * 3
+    )
+    difference = other - baseline
+    noise = None
+    if other_noise is not None:
+        again = other_noise[1] - other_noise[0]
+        noise = noise_interval(difference[: again.size], again, confidence)
+    wins = np.where(both, better * (other - baseline) > 0.0, np.nan)
+    return Paired(
+        metric=metric,
+        pairs=first.size,
+        difference=replicates_interval(difference, REPLICATES, confidence),
+        change=float(middle),
+        change_low=float(low),
+        change_high=float(high),
+        better=share_interval(wins, REPLICATES, confidence) if better else None,
+        equal=float(np.mean(first == second)),
+        effective_size=effective_sample_size(second - first),
+        noise=noise,
+    )
+
+
+def best_probabilities(values: Sequence[Floats], better: int, confidence: float) -> list[Interval]:
+    """Return the probability of each configuration to be the best in a draw; ties count for all of them."""
+    table = better * np.stack(values)
+    known = np.all(np.isfinite(table), axis=0)
+    if not known.any():
+        return []
+    is_best = np.where(known, table == np.max(table, axis=0), np.nan)
+    return [share_interval(row, REPLICATES, confidence) for row in is_best]

@@ -1,1 +1,0 @@
-"""How sure is a number, and how many runs does it take?"""

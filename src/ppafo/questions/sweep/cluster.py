@@ -1,0 +1,56 @@
+"""The chunks of a study computed on a cluster."""
+
+from collections.abc import Callable, Iterable
+from typing import Any
+from uuid import uuid4
+
+from ppafo.errors import PpafoError, StudyError, one_line
+from ppafo.study.store import Finished, Task, work_on_chunk
+
+_TASKS_PER_THREAD = 3
+"""Tasks that wait at the scheduler for every thread of the workers: enough to keep them busy, few for 10^9 runs."""
+_SECONDS_TO_CONNECT = 30
+
+
+def compute_on_cluster(address: str, task: Task, numbers: Iterable[int], finish: Callable[[Finished], None]) -> None:
+    """Compute chunks on the workers of the scheduler at an address; ``finish`` hears of each one.
+
+    A chunk whose worker dies is given to another one by the scheduler.
+    """
+    distributed = _import_distributed()
+    try:
+        client = distributed.Client(address, timeout=_SECONDS_TO_CONNECT, set_as_default=False)
+    except (OSError, ValueError, TimeoutError) as error:
+        raise StudyError(f"--scheduler {address}: cannot be reached: {one_line(error)}") from error
+    with client:
+        _work_through(client, task, iter(numbers), finish, distributed)
+
+
+def _work_through(client: Any, task: Task, numbers: Any, finish: Callable[[Finished], None], distributed: Any) -> None:
+    queue = distributed.as_completed(loop=client.loop)
+
+    sweep = f"{task.study.name}-{uuid4().hex[:8]}"
+
+    def submit(count: int) -> None:
+        for _, number in zip(range(count), numbers, strict=False):
+            queue.add(client.submit(work_on_chunk, task, number, key=f"{sweep}-{number}", pure=False))
+
+    submit(max(4, _TASKS_PER_THREAD * sum(client.nthreads().values())))
+    for future in queue:
+        try:
+            finished: Finished = future.result()
+        except PpafoError:
+            raise
+        except distributed.scheduler.KilledWorker as error:
+            raise StudyError(f"chunk {future.key}: its workers died repeatedly: {one_line(error)}") from error
+        future.release()
+        finish(finished)
+        submit(1)
+
+
+def _import_distributed() -> Any:
+    try:
+        import distributed
+    except ModuleNotFoundError as error:
+        raise StudyError("--scheduler needs the extra 'cluster': pip install 'ppafo[cluster]'") from error
+    return distributed

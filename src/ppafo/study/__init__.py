@@ -1,0 +1,1 @@
+"""Runs over columns of values, and what an analysis found: one form for all of them."""

@@ -1,0 +1,108 @@
+"""A study divided into blocks of runs (chunks), and what varies in each of its runs.
+
+Runs are numbered configuration by configuration, in each grid point by grid point (the last axis fastest), at each
+draw by draw. A chunk never holds runs of two configurations.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ppafo.simulation.ensemble.running import reacts
+from ppafo.studies.distributions import Floats
+from ppafo.studies.sampling import correlate, uniform_numbers
+from ppafo.studies.study import Configuration, Study, with_followers
+
+MAXIMUM_RUNS_OF_CHUNK = 65_536
+_FEWEST_RUNS_OF_CHUNK = 512
+_SLOW_RUNS_OF_CHUNK = 64
+"""Where a Python object controls: some seconds, after which progress is said and nothing of it is lost."""
+_REACTING_RUNS_OF_CHUNK = 64
+"""Where the wearer reacts: a quarter of a minute of one processor, for walks of a minute."""
+_MAXIMUM_BYTES_OF_TRACES = 48_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Chunk:
+    """Some runs of one configuration: number of the chunk, first run of its configuration, and how many."""
+
+    number: int
+    configuration: int
+    first: int
+    runs: int
+
+
+def chunk_size(study: Study) -> int:
+    """Return the runs of a full chunk: fewer where channels over time are kept, so that memory stays small."""
+    if study.runs_of_chunk is not None:
+        return study.runs_of_chunk
+    if any(item.scenario.control.custom is not None for item in study.configurations):
+        return _SLOW_RUNS_OF_CHUNK
+    if any(reacts(item.scenario) for item in study.configurations):
+        return _REACTING_RUNS_OF_CHUNK
+    bytes_of_run = 8 * len(study.outputs.traces) * maximum_samples(study)
+    size = MAXIMUM_RUNS_OF_CHUNK
+    while size > _FEWEST_RUNS_OF_CHUNK and size * bytes_of_run > _MAXIMUM_BYTES_OF_TRACES:
+        size //= 2
+    return size
+
+
+def samples_of(study: Study, configuration: Configuration) -> int:
+    """Return how many samples a channel over time has in a configuration."""
+    return int(configuration.scenario.duration / study.outputs.every + 1.0e-9) + 1
+
+
+def maximum_samples(study: Study) -> int:
+    """Return how many samples a channel over time has, in the longest configuration."""
+    return max(samples_of(study, configuration) for configuration in study.configurations)
+
+
+def chunk_count(study: Study) -> int:
+    """Return the number of all chunks."""
+    return len(study.configurations) * -(-study.runs_of_configuration // chunk_size(study))
+
+
+def chunk(study: Study, number: int) -> Chunk:
+    """Return a chunk by its number."""
+    size = chunk_size(study)
+    configuration, place = divmod(number, -(-study.runs_of_configuration // size))
+    first = place * size
+    return Chunk(number, configuration, first, min(size, study.runs_of_configuration - first))
+
+
+def drawn_values(study: Study, runs: NDArray[np.int64]) -> dict[str, Floats]:
+    """Return the values [SI] of all varied paths for ascending runs of one configuration; the same in each of them."""
+    point, draw = np.divmod(runs, study.sample.runs)
+    columns: dict[str, Floats] = {}
+    for axis in reversed(study.axes):
+        point, place = np.divmod(point, len(axis.values))
+        columns[axis.path] = np.asarray(axis.values)[place]
+    if study.drawn:
+        columns |= _random_values(study, draw)
+    return {path: columns[path] for path in study.paths}
+
+
+def varied_columns(study: Study, configuration: Configuration, values: dict[str, Floats]) -> dict[str, Floats]:
+    """Return the values that the runs of a configuration get."""
+    own = {path: column for path, column in values.items() if study.varies(path, configuration.name)}
+    return with_followers(own, study.same_in(configuration.name))
+
+
+def _random_values(study: Study, draws: NDArray[np.int64]) -> dict[str, Floats]:
+    """Return the values of the distributions."""
+    uniform = _uniform_numbers(study, draws)
+    if study.scores is not None:
+        uniform = correlate(uniform, study.scores)
+    columns = np.ascontiguousarray(uniform.T)
+    return {item.path: item.distribution.values(columns[row]) for row, item in enumerate(study.drawn)}
+
+
+def _uniform_numbers(study: Study, draws: NDArray[np.int64]) -> Floats:
+    """Return the uniform numbers of some draws: of a small sample all and from these, of a large one in stretches."""
+    dimensions = len(study.drawn)
+    if study.sample.runs <= MAXIMUM_RUNS_OF_CHUNK:
+        return uniform_numbers(study.sample, dimensions, 0, study.sample.runs)[draws]
+    starts = np.flatnonzero(np.diff(draws, prepend=draws[0] - 2) != 1)
+    stretches = np.split(draws, starts[1:])
+    return np.concatenate([uniform_numbers(study.sample, dimensions, int(part[0]), part.size) for part in stretches])

@@ -1,0 +1,98 @@
+"""What a number is: its words, its unit in SI, how people are shown it. Declared once for text, tables and axes."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ppafo.answers.display_units import (
+    axis_unit,
+    change_text,
+    display_difference,
+    display_unit,
+    display_value,
+    display_values,
+    metric_quantity,
+    metric_words,
+    quantity_of_unit,
+)
+from ppafo.answers.setting_names import label_of
+from ppafo.metrics import METRICS
+from ppafo.studies.distributions import Floats, Interval
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """What a number is: its words, unit in SI, quantity (``display_units.QUANTITIES``; else shown in SI), and form."""
+
+    words: str = ""
+    unit: str = ""
+    quantity: str = ""
+    form: str = ".4g"
+
+    @property
+    def shown_unit(self) -> str:
+        """The unit in which it is shown; empty for a plain number."""
+        return display_unit(self.quantity) if self.quantity else self.unit.removeprefix("-")
+
+    @property
+    def title(self) -> str:
+        """Words and unit for a table."""
+        return f"{self.words} ({self.shown_unit})" if self.shown_unit else self.words
+
+    @property
+    def axis(self) -> str:
+        """Words and unit for an axis."""
+        unit = axis_unit(self.quantity) if self.quantity else self.shown_unit
+        return self.words if unit in ("", "1") else f"{self.words} ({unit})"
+
+    def values(self, values: ArrayLike) -> Floats:
+        """Return values in SI in the unit in which they are shown."""
+        return display_values(np.asarray(values, dtype=np.float64), self.quantity)
+
+    def number(self, value: float, form: str = "") -> str:
+        """Return a value in SI as text in the unit in which it is shown, without that unit."""
+        return f"{display_value(value, self.quantity):{form or self.form}}"
+
+    def text(self, value: float, form: str = "") -> str:
+        """Return a value in SI as text with the unit in which it is shown."""
+        return f"{self.number(value, form)} {self.shown_unit}".rstrip()
+
+    def change(self, value: float, form: str = ".3g") -> str:
+        """Return a difference of two values in SI as text with the unit in which it is shown."""
+        return change_text(value, self.quantity, form) if self.quantity else self.text(value, form)
+
+    def change_number(self, value: float, form: str = ".3g") -> str:
+        """Return a difference of two values in SI as text in the unit in which it is shown, without that unit."""
+        return f"{display_difference(value, self.quantity):{form}}"
+
+    def interval(self, found: Interval, form: str = "") -> str:
+        """Return an estimate and the ends of its interval as text without unit."""
+        value, low, high = (self.number(each, form) for each in (found.value, found.low, found.high))
+        return f"{value} [{low}, {high}]"
+
+    def change_interval(self, found: Interval, form: str = "") -> str:
+        """Return a difference and the ends of its interval as text without unit."""
+        ends = (found.value, found.low, found.high)
+        value, low, high = (self.change_number(each, form or self.form) for each in ends)
+        return f"{value} [{low}, {high}]"
+
+
+PLAIN = Kind()
+"""A plain number, or a text."""
+TIME = Kind("Time", "s", "time")
+
+
+def of_metric(name: str, form: str = ".4g") -> Kind:
+    """Return what a metric is."""
+    return Kind(metric_words(name), METRICS[name].unit, metric_quantity(name), form)
+
+
+def of_path(path: str, unit: str, form: str = ".6g") -> Kind:
+    """Return what the number at a path is, from its unit in SI."""
+    return Kind(label_of(path), unit, quantity_of_unit(unit), form)
+
+
+def of_channel(name: str, unit: str) -> Kind:
+    """Return what a channel of a recording is, from its unit in SI."""
+    return Kind(name.replace("_", " ").capitalize(), unit, quantity_of_unit(unit))

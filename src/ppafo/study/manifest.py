@@ -1,0 +1,255 @@
+"""What identifies a study: the controllers in Python, the programs, and ``study.json``, which refuses another study."""
+
+import copy
+import hashlib
+import inspect
+import json
+import math
+import numbers
+import sys
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from types import CodeType, FunctionType
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import BaseModel, Field
+
+from ppafo.control.kind import PythonController
+from ppafo.documents.json_text import json_text
+from ppafo.documents.models import quote, validate
+from ppafo.engine.lanes import write_source
+from ppafo.errors import DataError, StudyError
+from ppafo.metrics import METRICS
+from ppafo.simulation.plan import plan_run
+from ppafo.simulation.scenario import Scenario, plain, scenario_document
+from ppafo.storage.places import Place, read_document
+from ppafo.studies.study import Study
+from ppafo.study.blocks import chunk_count, chunk_size
+from ppafo.version import __version__
+
+_DIGITS = 16
+"""Digits of the hashes of a program and of a controller in Python."""
+_DEEPEST, _LONGEST = 12, 64
+"""Levels of settings that are looked into, items of a list that is kept and not hashed, and digits of a hash."""
+Inside = tuple[int, ...]
+"""Identities of what a value is inside of, so that what holds itself comes to an end."""
+
+
+def controller_document(controller: PythonController) -> dict[str, Any]:
+    """Return type, hash of the source text and settings of a controller as it is after a reset, as plain data."""
+    try:
+        fresh = copy.deepcopy(controller)
+    except (TypeError, copy.Error, NotImplementedError, RecursionError):  # it holds what has no copy, such as a port
+        return _object(controller, ())
+    # What a run left behind is no setting: a study resumes with the same object too.
+    fresh.reset()
+    return _object(fresh, ())
+
+
+def _object(value: object, inside: Inside) -> dict[str, Any]:
+    try:
+        found = object.__getstate__(value)
+    except TypeError:  # made outside of Python
+        found = None
+    tables = [table for table in (found if isinstance(found, tuple) else (found,)) if isinstance(table, dict)]
+    settings = {str(name): item for table in tables for name, item in table.items()}
+    kind = type(value)
+    return {"type": _name(kind), "source": _hash_of(kind.__mro__), "settings": _plain_setting(settings, inside)}
+
+
+def _name(made: type | FunctionType) -> str:
+    return f"{made.__module__}.{made.__qualname__}"
+
+
+def _hash_of(made: tuple[type | FunctionType, ...]) -> str:
+    """Return a hash of the files in which classes or functions are written; of their code where there is no file."""
+    digest = hashlib.sha256()
+    for one in made:
+        # The standard library is another one with another Python, which is no other controller.
+        if one.__module__ == "__main__" or one.__module__.partition(".")[0] not in sys.stdlib_module_names:
+            digest.update(_text_of(one))
+    return digest.hexdigest()[:_DIGITS]
+
+
+def _text_of(made: type | FunctionType) -> bytes:
+    try:
+        return Path(inspect.getfile(made)).read_bytes()
+    except (TypeError, OSError):  # from a notebook, or typed in
+        functions = [made] if isinstance(made, FunctionType) else vars(made).values()
+        return repr([list(_code(one.__code__)) for one in functions if isinstance(one, FunctionType)]).encode()
+
+
+def _code(code: CodeType) -> Iterator[object]:
+    yield from (code.co_name, code.co_code, code.co_names)
+    for constant in code.co_consts:
+        yield list(_code(constant)) if isinstance(constant, CodeType) else constant
+
+
+def _plain_setting(value: object, inside: Inside) -> Any:
+    """Return a setting as data that JSON can hold; one that holds itself, or lies too deep, is its type's name."""
+    if value is None or isinstance(value, str | bool | numbers.Number | np.generic):
+        return _number_or_text(value)
+    if isinstance(value, bytes):
+        return hashlib.sha256(value).hexdigest()[:_DIGITS]
+    if isinstance(value, type | FunctionType):
+        return {"type": _name(value), "source": _hash_of((value,))}
+    if id(value) in inside or len(inside) >= _DEEPEST:
+        return _name(type(value))
+    deeper = (*inside, id(value))
+    if isinstance(value, Mapping):
+        return {str(key): _plain_setting(item, deeper) for key, item in value.items()}
+    items = _items(value)
+    return _object(value, deeper) if items is None else _shortened([_plain_setting(item, deeper) for item in items])
+
+
+def _number_or_text(value: object) -> Any:
+    bare = value.item() if isinstance(value, np.generic) else value
+    if bare is None or isinstance(bare, str | bool | int):
+        return bare
+    return bare if isinstance(bare, float) and math.isfinite(bare) else repr(bare)
+
+
+def _items(value: object) -> list[Any] | None:
+    """Return what a collection has in it, None of what is none."""
+    if isinstance(value, np.ndarray):
+        return list(value.tolist()) if value.ndim else [value.item()]
+    if isinstance(value, set | frozenset):
+        return sorted(value, key=repr)
+    return list(value) if isinstance(value, tuple | list) else None
+
+
+def _shortened(items: list[Any]) -> Any:
+    if len(items) <= _LONGEST:
+        return items
+    return {"items": len(items), "sha256": hashlib.sha256(json.dumps(items).encode()).hexdigest()}
+
+
+MANIFEST = "study.json"
+STUDY_COPY = "study.toml"
+FORMAT = "ppafo study results"
+SCHEMA_VERSION = 2
+_NAMED = 4
+_COMPARED = ("ppafo", "study", "scenarios", "varied", "drawn", "programs")
+
+
+def manifest(study: Study) -> dict[str, Any]:
+    """Return the document: study, base scenarios in SI units, runs, columns with units; no time and no machine."""
+    scenarios = {item.name: _without_origin(item.scenario) for item in study.configurations}
+    # What is drawn may come from a parameter set, or have been changed in Python, and the file says neither.
+    parts = {name: getattr(study, name) for name in ("axes", "drawn", "same", "scores", "sample", "outputs")}
+    drawn = _plain(plain(parts))
+    requested = {
+        "ppafo": __version__,
+        "study": _plain(study.document),
+        "scenarios": scenarios,
+        "drawn": drawn,
+        "programs": {item.name: _program_hash(item.scenario) for item in study.configurations},
+    }
+    return {
+        "format": FORMAT,
+        "schema_version": SCHEMA_VERSION,
+        **requested,
+        "sha256": hashlib.sha256(json.dumps(requested, sort_keys=True).encode()).hexdigest(),
+        "runs": study.runs,
+        "runs_of_configuration": study.runs_of_configuration,
+        "chunks": chunk_count(study),
+        "runs_of_chunk": chunk_size(study),
+        "varied": {path: {"unit": study.units[path]} for path in study.paths},
+        "metrics": {
+            name: {"unit": METRICS[name].unit, "summary": METRICS[name].summary} for name in study.outputs.metrics
+        },
+    }
+
+
+def read_manifest(place: Place) -> dict[str, Any]:
+    """Return the document of a folder of results; DataError where it is none."""
+    try:
+        document = read_document(place, MANIFEST)
+    except (OSError, ValueError) as error:
+        raise DataError(f"{place.address}: contains no study results ({MANIFEST} cannot be read)") from error
+    if not isinstance(document, dict) or document.get("format") != FORMAT:
+        raise DataError(f"{place.address}: {MANIFEST} is not a manifest of study results")
+    if document.get("schema_version") != SCHEMA_VERSION:
+        raise DataError(
+            f"{place.address}: has schema_version {quote(document.get('schema_version'))}, "
+            f"this version of ppafo reads {SCHEMA_VERSION}"
+        )
+    validate(_Stored, document, f"{place.address}: {MANIFEST}", DataError)
+    return document
+
+
+class _Named(BaseModel):
+    name: str
+
+
+class _StoredStudy(_Named):
+    configurations: Annotated[list[_Named], Field(min_length=1)]
+    outputs: dict[str, Any]
+
+
+class _Stored(BaseModel):
+    """What everybody may rely on in the document; how it differs from that of a study is said elsewhere."""
+
+    study: _StoredStudy
+    runs: Annotated[int, Field(ge=1)]
+    chunks: Annotated[int, Field(ge=1)]
+    varied: dict[str, Any]
+    metrics: dict[str, dict[str, Any]]
+
+
+def check_same_study(place: Place, stored: Mapping[str, Any], requested: Mapping[str, Any]) -> None:
+    """Refuse to go on with the results of another study, or of this one before it was changed."""
+    before, now = stored.get("study", {}), requested["study"]
+    if before.get("name") != now["name"]:
+        raise StudyError(
+            f"{place.address}: contains the results of the study '{before.get('name')}', not of '{now['name']}'; "
+            "choose another folder"
+        )
+    changed = [line for key in _COMPARED for line in _differences(key, stored.get(key), requested[key])]
+    if changed:
+        named = "; ".join(changed[:_NAMED]) + (f"; and {len(changed) - _NAMED} more" if len(changed) > _NAMED else "")
+        raise StudyError(
+            f"{place.address}: contains results of an earlier version of '{now['name']}': {named}; undo the change "
+            "or choose another folder"
+        )
+
+
+def manifest_bytes(document: Mapping[str, Any]) -> bytes:
+    """Return the content of the file."""
+    return f"{json_text(document)}\n".encode()
+
+
+def _without_origin(scenario: Scenario) -> dict[str, Any]:
+    """Return a base scenario in SI units without the file it came from, which may lie elsewhere the next time."""
+    document: dict[str, Any] = _plain(scenario_document(scenario))
+    del document["origin"]
+    custom = scenario.control.custom
+    if custom is not None:
+        document["control"]["custom"] = controller_document(custom)
+    return document
+
+
+def _program_hash(scenario: Scenario) -> str:
+    """Return a hash of what a scenario computes: a law or a valve from a module of the user is a name elsewhere."""
+    lines = write_source(plan_run(scenario).program, 1)[1].splitlines()
+    # A line of comment says where a function stands, which may be elsewhere the next time.
+    code = "\n".join(line for line in lines if not line.startswith("#"))
+    return hashlib.sha256(code.encode()).hexdigest()[:_DIGITS]
+
+
+def _plain(document: Any) -> Any:
+    return json.loads(json.dumps(document))
+
+
+def _differences(path: str, before: Any, now: Any) -> Iterator[str]:
+    """Give a line for every key at which two documents differ."""
+    if isinstance(before, dict) and isinstance(now, dict):
+        for key in dict.fromkeys((*before, *now)):
+            yield from _differences(f"{path}.{key}", before.get(key), now.get(key))
+    elif isinstance(before, list) and isinstance(now, list) and len(before) == len(now):
+        for number, (old, new) in enumerate(zip(before, now, strict=True), start=1):
+            label = new.get("path", new.get("name", number)) if isinstance(new, dict) else number
+            yield from _differences(f"{path}[{label}]", old, new)
+    elif before != now:
+        yield f"{path.removeprefix('study.')} was {quote(before)} and is now {quote(now)}"

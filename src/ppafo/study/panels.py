@@ -1,0 +1,150 @@
+"""Panels of a figure, as data, and drawn: what the shapes of marks look like; Matplotlib lays them out itself."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import groupby
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ppafo.answers.style import BLUE, house_style, label_lines, mark_kind
+from ppafo.study.kind import Kind
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """Something drawn: a shape of ``SHAPES``, where, up to where [SI], its name, colour, words of Matplotlib."""
+
+    shape: str
+    x: Any = ()
+    y: Any = ()
+    to: Any = ()
+    label: str = ""
+    colour: str = BLUE
+    style: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Panel:
+    """A panel of a figure: what its axes are, and the marks on them.
+
+    ``scale`` is what the colours of a map or of points stand for; panels that follow each other with one scale share
+    its bar. ``legend`` is "above", "inside" or empty. ``then`` has the last word on the axes.
+    """
+
+    x: Kind
+    y: Kind
+    marks: Sequence[Mark]
+    title: str = ""
+    scale: Kind | None = None
+    legend: str = "above"
+    then: "Callable[[Axes], object] | None" = None
+
+
+_TOP = 0.28
+"""Inches above the panels, in which the figure says that it is simulated."""
+_AREA = {"alpha": 0.15, "linewidth": 0}
+
+
+def _line(axes: "Axes", mark: Mark, x: Any, y: Any) -> None:
+    axes.plot(x, y, color=mark.colour, label=mark.label, **mark.style)
+
+
+def _reach(axes: "Axes", mark: Mark, x: Any, y: Any) -> None:
+    axes.errorbar(x, y, xerr=mark.to, fmt="o", color=mark.colour, label=mark.label, **mark.style)
+
+
+def _bars(axes: "Axes", mark: Mark, x: Any, _y: Any) -> None:
+    axes.stairs(mark.y, x, fill=True, color=mark.colour, alpha=0.35)
+    axes.stairs(mark.y, x, color=mark.colour, label=mark.label, linewidth=1.2)
+
+
+SHAPES: Mapping[str, Callable[..., Any]] = {
+    "line": _line,
+    "reach": _reach,
+    "bars": _bars,
+    "band": lambda axes, mark, x, y: axes.fill_between(
+        x, y[0], y[1], color=mark.colour, label=mark.label, **_AREA | dict(mark.style)
+    ),
+    "span": lambda axes, mark, x, _y: axes.axvspan(
+        x[0], x[1], color=mark.colour, label=mark.label, **_AREA | dict(mark.style)
+    ),
+    "strip": lambda axes, mark, _x, y: axes.axhspan(
+        y[0], y[1], color=mark.colour, label=mark.label, **_AREA | dict(mark.style)
+    ),
+    "upright": lambda axes, mark, x, y: axes.vlines(x, y[0], y[1], color=mark.colour, label=mark.label, **mark.style),
+    "level": lambda axes, mark, _x, y: axes.axhline(y, color=mark.colour, label=mark.label, **mark.style),
+    "at": lambda axes, mark, x, _y: axes.axvline(x, color=mark.colour, label=mark.label, **mark.style),
+    "map": lambda axes, mark, x, y: axes.pcolormesh(
+        x, y, mark.to, shading="nearest", rasterized=True, cmap="cividis", **mark.style
+    ),
+    "points": lambda axes, mark, x, y: axes.scatter(
+        x, y, c=mark.to, s=9, linewidths=0, cmap="cividis", rasterized=True, **mark.style
+    ),
+}
+"""How a mark is drawn, by its shape: axes, mark, and where it is in the units that are shown.
+
+``line``, ``bars`` (edges and counts), ``reach`` (points with the half width ``to``), ``band`` (between two rows of y),
+``span`` and ``strip`` (between two x, two y), ``upright`` (from one y to another), ``level`` and ``at`` (a line across
+or upright), ``map`` and ``points`` (coloured by ``to``).
+"""
+
+
+def draw_panels(
+    panels: Sequence[Panel], across: int = 1, size: tuple[float, float] = (6.6, 2.9), title: str = ""
+) -> Any:
+    """Return the figure of some panels, ``across`` of them side by side, each of a size [inches]."""
+    from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+    rows = max(1, -(-len(panels) // across))
+    width, height = size[0] * across + 0.3, size[1] * rows + 0.4
+    with house_style():
+        layout = ConstrainedLayoutEngine(w_pad=0.1, h_pad=0.08, rect=(0.0, 0.0, 1.0, 1.0 - _TOP / height))
+        figure = Figure(figsize=(width, height), layout=layout)
+        grid = list(figure.subplots(rows, across, squeeze=False).flat)
+        drawn = [_draw(axes, panel) for axes, panel in zip(grid, panels, strict=False)]
+        for axes in grid[len(panels) :]:
+            axes.set_axis_off()
+        _share_scales(figure, [(axes, panel, each) for axes, panel, each in zip(grid, panels, drawn, strict=False)])
+        if title:
+            figure.suptitle(title, x=0.01, ha="left", fontsize=11, wrap=True)
+        mark_kind(figure, "simulated")
+        return figure
+
+
+def _draw(axes: "Axes", panel: Panel) -> Any:
+    """Draw a panel, and return what has colours that stand for numbers."""
+    mapped = None
+    for mark in panel.marks:
+        shown = SHAPES[mark.shape](axes, mark, panel.x.values(mark.x), panel.y.values(mark.y))
+        mapped = shown if mark.shape in ("map", "points") else mapped
+    axes.set_xlabel(panel.x.axis)
+    axes.set_ylabel(panel.y.axis)
+    axes.set_title(panel.title)
+    if panel.legend and any(mark.label for mark in panel.marks):
+        if panel.legend == "above":
+            label_lines(axes)
+        else:
+            axes.legend(loc="best", frameon=True, framealpha=0.85, edgecolor="none", handlelength=1.2)
+    if panel.then is not None:
+        panel.then(axes)
+    return mapped
+
+
+def _share_scales(figure: "Figure", drawn: list[tuple["Axes", Panel, Any]]) -> None:
+    """Give panels that follow each other with one scale the same limits and one bar."""
+    for scale, group in groupby(drawn, key=lambda item: item[1].scale):
+        members = list(group)
+        if scale is None:
+            continue
+        limits = np.array([each.get_clim() for _, _, each in members], dtype=np.float64)
+        limits = limits[np.isfinite(limits).all(axis=1)]
+        for _, _, each in members if limits.size else ():
+            each.set_clim(float(limits[:, 0].min()), float(limits[:, 1].max()))
+        bar = figure.colorbar(members[0][2], ax=[axes for axes, _, _ in members], pad=0.02)
+        bar.set_label(scale.axis)

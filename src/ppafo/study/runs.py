@@ -1,0 +1,159 @@
+"""Runs of a scenario over columns of values: numbers in, metrics out, one table that grows."""
+
+import time
+from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import Any, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ppafo.errors import ScenarioError, StudyError, refused_as
+from ppafo.metrics import METRICS
+from ppafo.metrics.tracking import ONE_INSTANT, settled_error
+from ppafo.progress import Progress, Report
+from ppafo.simulation.ensemble import run_ensemble
+from ppafo.simulation.ensemble.running import lacking, reacts
+from ppafo.simulation.scenario import Scenario
+from ppafo.studies.distributions import Floats
+from ppafo.studies.draws import check_metrics
+
+Rows = dict[str, NDArray[Any]]
+"""Columns of one length: metrics by name [SI], nan where a run has none, and whether each run ``failed``."""
+FAILED = "failed"
+OSCILLATES = ("rms_error_hold", "oscillations_hold")
+"""What says whether a metric at one instant can be believed."""
+_AT_ONCE, _SLOW_AT_ONCE, _REACTING_AT_ONCE = 16_384, 32, 64
+"""Runs between two reports: as a rule, where a Python object controls, and where the wearer reacts."""
+
+
+@final
+class Tally:
+    """Counts runs for whoever watches: ``runs`` is how many there will be, doubled where there are more after all."""
+
+    def __init__(self, runs: int, progress: Report | None) -> None:
+        self._runs, self._report, self._started = max(1, runs), progress, 0.0
+        self.done = self.failed = self._first = 0
+
+    def add(self, runs: int, failed: int) -> None:
+        """Count runs that are done; the rate leaves out the first ones, before which models may be compiled."""
+        if self.done == 0:
+            self._first, self._started = runs, time.monotonic()
+        self.done += runs
+        self.failed += failed
+        while self._runs < self.done:
+            self._runs *= 2
+        if self._report is not None:
+            elapsed = time.monotonic() - self._started
+            self._report(Progress("", self.done, self._runs, self.failed, self._first, elapsed))
+
+
+@final
+class Runs:
+    """Runs of a scenario: ``run(columns)`` returns their rows and appends columns and rows to ``table``.
+
+    ``count`` runs were made, ``failures`` of them diverged or were refused; ``reason`` states why the first did.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        metrics: Sequence[str],
+        tally: "Tally",
+        gauge: Collection[str] = (),
+        threads: int | None = None,
+    ) -> None:
+        """Refuse a metric that does not exist or that the scenario cannot have.
+
+        Columns of the paths in ``gauge`` count from the atmosphere of their run.
+        """
+        check_metrics(metrics, scenario)
+        at_once = _REACTING_AT_ONCE if reacts(scenario) else _AT_ONCE
+        self._at_once = at_once if scenario.control.custom is None else _SLOW_AT_ONCE
+        self._tally = tally
+        self._begin(metrics, lambda columns: _ensemble(scenario, columns, metrics, threads, gauge))
+
+    @classmethod
+    def of_model(cls, model: Callable[[Mapping[str, Floats]], Mapping[str, Any]], metrics: Sequence[str]) -> "Runs":
+        """Return runs of a function of the columns in place of a scenario; a run without a finite metric failed."""
+        runs = cls.__new__(cls)
+        runs._at_once, runs._tally = _AT_ONCE, Tally(1, None)
+
+        def rows(columns: Mapping[str, Floats]) -> tuple[Rows, str]:
+            found = {name: np.asarray(values) for name, values in model(columns).items()}
+            failed = found.get(FAILED, ~np.any([np.isfinite(found[name]) for name in metrics], axis=0))
+            return {**found, FAILED: failed}, "diverged" if failed.any() else ""
+
+        runs._begin(metrics, rows)
+        return runs
+
+    def _begin(self, metrics: Sequence[str], rows: Callable[[Mapping[str, Floats]], tuple[Rows, str]]) -> None:
+        self.metrics, self._rows = tuple(metrics), rows
+        self._parts: list[Rows] = []
+        self.count, self.failures, self.reason = 0, 0, ""
+
+    def run(self, columns: Mapping[str, Floats]) -> Rows:
+        """Return the rows of runs with these values [SI] by path, each column (runs,)."""
+        runs = len(next(iter(columns.values())))
+        parts = []
+        for first in range(0, runs, self._at_once):
+            part = {path: values[first : first + self._at_once] for path, values in columns.items()}
+            rows, reason = self._rows(part)
+            parts.append(rows)
+            self._parts.append({**part, **rows})
+            self.reason = self.reason or reason
+            self.count += rows[FAILED].size
+            self.failures += failures_of(rows)
+            self._tally.add(rows[FAILED].size, failures_of(rows))
+        return joined(parts)
+
+    @property
+    def table(self) -> Rows:
+        """All rows so far, with the columns that made them."""
+        return joined(self._parts) if self._parts else {}
+
+    def check(self, rows: Rows, maximum_failed: float, what: str) -> None:
+        """Refuse to continue where more than a fraction of some rows failed; ``what`` names them in the message."""
+        failures, runs = failures_of(rows), rows[FAILED].size
+        if failures > maximum_failed * runs:
+            raise StudyError(
+                f"{what}: {failures:,} of {runs:,} runs failed ({100.0 * failures / runs:.3g} %), more than the "
+                f"{100.0 * maximum_failed:.3g} % allowed; the first: {self.reason}"
+            )
+
+
+def _ensemble(
+    scenario: Scenario,
+    columns: Mapping[str, Floats],
+    metrics: Sequence[str],
+    threads: int | None,
+    gauge: Collection[str],
+) -> tuple[Rows, str]:
+    with refused_as(StudyError, f"scenario '{scenario.name}'", ScenarioError):
+        result = run_ensemble(scenario, columns, metrics, threads=threads, gauge=gauge)
+    runs = result.status.size
+    values: Rows = {name: result.metrics.get(name, np.full(runs, np.nan)) for name in metrics}
+    return {**values, FAILED: result.status != 0}, result.reasons[min(result.reasons)] if result.reasons else ""
+
+
+def joined(parts: Sequence[Rows]) -> Rows:
+    """Return rows one after the other."""
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+def failures_of(rows: Rows) -> int:
+    """Return how many of some rows failed."""
+    return int(np.count_nonzero(rows[FAILED]))
+
+
+def with_companions(metrics: Sequence[str], scenario: Scenario) -> tuple[str, ...]:
+    """Return metrics with those that a metric at one instant needs beside it, where the scenario offers them."""
+    if ONE_INSTANT not in metrics or any(lacking(scenario, METRICS[name]) for name in OSCILLATES):
+        return tuple(metrics)
+    return tuple(dict.fromkeys((*metrics, *OSCILLATES)))
+
+
+def settled(rows: Rows, metric: str) -> Floats:
+    """Return a metric for a judgement: no instant of a loop that oscillates counts as its error."""
+    if metric != ONE_INSTANT or not set(OSCILLATES) <= set(rows):
+        return rows[metric]
+    return settled_error(rows[metric], *(rows[name] for name in OSCILLATES))

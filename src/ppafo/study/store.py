@@ -1,0 +1,270 @@
+"""The results of a study in a folder or at an address: chunks of rows, each with a note of its checksum.
+
+A chunk counts as finished once its note is written, last; a file that does not match its note is computed again. Page
+checksums of Parquet miss a flipped bit here and there: SHA-256 does not.
+"""
+
+import hashlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ppafo.documents.json_text import json_text
+from ppafo.errors import DataError, ScenarioError, StudyError, refused_as
+from ppafo.metrics import METRICS
+from ppafo.signals.recording import CHANNELS
+from ppafo.simulation.ensemble import EnsembleResult, run_ensemble
+from ppafo.simulation.numbers import absolute
+from ppafo.storage.parquet import (
+    TableColumn,
+    encode_texts,
+    lists_of,
+    parquet_bytes,
+    read_parquet,
+    table_of,
+    texts_of_some,
+)
+from ppafo.storage.places import Place, place_at, read_document
+from ppafo.studies.distributions import Floats
+from ppafo.studies.study import Study
+from ppafo.study.blocks import Chunk, chunk, chunk_count, drawn_values, maximum_samples, samples_of, varied_columns
+from ppafo.study.manifest import MANIFEST, STUDY_COPY, check_same_study, manifest, manifest_bytes, read_manifest
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+_TRIED_RUNS = 8
+STATUSES = ("completed", "diverged", "refused")
+_PLAIN = "-"
+ASKED_ABOVE = 10_000_000_000
+"""Bytes above which a study is only started with ``--yes``."""
+_FIXED_BYTES_OF_ROW = 3
+_BYTES_OF_NUMBER, _BYTES_OF_SAMPLE = 8, 4
+_BYTES_OF_FILE = 12_000
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """What a worker needs beside the number of a chunk: study, address of the folder, threads."""
+
+    study: Study
+    address: str
+    threads: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class Finished:
+    """A chunk that is written: its number, its runs, and how many of them failed."""
+
+    number: int
+    runs: int
+    failed: int
+
+
+@dataclass(frozen=True, slots=True)
+class Store:
+    """The chunks of a study at a place."""
+
+    study: Study
+    place: Place
+
+    @classmethod
+    def claim(cls, study: Study, place: Place, agreed: bool, threads: int | None) -> "Store":
+        """Make a place that of a study, or refuse it: of another study, of an earlier version, without room."""
+        names = place.names()
+        if MANIFEST in names:
+            check_same_study(place, read_manifest(place), manifest(study))
+        elif names:
+            raise StudyError(
+                f"{place.address}: is not empty and contains no study results (it has no {MANIFEST}); choose another "
+                "folder"
+            )
+        else:
+            check_room(study, place, agreed)
+            _try(study, threads)
+            place.write(MANIFEST, manifest_bytes(manifest(study)))
+        place.tidy()
+        # After study.json, by which the folder is known to be ours.
+        if study.text and STUDY_COPY not in names:
+            place.write(STUDY_COPY, study.text)
+        return cls(study, place)
+
+    def finished(self) -> list[Finished]:
+        """Return the chunks whose files are as they were written."""
+        there = self.place.names()
+        known = (self._known(number) for number in range(chunk_count(self.study)) if note_file(number) in there)
+        return [item for item in known if item is not None]
+
+    def write(self, finished: Finished, content: bytes) -> None:
+        """Write the file of a chunk, and last the note by which it counts as finished."""
+        name = chunk_file(finished.number)
+        self.place.write(name, content)
+        checksums = {name: hashlib.sha256(content).hexdigest()}
+        note = {"runs": finished.runs, "failed": finished.failed, "sha256": checksums}
+        self.place.write(note_file(finished.number), f"{json_text(note)}\n".encode())
+
+    def _known(self, number: int) -> Finished | None:
+        try:
+            note = read_document(self.place, note_file(number))
+            finished = Finished(number, int(note["runs"]), int(note["failed"]))
+            name = chunk_file(number)
+            with self.place.open(name) as file:
+                is_whole = hashlib.file_digest(file, "sha256").hexdigest() == note["sha256"][name]
+        except (OSError, ValueError, KeyError, TypeError, OverflowError):
+            return None
+        return finished if is_whole and finished.runs == chunk(self.study, number).runs else None
+
+
+def stored_rows(place: Place, numbers: Sequence[int], columns: Sequence[str] | None = None) -> "Iterator[pa.Table]":
+    """Give the tables of some chunks one after the other; DataError where one is missing or damaged."""
+    for number in numbers:
+        name = chunk_file(number)
+        try:
+            yield read_parquet(place.open(name), name, columns)
+        except (DataError, OSError) as error:
+            raise DataError(
+                f"{place.address}/{name}: is missing or damaged; run the study again into this folder to recompute "
+                "this chunk"
+            ) from error
+
+
+def compute_chunk(task: Task, number: int) -> tuple[Finished, bytes]:
+    """Return the file of a chunk, computed here and not yet written."""
+    study, part = task.study, chunk(task.study, number)
+    values = drawn_values(study, np.arange(part.first, part.first + part.runs))
+    result = _result(study, part, values, task.threads)
+    # A row for every run: number, configuration, varied values, status, metrics; SI units, nan where none.
+    configuration = study.configurations[part.configuration]
+    name = configuration.name
+    own = absolute(configuration.scenario, varied_columns(study, configuration, dict(values)), study.gauge)
+    names = [item.name for item in study.configurations]
+    columns = {
+        "run": TableColumn(_numbers(study, part), _PLAIN, "number of the run in the study"),
+        "configuration": TableColumn(
+            encode_texts(np.full(part.runs, part.configuration), names), _PLAIN, "name of the base scenario"
+        ),
+    }
+    for path, column in values.items():
+        given = own.get(path, column) if study.varies(path, name) else np.full(part.runs, np.nan)
+        columns[path] = TableColumn(given, study.units[path], "varied value")
+    columns["status"] = TableColumn(encode_texts(result.status, STATUSES), _PLAIN, "how the run ended")
+    columns["failure_time"] = TableColumn(result.failure_time, "s", "time at which the run diverged")
+    columns["reason"] = TableColumn(texts_of_some(result.reasons, part.runs), _PLAIN, "why the run has no metrics")
+    for metric in study.outputs.metrics:
+        computed = result.metrics.get(metric, np.full(part.runs, np.nan))
+        columns[metric] = TableColumn(computed, stored_unit(METRICS[metric].unit), METRICS[metric].summary)
+        if metric in result.errors:
+            unit = "Pa_d" if METRICS[metric].unit == "Pa" else METRICS[metric].unit
+            columns[f"{metric}_error"] = TableColumn(result.errors[metric], unit, f"estimated error of {metric}")
+    for channel in study.outputs.traces:
+        # What bands are read from is kept as it was computed, all else in single precision.
+        trace = result.traces[channel].T
+        trace = trace if trace.size else np.full((part.runs, samples_of(study, configuration)), np.nan)
+        trace = trace.astype(np.float64 if channel in study.outputs.bands else np.float32)
+        said = f"{CHANNELS[channel].summary}, every {study.outputs.every:g} s"
+        columns[trace_column(channel)] = TableColumn(lists_of(trace), stored_unit(CHANNELS[channel].unit), said)
+    facts = {"study": study.name, "chunk": str(number), "rows": str(part.runs), "every": f"{study.outputs.every!r} s"}
+    content = parquet_bytes(table_of(columns, facts))
+    return Finished(number, part.runs, int(np.count_nonzero(result.status))), content
+
+
+def work_on_chunk(task: Task, number: int) -> Finished:
+    """Compute and write a chunk: what a worker of a cluster does."""
+    finished, content = compute_chunk(task, number)
+    Store(task.study, place_at(task.address)).write(finished, content)
+    return finished
+
+
+def trace_column(channel: str) -> str:
+    """Return the name of the column with the values of a channel over time."""
+    return f"{channel}_over_time"
+
+
+def chunk_file(number: int) -> str:
+    """Return the name of the file of a chunk."""
+    return f"runs/chunk-{number:07d}.parquet"
+
+
+def note_file(number: int) -> str:
+    """Return the name of the note by which a chunk counts as finished."""
+    return f"finished/chunk-{number:07d}.json"
+
+
+def completed_rows(table: "pa.Table") -> NDArray[np.bool_]:
+    """Return which rows of a table of runs completed."""
+    import pyarrow.compute as pc
+
+    equal = pc.equal(table.column("status").cast("string"), STATUSES[0])
+    return np.asarray(equal.to_numpy(), dtype=np.bool_)
+
+
+def _try(study: Study, threads: int | None) -> None:
+    """Run a few runs of each configuration, spread evenly, so that a path that cannot vary is refused at once."""
+    total = study.runs_of_configuration
+    runs = np.unique(np.linspace(0, total - 1, min(total, _TRIED_RUNS)).astype(np.int64))
+    values = drawn_values(study, runs)
+    for number in range(len(study.configurations)):
+        _result(study, Chunk(0, number, 0, runs.size), values, threads)
+
+
+def _result(study: Study, part: Chunk, values: dict[str, Floats], threads: int | None) -> EnsembleResult:
+    configuration, outputs = study.configurations[part.configuration], study.outputs
+    columns = varied_columns(study, configuration, values) or {
+        "supply.pressure": np.full(part.runs, configuration.scenario.device.supply.pressure)
+    }
+    every = outputs.every if outputs.traces else 0.0
+    with refused_as(StudyError, f"configuration '{configuration.name}'", ScenarioError):
+        return run_ensemble(
+            configuration.scenario,
+            columns,
+            outputs.metrics,
+            outputs.traces,
+            every,
+            threads,
+            study.gauge,
+            outputs.errors,
+        )
+
+
+def stored_unit(unit: str) -> str:
+    """Return the unit as tables state it: a pressure is absolute (``Pa_a``) or a difference (``Pa_d``), never bare.
+
+    What metrics and channels call Pa is absolute.
+    """
+    return "Pa_a" if unit == "Pa" else unit
+
+
+def _numbers(study: Study, chunk: Chunk) -> "np.ndarray[tuple[int], np.dtype[np.int64]]":
+    first = chunk.configuration * study.runs_of_configuration + chunk.first
+    return np.arange(first, first + chunk.runs, dtype=np.int64)
+
+
+def estimate_bytes(study: Study) -> int:
+    """Return an upper estimate of the bytes on disk: as if nothing could be compressed."""
+    outputs, samples = study.outputs, maximum_samples(study)
+    numbers = 2 + len(study.paths) + len(outputs.metrics) * (2 if outputs.errors else 1)
+    traces = sum(_BYTES_OF_NUMBER if name in outputs.bands else _BYTES_OF_SAMPLE for name in outputs.traces)
+    row = _FIXED_BYTES_OF_ROW + _BYTES_OF_NUMBER * numbers + samples * traces
+    return study.runs * row + chunk_count(study) * _BYTES_OF_FILE
+
+
+def check_room(study: Study, place: Place, agreed: bool) -> None:
+    """Refuse a study that does not fit onto the disk, or that takes much of it and was not agreed to with ``--yes``."""
+    needed, free = estimate_bytes(study), place.free_bytes()
+    size = f"{study.runs:,} runs of '{study.name}' need about {_bytes_text(needed)}"
+    if free is not None and needed > free:
+        raise StudyError(
+            f"{place.address}: {size}, but only {_bytes_text(free)} are free: use fewer runs, metrics or trajectories"
+        )
+    if needed > ASKED_ABOVE and not agreed:
+        raise StudyError(f"{place.address}: {size}; give --yes to start it anyway")
+
+
+def _bytes_text(size: int) -> str:
+    for unit, scale in (("TB", 1e12), ("GB", 1e9), ("MB", 1e6)):
+        if size >= scale:
+            return f"{size / scale:.3g} {unit}"
+    return f"{size / 1e3:.3g} kB"

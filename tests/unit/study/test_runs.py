@@ -1,0 +1,72 @@
+"""Runs: columns in, rows out, one table that grows; failures counted."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+from ppafo.errors import StudyError
+from ppafo.progress import Progress
+from ppafo.running import simulate
+from ppafo.simulation.loading import load_scenario
+from ppafo.studies.distributions import Floats
+from ppafo.study.runs import FAILED, Runs, Tally, settled
+
+SHORT = ("run.duration=0.2 s",)
+
+
+def runs_of(*metrics: str) -> Runs:
+    """Runs of a short task."""
+    return Runs(load_scenario("torque-task-proportional", SHORT), metrics, Tally(1, None))
+
+
+def test_each_run_gives_what_it_gives_alone() -> None:
+    runs = runs_of("rms_error", "gas_supplied")
+    rows = runs.run({"valve.area": np.array([10e-6, 12e-6])})
+    alone = simulate("torque-task-proportional", [*SHORT, "valve.area=12 mm^2"]).metrics
+    assert rows["rms_error"][1] == pytest.approx(alone["rms_error"].value, rel=1e-9)
+    assert rows["gas_supplied"][1] == pytest.approx(alone["gas_supplied"].value, rel=1e-9)
+    assert runs.failures == 0
+
+
+def test_a_run_that_is_refused_is_a_failure_with_its_reason() -> None:
+    runs = runs_of("rms_error")
+    rows = runs.run({"valve.area": np.array([10e-6, -1.0, 12e-6])})
+    assert rows[FAILED].tolist() == [False, True, False]
+    assert np.isnan(rows["rms_error"][1])
+    assert "valve.area" in runs.reason
+    with pytest.raises(StudyError, match=r"trial: 1 of 3 runs failed \(33.3 %\), more than the 10 %.*valve.area"):
+        runs.check(rows, 0.1, "trial")
+    runs.check(rows, 0.34, "trial")
+
+
+def test_the_table_has_all_rows_with_the_values_that_made_them() -> None:
+    def model(columns: Mapping[str, Floats]) -> dict[str, Floats]:
+        return {"y": np.sqrt(columns["x"])}
+
+    runs = Runs.of_model(model, ["y"])
+    with np.errstate(invalid="ignore"):
+        runs.run({"x": np.array([1.0, -4.0])})
+    last = runs.run({"x": np.array([9.0])})
+    assert last["y"].tolist() == [3.0]
+    assert runs.table["x"].tolist() == [1.0, -4.0, 9.0]
+    assert runs.table[FAILED].tolist() == [False, True, False]
+    assert (runs.count, runs.failures, runs.reason) == (3, 1, "diverged")
+
+
+def test_progress_grows_where_there_are_more_runs_than_were_thought() -> None:
+    seen: list[Progress] = []
+    tally = Tally(100, seen.append)
+    for runs in (100, 100, 200):
+        tally.add(runs, 1)
+    assert [(item.total, item.done, item.failed) for item in seen] == [(100, 100, 1), (200, 200, 2), (400, 400, 3)]
+
+
+def test_only_a_loop_that_oscillates_on_the_hold_has_its_last_error_replaced() -> None:
+    rows = {
+        "final_error": np.array([0.1, 0.1, 0.5]),
+        "rms_error_hold": np.array([0.4, 0.4, 0.4]),
+        "oscillations_hold": np.array([20.0, 2.0, 20.0]),
+    }
+    assert settled(rows, "final_error").tolist() == [0.4, 0.1, 0.5]
+    assert settled(rows, "rms_error_hold") is rows["rms_error_hold"]
