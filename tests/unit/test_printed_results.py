@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 import ppafo
+from ppafo.answers.solved import Solved
 from ppafo.cli.main import main
 from ppafo.kinds import kind_at
-from ppafo.questions.question import Solved
 
 FEWEST_ANSWERS = 14
 

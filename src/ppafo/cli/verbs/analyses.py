@@ -30,14 +30,8 @@ from ppafo.cli.arguments import (
 )
 
 if TYPE_CHECKING:
-    from ppafo.questions.compare.answer import Compared
-    from ppafo.questions.find.solve import Threshold
-    from ppafo.questions.sensitivity.solve import Influences
-    from ppafo.questions.sweep.results import StudyResults
-    from ppafo.questions.sweep.statistic import Estimate
-    from ppafo.questions.tune.answer import Tuned
-    from ppafo.study.finding import Finding
     from ppafo.progress import Report
+    from ppafo.questions.compare.answer import Compared
     from ppafo.questions.design.front.answer import Design
     from ppafo.questions.design.front.problem import DesignProblem
     from ppafo.questions.design.profile.answer import Sizing
@@ -45,11 +39,17 @@ if TYPE_CHECKING:
     from ppafo.questions.design.wearer.solve import WearerSizing
     from ppafo.questions.endurance.answer import Endurance, Endurances
     from ppafo.questions.endurance.solve import GasUse
+    from ppafo.questions.find.solve import Threshold
     from ppafo.questions.linearise.answer import LinearModel
     from ppafo.questions.reproduce.answer import Reproduction, Studies
+    from ppafo.questions.sensitivity.solve import Influences
+    from ppafo.questions.sweep.results import StudyResults
+    from ppafo.questions.sweep.statistic import Estimate
+    from ppafo.questions.tune.answer import Tuned
     from ppafo.questions.tune.problem import Problem
     from ppafo.simulation.scenario import Scenario
     from ppafo.studies.study import Configurations, Study
+    from ppafo.study.finding import Finding
 
 StudyLike = Annotated["Study | str | Path | Mapping[str, Any]", Word("STUDY")]
 DistributedStudy = Annotated[

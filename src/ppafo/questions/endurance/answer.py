@@ -9,6 +9,7 @@ import numpy as np
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
 from ppafo.answers.display_units import axis_unit, display_value, display_values, quantity_text
+from ppafo.answers.solved import Solved
 from ppafo.answers.style import (
     BLUE,
     GREY,
@@ -25,7 +26,6 @@ from ppafo.model.source import bottle_content
 from ppafo.parameters.bottles.bottle import Bottle
 from ppafo.questions.endurance.discharge import Discharge
 from ppafo.questions.endurance.draw import Draw
-from ppafo.questions.question import Solved
 from ppafo.signals.recording import Floats
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.units import format_quantity

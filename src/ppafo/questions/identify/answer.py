@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ppafo.answers import Answer, Figure, Section, Table
+from ppafo.answers.solved import Solved
 from ppafo.answers.style import (
     ACTUAL,
     BLACK,
@@ -30,7 +31,6 @@ from ppafo.identification.trajectory.fitting import Known, TrajectoryFit
 from ppafo.identification.trajectory.section import TrajectoryOutcome
 from ppafo.parameters.loading import parameter_set_toml
 from ppafo.parameters.parameter_set import ParameterSet
-from ppafo.questions.question import Solved
 from ppafo.signals import Recording, RecordingKind
 from ppafo.simulation.scenario import plain
 

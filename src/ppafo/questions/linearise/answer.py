@@ -10,6 +10,7 @@ import numpy as np
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
 from ppafo.answers.display_units import QUANTITIES, quantity_of_unit, quantity_text
+from ppafo.answers.solved import Solved
 from ppafo.answers.style import (
     BLACK,
     BLUE,
@@ -25,7 +26,6 @@ from ppafo.engine.lanes import Floats, StepInputs, replay
 from ppafo.engine.run import batch_of
 from ppafo.errors import ScenarioError, nearest_name, one_line
 from ppafo.model.plant import chamber_pressures
-from ppafo.questions.question import Solved
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.sampled import state_row_numbers
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, PrescribedMotion, Scenario

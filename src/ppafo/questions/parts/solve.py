@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from ppafo.answers import Answer, Column, Section, Table
+from ppafo.answers.solved import Solved
 from ppafo.errors import ParameterError, nearest_name
 from ppafo.parameters.parts import Catalogue, Part, load_catalogue
 from ppafo.parameters.parts.catalogue import DEFAULT
-from ppafo.questions.question import Solved
 
 
 @dataclass(frozen=True, slots=True, repr=False)

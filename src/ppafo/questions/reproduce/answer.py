@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
 from ppafo.answers.display_units import metric_level
+from ppafo.answers.solved import Solved
 from ppafo.answers.writing import inline_figure, quantity, render_page, sentence
 from ppafo.identification.bench.result import synthetic_figure_3
 from ppafo.live.workbench import live_part
@@ -15,7 +16,6 @@ from ppafo.metrics import Metric
 from ppafo.parameters import load_parameter_set
 from ppafo.parameters.audit import Finding
 from ppafo.parameters.publications.publication import paper_entries
-from ppafo.questions.question import Solved
 from ppafo.questions.reproduce.bench import (
     BENCH_PRESET,
     RIG_SEED,

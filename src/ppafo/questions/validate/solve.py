@@ -18,6 +18,7 @@ from ppafo.answers.display_units import (
     quantity_of_unit,
     quantity_text,
 )
+from ppafo.answers.solved import Solved
 from ppafo.answers.style import (
     ACTUAL,
     BLACK,
@@ -33,7 +34,6 @@ from ppafo.errors import DataError, nearest_name, one_line
 from ppafo.parameters import load_device
 from ppafo.parameters.device import Device
 from ppafo.progress import Progress, Report, report_nothing
-from ppafo.questions.question import Solved
 from ppafo.signals.recording import Floats
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.foreign import ColumnMap, load_column_map

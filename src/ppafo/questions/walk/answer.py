@@ -9,13 +9,13 @@ import numpy as np
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
 from ppafo.answers.display_units import rounded_text, title_with_unit
+from ppafo.answers.solved import Solved
 from ppafo.live.workbench import live_part
 from ppafo.metrics import Metric
 from ppafo.metrics.strides import PER_STRIDE
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.questions.endurance.draw import FORMAT
-from ppafo.questions.question import Solved
 from ppafo.questions.walk.course import (
     WOULD_DRAG,
     bottle_data,

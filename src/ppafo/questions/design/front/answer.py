@@ -10,12 +10,12 @@ import numpy as np
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
 from ppafo.answers.display_units import display_values, quantity_of_unit, quantity_text, title_with_unit
+from ppafo.answers.solved import Solved
 from ppafo.answers.style import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILION, house_style, mark_kind
 from ppafo.parameters.parts import Part
 from ppafo.questions.design.front.problem import GAS, SEARCHED_STREAMS, DesignProblem, Variable
 from ppafo.questions.design.front.search import PATIENCE, Floats
 from ppafo.questions.parts.solve import doubts_data, doubts_sections, titles_section
-from ppafo.questions.question import Solved
 from ppafo.simulation.simulate import Result
 from ppafo.version import __version__
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
 from ppafo.answers.display_units import axis_unit, display_value, display_values, quantity_text
+from ppafo.answers.solved import Solved
 from ppafo.answers.style import BLACK, BLUE, GREEN, GREY, ORANGE, REFERENCE, VERMILION, house_style, mark_kind
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.errors import ParameterError
@@ -32,7 +33,6 @@ from ppafo.questions.endurance.discharge import TIME_IS_UP
 from ppafo.questions.endurance.draw import draw_of_numbers
 from ppafo.questions.endurance.solve import follow_bottle
 from ppafo.questions.parts.solve import doubts_data, doubts_sections, titles_section
-from ppafo.questions.question import Solved
 from ppafo.signals import Recording
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.simulate import simulate

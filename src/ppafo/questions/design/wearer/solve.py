@@ -14,6 +14,7 @@ import numpy as np
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
 from ppafo.answers.display_units import quantity_text
+from ppafo.answers.solved import Solved
 from ppafo.constants import PASCALS_PER_PSI, STANDARD_ATMOSPHERE
 from ppafo.control.walking.assistance import ASSISTANCE_QUANTITIES
 from ppafo.errors import ScenarioError, StudyError
@@ -26,7 +27,6 @@ from ppafo.questions.design.wearer.electrical import Electrical, electrical_of, 
 from ppafo.questions.endurance.answer import Endurance
 from ppafo.questions.endurance.solve import endurance_of_walk
 from ppafo.questions.parts.solve import doubts_data, doubts_sections, titles_section
-from ppafo.questions.question import Solved
 from ppafo.version import __version__
 from ppafo.walking.bottle import WALKED, minutes_text
 from ppafo.walking.figures.over_time import bottle_figure, peak_torques
