@@ -9,11 +9,13 @@ each fit. Departures are runs of a device that the fitted model is not. A seed i
 """
 
 import argparse
+import json
 import math
 import sys
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -83,7 +85,7 @@ def walk(random: np.random.Generator, count: int) -> Floats:
 
 def heavy(random: np.random.Generator, count: int) -> Floats:
     """Student t of 3 degrees of freedom."""
-    return random.standard_t(3.0, count) / math.sqrt(3.0)
+    return np.asarray(random.standard_t(3.0, count) / math.sqrt(3.0))
 
 
 def hum(random: np.random.Generator, count: int) -> Floats:
@@ -175,24 +177,41 @@ def recordings_of(cell: str, random: np.random.Generator) -> tuple[Recording, ..
     )
 
 
-def row_of(cell: str, fits: int, seed: int) -> str:
-    """Return a line of the table: intervals that hold, by number, fits that are flagged, and what a fit costs."""
+class Row(NamedTuple):
+    """A line of the table: intervals that hold, by number, fits that are flagged, and what a fit costs."""
+
+    cell: str
+    fits: int
+    held: list[int]
+    flagged: int
+    wrong_and_identified: int
+    half_widths: list[float]
+    seconds: float
+
+    def text(self) -> str:
+        """Return it as a line of a table of Markdown."""
+        counts, widths = ", ".join(map(str, self.held)), ", ".join(f"{100.0 * one:.2g}" for one in self.half_widths)
+        others = f"{self.flagged} | {self.wrong_and_identified} | {widths} | {self.seconds:.1f}"
+        return f"| {self.cell} | {self.fits} | {counts} | {others} |"
+
+
+def row_of(cell: str, fits: int, seed: int) -> Row:
+    """Return what some fits of a cell come to."""
     random = np.random.default_rng([seed, CELLS.index(cell)])
+    truth = [number_at(scenarios(truth_in_words())[0], path) for path in SOUGHT]
     held, wrong, flagged, seconds, half = np.zeros(len(SOUGHT), dtype=int), 0, 0, [], []
     for _ in range(fits):
         recordings = recordings_of(cell, random)
         begun = time.process_time()
         found: TrajectoryFit = fit(problem_of(recordings, random, cell not in DEPARTURES))
         seconds.append(time.process_time() - begun)
-        truth = [number_at(scenarios(truth_in_words())[0], path) for path in SOUGHT]
         holds = [one.low <= true <= one.high for one, true in zip(found.estimates, truth, strict=True)]
         held += holds
-        flagged += found.fit.conflict is not None
-        wrong += sum(not hold and one.verdict == "identified" for hold, one in zip(holds, found.estimates, strict=True))
+        flagged += bool(found.conflict)
+        wrong += sum(not hold and one.is_identified for hold, one in zip(holds, found.estimates, strict=True))
         half.append([one.half_width / true for one, true in zip(found.estimates, truth, strict=True)])
-    widths = " ".join(f"{100.0 * one:5.2f}" for one in np.median(half, axis=0))
-    counts = " ".join(f"{one:3d}" for one in held.tolist())
-    return f"{cell:17s} {fits:4d}   {counts}   {flagged:3d}   {wrong:3d}   {widths}   {np.median(seconds):5.2f}"
+    widths = np.median(half, axis=0).tolist()
+    return Row(cell, fits, held.tolist(), flagged, wrong, widths, float(np.median(seconds)))
 
 
 def main(words: Sequence[str] | None = None) -> int:
@@ -201,11 +220,17 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, required=True, help="random seed of truths, noise and starts")
     parser.add_argument("--fits", type=int, default=40, help="fits for each cell; default 40")
     parser.add_argument("--cell", action="append", choices=CELLS, help="a line of the table; default: all")
+    parser.add_argument("--out", type=Path, help="write the table as JSON into this file, too")
     parsed = parser.parse_args(words)
-    print("synthetic recordings; intervals that hold of", ", ".join(SOUGHT))
-    print("cell              fits   held               flagged  wrong and 'identified'  half width [%]  CPU s a fit")
+    print(f"synthetic recordings; held and half width are those of {', '.join(SOUGHT)}")
+    print("| cell | fits | held | flagged | wrong, yet identified | half width, % | CPU s a fit |")
+    print("|---|---|---|---|---|---|---|")
+    rows = []
     for cell in parsed.cell or CELLS:
-        print(row_of(cell, parsed.fits, parsed.seed), flush=True)
+        rows.append(row_of(cell, parsed.fits, parsed.seed))
+        print(rows[-1].text(), flush=True)
+    if parsed.out is not None:
+        parsed.out.write_text(json.dumps([row._asdict() for row in rows], indent=1), encoding="utf-8")
     return 0
 
 

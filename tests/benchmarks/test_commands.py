@@ -1,7 +1,6 @@
 """The commands of the repository refuse as those of the package do; the package names them where it had them once."""
 
 import importlib
-import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -9,13 +8,11 @@ import pytest
 
 from benchmarks import __main__ as speed
 from ppafo.cli.main import main as package
-from ppafo.storage.result_folder import MARK, write_marked_folder
-from scripts import interval_coverage as coverage
+from ppafo.storage.result_folder import MARK
 
 Command = Callable[[Sequence[str]], int]
 COMMANDS: dict[str, tuple[Command, list[str], str]] = {
     "bench": (speed.main, ["--quick"], "benchmarks.study.measure_speed"),
-    "coverage": (coverage.main, ["--draws", "1"], "benchmarks.intervals.calibration.run_tasks"),
 }
 
 
@@ -32,7 +29,7 @@ def refuses(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> 
     return lambda out: main([*words, "--out", str(out)]) == 2
 
 
-@pytest.mark.parametrize("theirs", ["notes.txt", "bench.md", "fits-fixed-2026.jsonl", MARK])
+@pytest.mark.parametrize("theirs", ["notes.txt", "bench.md", MARK])
 def test_a_folder_of_others_is_refused_before_anything_runs(
     refuses: Callable[[Path], bool], theirs: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -66,27 +63,11 @@ def test_a_file_in_the_place_of_the_folder_is_refused(
     assert file.read_text() == "mine"
 
 
-@pytest.mark.parametrize("main", [speed.main, coverage.main])
-def test_a_mistyped_option_is_one_line_and_exit_code_2(main: Command, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["--jsom"]) == 2
+def test_a_mistyped_option_is_one_line_and_exit_code_2(capsys: pytest.CaptureFixture[str]) -> None:
+    assert speed.main(["--jsom"]) == 2
     said = capsys.readouterr().err
     assert "did you mean '--json'" in said
     assert said.count("\n") == 1
-
-
-def test_a_folder_that_the_command_of_the_package_left_goes_on(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    out = tmp_path / "out"
-    known = {"kind": "white", "number": 0, "below": [0.5] * 5, "width": [1.0] * 5, "verdicts": ["identified"] * 5}
-    fit = known | {"alarm": False, "chance": 0.5, "noise": "angle white", "seconds": 0.25}
-    write_marked_folder(out, {"fits-fixed-2026.jsonl": f"{json.dumps(fit)}\n".encode()}, "coverage")
-    assert coverage.main(["--noise", "white", "--draws", "1", "--out", str(out)]) == 1
-    (kind,) = json.loads((out / "coverage.json").read_text())["kinds"]
-    assert kind["fits"] == 1
-    assert "0.2 s a fit" in (out / "coverage.txt").read_text()  # of the old fit: none was made anew
-    warned = f"coverage: {out}/fits-fixed-2026.jsonl: which code made them is not said of 1 of 1 fits; they are counted"
-    assert warned in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

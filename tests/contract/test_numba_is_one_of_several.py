@@ -28,8 +28,8 @@ from ppafo.simulation.plan import plan_run
 solve_reference(plan_run(load_scenario("torque-task-proportional", ["run.duration=20 ms"])))
 print("reference solution", "numba" in sys.modules)
 
-from benchmarks.intervals.calibration import Task, repetition
-repetition(Task("white", 1, 5, True))
+from scripts.interval_coverage import row_of
+row_of("white", 1, 5)
 print("fit", "numba" in sys.modules)
 """
 

@@ -57,10 +57,7 @@ def test_planted_values_are_found_where_the_run_follows_the_recorded_supply(fold
     assert max(channel.fraction for channel in found.channels) < 2e-3
 
 
-@pytest.mark.long
-@pytest.mark.thorough
-def test_a_supply_taken_as_constant_is_found_as_misfit(folder: Path) -> None:
+def test_a_supply_taken_as_constant_within_its_tolerance_is_found_as_misfit(folder: Path) -> None:
     found = fitted(folder, "")
-    assert found.values["friction.viscous_damping"] > 2.0 * 0.032
+    assert found.conflict
     assert {estimate.verdict for estimate in found.estimates} == {"holds for this model only"}
-    assert found.remarks != ()

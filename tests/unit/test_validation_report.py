@@ -24,19 +24,13 @@ def test_the_report_counts_the_verdicts_and_numbers_the_commands() -> None:
 
 
 def test_what_takes_hours_is_read_from_its_folder_or_said_not_to_have_run(tmp_path: Path) -> None:
-    assert [found.verdict for found in intervals(tmp_path)] == [NOT_RUN, NOT_RUN]
-    kind = {
-        "noise": "white",
-        "fits": 100,
-        "held": {"inertia": 0.95, "damping": 0.89},
-        "share_of_band": {"inertia": 0.4},
-    }
-    for folder in ("coverage-fixed", "coverage-prior"):
-        (tmp_path / folder).mkdir()
-        (tmp_path / folder / "coverage.json").write_text(json.dumps({"kinds": [kind]}))
-    fixed, drawn = intervals(tmp_path)
-    assert (fixed.verdict, drawn.verdict) == (DIFFERS, AGREES)
-    assert "hold 89% (white, damping) to 95%; 1 of 2 cells outside; 100 fits a kind" in fixed.result
+    assert [found.verdict for found in intervals(tmp_path)] == [NOT_RUN]
+    row = {"cell": "white", "fits": 40, "held": [38, 35, 40]}
+    other = {"cell": "stribeck", "fits": 40, "held": [0, 0, 0]}
+    (tmp_path / "coverage.json").write_text(json.dumps([row, other]))
+    (line,) = intervals(tmp_path)
+    assert line.verdict == DIFFERS
+    assert line.result == "hold 88% (white) to 100%; 1 of 3 cells outside"
 
 
 def test_one_false_stop_differs(tmp_path: Path) -> None:

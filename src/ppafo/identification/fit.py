@@ -347,7 +347,7 @@ def _linear(work: _Work, point: Floats, left: Floats, slopes: Floats) -> tuple[_
         step = np.asarray(solved.x)
         if np.abs((step - before) @ np.linalg.pinv(root)).max() < 0.01 and series.shape[1] > 1:
             break
-    return _Linear(rows, root, noise, known), step
+    return _Linear(rows=rows, root=root, noise=noise, sensors=known), step
 
 
 def _root_of_inverse(curvature: Floats) -> tuple[Floats, Mask]:
@@ -463,7 +463,7 @@ def _conflict(work: _Work, rows: Floats, point: Floats, free: Mask, freedom: flo
             spread = np.sqrt(np.square(axes) @ (1.0 / alone - 1.0))
             ratio = moved / np.maximum(spread, 1.0e-300)
             most = int(np.argmax(ratio))
-            found = Conflict(name, str(names[most]), float(ratio[most]), p)
+            found = Conflict(group=name, number=str(names[most]), standard_errors=float(ratio[most]), p=p)
     # What is stated of a tolerance is a group of its own: its mean parts from the fit by deviation^2 - C.
     variance = np.square(root).sum(axis=1)
     own_variance = 1.0 / np.maximum(prior, 1.0e-300) - variance
@@ -471,7 +471,7 @@ def _conflict(work: _Work, rows: Floats, point: Floats, free: Mask, freedom: flo
         ratio = abs(float(shift[place])) / math.sqrt(float(own_variance[place]))
         p = min(2.0 * float(student.sf(ratio, freedom)) * count_of_tests, 1.0)
         if p < _SIGNIFICANCE and (found is None or p < found.p):
-            found = Conflict("what is stated of it", str(names[place]), ratio, p)
+            found = Conflict(group="what is stated of it", number=str(names[place]), standard_errors=ratio, p=p)
     return found
 
 

@@ -161,12 +161,12 @@ def test_the_document_has_all_that_the_fit_says(both: Identification) -> None:
     assert len(document["tolerances"]) > 15
 
 
-def test_every_recording_has_a_figure_and_correlations_have_one(both: Identification) -> None:
-    names = {"fit-step", "fit-replayed", "correlation"}
+def test_every_recording_has_a_figure(both: Identification) -> None:
+    names = {"fit-step", "fit-replayed"}
     files = files_of(both.answer())
     pictures = {f"trajectory-{name}.{kind}" for name in names for kind in ("png", "svg")}
     assert set(files) == pictures | {"fitted.toml", "identify.json", "identify.txt", "report.html"}
-    assert files["trajectory-correlation.png"].startswith(b"\x89PNG")
+    assert files["trajectory-fit-step.png"].startswith(b"\x89PNG")
 
 
 def test_the_table_shows_units_of_the_set_tolerances_and_the_next_experiment(both: Identification) -> None:

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from ppafo.errors import DataError
-from ppafo.questions.identify.answer import correlation_figure, trajectory_fit_figure
+from ppafo.questions.identify.answer import trajectory_fit_figure
 from ppafo.signals.recording import Channel, Recording, RecordingKind
 
 TIME = np.linspace(0.0, 1.0, 101)
@@ -50,11 +50,3 @@ def test_a_figure_of_synthetic_samples_says_so() -> None:
 def test_a_model_at_other_times_is_refused() -> None:
     with pytest.raises(DataError, match="is not at the times of"):
         trajectory_fit_figure(recording("measured", 0.0), recording("simulated", 0.0).between(0.0, 0.5))
-
-
-def test_strong_correlations_are_written_into_the_picture() -> None:
-    matrix = np.array([[1.0, -0.95, 0.1], [-0.95, 1.0, 0.0], [0.1, 0.0, 1.0]])
-    figure = correlation_figure(["a.one", "b.two", "c.three"], matrix)
-    axes = figure.axes[0]
-    assert [text.get_text() for text in axes.texts] == ["-0.95", "-0.95"]
-    assert [label.get_text() for label in axes.get_yticklabels()] == ["a.one  1", "b.two  2", "c.three  3"]

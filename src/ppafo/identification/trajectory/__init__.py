@@ -8,7 +8,6 @@ Each file leans on those before it: ``problem`` says what is requested, ``tolera
 from ppafo.identification.trajectory.expected import Candidate, Expected, expected_information
 from ppafo.identification.trajectory.fitting import ChannelFit, TrajectoryFit, fit
 from ppafo.identification.trajectory.problem import Experiment, FreeParameter, TrajectoryProblem
-from ppafo.identification.trajectory.section import trajectory_from_dict
 from ppafo.identification.trajectory.tolerances import Tolerances, tolerance_parameters
 
 __all__ = [
@@ -23,5 +22,4 @@ __all__ = [
     "expected_information",
     "fit",
     "tolerance_parameters",
-    "trajectory_from_dict",
 ]

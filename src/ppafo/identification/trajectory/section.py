@@ -15,10 +15,10 @@ import numpy as np
 from pydantic import Field
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.documents.models import NAME, StrictTable, Text, Texts, validate
+from ppafo.documents.models import NAME, StrictTable, Text, Texts
 from ppafo.errors import DataError, IdentificationError, ScenarioError, UnitError, nearest_name, refused_as
 from ppafo.identification.estimate import Estimate, interval_factor
-from ppafo.identification.source import Source, Use, common_use, source_of, told_of_readings
+from ppafo.identification.source import Source, Use, common_use, told_of_readings
 from ppafo.identification.trajectory.expected import Candidate, Expected, expected_information
 from ppafo.identification.trajectory.fitting import TrajectoryFit, fit
 from ppafo.identification.trajectory.problem import (
@@ -54,7 +54,6 @@ from ppafo.simulation.recorded import (
     with_fixed_volume,
 )
 from ppafo.simulation.scenario import Scenario
-from ppafo.storage.comma_separated import read_csv
 from ppafo.units import parse_quantity
 
 _Label = Annotated[str, Field(pattern=NAME, max_length=60, description="its name, also in the names of files")]
@@ -242,23 +241,6 @@ def noise_of_channels(given: Mapping[str, str], said: str) -> dict[str, float]:
 
 SHORTEST_STEP = 1.0e-6
 """Seconds; a shorter step would only cost time."""
-
-
-def trajectory_from_dict(
-    content: Mapping[str, Any], folder: Path | None = None, file: str = "trajectory"
-) -> TrajectoryProblem:
-    """Return the problem in nested dictionaries laid out as the section of a file; paths in it begin in ``folder``.
-
-    Texts have their units, the problem is in SI. IdentificationError or DataError, one line that names ``file``.
-    """
-    refuse_removed({"trajectory": content}, file)
-    section = validate(TrajectorySection, dict(content), file, IdentificationError)
-    home = folder or Path()
-
-    def read(item: ExperimentSection) -> Source:
-        return source_of(home / item.recording, read_csv(home / item.recording))
-
-    return trajectory_problem(section, Setting(read, home, file))
 
 
 def trajectory_problem(section: TrajectorySection, setting: Setting) -> TrajectoryProblem:

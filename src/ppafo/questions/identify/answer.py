@@ -32,7 +32,6 @@ from ppafo.parameters.loading import parameter_set_toml
 from ppafo.parameters.parameter_set import ParameterSet
 from ppafo.questions.question import Solved
 from ppafo.signals import Recording, RecordingKind
-from ppafo.signals.recording import Floats
 from ppafo.simulation.scenario import plain
 
 if TYPE_CHECKING:
@@ -71,14 +70,11 @@ class Identification(Solved):
 
 _TRAJECTORY_WIDTH, _VALUES, _LEFT_OVER = 7.2, 1.5, 0.62
 _MARGINS = Margins(left=0.78, right=0.2, top=0.62, bottom=0.52, row_gap=0.36, label=0.58)
-_MATRIX_CELL, _LETTER, _MATRIX_TOP = 0.62, 0.08, 0.5
 """Inches."""
 _DOT, _SAMPLE = 1.6, 3.6
 _MAXIMUM_DOTS = 90
 """Samples shown beside the line; what is left is shown of all."""
 _KIND_WORDS = {"measured": "measured", "simulated": "simulated samples", "synthetic": "synthetic measurement"}
-_NAMED = 0.3
-"""Correlations from this size on are written into their cell."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,38 +119,6 @@ def trajectory_fit_figure(
         return figure
 
 
-def correlation_figure(
-    names: Sequence[str], correlation: Floats, kind: RecordingKind = "measured"
-) -> "matplotlib.figure.Figure":
-    """Return the correlation matrix of estimates as a picture; strong colours are numbers that trade off.
-
-    ``kind`` is that of the recordings.
-    """
-    import matplotlib.figure
-
-    count = len(names)
-    name_width = 0.45 + _LETTER * max(len(name) for name in names)
-    width, height = name_width + count * _MATRIX_CELL + 0.2, _MATRIX_TOP + count * _MATRIX_CELL + 0.35
-    with house_style():
-        figure = matplotlib.figure.Figure(figsize=(width, height))
-        place = (name_width / width, 0.35 / height, count * _MATRIX_CELL / width, count * _MATRIX_CELL / height)
-        axes = figure.add_axes(place)
-        axes.imshow(correlation, cmap="RdBu_r", vmin=-1.0, vmax=1.0)
-        axes.grid(visible=False)
-        axes.set_yticks(range(count), [f"{name}  {index + 1}" for index, name in enumerate(names)])
-        axes.set_xticks(range(count), [str(index + 1) for index in range(count)])
-        for row, column in np.argwhere(np.abs(correlation) >= _NAMED):
-            if row != column:
-                number = float(correlation[row, column])
-                colour = "white" if abs(number) > 0.6 else BLACK
-                axes.text(int(column), int(row), f"{number:+.2f}", ha="center", va="center", fontsize=8.5, color=colour)
-        figure.text(
-            0.12 / width, 1.0 - 0.12 / height, "Correlation of the estimates", ha="left", va="top", fontweight="bold"
-        )
-        mark_kind(figure, kind)
-        return figure
-
-
 def _channels(atmosphere: float) -> tuple[_ChannelPanel, ...]:
     degrees, gauge = float(np.degrees(1.0)), 1.0 / PASCALS_PER_PSI
     return (
@@ -189,9 +153,8 @@ def _draw_trajectory(one: _ChannelPanel, panels: "tuple[Axes, Axes]", measuremen
     left.locator_params(axis="y", nbins=3)
 
 
-_FAR, _SHOWN = 2.0, 0.01
+_FAR, _SHOWN = 2.0, 0.05
 """Standard deviations from which a tolerance is said to be contradicted; least share of a variance that is shown."""
-_NO_VALUE = "no value"
 _MINIMUM_DIGITS, _MAXIMUM_DIGITS = 4, 9
 
 
@@ -294,9 +257,14 @@ def _shown(number: float, one: Known, before: ParameterSet) -> tuple[float, str]
 
 
 def estimate_row(item: Estimate, before: ParameterSet) -> tuple[str, ...]:
-    """Return path, value, interval and verdict of an estimate, in the unit of the set."""
-    path, value, unit, interval = _row(item, before)
-    return path, f"{value} {unit}".rstrip(), interval, item.verdict
+    """Return path, value, interval and verdict of an estimate in the unit of the set, digits that tell its ends."""
+    if math.isnan(item.value):
+        return item.path, "no value", "", item.verdict
+    shown = [in_set_unit(one, item.path, item.unit, before) for one in (item.value, item.low, item.high)]
+    (value, unit), (low, _), (high, _) = shown
+    digits = _digits(value, 0.5 * abs(high - low))
+    text = f"{value:#.{digits}g} {unit}".removesuffix(" -").rstrip()
+    return item.path, text, f"{low:#.{digits}g} to {high:#.{digits}g}", item.verdict
 
 
 def _candidate(one: Expected) -> str:
@@ -305,21 +273,6 @@ def _candidate(one: Expected) -> str:
         f"{one.label}: gain {one.gain:.2f}; largest for {one.most_helped}, "
         f"whose interval would shrink by {fraction:.0%}"
     )
-
-
-def _row(estimate: Estimate, before: ParameterSet) -> tuple[str, str, str, str]:
-    """Return path, value, unit and interval."""
-    if math.isnan(estimate.value):
-        return estimate.path, _NO_VALUE, "", ""
-    return estimate.path, *_in_set_unit(estimate, (estimate.low, estimate.high), before)
-
-
-def _in_set_unit(estimate: Estimate, ends: tuple[float, float], before: ParameterSet) -> tuple[str, str, str]:
-    """Return value, unit and interval of an estimate as the set would write them, with digits that tell its ends."""
-    shown = [in_set_unit(one, estimate.path, estimate.unit, before) for one in (estimate.value, *ends)]
-    value, low, high = (number for number, _ in shown)
-    digits = _digits(value, 0.5 * abs(high - low))
-    return f"{value:#.{digits}g}", shown[0][1], f"{low:#.{digits}g} to {high:#.{digits}g}"
 
 
 def _digits(value: float, half_width: float) -> int:
@@ -346,14 +299,10 @@ def _figures(identification: Identification) -> list[Figure]:
 
 
 def _trajectory_figures(outcome: TrajectoryOutcome) -> list[Figure]:
-    fit, kind = outcome.fit, kind_of_fit(outcome.fit)
-    figures = []
+    figures, fit = [], outcome.fit
     for measurement, model, scenario in zip(fit.measurements, fit.models, fit.scenarios, strict=True):
         draw = partial(trajectory_fit_figure, measurement, model, scenario.device.supply.atmospheric_pressure)
         figures.append(Figure(f"trajectory-fit-{measurement.label}", f"{measurement.label} and the fit.", draw))
-    if len(fit.estimates) > 1:
-        draw = partial(correlation_figure, [item.path for item in fit.estimates], fit.correlation, kind)
-        figures.append(Figure("trajectory-correlation", "Correlations of the estimates.", draw))
     return figures
 
 
