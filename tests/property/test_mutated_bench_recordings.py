@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
-from ppafo.identification.bench.flow_laws import GasAt
 
 from ppafo.errors import PpafoError
 from ppafo.identification.bench import (
