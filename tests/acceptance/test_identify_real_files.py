@@ -2,6 +2,7 @@
 
 import re
 import shutil
+from importlib import resources
 from pathlib import Path
 
 import pytest
@@ -11,36 +12,11 @@ from ppafo.questions.identify.answer import Identification
 from ppafo.questions.identify.solve import identify
 
 PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "identify-from-raw-files.md"
-FILES = (
-    *(f"zillen2021_cylinder_friction/O-ring257_{bar}bar.csv" for bar in (1, 3, 5, 7)),
-    "zillen2021_chamber_leak/Prusa.csv",
-    "zillen2021_chamber_leak/Formlabs.csv",
-)
-"""Those of the page, and the other chamber; the folder of measurements has more."""
+EXAMPLE = Path(str(resources.files("ppafo"))) / "examples" / "measured-cylinder"
 KNOWN_AREA = 5.1875e-4
 
 
-CHAMBER = """
-schema_version = 1
-name = "chamber"
-device.set = "ppafo2011"
-
-[[procedure]]
-kind = "vane-leak"
-columns = "logger"
-gas = "air"
-start = "10 s"                         # the supply was shut before
-recordings = ["Prusa.csv"]
-
-[columns.logger]
-delimiter = "semicolon"
-header = false
-
-[columns.logger.channels]
-time = { column = 1, unit = "s", factor = 1e-6, thousands = "point" }
-pressure_1 = { column = 3, unit = "bar_g" }
-pressure_2 = { constant = "0 bar_g" }  # the room
-"""
+CHAMBER = (EXAMPLE / "chamber.toml").read_text(encoding="utf-8")
 """The printed chamber of the same author: gas and walls come to rest, and the pressure falls."""
 
 
@@ -49,12 +25,9 @@ def blocks(language: str) -> list[str]:
 
 
 @pytest.fixture(scope="module")
-def raw_files(shared_data: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with the raw files of the page."""
-    folder = tmp_path_factory.mktemp("raw")
-    for name in FILES:
-        shutil.copy(shared_data / "pneumatic" / name, folder)
-    return folder
+def raw_files(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the recordings of the page."""
+    return Path(shutil.copytree(EXAMPLE, tmp_path_factory.mktemp("raw") / "files"))
 
 
 @pytest.fixture(scope="module")
@@ -122,12 +95,12 @@ def test_the_page_shows_what_the_command_prints(raw_files: Path, capsys: pytest.
     assert capsys.readouterr().out.strip() == blocks("text")[0].strip()
 
 
-def test_the_command_of_the_page_leaves_what_the_page_says(
-    raw_files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    words = blocks("sh")[0].split()
-    monkeypatch.chdir(tmp_path)
-    (raw_files / "problem.toml").write_text(blocks("toml")[0], encoding="utf-8")
-    assert main([str(raw_files / word) if word == "problem.toml" else word for word in words[1:]]) == 1
-    made = {path.name for path in (tmp_path / "identified").iterdir()}
+def test_the_command_of_the_page_leaves_what_the_page_says(raw_files: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(raw_files.parent)
+    for line in blocks("sh")[0].splitlines():
+        if line.startswith("cd "):
+            monkeypatch.chdir(line.removeprefix("cd "))
+        else:
+            assert main(line.split()[1:]) == (1 if " identify " in line else 0)
+    made = {path.name for path in Path("identified").iterdir()}
     assert {"cylinder.toml", "identify.json", "identify.txt", "static-torque.png"} <= made
