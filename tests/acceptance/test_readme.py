@@ -178,7 +178,7 @@ def test_the_answers_of_the_five_minutes_are_those_of_runs() -> None:
     assert f"{error(more)} N m, {gas(more)} g" in lines["2"]
     assert f"{error(pair)} and {error(first)} N m, {gas(pair)} and {gas(first)} g" in lines["3"]
     metrics = walk("solenoid", 0.2).metrics
-    assert f"{1e3 * metrics['gas_per_stride'].value:.3g} g a stride" in lines["4"]
+    assert f"{1e3 * metrics['gas'].value:.3g} g a stride" in lines["4"]
 
 
 @pytest.mark.short
