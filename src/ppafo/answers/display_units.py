@@ -7,7 +7,6 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.answers import Column
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.metrics import METRICS, Metric
 from ppafo.units import from_si
@@ -130,23 +129,6 @@ def metric_words(name: str) -> str:
     """Return the name of a metric in words: ``RMS error``."""
     words = name.replace("_", " ").replace("rms", "RMS")
     return words[:1].upper() + words[1:]
-
-
-def metric_title(name: str) -> str:
-    """Return the name of a metric in words with the unit in which it is shown: ``RMS error (N m)``."""
-    unit = metric_unit(name)
-    return f"{metric_words(name)} ({unit})" if unit else metric_words(name)
-
-
-def metric_unit(name: str) -> str:
-    """Return the unit in which a metric is shown, its own where it is no quantity of the table; empty for a number."""
-    quantity = metric_quantity(name)
-    return display_unit(quantity) if quantity else METRICS[name].unit.removeprefix("-")
-
-
-def metric_column(name: str, form: str = ".4g") -> Column:
-    """Return the column of the values of a metric in SI."""
-    return Column(metric_words(name), metric_quantity(name), form)
 
 
 def metrics_lines(metrics: Mapping[str, Metric], atmosphere: float = STANDARD_ATMOSPHERE) -> list[str]:

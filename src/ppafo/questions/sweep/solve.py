@@ -1,9 +1,9 @@
 """Runs a study into a folder, from where it stands, and sums it up; chunks that are whole are not computed again.
 
-Only completed runs that have the metric count, and how many those are is said beside each. Columns are read chunk by
-chunk; mean, spread and quantiles are exact and in bounded memory. The quantile of fraction q of n sorted values is the
-value at place (n - 1) q, on a line between its neighbours: definition 7 of Hyndman and Fan (The American Statistician,
-1996). The standard deviation divides by n - 1.
+Only completed runs that have the metric count, and how many those are is said beside each. Mean, spread and quantiles
+are exact; for quantiles a column of one configuration is in memory at a time. The quantile of fraction q of n sorted
+values is the value at place (n - 1) q, on a line between its neighbours: definition 7 of Hyndman and Fan (The American
+Statistician, 1996). The standard deviation divides by n - 1.
 """
 
 import json
