@@ -20,6 +20,30 @@ FILES = (
 KNOWN_AREA = 5.1875e-4
 
 
+CHAMBER = """
+schema_version = 1
+name = "chamber"
+device.set = "ppafo2011"
+
+[[procedure]]
+kind = "vane-leak"
+columns = "logger"
+gas = "air"
+start = "10 s"                         # the supply was shut before
+recordings = ["Prusa.csv"]
+
+[columns.logger]
+delimiter = "semicolon"
+header = false
+
+[columns.logger.channels]
+time = { column = 1, unit = "s", factor = 1e-6, thousands = "point" }
+pressure_1 = { column = 3, unit = "bar_g" }
+pressure_2 = { constant = "0 bar_g" }  # the room
+"""
+"""The printed chamber of the same author: gas and walls come to rest, and the pressure falls."""
+
+
 def blocks(language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
 
@@ -40,30 +64,27 @@ def cylinder(raw_files: Path) -> Identification:
     return identify(raw_files / "cylinder-problem.toml")
 
 
-def test_the_known_area_lies_inside_the_interval_and_within_half_a_percent(cylinder: Identification) -> None:
+def test_the_known_area_lies_inside_the_interval_and_within_a_quarter_percent(cylinder: Identification) -> None:
     area = cylinder.results[0]["static_torque.area"]
     assert area.low <= KNOWN_AREA <= area.high
-    assert abs(area.value / KNOWN_AREA - 1.0) < 0.005
-    assert area.relative_half_width < 0.005
+    assert abs(area.value / KNOWN_AREA - 1.0) < 0.0025
+    assert area.half_width < 0.01 * area.value
 
 
 def test_friction_of_the_cylinder_grows_with_pressure(cylinder: Identification) -> None:
     growth = cylinder.results[0]["static_torque.friction_per_pressure"]
     assert growth.low > 2.0e-6
     assert growth.value == pytest.approx(5.07e-6, rel=0.02)
-    assert "grows" in cylinder.results[0]["static_torque.dynamic_friction"].explanation
 
 
-def test_friction_of_the_cylinder_says_its_pressure_and_nothing_of_it_counts_as_identified(
+def test_recordings_that_do_not_agree_hold_for_this_model_only_and_nothing_of_newtons_is_written(
     cylinder: Identification,
 ) -> None:
-    friction = cylinder.results[0]["static_torque.dynamic_friction"]
-    assert friction.verdict_in_words.startswith("holds for this model only, at 431.6 kPa")
-    assert [check.name for check in cylinder.results[0].failed] == ["friction over pressure"]
+    result = cylinder.results[0]
+    assert {item.verdict for item in result.estimates} == {"holds for this model only"}
+    assert "alone want other numbers" in result.conflict
     assert cylinder.new_set.written == ()
     assert cylinder.new_set.fitted == (), "a set has no place for newtons"
-    left = cylinder.results[0]["static_torque.friction_at_no_pressure"]
-    assert left.low < friction.value - 5.07e-6 * 4.316e5 < left.high
 
 
 def test_with_its_lever_arm_the_friction_of_a_sliding_cylinder_is_friction_in_motion(raw_files: Path) -> None:
@@ -72,17 +93,10 @@ def test_with_its_lever_arm_the_friction_of_a_sliding_cylinder_is_friction_in_mo
     )
     (raw_files / "lever.toml").write_text(text, encoding="utf-8")
     found = identify(raw_files / "lever.toml")
-    assert set(found.new_set.fitted) == {"actuator.torque_constant", "friction.dynamic_torque"}
-    assert found.results[0]["friction.dynamic_torque"].value == pytest.approx(0.022 * 6.42, rel=1e-3)
+    growth = "effects.seal_friction.dynamic_per_pressure"
+    assert set(found.new_set.fitted) == {"actuator.torque_constant", "friction.dynamic_torque", growth}
+    assert found.results[0]["friction.dynamic_torque"].value == pytest.approx(0.022 * 4.23, rel=0.01)
     assert found.new_set.parameter_set.numbers["friction.static_torque"].origin != "fitted"
-
-
-def test_mean_forces_alone_would_count_the_regulator_as_friction(cylinder: Identification) -> None:
-    friction = cylinder.results[0]["static_torque.dynamic_friction"].value
-    growth = cylinder.results[0]["static_torque.friction_per_pressure"].value
-    at_1_bar = friction + growth * (1.0e5 - 4.3e5)
-    assert at_1_bar == pytest.approx(4.7, abs=0.2)
-    assert "6.6 N at 1 bar" in PAGE.read_text(encoding="utf-8")
 
 
 def test_a_wrong_sign_of_the_direction_is_found_in_the_real_data(raw_files: Path) -> None:
@@ -91,35 +105,21 @@ def test_a_wrong_sign_of_the_direction_is_found_in_the_real_data(raw_files: Path
     assert main(["identify", str(raw_files / "turned.toml")]) == 2
 
 
-def test_the_printed_chamber_gets_no_area(raw_files: Path) -> None:
-    (raw_files / "chamber-problem.toml").write_text(blocks("toml")[1], encoding="utf-8")
-    result = identify(raw_files / "chamber-problem.toml").results[0]
-    assert result["actuator.leak.area"].verdict == "law does not describe the data"
-    assert "vane_leak.relaxation_rate" in [item.path for item in result.estimates]
-    plateau = result["vane_leak.plateau"]
-    assert 7.4e5 < plateau.low < plateau.high < 7.55e5, "below the last readings, 7.55 bar"
-    told = next(check for check in result.failed if check.name == "leak or relaxation")
-    assert "give the same curve" in told.statement
-
-
-def test_a_chamber_whose_laws_cannot_be_told_apart_gets_no_area_either(raw_files: Path) -> None:
-    text = blocks("toml")[1].replace("Prusa", "Formlabs").replace("10 s", "25 s")
-    (raw_files / "formlabs-problem.toml").write_text(text, encoding="utf-8")
-    outcome = identify(raw_files / "formlabs-problem.toml")
+@pytest.mark.parametrize(("name", "start"), [("Prusa", "10 s"), ("Formlabs", "25 s")])
+def test_a_chamber_whose_gas_comes_to_rest_gets_no_area(raw_files: Path, name: str, start: str) -> None:
+    text = CHAMBER.replace("Prusa", name).replace("10 s", start)
+    (raw_files / "chamber-problem.toml").write_text(text, encoding="utf-8")
+    outcome = identify(raw_files / "chamber-problem.toml")
     assert outcome.new_set.written == ()
-    assert outcome.results[0]["vane_leak.area_over_volume"].verdict == "weak"
-    assert "which law" in [check.name for check in outcome.results[0].failed]
-    missing = {item.name for item in outcome.beforehand[0].prospects if not item.can_be_had}
-    assert missing == {"area of the leak", "law of the leak", "plateau or leak"}
+    (area,) = outcome.results[0].estimates
+    assert area.path == "vane_leak.area_over_volume"
+    assert not area.is_identified
 
 
-@pytest.mark.parametrize("number", [0, 1])
-def test_the_page_shows_what_the_command_prints(
-    raw_files: Path, number: int, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (raw_files / "problem.toml").write_text(blocks("toml")[number], encoding="utf-8")
+def test_the_page_shows_what_the_command_prints(raw_files: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (raw_files / "problem.toml").write_text(blocks("toml")[0], encoding="utf-8")
     assert main(["identify", str(raw_files / "problem.toml")]) == 1
-    assert capsys.readouterr().out.strip() == blocks("text")[number].strip()
+    assert capsys.readouterr().out.strip() == blocks("text")[0].strip()
 
 
 def test_the_command_of_the_page_leaves_what_the_page_says(

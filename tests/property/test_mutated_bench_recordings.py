@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
-from ppafo.identification.bench.flow_laws import GasAt
 
 from ppafo.errors import PpafoError
 from ppafo.identification.bench import (
@@ -19,6 +18,7 @@ from ppafo.identification.bench import (
     valve_map,
     vane_leak,
 )
+from ppafo.identification.bench.flow import GasAt
 from ppafo.identification.source import Source
 from ppafo.storage import read_csv
 from ppafo.storage.foreign import ColumnMap, read_foreign

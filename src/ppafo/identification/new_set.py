@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 from ppafo.errors import ParameterError, UnitError
 from ppafo.identification.estimate import Estimate, half_width_for
+from ppafo.model.catalog import find_effects
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.building import build_device
 from ppafo.parameters.declaration import AREA_FORM, SONIC_FORM, alternatives, is_within
@@ -41,6 +42,7 @@ def with_estimates(parameter_set: ParameterSet, estimates: Iterable[Estimate], v
     """Return the set with every usable estimate that has a place in it; the later of two for one path counts."""
     found: dict[str, bool] = {}
     for estimate in estimates:
+        find_effects([estimate.path])
         quantity = parameter_set.declarations().get(estimate.path)
         if quantity is not None and estimate.is_usable and is_within(estimate.value, quantity):
             parameter_set = _with_estimate(parameter_set, estimate, quantity)

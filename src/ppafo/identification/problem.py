@@ -28,6 +28,7 @@ from ppafo.identification.bench.vane_leak import VaneLeakSettings, vane_leak
 from ppafo.identification.source import Source
 from ppafo.identification.trajectory.section import TrajectorySection, refuse_removed
 from ppafo.identification.trajectory.tolerances import BenchSection
+from ppafo.identification.trajectory.tolerances import Tolerances as FitTolerances
 from ppafo.model.gas import SPECIES
 from ppafo.parameters.parameter_set import ParameterSet, chosen_valve, number_in_si
 from ppafo.storage.foreign import ColumnMap
@@ -317,32 +318,17 @@ class ProblemFile(StrictTable):
     ] = None
 
 
-_OF_THE_BENCH = {
-    "gas_temperature": ("temperature", "K"),
-    "gas_law": ("gas_law", "1"),
-    "zero_of_pressure": ("zero_of_pressure", "Pa_d"),
-    "gain": ("gain", "1"),
-    "zero_of_flow": ("zero_of_flow", "1"),
-    "held": ("held", "1"),
-}
-"""Of each key of [bench]: the tolerance of the procedures, and its unit."""
-
-
-def bench_tolerances(section: BenchSection | None, file: str) -> Tolerances:
-    """Return what a bench does not know exactly, the defaults where a problem states nothing.
-
-    IdentificationError for a limit below 0 or in another unit.
-    """
-    stated = {}
-    for key, (name, unit) in _OF_THE_BENCH.items():
-        text = None if section is None else getattr(section, key)
-        if text is None:
-            continue
-        with refused_as(IdentificationError, f"{file}: bench.{key} = {text!r}", UnitError):
-            stated[name] = parse_quantity(text, unit)
-        if stated[name] < 0.0:
-            raise IdentificationError(f"{file}: bench.{key} = {text!r} must not be below 0")
-    return Tolerances(**stated)
+def bench_tolerances(stated: FitTolerances) -> Tolerances:
+    """Return what the procedures take of a bench, their defaults where a problem states nothing."""
+    given = {
+        "temperature": stated.gas_temperature,
+        "gas_law": stated.gas_law,
+        "zero_of_pressure": stated.zero_of_pressure,
+        "gain": stated.gain,
+        "zero_of_flow": stated.zero_of_flow,
+        "held": stated.held,
+    }
+    return Tolerances(**{name: limit for name, limit in given.items() if limit is not None})
 
 
 def load_problem(path: str | Path) -> ProblemFile:

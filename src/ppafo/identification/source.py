@@ -13,7 +13,7 @@ import numpy as np
 
 from ppafo.errors import IdentificationError, nearest_name
 from ppafo.signals import CHANNELS, Recording, RecordingKind
-from ppafo.signals.faults import is_at_limit, longest_gap, plateaus
+from ppafo.signals.faults import FEWEST_AT_LIMIT, Plateau, is_at_limit, longest_gap, plateaus, scatters
 from ppafo.signals.recording import Floats
 from ppafo.storage.files import read_bytes
 
@@ -100,7 +100,6 @@ def _digest(recording: Recording) -> str:
 
 
 _NO_SENSORS = ("command", "direction", "repetition")
-_COARSE = 0.02
 _SHARE_THAT_IS_CLIPPED = 0.05
 _FEWEST_CLIPPED = 4
 _FRACTION_THAT_MOVES = 0.02
@@ -211,8 +210,13 @@ def kind_of(sources: tuple[Source, ...]) -> RecordingKind:
     return next(kind for kind in _KINDS if kind in kinds)
 
 
+def _is_held(values: Floats, plateau: Plateau) -> bool:
+    """Whether values that scatter elsewhere stay at an extreme for long."""
+    return plateau.count >= FEWEST_AT_LIMIT and scatters(values)
+
+
 def told_of_readings(sources: tuple[Source, ...]) -> tuple[str, ...]:
-    """Return remarks on what the sensors did not show: pauses, values beyond a limit, steps of a coarse converter."""
+    """Return remarks on what the sensors did not show: pauses, and values beyond a limit."""
     found = []
     for source in sources:
         gap = longest_gap(source.recording.time)
@@ -222,22 +226,13 @@ def told_of_readings(sources: tuple[Source, ...]) -> tuple[str, ...]:
             if name in _NO_SENSORS:
                 continue
             values = source.recording[name]
-            limits = [item for item in plateaus(values) if is_at_limit(values, item)]
+            limits = [item for item in plateaus(values) if is_at_limit(values, item) or _is_held(values, item)]
             unit = source.recording.unit(name)
             found += [
                 f"{source.name}: '{name}' stays at {item.value:.6g} {unit} for {item.count} samples, from sample "
                 f"{item.first + 1}: a limit of the sensor?"
                 for item in limits
             ]
-            # A converter is coarse where many samples share few values, far apart.
-            levels = np.unique(values)
-            if limits or levels.size < 2 or levels.size > values.size / 10:
-                continue
-            step = float(np.median(np.diff(levels)) / (levels[-1] - levels[0]))
-            if step > _COARSE:
-                found.append(
-                    f"{source.name}: values of '{name}' are {step:.0%} of their range apart, a coarse converter"
-                )
     return tuple(found)
 
 

@@ -1,28 +1,30 @@
 """Recordings with known values planted, for the tests of the bench procedures."""
 
 import numpy as np
-from ppafo.identification.bench.flow_laws import (
-    LAMINAR,
-    LINEAR,
-    Chambers,
-    GasAt,
-    Opening,
-    difference_in_time,
-    orifice_shape,
-)
 
-from ppafo.identification.bench.free_decay import angle_of_decay
-from ppafo.identification.bench.valve_map import area_of_command
+from ppafo.identification.bench.flow import GasAt, Opening, orifice_shape
+from ppafo.identification.bench.valve_map import area_of_command, spool_of
+from ppafo.identification.bench.vane_leak import fall_of_difference
 from ppafo.identification.source import Source
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import Floats
 
 CO2 = GasAt(0.044, 1.3, 298.0)
-LAWS = (Opening(CO2).law(), LAMINAR, LINEAR)
 PSI = 6894.757293168361
 TORQUE_CONSTANT, STATIC_TORQUE, OFFSET = 1.451e-5, 0.45, 0.12
 DAMPING_RATE, DECELERATION = 0.4, 0.13
 SUPPLY, ROOM = 446.0e3, 101325.0
+
+
+def angle_of_decay(
+    times: Floats, start_angle: float, start_velocity: float, damping_rate: float, deceleration: float
+) -> Floats:
+    """Angle [rad] of I w' = -beta w - T_c in closed form, at rest from where the speed is 0; beta/I [1/s] above 0."""
+    ratio = deceleration / damping_rate
+    stop = np.inf if ratio == 0.0 else np.log1p(start_velocity / ratio) / damping_rate
+    moving = np.minimum(times, stop)
+    swept = (start_velocity + ratio) * -np.expm1(-damping_rate * moving) / damping_rate - ratio * moving
+    return np.asarray(start_angle + swept)
 
 
 def source(label: str, time: Floats, **channels: tuple[Floats, str]) -> Source:
@@ -36,7 +38,7 @@ def static(noise: float = 0.03, growth: float = 0.0, seed: int = 1, sign: float 
     steps = np.arange(0.0, 96.0, 5.0) * PSI
     pressure = np.tile(np.concatenate([steps, steps[::-1]]), 3)
     direction = np.tile(np.repeat([1.0, -1.0], steps.size), 3)
-    friction = STATIC_TORQUE + growth * (pressure - steps.mean())
+    friction = STATIC_TORQUE + growth * pressure
     torque = TORQUE_CONSTANT * pressure + OFFSET - sign * direction * friction
     torque += np.random.default_rng(seed).normal(0.0, noise, torque.size)
     return source(
@@ -80,27 +82,30 @@ def flow(
     )
 
 
-def leak(law: str, rate: float, ratio: float = 1.3, seed: int = 1, lost: float = 0.0) -> Source:
-    """Two closed chambers, one at supply pressure and one at the atmosphere, for 20 s at 100 Hz."""
-    time = np.arange(0.0, 20.0, 0.01)
-    chambers = Chambers(ratio, ratio * SUPPLY + ROOM)
-    chosen = next(item for item in LAWS if item.name == law)
-    first, second = chambers.pressures(difference_in_time(chosen, chambers, SUPPLY - ROOM, rate, time, 100.0))
+def leak(law: str, size: float, ratio: float = 1.3, seed: int = 1, lost: float = 0.0, volume: float = 60e-6) -> Source:
+    """Two closed chambers, one at supply pressure and one at the atmosphere, 20 s at 20 Hz; Cd A or c is planted."""
+    time = np.arange(0.0, 20.0, 0.05)
+    opening = Opening(CO2, "laminar" if law == "laminar" else "orifice")
+    rate = CO2.specific_gas_constant * CO2.temperature / volume
+    first, second = fall_of_difference(opening, size, SUPPLY, ROOM, ratio, rate).pressures(time)
     draw = np.random.default_rng(seed)
     first, second = (values + draw.normal(0.0, 300.0, time.size) - lost * time for values in (first, second))
     return source("leak", time, pressure_1=(first, "Pa"), pressure_2=(second, "Pa"))
 
 
-def orifice_rate(area: float, volume: float) -> float:
-    """Rate of the orifice law [1/s] for an effective area [m^2] and a volume [m^3]."""
-    return area * CO2.choked_flow_constant * CO2.specific_gas_constant * CO2.temperature / volume
+def steady(law: str, size: float, zero: float = 0.0, seed: int = 1) -> Source:
+    """Twenty-four readings of the flow that keeps up a pressure; Cd A or c is planted, and the zero of the meter."""
+    first, second = np.linspace(1.3e5, 6.0e5, 24), np.full(24, ROOM)
+    flow = Opening(CO2, "laminar" if law == "laminar" else "orifice").flow(size, 0.0, first, second)
+    flow = flow * (1.0 + np.random.default_rng(seed).normal(0.0, 0.003, 24)) + zero
+    channels = {"pressure_1": (first, "Pa"), "pressure_2": (second, "Pa"), "mass_flow": (flow, "kg/s")}
+    return source("steady", np.arange(24.0), **channels)
 
 
 def sweep(dead_band: float = 0.12, width: float = 0.04, sign: float = 1.0, seed: int = 1) -> Source:
     """Command from -1 to 1 and back at constant pressures, with a valve that saturates."""
     command = np.concatenate([np.linspace(-1.0, 1.0, 101), np.linspace(1.0, -1.0, 101)])
-    branch = np.repeat([1.0, -1.0], 101)
-    area = area_of_command(command, branch, dead_band, 4.2e-6, 3.4e-6, width)
+    area = area_of_command(spool_of(command, width), dead_band, 4.2e-6, 0.9)
     upstream, downstream = np.full(202, SUPPLY), np.full(202, ROOM)
     mass_flow = area * CO2.choked_flow_constant * orifice_shape(upstream, downstream, CO2.heat_capacity_ratio)
     mass_flow += np.random.default_rng(seed).normal(0.0, 1e-5, 202)

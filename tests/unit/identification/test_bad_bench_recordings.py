@@ -36,7 +36,7 @@ Solve = Callable[[Source], BenchResult]
 def bench(planted: ModuleType) -> dict[str, tuple[Source, Solve]]:
     """A good recording for each procedure, and the procedure."""
     co2 = planted.CO2
-    leak = planted.leak("orifice", planted.orifice_rate(3.39e-8, VOLUME))
+    leak = planted.leak("orifice", 3.39e-8)
     leak_settings = VaneLeakSettings(co2, VOLUME, VOLUME / 1.3, 0.113)
     return {
         "static-torque": (planted.static(), lambda source: static_torque((source,))),
@@ -109,7 +109,7 @@ def test_a_constant_channel_is_refused(
         ("static-torque", "pressure_difference", 0.5),
         ("free-decay", "angle", 0.6),
         ("open-valve-flow", "mass_flow", 0.7),
-        ("vane-leak", "pressure_1", 0.9),
+        ("vane-leak", "pressure_1", 0.6),
     ],
 )
 def test_a_saturated_sensor_is_refused_with_its_sample(
@@ -128,9 +128,9 @@ def test_a_saturated_sensor_is_refused_with_its_sample(
 def test_a_gap_in_a_decay_is_refused_with_its_sample(bench: dict[str, tuple[Source, Solve]], kind: str) -> None:
     source, solve = bench[kind]
     time = source.recording.time.copy()
-    time[400:] += 3.0
+    time[200:] += 3.0
     assert "there is a gap of 3.0" in refusal(solve, retimed(source, time))
-    assert "(sample 400)" in refusal(solve, retimed(source, time))
+    assert "(sample 200)" in refusal(solve, retimed(source, time))
 
 
 @pytest.mark.parametrize("kind", ["static-torque", "open-valve-flow", "valve-map"])
@@ -138,21 +138,19 @@ def test_a_pause_between_steady_readings_is_told(bench: dict[str, tuple[Source, 
     source, solve = bench[kind]
     time = source.recording.time.copy()
     time[30:] += 1000.0
-    (told,) = [remark for remark in solve(retimed(source, time)).remarks if remark.startswith("pauses")]
+    (told,) = [remark for remark in solve(retimed(source, time)).remarks if "no reading for" in remark]
     assert "after sample 30" in told
-    assert not [remark for remark in solve(source).remarks if remark.startswith("pauses")]
+    assert not [remark for remark in solve(source).remarks if "no reading for" in remark]
 
 
-def test_a_saturated_flow_meter_is_flagged_and_a_valve_that_is_open_is_not(
+def test_a_saturated_flow_meter_is_told_and_a_valve_that_is_open_is_not(
     bench: dict[str, tuple[Source, Solve]],
 ) -> None:
     source, solve = bench["valve-map"]
     flow = source.recording["mass_flow"]
     clipped = solve(changed(source, "mass_flow", np.minimum(flow, 0.6 * flow.max())))
-    meter = next(check for check in clipped.failed if check.name == "flow meter")
-    assert "'mass_flow' stays at exactly" in meter.statement
-    assert "from sample 83" in meter.statement
-    assert solve(source).failed == ()
+    assert any("'mass_flow' stays at" in remark and "from sample" in remark for remark in clipped.remarks)
+    assert not any("'mass_flow'" in remark for remark in solve(source).remarks)
 
 
 def test_noise_alone_is_no_decay(bench: dict[str, tuple[Source, Solve]]) -> None:

@@ -18,25 +18,9 @@ import numpy as np
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.law import DEFAULTS, Tolerances, Values, solve, sought, tolerance
-from ppafo.identification.bench.result import (
-    BenchResult,
-    Panel,
-    Reported,
-    Series,
-    conflict_of,
-    count_of,
-    estimates_of,
-)
+from ppafo.identification.bench.result import BenchResult, Panel, Reported, Series, count_of, result_of
 from ppafo.identification.fit import Free
-from ppafo.identification.source import (
-    Source,
-    check_moves,
-    check_no_gap,
-    check_sources,
-    kind_of,
-    told_of_readings,
-    window,
-)
+from ppafo.identification.source import Source, check_moves, check_no_gap, check_sources, window
 from ppafo.signals.faults import is_at_limit, plateaus
 from ppafo.signals.recording import Floats
 
@@ -102,7 +86,6 @@ def free_decay(sources: tuple[Source, ...], settings: FreeDecaySettings | None =
         Reported(damping, units[0], "Viscous damping" if chosen.inertia else "Viscous damping over the inertia"),
         Reported(friction, units[1], "Dynamic friction" if chosen.inertia else "Dynamic friction over the inertia"),
     )
-    estimates = estimates_of(found, reported, sources, chosen.confidence)
     values = dict(zip((one.name for one in numbers), found.values.tolist(), strict=True))
     rates = values[damping] / inertia, values[friction] / inertia
     missing = "" if chosen.inertia else "; the inertia is not known, so only ratios to it follow"
@@ -110,15 +93,16 @@ def free_decay(sources: tuple[Source, ...], settings: FreeDecaySettings | None =
         float(decay.time[-1]) > course_times(values[f"start speed {number + 1}"], *rates, *_near_rest(values))[0][-1]
         for number, decay in enumerate(decays)
     )
-    return BenchResult(
+    return result_of(
         PROCEDURE,
+        sources,
+        found,
+        reported,
+        chosen.confidence,
         f"{count_of(len(decays), 'decay')}, {at_rest} to standstill; beta/I = {rates[0]:.4g} 1/s, T_c/I = "
         f"{rates[1]:.4g} rad/s^2{missing}",
-        estimates,
         _panels(decays, model, rates, _near_rest(values)),
-        kind_of(sources),
-        conflict_of(found, "another torque acts, such as gravity, an end stop or a friction of another shape"),
-        told_of_readings(sources),
+        "another torque acts, such as gravity, an end stop or a friction of another shape",
     )
 
 
@@ -259,7 +243,7 @@ def decay_of(source: Source, start: float | None, end: float | None) -> Decay:
                 f"before: the sensor is saturated or the vane is at a stop; give end"
             )
     if VELOCITY not in part:
-        return Decay(time - time[0], angle, sign, None)
+        return Decay(time=time - time[0], angle=angle, sign=sign, velocity=None)
     measured = part[VELOCITY][first:last]
     # How fast the angle changes, by the area under the velocity: another unit or another sign is no 1.
     moved = np.concatenate(([0.0], np.cumsum(0.5 * (measured[1:] + measured[:-1]) * np.diff(time))))
@@ -270,7 +254,7 @@ def decay_of(source: Source, start: float | None, end: float | None) -> Decay:
             f"{source.name}: {PROCEDURE}: channel '{VELOCITY}' is {gain:.3g} times as fast as 'angle' changes; "
             f"check unit and sign of both"
         )
-    return Decay(time - time[0], angle, sign, measured)
+    return Decay(time=time - time[0], angle=angle, sign=sign, velocity=measured)
 
 
 def noise_of(values: Floats) -> float:

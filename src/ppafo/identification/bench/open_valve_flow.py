@@ -1,6 +1,6 @@
 """Flow through the fully open valve: Cd of equations (6), (7), C and b of ISO 6358, or a laminar coefficient.
 
-    m = Cd A C1 P_up psi(r)   or   C rho_0 sqrt(T_0 / T) P_up phi(r; b)   or   c (P_up^2 - P_down^2),   r = P_down / P_up
+    m = Cd A C1 P_up psi(r)  or  C rho_0 sqrt(T_0 / T) P_up phi(r; b)  or  c (P_up^2 - P_down^2),   r = P_down / P_up
 
 m is the mass flow [kg/s], P_up and P_down the absolute pressures before and behind the valve [Pa]; flow functions and
 constants are those of ``flow``. Temperature and law of the gas, gains of the sensors, the zero of each of them are
@@ -22,25 +22,8 @@ from ppafo.identification.bench.flow import (
     true_pressure,
 )
 from ppafo.identification.bench.law import DEFAULTS, Tolerances, Values, solve, sought
-from ppafo.identification.bench.result import (
-    BenchResult,
-    Panel,
-    Reported,
-    Series,
-    conflict_of,
-    estimates_of,
-    with_residuals,
-)
-from ppafo.identification.source import (
-    Source,
-    check_absolute,
-    check_moves,
-    check_not_clipped,
-    check_sources,
-    kind_of,
-    pool,
-    told_of_readings,
-)
+from ppafo.identification.bench.result import BenchResult, Panel, Reported, Series, result_of, with_residuals
+from ppafo.identification.source import Source, check_absolute, check_moves, check_not_clipped, check_sources, pool
 from ppafo.model.gas import critical_pressure_ratio
 from ppafo.signals.recording import Floats
 
@@ -48,10 +31,11 @@ PROCEDURE = "open-valve-flow"
 CHANNELS = ("upstream_pressure", "downstream_pressure", "mass_flow")
 MINIMUM_SAMPLES = 5
 _FULLY_OPEN = 0.99
-_RATIO = "open_valve_flow.critical_ratio"
 _RATIOS = 0.2, 0.01, 0.95
 """Critical ratio of ISO 6358: start, lowest, highest."""
 _NEARLY_EQUAL = 0.9
+_SPAN, _SUBSONIC = 0.15, 0.6
+"""Span of the pressure ratios, and the largest of them, from which both numbers of ISO 6358 can be fitted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,24 +62,28 @@ def open_valve_flow(sources: tuple[Source, ...], settings: OpenValveFlowSettings
     upstream, downstream, flow, labels = open_readings(sources, gas)
     size = _size(settings)
     opening = Opening(gas, settings.law, settings.area or 1.0)
-    names = CHANNELS[:2]
+    names, critical = CHANNELS[:2], f"{settings.path}.critical_ratio"
     largest = float(flow.max())
 
     def law(at: Values) -> Floats:
         pressures = (true_pressure(at, name, shown) for name, shown in zip(names, (upstream, downstream), strict=True))
-        return read_flow(at, gas, opening.flow(at[size.path], at[_RATIO], *pressures))
+        return read_flow(at, gas, opening.flow(at[size.path], at[critical], *pressures))
 
     unit = opening.flow(1.0, _RATIOS[0], upstream, downstream)
     is_standard = settings.law == "iso6358"
     numbers = (
         sought(size.path, float(unit @ flow / (unit @ unit)), 0.0),
-        *((sought(_RATIO, *_RATIOS),) if is_standard else ()),
+        *((sought(critical, *_RATIOS),) if is_standard else ()),
         *flow_tolerances(gas, settings.tolerances, names, largest),
     )
     ratio = downstream / upstream
+    if is_standard and (np.ptp(ratio) < _SPAN or ratio.max() < _SUBSONIC):
+        raise IdentificationError(
+            f"{sources[0].name}: {PROCEDURE}: C and b need choked and subsonic flow, pressure ratios that span "
+            f"{_SPAN:g} or more and go beyond {_SUBSONIC:g}; these go from {ratio.min():.3g} to {ratio.max():.3g}"
+        )
     found, model = solve(law, flow, numbers, (labels, _levels(ratio, gas)), settings.confidence)
-    reported = (size, *((Reported(_RATIO, "", "Critical ratio b of ISO 6358"),) if is_standard else ()))
-    estimates = estimates_of(found, reported, sources, settings.confidence)
+    reported = (size, *((Reported(critical, "", "Critical ratio b of ISO 6358"),) if is_standard else ()))
     order = np.argsort(ratio)
     panel = Panel(
         "Open-valve flow",
@@ -109,15 +97,16 @@ def open_valve_flow(sources: tuple[Source, ...], settings: OpenValveFlowSettings
         ),
     )
     others = " or ".join(f"'{item}'" for item in ("orifice", "iso6358", "laminar") if item != settings.law)
-    return BenchResult(
+    return result_of(
         PROCEDURE,
+        sources,
+        found,
+        reported,
+        settings.confidence,
         f"{flow.size} readings at pressure ratios from {ratio.min():.2f} to {ratio.max():.2f}; "
         f"scatter {np.std(flow - model) / largest:.2%} of the largest flow",
-        estimates,
         with_residuals(panel, ratio, (flow - model) / upstream),
-        kind_of(sources),
-        conflict_of(found, f"try law = {others}, or leave those readings out"),
-        told_of_readings(sources),
+        f"try law = {others}, or leave those readings out",
     )
 
 

@@ -14,7 +14,7 @@ from ppafo.answers.style import BLACK, BLUE, VERMILION, house_style, mark_kind
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.identification.estimate import Estimate, Verdict
 from ppafo.identification.fit import Fit
-from ppafo.identification.source import Source, traces
+from ppafo.identification.source import Source, kind_of, told_of_readings, traces
 from ppafo.signals import RecordingKind
 from ppafo.signals.recording import Floats
 
@@ -112,10 +112,11 @@ def estimates_of(
         value, low, high = (float(one[place]) for one in (found.values, found.low, found.high))
         number = found.numbers[place]
         size, half = abs(value) if item.size is None else item.size, 0.5 * (high - low)
-        is_at_bound = any(abs(value - end) <= _AT_BOUND * number.scale for end in (number.low, number.high))
+        bound = next((end for end in (number.low, number.high) if abs(value - end) <= _AT_BOUND * number.scale), None)
+        value = value if bound is None else bound
         verdict: Verdict = "identified"
         sentence = f"{item.text}{_widened_by(found, item.path)}."
-        if is_at_bound:
+        if bound is not None:
             verdict = "at its bound"
             sentence = f"{sentence} The readings want a value at or beyond {value:.4g}; the interval ends there."
         elif half >= size:
@@ -132,14 +133,29 @@ def _widened_by(found: Fit, path: str) -> str:
     return f"; variance from {', '.join(named)}" if named else "; interval from the scatter of the readings"
 
 
-def conflict_of(found: Fit, remedy: str) -> str:
-    """Return which readings want other numbers than all together, and what to do; an empty text where none do."""
-    one = found.conflict
-    if one is None:
-        return ""
-    is_sought = not math.isfinite(found.numbers[found.index(one.number)].deviation)
-    moved = f", {one.number} by {one.standard_errors:.1f} standard errors" if is_sought else ""
-    return f"{one.group} alone want other numbers than all readings together{moved}; {remedy}"
+def result_of(
+    procedure: str,
+    sources: tuple[Source, ...],
+    found: Fit,
+    reported: Sequence[Reported],
+    confidence: float,
+    summary: str,
+    panels: tuple[Panel, ...],
+    remedy: str,
+    remarks: tuple[str, ...] = (),
+) -> BenchResult:
+    """Return what a procedure has found: an estimate for each number that is reported, and what to know of them.
+
+    ``remedy`` is what to do where some readings want other numbers than all together.
+    """
+    estimates, conflict = estimates_of(found, reported, sources, confidence), ""
+    if found.conflict is not None:
+        one = found.conflict
+        is_sought = not math.isfinite(found.numbers[found.index(one.number)].deviation)
+        moved = f", {one.number} by {one.standard_errors:.1f} standard errors" if is_sought else ""
+        conflict = f"readings of {one.group} alone want other numbers than all readings together{moved}; {remedy}"
+    told = (*remarks, *told_of_readings(sources))
+    return BenchResult(procedure, summary, estimates, panels, kind_of(sources), conflict, told)
 
 
 _SIZE = (8.4, 3.7)

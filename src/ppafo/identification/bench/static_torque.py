@@ -24,20 +24,11 @@ from ppafo.identification.bench.result import (
     Reported,
     Role,
     Series,
-    conflict_of,
     count_of,
-    estimates_of,
+    result_of,
     with_residuals,
 )
-from ppafo.identification.source import (
-    Source,
-    check_moves,
-    check_not_clipped,
-    check_sources,
-    kind_of,
-    pool,
-    told_of_readings,
-)
+from ppafo.identification.source import Source, check_moves, check_not_clipped, check_sources, pool
 from ppafo.signals.recording import Floats
 
 Labels = NDArray[np.int64]
@@ -109,21 +100,21 @@ def static_torque(sources: tuple[Source, ...], settings: StaticTorqueSettings | 
     reported = (
         Reported(names.slope_path, names.slope_unit, f"{names.slope.capitalize()}, the common slope of both branches"),
         Reported(names.friction_path, names.unit, f"{names.friction.capitalize()} without a pressure difference"),
-        Reported(names.growth_path, names.slope_unit, f"Growth of the {names.friction} with the pressure difference"),
+        Reported(names.growth_path, f"{names.unit}/Pa", f"Growth of the {names.friction} with the pressure difference"),
         Reported(names.zero_path, names.unit, f"Zero of the {names.load} sensor", float(np.ptp(torque))),
     )
-    estimates = estimates_of(found, reported, sources, chosen.confidence)
-    scatter = float(np.std(torque - model))
+    values = found.values.tolist()
     count = count_of(int(readings.clusters.max()) + 1, "repetition")
-    return BenchResult(
+    return result_of(
         PROCEDURE,
-        f"{pressure.size} readings, {count}; {names.slope} {estimates[0].value:.4g} {names.slope_unit}, {names.friction} "
-        f"{estimates[1].value:.3g} {names.unit}; scatter {scatter:.3g} {names.unit}",
-        estimates,
-        with_residuals(_panel(readings, estimates[0].value, estimates[3].value), pressure, torque - model),
-        kind_of(sources),
-        conflict_of(found, f"one {names.slope} and a {names.friction} linear in pressure do not describe them"),
-        told_of_readings(sources),
+        sources,
+        found,
+        reported,
+        chosen.confidence,
+        f"{pressure.size} readings, {count}; {names.slope} {values[0]:.4g} {names.slope_unit}, {names.friction} "
+        f"{values[1]:.3g} {names.unit}; scatter {np.std(torque - model):.3g} {names.unit}",
+        with_residuals(_panel(readings, values[0], values[3]), pressure, torque - model),
+        f"one {names.slope} and a {names.friction} linear in pressure do not describe them",
     )
 
 
@@ -142,14 +133,17 @@ def _straight_line(readings: "Readings", sources: tuple[Source, ...]) -> tuple[F
 
 
 def _groups(readings: "Readings") -> tuple[list[str], list[str]]:
-    """Return a label of repetition and half of the pressures (or of the recording) and one of branch, for each reading."""
-    branches = np.where(readings.branch > 0.0, "rising branch", "falling branch").tolist()
+    """Return a label of branch and half of the pressures and one of the repetition, for each reading.
+
+    Of many repetitions it is the recording and the branch.
+    """
+    branches = np.where(readings.branch > 0.0, "the rising branch", "the falling branch").tolist()
     if readings.clusters.max() >= _MOST_REPETITIONS:
         return [f"recording {number + 1}" for number in readings.files.tolist()], branches
     middle = 0.5 * float(readings.pressure.max() + readings.pressure.min())
     halves = np.where(readings.pressure > middle, "higher", "lower").tolist()
-    numbers = (readings.clusters + 1).tolist()
-    return [f"{half} pressures of repetition {n}" for half, n in zip(halves, numbers, strict=True)], branches
+    levels = [f"{branch} at {half} pressures" for branch, half in zip(branches, halves, strict=True)]
+    return levels, [f"repetition {number + 1}" for number in readings.clusters.tolist()]
 
 
 @dataclass(frozen=True, slots=True)
@@ -231,9 +225,7 @@ def readings_of(sources: tuple[Source, ...]) -> Readings:
     load = load_of(sources)
     for source in sources:
         check_moves(source, PROCEDURE, load)
-        pressure, torque = source.recording["pressure_difference"], source.recording[load]
-        check_not_clipped(source, PROCEDURE, load, "pressure_difference", pressure)
-        check_not_clipped(source, PROCEDURE, "pressure_difference", load, torque, _MORE_THAN_FRICTION)
+        check_not_clipped(source, PROCEDURE, load, "pressure_difference", source.recording["pressure_difference"])
         values = source.recording["direction"]
         wrong = np.flatnonzero(~np.isin(values, (-1.0, 0.0, 1.0)))
         if wrong.size:
@@ -271,6 +263,9 @@ def readings_of(sources: tuple[Source, ...]) -> Readings:
             f"{sources[0].name}: {PROCEDURE} needs readings at {_MINIMUM_LEVELS} different pressures or more, "
             f"there are {levels}"
         )
+    for source in sources:
+        driving = source.recording[load]
+        check_not_clipped(source, PROCEDURE, "pressure_difference", load, driving, _MORE_THAN_FRICTION)
     # A repetition of a recording is one cluster; so is a recording without repetitions.
     recordings = [source.recording for source in sources]
     files = np.concatenate([np.full(len(one), number) for number, one in enumerate(recordings)])[used]

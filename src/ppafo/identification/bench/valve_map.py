@@ -1,7 +1,7 @@
 """Valve map: command against opening; dead band, gain, saturation and hysteresis of a proportional valve.
 
-    m = Cd A(u') C1 P_up psi(P_down / P_up),   Cd A = sign(u') k min(max(|u'| - u_0, 0), u_s - u_0)      equations (6), (7)
-    u' = play(u; h):   y = max(u - h/2, min(u + h/2, y)),   u' = y / (1 - h/2)                    effect ``spool_play``
+    m = Cd A(u') C1 P_up psi(P_down / P_up),   Cd A = sign(u') k min(max(|u'| - u_0, 0), u_s - u_0)     (6), (7)
+    u' = play(u; h):   y = max(u - h/2, min(u + h/2, y)),   u' = y / (1 - h/2)     effect ``spool_play``
 
 m is the mass flow [kg/s], positive into chamber 1, u the command from -1 to 1, u_0 the dead band, u_s the command from
 which the valve opens no further, h the width of the play, k the effective area per command [m^2]. Flow is over what the
@@ -16,25 +16,8 @@ import numpy as np
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.flow import GasAt, flow_tolerances, orifice_shape, read_flow, true_pressure
 from ppafo.identification.bench.law import DEFAULTS, Tolerances, Values, solve, sought
-from ppafo.identification.bench.result import (
-    BenchResult,
-    Panel,
-    Reported,
-    Role,
-    Series,
-    conflict_of,
-    estimates_of,
-    with_residuals,
-)
-from ppafo.identification.source import (
-    Source,
-    check_absolute,
-    check_moves,
-    check_sources,
-    kind_of,
-    pool,
-    told_of_readings,
-)
+from ppafo.identification.bench.result import BenchResult, Panel, Reported, Role, Series, result_of, with_residuals
+from ppafo.identification.source import Source, check_absolute, check_moves, check_sources, pool
 from ppafo.model.effects.spool_play import spool_position
 from ppafo.signals.recording import Floats
 
@@ -83,10 +66,10 @@ def valve_map(sources: tuple[Source, ...], settings: ValveMapSettings) -> BenchR
     )
 
     def law(at: Values) -> Floats:
-        pressures = (true_pressure(at, name, shown) for name, shown in zip(names, (upstream, downstream), strict=True))
+        before, behind = true_pressure(at, names[0], upstream), true_pressure(at, names[1], downstream)
         drawn = np.concatenate([spool_of(one, at[_PLAY]) for one in commands])
         area = area_of_command(drawn, at[band], at[_GAIN], at[_SATURATION])
-        shape = np.abs(orifice_shape(*pressures, gas.heat_capacity_ratio))
+        shape = np.abs(orifice_shape(before, behind, gas.heat_capacity_ratio))
         return read_flow(at, gas, area * gas.choked_flow_constant * shape)
 
     found, model = solve(law, flow, numbers, _groups(command, branch, highest), settings.confidence)
@@ -99,18 +82,19 @@ def valve_map(sources: tuple[Source, ...], settings: ValveMapSettings) -> BenchR
         reported.append(Reported(_SATURATION, "", "Command from which the valve opens no further"))
     if is_two_way:
         reported.append(Reported(_PLAY, "", "Width between a rising and a falling command", _SMALL_COMMAND))
-    estimates = estimates_of(found, reported, sources, settings.confidence)
     ways = bool((command > 0.1).any() and (command < -0.1).any())
     one_way = "only one direction was recorded: whether the other behaves the same is unknown"
-    return BenchResult(
+    return result_of(
         PROCEDURE,
+        sources,
+        found,
+        reported,
+        settings.confidence,
         f"{command.size} readings; dead band {values[band]:.3g}, {values[_GAIN] * 1e6:.4g} mm^2 per command; "
         f"scatter {np.std(flow - model) / np.abs(flow).max():.2%} of the largest flow",
-        estimates,
         with_residuals(_panel(command, branch, flow, model), command, flow - model),
-        kind_of(sources),
-        conflict_of(found, "the opening is not the same in both directions, or not linear in the command"),
-        (*(() if ways else (one_way,)), *told_of_readings(sources)),
+        "the opening is not the same in both directions, or not linear in the command",
+        () if ways else (one_way,),
     )
 
 

@@ -23,6 +23,7 @@ from ppafo.identification.bench.flow import (
     GAS_LAW,
     TEMPERATURE,
     GasAt,
+    Law,
     Opening,
     flow_tolerances,
     gas_tolerances,
@@ -30,16 +31,7 @@ from ppafo.identification.bench.flow import (
     true_pressure,
 )
 from ppafo.identification.bench.law import DEFAULTS, Tolerances, Values, solve, sought, tolerance
-from ppafo.identification.bench.result import (
-    BenchResult,
-    Panel,
-    Reported,
-    Series,
-    conflict_of,
-    count_of,
-    estimates_of,
-    with_residuals,
-)
+from ppafo.identification.bench.result import BenchResult, Panel, Reported, Series, count_of, result_of, with_residuals
 from ppafo.identification.fit import Free
 from ppafo.identification.source import (
     Source,
@@ -48,9 +40,7 @@ from ppafo.identification.source import (
     check_no_gap,
     check_not_clipped,
     check_sources,
-    kind_of,
     pool,
-    told_of_readings,
     window,
 )
 from ppafo.signals.faults import plateaus, stands_out
@@ -96,7 +86,7 @@ class VaneLeakSettings:
     @property
     def opening(self) -> Opening:
         """The leak in the form in which it is sought."""
-        law: str = "laminar" if self.is_laminar else "orifice" if self.critical_ratio is None else "iso6358"
+        law: Law = "laminar" if self.is_laminar else "orifice" if self.critical_ratio is None else "iso6358"
         return Opening(self.gas, law, self.discharge_coefficient or 1.0, self.critical_ratio)
 
     @property
@@ -191,10 +181,11 @@ def closed_chambers(source: Source, settings: VaneLeakSettings) -> ClosedChamber
             f"{source.name}: {PROCEDURE}: only {last} samples lie between start and equal pressures, "
             f"{MINIMUM_SAMPLES} are needed; record faster, or give start"
         )
-    return ClosedChambers(part.time[:last] - part.time[0], first[:last], second[:last], fuller)
+    time = part.time[:last] - part.time[0]
+    return ClosedChambers(time=time, first=first[:last], second=second[:last], fuller=fuller)
 
 
-_POINTS = 1200
+_POINTS = 400
 _LOWEST = 1.0e-3
 """Difference at the end of a computed fall over that at its start."""
 
@@ -226,7 +217,8 @@ def fall_of_difference(opening: Opening, size: float, first: float, second: floa
     flow = opening.flow(max(size, 1.0e-300), 0.0, lower + difference, lower)
     slowness = difference / np.maximum((1.0 + ratio) * rate * flow, 1.0e-300)
     steps = 0.5 * (slowness[1:] + slowness[:-1]) * np.diff(logs)
-    return Falls(np.concatenate(([0.0], np.cumsum(steps))), difference, ratio, conserved)
+    times = np.concatenate(([0.0], np.cumsum(steps)))
+    return Falls(time=times, difference=difference, ratio=ratio, conserved=conserved)
 
 
 def _decaying_leak(
@@ -251,8 +243,9 @@ def _decaying_leak(
         rate, parts = warm / (emptied * (1.0 + at[_VOLUME])), []
         lasting = longest / _RELAXED * math.exp(at[_RELAXATION])
         for number, item in enumerate(closed, start=1):
-            starts = (at[f"start of {name}, decay {number}"] for name in names)
-            falls = fall_of_difference(opening, at[size.path], *starts, 0.0 if item.is_a_room else at[_RATIO], rate)
+            first, second = (at[f"start of {name}, decay {number}"] for name in names)
+            ratio = 0.0 if item.is_a_room else at[_RATIO]
+            falls = fall_of_difference(opening, at[size.path], first, second, ratio, rate)
             faded = np.exp(-item.time / lasting)
             for name, true in list(zip(names, falls.pressures(item.time), strict=True))[: item.fitted]:
                 parts.append(true * (1.0 + at[f"relaxation of {name}, decay {number}"] * faded) + at[f"zero of {name}"])
@@ -280,7 +273,6 @@ def _decaying_leak(
         early = ["early" if is_early else "late" for is_early in item.is_early]
         channels += [f"{name}, {word} in the fall" for name in names[: item.fitted] for word in early]
     found, model = solve(law, measured, numbers, (labels, channels), settings.confidence)
-    estimates = estimates_of(found, (size,), sources, settings.confidence)
     time = np.concatenate([item.time for item in closed])
     readings, fitted, place = [], [], 0
     for item in closed:
@@ -290,24 +282,22 @@ def _decaying_leak(
             model[place : place + count] - (item.second if item.is_a_room else model[place + count :][:count])
         )
         place += item.fitted * count
-    shown = (("measured", readings, "measured"), (opening.law, fitted, "law"))
-    series = tuple(
-        Series(name if number == 0 else "", item.time, values[number], role)
-        for name, values, role in shown
-        for number, item in enumerate(closed)
-    )
-    panel = Panel("Closed chambers", "Time", "s", "Pressure difference", "Pa_d", series)
+    series = [Series("measured" if not n else "", closed[n].time, one, "measured") for n, one in enumerate(readings)]
+    series += [Series(opening.law if not n else "", closed[n].time, one, "law") for n, one in enumerate(fitted)]
+    panel = Panel("Closed chambers", "Time", "s", "Pressure difference", "Pa_d", tuple(series))
     room = all(item.is_a_room for item in closed)
     remark = (f"the pressure in chamber {3 - fuller} is constant, so it is treated as a room",) if room else ()
     fall = max(1.0 - float(one[-EDGE:].mean() / one[:EDGE].mean()) for one in readings)
-    return BenchResult(
+    return result_of(
         PROCEDURE,
-        f"{count_of(len(closed), 'decay')} of up to {float(time.max()):.3g} s; the pressure difference falls by {fall:.1%}",
-        estimates,
+        sources,
+        found,
+        (size,),
+        settings.confidence,
+        f"{count_of(len(closed), 'decay')} of up to {longest:.3g} s; the pressure difference falls by {fall:.1%}",
         with_residuals(panel, time, np.concatenate(readings) - np.concatenate(fitted)),
-        kind_of(sources),
-        conflict_of(found, _REMEDY.format("'orifice'" if settings.is_laminar else "'laminar'")),
-        (*remark, *told_of_readings(sources)),
+        _REMEDY.format("'orifice'" if settings.is_laminar else "'laminar'"),
+        remark,
     )
 
 
@@ -382,12 +372,13 @@ def _steady_leak(sources: tuple[Source, ...], settings: VaneLeakSettings) -> Ben
         Series(opening.law, difference[order], model[order], "law"),
     )
     panel = Panel("Steady leak", "Pressure difference", "Pa_d", "Flow", "kg/s", series)
-    return BenchResult(
+    return result_of(
         PROCEDURE,
+        sources,
+        found,
+        (size,),
+        settings.confidence,
         f"{flow.size} steady readings; scatter {np.std(flow - model) / largest:.2%} of the largest flow",
-        estimates_of(found, (size,), sources, settings.confidence),
         with_residuals(panel, difference, flow - model),
-        kind_of(sources),
-        conflict_of(found, _REMEDY.format("'orifice'" if settings.is_laminar else "'laminar'")),
-        told_of_readings(sources),
+        _REMEDY.format("'orifice'" if settings.is_laminar else "'laminar'"),
     )

@@ -85,6 +85,7 @@ class Tolerances:
     start_of_pressure: float | None = None
     gas_temperature: float | None = None
     gas_law: float | None = None
+    zero_of_flow: float | None = None
     held: float | None = None
     each_recording: tuple[Sensed, ...] = ()
 
@@ -137,6 +138,7 @@ _UNITS = {
     "start_of_pressure": "Pa_d",
     "gas_temperature": "K",
     "gas_law": "1",
+    "zero_of_flow": "1",
     "held": "1",
 }
 _LARGEST_FRACTION = 0.5

@@ -72,7 +72,8 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
             raise IdentificationError(f"{file}: {twice}")
         found += uses
     used = tuple(found)
-    known = bench_tolerances(problem.bench, file)
+    stated = tolerances_of(problem.bench, file)
+    known = bench_tolerances(stated)
     for task in tasks:
         result = run_procedure(task.sources, task.item, Setting(current, valve, task.place, known))
         results.append(result)
@@ -86,7 +87,7 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
         problem.device.valve,
         bench,
         used,
-        tolerances_of(problem.bench, file),
+        stated,
     )
     fitted = None if problem.trajectory is None else solve_section(problem.trajectory, setting, progress)
     estimates = (*bench_estimates(results), *(() if fitted is None else fitted.fit.estimates))
