@@ -91,7 +91,7 @@ def heavy(random: np.random.Generator, count: int) -> Floats:
 def hum(random: np.random.Generator, count: int) -> Floats:
     """White noise and a hum of 50 Hz of the same size, at 1 kHz."""
     phase = 2.0 * math.pi * (0.05 * np.arange(count) + random.random())
-    return random.standard_normal(count) + math.sqrt(2.0) * np.sin(phase)
+    return np.asarray(random.standard_normal(count) + math.sqrt(2.0) * np.sin(phase))
 
 
 KINDS: dict[str, Callable[[np.random.Generator, int], Floats]] = {

@@ -20,7 +20,6 @@ import numpy as np
 
 import ppafo
 from ppafo.constants import PASCALS_PER_PSI
-from ppafo.errors import PpafoError
 from ppafo.questions.validate.solve import Validation, in_words
 from ppafo.rig.experiments import record
 from ppafo.signals.recording import Recording
@@ -115,6 +114,7 @@ FAULTS = (
     Fault("inertia 30 % high", ("foot_plate.inertia",), device=("foot_plate.inertia=0.01092 kg m^2",)),
 )
 NOTHING = Fault("nothing", ())
+VERDICTS = ("right", "wrong", "none")
 
 
 def recorded(fault: Fault, seed: int) -> Recording:
@@ -146,29 +146,18 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, nargs="+", required=True)
     parser.add_argument("--right", type=int, default=0, metavar="COUNT", help="nothing planted, COUNT times")
     words = parser.parse_args()
-    print("| planted | named | verdict | G | error over noise without, with | CPU s |\n|---|---|---|---|---|---|")
     total: Counter[str] = Counter()
-    for seed in words.seeds:
-        for fault in FAULTS:
-            begun = time.process_time()
-            try:
-                found = validated(fault, seed)
-            except PpafoError as error:
-                said = str(error).partition("planted.csv: ")[2] or str(error)
-                total["refused"] += 1
-                print(f"| {fault.title} | {said} | refused | | | {time.process_time() - begun:.1f} |", flush=True)
-                continue
-            verdict, best, spent = judged(fault, found), found.causes.found, time.process_time() - begun
-            total[verdict] += 1
-            worst = max(one.in_noise for item in found.recordings for one in item.channels)
-            said, gain, left = "none", "", ""
-            if best is not None:
-                names = [in_words(best), *(one.name for one in best.same)]
-                said, gain, left = " or ".join(names), f"{best.gain:.0f}", f", {best.left:.2g}"
-            elif found.causes.nearest is not None:
-                said, left = f"none; nearest: {in_words(found.causes.nearest)}", f", {found.causes.nearest.left:.2g}"
-            print(f"| {fault.title} | {said} | {verdict} | {gain} | {worst:.2g}{left} | {spent:.1f} |", flush=True)
-    print(f"\n{', '.join(f'{count} {word}' for word, count in total.most_common())}", flush=True)
+    begun = time.process_time()
+    for fault in FAULTS:
+        found = [validated(fault, seed) for seed in words.seeds]
+        counts = Counter(judged(fault, one) for one in found)
+        total += counts
+        best = found[0].causes.found
+        same = [] if best is None else [one.name for one in (best, *best.same)]
+        said = ", ".join(f"{counts[verdict]} {verdict}" for verdict in VERDICTS if counts[verdict])
+        print(f"{fault.title}: {said} ({' or '.join(same)})", flush=True)
+    spent = (time.process_time() - begun) / total.total()
+    print(f"\n{', '.join(f'{total[verdict]} {verdict}' for verdict in VERDICTS)}; {spent:.1f} CPU s each", flush=True)
     if words.right:
         right = [validated(NOTHING, words.seeds[0] + number) for number in range(words.right)]
         alarms = sum(not one.passes for one in right)

@@ -155,10 +155,8 @@ class ChannelAgreement:
     """Errors (model less measured) in one channel, in its SI unit, after the common delay was taken out.
 
     ``rms``, ``bias`` and ``largest`` (with its sign, at ``largest_time`` [s]); ``rms_unaligned`` is the RMS error
-    without any shift; ``noise`` is that of its samples; ``delay`` [s] is what this channel alone would have;
-    ``delay_is_at_limit`` says that the search for it ended at its limit, so that it is none of a sensor. ``variation``
-    is the standard deviation of the signal without its noise. ``limit`` is the largest fraction of ``full_range`` that
-    passes.
+    without any shift; ``noise`` is that of its samples; ``variation`` is the standard deviation of the signal without
+    its noise. ``limit`` is the largest fraction of ``full_range`` that passes.
     """
 
     channel: str
@@ -171,8 +169,6 @@ class ChannelAgreement:
     bias: float
     largest: float
     largest_time: float
-    delay: float
-    delay_is_at_limit: bool
     limit: float
 
     @property
@@ -222,13 +218,12 @@ class Comparison:
     limit: Limit | None
 
 
-def channel_agreement(item: Comparison, delay: float, longest_delay: float) -> ChannelAgreement:
+def channel_agreement(item: Comparison, delay: float) -> ChannelAgreement:
     """The errors in one channel with the model shifted by ``delay`` [s]."""
     curve = item.curve
     weights = sample_weights(curve.times)
     error = errors(curve, delay)
     worst = int(np.argmax(np.abs(error)))
-    own = estimate_delay([curve], longest_delay)
     noise = max(noise_of(curve.values), LEAST_NOISE * curve.full_range)
     variation = variation_of(curve.values, weights, noise)
     usual = acceptable_error(variation, noise, curve.full_range) / curve.full_range
@@ -243,8 +238,6 @@ def channel_agreement(item: Comparison, delay: float, longest_delay: float) -> C
         bias=float(weights @ error),
         largest=float(error[worst]),
         largest_time=float(curve.times[worst]),
-        delay=own.value,
-        delay_is_at_limit=own.is_at_limit,
         limit=usual if item.limit is None else item.limit.fraction_of(curve.full_range),
     )
 
@@ -305,14 +298,9 @@ def compare_recording(measured: Measured, device: Device, settings: ReplaySettin
     replayed = replay_recording(wanted)
     items = _comparisons(measured, replayed, wanted.device, settings)
     delay = common_delay(items, settings.longest_delay)
-    channels = tuple(channel_agreement(item, delay.correction, settings.longest_delay) for item in items)
-    late, longest = [], settings.longest_delay
-    alone = ", ".join(channel.channel for channel in channels if channel.delay_is_at_limit)
-    if delay.is_at_limit:
-        late.append(f"model and measurement are more than {longest:g} s apart in time; no delay was removed")
-    elif alone:
-        limit = f"own delay of {alone} is at the limit of {longest:g} s"
-        late.append(f"{limit}: not the delay of a sensor, but a different time course")
+    channels = tuple(channel_agreement(item, delay.correction) for item in items)
+    longest = f"model and measurement are more than {settings.longest_delay:g} s apart in time; no delay was removed"
+    late = [longest] if delay.is_at_limit else []
     return RecordingAgreement(
         file=measured.file,
         sha256=measured.sha256,

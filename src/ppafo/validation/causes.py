@@ -3,7 +3,7 @@
 A cause is a model of a sensor, y = h(model; a) + e, or another number of the set: the recorded samples stay as they
 are, so that hypotheses are compared by what they leave of the same samples. G = sum over channels of
 n [ln max(MS0/s^2, 1) - ln max(MSc/s^2, 1)] - k ln N, with MS the mean square left, s the noise of the samples and k = 1
-for a cause with a size. A start read from noisy samples, and part of a sample of delay, are taken out with every cause.
+for a cause with a size. A common delay, and a start that was read from noisy samples, are taken out with every cause.
 """
 
 import math
@@ -61,11 +61,15 @@ class Cause:
 
 @dataclass(frozen=True, slots=True)
 class Causes:
-    """The cause of a disagreement, if one is found; else the ``nearest``; ``tried`` is how many were compared."""
+    """The cause of a disagreement, if one is found; else the ``nearest``; ``tried`` is how many were compared.
+
+    ``is_noise`` says that nothing but noise is left without any.
+    """
 
     found: Cause | None = None
     nearest: Cause | None = None
     tried: int = 0
+    is_noise: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,15 +162,21 @@ def causes_of(
     for measured, agreement in zip(read, agreements, strict=True):
         search.records.append(search.record_of(measured, agreement))
     none, _ = search.evaluated([Change()])[0]
-    if none is None or float(none.max()) < ONLY_NOISE:
+    if none is not None and float(none.max()) < ONLY_NOISE:
+        return Causes(is_noise=True)
+    if none is None:
         return Causes()
     faults = tuple(_faults(search.records, none))
     if faults:
         return Causes(replace(faults[0], same=faults[1:]), None, len(none))
+    if settings.motion == "measured":
+        # The angle is an input, and a delay of the sensors one of an input.
+        return Causes()
+    report(Progress("searching for causes"))
     tried: list[Cause] = []
     names = set.intersection(*(set(one.recording.names) for one in read))
     # Numbers of the set are compared with sensors: the gain of a command is the area of its valve.
-    stages = (_motions(search), _exchanges(device, names), [*_sizes(device, names, settings), *_numbers(search)])
+    stages = (_motions(search), _exchanges(device, names), [*_sizes(device, names), *_numbers(search)])
     for stage in (*stages, _effects(device)):
         tried += search.compared(list(stage), none)
         tried.sort(key=lambda one: -one.gain)
@@ -226,7 +236,8 @@ class _Search:
         """Return, for each change, the mean square left in each channel over that of its noise, and what is left."""
         left: list[tuple[Floats | None, Floats]] = []
         for first in range(0, len(changes), _TOGETHER):
-            self.report(Progress("searching for causes", first, len(changes)))
+            if first:
+                self.report(Progress("searching for causes", first, len(changes)))
             some = changes[first : first + _TOGETHER]
             parts = [self._left(record, some) for record in self.records]
             for place in range(len(some)):
@@ -251,7 +262,9 @@ class _Search:
         found: list[list[Floats] | None] = []
         for place, change in enumerate(changes):
             one = replayed.get(place)
-            found.append(_freed(record, one, change) if isinstance(one, Replayed) else None)
+            found.append(
+                _freed(record, one, change, self.settings.longest_delay) if isinstance(one, Replayed) else None
+            )
         return found
 
     def _replay(self, measured: Measured, change: Change) -> Replay:
@@ -351,21 +364,25 @@ def _signals(record: _Record, replayed: Replayed, change: Change, offset: float)
     return np.concatenate(readings), np.concatenate(slopes)
 
 
-def _freed(record: _Record, replayed: Replayed, change: Change) -> list[Floats]:
-    """Return what is left in each channel, over its noise, without a sample of delay and the error of the start.
+def _freed(record: _Record, replayed: Replayed, change: Change, longest_delay: float) -> list[Floats]:
+    """Return what is left in each channel, over its noise, without a common delay and the error of the start.
 
-    The delay that was found may be what a wrong model makes: the better of it and none counts.
+    The delay that was found may be what a wrong model makes: it is sought from there and from none.
     """
     measured = np.concatenate([one.values / one.noise for one in record.channels])
+    interval = float(np.median(np.diff(record.measured.recording.time)))
     options = []
-    for offset in {0.0, record.delay}:
-        readings, slope = _signals(record, replayed, change, offset)
-        columns = np.vstack([slope, *record.starts]).T
-        ridge = np.eye(columns.shape[1])
-        left = measured - readings
-        sizes = np.linalg.lstsq(np.vstack([columns, ridge]), np.append(left, np.zeros(len(ridge))))[0]
-        options.append(left - columns @ sizes)
-    return np.split(min(options, key=lambda left: float(left @ left)), len(record.channels))
+    for first in {0.0, record.delay}:
+        offset = first
+        for _ in range(_STEPS + 1):
+            readings, slope = _signals(record, replayed, change, offset)
+            columns = np.vstack([slope, *record.starts])
+            left = measured - readings
+            sizes = np.linalg.solve(columns @ columns.T + np.eye(len(columns)), columns @ left)
+            left = left - sizes @ columns
+            offset = min(max(offset - interval * float(sizes[0]), -longest_delay), longest_delay)
+        options.append(left)
+    return np.split(min(options, key=lambda one: float(one @ one)), len(record.channels))
 
 
 def _faults(records: Sequence[_Record], none: Floats) -> Iterator[Cause]:
@@ -374,7 +391,8 @@ def _faults(records: Sequence[_Record], none: Floats) -> Iterator[Cause]:
     for (record, one), square in zip(channels, none.tolist(), strict=True):
         words = _fault_of(one, record.measured.recording.time) if square >= ONLY_NOISE else ""
         if words:
-            yield Cause(f"samples of {one.name}", f"{one.name} {words} ({record.measured.file})", 0.0, 0.0)
+            file = f" ({record.measured.file})" if len(records) > 1 else ""
+            yield Cause(f"samples of {one.name}", f"{one.name} {words}{file}", 0.0, 0.0)
 
 
 def _fault_of(one: _Channel, time: Floats) -> str:
@@ -482,7 +500,7 @@ _LONG_DELAYS = _both_ways(0.015, 0.03, 0.05, 0.08, 0.12)
 _RATES = (0.7, 0.85, 0.94, 0.98, 0.995, 1.005, 1.02, 1.06, 1.15, 1.4)
 
 
-def _sizes(device: Device, names: Collection[str], settings: ReplaySettings) -> Iterator[Candidate]:
+def _sizes(device: Device, names: Collection[str]) -> Iterator[Candidate]:
     """Gain and zero of one sensor, of all pressures, of command and supply; delays and the rate of the clock."""
     supply = device.supply
     room = supply.atmospheric_pressure
@@ -511,9 +529,6 @@ def _sizes(device: Device, names: Collection[str], settings: ReplaySettings) -> 
             is_ratio=True,
             usual=usual_gain,
         )
-    if settings.motion == "measured":
-        # The angle, an input, would be late too.
-        return
     compared = [name for name in _SENSORS if name in names]
     for name in compared:
         words = f"{name} seems to be later than the other channels by {{:.3g}} ms"

@@ -280,12 +280,6 @@ def _gap_remarks(recording: Recording) -> tuple[str, ...]:
     return (f"{count} {noun} in time, the first after {first:.6g} s; inputs were held across",)
 
 
-def shows_nothing(recording: Recording, name: str) -> bool:
-    """Return whether a channel that is compared never changes, or stays at a limit of its sensor: nothing to fit."""
-    values = recording[name]
-    return bool(values.max() == values.min()) or any(_is_at_limit(values, one, name) for one in plateaus(values))
-
-
 def _constant_remarks(recording: Recording) -> tuple[str, ...]:
     """Remark on channels to compare that never change; a real sensor that is connected has noise."""
     return tuple(

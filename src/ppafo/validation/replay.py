@@ -84,14 +84,15 @@ def replay_together(wanted: Sequence[Replay]) -> list[Replayed | PpafoError]:
     planned: dict[int, tuple[Run, StepInputs, Batch]] = {}
     groups: dict[tuple[Any, ...], list[int]] = {}
     for place, one in enumerate(wanted):
+        followed = followed_channels(one.measured, one.motion)
+        inputs = RecordedInputs(one.measured.recording, followed, float(one.measured.recording.time[0]))
         try:
             run = _plan(one)
+            steps = step_inputs(inputs, one.device, run)
         except PpafoError as error:
             found[place] = error
             continue
-        followed = followed_channels(one.measured, one.motion)
-        inputs = RecordedInputs(one.measured.recording, followed, float(one.measured.recording.time[0]))
-        steps, batch = step_inputs(inputs, one.device, run), batch_of(run)
+        batch = batch_of(run)
         planned[place] = run, steps, batch
         table = [(name, series.tobytes()) for name, series in steps.parameters.items()]
         command = b"" if steps.command is None else steps.command.tobytes()

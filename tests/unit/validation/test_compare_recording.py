@@ -66,7 +66,7 @@ def test_recorded_commands_of_closed_loops_give_the_same_pressures_again(scenari
 
 def test_a_changed_parameter_fails_and_its_channels_are_named(step: Step, agree: Agree) -> None:
     device, recording = step
-    other = dataclasses.replace(device, foot_plate=dataclasses.replace(device.foot_plate, gravity_torque=4.0))
+    other = dataclasses.replace(device, foot_plate=dataclasses.replace(device.foot_plate, gravity_torque=8.0))
     agreement = agree(recording, other)
     assert not agreement.passes
     assert not next(channel for channel in agreement.channels if channel.channel == "angle").passes
@@ -176,7 +176,7 @@ def test_a_right_model_agrees_with_a_noisy_signal_that_moves_little_or_not_at_al
     assert channels["pressure_2"].passes
     time, room = recording.time, np.full(len(recording), 101325.0)
     seen = room + 200.0 * random.standard_normal(room.size)
-    still = channel_agreement(Comparison("pressure_1", "Pa_d", Curve(time, seen, time, room, 4.0e5), None), 0.0, 0.0)
+    still = channel_agreement(Comparison("pressure_1", "Pa_d", Curve(time, seen, time, room, 4.0e5), None), 0.0)
     assert still.variation < 100.0
     assert still.passes
 
@@ -266,20 +266,6 @@ def test_only_what_was_recorded_is_compared_and_the_rest_of_the_start_is_asked_f
     agreement = agree(lean, device, initial=start)
     assert list(shares(agreement)) == ["angle"]
     assert shares(agreement)["angle"] < 1e-12
-
-
-def test_a_channel_whose_own_delay_is_at_the_limit_is_flagged(step: Step, agree: Agree) -> None:
-    device, recording = step
-    clean = agree(recording, device)
-    assert not any(channel.delay_is_at_limit for channel in clean.channels)
-    # One pressure comes 60 ms late: not the delay of a sensor, and the other channels do not share it.
-    moved = np.interp(recording.time - 0.06, recording.time, recording["pressure_2"])
-    kept = only(recording, "command", "angle", "pressure_1", "pressure_2")
-    agreement = agree(with_channels(kept, pressure_2=moved), device)
-    late_ones = {channel.channel for channel in agreement.channels if channel.delay_is_at_limit}
-    assert "pressure_2" in late_ones
-    assert "angle" not in late_ones
-    assert any(remark.startswith("own delay of pressure_2") for remark in agreement.remarks)
 
 
 def test_another_actuator_is_replayed_with_its_own_pressures_and_torque(agree: Agree) -> None:

@@ -78,7 +78,7 @@ class Validation(Solved):
 
     @property
     def passes(self) -> bool:
-        """True where every error is within its limit and, unless limits were given, no cause that no bench has is found."""
+        """True where every error is within its limit and, without limits given, no cause is found that no bench has."""
         within = all(recording.passes for recording in self.recordings)
         found = self.causes.found
         return within and (self.has_limits or found is None or found.is_usual)
@@ -271,7 +271,7 @@ _HEAD = tuple(
         Column,
         (
             *("channel", "RMS error", "in noise", "variation", "of range", "limit", "bias", "largest", "at"),
-            *("own delay", "verdict"),
+            "verdict",
         ),
     )
 )
@@ -345,10 +345,10 @@ def verdict(validation: Validation) -> str:
     )
     why = _why(validation.causes)
     if not validation.passes:
-        parts = [part for part in (why, size, failed and f"beyond the limit: {failed}") if part]
-        return f"{name} does not agree: {'; '.join(parts)}"
-    agrees = f"{name} agrees with {count} recording{'s' * (count > 1)}: every RMS error is within its limit"
-    return f"{agrees}; {size}; {why}" if why else f"{agrees}; nothing but noise is left"
+        parts = (why, size, f"beyond the limit: {failed}") if why else (failed, size)
+        return f"{name} does not agree: {'; '.join(parts if failed else parts[:2])}"
+    rest = "nothing but noise is left" if validation.causes.is_noise else "; ".join([size, *([why] if why else [])])
+    return f"{name} agrees with {count} recording{'s' * (count > 1)}: every RMS error is within its limit; {rest}"
 
 
 def _why(causes: Causes) -> str:
@@ -454,7 +454,6 @@ def channel_cells(channel: ChannelAgreement) -> tuple[str, ...]:
         _error(channel, channel.bias),
         _error(channel, channel.largest),
         f"{channel.largest_time:.4g} s",
-        f"{'limit, ' if channel.delay_is_at_limit else ''}{_number(_MILLISECONDS * channel.delay)} ms",
         "pass" if channel.passes else "FAIL",
     )
 
@@ -503,7 +502,5 @@ def _channel_data(channel: ChannelAgreement) -> dict[str, Any]:
         "bias": channel.bias,
         "largest": channel.largest,
         "largest_time": channel.largest_time,
-        "delay": channel.delay,
-        "delay_is_at_limit": channel.delay_is_at_limit,
         "shown": {"unit": display_unit(quantity), "rms": display_value(channel.rms, quantity)},
     }

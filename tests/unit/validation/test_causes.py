@@ -1,0 +1,186 @@
+"""Causes of a disagreement: each stage names what was planted, and nothing is named that leaves more than noise."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ppafo.parameters import load_device
+from ppafo.parameters.device import Device
+from ppafo.running import simulate
+from ppafo.signals import Channel, Recording
+from ppafo.simulation.loading import load_scenario
+from ppafo.validation.agreement import ReplaySettings, compare_recording
+from ppafo.validation.causes import Causes, causes_of
+from ppafo.validation.measured import check_recording
+
+ROOM = 101325.0
+SUPPLY = ["supply.pressure=55 psi_g", "supply.dorsiflexion_pressure=55 psi_g"]
+
+
+@pytest.fixture(scope="module")
+def bench() -> Recording:
+    """A step response of the model itself with noise, its supply recorded."""
+    run = simulate(load_scenario("step-response", ["motion.kind=free", "run.duration=0.2 s"])).recording
+    random = np.random.default_rng(20)
+    noise = {"angle": 2e-3, "pressure_1": 500.0, "pressure_2": 500.0}
+    units = {"angle": "rad", "pressure_1": "Pa", "pressure_2": "Pa"}
+    channels = {
+        name: Channel(run[name] + size * random.standard_normal(len(run)), units[name]) for name, size in noise.items()
+    }
+    device = load_scenario("step-response").device
+    supply = np.full(len(run), device.supply.pressure)
+    channels |= {"command": Channel(run["command"], "-"), "supply_pressure": Channel(supply, "Pa")}
+    return Recording("bench", run.time, channels, "synthetic")
+
+
+def causes(recording: Recording, device: Device | None = None, **settings: object) -> Causes:
+    used = device or load_device("ppafo2011", overrides=SUPPLY)
+    measured, replays = check_recording(recording, used, "r.csv"), ReplaySettings(**settings)  # type: ignore[arg-type]
+    return causes_of([measured], [compare_recording(measured, used, replays)], used, replays)
+
+
+def with_channel(recording: Recording, name: str, values: np.ndarray) -> Recording:
+    return recording.with_channel(name, values, recording.unit(name))
+
+
+def test_nothing_is_searched_where_only_noise_is_left(bench: Recording) -> None:
+    assert causes(bench) == Causes(is_noise=True)
+
+
+def dead(one: Recording) -> Recording:
+    return with_channel(one, "pressure_2", np.full(len(one), ROOM))
+
+
+def clipped(one: Recording) -> Recording:
+    return with_channel(one, "pressure_1", np.minimum(one["pressure_1"], 3.0e5))
+
+
+def with_outliers(one: Recording) -> Recording:
+    values = one["pressure_1"].copy()
+    values[[40, 80, 150]] += 6.0e4
+    return with_channel(one, "pressure_1", values)
+
+
+def swapped(one: Recording) -> Recording:
+    return with_channel(with_channel(one, "pressure_1", one["pressure_2"]), "pressure_2", one["pressure_1"])
+
+
+def reversed_command(one: Recording) -> Recording:
+    return with_channel(one, "command", -one["command"])
+
+
+def read_with_gain(one: Recording) -> Recording:
+    return with_channel(one, "pressure_1", ROOM + 1.04 * (one["pressure_1"] - ROOM))
+
+
+def fast_clock(one: Recording) -> Recording:
+    return replace(one, time=1.05 * one.time)
+
+
+@pytest.mark.parametrize(
+    ("mistake", "words"),
+    [
+        (dead, "pressure_2 never changes"),
+        (clipped, "pressure_1 is clipped"),
+        (with_outliers, "pressure_1 has 3 isolated outliers, the first at 0.04 s"),
+        (swapped, "pressure_1 and pressure_2 seem to be swapped"),
+        (reversed_command, "command seems to have the wrong sign"),
+        (read_with_gain, "pressure_1 seems to be read 1.04 times too large"),
+        (fast_clock, "the clock of the recording seems to run 1.05 times as fast"),
+    ],
+    ids=lambda one: getattr(one, "__name__", None),
+)
+def test_a_mistake_of_the_record_is_named(
+    mistake: Callable[[Recording], Recording], words: str, bench: Recording
+) -> None:
+    found = causes(mistake(bench)).found
+    assert found is not None
+    assert found.in_words.startswith(words)
+    assert not found.is_usual
+
+
+def test_a_vane_that_was_held_is_named_where_the_model_moves_it(bench: Recording) -> None:
+    device = load_device("ppafo2011", overrides=SUPPLY)
+    random = np.random.default_rng(3)
+    angle = 1.0 + 2e-3 * random.standard_normal(len(bench))
+    measured = check_recording(with_channel(bench, "angle", angle), device, "r.csv")
+    held = compare_recording(measured, device, ReplaySettings(motion="held")).model.resample(bench.time)
+    seen = measured.recording
+    for name in ("pressure_1", "pressure_2"):
+        seen = with_channel(seen, name, held[name] + 500.0 * random.standard_normal(len(seen)))
+    found = causes(seen).found
+    assert found is not None
+    assert found.name == "motion"
+
+
+def test_a_number_of_the_set_is_named_with_those_that_do_the_same(bench: Recording) -> None:
+    found = causes(bench, load_device("ppafo2011", overrides=[*SUPPLY, "valve.area=40 mm^2"])).found
+    assert found is not None
+    assert {"valve.area", "valve.discharge_coefficient"} <= {one.name for one in (found, *found.same)}
+    assert found.left**2 < 2.0
+
+
+def test_an_effect_is_named_where_no_number_does_the_same(bench: Recording) -> None:
+    words = ["motion.kind=free", "run.duration=0.2 s", "effects.second_virial.share=1"]
+    run = simulate(load_scenario("step-response", words)).recording
+    random = np.random.default_rng(9)
+    seen = bench
+    for name, size in (("angle", 2e-4), ("pressure_1", 100.0), ("pressure_2", 100.0)):
+        seen = with_channel(seen, name, run[name] + size * random.standard_normal(len(run)))
+    found = causes(seen).found
+    assert found is not None
+    assert found.name == "second_virial"
+
+
+def test_what_sensors_of_any_bench_are_off_by_is_no_disagreement(bench: Recording) -> None:
+    found = causes(with_channel(bench, "pressure_2", bench["pressure_2"] + 1.8e3)).found
+    assert found is not None
+    assert found.name == "zero of pressure_2"
+    assert found.is_usual
+
+
+def test_two_mistakes_at_once_have_no_single_cause_and_the_nearest_is_said(bench: Recording) -> None:
+    wrong = with_channel(read_with_gain(bench), "angle", 1.06 * bench["angle"])
+    found = causes(wrong)
+    assert found.found is None
+    assert found.nearest is not None
+    assert found.nearest.left**2 > 2.0
+
+
+def test_a_cylinder_is_searched_as_a_vane_is() -> None:
+    scenario = load_scenario("step-response", ["device.set=cylinder-lever", "motion.kind=free", "run.duration=0.1 s"])
+    recording = simulate(scenario).recording
+    settings = {**scenario.device.actuator.settings, "bore": 0.024}
+    device = replace(scenario.device, actuator=replace(scenario.device.actuator, settings=settings))
+    found = causes(recording, device).found
+    assert found is not None
+    assert found.name == "actuator.bore"
+    assert found.numbers["actuator.bore"][0] == pytest.approx(0.0257, rel=1e-3)
+
+
+def test_a_real_cylinder_that_is_led_at_constant_pressure_is_replayed(shared_data: Path) -> None:
+    """Zillen (2021), CC0: a single-acting cylinder is driven back and forth at 3 bar; its stroke as a lever's angle."""
+    file = shared_data / "pneumatic" / "zillen2021_cylinder_friction" / "KDN_3bar.csv"
+    if not file.is_file():
+        pytest.skip("the recordings of real cylinders are not here")
+    rows = np.loadtxt(file)[15:800]
+    device = load_scenario("step-response", ["device.set=cylinder-lever"]).device
+    device = replace(device, supply=replace(device.supply, relieving=True))
+    middle = 0.5 * (device.actuator.angle_min + device.actuator.angle_max)
+    angle = middle + (rows[:, 4] - 0.5 * (rows[:, 4].max() + rows[:, 4].min())) * 1e-3 / 0.025
+    pressure = ROOM + 1e5 * rows[:, 5]
+    channels = {
+        "command": Channel(np.ones(len(rows)), "-"),
+        "supply_pressure": Channel(np.full(len(rows), pressure.mean()), "Pa"),
+        "angle": Channel(angle, "rad"),
+        "pressure_1": Channel(pressure, "Pa"),
+    }
+    time = 1e-3 * rows[:, 0]
+    measured = check_recording(Recording("cylinder", time - time[0], channels), device, "r.csv")
+    settings = ReplaySettings(motion="measured", initial={"pressure_2": ROOM})
+    agreement = compare_recording(measured, device, settings)
+    assert [one.channel for one in agreement.channels] == ["pressure_1"]
+    assert agreement.channels[0].fraction < 0.05
