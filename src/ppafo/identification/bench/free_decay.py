@@ -243,7 +243,7 @@ def decay_of(source: Source, start: float | None, end: float | None) -> Decay:
                 f"before: the sensor is saturated or the vane is at a stop; give end"
             )
     if VELOCITY not in part:
-        return Decay(time - time[0], angle, sign, None)
+        return Decay(time=time - time[0], angle=angle, sign=sign, velocity=None)
     measured = part[VELOCITY][first:last]
     # How fast the angle changes, by the area under the velocity: another unit or another sign is no 1.
     moved = np.concatenate(([0.0], np.cumsum(0.5 * (measured[1:] + measured[:-1]) * np.diff(time))))
@@ -254,7 +254,7 @@ def decay_of(source: Source, start: float | None, end: float | None) -> Decay:
             f"{source.name}: {PROCEDURE}: channel '{VELOCITY}' is {gain:.3g} times as fast as 'angle' changes; "
             f"check unit and sign of both"
         )
-    return Decay(time - time[0], angle, sign, measured)
+    return Decay(time=time - time[0], angle=angle, sign=sign, velocity=measured)
 
 
 def noise_of(values: Floats) -> float:

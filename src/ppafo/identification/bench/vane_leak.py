@@ -181,7 +181,8 @@ def closed_chambers(source: Source, settings: VaneLeakSettings) -> ClosedChamber
             f"{source.name}: {PROCEDURE}: only {last} samples lie between start and equal pressures, "
             f"{MINIMUM_SAMPLES} are needed; record faster, or give start"
         )
-    return ClosedChambers(part.time[:last] - part.time[0], first[:last], second[:last], fuller)
+    time = part.time[:last] - part.time[0]
+    return ClosedChambers(time=time, first=first[:last], second=second[:last], fuller=fuller)
 
 
 _POINTS = 400
@@ -216,7 +217,8 @@ def fall_of_difference(opening: Opening, size: float, first: float, second: floa
     flow = opening.flow(max(size, 1.0e-300), 0.0, lower + difference, lower)
     slowness = difference / np.maximum((1.0 + ratio) * rate * flow, 1.0e-300)
     steps = 0.5 * (slowness[1:] + slowness[:-1]) * np.diff(logs)
-    return Falls(np.concatenate(([0.0], np.cumsum(steps))), difference, ratio, conserved)
+    times = np.concatenate(([0.0], np.cumsum(steps)))
+    return Falls(time=times, difference=difference, ratio=ratio, conserved=conserved)
 
 
 def _decaying_leak(
