@@ -211,7 +211,7 @@ def test_a_problem_without_a_device_is_refused() -> None:
 
 def test_the_leak_of_a_cylinder_is_identified_as_that_of_a_vane(bench: Path) -> None:
     head = HEAD.replace("ppafo2011", "cylinder-lever")
-    (bench / "problem.toml").write_text(head + LEAK)
+    (bench / "problem.toml").write_text(f'{head}{LEAK}gas = "CO2"\n')
     outcome = identify(bench / "problem.toml")
     assert outcome.new_set.written == ("actuator.leak.area",)
     assert outcome.results[0].estimates[0].value == pytest.approx(0.3e-6 * 0.113 / 0.6, rel=0.05)
