@@ -30,6 +30,7 @@ from ppafo.identification.trajectory.section import TrajectorySection, refuse_re
 from ppafo.identification.trajectory.tolerances import BenchSection
 from ppafo.identification.trajectory.tolerances import Tolerances as FitTolerances
 from ppafo.model.gas import SPECIES
+from ppafo.parameters.device import VANE
 from ppafo.parameters.parameter_set import ParameterSet, chosen_valve, number_in_si
 from ppafo.storage.foreign import ColumnMap
 from ppafo.units import parse_quantity, to_si
@@ -213,6 +214,11 @@ class VaneLeakProblem(StrictTable):
                 raise IdentificationError(f"{setting.place}: {name} = {text!r} must be above zero")
         angle, limit = setting.quantity("angle", self.angle, "rad"), setting.tolerances.held
         if angle is not None:
+            if setting.parameter_set.actuator_kind != VANE:
+                raise IdentificationError(
+                    f"{setting.place}: angle = {self.angle!r}: volumes follow from the angle of a vane only; give "
+                    "volume_1 and volume_2"
+                )
             names = ("angle_min", "angle_max", "volume_per_angle", "dead_volume_1", "dead_volume_2")
             lower, upper, per_angle, dead_1, dead_2 = (setting.number(f"actuator.{name}") for name in names)
             if not lower <= angle <= upper:

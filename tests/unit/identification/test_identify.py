@@ -209,6 +209,17 @@ def test_a_problem_without_a_device_is_refused() -> None:
         parse_problem(b'schema_version = 1\nname = "a"\n', "p.toml")
 
 
+def test_the_leak_of_a_cylinder_is_identified_as_that_of_a_vane(bench: Path) -> None:
+    head = HEAD.replace("ppafo2011", "cylinder-lever")
+    (bench / "problem.toml").write_text(f'{head}{LEAK}gas = "CO2"\n')
+    outcome = identify(bench / "problem.toml")
+    assert outcome.new_set.written == ("actuator.leak.area",)
+    assert outcome.results[0].estimates[0].value == pytest.approx(0.3e-6 * 0.113 / 0.6, rel=0.05)
+    (bench / "problem.toml").write_text(head + LEAK.partition("volume_1")[0] + 'angle = "60 deg"\n')
+    with pytest.raises(PpafoError, match="give volume_1 and volume_2"):
+        identify(bench / "problem.toml")
+
+
 def test_the_command_writes_the_folder_and_prints_json(
     bench: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
