@@ -84,21 +84,16 @@ def nomenclature() -> Iterator[tuple[str, str]]:
         yield from zip(names, units, strict=True)
 
 
-def is_number(annotation: ast.expr | None) -> bool:
-    """True for a parameter or field that is a float or a whole number."""
-    return isinstance(annotation, ast.Name) and annotation.id in {"float", "int"}
-
-
-def names_of(folder: Path, only_numbers: bool) -> set[str]:
+def names_of(folder: Path) -> set[str]:
     """Names of parameters of public functions and of fields of classes in a folder, at the top of their modules."""
     names: set[str] = set()
     for path in folder.rglob("*.py"):
         for node in ast.parse(path.read_text(encoding="utf-8")).body:
             if isinstance(node, ast.FunctionDef) and not node.name.startswith("_"):
-                names |= {item.arg for item in node.args.args if not only_numbers or is_number(item.annotation)}
+                names |= {item.arg for item in node.args.args}
             if isinstance(node, ast.ClassDef):
                 fields = [item for item in node.body if isinstance(item, ast.AnnAssign)]
-                targets = {item.target for item in fields if not only_numbers or is_number(item.annotation)}
+                targets = {item.target for item in fields}
                 names |= {target.id for target in targets if isinstance(target, ast.Name)}
     return names
 
@@ -154,7 +149,7 @@ def test_no_name_of_the_nomenclature_is_listed_twice() -> None:
 def test_every_name_of_the_nomenclature_is_a_parameter_or_field_or_declared_value() -> None:
     used = set(declared_units())
     for package in ("model", "parameters", "control"):
-        used |= names_of(SOURCE / package, only_numbers=False)
+        used |= names_of(SOURCE / package)
     assert sorted({name for name, _ in nomenclature()} - used) == []
 
 

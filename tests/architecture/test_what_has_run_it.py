@@ -1,4 +1,4 @@
-"""The table of tools that have run each export, in docs/evidence.md: its tests exist, its versions are those that are locked, none is missing."""
+"""Tools that have run each export (docs/evidence.md): their tests exist, versions are the locked ones, none is missing."""
 
 import argparse
 import re
