@@ -1,4 +1,4 @@
-"""Tools that have run each export (docs/evidence.md): their tests exist, versions are the locked ones, none is missing."""
+"""Tools that have run each export (docs/evidence.md): tests exist, versions are the locked ones, none is missing."""
 
 import argparse
 import re
