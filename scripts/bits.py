@@ -6,7 +6,7 @@
     python scripts/bits.py --renew
     python scripts/bits.py --translate 200
 
-Prints the table of ``docs/accuracy-and-speed.md``, a row for each target: the golden hashes that it found, and what it
+Prints the table of ``docs/evidence.md``, a row for each target: the golden hashes that it found, and what it
 did not find; ``here`` is this computer as ``ppafo`` uses it. A target that cannot be run here says what is missing. The
 rows of the runs come from plans on this machine: only the time stepping is compared elsewhere.
 ``--renew`` writes the golden hashes anew.

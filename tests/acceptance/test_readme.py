@@ -24,7 +24,7 @@ ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 ASKED, MEASURED_PAGE, STUDIES_PAGE = (
     (ROOT / "docs" / name).read_text(encoding="utf-8")
-    for name in ("what-you-can-ask.md", "accuracy-and-speed.md", "the-paper.md")
+    for name in ("what-you-can-ask.md", "evidence.md", "the-paper.md")
 )
 TEXT = "\n".join((README, ASKED, MEASURED_PAGE))
 MOST_LINES, MOST_WORDS = 80, 500

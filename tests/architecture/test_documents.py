@@ -84,21 +84,16 @@ def nomenclature() -> Iterator[tuple[str, str]]:
         yield from zip(names, units, strict=True)
 
 
-def is_number(annotation: ast.expr | None) -> bool:
-    """True for a parameter or field that is a float or a whole number."""
-    return isinstance(annotation, ast.Name) and annotation.id in {"float", "int"}
-
-
-def names_of(folder: Path, only_numbers: bool) -> set[str]:
+def names_of(folder: Path) -> set[str]:
     """Names of parameters of public functions and of fields of classes in a folder, at the top of their modules."""
     names: set[str] = set()
     for path in folder.rglob("*.py"):
         for node in ast.parse(path.read_text(encoding="utf-8")).body:
             if isinstance(node, ast.FunctionDef) and not node.name.startswith("_"):
-                names |= {item.arg for item in node.args.args if not only_numbers or is_number(item.annotation)}
+                names |= {item.arg for item in node.args.args}
             if isinstance(node, ast.ClassDef):
                 fields = [item for item in node.body if isinstance(item, ast.AnnAssign)]
-                targets = {item.target for item in fields if not only_numbers or is_number(item.annotation)}
+                targets = {item.target for item in fields}
                 names |= {target.id for target in targets if isinstance(target, ast.Name)}
     return names
 
@@ -154,7 +149,7 @@ def test_no_name_of_the_nomenclature_is_listed_twice() -> None:
 def test_every_name_of_the_nomenclature_is_a_parameter_or_field_or_declared_value() -> None:
     used = set(declared_units())
     for package in ("model", "parameters", "control"):
-        used |= names_of(SOURCE / package, only_numbers=False)
+        used |= names_of(SOURCE / package)
     assert sorted({name for name, _ in nomenclature()} - used) == []
 
 
@@ -167,15 +162,13 @@ def test_every_field_of_plant_state_and_device_is_in_the_nomenclature(group: Any
     )
 
 
-def test_every_number_that_the_physics_takes_or_keeps_is_in_the_nomenclature() -> None:
-    data_only = {"default", "minimum", "maximum"}
-    of_effects = {name for effect in EFFECTS.values() for _, name, _, _ in effect.symbols}
-    known = data_only | of_effects | set(dict(nomenclature()))
-    missing = sorted(names_of(SOURCE / "model", only_numbers=True) - known)
-    assert missing == [], (
-        "paste into the table of its subject in docs/nomenclature.md, with symbol, unit, meaning:\n"
-        + ("\n".join(f"| - | `{name}` | - | what it is |" for name in missing))
-    )
+def test_every_channel_of_a_recording_is_in_the_nomenclature() -> None:
+    missing = [
+        f"| - | `{name}` | {CHANNELS[name].unit} | what it is |"
+        for name in CHANNELS
+        if name not in dict(nomenclature())
+    ]
+    assert missing == [], "paste into docs/nomenclature.md, with symbol and meaning:\n" + "\n".join(missing)
 
 
 @pytest.mark.parametrize("effect", EFFECTS.values(), ids=lambda effect: effect.name)

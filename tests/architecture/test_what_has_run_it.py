@@ -1,4 +1,4 @@
-"""The page on what has run each export: its tests exist, its versions are those that are locked, none is missing."""
+"""Tools that have run each export (docs/evidence.md): tests exist, versions are the locked ones, none is missing."""
 
 import re
 from pathlib import Path
@@ -9,7 +9,8 @@ from ppafo.cli.command_line import Group
 from ppafo.cli.commands import COMMANDS
 
 ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / "docs" / "what-has-run-it.md").read_text(encoding="utf-8")
+EVIDENCE = (ROOT / "docs" / "evidence.md").read_text(encoding="utf-8")
+PAGE = EVIDENCE.partition("## Tools that have run the exports")[2].partition("\n## ")[0]
 TESTS = re.findall(r"`(tests/[\w/]+\.py)::(\w+)`", PAGE)
 LOCKED = {name: name.lower() for name in ("FMPy", "Gymnasium", "Playwright")}
 

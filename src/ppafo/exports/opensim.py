@@ -1,4 +1,8 @@
-"""The torque of a walk for OpenSim: a table in its names, zero and signs. Nothing here needs OpenSim."""
+"""The torque of a walk for OpenSim: a table in its names, zero and signs. Nothing here needs OpenSim.
+
+Inverse dynamics of OpenSim 4.6 took the torque by PrescribedController and PrescribedForce alike, to 1e-4 N m; static
+optimisation gives every actuator a control of its own, and gave the device 0 N m.
+"""
 
 from collections.abc import Sequence
 from itertools import pairwise

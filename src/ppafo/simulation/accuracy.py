@@ -12,7 +12,7 @@ from ppafo.engine.run import Run
 SHORTER = 4
 """How many times shorter the steps of a finer run are; its allowed error is smaller by the square."""
 MARGIN = 1.5
-"""Estimated error over the change: it is then above the error in 99 % of drawn runs (docs/accuracy-and-speed.md)."""
+"""Estimated error over the change: it is then above the error in 99 % of drawn runs (docs/evidence.md)."""
 LARGEST_OF_ANGLE, LARGEST_OF_PRESSURE = 2.0e-4, 1.0e-3
 """Errors over the range of the angle and over that of the pressures that a run keeps to unless it is sensitive."""
 

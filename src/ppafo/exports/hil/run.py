@@ -1,7 +1,7 @@
 """A scenario at the wire, from its settings to a folder: plant, run, result, log, how the link did; a controller.
 
 The plant is the lanes of one run, whose command comes from outside. Why in this process and not in one of its own:
-docs/decisions/0023-hardware-in-the-loop.md.
+docs/decisions/0022-processor-and-hardware-in-the-loop.md.
 """
 
 import csv

@@ -129,6 +129,7 @@ def answer_bytes(answer: Answer) -> bytes:
 def _packet(kind: int, head: tuple[int, int, int, int], payload: bytes) -> bytes:
     flags, run, sequence, time = head
     length = _HEADER.size + len(payload) + _CHECKSUM
+    # 16 bits of checksum would pass a garbled packet in two hours at 1 kHz with 1 % garbled, 32 one in fourteen years.
     body = _HEADER.pack(MARK, VERSION, kind, length, flags, run, sequence, time) + payload
     return body + zlib.crc32(body).to_bytes(_CHECKSUM, "little")
 
