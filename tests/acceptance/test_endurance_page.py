@@ -74,7 +74,10 @@ def test_a_row_of_the_regulators_is_what_comes_out(name: str, change: str, numbe
     assert numbers == f"{1e3 * gas:.3f} | {work:.2f} | {f'{1e2 * toes:.1f}' if toes >= 0.0 else 'would drag'}"
 
 
-def test_strides_of_a_warm_bottle_are_those_of_the_page(capsys: pytest.CaptureFixture[str]) -> None:
+def test_strides_of_a_warm_bottle_are_those_of_the_page(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
     warm = [results(words, capsys)["result"]["strides_when_warm"] for words in COMMANDS[:2]]  # type: ignore[index]
     assert f"would give {warm[0]:.0f} and {warm[1]:.0f} strides" in TEXT
 

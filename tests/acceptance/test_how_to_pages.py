@@ -113,7 +113,7 @@ def test_the_scenario_of_the_page_loads_and_says_what_the_page_says() -> None:
 def test_every_section_of_a_scenario_file_is_in_the_table_of_the_page(capsys: pytest.CaptureFixture[str]) -> None:
     text = (PAGES / "write-a-scenario.md").read_text(encoding="utf-8")
     listed = set(re.findall(r"^\| `(\w+)` \|", text, re.MULTILINE))
-    assert main(["schema", "scenario"]) == 0
+    assert main(["doctor", "--schema", "scenario"]) == 0
     sections = json.loads(capsys.readouterr().out)["$defs"]["vane"]["properties"]
     assert listed == set(sections) - {"schema_version", "name", "description"}
 

@@ -332,7 +332,7 @@ class _Search:
             parts = np.log(np.maximum(none, 1.0)) - np.log(np.maximum(squares, 1.0))
             gain = float(self.counts @ parts) - (self.penalty if len(one.sizes) > 1 else 0.0)
             if one.name not in best or gain > best[one.name].gain:
-                best[one.name] = _Tried(size, squares, left, gain)
+                best[one.name] = _Tried(size=size, squares=squares, left=left, gain=gain)
 
 
 class _Tried(NamedTuple):

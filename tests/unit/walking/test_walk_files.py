@@ -14,6 +14,7 @@ import ppafo
 from ppafo.cli.main import main
 from ppafo.errors import DataError, PpafoError, ScenarioError
 from ppafo.loading import json_schema, list_all_scenarios, load_scenario, reloaded, scenario_from_dict
+from ppafo.questions.sensitivity.methods import METHODS
 from ppafo.questions.walk.answer import walk_with_and_without
 from ppafo.simulation.loading import load_scenario as load_vane
 from ppafo.simulation.numbers import declared_numbers
@@ -253,9 +254,9 @@ def test_sensitivity_ranks_what_varies_in_a_walk_whose_file_lies_in_another_fold
     (folder / "walks").mkdir(parents=True)
     written(folder / "walks", text_of(NAME) + MOTION)
     (folder / "study.toml").write_text(STUDY)
-    found = ppafo.sensitivity(folder / "study.toml", samples=64)
+    found = ppafo.sensitivity(folder / "study.toml", samples=64).found
     (metric,) = found.metrics
-    shares = dict(zip(found.paths, metric.indices.values[found.method.shown[0]], strict=True))
+    shares = dict(zip(found.paths, metric.indices.values[METHODS[found.method].shown[0]], strict=True))
     assert shares["supply.dorsiflexion_pressure"] > 10.0 * shares["wearer.body_mass"] > 0.0
 
 
