@@ -249,7 +249,7 @@ LAWS = (
         (("convergence_rate", 91.0), ("rate_filter", 0.0018)),
     ),
 )
-"""Gains found with ``python scripts/walking_gains.py event_pid``, and so on for the others."""
+"""Gains found by search, one law at a time."""
 
 
 def _event_based(item: Walking) -> ControllerKind:

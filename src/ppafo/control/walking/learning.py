@@ -200,7 +200,7 @@ TUNED = {
     "damping": 0.0046,
     "damping_filter": 0.001,
 }
-"""SI units; found with ``python scripts/walking_gains.py event_damped_learning``."""
+"""SI units; found by search."""
 
 KIND = ControllerKind(
     name="event_damped_learning",
