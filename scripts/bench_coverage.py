@@ -1,4 +1,4 @@
-"""Counts how often the intervals of the bench procedures hold the truth, on recordings of the virtual rig.
+"""Counts how often the intervals of the bench procedures hold the truth, on recordings of the simulated test bench.
 
     python scripts/bench_coverage.py --first 5101 --count 40 --preset paper-bench
 

@@ -2,7 +2,7 @@
 
     python scripts/planted_disagreements.py --seeds 4711 4712 --right 100
 
-Recordings are step responses of the virtual rig's ideal laboratory, a simulator that shares no equation of motion and
+Recordings are step responses of the simulated bench (ideal-laboratory), which shares no equation of motion and
 no integrator with the model: 1 kHz, free vane, its own noise. Each fault is one of the record or one number of the
 device. `right`: the fault is named first, or among those that the recordings cannot tell from the first; `wrong`:
 another is named; `none`: none is. ``--right`` plants nothing, as often as it says, with seeds from the first on.

@@ -1,4 +1,4 @@
-"""The recipe of the how-to pages on the default bench of the virtual rig, end to end: record, identify, compare."""
+"""The recipe of the how-to pages on the default bench of the simulated bench, end to end: record, identify, compare."""
 
 import json
 from pathlib import Path

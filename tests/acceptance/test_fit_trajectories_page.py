@@ -1,4 +1,4 @@
-"""The commands of the page on trajectory fits are run as they stand there, on recordings of the virtual rig."""
+"""The commands of the page on trajectory fits are run as they stand there, on recordings of the simulated bench."""
 
 import json
 import re

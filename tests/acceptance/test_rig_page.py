@@ -1,4 +1,4 @@
-"""The commands of the page on the virtual rig are run as they stand there."""
+"""The commands of the page on the simulated test bench are run as they stand there."""
 
 import re
 import shlex

@@ -1,4 +1,4 @@
-"""A regulator that gives way under load: the virtual rig, with another solver, records it, and the fit follows."""
+"""A regulator that gives way under load: the simulated bench, with another solver, records it, and the fit follows."""
 
 from pathlib import Path
 

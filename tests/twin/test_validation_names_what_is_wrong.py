@@ -1,4 +1,4 @@
-"""Faults of record and device, planted in recordings of the virtual rig: the right one is named."""
+"""Faults of record and device, planted in recordings of the simulated test bench: the right one is named."""
 
 import pytest
 

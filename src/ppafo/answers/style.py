@@ -39,7 +39,7 @@ CHAMBER_1 = Look(GREEN, marker="^")
 CHAMBER_2 = Look(PURPLE, marker="v")
 REFERENCE = Look(BLACK, line="--")
 EXPERIMENT = Look(GREY, marker=".")
-"""What was measured, on a bench or on the virtual rig."""
+"""What was measured, on a bench or on the simulated test bench."""
 ACTUAL = Look(BLUE)
 """What a device does whose valve is no matter."""
 _VALVES = MappingProxyType({"proportional": PROPORTIONAL, "solenoid": SOLENOID, "solenoid_recycling": SOLENOID})

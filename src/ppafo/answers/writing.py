@@ -160,7 +160,7 @@ def _pad_row(row: Sequence[str], widths: Sequence[int], left: int) -> list[str]:
 
 _ORIGINS = {
     "simulated": "Every run is of the model; nothing on this page was measured.",
-    "synthetic": "The recordings are synthetic: the virtual test rig made them, nothing was measured.",
+    "synthetic": "The recordings are synthetic: the simulated test bench made them, nothing was measured.",
     "measured": "",
 }
 

@@ -1,4 +1,4 @@
-"""The virtual test rig: a richer model than the identified one, which records synthetic data as a laboratory would."""
+"""The simulated bench: a richer model than the identified one, which records synthetic data as a laboratory would."""
 
 from ppafo.rig.experiments import RigRecording, record
 from ppafo.rig.preset import Preset, list_presets, load_preset

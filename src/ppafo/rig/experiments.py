@@ -277,7 +277,9 @@ def rig_run(scenario: Scenario, request: Request, rate: float) -> RigRun:
     device = real_device(scenario.device, preset)
     run = plan_run(replace(scenario, device=device))
     if run.program.valve.joint is not None:
-        raise ScenarioError(f"the virtual rig has no valve between the chambers: valve '{device.valve.kind}' has one")
+        raise ScenarioError(
+            f"the simulated test bench has no valve between the chambers: valve '{device.valve.kind}' has one"
+        )
     run = replace(run, plant=rig_plant(run.plant, preset))
     physics = rig_physics(device, preset)
     times = np.arange(int(scenario.duration * rate + _WHOLE) + 1, dtype=np.float64) / rate
@@ -424,7 +426,7 @@ LARGEST_SEED = 2**32 - 1
 DEFAULT_DEVICE = "ppafo2011"
 DEFAULT_PRESET = "paper-bench"
 
-NOTICE = "synthetic: made by the virtual test rig of ppafo in place of a measurement"
+NOTICE = "synthetic: made by the simulated test bench of ppafo in place of a measurement"
 
 
 @dataclass(frozen=True, slots=True)
@@ -459,7 +461,9 @@ def record(
     used = _refuse_overrides(preset, of_preset) if isinstance(preset, Preset) else load_preset(preset, of_preset)
     kind = load_parameter_set(device).actuator_kind
     if kind != VANE:
-        raise ParameterError(f"the virtual rig is made for a vane, and '{one_line(device)}' has an actuator '{kind}'")
+        raise ParameterError(
+            f"the simulated test bench is made for a vane, and '{one_line(device)}' has an actuator '{kind}'"
+        )
     outcome = chosen.record(Request(used, seed, device, valve, others))
     return RigRecording(outcome.recording, outcome.device, _truth(chosen, used, seed, device, words, outcome))
 

@@ -302,7 +302,7 @@ def real_device(device: Device, preset: Preset) -> Device:
     for effect, is_on in switches_of(device).items():
         if is_on:
             raise ParameterError(
-                f"the virtual rig has no effect '{effect.name}': switch it off with {_off(effect)}, or take the "
+                f"the simulated bench has no effect '{effect.name}': switch it off with {_off(effect)}, or take the "
                 "recording of a simulated run"
             )
     declared = {item.name for item in VALVES[device.valve.kind].quantities}

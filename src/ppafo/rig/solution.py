@@ -257,7 +257,7 @@ class _Rig:
         """Let the controller see the sensors and send its command on its way."""
         run, controller = self.run, self.run.program.controller
         if controller is None:
-            raise SimulationError("the virtual rig runs controllers of the catalogue only")
+            raise SimulationError("the simulated test bench runs controllers of the catalogue only")
         requested = run.program.reference.value(run.reference, sample * self.rig_run.control_period)[0]
         self.decided, self.controller_state = controller.update(
             run.controller, self.controller_state, requested, self.measurement(), run.period

@@ -136,7 +136,7 @@ CHANNELS: dict[str, ChannelKind] = {
 Floats = NDArray[np.float64]
 
 RecordingKind = Literal["measured", "simulated", "synthetic"]
-"""Where a recording comes from: sensors, a model's own output, or the virtual rig that stands in for sensors."""
+"""Where a recording comes from: sensors, a model's own output, or the simulated bench that stands in for sensors."""
 
 _NAME = re.compile(r"[A-Za-z]\w*", re.ASCII)
 _KINDS: tuple[RecordingKind, ...] = get_args(RecordingKind)

@@ -107,7 +107,7 @@ EFFECT = Effect(
     symbols=(
         ("x_s", "steady_rise", "K", "rise of temperature of a coil that is always on"),
         ("1/tau", "warming", "1/s", "rate at which a coil warms and cools"),
-        ("-", "slowing", "1/K", "opening time over that of a cold coil, by the rise of temperature"),
+        ("-", "slowing", "1/K", "opening time relative to a cold coil, by the rise of temperature"),
         ("-", "slowing_squared", "1/K^2", "the same, by its square"),
         ("x", "rise`, `rise_a`, `rise_b", "K", "rises of temperature of a coil, and of both"),
         ("q", "pull_in_share", "-", "current that lifts a valve, over the last one of a cold coil"),

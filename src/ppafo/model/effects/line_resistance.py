@@ -52,6 +52,6 @@ EFFECT = Effect(
     prepare=prepare,
     switch=("area",),
     laws={way_in: fed_through_line, way_out: vented_through_line},
-    source="equation (6) of the paper, ISO 6358-3:2014, and the orifice of the virtual rig's lines",
+    source="equation (6) of the paper, ISO 6358-3:2014, and the orifice of the simulated test bench's lines",
     equation="1/C^2 = 1/C_v^2 + 1/C_r^2",
 )

@@ -45,7 +45,7 @@ EFFECT = Effect(
     prepare=prepare,
     switch=("static_per_pressure", "dynamic_per_pressure"),
     laws={friction_at_rest: pressed_at_rest, friction_in_motion: pressed_in_motion},
-    source="assumed: linear in the pressure on the seals, to be fitted to an actuator; the virtual rig has it too",
+    source="assumed: linear in the pressure on the seals, to be fitted to an actuator; the simulated bench has it too",
     equation="T_f = T_f0 + c |P_1 - P_2|",
     symbols=(
         ("c_s", "static_per_pressure", "N m/Pa", "friction torque at rest per pressure between the chambers"),

@@ -1,7 +1,7 @@
 """Gas that is not ideal: the virial equation of state cut after its second term, ``P = rho R T (1 + b rho)``.
 
 With a constant ``b`` the internal energy is that of the ideal gas, so that energy and state agree with each other; with
-``b = 0`` all of it is the ideal gas. Lanes, reference solver and virtual rig have these functions.
+``b = 0`` all of it is the ideal gas. Lanes, reference solver and simulated test bench have these functions.
 """
 
 import math

@@ -74,7 +74,7 @@ EFFECT = Effect(
     prepare=prepare,
     switch=("width",),
     laws={at_valve: behind_play},
-    source="the play operator of hysteresis; the virtual rig has it too",
+    source="the play operator of hysteresis; the simulated test bench has it too",
     equation="y = max(c - b/2, min(c + b/2, y)), c' = y / (1 - b/2)",
     symbols=(
         ("b", "play_width", "-", "whole width of the play between command and spool"),

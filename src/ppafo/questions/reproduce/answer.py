@@ -379,7 +379,7 @@ def result_on_u(rows: Sequence[ReadingOfU]) -> tuple[str, ...]:
 def _paper_answer(reproduction: Reproduction) -> Answer:
     """Return the answer; it has not passed where a number misses its window, unless values were changed.
 
-    Without the virtual rig there is no figure 3.
+    Without the simulated test bench there is no figure 3.
     """
     table = Table(tuple(map(Column, _HEAD)), _paper_rows(reproduction), left=len(_HEAD))
     runs = (reproduction.step, reproduction.solenoid, reproduction.proportional)

@@ -1,4 +1,4 @@
-"""Figures 7 and 8 of the paper: the step response and the torque task, simulated, with the virtual rig beside them."""
+"""Figures 7 and 8 of the paper: the step response and the torque task, simulated, beside synthetic measurements."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
@@ -68,7 +68,7 @@ def step_response_figure(
 ) -> "Figure":
     """Return figure 7: angle, pressure difference, and both pressures over time; ``events`` are marked where known.
 
-    ``synthetic`` is a measurement on the virtual rig: a thin line and the band of its readings; below each panel
+    ``synthetic`` is a measurement on the simulated bench: a thin line and the band of its readings; below each panel
     stands what it differs from the model.
     """
     with house_style():
@@ -179,8 +179,8 @@ def torque_task_figure(
     """Return figure 8: torque and reference with each valve, what the valve does below, error and gas at the bottom.
 
     ``ceiling`` is the torque that the supply can hold [N m], ``gas_in_paper`` what the paper states for the solenoid
-    valves and for the proportional valve [g]. ``synthetic`` is the same task on the virtual rig with the one and with
-    the other.
+    valves and for the proportional valve [g]. ``synthetic`` is the same task on the simulated bench, with the one and
+    with the other.
     """
     runs = (solenoid, proportional)
     with house_style():

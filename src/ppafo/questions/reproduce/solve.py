@@ -73,7 +73,7 @@ def reproduce(
     """Run the paper's experiments with the shipped scenarios and judge every claim, or those of other publications.
 
     ``overrides`` change the experiments (not the paper's printed numbers): a path of a scenario reaches those that
-    have it, a path of the device all of them. The figures have synthetic measurements of the virtual rig, where it can.
+    have it, a path of the device all of them. The figures have synthetic measurements where the bench can make them.
     ``progress`` hears what is being done; ``study`` is a publication, by name or by its file, or ``all``.
     SimulationError where a run diverges, ScenarioError for a study that is none.
     """
@@ -90,7 +90,7 @@ def _reproduce_paper(overrides: Sequence[str], report: Report) -> Reproduction:
     scenarios = _scenarios(overrides)
     runs = {name: _run(scenario, report) for name, scenario in scenarios.items()}
     step, solenoid, proportional = (runs[name] for name in EXPERIMENTS)
-    report(Progress("measuring on the virtual rig (synthetic)"))
+    report(Progress("measuring on the simulated test bench (synthetic)"))
     # The rig records with the overrides of the simulations.
     meant = {name: scenario.origin.overrides for name, scenario in scenarios.items()}
     tasks = {"solenoid": meant[SOLENOID], "proportional": meant[PROPORTIONAL]}
