@@ -160,7 +160,7 @@ def test_kinds_are_a_mapping_that_can_be_changed_for_a_while() -> None:
     assert len(kinds) == 0
 
 
-def test_help_looks_for_questions_of_other_packages_and_a_scenario_of_the_package_for_nothing() -> None:
+def test_help_looks_for_commands_of_other_packages_and_a_scenario_of_the_package_for_nothing() -> None:
     code = (
         "import importlib.metadata as m\n"
         "looked, original = [], m.entry_points\n"
@@ -168,7 +168,7 @@ def test_help_looks_for_questions_of_other_packages_and_a_scenario_of_the_packag
         "m.entry_points = scan\n"
         "import ppafo.cli.main as main\n"
         "try:\n    main.main(['--help'])\nexcept SystemExit:\n    pass\n"
-        "assert [one for one in looked if one.startswith('ppafo')] == ['ppafo.questions'], looked\n"
+        "assert [one for one in looked if one.startswith('ppafo')] == ['ppafo.commands'], looked\n"
         "looked.clear()\n"
         "import ppafo\nppafo.load_scenario('torque-task-proportional')\nppafo.load_walk('proportional')\n"
         "assert not [one for one in looked if one.startswith('ppafo')], looked\n"
