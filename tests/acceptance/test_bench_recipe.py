@@ -21,7 +21,7 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with all that the default bench records, and the problem."""
     folder = tmp_path_factory.mktemp("bench")
     for kind in EXPERIMENTS:
-        assert main(["rig", "record", kind, "--seed", "7", "--out", str(folder)]) == 0
+        assert main(["rig", "simulate", kind, "--seed", "7", "--out", str(folder)]) == 0
     (folder / "problem.toml").write_text(f'{PROBLEM}angle = "90 deg"\n')
     return folder
 
