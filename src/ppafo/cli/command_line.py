@@ -178,9 +178,10 @@ def _add_parameter(
     if option:
         options["dest"] = parameter.name
     if reading.is_flag:
-        parser.add_argument(option, action="store_true", **options)
+        either = parser.add_mutually_exclusive_group()
+        either.add_argument(option, action="store_true", **options)
         if word.off:
-            parser.add_argument(
+            either.add_argument(
                 word.off, action="store_false", dest=parameter.name, default=default, help=word.help.replace("%", "%%")
             )
         return

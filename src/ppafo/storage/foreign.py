@@ -124,8 +124,9 @@ def read_foreign(
 
     DataError names the file and the column.
     """
+    content = read_bytes(path)
     with refused_as(DataError, path, DataError):
-        lines = _lines(path, columns.encoding)
+        lines = _lines(content, columns.encoding)
         if TIME not in columns.channels:
             raise DataError(f"the column map has no channel '{TIME}'")
         names, first, rows = _rows(lines, columns)
@@ -183,8 +184,7 @@ def _rows(lines: list[str], columns: ColumnMap) -> tuple[list[str], list[str], R
     return names, first[1], chain([first], rows)
 
 
-def _lines(path: str | Path, encoding: str) -> list[str]:
-    content = read_bytes(path)
+def _lines(content: bytes, encoding: str) -> list[str]:
     try:
         text = decoded(content) if encoding == "utf-8" else content.decode(encoding)
     except UnicodeDecodeError as error:

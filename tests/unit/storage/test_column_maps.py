@@ -309,3 +309,14 @@ def test_commas_for_columns_and_decimals_alike_are_named_whatever_the_map_says(t
     channels = {"time": {"column": "t", "unit": "s"}, "command": {"column": "u"}}
     with pytest.raises(DataError, match="commas seem to separate columns and decimals alike"):
         read_foreign(tmp_path / "log.csv", ColumnMap.model_validate({"decimal": "comma", "channels": channels}))
+
+
+@pytest.mark.parametrize("content", [b"", None])
+def test_a_foreign_file_that_is_empty_or_absent_is_named_once(tmp_path: Path, content: bytes | None) -> None:
+    path = tmp_path / "logger.csv"
+    if content is not None:
+        path.write_bytes(content)
+    columns = ColumnMap.model_validate({"channels": {"time": {"column": 1, "unit": "s"}}})
+    with pytest.raises(DataError) as refused:
+        read_foreign(path, columns)
+    assert str(refused.value).count(path.name) == 1
