@@ -68,7 +68,7 @@ class Noise:
 class Conflict:
     """A sensor, a recording, a channel of one or a stated value that alone wants other numbers than all together.
 
-    It is Hausman's test. ``group`` is "pressure_1", "back", "pressure_1 of back" or "what is stated of it".
+    It is Hausman's test. ``group`` is "pressure_1", "back", "pressure_1 of back" or ``STATED``.
     ``number`` is the one that parts most, by so many ``standard_errors``; ``p`` is the chance, over all groups, that a
     model that holds shows as much.
     """
@@ -109,6 +109,9 @@ class Fit:
         """Return the place of a number."""
         return [one.name for one in self.numbers].index(name)
 
+
+STATED = "stated limit"
+"""Group of a conflict that is not among recordings: they want a tolerance beyond its limit."""
 
 _UNITS_OF_NOISE = 3.0
 """Change of all residuals together, in units of noise, that a difference makes."""
@@ -471,7 +474,7 @@ def _conflict(work: _Work, rows: Floats, point: Floats, free: Mask, freedom: flo
         ratio = abs(float(shift[place])) / math.sqrt(float(own_variance[place]))
         p = min(2.0 * float(student.sf(ratio, freedom)) * count_of_tests, 1.0)
         if p < _SIGNIFICANCE and (found is None or p < found.p):
-            found = Conflict(group="what is stated of it", number=str(names[place]), standard_errors=ratio, p=p)
+            found = Conflict(group=STATED, number=str(names[place]), standard_errors=ratio, p=p)
     return found
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from ppafo.answers.style import BLACK, BLUE, VERMILION, house_style, mark_kind
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.identification.estimate import Estimate, Verdict
-from ppafo.identification.fit import Fit
+from ppafo.identification.fit import STATED, Fit
 from ppafo.identification.source import Source, kind_of, told_of_readings, traces
 from ppafo.signals import RecordingKind
 from ppafo.signals.recording import Floats
@@ -154,6 +154,8 @@ def result_of(
         is_sought = not math.isfinite(found.numbers[found.index(one.number)].deviation)
         moved = f", {one.number} by {one.standard_errors:.1f} standard errors" if is_sought else ""
         conflict = f"readings of {one.group} alone want other numbers than all readings together{moved}; {remedy}"
+        if one.group == STATED:
+            conflict = f"{one.number} is {one.standard_errors:.1f} standard errors beyond its stated limit; {remedy}"
     told = (*remarks, *told_of_readings(sources))
     return BenchResult(procedure, summary, estimates, panels, kind_of(sources), conflict, told)
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ppafo.errors import IdentificationError, nearest_name
 from ppafo.identification.estimate import Estimate, Verdict
-from ppafo.identification.fit import Fit
+from ppafo.identification.fit import STATED, Fit
 from ppafo.identification.fit import fit as estimate
 from ppafo.identification.trajectory.problem import (
     Experiment,
@@ -188,6 +188,8 @@ def conflict_in_words(found: Fit) -> str:
     one = found.conflict
     if one is None:
         return ""
+    if one.group == STATED:
+        return f"{one.number} is {one.standard_errors:.1f} standard errors beyond its stated limit: the model lacks something"
     return (
         f"{one.group} alone wants another {one.number}, {one.standard_errors:.1f} standard errors from what all want: "
         "the model lacks something"
