@@ -116,7 +116,8 @@ _UNITS_OF_NOISE = 3.0
 _STEPS = (1.0e-7, 1.0e-3)
 """Shortest and longest difference over the scale of a number."""
 
-_HIGHEST_ORDER = 12
+_HIGHEST_ORDER = 36
+_SAMPLES_A_COEFFICIENT = 30
 _LARGEST_REFLECTION = 1.0 - 1.0e-9
 """Of residuals that follow a law exactly, such as those of a constant: no innovation would be left."""
 
@@ -149,9 +150,16 @@ def fit(
 
     Squares are minimised within bounds, at first with a loss that is robust (soft L1); weights follow from what is left
     in each channel. Then residuals are whitened by one autoregression per channel and the numbers take one more step.
-    Other starts are tried only where the recordings disagree. IdentificationError where no run succeeds.
+    Other starts are tried only where the recordings disagree. IdentificationError where no run succeeds, and where
+    samples are no more than the numbers that are sought.
     """
     work = _Work(residuals, tuple(numbers), tuple(blocks), report)
+    samples, sought = (
+        sum(one.rows.stop - one.rows.start for one in blocks),
+        sum(math.isinf(one.deviation) for one in numbers),
+    )
+    if samples <= sought:
+        raise IdentificationError(f"{samples} samples for {sought} numbers that are sought; more samples are needed")
     found = _whitened(work, *_search(work, work.start), confidence)
     if found.conflict is None and found.has_converged:
         return found
@@ -178,6 +186,7 @@ class _Work:
         self.prior = 1.0 / deviation
         self.mean = self.start
         self.evaluations = 0
+        self.least: dict[str, float] = {}
         self.step = np.full(len(numbers), _STEPS[1])
         self._last: tuple[bytes, Floats] | None = None
 
@@ -234,10 +243,11 @@ class _Work:
         ``series`` are residuals, and in further columns what the error of the numbers may hide of them.
         """
         found = np.empty(len(series))
-        least = max(1.0e-12 * float(np.abs(series[:, 0]).max()), 1.0e-300)
         for channel in self.channels:
             own = np.concatenate([series[rows] for rows in self.rows_of(channel)])
             pooled = math.sqrt(float(np.square(own).sum()) / len(own))
+            # Of its own size at the start: channels have units of their own, and a law may fit exactly.
+            least = self.least.setdefault(channel, 1.0e-12 * (float(np.abs(own[:, 0]).max()) or 1.0))
             for one in self.blocks:
                 if one.channel == channel:
                     found[one.rows] = max(pooled, one.floor, least)
@@ -276,13 +286,14 @@ def _search(work: _Work, start: Floats) -> tuple[Floats, bool]:
 def burg(series: Sequence[Floats], highest: int = _HIGHEST_ORDER) -> tuple[float, ...]:
     """Return the reflection coefficients [-] of one autoregression of several series (Burg), as many as AIC wants.
 
-    Columns of a series (samples, columns) add up, as its residuals and their error do. Of 100 samples AIC would take
-    noise for an autoregression in a third of all cases: there is at most one coefficient for each 100.
+    Columns of a series (samples, columns) add up, as its residuals and their error do. A slow drift under white noise
+    needs many coefficients, each of them small; a coefficient too many costs next to nothing. There is at most one for
+    each 30 samples.
     """
     forward, backward = list(series), list(series)
     count = sum(len(one) for one in series)
     power, found, best = 1.0, [], (0.0, 0)
-    for order in range(1, min(highest, count // 100, min(len(one) for one in series) - 2) + 1):
+    for order in range(1, min(highest, count // _SAMPLES_A_COEFFICIENT, min(len(one) for one in series) - 2) + 1):
         ahead, behind = [one[1:] for one in forward], [one[:-1] for one in backward]
         across = sum(float(np.sum(a * b)) for a, b in zip(ahead, behind, strict=True))
         size = sum(float(np.sum(a * a + b * b)) for a, b in zip(ahead, behind, strict=True))
