@@ -116,8 +116,7 @@ _UNITS_OF_NOISE = 3.0
 _STEPS = (1.0e-7, 1.0e-3)
 """Shortest and longest difference over the scale of a number."""
 
-_HIGHEST_ORDER = 36
-_SAMPLES_A_COEFFICIENT = 30
+_HIGHEST_ORDER = 12
 _LARGEST_REFLECTION = 1.0 - 1.0e-9
 """Of residuals that follow a law exactly, such as those of a constant: no innovation would be left."""
 
@@ -286,14 +285,14 @@ def _search(work: _Work, start: Floats) -> tuple[Floats, bool]:
 def burg(series: Sequence[Floats], highest: int = _HIGHEST_ORDER) -> tuple[float, ...]:
     """Return the reflection coefficients [-] of one autoregression of several series (Burg), as many as AIC wants.
 
-    Columns of a series (samples, columns) add up, as its residuals and their error do. A slow drift under white noise
-    needs many coefficients, each of them small; a coefficient too many costs next to nothing. There is at most one for
-    each 30 samples.
+    Columns of a series (samples, columns) add up, as its residuals and their error do. There is at most one coefficient
+    for each 100 samples: with more, the misfit of a law that is wrong passes for noise in the few readings of a bench,
+    and nothing is flagged. So correlated noise of fewer samples is not seen, and its intervals are too narrow.
     """
     forward, backward = list(series), list(series)
     count = sum(len(one) for one in series)
     power, found, best = 1.0, [], (0.0, 0)
-    for order in range(1, min(highest, count // _SAMPLES_A_COEFFICIENT, min(len(one) for one in series) - 2) + 1):
+    for order in range(1, min(highest, count // 100, min(len(one) for one in series) - 2) + 1):
         ahead, behind = [one[1:] for one in forward], [one[:-1] for one in backward]
         across = sum(float(np.sum(a * b)) for a, b in zip(ahead, behind, strict=True))
         size = sum(float(np.sum(a * a + b * b)) for a, b in zip(ahead, behind, strict=True))

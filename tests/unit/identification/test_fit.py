@@ -135,35 +135,6 @@ def test_whitening_by_the_autoregression_that_was_found_leaves_white_noise() -> 
     assert abs(np.corrcoef(white[1:], white[:-1])[0, 1]) < 0.12
 
 
-def _level_of(kind: str, count: int, fits: int, ahead: float) -> tuple[int, int]:
-    """How many intervals of a level, seen by two recordings of one channel, hold, and how many fits are flagged."""
-    generator, held, flagged = np.random.default_rng(815), 0, 0
-    blocks = [Block(label, "first", slice(place * count, (place + 1) * count)) for place, label in enumerate("ab")]
-    for _ in range(fits):
-        noise = generator.normal(size=(2, count))
-        if kind == "AR(1)":
-            for place in range(1, count):
-                noise[:, place] = ahead * noise[:, place - 1] + math.sqrt(1.0 - ahead**2) * noise[:, place]
-        else:
-            noise += np.cumsum(generator.normal(size=(2, count)), axis=1) / math.sqrt(count)
-        wave = np.tile(np.sin(0.2 * np.arange(count)), 2)[:, None]
-        measured = noise.reshape(-1, 1) + 5.0 * wave
-        found = fit(
-            lambda points, measured=measured, wave=wave: measured - points[1] * wave,
-            (Free("level", 0.0, -9.0, 9.0, 1.0, 1.0e-6), Free("size", 4.0, 0.0, 9.0, 1.0)),
-            blocks,
-        )
-        held += bool(found.low[1] <= 5.0 <= found.high[1])
-        flagged += found.conflict is not None
-    return held, flagged
-
-
-def test_noise_of_a_short_recording_is_taken_as_correlated_where_it_is() -> None:
-    held, flagged = _level_of("AR(1)", 45, 40, 0.9)
-    assert held >= 35
-    assert flagged <= 2
-
-
 def test_a_law_that_fits_exactly_leaves_numbers_and_a_channel_of_small_units_keeps_its_weight() -> None:
     one = (Free("level", 1.0, -10.0, 10.0, 1.0),)
     exact = fit(lambda points: 2.0 - np.ones((50, 1)) * points[:1], one, [Block("a", "first", slice(0, 50))])
