@@ -40,6 +40,7 @@ WITHIN = 1.96
 ATMOSPHERE, AIR = 101_325.0, 1.4
 STARTS = {"chamber-Prusa": 10.0, "chamber-Formlabs": 25.0}
 """Time [s] from which a chamber is closed for certain; 10 s for others."""
+FEWEST = 20
 
 
 @dataclass(frozen=True)
@@ -240,7 +241,10 @@ def emptied(time: Floats, start: float, orifice: float, laminar: float) -> Float
 def leak_in(file: Path) -> Leak:
     """Return what the recording of a closed chamber says of the laws of a leak."""
     found = read_foreign(file, load_column_map(EXAMPLE / "chamber.toml"))
-    closed = found.time >= STARTS.get(file.stem, 10.0)
+    begins = STARTS.get(file.stem, 10.0)
+    closed = found.time >= begins
+    if np.count_nonzero(closed) < FEWEST:
+        raise PpafoError(f"{file}: has fewer than {FEWEST} samples from {begins:g} s on, when the chamber is closed")
     time, pressure = found.time[closed] - found.time[closed][0], found["pressure_1"][closed]
     half, courses = len(time) // 2, {}
     rate = math.log(pressure[0] / pressure[half - 1]) / time[half - 1]

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ppafo.errors import PpafoError
 from ppafo.questions.identify.solve import identify
 
 ROOT = Path(__file__).parents[2]
@@ -91,3 +92,10 @@ def test_a_first_fit_of_a_real_device_finds_the_known_area() -> None:
     area = identify(measured.EXAMPLE / "cylinder.toml").results[0]["static_torque.area"]
     assert area.value == pytest.approx(KNOWN_AREA, rel=0.0025)
     assert area.low <= KNOWN_AREA <= area.high
+
+
+def test_a_chamber_that_is_recorded_too_briefly_is_refused_in_one_line(tmp_path: Path) -> None:
+    lines = (measured.EXAMPLE / "chamber-Prusa.csv").read_text(encoding="utf-8").splitlines()
+    (tmp_path / "chamber-Prusa.csv").write_text("\n".join(lines[:6]) + "\n", encoding="utf-8")
+    with pytest.raises(PpafoError, match="fewer than 20 samples from 10 s on"):
+        measured.leak_in(tmp_path / "chamber-Prusa.csv")

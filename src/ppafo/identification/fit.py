@@ -152,9 +152,16 @@ def fit(
 
     Squares are minimised within bounds, at first with a loss that is robust (soft L1); weights follow from what is left
     in each channel. Then residuals are whitened by one autoregression per channel and the numbers take one more step.
-    Other starts are tried only where the recordings disagree. IdentificationError where no run succeeds.
+    Other starts are tried only where the recordings disagree. IdentificationError where no run succeeds, and where
+    samples are no more than the numbers that are sought.
     """
     work = _Work(residuals, tuple(numbers), tuple(blocks), report)
+    samples, sought = (
+        sum(one.rows.stop - one.rows.start for one in blocks),
+        sum(math.isinf(one.deviation) for one in numbers),
+    )
+    if samples <= sought:
+        raise IdentificationError(f"{samples} samples for {sought} numbers that are sought; more samples are needed")
     found = _whitened(work, *_search(work, work.start), confidence)
     if found.conflict is None and found.has_converged:
         return found
@@ -181,6 +188,7 @@ class _Work:
         self.prior = 1.0 / deviation
         self.mean = self.start
         self.evaluations = 0
+        self.least: dict[str, float] = {}
         self.step = np.full(len(numbers), _STEPS[1])
         self._last: tuple[bytes, Floats] | None = None
 
@@ -237,10 +245,11 @@ class _Work:
         ``series`` are residuals, and in further columns what the error of the numbers may hide of them.
         """
         found = np.empty(len(series))
-        least = max(1.0e-12 * float(np.abs(series[:, 0]).max()), 1.0e-300)
         for channel in self.channels:
             own = np.concatenate([series[rows] for rows in self.rows_of(channel)])
             pooled = math.sqrt(float(np.square(own).sum()) / len(own))
+            # Of its own size at the start: channels have units of their own, and a law may fit exactly.
+            least = self.least.setdefault(channel, 1.0e-12 * (float(np.abs(own[:, 0]).max()) or 1.0))
             for one in self.blocks:
                 if one.channel == channel:
                     found[one.rows] = max(pooled, one.floor, least)
@@ -279,8 +288,9 @@ def _search(work: _Work, start: Floats) -> tuple[Floats, bool]:
 def burg(series: Sequence[Floats], highest: int = _HIGHEST_ORDER) -> tuple[float, ...]:
     """Return the reflection coefficients [-] of one autoregression of several series (Burg), as many as AIC wants.
 
-    Columns of a series (samples, columns) add up, as its residuals and their error do. Of 100 samples AIC would take
-    noise for an autoregression in a third of all cases: there is at most one coefficient for each 100.
+    Columns of a series (samples, columns) add up, as its residuals and their error do. There is at most one coefficient
+    for each 100 samples: with more, the misfit of a law that is wrong passes for noise in the few readings of a bench,
+    and nothing is flagged. So correlated noise of fewer samples is not seen, and its intervals are too narrow.
     """
     forward, backward = list(series), list(series)
     count = sum(len(one) for one in series)

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from ppafo.errors import IdentificationError
 from ppafo.identification.fit import Block, Fit, Free, Noise, burg, fit, whiten
 from ppafo.signals.recording import Floats
 
@@ -132,3 +133,22 @@ def test_whitening_by_the_autoregression_that_was_found_leaves_white_noise() -> 
 
     assert reflection[0] == pytest.approx(0.9, abs=0.06)
     assert abs(np.corrcoef(white[1:], white[:-1])[0, 1]) < 0.12
+
+
+def test_a_law_that_fits_exactly_leaves_numbers_and_a_channel_of_small_units_keeps_its_weight() -> None:
+    one = (Free("level", 1.0, -10.0, 10.0, 1.0),)
+    exact = fit(lambda points: 2.0 - np.ones((50, 1)) * points[:1], one, [Block("a", "first", slice(0, 50))])
+    assert exact.values[0] == pytest.approx(2.0)
+    measured = 2.0 + np.random.default_rng(1).normal(size=100)[:, None] * 0.1
+    blocks = [Block("a", "first", slice(0, 50)), Block("a", "second", slice(50, 100))]
+    large, small = (
+        fit(lambda points, unit=unit: unit * (measured - points[:1]), one, blocks)
+        for unit in (np.ones((100, 1)), np.repeat([[1.0], [1.0e-13]], 50, axis=0))
+    )
+    assert small.values[0] == pytest.approx(large.values[0], abs=1.0e-6)
+    assert small.high[0] == pytest.approx(large.high[0], abs=1.0e-6)
+
+
+def test_as_many_samples_as_numbers_are_refused() -> None:
+    with pytest.raises(IdentificationError, match="1 samples for 1 numbers"):
+        fit(lambda points: 2.5 - points[:1], (Free("a", 1.0, -9.0, 9.0, 1.0),), [Block("a", "first", slice(0, 1))])

@@ -15,6 +15,7 @@ from pydantic import Field
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.documents.models import StrictTable, Text
 from ppafo.errors import IdentificationError, UnitError, refused_as
+from ppafo.identification.bench.law import DEFAULTS
 from ppafo.identification.estimate import interval_factor
 from ppafo.identification.new_set import fitting_unit
 from ppafo.identification.trajectory.problem import (
@@ -79,7 +80,7 @@ class Tolerances:
     load: float = 0.02
     supply: float = PASCALS_PER_PSI
     zero_of_angle: float = math.radians(0.5)
-    zero_of_pressure: float = 0.3 * PASCALS_PER_PSI
+    zero_of_pressure: float = DEFAULTS.zero_of_pressure
     gain: float | None = None
     start_of_angle: float | None = None
     start_of_pressure: float | None = None
@@ -95,12 +96,12 @@ class Tolerances:
 
     def gain_of(self, channel: str) -> float:
         """Return the limit of the gain of a channel [-]."""
-        usual = 0.0 if channel == ANGLE else 0.005
+        usual = 0.0 if channel == ANGLE else DEFAULTS.gain
         return usual if self.gain is None else self.gain
 
 
 HELD = {
-    "gas.molar_mass": 0.01,
+    "gas.molar_mass": DEFAULTS.gas_law,
     "gas.heat_capacity_ratio": 0.02,
     "actuator.torque_constant": 0.02,
     "actuator.volume_per_angle": 0.02,
@@ -119,7 +120,6 @@ HELD = {
 }
 """Limits [-] of numbers of a set that is silent about them, over the number."""
 
-_TEMPERATURE = 15.0
 _OTHER_SETTING = 0.1
 """Limit [-] of a setting of the valve, an effect or an actuator of another kind."""
 
@@ -252,7 +252,7 @@ def _of_set(
         usual = HELD.get(path.replace(f"valves.{scenario.device.valve_name}.", "valve."), _OTHER_SETTING)
         limit = abs(value) * (usual if tolerances.held is None else tolerances.held)
         if path == "gas.temperature":
-            limit, own = _TEMPERATURE, 0.0 if tolerances.gas_temperature is not None else own
+            limit, own = DEFAULTS.temperature, 0.0 if tolerances.gas_temperature is not None else own
             limit = limit if tolerances.gas_temperature is None else tolerances.gas_temperature
         if path == "gas.molar_mass" and tolerances.gas_law is not None:
             limit, own = abs(value) * tolerances.gas_law, 0.0
