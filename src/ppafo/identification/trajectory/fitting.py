@@ -189,7 +189,8 @@ def conflict_in_words(found: Fit) -> str:
     if one is None:
         return ""
     if one.group == STATED:
-        return f"{one.number} is {one.standard_errors:.1f} standard errors beyond its stated limit: the model lacks something"
+        beyond = f"{one.standard_errors:.1f} standard errors beyond its stated limit"
+        return f"{one.number} is {beyond}: the model lacks something"
     return (
         f"{one.group} alone wants another {one.number}, {one.standard_errors:.1f} standard errors from what all want: "
         "the model lacks something"
