@@ -399,7 +399,12 @@ def _fault_of(one: _Channel, time: Floats) -> str:
     values = one.values
     levels, counts = np.unique(values, return_counts=True)
     if len(levels) == 1:
-        return "never changes: its sensor is dead or not connected"
+        dead = "its sensor is dead or not connected"
+        return (
+            f"never changes: the vane was held (--motion held), or {dead}"
+            if one.name == ANGLE
+            else f"never changes: {dead}"
+        )
     for place, word in ((0, "least"), (-1, "largest")):
         others = int(counts[1:-1].max(initial=1))
         is_many = counts[place] >= _FEWEST_CLIPPED * others
