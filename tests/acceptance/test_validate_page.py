@@ -61,7 +61,7 @@ def test_the_column_map_of_the_page_reads_a_foreign_file(
     monkeypatch.chdir(tmp_path)
     Path("maps.toml").write_text(blocks("toml")[0])
     rows = [f"{n};{0 if n < 10 else 10};{-20 - 0.2 * n:.3f};{0.01 * n:.3f};{3.5 - 0.01 * n:.3f}" for n in range(300)]
-    Path("bench.csv").write_text("\n".join(["t;u;phi;p1;p2", *rows, ""]))
+    Path("bench.csv").write_text("\n".join(["t;u;phi;p1;p2", *rows, ""]).replace(".", ","))
     for columns in ("maps.toml", "maps.toml:logger"):
         words = ["validate", "ppafo2011", "bench.csv", "--columns", columns, "--threshold", "1000%", "--json"]
         words += ["--set", "supply.pressure=55 psi_g", "--set", "supply.dorsiflexion_pressure=55 psi_g"]
