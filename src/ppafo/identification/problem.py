@@ -31,7 +31,7 @@ from ppafo.identification.trajectory.tolerances import BenchSection
 from ppafo.identification.trajectory.tolerances import Tolerances as FitTolerances
 from ppafo.model.gas import SPECIES
 from ppafo.parameters.device import VANE
-from ppafo.parameters.parameter_set import ParameterSet, chosen_valve, number_in_si
+from ppafo.parameters.parameter_set import Citation, ParameterSet, chosen_valve, number_in_si
 from ppafo.storage.foreign import ColumnMap
 from ppafo.units import parse_quantity, to_si
 
@@ -309,6 +309,9 @@ class ProblemFile(StrictTable):
     name: Annotated[str, Field(pattern=NAME, max_length=100, description="name of the new parameter set")]
     title: Annotated[str, Field(description="title of the new parameter set")] = ""
     device: Annotated[DeviceProblem, Field(description="the set to start from")]
+    citation: Annotated[
+        Citation | None, Field(description="who measured, of the new set; default: that of the set to start from")
+    ] = None
     columns: Annotated[dict[str, ColumnMap], Field(description="column maps by name, for files from elsewhere")] = (
         Field(default={})
     )

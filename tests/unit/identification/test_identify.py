@@ -132,6 +132,23 @@ def test_two_parts_of_one_recording_are_not_the_same_samples_twice(solved: Solve
     assert len(outcome.results) == 2
 
 
+def test_a_set_from_a_simulated_bench_says_so_and_a_measured_one_does_not(solved: Solve, bench: Path) -> None:
+    assert "from the problem 'twin', whose recordings are synthetic, " in solved(STATIC).new_set.parameter_set.notes
+    text = (bench / "static.csv").read_text()
+    (bench / "static.csv").write_text("".join(line for line in text.splitlines(True) if line[0] != "#"))
+    assert "from the problem 'twin', the fitted " in solved(STATIC).new_set.parameter_set.notes
+
+
+def test_the_citation_of_a_problem_is_that_of_the_new_set(solved: Solve) -> None:
+    before = load_parameter_set("ppafo2011").citation
+    cited = '[citation]\ntitle = "Our orthosis"\nauthors = ["Roe"]\nyear = 2026\n'
+    written = parameter_set_toml(solved(STATIC + cited).new_set.parameter_set)
+    found = parse_parameter_set(written.encode(), "twin.toml").citation
+    assert found is not None
+    assert (found.title, found.authors, found.year) == ("Our orthosis", ("Roe",), 2026)
+    assert solved(STATIC).new_set.parameter_set.citation == before
+
+
 def test_values_that_no_procedure_touched_stay_as_they_were(solved: Solve) -> None:
     new, old = solved(STATIC).new_set.parameter_set, load_parameter_set("ppafo2011")
     changed = {path for path in old.numbers if new.numbers[path] != old.numbers[path]}

@@ -277,9 +277,14 @@ def run_with(prepared: PreparedExperiment, numbers: Mapping[str, Any]) -> Run:
         own = {name: at(value, run) for name, value in settings.items()}
         valve = VALVES[device.valve.kind].choose(own)
         if valve != base.program.valve or (valve.command_delay(own) > 0.0) != base.program.late_commands:
+            fitted = {path.rpartition(".")[2] for path in numbers if path.startswith("valves.")}
+            at_zero = [name for name in own if name in fitted and own[name] == 0.0]
+            moved = at_zero or [
+                name for name in own if name in fitted and prepared.scenario.device.valve.settings[name] == 0.0
+            ]
             raise IdentificationError(
-                f"experiment '{prepared.label}': a setting of the valve went to or from 0, which is another "
-                f"model of the valve; start above 0 and give a lower bound above 0"
+                f"experiment '{prepared.label}': {' or '.join(f'valve.{name}' for name in moved)} went to or from 0, "
+                "which is another model of the valve; give a start and a lower bound above 0"
             )
     if any(np.any(is_on != (effect in base.program.effects)) for effect, is_on in switches_of(device).items()):
         raise IdentificationError(

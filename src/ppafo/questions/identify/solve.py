@@ -5,7 +5,7 @@ from pathlib import Path
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.result import BenchResult
-from ppafo.identification.new_set import NewSet, with_estimates
+from ppafo.identification.new_set import with_estimates
 from ppafo.identification.problem import (
     PROCEDURES,
     ProblemFile,
@@ -92,8 +92,8 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
     fitted = None if problem.trajectory is None else solve_section(problem.trajectory, setting, progress)
     estimates = (*bench_estimates(results), *(() if fitted is None else fitted.fit.estimates))
     new_set = with_estimates(before, estimates, valve)
-    named = replace(new_set, parameter_set=_name_set(new_set, problem))
-    return Identification(problem.name, tuple(results), fitted, before, named)
+    outcome = Identification(problem.name, tuple(results), fitted, before, new_set)
+    return replace(outcome, new_set=replace(new_set, parameter_set=_name_set(outcome, problem)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,17 +125,19 @@ def _source(folder: Path, name: str, columns: str | None, problem: ProblemFile, 
     return source_of(path, recording)
 
 
-def _name_set(new_set: NewSet, problem: ProblemFile) -> ParameterSet:
-    old = new_set.parameter_set
+def _name_set(found: Identification, problem: ProblemFile) -> ParameterSet:
+    old = found.new_set.parameter_set
+    recordings = "" if found.kind == "measured" else f", whose recordings are {found.kind}"
     origins = (
-        f"Values with origin 'identified' or 'fitted' come from the problem '{problem.name}', the fitted ones being "
-        f"true for this model only; the others are those of '{old.name}'."
+        f"Values with origin 'identified' or 'fitted' come from the problem '{problem.name}'{recordings}, the fitted "
+        f"ones being true for this model only; the others are those of '{old.name}'."
     )
     return replace(
         old,
         file=f"{problem.name}.toml",
         name=problem.name,
         title=problem.title or f"{old.title}, identified",
+        citation=problem.citation or old.citation,
         # The new set may go anywhere, where the path of a file would not lead to its parent.
         parent=problem.device.set if problem.device.set in list_sets() else "",
         notes=f"{old.notes.rstrip()}\n{origins}".lstrip(),

@@ -15,7 +15,7 @@ from ppafo.identification.trajectory.problem import (
     numbers_of,
     with_numbers,
 )
-from ppafo.identification.trajectory.runs import prepare
+from ppafo.identification.trajectory.runs import prepare, run_with
 from ppafo.running import simulate
 from ppafo.signals.faults import noise_of
 from ppafo.simulation.scenario import Scenario
@@ -80,6 +80,16 @@ def test_the_same_parameter_twice_is_refused(experiment: Experiment) -> None:
 def test_a_problem_without_parameters_is_refused(experiment: Experiment) -> None:
     with pytest.raises(IdentificationError, match="at least one"):
         problem(experiment)
+
+
+@pytest.mark.parametrize(("start", "then"), [(0.0, 0.002), (0.002, 0.0)])
+def test_a_setting_of_the_valve_that_goes_to_or_from_zero_is_named(
+    experiment: Experiment, start: float, then: float
+) -> None:
+    path = "valves.proportional.delay"
+    prepared = prepare(experiment, {path: start})
+    with pytest.raises(IdentificationError, match=r"'step': valve\.delay went to or from 0"):
+        run_with(prepared, {path: then})
 
 
 def test_noise_is_estimated_from_a_signal_that_moves() -> None:
