@@ -16,24 +16,22 @@ from pydantic import Field
 
 from ppafo.documents.models import NAME, StrictTable, Text, make_schema, validate
 from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import IdentificationError, UnitError, nearest_name, refused_as
+from ppafo.errors import IdentificationError, nearest_name
 from ppafo.identification.bench.flow import GasAt, Law
 from ppafo.identification.bench.free_decay import FreeDecaySettings, free_decay
-from ppafo.identification.bench.law import DEFAULTS, Tolerances
 from ppafo.identification.bench.open_valve_flow import OpenValveFlowSettings, open_valve_flow
 from ppafo.identification.bench.result import BenchResult
 from ppafo.identification.bench.static_torque import StaticTorqueSettings, static_torque
 from ppafo.identification.bench.valve_map import ValveMapSettings, valve_map
 from ppafo.identification.bench.vane_leak import VaneLeakSettings, vane_leak
 from ppafo.identification.source import Source
+from ppafo.identification.tolerances import DEFAULTS, BenchSection, Tolerances, deviation_of_limit, quantity_of
 from ppafo.identification.trajectory.section import TrajectorySection, refuse_removed
-from ppafo.identification.trajectory.tolerances import BenchSection
-from ppafo.identification.trajectory.tolerances import Tolerances as FitTolerances
 from ppafo.model.gas import SPECIES
 from ppafo.parameters.device import VANE
 from ppafo.parameters.parameter_set import Citation, ParameterSet, chosen_valve, number_in_si
 from ppafo.storage.foreign import ColumnMap
-from ppafo.units import parse_quantity, to_si
+from ppafo.units import to_si
 
 _Recordings = Annotated[tuple[Text, ...], Field(strict=False, min_length=1, description="files, relative to this one")]
 _Columns = Annotated[
@@ -79,40 +77,40 @@ class Setting:
 
         IdentificationError where its text does not fit the unit.
         """
-        if text is None:
-            return None
-        with refused_as(IdentificationError, f"{self.place}: {name} = {text!r}", UnitError):
-            return parse_quantity(text, unit)
+        return None if text is None else quantity_of(f"{self.place}: {name}", text, unit)
 
     def gas(self, species: str | None, text: str | None) -> GasAt:
         """Return the gas of the bench; species and temperature are the set's where none is named.
 
         IdentificationError for an unknown species.
         """
-        temperature, limit = self.quantity("temperature", text, "K"), _THERMOMETER
+        temperature = self.quantity("temperature", text, "K")
         if temperature is None:
             temperature = self.number("gas.temperature")
-            limit = self.limit("gas.temperature", "K") or self.tolerances.temperature
-        elif not _COLDEST <= temperature <= _HOTTEST:
+            deviation = self.deviation("gas.temperature", temperature, "K")
+        elif _COLDEST <= temperature <= _HOTTEST:
+            limit = self.tolerances.gas_temperature
+            deviation = deviation_of_limit(_THERMOMETER if limit is None else limit)
+        else:
             raise IdentificationError(
                 f"{self.place}: temperature = {text!r} must be from {_COLDEST:g} to {_HOTTEST:g} K"
             )
         if species is None:
             own = self.number("gas.molar_mass"), self.number("gas.heat_capacity_ratio")
-            return GasAt(*own, temperature, limit)
+            return GasAt(*own, temperature, deviation)
         if species not in SPECIES:
             hint = nearest_name(species, SPECIES)
             known = ", ".join(SPECIES)
             raise IdentificationError(f"{self.place}: gas = {species!r} is unknown{hint}; available: {known}")
         known_gas = SPECIES[species]
-        return GasAt(known_gas.molar_mass, known_gas.heat_capacity_ratio, temperature, limit)
+        return GasAt(known_gas.molar_mass, known_gas.heat_capacity_ratio, temperature, deviation)
 
-    def limit(self, path: str, unit: str) -> float:
-        """Return half the interval of a value in the set [unit]; 0 where it states none."""
-        entry = self.parameter_set.numbers.get(path)
-        if entry is None or not entry.uncertainty:
-            return 0.0
-        return to_si(entry.value + entry.uncertainty, entry.unit, unit) - to_si(entry.value, entry.unit, unit)
+    def deviation(self, path: str, value: float, unit: str) -> float:
+        """Return the standard deviation of a number that the set has or leaves to the problem, at a value [unit]."""
+        entry, half_width = self.parameter_set.numbers.get(path), 0.0
+        if entry is not None and entry.uncertainty:
+            half_width = to_si(entry.value + entry.uncertainty, entry.unit, unit) - to_si(entry.value, entry.unit, unit)
+        return self.tolerances.deviation_of(path, value, half_width)
 
     def valve_path(self, name: str | None) -> str:
         """Return the path of a valve in the set, ``valves.main``."""
@@ -151,15 +149,16 @@ class FreeDecayProblem(StrictTable):
         inertia = setting.quantity("inertia", None if self.inertia == UNKNOWN else self.inertia, "kg m^2")
         if inertia is not None and inertia <= 0.0:
             raise IdentificationError(f"{setting.place}: inertia = {self.inertia!r} must be above zero")
-        limit = 0.0
+        path, deviation = "foot_plate.inertia", 0.0
         if self.inertia is None:
-            inertia = number_in_si(setting.parameter_set, "foot_plate.inertia")
-            limit = setting.limit("foot_plate.inertia", "kg m^2")
-        limit = limit or setting.tolerances.held * (inertia or 0.0)
+            inertia = number_in_si(setting.parameter_set, path)
+            deviation = 0.0 if inertia is None else setting.deviation(path, inertia, "kg m^2")
+        elif inertia is not None:
+            deviation = setting.tolerances.deviation_of(path, inertia, 0.0)
         paths = ("friction.static_torque", "friction.dynamic_torque")
         static, dynamic = (number_in_si(setting.parameter_set, path) for path in paths)
         rise = max(static / dynamic - 1.0, 0.0) if static and dynamic else 1.0
-        return FreeDecaySettings(start, end, inertia, limit, rise, self.confidence, setting.tolerances)
+        return FreeDecaySettings(start, end, inertia, deviation, rise, self.confidence, setting.tolerances)
 
 
 class OpenValveFlowProblem(StrictTable):
@@ -212,7 +211,8 @@ class VaneLeakProblem(StrictTable):
             volume = volumes[name] = setting.quantity(name, text, "m^3")
             if volume is not None and volume <= 0.0:
                 raise IdentificationError(f"{setting.place}: {name} = {text!r} must be above zero")
-        angle, limit = setting.quantity("angle", self.angle, "rad"), setting.tolerances.held
+        angle = setting.quantity("angle", self.angle, "rad")
+        deviation = setting.tolerances.deviation_of("actuator.dead_volume_1", 1.0, 0.0)
         if angle is not None:
             if setting.parameter_set.actuator_kind != VANE:
                 raise IdentificationError(
@@ -225,7 +225,9 @@ class VaneLeakProblem(StrictTable):
                 raise IdentificationError(f"{setting.place}: angle = {self.angle!r} lies beyond the stops of the set")
             volumes["volume_1"] = volumes["volume_1"] or dead_1 + per_angle * (angle - lower)
             volumes["volume_2"] = volumes["volume_2"] or dead_2 + per_angle * (upper - angle)
-            limit = _volume_limit(setting, dead_1 + per_angle * (angle - lower), angle - lower) or limit
+            of_volume = setting.deviation("actuator.dead_volume_1", dead_1, "m^3")
+            of_angle = (angle - lower) * setting.deviation("actuator.volume_per_angle", per_angle, "m^3/rad")
+            deviation = math.hypot(of_volume, of_angle) / (dead_1 + per_angle * (angle - lower))
         forms = ("discharge_coefficient", "critical_ratio")
         coefficient, ratio = (number_in_si(setting.parameter_set, f"actuator.leak.{name}") for name in forms)
         return VaneLeakSettings(
@@ -237,16 +239,9 @@ class VaneLeakProblem(StrictTable):
             critical_ratio=ratio,
             is_laminar=self.law == "laminar",
             tolerances=setting.tolerances,
-            volume_limit=limit,
+            volume_deviation=deviation,
             **volumes,
         )
-
-
-def _volume_limit(setting: Setting, volume: float, swept: float) -> float:
-    """Return how well a volume [m^3] of a set is known [-] that an angle [rad] has swept; 0 where it states nothing."""
-    of_volume = setting.limit("actuator.dead_volume_1", "m^3")
-    of_angle = swept * setting.limit("actuator.volume_per_angle", "m^3/rad")
-    return math.hypot(of_volume, of_angle) / volume
 
 
 class ValveMapProblem(StrictTable):
@@ -325,19 +320,6 @@ class ProblemFile(StrictTable):
     trajectory: Annotated[
         TrajectorySection | None, Field(description="a fit to recordings of motion, after the bench procedures")
     ] = None
-
-
-def bench_tolerances(stated: FitTolerances) -> Tolerances:
-    """Return what the procedures take of a bench, their defaults where a problem states nothing."""
-    given = {
-        "temperature": stated.gas_temperature,
-        "gas_law": stated.gas_law,
-        "zero_of_pressure": stated.zero_of_pressure,
-        "gain": stated.gain,
-        "zero_of_flow": stated.zero_of_flow,
-        "held": stated.held,
-    }
-    return Tolerances(**{name: limit for name, limit in given.items() if limit is not None})
 
 
 def load_problem(path: str | Path) -> ProblemFile:

@@ -13,11 +13,16 @@ from ppafo.cli.main import main
 from ppafo.errors import IdentificationError, PpafoError
 from ppafo.identification.estimate import Estimate
 from ppafo.identification.new_set import with_estimates
-from ppafo.identification.problem import json_schema, parse_problem
+from ppafo.identification.problem import FreeDecayProblem, Setting, VaneLeakProblem, json_schema, parse_problem
+from ppafo.identification.tolerances import Tolerances
+from ppafo.identification.trajectory import Experiment, tolerance_parameters
+from ppafo.identification.trajectory.tolerances import stated_by
 from ppafo.parameters import apply_overrides, build_device
 from ppafo.parameters.loading import load_device, load_parameter_set, parameter_set_toml, parse_parameter_set
 from ppafo.questions.identify.answer import Identification
 from ppafo.questions.identify.solve import identify
+from ppafo.running import simulate
+from ppafo.simulation.loading import load_scenario
 from ppafo.storage import write_csv
 from ppafo.units import to_si
 
@@ -301,8 +306,31 @@ def test_the_gas_temperature_is_known_as_well_as_it_is_stated(solved: Solve, ben
     known = '[gas.temperature]\nvalue = 298.0\nunit = "K"\n'
     assert text.count(known) == 1
     (bench / "warm.toml").write_text(text.replace(known, f"{known}uncertainty = 40.0\n"))
-    (bench / "problem.toml").write_text(HEAD.replace("ppafo2011", "warm.toml") + FLOW)
-    assert identify(bench / "problem.toml").results[0][path].half_width > 1.4 * usual.half_width
+    head, half = HEAD.replace("ppafo2011", "warm.toml"), {}
+    for stated in ("", "gas_temperature = '1 K'", "gas_temperature = '35.348 K'", "held = '1 %'"):
+        (bench / "problem.toml").write_text(f"{head}[bench]\n{stated}\n{FLOW}")
+        half[stated] = identify(bench / "problem.toml").results[0][path].half_width
+    assert half[""] > 1.4 * usual.half_width
+    # The set states half a 95 % interval: 40 K / 1.96 is the standard deviation of a limit of 35.348 K.
+    assert half[""] == half["held = '1 %'"] == pytest.approx(half["gas_temperature = '35.348 K'"], rel=1e-4)
+    assert half["gas_temperature = '1 K'"] == pytest.approx(measured.half_width, rel=1e-6)
+
+
+def test_bench_and_trajectory_hold_a_number_alike() -> None:
+    chosen, device = Setting(load_parameter_set("ppafo2011"), "proportional", "here"), load_device("ppafo2011")
+    scenario = load_scenario("step-response", ["motion.kind=free"])
+    experiment = Experiment("step", scenario, simulate(scenario).recording)
+    stated = stated_by(chosen.parameter_set, scenario)
+    held = {one.path: one.deviation for one in tolerance_parameters(Tolerances(), (experiment,), (), stated)}
+    leak = VaneLeakProblem(kind="vane-leak", recordings=("leak.csv",), angle="60 deg").settings(chosen)
+    decay = FreeDecayProblem(kind="free-decay", recordings=("decay.csv",)).settings(chosen)
+    told = FreeDecayProblem(kind="free-decay", recordings=("decay.csv",), inertia="8.4 g m^2").settings(chosen)
+    assert decay.inertia_deviation == held["foot_plate.inertia"] == told.inertia_deviation
+    assert leak.gas.temperature_deviation == held["gas.temperature"]
+    swept = math.radians(60.0) - device.actuator.angle_min
+    volume = math.hypot(held["actuator.dead_volume_1"], swept * held["actuator.volume_per_angle"])
+    assert leak.volume_1 is not None
+    assert leak.volume_deviation == pytest.approx(volume / leak.volume_1)
 
 
 def test_a_measured_gas_temperature_takes_the_place_of_the_set_s(solved: Solve) -> None:

@@ -14,8 +14,9 @@ from typing import Literal
 import numpy as np
 
 from ppafo.constants import STANDARD_ATMOSPHERE, UNIVERSAL_GAS_CONSTANT
-from ppafo.identification.bench.law import Tolerances, Values, tolerance
+from ppafo.identification.bench.law import Values, tolerance, within
 from ppafo.identification.fit import Free
+from ppafo.identification.tolerances import Tolerances
 from ppafo.model.gas import choked_flow_constant, critical_pressure_ratio, specific_gas_constant
 from ppafo.model.orifice import sonic_conductance_mass
 from ppafo.signals.recording import Floats
@@ -28,12 +29,12 @@ LINEAR_RATIO = 0.999
 
 @dataclass(frozen=True, slots=True)
 class GasAt:
-    """A gas at one temperature: molar mass [kg/mol], heat capacity ratio [-], temperature [K] and its limit [K]."""
+    """A gas: molar mass [kg/mol], heat capacity ratio [-], temperature [K] and its standard deviation [K]."""
 
     molar_mass: float
     heat_capacity_ratio: float
     temperature: float
-    temperature_limit: float = 0.0
+    temperature_deviation: float = 0.0
 
     @property
     def specific_gas_constant(self) -> float:
@@ -57,7 +58,7 @@ ZERO = "zero of the flow meter"
 
 def gas_tolerances(gas: GasAt, tolerances: Tolerances) -> tuple[Free, ...]:
     """Return what is not known exactly of the gas: its temperature [K] and its law [-]."""
-    return (*tolerance(TEMPERATURE, gas.temperature_limit), *tolerance(GAS_LAW, tolerances.gas_law))
+    return (*tolerance(TEMPERATURE, gas.temperature_deviation), *within(GAS_LAW, tolerances.law_of_gas))
 
 
 def flow_tolerances(gas: GasAt, tolerances: Tolerances, names: tuple[str, str], largest: float) -> tuple[Free, ...]:
@@ -67,10 +68,10 @@ def flow_tolerances(gas: GasAt, tolerances: Tolerances, names: tuple[str, str], 
     """
     return (
         *gas_tolerances(gas, tolerances),
-        *tolerance(METER, tolerances.gain),
-        *tolerance(SENSORS, tolerances.gain),
-        *tolerance(ZERO, tolerances.zero_of_flow * largest),
-        *(item for name in names for item in tolerance(f"zero of {name}", tolerances.zero_of_pressure)),
+        *within(METER, tolerances.gain_of("mass_flow")),
+        *within(SENSORS, tolerances.gain_of("pressure")),
+        *within(ZERO, tolerances.zero_of_flow * largest),
+        *(item for name in names for item in within(f"zero of {name}", tolerances.zero_of_pressure)),
     )
 
 

@@ -17,10 +17,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.bench.law import DEFAULTS, Tolerances, Values, solve, sought, tolerance
+from ppafo.identification.bench.law import Values, solve, sought, tolerance, within
 from ppafo.identification.bench.result import BenchResult, Panel, Reported, Series, count_of, result_of
 from ppafo.identification.fit import Free
 from ppafo.identification.source import Source, check_moves, check_no_gap, check_sources, window
+from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.signals.faults import is_at_limit, plateaus
 from ppafo.signals.recording import Floats
 
@@ -41,7 +42,7 @@ _STRIBECK = 0.1, 1.0e-3, 2.0
 
 @dataclass(frozen=True, slots=True)
 class FreeDecaySettings:
-    """Times between which the vane turns freely [s], inertia [kg m^2] with its limit, and how much seals may grip.
+    """Times between which the vane turns freely [s], inertia [kg m^2] with its deviation, and how much seals may grip.
 
     ``rise`` is friction at rest over dynamic friction, less 1 [-]. Without a start the decay begins where the speed is
     largest; without an inertia only ratios over it are known.
@@ -50,7 +51,7 @@ class FreeDecaySettings:
     start: float | None = None
     end: float | None = None
     inertia: float | None = None
-    inertia_limit: float = 0.0
+    inertia_deviation: float = 0.0
     rise: float = 1.0
     confidence: float = 0.95
     tolerances: Tolerances = DEFAULTS
@@ -132,8 +133,8 @@ def _numbers(
         sought(friction, deceleration, 0.0),
         *starts,
         *(() if rise is None else (rise, Free(_RISE_VELOCITY, usual, *_STRIBECK[1:], usual, usual))),
-        *tolerance(_INERTIA, 0.0 if settings.inertia is None else settings.inertia_limit / settings.inertia),
-        *tolerance(_GAIN, settings.tolerances.gain),
+        *tolerance(_INERTIA, 0.0 if settings.inertia is None else settings.inertia_deviation / settings.inertia),
+        *within(_GAIN, settings.tolerances.gain_of(ANGLE)),
     )
 
 

@@ -1,18 +1,13 @@
-"""A law of the bench as residuals of the one estimator, and the tolerances of a bench as numbers with priors.
-
-A tolerance is a limit, as data sheets state it. Only the limit is known, so its prior has the standard deviation of an
-even distribution between the limits, limit / sqrt(3) (GUM, JCGM 100:2008, 4.3.7).
-"""
+"""A law of the bench as residuals of the one estimator, and what a bench does not know as numbers with priors."""
 
 import math
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
-from ppafo.constants import PASCALS_PER_PSI
 from ppafo.identification.fit import Block, Fit, Free, fit
+from ppafo.identification.tolerances import deviation_of_limit
 from ppafo.signals.recording import Floats
 
 Values = Mapping[str, float]
@@ -22,33 +17,18 @@ _WIDEST = 12.0
 """Limits by which a tolerance may be off at most in the search."""
 
 
-@dataclass(frozen=True, slots=True)
-class Tolerances:
-    """Limits on either side of what a bench does not know exactly, in SI units or as a fraction; 0 is known.
-
-    Temperature of the gas [K] where none is stated; departure from the ideal gas law; zero of each pressure sensor
-    [Pa]; gain of each sensor; zero of the flow meter, of its largest reading; a number of the set or of the problem
-    that states no uncertainty of its own.
-    """
-
-    temperature: float = 15.0
-    gas_law: float = 0.01
-    zero_of_pressure: float = 0.3 * PASCALS_PER_PSI
-    gain: float = 0.005
-    zero_of_flow: float = 0.05
-    held: float = 0.02
-
-
-DEFAULTS = Tolerances()
-"""Of a bench of which a problem says nothing."""
-
-
-def tolerance(name: str, limit: float, start: float = 0.0) -> tuple[Free, ...]:
-    """Return a number known within a limit on either side of its start [SI]; nothing where the limit is 0."""
-    if not limit > 0.0:
+def tolerance(name: str, deviation: float, start: float = 0.0) -> tuple[Free, ...]:
+    """Return a number known to a standard deviation about its start [SI]; nothing where it is known exactly."""
+    if not deviation > 0.0:
         return ()
+    limit = math.sqrt(3.0) * deviation
     width = _WIDEST * limit
-    return (Free(name, start, start - width, start + width, limit, limit / math.sqrt(3.0)),)
+    return (Free(name, start, start - width, start + width, limit, deviation),)
+
+
+def within(name: str, limit: float) -> tuple[Free, ...]:
+    """Return an error of the bench, known within a limit on either side of 0 [SI]."""
+    return tolerance(name, deviation_of_limit(limit))
 
 
 def sought(name: str, start: float, low: float = -math.inf, high: float = math.inf, scale: float = 0.0) -> Free:

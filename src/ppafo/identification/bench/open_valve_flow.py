@@ -21,9 +21,10 @@ from ppafo.identification.bench.flow import (
     read_flow,
     true_pressure,
 )
-from ppafo.identification.bench.law import DEFAULTS, Tolerances, Values, solve, sought
+from ppafo.identification.bench.law import Values, solve, sought
 from ppafo.identification.bench.result import BenchResult, Panel, Reported, Series, result_of, with_residuals
 from ppafo.identification.source import Source, check_absolute, check_moves, check_not_clipped, check_sources, pool
+from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.model.gas import critical_pressure_ratio
 from ppafo.signals.recording import Floats
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.bench.law import DEFAULTS, Tolerances, Values, solve, sought, tolerance
+from ppafo.identification.bench.law import Values, solve, sought, within
 from ppafo.identification.bench.result import (
     BenchResult,
     Panel,
@@ -29,6 +29,7 @@ from ppafo.identification.bench.result import (
     with_residuals,
 )
 from ppafo.identification.source import Source, check_moves, check_not_clipped, check_sources, pool
+from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.signals.recording import Floats
 
 Labels = NDArray[np.int64]
@@ -84,9 +85,9 @@ def static_torque(sources: tuple[Source, ...], settings: StaticTorqueSettings | 
         sought(names.friction_path, friction, scale=size),
         sought(names.growth_path, 0.0, scale=size / span),
         sought(names.zero_path, zero, scale=size),
-        *tolerance("zero of the pressure sensor", tolerances.zero_of_pressure),
-        *tolerance("gain of the pressure sensor", tolerances.gain),
-        *tolerance(f"gain of the {names.load} sensor", tolerances.gain),
+        *within("zero of the pressure sensor", tolerances.zero_of_pressure),
+        *within("gain of the pressure sensor", tolerances.gain_of("pressure")),
+        *within(f"gain of the {names.load} sensor", tolerances.gain_of(names.load)),
     )
 
     def law(at: Values) -> Floats:

@@ -15,9 +15,10 @@ import numpy as np
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.flow import GasAt, flow_tolerances, orifice_shape, read_flow, true_pressure
-from ppafo.identification.bench.law import DEFAULTS, Tolerances, Values, solve, sought
+from ppafo.identification.bench.law import Values, solve, sought
 from ppafo.identification.bench.result import BenchResult, Panel, Reported, Role, Series, result_of, with_residuals
 from ppafo.identification.source import Source, check_absolute, check_moves, check_sources, pool
+from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.model.effects.spool_play import spool_position
 from ppafo.signals.recording import Floats
 

@@ -30,7 +30,7 @@ from ppafo.identification.bench.flow import (
     read_flow,
     true_pressure,
 )
-from ppafo.identification.bench.law import DEFAULTS, Tolerances, Values, solve, sought, tolerance
+from ppafo.identification.bench.law import Values, solve, sought, tolerance, within
 from ppafo.identification.bench.result import BenchResult, Panel, Reported, Series, count_of, result_of, with_residuals
 from ppafo.identification.fit import Free
 from ppafo.identification.source import (
@@ -43,6 +43,7 @@ from ppafo.identification.source import (
     pool,
     window,
 )
+from ppafo.identification.tolerances import DEFAULTS, HELD, Tolerances, deviation_of_limit
 from ppafo.signals.faults import plateaus, stands_out
 from ppafo.signals.recording import Floats
 
@@ -68,7 +69,7 @@ class VaneLeakSettings:
 
     Without the volume of the chamber that empties there is no area, only one over the volume. A
     ``discharge_coefficient`` [-] makes an area of the product, a ``critical_ratio`` [-] asks for a sonic conductance,
-    ``is_laminar`` for a laminar coefficient. ``volume_limit`` [-] is how well the volumes are known.
+    ``is_laminar`` for a laminar coefficient. ``volume_deviation`` [-] is the standard deviation of a volume over it.
     """
 
     gas: GasAt
@@ -81,7 +82,7 @@ class VaneLeakSettings:
     critical_ratio: float | None = None
     is_laminar: bool = False
     tolerances: Tolerances = DEFAULTS
-    volume_limit: float = 0.02
+    volume_deviation: float = deviation_of_limit(HELD["actuator.dead_volume_1"])
 
     @property
     def opening(self) -> Opening:
@@ -253,18 +254,18 @@ def _decaying_leak(
 
     numbers = (
         sought(size.path, _rough_size(closed, opening, constant * gas.temperature / emptied), 0.0),
-        *_ratio_numbers(closed, volumes, settings.volume_limit),
+        *_ratio_numbers(closed, volumes, settings.volume_deviation),
         *(one for number, item in enumerate(closed, start=1) for one in _starts(names, number, item)),
         *(
             one
             for number, item in enumerate(closed, start=1)
             for name in names[: item.fitted]
-            for one in tolerance(f"relaxation of {name}, decay {number}", _MOST_RELAXED)
+            for one in within(f"relaxation of {name}, decay {number}", _MOST_RELAXED)
         ),
         Free(_RELAXATION, 0.0, -5.0, math.log(_RELAXED), 1.0, 1.5),
         *gas_tolerances(gas, tolerances),
-        *tolerance(_VOLUME, settings.volume_limit if volumes[0] else 0.0),
-        *(one for name in names for one in tolerance(f"zero of {name}", tolerances.zero_of_pressure)),
+        *tolerance(_VOLUME, settings.volume_deviation if volumes[0] else 0.0),
+        *(one for name in names for one in within(f"zero of {name}", tolerances.zero_of_pressure)),
     )
     measured = np.concatenate([one for item in closed for one in (item.first, item.second)[: item.fitted]])
     labels, channels = [], []
@@ -325,7 +326,7 @@ def _rough_size(closed: tuple[ClosedChambers, ...], opening: Opening, rate: floa
 
 
 def _ratio_numbers(
-    closed: tuple[ClosedChambers, ...], volumes: tuple[float | None, ...], limit: float
+    closed: tuple[ClosedChambers, ...], volumes: tuple[float | None, ...], deviation: float
 ) -> tuple[Free, ...]:
     """Return the ratio of the volumes as a tolerance where both are known, else as a number that is sought."""
     shut = [item.changes for item in closed if not item.is_a_room]
@@ -333,7 +334,7 @@ def _ratio_numbers(
         return ()
     if volumes[0] and volumes[1]:
         ratio = volumes[0] / volumes[1]
-        return tolerance(_RATIO, math.sqrt(2.0) * limit * ratio, ratio)
+        return tolerance(_RATIO, math.sqrt(2.0) * deviation * ratio, ratio)
     return (sought(_RATIO, max(float(np.mean([rise / fall for fall, rise in shut])), 1.0e-3), 1.0e-6),)
 
 

@@ -5,10 +5,11 @@ Each file leans on those before it: ``problem`` says what is requested, ``tolera
 ``section`` does so for a problem file.
 """
 
+from ppafo.identification.tolerances import Tolerances
 from ppafo.identification.trajectory.expected import Candidate, Expected, expected_information
 from ppafo.identification.trajectory.fitting import ChannelFit, TrajectoryFit, fit
 from ppafo.identification.trajectory.problem import Experiment, FreeParameter, TrajectoryProblem
-from ppafo.identification.trajectory.tolerances import Tolerances, tolerance_parameters
+from ppafo.identification.trajectory.tolerances import tolerance_parameters
 
 __all__ = [
     "Candidate",

@@ -359,7 +359,9 @@ def _refuse_followed(parameter: FreeParameter, path: str, experiment: Experiment
 def _refuse_nonsense(parameter: FreeParameter, start: float, low: float, high: float) -> None:
     if not math.isfinite(start) or math.isnan(low) or math.isnan(high):
         raise IdentificationError(f"{parameter.name}: start and bounds must be finite numbers")
-    if not low < high or not low <= start <= high:
+    if not low < high:
+        raise IdentificationError(f"{parameter.name}: low, {low:.6g}, must be below high, {high:.6g}")
+    if not low <= start <= high:
         raise IdentificationError(
             f"{parameter.name}: start {start:.6g} must lie between the bounds {low:.6g} and {high:.6g}"
         )

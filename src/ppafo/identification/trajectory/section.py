@@ -14,11 +14,11 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field
 
-from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.models import NAME, StrictTable, Text, Texts
-from ppafo.errors import DataError, IdentificationError, ScenarioError, UnitError, nearest_name, refused_as
+from ppafo.errors import DataError, IdentificationError, ScenarioError, nearest_name
 from ppafo.identification.estimate import Estimate, interval_factor
 from ppafo.identification.source import Source, Use, common_use, told_of_readings
+from ppafo.identification.tolerances import Tolerances, deviation_of_limit, quantity_of
 from ppafo.identification.trajectory.expected import Candidate, Expected, expected_information
 from ppafo.identification.trajectory.fitting import TrajectoryFit, fit
 from ppafo.identification.trajectory.problem import (
@@ -33,7 +33,7 @@ from ppafo.identification.trajectory.problem import (
     full_path,
     use_of,
 )
-from ppafo.identification.trajectory.tolerances import Tolerances, stated_by, tolerance_parameters
+from ppafo.identification.trajectory.tolerances import stated_by, tolerance_parameters
 from ppafo.parameters import apply_overrides, build_device
 from ppafo.parameters.device import Device
 from ppafo.parameters.overrides import over
@@ -54,7 +54,6 @@ from ppafo.simulation.recorded import (
     with_fixed_volume,
 )
 from ppafo.simulation.scenario import Scenario
-from ppafo.units import parse_quantity
 
 _Label = Annotated[str, Field(pattern=NAME, max_length=60, description="its name, also in the names of files")]
 _Noise = dict[str, Text]
@@ -221,12 +220,6 @@ def name_in_refusals(file: str) -> Iterator[None]:
         raise type(error)(f"{file}: {error}") from error
 
 
-def quantity_of(said: str, text: str, unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
-    """Return the number in a text in ``unit``; IdentificationError where it is none. ``said`` is file and key."""
-    with refused_as(IdentificationError, f"{said} = '{text}'", UnitError):
-        return parse_quantity(text, unit, atmosphere)
-
-
 def noise_of_channels(given: Mapping[str, str], said: str) -> dict[str, float]:
     """Return the standard deviations [rad], [Pa] that are given by channel.
 
@@ -265,9 +258,12 @@ def candidates_of(section: TrajectorySection, setting: Setting) -> tuple[Candida
     for item in section.candidates:
         said = f"{setting.file}: candidate '{item.label}'"
         interval = quantity_of(f"{said}: interval", item.interval, "s")
-        if interval <= 0.0:
-            raise IdentificationError(f"{said}: interval = '{item.interval}' must be above 0")
         scenario = _scenario(item.scenario, item.overrides, setting)
+        if not SHORTEST_STEP <= interval <= scenario.duration:
+            raise IdentificationError(
+                f"{said}: interval = '{item.interval}': must be from {SHORTEST_STEP:g} s to {scenario.duration:g} s, "
+                "the duration of its run"
+            )
         found.append(Candidate(item.label, scenario, noise_of_channels(item.noise, said), interval))
     return tuple(found)
 
@@ -318,7 +314,7 @@ def _time_offset(item: ExperimentSection, setting: Setting) -> list[FreeParamete
     longest = quantity_of(said, item.time_offset, "s")
     if longest <= 0.0:
         raise IdentificationError(f"{said} = '{item.time_offset}' must be above 0")
-    deviation = longest / math.sqrt(3.0)
+    deviation = deviation_of_limit(longest)
     return [FreeParameter(TIME_OFFSET, 0.0, -longest, longest, deviation, (item.label,), is_tolerance=True)]
 
 

@@ -11,15 +11,14 @@ from ppafo.identification.problem import (
     ProblemFile,
     ProcedureProblem,
     Setting,
-    bench_tolerances,
     load_problem,
     run_procedure,
     window_of,
 )
 from ppafo.identification.source import Source, Use, double_use, source_of
+from ppafo.identification.tolerances import tolerances_of
 from ppafo.identification.trajectory.section import Setting as FitSetting
 from ppafo.identification.trajectory.section import solve_section
-from ppafo.identification.trajectory.tolerances import tolerances_of
 from ppafo.parameters.loading import list_sets, load_parameter_set
 from ppafo.parameters.overrides import check_valve
 from ppafo.parameters.parameter_set import ParameterSet, apply_overrides, atmospheric_pressure, chosen_valve
@@ -73,9 +72,8 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
         found += uses
     used = tuple(found)
     stated = tolerances_of(problem.bench, file)
-    known = bench_tolerances(stated)
     for task in tasks:
-        result = run_procedure(task.sources, task.item, Setting(current, valve, task.place, known))
+        result = run_procedure(task.sources, task.item, Setting(current, valve, task.place, stated))
         results.append(result)
         current = with_estimates(current, result.estimates).parameter_set
     bench = {estimate.path: estimate for estimate in bench_estimates(results)}

@@ -1,5 +1,6 @@
 """Free decay: the course of equation (1), planted damping and friction, and an inertia that may be unknown."""
 
+import math
 from types import ModuleType
 
 import numpy as np
@@ -70,7 +71,7 @@ def test_an_unknown_inertia_leaves_only_ratios_and_says_so(planted: ModuleType) 
 
 
 def test_an_uncertain_inertia_widens_what_depends_on_it(planted: ModuleType) -> None:
-    settings = FreeDecaySettings(inertia=8.4e-3, inertia_limit=0.84e-3, rise=0.0)
+    settings = FreeDecaySettings(inertia=8.4e-3, inertia_deviation=0.84e-3 / math.sqrt(3.0), rise=0.0)
     damping = free_decay((planted.decay(),), settings)["friction.viscous_damping"]
     assert damping.half_width / damping.value == pytest.approx(0.1 / np.sqrt(3.0) * 1.96, rel=0.05)
     assert "inertia" in damping.explanation

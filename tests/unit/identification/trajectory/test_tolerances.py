@@ -9,16 +9,12 @@ import pytest
 
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.errors import IdentificationError
+from ppafo.identification.tolerances import BenchSection, Tolerances, tolerances_of
 from ppafo.identification.trajectory import Experiment, FreeParameter, TrajectoryProblem, fit
 from ppafo.identification.trajectory import runs as trajectory_runs
 from ppafo.identification.trajectory.problem import number_at, with_numbers
 from ppafo.identification.trajectory.runs import prepare, signals_at
-from ppafo.identification.trajectory.tolerances import (
-    BenchSection,
-    Tolerances,
-    tolerance_parameters,
-    tolerances_of,
-)
+from ppafo.identification.trajectory.tolerances import tolerance_parameters
 from ppafo.signals.recording import Channel, Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario

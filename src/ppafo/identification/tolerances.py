@@ -1,0 +1,179 @@
+"""What a bench and a set do not know exactly: the table [bench], the defaults, and the one rule for priors.
+
+A limit, as data sheets state it, has the standard deviation of an even distribution between its ends, limit / sqrt(3)
+(GUM, JCGM 100:2008, 4.3.7). A set states half a 95 % interval, which is 1.96 standard deviations.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from ppafo.constants import PASCALS_PER_PSI, STANDARD_ATMOSPHERE
+from ppafo.documents.models import StrictTable, Text
+from ppafo.errors import IdentificationError, UnitError, refused_as
+from ppafo.identification.estimate import interval_factor
+from ppafo.parameters.parameter_set import CONFIDENCE
+from ppafo.units import parse_quantity
+
+Sensed = Literal["zero", "gain"]
+
+GAS_TEMPERATURE, GAS_LAW = 15.0, 0.01
+"""Limits of the gas temperature [K] and of the departure from the ideal gas law [-] where nobody states one."""
+
+HELD = {
+    "gas.molar_mass": GAS_LAW,
+    "gas.heat_capacity_ratio": 0.02,
+    "actuator.torque_constant": 0.02,
+    "actuator.volume_per_angle": 0.02,
+    "actuator.dead_volume_1": 0.05,
+    "actuator.dead_volume_2": 0.05,
+    "actuator.leak.discharge_coefficient": 0.3,
+    "actuator.leak.sonic_conductance": 0.3,
+    "actuator.restitution": 0.2,
+    "friction.static_torque": 0.3,
+    "friction.dynamic_torque": 0.5,
+    "friction.viscous_damping": 0.3,
+    "foot_plate.inertia": 0.05,
+    "foot_plate.gravity_torque": 0.1,
+    "valve.discharge_coefficient": 0.1,
+    "valve.sonic_conductance": 0.1,
+}
+"""Limits [-] of numbers of which nobody states an uncertainty, over the number; ``valve`` is the chosen valve."""
+
+_OTHER_SETTING = 0.1
+"""Limit [-] of a setting of the valve, an effect or an actuator of another kind."""
+
+_LARGEST_FRACTION = 0.5
+
+
+def deviation_of_limit(limit: float) -> float:
+    """Return the standard deviation of a number known within a limit on either side, in the unit of the limit."""
+    return limit / math.sqrt(3.0)
+
+
+class BenchSection(StrictTable):
+    """What the bench does not know exactly: limits on either side; 0 is known exactly."""
+
+    load: Annotated[Text | None, Field(description="of the external torque, of each recording; default 2 %")] = None
+    supply: Annotated[Text | None, Field(description="of each supply pressure, of each recording; 1 psi_d")] = None
+    zero_of_angle: Annotated[Text | None, Field(description="of the zero of the angle sensor; 0.5 deg")] = None
+    zero_of_pressure: Annotated[Text | None, Field(description="of each pressure sensor; 0.3 psi_d")] = None
+    gain: Annotated[
+        Text | None, Field(description="of the gain of each sensor; 0.5 %, but 0 % of the angle sensor")
+    ] = None
+    start_of_angle: Annotated[
+        Text | None, Field(description="of the angle at the start of each recording; 0.05 deg where it is read there")
+    ] = None
+    start_of_pressure: Annotated[
+        Text | None,
+        Field(description="of both pressures at the start; the noise of a sample where they are read there"),
+    ] = None
+    each_recording: Annotated[
+        tuple[Sensed, ...],
+        Field(strict=False, description="'zero', 'gain': anew in each recording; default: the same in all of them"),
+    ] = ()
+    gas_temperature: Annotated[
+        Text | None, Field(description="of the gas temperature; default: what the set states, else 15 K")
+    ] = None
+    gas_law: Annotated[Text | None, Field(description="departure of the gas from the ideal gas law; 1 %")] = None
+    zero_of_flow: Annotated[Text | None, Field(description="zero of the flow meter, of its largest reading; 5 %")] = (
+        None
+    )
+    held: Annotated[
+        Text | None, Field(description="of a number without an uncertainty of its own; default: 1 to 50 % by kind")
+    ] = None
+
+
+@dataclass(frozen=True, slots=True)
+class Tolerances:
+    """Limits on either side of what a bench does not know exactly, in SI units or as a fraction; 0 is known.
+
+    None takes the default of the channel or number. Those ``each_recording`` names are others in each recording.
+    """
+
+    load: float = 0.02
+    supply: float = PASCALS_PER_PSI
+    zero_of_angle: float = math.radians(0.5)
+    zero_of_pressure: float = 0.3 * PASCALS_PER_PSI
+    gain: float | None = None
+    start_of_angle: float | None = None
+    start_of_pressure: float | None = None
+    gas_temperature: float | None = None
+    gas_law: float | None = None
+    zero_of_flow: float = 0.05
+    held: float | None = None
+    each_recording: tuple[Sensed, ...] = ()
+
+    def zero_of(self, channel: str) -> float:
+        """Return the limit of the zero of a channel [rad], [Pa]."""
+        return self.zero_of_angle if channel == "angle" else self.zero_of_pressure
+
+    def gain_of(self, channel: str) -> float:
+        """Return the limit of the gain of a channel [-]; an angle sensor counts as exact where nothing is stated."""
+        usual = 0.0 if channel == "angle" else 0.005
+        return usual if self.gain is None else self.gain
+
+    @property
+    def law_of_gas(self) -> float:
+        """Limit of the departure from the ideal gas law [-]."""
+        return GAS_LAW if self.gas_law is None else self.gas_law
+
+    def deviation_of(self, path: str, value: float, half_width: float) -> float:
+        """Return the standard deviation of a number that is held at a ``value`` [SI].
+
+        The first that is there counts: a limit that the bench states of this number, the ``half_width`` of the 95 %
+        interval that the set states, the limit of ``held``, the default by kind.
+        """
+        gas_law = None if self.gas_law is None else abs(value) * self.gas_law
+        of_bench = {"gas.temperature": self.gas_temperature, "gas.molar_mass": gas_law}.get(path)
+        if of_bench is not None:
+            return deviation_of_limit(of_bench)
+        if half_width > 0.0:
+            return half_width / interval_factor(CONFIDENCE)
+        if path == "gas.temperature":
+            return deviation_of_limit(GAS_TEMPERATURE)
+        return deviation_of_limit(abs(value) * (HELD.get(path, _OTHER_SETTING) if self.held is None else self.held))
+
+
+DEFAULTS = Tolerances()
+"""Of a bench of which a problem says nothing."""
+
+_UNITS = {
+    "load": "1",
+    "supply": "Pa_d",
+    "zero_of_angle": "rad",
+    "zero_of_pressure": "Pa_d",
+    "gain": "1",
+    "start_of_angle": "rad",
+    "start_of_pressure": "Pa_d",
+    "gas_temperature": "K",
+    "gas_law": "1",
+    "zero_of_flow": "1",
+    "held": "1",
+}
+
+
+def tolerances_of(section: BenchSection | None, file: str) -> Tolerances:
+    """Return the tolerances of a table [SI], defaults without one; IdentificationError for one below 0."""
+    limits = {}
+    for name, unit in _UNITS.items():
+        text = None if section is None else getattr(section, name)
+        if text is None:
+            continue
+        said = f"{file}: bench: {name}"
+        limit = limits[name] = quantity_of(said, text, unit)
+        if not 0.0 <= limit < math.inf or (unit == "1" and limit > _LARGEST_FRACTION):
+            most = f" and at most {_LARGEST_FRACTION:.0%}" if unit == "1" else ""
+            raise IdentificationError(f"{said} = '{text}': must be 0 or above{most}")
+    return Tolerances(**limits, each_recording=() if section is None else section.each_recording)
+
+
+def quantity_of(said: str, text: str, unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
+    """Return the number in a text of a problem file in ``unit``; ``said`` is file and key.
+
+    IdentificationError where the text does not fit the unit.
+    """
+    with refused_as(IdentificationError, f"{said} = '{text}'", UnitError):
+        return parse_quantity(text, unit, atmosphere)
