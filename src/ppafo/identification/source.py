@@ -13,7 +13,7 @@ import numpy as np
 
 from ppafo.errors import IdentificationError, nearest_name
 from ppafo.signals import CHANNELS, Recording, RecordingKind
-from ppafo.signals.faults import FEWEST_AT_LIMIT, Plateau, is_at_limit, longest_gap, plateaus, scatters
+from ppafo.signals.faults import FEWEST_AT_LIMIT, is_at_limit, longest_gap, plateaus, scatters
 from ppafo.signals.recording import Floats
 from ppafo.storage.files import read_bytes
 
@@ -66,22 +66,14 @@ class Use:
         return is_alike and self.first < other.last and other.first < self.last
 
 
-def double_use(uses: Iterable[Use]) -> str:
-    """Return why some samples would count twice, an empty text where none do.
+def double_use(uses: Iterable[Use], others: Iterable[Use] | None = None) -> str:
+    """Return why some samples would count twice, in ``uses`` or also in ``others``; an empty text where none do.
 
     Recordings are the same where the hash of their numbers is, under whatever names their files go.
     """
-    return _overlap_message(combinations([(use, _digest(use.recording)) for use in uses], 2))
-
-
-def common_use(ones: Iterable[Use], others: Iterable[Use]) -> str:
-    """Return why some samples would count twice, once in each of two groups of uses; an empty text where none do."""
-    first, second = ([(use, _digest(use.recording)) for use in group] for group in (ones, others))
-    return _overlap_message(product(first, second))
-
-
-def _overlap_message(pairs: Iterable[tuple[tuple[Use, str], tuple[Use, str]]]) -> str:
-    for (one, digest), (other, second) in pairs:
+    known = [(use, _digest(use.recording)) for use in uses]
+    more = None if others is None else [(use, _digest(use.recording)) for use in others]
+    for (one, digest), (other, second) in combinations(known, 2) if more is None else product(known, more):
         if digest == second and one.overlaps(other):
             return (
                 f"{one.by} ({one.trace}) and {other.by} ({other.trace}) are the same recording, sha256 {digest[:12]} "
@@ -210,11 +202,6 @@ def kind_of(sources: tuple[Source, ...]) -> RecordingKind:
     return next(kind for kind in _KINDS if kind in kinds)
 
 
-def _is_held(values: Floats, plateau: Plateau) -> bool:
-    """Whether values that scatter elsewhere stay at an extreme for long."""
-    return plateau.count >= FEWEST_AT_LIMIT and scatters(values)
-
-
 def told_of_readings(sources: tuple[Source, ...]) -> tuple[str, ...]:
     """Return remarks on what the sensors did not show: pauses, and values beyond a limit."""
     found = []
@@ -226,12 +213,12 @@ def told_of_readings(sources: tuple[Source, ...]) -> tuple[str, ...]:
             if name in _NO_SENSORS:
                 continue
             values = source.recording[name]
-            limits = [item for item in plateaus(values) if is_at_limit(values, item) or _is_held(values, item)]
-            unit = source.recording.unit(name)
             found += [
-                f"{source.name}: '{name}' stays at {item.value:.6g} {unit} for {item.count} samples, from sample "
-                f"{item.first + 1}: a limit of the sensor?"
-                for item in limits
+                f"{source.name}: '{name}' stays at {item.value:.6g} {source.recording.unit(name)} for {item.count} "
+                f"samples, from sample {item.first + 1}: a limit of the sensor?"
+                for item in plateaus(values)
+                # Values that scatter elsewhere do not stay at an extreme for long by themselves.
+                if is_at_limit(values, item) or (item.count >= FEWEST_AT_LIMIT and scatters(values))
             ]
     return tuple(found)
 

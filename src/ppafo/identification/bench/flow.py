@@ -8,14 +8,15 @@ With r the downstream over the upstream pressure and k the heat capacity ratio, 
     laminar    c (P_a^2 - P_b^2)
 """
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from ppafo.constants import STANDARD_ATMOSPHERE, UNIVERSAL_GAS_CONSTANT
-from ppafo.identification.bench.law import Values, tolerance, within
-from ppafo.identification.fit import Free
+from ppafo.identification.bench.law import Values, solve, sought, tolerance, within
+from ppafo.identification.fit import Fit, Free
 from ppafo.identification.tolerances import Tolerances
 from ppafo.model.gas import choked_flow_constant, critical_pressure_ratio, specific_gas_constant
 from ppafo.model.orifice import sonic_conductance_mass
@@ -144,3 +145,37 @@ class Opening:
             return size * self.gas.flow_per_sonic_conductance * iso6358_shape(first, second, ratio)
         per_size = self.known * self.gas.choked_flow_constant
         return size * per_size * orifice_shape(first, second, self.gas.heat_capacity_ratio)
+
+
+CRITICAL_RATIOS = 0.2, 0.01, 0.95
+"""Critical ratio of ISO 6358 where it is sought [-]: start, lowest, highest."""
+
+
+def solve_flow(
+    opening: Opening,
+    paths: tuple[str, str],
+    pressures: Mapping[str, Floats],
+    flow: Floats,
+    labels: tuple[Sequence[str], Sequence[str]],
+    tolerances: Tolerances,
+    confidence: float,
+) -> tuple[Fit, Floats]:
+    """Return the fit of an opening to the flow through it, and the flow that it gives [kg/s]; see ``law.solve``.
+
+    ``paths`` are those of its size and its critical ratio, which is not sought where it is empty. ``pressures`` are two
+    channels [Pa absolute], the one from which a positive flow [kg/s] comes first.
+    """
+    size, critical = paths
+    names = (*pressures,)
+
+    def law(at: Values) -> Floats:
+        first, second = (true_pressure(at, name, shown) for name, shown in pressures.items())
+        return read_flow(at, opening.gas, opening.flow(at[size], at[critical], first, second))
+
+    unit = opening.flow(1.0, CRITICAL_RATIOS[0], *pressures.values())
+    numbers = (
+        sought(size, float(unit @ flow / (unit @ unit)), 0.0),
+        *((sought(critical, *CRITICAL_RATIOS),) if critical else ()),
+        *flow_tolerances(opening.gas, tolerances, (names[0], names[1]), float(np.abs(flow).max())),
+    )
+    return solve(law, flow, numbers, labels, confidence)

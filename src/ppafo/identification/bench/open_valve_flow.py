@@ -12,17 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.bench.flow import (
-    GasAt,
-    Law,
-    Opening,
-    flow_tolerances,
-    orifice_shape,
-    read_flow,
-    true_pressure,
-)
-from ppafo.identification.bench.law import Values, solve, sought
-from ppafo.identification.bench.result import BenchResult, Panel, Reported, Series, result_of, with_residuals
+from ppafo.identification.bench.flow import GasAt, Law, Opening, orifice_shape, solve_flow
+from ppafo.identification.bench.result import BenchResult, Panel, Reported, fitted_panels, result_of
 from ppafo.identification.source import Source, check_absolute, check_moves, check_not_clipped, check_sources, pool
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.model.gas import critical_pressure_ratio
@@ -32,8 +23,6 @@ PROCEDURE = "open-valve-flow"
 CHANNELS = ("upstream_pressure", "downstream_pressure", "mass_flow")
 MINIMUM_SAMPLES = 5
 _FULLY_OPEN = 0.99
-_RATIOS = 0.2, 0.01, 0.95
-"""Critical ratio of ISO 6358: start, lowest, highest."""
 _NEARLY_EQUAL = 0.9
 _SPAN, _SUBSONIC = 0.15, 0.6
 """Span of the pressure ratios, and the largest of them, from which both numbers of ISO 6358 can be fitted."""
@@ -59,54 +48,36 @@ def open_valve_flow(sources: tuple[Source, ...], settings: OpenValveFlowSettings
 
     IdentificationError for recordings that cannot say it, with the file, the sample and the remedy.
     """
-    gas = settings.gas
-    upstream, downstream, flow, labels = open_readings(sources, gas)
-    size = _size(settings)
-    opening = Opening(gas, settings.law, settings.area or 1.0)
-    names, critical = CHANNELS[:2], f"{settings.path}.critical_ratio"
-    largest = float(flow.max())
-
-    def law(at: Values) -> Floats:
-        pressures = (true_pressure(at, name, shown) for name, shown in zip(names, (upstream, downstream), strict=True))
-        return read_flow(at, gas, opening.flow(at[size.path], at[critical], *pressures))
-
-    unit = opening.flow(1.0, _RATIOS[0], upstream, downstream)
+    upstream, downstream, flow, labels = open_readings(sources, settings.gas)
+    size, ratio, largest = _size(settings), downstream / upstream, float(flow.max())
     is_standard = settings.law == "iso6358"
-    numbers = (
-        sought(size.path, float(unit @ flow / (unit @ unit)), 0.0),
-        *((sought(critical, *_RATIOS),) if is_standard else ()),
-        *flow_tolerances(gas, settings.tolerances, names, largest),
-    )
-    ratio = downstream / upstream
+    critical = f"{settings.path}.critical_ratio" if is_standard else ""
     if is_standard and (np.ptp(ratio) < _SPAN or ratio.max() < _SUBSONIC):
         raise IdentificationError(
             f"{sources[0].name}: {PROCEDURE}: C and b need choked and subsonic flow, pressure ratios that span "
             f"{_SPAN:g} or more and go beyond {_SUBSONIC:g}; these go from {ratio.min():.3g} to {ratio.max():.3g}"
         )
-    found, model = solve(law, flow, numbers, (labels, _levels(ratio, gas)), settings.confidence)
-    reported = (size, *((Reported(critical, "", "Critical ratio b of ISO 6358"),) if is_standard else ()))
-    order = np.argsort(ratio)
-    panel = Panel(
-        "Open-valve flow",
-        "Downstream over upstream pressure",
-        "-",
-        "Flow over upstream pressure",
-        "kg/(s Pa)",
-        (
-            Series("measured", ratio, flow / upstream, "measured"),
-            Series(settings.law, ratio[order], (model / upstream)[order], "law"),
-        ),
+    found, model = solve_flow(
+        Opening(settings.gas, settings.law, settings.area or 1.0),
+        (size.path, critical),
+        dict(zip(CHANNELS, (upstream, downstream), strict=False)),
+        flow,
+        (labels, _levels(ratio, settings.gas)),
+        settings.tolerances,
+        settings.confidence,
     )
+    axes = "Downstream over upstream pressure", "-", "Flow over upstream pressure", "kg/(s Pa)"
+    panel = Panel("Open-valve flow", *axes)
     others = " or ".join(f"'{item}'" for item in ("orifice", "iso6358", "laminar") if item != settings.law)
     return result_of(
         PROCEDURE,
         sources,
         found,
-        reported,
+        (size, *((Reported(critical, "", "Critical ratio b of ISO 6358"),) if is_standard else ())),
         settings.confidence,
         f"{flow.size} readings at pressure ratios from {ratio.min():.2f} to {ratio.max():.2f}; "
         f"scatter {np.std(flow - model) / largest:.2%} of the largest flow",
-        with_residuals(panel, ratio, (flow - model) / upstream),
+        fitted_panels(panel, settings.law, ratio, flow / upstream, model / upstream),
         f"try law = {others}, or leave those readings out",
     )
 

@@ -45,7 +45,14 @@ class Panel:
     x_unit: str
     y_name: str
     y_unit: str
-    series: tuple[Series, ...]
+    series: tuple[Series, ...] = ()
+
+
+def fitted_panels(panel: Panel, name: str, x: Floats, measured: Floats, model: Floats) -> tuple[Panel, Panel]:
+    """Return a panel with readings and the curve of a law by ``name``, and the one of their differences."""
+    order = np.argsort(x)
+    series = Series("measured", x, measured, "measured"), Series(name, x[order], model[order], "law")
+    return with_residuals(replace(panel, series=series), x, measured - model)
 
 
 def with_residuals(panel: Panel, x: Floats, residuals: Floats) -> tuple[Panel, Panel]:
@@ -165,6 +172,7 @@ _LEFT, _RIGHT, _TOP, _BOTTOM, _BETWEEN = 0.72, 0.15, 0.62, 0.55, 0.85
 """Inches."""
 
 _SHOWN_IN = {
+    "Pa": ("psi", 1.0 / PASCALS_PER_PSI),
     "Pa_d": ("psi", 1.0 / PASCALS_PER_PSI),
     "rad": ("deg", 180.0 / math.pi),
     "m^2": ("mm$^2$", 1.0e6),

@@ -19,19 +19,18 @@ from typing import NamedTuple
 import numpy as np
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.bench.flow import (
-    GAS_LAW,
-    TEMPERATURE,
-    GasAt,
-    Law,
-    Opening,
-    flow_tolerances,
-    gas_tolerances,
-    read_flow,
-    true_pressure,
-)
+from ppafo.identification.bench.flow import GAS_LAW, TEMPERATURE, GasAt, Law, Opening, gas_tolerances, solve_flow
 from ppafo.identification.bench.law import Values, solve, sought, tolerance, within
-from ppafo.identification.bench.result import BenchResult, Panel, Reported, Series, count_of, result_of, with_residuals
+from ppafo.identification.bench.result import (
+    BenchResult,
+    Panel,
+    Reported,
+    Series,
+    count_of,
+    fitted_panels,
+    result_of,
+    with_residuals,
+)
 from ppafo.identification.fit import Free
 from ppafo.identification.source import (
     Source,
@@ -142,9 +141,9 @@ class ClosedChambers(NamedTuple):
         return abs(rise) <= STANDS_STILL * abs(fall)
 
     @property
-    def fitted(self) -> int:
-        """How many of the pressures are fitted: that of a room is not."""
-        return 1 if self.is_a_room else 2
+    def fitted(self) -> tuple[Floats, ...]:
+        """The pressures [Pa] that are fitted: the one of a room is not."""
+        return (self.first,) if self.is_a_room else (self.first, self.second)
 
     @property
     def is_early(self) -> list[bool]:
@@ -248,7 +247,7 @@ def _decaying_leak(
             ratio = 0.0 if item.is_a_room else at[_RATIO]
             falls = fall_of_difference(opening, at[size.path], first, second, ratio, rate)
             faded = np.exp(-item.time / lasting)
-            for name, true in list(zip(names, falls.pressures(item.time), strict=True))[: item.fitted]:
+            for name, true, _ in zip(names, falls.pressures(item.time), item.fitted, strict=False):
                 parts.append(true * (1.0 + at[f"relaxation of {name}, decay {number}"] * faded) + at[f"zero of {name}"])
         return np.concatenate(parts)
 
@@ -259,7 +258,7 @@ def _decaying_leak(
         *(
             one
             for number, item in enumerate(closed, start=1)
-            for name in names[: item.fitted]
+            for name, _ in zip(names, item.fitted, strict=False)
             for one in within(f"relaxation of {name}, decay {number}", _MOST_RELAXED)
         ),
         Free(_RELAXATION, 0.0, -5.0, math.log(_RELAXED), 1.0, 1.5),
@@ -267,28 +266,23 @@ def _decaying_leak(
         *tolerance(_VOLUME, settings.volume_deviation if volumes[0] else 0.0),
         *(one for name in names for one in within(f"zero of {name}", tolerances.zero_of_pressure)),
     )
-    measured = np.concatenate([one for item in closed for one in (item.first, item.second)[: item.fitted]])
+    measured = np.concatenate([one for item in closed for one in item.fitted])
     labels, channels = [], []
     for number, item in enumerate(closed, start=1):
-        labels += [f"decay {number}"] * item.fitted * item.time.size
-        early = ["early" if is_early else "late" for is_early in item.is_early]
-        channels += [f"{name}, {word} in the fall" for name in names[: item.fitted] for word in early]
+        for name, values in zip(names, item.fitted, strict=False):
+            labels += [f"decay {number}"] * values.size
+            channels += [f"{name}, {'early' if is_early else 'late'} in the fall" for is_early in item.is_early]
     found, model = solve(law, measured, numbers, (labels, channels), settings.confidence)
-    time = np.concatenate([item.time for item in closed])
-    readings, fitted, place = [], [], 0
-    for item in closed:
-        count = item.time.size
-        readings.append(item.first - item.second)
-        fitted.append(
-            model[place : place + count] - (item.second if item.is_a_room else model[place + count :][:count])
-        )
-        place += item.fitted * count
-    series = [Series("measured" if not n else "", closed[n].time, one, "measured") for n, one in enumerate(readings)]
-    series += [Series(opening.law if not n else "", closed[n].time, one, "law") for n, one in enumerate(fitted)]
-    panel = Panel("Closed chambers", "Time", "s", "Pressure difference", "Pa_d", tuple(series))
+    times = [item.time for item in closed for _ in item.fitted]
+    series, place = [Series("measured", np.concatenate(times), measured, "measured")], 0
+    for time in times:
+        series.append(Series("" if place else opening.law, time, model[place : place + time.size], "law"))
+        place += time.size
+    panel = Panel("Closed chambers", "Time", "s", "Pressure", "Pa", tuple(series))
     room = all(item.is_a_room for item in closed)
     remark = (f"the pressure in chamber {3 - fuller} is constant, so it is treated as a room",) if room else ()
-    fall = max(1.0 - float(one[-EDGE:].mean() / one[:EDGE].mean()) for one in readings)
+    differences = [item.first - item.second for item in closed]
+    fall = max(1.0 - float(one[-EDGE:].mean() / one[:EDGE].mean()) for one in differences)
     return result_of(
         PROCEDURE,
         sources,
@@ -296,7 +290,7 @@ def _decaying_leak(
         (size,),
         settings.confidence,
         f"{count_of(len(closed), 'decay')} of up to {longest:.3g} s; the pressure difference falls by {fall:.1%}",
-        with_residuals(panel, time, np.concatenate(readings) - np.concatenate(fitted)),
+        with_residuals(panel, np.concatenate(times), measured - model),
         _REMEDY.format("'orifice'" if settings.is_laminar else "'laminar'"),
         remark,
     )
@@ -352,34 +346,27 @@ def _steady_leak(sources: tuple[Source, ...], settings: VaneLeakSettings) -> Ben
         raise IdentificationError(
             f"{sources[0].name}: {PROCEDURE}: the flow runs from the lower to the higher pressure; reverse its sign"
         )
-    gas, opening, size = settings.gas, settings.opening, settings.size
-
-    def law(at: Values) -> Floats:
-        pressures = (true_pressure(at, name, shown) for name, shown in zip(CHANNELS, (first, second), strict=True))
-        return read_flow(at, gas, opening.flow(at[size.path], 0.0, *pressures))
-
-    unit, largest = opening.flow(1.0, 0.0, first, second), float(np.abs(flow).max())
-    numbers = (
-        sought(size.path, float(unit @ flow / (unit @ unit)), 0.0),
-        *flow_tolerances(gas, settings.tolerances, CHANNELS, largest),
-    )
+    opening, size = settings.opening, settings.size
     halves = np.where(difference > np.median(difference), "higher", "lower")
-    channels = [f"flow at {half} pressures" for half in halves]
     labels = [f"recording {number}" for number, one in enumerate(sources, start=1) for _ in range(len(one.recording))]
-    found, model = solve(law, flow, numbers, (labels, channels), settings.confidence)
-    order = np.argsort(difference)
-    series = (
-        Series("measured", difference, flow, "measured"),
-        Series(opening.law, difference[order], model[order], "law"),
+    found, model = solve_flow(
+        opening,
+        (size.path, ""),
+        {"pressure_1": first, "pressure_2": second},
+        flow,
+        (labels, [f"flow at {half} pressures" for half in halves]),
+        settings.tolerances,
+        settings.confidence,
     )
-    panel = Panel("Steady leak", "Pressure difference", "Pa_d", "Flow", "kg/s", series)
+    scatter = np.std(flow - model) / float(np.abs(flow).max())
+    panel = Panel("Steady leak", "Pressure difference", "Pa_d", "Flow", "kg/s")
     return result_of(
         PROCEDURE,
         sources,
         found,
         (size,),
         settings.confidence,
-        f"{flow.size} steady readings; scatter {np.std(flow - model) / largest:.2%} of the largest flow",
-        with_residuals(panel, difference, flow - model),
+        f"{flow.size} steady readings; scatter {scatter:.2%} of the largest flow",
+        fitted_panels(panel, opening.law, difference, flow, model),
         _REMEDY.format("'orifice'" if settings.is_laminar else "'laminar'"),
     )

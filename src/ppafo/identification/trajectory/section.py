@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
@@ -17,7 +17,7 @@ from pydantic import Field
 from ppafo.documents.models import NAME, StrictTable, Text, Texts
 from ppafo.errors import DataError, IdentificationError, ScenarioError, nearest_name
 from ppafo.identification.estimate import Estimate, interval_factor
-from ppafo.identification.source import Source, Use, common_use, told_of_readings
+from ppafo.identification.source import Source, Use, double_use, told_of_readings
 from ppafo.identification.tolerances import Tolerances, deviation_of_limit, quantity_of
 from ppafo.identification.trajectory.expected import Candidate, Expected, expected_information
 from ppafo.identification.trajectory.fitting import TrajectoryFit, fit
@@ -159,30 +159,6 @@ class TrajectorySection(StrictTable):
     ] = ()
 
 
-_REMOVED = {
-    "loss": "the first pass is robust by itself; omit it",
-    "other_starts": "other starts are tried where the first does not explain the recordings; omit it",
-    "seed": "nothing is drawn; omit it",
-    "directions": "recordings that want other numbers are found by themselves; omit it",
-    "profiles": "intervals are those of the table; omit it",
-    "scale": "the search scales numbers by itself; omit it",
-}
-_CAN = "proposals within limits of the bench are not made; write [[trajectory.candidates]], which are ranked"
-
-
-def refuse_removed(document: Mapping[str, Any], file: str) -> None:
-    """Refuse keys that earlier versions had, with what to write instead; IdentificationError."""
-    section, bench = document.get("trajectory"), document.get("bench")
-    if isinstance(bench, dict) and "can" in bench:
-        raise IdentificationError(f"{file}: bench.can: {_CAN}")
-    if isinstance(section, dict):
-        parameters = section.get("parameters")
-        tables = [item for item in (section, *(parameters if isinstance(parameters, list) else ()))]
-        for key, instead in _REMOVED.items():
-            if any(isinstance(table, dict) and key in table for table in tables):
-                raise IdentificationError(f"{file}: trajectory: {key}: {instead}")
-
-
 _NOISE_UNITS = {"angle": "rad", "pressure_1": "Pa_d", "pressure_2": "Pa_d"}
 
 
@@ -240,7 +216,7 @@ def trajectory_problem(section: TrajectorySection, setting: Setting) -> Trajecto
     """Return the problem of a section. IdentificationError where it repeats what the bench settles."""
     experiments = tuple(_experiment(item, setting) for item in section.experiments)
     scenarios = {item.label: item.scenario for item in experiments}
-    twice = common_use(setting.used, map(use_of, experiments))
+    twice = double_use(setting.used, map(use_of, experiments))
     if twice:
         raise IdentificationError(f"{setting.file}: {twice}; bench values are where the fit starts and what it holds")
     parameters = [_parameter(item, scenarios, setting) for item in section.parameters]
