@@ -34,20 +34,9 @@ from ppafo.identification.trajectory.problem import (
 )
 from ppafo.model.catalog import VALVES
 from ppafo.model.columns import at, over_runs
-from ppafo.parameters.plant import effect_rows, plant_parameters, switches_of
+from ppafo.parameters.plant import switches_of
 from ppafo.signals.faults import MINIMUM_SAMPLES, is_at_limit, noise_of, plateaus
-from ppafo.simulation.plan import (
-    exact_orifice,
-    initial_lines,
-    initial_state,
-    led_leg,
-    outside_torque,
-    plan_run,
-    plant_behind_lines,
-    thermal_parameters,
-    valve_parameters,
-    with_load,
-)
+from ppafo.simulation.plan import plan_run, plan_runs
 from ppafo.simulation.recorded import (
     ANGLE,
     DORSIFLEXION_SUPPLY,
@@ -56,7 +45,7 @@ from ppafo.simulation.recorded import (
     step_inputs,
     with_prescribed_angle,
 )
-from ppafo.simulation.scenario import FreeMotion, Scenario, vane_motion
+from ppafo.simulation.scenario import FreeMotion, Scenario
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -261,6 +250,12 @@ def _with_half_steps(prepared: PreparedExperiment, numbers: Sequence[Number], po
     return _place_samples(prepared, replace(run, tolerance=_FINER * prepared.run.tolerance))
 
 
+_NUMBERS_OF_RUN = (
+    "plant", "thermal", "valve_orifice", "leak_orifice", "initial", "valve", "command_delay", "lines", "effects", "leg"
+)  # fmt: skip
+"""What of a run follows from the numbers of its scenario; program, clock and prescribed motion stay."""
+
+
 def run_with(prepared: PreparedExperiment, numbers: Mapping[str, Any]) -> Run:
     """Return the run of an experiment with other numbers [SI], on its program and clock.
 
@@ -269,9 +264,8 @@ def run_with(prepared: PreparedExperiment, numbers: Mapping[str, Any]) -> Run:
     """
     base = prepared.run
     scenario = with_numbers(prepared.scenario, numbers)
-    device, motion = scenario.device, vane_motion(scenario)
+    device = scenario.device
     settings: Mapping[str, Any] = device.valve.settings
-    delay = base.program.valve.command_delay(settings)
     counts = [value.size for value in settings.values() if isinstance(value, np.ndarray)]
     for run in range(max(counts, default=1)):
         own = {name: at(value, run) for name, value in settings.items()}
@@ -291,33 +285,19 @@ def run_with(prepared: PreparedExperiment, numbers: Mapping[str, Any]) -> Run:
             f"experiment '{prepared.label}': an effect went on or off, which is another model; start above 0 and give "
             "a lower bound above 0"
         )
-    bare = plant_behind_lines(plant_parameters(device, outside_torque(motion)), scenario.supply_lines)
-    of_leg = motion.leg if isinstance(motion, FreeMotion) else None
-    leg = None if of_leg is None else led_leg(bare, of_leg)
-    plant = bare if leg is None else with_load(bare, leg.load)
+    planned, _ = plan_runs(scenario)
     # The engine allows a fraction of the supply pressure. Where that is fitted, the error in pascals must stay.
+    supplied = planned.plant
 
     def range_of_supply(first: float, second: float, atmosphere: float) -> float:
         return supply_range(
-            plant._replace(supply_pressure=first, dorsiflexion_pressure=second, atmospheric_pressure=atmosphere)
+            supplied._replace(supply_pressure=first, dorsiflexion_pressure=second, atmospheric_pressure=atmosphere)
         )
 
-    pressures = plant.supply_pressure, plant.dorsiflexion_pressure, plant.atmospheric_pressure
+    pressures = supplied.supply_pressure, supplied.dorsiflexion_pressure, supplied.atmospheric_pressure
     allowed = supply_range(base.plant) / over_runs(range_of_supply, *pressures)
-    return replace(
-        base,
-        plant=plant,
-        tolerance=base.tolerance * allowed,
-        thermal=thermal_parameters(scenario.thermal, device),
-        valve_orifice=exact_orifice(device.valve.orifice, device),
-        leak_orifice=exact_orifice(device.actuator.leak, device),
-        initial=initial_state(scenario, plant),
-        valve=valve_parameters(base.program.valve, settings),
-        command_delay=delay,
-        lines=initial_lines(plant, scenario.supply_lines),
-        effects=effect_rows(device, scenario.effect_sections),
-        leg=leg,
-    )
+    of_numbers = {name: getattr(planned, name) for name in _NUMBERS_OF_RUN}
+    return replace(base, tolerance=base.tolerance * allowed, **of_numbers)
 
 
 def signals_at(prepared: PreparedExperiment, columns: Mapping[str, Floats], count: int) -> dict[str, Floats]:
