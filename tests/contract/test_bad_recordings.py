@@ -188,7 +188,7 @@ REFUSED = {
     "duplicate time in a step": ("validate", with_earlier_time(1), ["LINE", "column 'time'", "stands still"]),
     "clipped time": ("identify", clock_that_ends, ["LINE", "column 'time'", "stands still"]),
     "clipped time in a step": ("validate", clock_that_ends, ["LINE", "column 'time'", "stands still"]),
-    "constant": ("identify", stuck, ["'angle' is 1.0472 rad throughout"]),
+    "constant": ("identify", stuck, ["'angle' is 60 deg throughout"]),
     "saturated": ("identify", saturated, ["'angle' stays at exactly", "from sample", "saturated"]),
     "too short": ("identify", short, ["at least 20 samples, it has 7"]),
     "too short a step": ("validate", short, ["has 7 samples; at least 10"]),

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ppafo.errors import IdentificationError, nearest_name
+from ppafo.identification.wording import in_shown_unit
 from ppafo.signals import CHANNELS, Recording, RecordingKind
 from ppafo.signals.faults import FEWEST_AT_LIMIT, is_at_limit, longest_gap, plateaus, scatters
 from ppafo.signals.recording import Floats
@@ -128,12 +129,17 @@ def check_sources(sources: tuple[Source, ...], procedure: str, channels: Iterabl
             )
 
 
+def _shown(source: Source, name: str, value: float) -> str:
+    number, unit = in_shown_unit(value, source.recording.unit(name))
+    return f"{number:.6g} {unit}".removesuffix(" -")
+
+
 def check_moves(source: Source, procedure: str, name: str) -> None:
     """Refuse a channel that never changes: nothing can be learnt from it. IdentificationError names the recording."""
     values = source.recording[name]
     if values.max() == values.min():
         raise IdentificationError(
-            f"{source.name}: {procedure}: channel '{name}' is {values[0]:g} {source.recording.unit(name)} throughout; "
+            f"{source.name}: {procedure}: channel '{name}' is {_shown(source, name, values[0])} throughout; "
             f"the sensor is stuck, or nothing was done"
         )
 
@@ -151,7 +157,7 @@ def check_not_clipped(
     moves = float(np.ptp(driving[longest.first : longest.last + 1])) > fraction * float(np.abs(driving).max())
     if moves and longest.count >= max(_FEWEST_CLIPPED, _SHARE_THAT_IS_CLIPPED * values.size):
         raise IdentificationError(
-            f"{source.name}: {procedure}: channel '{name}' stays at {values.max():g} {source.recording.unit(name)} for "
+            f"{source.name}: {procedure}: channel '{name}' stays at {_shown(source, name, values.max())} for "
             f"{longest.count} samples, up to sample {longest.last + 1}, while '{driver}' moves: the sensor is "
             f"saturated; leave those samples out"
         )
@@ -167,8 +173,8 @@ def check_absolute(source: Source, procedure: str, names: Iterable[str]) -> None
         low = int(np.argmin(values))
         if values[low] <= 0.0:
             raise IdentificationError(
-                f"{source.name}: {procedure}: '{name}' is {values[low]:g} Pa at sample {low + 1}, which is not an "
-                f"absolute pressure: use psi_g, bar_g or kPa_g for gauge"
+                f"{source.name}: {procedure}: '{name}' is {_shown(source, name, values[low])} at sample {low + 1}, "
+                "which is not an absolute pressure: use psi_g, bar_g or kPa_g for gauge"
             )
 
 
@@ -214,7 +220,7 @@ def told_of_readings(sources: tuple[Source, ...]) -> tuple[str, ...]:
                 continue
             values = source.recording[name]
             found += [
-                f"{source.name}: '{name}' stays at {item.value:.6g} {source.recording.unit(name)} for {item.count} "
+                f"{source.name}: '{name}' stays at {_shown(source, name, item.value)} for {item.count} "
                 f"samples, from sample {item.first + 1}: a limit of the sensor?"
                 for item in plateaus(values)
                 # Values that scatter elsewhere do not stay at an extreme for long by themselves.

@@ -173,7 +173,7 @@ def test_the_table_shows_units_of_the_set_tolerances_and_the_next_experiment(bot
     text = text_of(both.answer())
     assert "trajectory (synthetic): 2 numbers fitted to 2 recordings" in text
     assert "foot_plate.inertia: variance from actuator.torque_constant" in text
-    assert "tolerance: actuator.torque_constant: stated" in text
+    assert "tolerance: actuator.torque_constant: stated (1.451 +- 0.017)e-05 m^3, fitted (1.45" in text
     assert "g m^2" in text
     assert "next experiment 1: slow: gain" in text
 
@@ -215,7 +215,10 @@ def test_a_fit_that_contradicts_the_bench_says_so(solve: Solve) -> None:
     bench = outcome.results[0]["friction.viscous_damping"]
     truth = load_scenario("step-response").device.friction.viscous_damping
     assert not bench.low <= truth <= bench.high
-    assert any("friction.viscous_damping: fitted to" in remark for remark in outcome.trajectory.remarks)
+    assert any(
+        "friction.viscous_damping: fitted " in remark and ", from the bench " in remark
+        for remark in outcome.trajectory.remarks
+    )
 
 
 def test_a_model_that_is_not_that_of_the_recordings_holds_for_itself_only(solve: Solve, laboratory: Path) -> None:

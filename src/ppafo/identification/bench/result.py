@@ -13,8 +13,9 @@ import numpy as np
 from ppafo.answers.style import BLACK, BLUE, VERMILION, house_style, mark_kind
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.identification.estimate import Estimate, Verdict
-from ppafo.identification.fit import STATED, Fit
+from ppafo.identification.fit import Fit
 from ppafo.identification.source import Source, kind_of, told_of_readings, traces
+from ppafo.identification.wording import conflict_in_words, widened_by
 from ppafo.signals import RecordingKind
 from ppafo.signals.recording import Floats
 
@@ -105,8 +106,6 @@ class Reported:
 
 
 _AT_BOUND = 1.0e-6
-_SHOWN = 0.05
-"""Smallest fraction of the variance for which a tolerance is named."""
 
 
 def estimates_of(
@@ -122,7 +121,7 @@ def estimates_of(
         bound = next((end for end in (number.low, number.high) if abs(value - end) <= _AT_BOUND * number.scale), None)
         value = value if bound is None else bound
         verdict: Verdict = "identified"
-        sentence = f"{item.text}{_widened_by(found, item.path)}."
+        sentence = f"{item.text}; {widened_by(found, item.path)}."
         if bound is not None:
             verdict = "at its bound"
             sentence = f"{sentence} The readings want a value at or beyond {value:.4g}; the interval ends there."
@@ -132,12 +131,6 @@ def estimates_of(
             verdict = "holds for this model only"
         made.append(Estimate(item.path, value, item.unit, low, high, verdict, sentence, traces(sources), confidence))
     return tuple(made)
-
-
-def _widened_by(found: Fit, path: str) -> str:
-    """Return the tolerances that widen an interval, largest first, as the end of a sentence."""
-    named = [f"{name} ({share:.0%})" for name, share in found.shares.get(path, ()) if share >= _SHOWN]
-    return f"; variance from {', '.join(named)}" if named else "; interval from the scatter of the readings"
 
 
 def result_of(
@@ -155,14 +148,7 @@ def result_of(
 
     ``remedy`` is what to do where some readings want other numbers than all together.
     """
-    estimates, conflict = estimates_of(found, reported, sources, confidence), ""
-    if found.conflict is not None:
-        one = found.conflict
-        is_sought = not math.isfinite(found.numbers[found.index(one.number)].deviation)
-        moved = f", {one.number} by {one.standard_errors:.1f} standard errors" if is_sought else ""
-        conflict = f"readings of {one.group} alone want other numbers than all readings together{moved}; {remedy}"
-        if one.group == STATED:
-            conflict = f"{one.number} is {one.standard_errors:.1f} standard errors beyond its stated limit; {remedy}"
+    estimates, conflict = estimates_of(found, reported, sources, confidence), conflict_in_words(found, remedy)
     told = (*remarks, *told_of_readings(sources))
     return BenchResult(procedure, summary, estimates, panels, kind_of(sources), conflict, told)
 

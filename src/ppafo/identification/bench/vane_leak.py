@@ -165,7 +165,7 @@ def closed_chambers(source: Source, settings: VaneLeakSettings) -> ClosedChamber
         for plateau in plateaus(part[name]):
             if plateau.first < EDGE and stands_out(part[name], plateau):
                 raise IdentificationError(
-                    f"{source.name}: {PROCEDURE}: channel '{name}' stays at exactly {plateau.value:g} Pa for "
+                    f"{source.name}: {PROCEDURE}: channel '{name}' stays at exactly {1e-3 * plateau.value:g} kPa for "
                     f"{plateau.count} samples, up to sample {skipped + plateau.last + 1}, and changes only then: the "
                     f"sensor is saturated, or the chamber was not yet closed; give start"
                 )

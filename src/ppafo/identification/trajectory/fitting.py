@@ -8,7 +8,7 @@ import numpy as np
 
 from ppafo.errors import IdentificationError, nearest_name
 from ppafo.identification.estimate import Estimate, Verdict
-from ppafo.identification.fit import STATED, Fit
+from ppafo.identification.fit import Fit
 from ppafo.identification.fit import fit as estimate
 from ppafo.identification.trajectory.problem import (
     Experiment,
@@ -29,10 +29,10 @@ from ppafo.identification.trajectory.runs import (
     residuals_of,
     signals_of,
 )
+from ppafo.identification.wording import conflict_in_words, in_shown_unit, widened_by
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.signals.recording import CHANNELS, Channel, Recording, RecordingKind
 from ppafo.simulation.scenario import Scenario
-from ppafo.units import percentage
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +139,7 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
         problem.confidence,
         report,
     )
-    conflict = conflict_in_words(found)
+    conflict = conflict_in_words(found, "the model lacks something")
     sought = [place for place, item in enumerate(numbers) if not item.is_tolerance]
     estimates = tuple(_estimate(problem, found, numbers[place], place, conflict) for place in sought)
     errors = np.sqrt(np.diag(found.covariance))
@@ -183,20 +183,6 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
     )
 
 
-def conflict_in_words(found: Fit) -> str:
-    """Return which recordings or channels want other numbers than all together, empty where they agree."""
-    one = found.conflict
-    if one is None:
-        return ""
-    if one.group == STATED:
-        beyond = f"{one.standard_errors:.1f} standard errors beyond its stated limit"
-        return f"{one.number} is {beyond}: the model lacks something"
-    return (
-        f"{one.group} alone wants another {one.number}, {one.standard_errors:.1f} standard errors from what all want: "
-        "the model lacks something"
-    )
-
-
 _OWN_SHARE = 0.2
 _AT_BOUND = 1.0e-6
 
@@ -216,12 +202,12 @@ def _estimate(problem: TrajectoryProblem, found: Fit, item: Number, place: int, 
         text = f"trades off against {' and '.join(others)}" if others else "the recordings are hardly sensitive to it"
         text += "; hold it, give it a prior, or record something else"
     elif bound is not None:
-        verdict, text = "at its bound", f"the recordings want a value at or beyond {bound:.6g} {item.unit}".rstrip(" -")
+        end, unit = in_shown_unit(bound, item.unit)
+        verdict, text = "at its bound", f"the recordings want a value at or beyond {end:.6g} {unit}".rstrip(" -")
     elif conflict:
         verdict, text = "holds for this model only", conflict
     else:
-        shares = [f"{other} ({percentage(share, 2)})" for other, share in found.shares[name] if other != name][:2]
-        text = f"variance from {', '.join(shares)}" if shares else "interval from the noise of the sensors"
+        text = widened_by(found, name)
     recordings = tuple(one.source or one.recording.label for one in problem.experiments if item.acts_in(one.label))
     return Estimate(
         path=name, value=value, unit=item.unit, low=low, high=high, verdict=verdict, explanation=text,

@@ -34,6 +34,7 @@ from ppafo.identification.trajectory.problem import (
     use_of,
 )
 from ppafo.identification.trajectory.tolerances import stated_by, tolerance_parameters
+from ppafo.identification.wording import in_shown_unit
 from ppafo.parameters import apply_overrides, build_device
 from ppafo.parameters.device import Device
 from ppafo.parameters.overrides import over
@@ -437,8 +438,10 @@ def _contradictions(found: TrajectoryFit, bench: Mapping[str, Estimate]) -> list
         if other is None or not (other.is_usable and fitted.is_usable):
             continue
         if fitted.low > other.high or fitted.high < other.low:
+            ends = [in_shown_unit(end, fitted.unit) for end in (fitted.low, fitted.high, other.low, other.high)]
+            low, high, lowest, highest = (f"{end:.4g}" for end, _ in ends)
             remarks.append(
-                f"{fitted.path}: fitted to {fitted.low:.4g} to {fitted.high:.4g} {fitted.unit}, but a bench procedure "
-                f"gave {other.low:.4g} to {other.high:.4g}: one of the two models is incomplete"
+                f"{fitted.path}: fitted {low} to {high} {ends[0][1]}, from the bench {lowest} to {highest}: one of the "
+                "two models is incomplete"
             )
     return remarks

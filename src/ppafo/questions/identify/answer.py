@@ -29,10 +29,12 @@ from ppafo.identification.new_set import NewSet, in_set_unit
 from ppafo.identification.trajectory.expected import Expected
 from ppafo.identification.trajectory.fitting import Known, TrajectoryFit
 from ppafo.identification.trajectory.section import TrajectoryOutcome
+from ppafo.identification.wording import in_shown_unit, with_error
 from ppafo.parameters.loading import parameter_set_toml
 from ppafo.parameters.parameter_set import ParameterSet
 from ppafo.signals import Recording, RecordingKind
 from ppafo.simulation.scenario import plain
+from ppafo.units import percentage
 
 if TYPE_CHECKING:
     import matplotlib.figure
@@ -239,28 +241,32 @@ def _tolerances(known: Sequence[Known], before: ParameterSet) -> list[str]:
     shown = sorted((one for one in known if one.share >= _SHOWN or is_far[one.name]), key=lambda one: -one.share)
     found = []
     for one in shown:
+        place = one.name.partition(" of ")[0]
         numbers = (one.before, one.before_error, one.after, one.after_error)
-        start, error, after, after_error = (_shown(number, one, before)[0] for number in numbers)
-        zero, unit = _shown(0.0, one, before)
-        text = f"tolerance: {one.name}: stated {start:.4g} +- {error - zero:.2g}, fitted {after:.4g} +- "
-        text = f"{text}{after_error - zero:.2g} {unit}".rstrip(" -")
-        found.append(f"{text}; {one.share:.0%} of the variance of {one.widens}" if one.share >= _SHOWN else text)
+        (start, unit), (error, _), (after, _), (after_error, _) = (
+            _shown(number, place, one.unit, before) for number in numbers
+        )
+        zero, _ = _shown(0.0, place, one.unit, before)
+        stated, fitted = with_error(start, error - zero), with_error(after, after_error - zero)
+        text = f"tolerance: {one.name}: stated {stated} {unit}".rstrip(" -") + f", fitted {fitted} {unit}".rstrip(" -")
+        found.append(
+            f"{text}; {percentage(one.share, 2)} of the variance of {one.widens}" if one.share >= _SHOWN else text
+        )
     rest = len(known) - len(shown)
     return [*found, f"tolerances that widen no interval: {rest}"] if rest else found
 
 
-def _shown(number: float, one: Known, before: ParameterSet) -> tuple[float, str]:
-    """Return a number of a tolerance in the unit of the set, an angle in degrees."""
-    if one.unit == "rad":
-        return math.degrees(number), "deg"
-    return in_set_unit(number, one.name.partition(" of ")[0], one.unit, before)
+def _shown(number: float, path: str, unit: str, before: ParameterSet) -> tuple[float, str]:
+    """Return a number in the unit of the set, one that the set does not have in the unit that people read."""
+    found, own = in_set_unit(number, path, unit, before)
+    return in_shown_unit(number, unit) if own == unit else (found, own)
 
 
 def estimate_row(item: Estimate, before: ParameterSet) -> tuple[str, ...]:
     """Return path, value, interval and verdict of an estimate in the unit of the set, digits that tell its ends."""
     if math.isnan(item.value):
         return item.path, "no value", "", item.verdict
-    shown = [in_set_unit(one, item.path, item.unit, before) for one in (item.value, item.low, item.high)]
+    shown = [_shown(one, item.path, item.unit, before) for one in (item.value, item.low, item.high)]
     (value, unit), (low, _), (high, _) = shown
     digits = _digits(value, 0.5 * abs(high - low))
     text = f"{value:#.{digits}g} {unit}".removesuffix(" -").rstrip()

@@ -1,0 +1,52 @@
+"""Numbers and sentences of a fit as people read them: units, digits, what widens an interval, who disagrees."""
+
+import math
+
+from ppafo.identification.fit import STATED, Fit
+from ppafo.units import percentage
+
+_SHOWN_IN = {"Pa": ("kPa", 1.0e-3), "rad": ("deg", 180.0 / math.pi)}
+_SMALLEST, _LARGEST = 1.0e-2, 1.0e5
+"""Sizes between which a number is written without a power of ten."""
+_SHARE, _MOST_NAMED = 0.05, 3
+"""Smallest fraction of the variance for which a tolerance is named, and how many are."""
+
+
+def in_shown_unit(number: float, unit: str) -> tuple[float, str]:
+    """Return a number in an SI unit in the unit that people read: kPa, degrees, or the unit itself."""
+    shown, factor = _SHOWN_IN.get(unit, (unit, 1.0))
+    return factor * number, shown
+
+
+def with_error(value: float, error: float) -> str:
+    """Return a value with its standard error, ``480.5 +- 6.9``: two digits of the error, and as many of the value."""
+    if not (math.isfinite(value) and math.isfinite(error) and error > 0.0):
+        return f"{value:.4g} +- {error:.2g}"
+    size = max(abs(value), error)
+    power = 0 if _SMALLEST <= size < _LARGEST else math.floor(math.log10(size))
+    scaled, scaled_error = value / 10.0**power, error / 10.0**power
+    digits = max(0, 1 - math.floor(math.log10(scaled_error)))
+    # A zero that was rounded from below has no sign.
+    text = f"{round(scaled, digits) + 0.0:.{digits}f} +- {scaled_error:.{digits}f}"
+    return f"({text})e{power:+03d}" if power else text
+
+
+def widened_by(found: Fit, name: str) -> str:
+    """Return the tolerances that widen the interval of a number, largest first."""
+    named = [
+        f"{other} ({percentage(share, 2)})" for other, share in found.shares[name] if other != name and share >= _SHARE
+    ][:_MOST_NAMED]
+    return f"variance from {', '.join(named)}" if named else "interval from the scatter of the readings"
+
+
+def conflict_in_words(found: Fit, remedy: str) -> str:
+    """Return which readings want other numbers than all together, and a remedy; empty where they agree."""
+    one = found.conflict
+    if one is None:
+        return ""
+    if one.group == STATED:
+        return f"{one.number} is {one.standard_errors:.1f} standard errors beyond its stated limit; {remedy}"
+    return (
+        f"{one.group} alone wants other numbers than all readings together, {one.number} by {one.standard_errors:.1f} "
+        f"standard errors; {remedy}"
+    )

@@ -1,0 +1,27 @@
+"""Numbers of a fit as people read them."""
+
+import pytest
+
+from ppafo.identification.wording import in_shown_unit, with_error
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "text"),
+    [
+        (480.537, 6.89, "480.5 +- 6.9"),
+        (298.0, 8.7, "298.0 +- 8.7"),
+        (26.4, 1.91, "26.4 +- 1.9"),
+        (1.451e-5, 1.7e-7, "(1.451 +- 0.017)e-05"),
+        (-0.0004, 0.58, "0.00 +- 0.58"),
+        (480537.0, 6890.0, "(4.805 +- 0.069)e+05"),
+        (0.0, 1.2e-6, "(0.0 +- 1.2)e-06"),
+    ],
+)
+def test_a_value_has_as_many_digits_as_its_error_allows(value: float, error: float, text: str) -> None:
+    assert with_error(value, error) == text
+
+
+def test_pressures_are_shown_in_kilopascals_and_angles_in_degrees() -> None:
+    assert in_shown_unit(480537.0, "Pa") == (pytest.approx(480.537), "kPa")
+    assert in_shown_unit(0.5, "rad")[1] == "deg"
+    assert in_shown_unit(0.01, "kg m^2") == (0.01, "kg m^2")
