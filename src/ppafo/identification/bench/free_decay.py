@@ -22,7 +22,7 @@ from ppafo.identification.bench.result import BenchResult, Panel, Reported, Seri
 from ppafo.identification.fit import Free
 from ppafo.identification.source import Source, check_moves, check_no_gap, check_sources, window
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
-from ppafo.signals.faults import is_at_limit, plateaus
+from ppafo.signals.faults import is_at_limit, noise_of, plateaus
 from ppafo.signals.recording import Floats
 
 PROCEDURE = "free-decay"
@@ -33,7 +33,6 @@ VELOCITY = "angular_velocity"
 MINIMUM_SAMPLES = 20
 _FEWEST_SMOOTHED, _SMOOTHED_FRACTION = 5, 0.04
 _VELOCITY_MAY_DIFFER = 0.1
-_SMALLEST_NOISE = 1.0e-6
 _MINIMUM_OVER_NOISE = 20.0
 _RISE, _RISE_VELOCITY, _INERTIA, _GAIN = "rise of the friction near standstill", "its velocity", "inertia", "gain"
 _STRIBECK = 0.1, 1.0e-3, 2.0
@@ -68,7 +67,13 @@ def free_decay(sources: tuple[Source, ...], settings: FreeDecaySettings | None =
     check_sources(sources, PROCEDURE, (ANGLE,), MINIMUM_SAMPLES)
     decays = tuple(decay_of(source, chosen.start, chosen.end) for source in sources)
     inertia = chosen.inertia or 1.0
-    damping, friction, units = _paths(chosen.inertia)
+    if chosen.inertia:
+        damping, friction, units = "friction.viscous_damping", "friction.dynamic_torque", ("N m s/rad", "N m")
+        missing = over_inertia = ""
+    else:
+        damping, friction = "free_decay.damping_over_inertia", "free_decay.friction_over_inertia"
+        units, over_inertia = ("1/s", "rad/s^2"), " over the inertia"
+        missing = "; the inertia is not known, so only ratios to it follow"
     numbers = _numbers(decays, chosen, inertia, damping, friction)
 
     def law(at: Values) -> Floats:
@@ -82,16 +87,17 @@ def free_decay(sources: tuple[Source, ...], settings: FreeDecaySettings | None =
             parts += [] if decay.velocity is None else [decay.sign * left]
         return np.concatenate(parts)
 
-    found, model = solve(law, _readings(decays), numbers, _groups(decays), chosen.confidence)
+    measured = np.concatenate([one for item in decays for one in (item.angle, item.velocity) if one is not None])
+    found, model = solve(law, measured, numbers, _groups(decays), chosen.confidence)
     reported = (
-        Reported(damping, units[0], "Viscous damping" if chosen.inertia else "Viscous damping over the inertia"),
-        Reported(friction, units[1], "Dynamic friction" if chosen.inertia else "Dynamic friction over the inertia"),
+        Reported(damping, units[0], f"Viscous damping{over_inertia}"),
+        Reported(friction, units[1], f"Dynamic friction{over_inertia}"),
     )
     values = dict(zip((one.name for one in numbers), found.values.tolist(), strict=True))
     rates = values[damping] / inertia, values[friction] / inertia
-    missing = "" if chosen.inertia else "; the inertia is not known, so only ratios to it follow"
+    near_rest = values.get(_RISE, 0.0), values.get(_RISE_VELOCITY, 0.0)
     at_rest = sum(
-        float(decay.time[-1]) > course_times(values[f"start speed {number + 1}"], *rates, *_near_rest(values))[0][-1]
+        float(decay.time[-1]) > course_times(values[f"start speed {number + 1}"], *rates, *near_rest)[0][-1]
         for number, decay in enumerate(decays)
     )
     return result_of(
@@ -102,15 +108,9 @@ def free_decay(sources: tuple[Source, ...], settings: FreeDecaySettings | None =
         chosen.confidence,
         f"{count_of(len(decays), 'decay')}, {at_rest} to standstill; beta/I = {rates[0]:.4g} 1/s, T_c/I = "
         f"{rates[1]:.4g} rad/s^2{missing}",
-        _panels(decays, model, rates, _near_rest(values)),
+        _panels(decays, model, rates, near_rest),
         "another torque acts, such as gravity, an end stop or a friction of another shape",
     )
-
-
-def _paths(inertia: float | None) -> tuple[str, str, tuple[str, str]]:
-    if inertia is None:
-        return "free_decay.damping_over_inertia", "free_decay.friction_over_inertia", ("1/s", "rad/s^2")
-    return "friction.viscous_damping", "friction.dynamic_torque", ("N m s/rad", "N m")
 
 
 def _numbers(
@@ -136,10 +136,6 @@ def _numbers(
         *tolerance(_INERTIA, 0.0 if settings.inertia is None else settings.inertia_deviation / settings.inertia),
         *within(_GAIN, settings.tolerances.gain_of(ANGLE)),
     )
-
-
-def _near_rest(values: Values) -> tuple[float, float]:
-    return values.get(_RISE, 0.0), values.get(_RISE_VELOCITY, 0.0)
 
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
@@ -184,11 +180,6 @@ class Decay(NamedTuple):
     angle: Floats
     sign: float
     velocity: Floats | None
-
-
-def _readings(decays: tuple[Decay, ...]) -> Floats:
-    parts = [one for decay in decays for one in (decay.angle, decay.velocity) if one is not None]
-    return np.concatenate(parts)
 
 
 def _groups(decays: tuple[Decay, ...]) -> tuple[list[str], list[str]]:
@@ -256,11 +247,6 @@ def decay_of(source: Source, start: float | None, end: float | None) -> Decay:
             f"check unit and sign of both"
         )
     return Decay(time=time - time[0], angle=angle, sign=sign, velocity=measured)
-
-
-def noise_of(values: Floats) -> float:
-    """Return the scatter, in the unit of the values, from second differences; never 0, so that it can be a weight."""
-    return max(float(np.sqrt(np.mean(np.diff(values, 2) ** 2) / 6.0)), _SMALLEST_NOISE * float(np.ptp(values)))
 
 
 def smoothed_rates(time: Floats, angle: Floats) -> tuple[Floats, Floats]:

@@ -154,9 +154,6 @@ def result_of(
 
 
 _SIZE = (8.4, 3.7)
-_LEFT, _RIGHT, _TOP, _BOTTOM, _BETWEEN = 0.72, 0.15, 0.62, 0.55, 0.85
-"""Inches."""
-
 _SHOWN_IN = {
     "Pa": ("psi", 1.0 / PASCALS_PER_PSI),
     "Pa_d": ("psi", 1.0 / PASCALS_PER_PSI),
@@ -210,24 +207,12 @@ def synthetic_figure_3(torque: BenchResult, decay: BenchResult) -> "Figure":
 def _figure(panels: tuple[Panel, ...], kinds: tuple[str, ...]) -> "Figure":
     from matplotlib.figure import Figure
 
-    width, height = _SIZE
     with house_style():
-        figure = Figure(figsize=_SIZE)
-        panel_width = (width - _LEFT - _RIGHT - _BETWEEN) / 2.0
-        figure.subplots_adjust(
-            left=_LEFT / width,
-            right=1.0 - _RIGHT / width,
-            top=1.0 - _TOP / height,
-            bottom=_BOTTOM / height,
-            wspace=_BETWEEN / panel_width,
-        )
+        figure = Figure(figsize=_SIZE, layout="constrained")
         row = figure.subplots(1, len(panels), squeeze=False)[0]
         for letter, axes, panel in zip("AB", row, panels, strict=False):
             _draw(axes, letter, panel)
-        if "synthetic" in kinds:
-            mark_kind(figure, "synthetic")
-        elif "simulated" in kinds:
-            mark_kind(figure, "simulated")
+        mark_kind(figure, next((kind for kind in ("synthetic", "simulated") if kind in kinds), "measured"))
         return figure
 
 

@@ -71,15 +71,8 @@ def static_torque(sources: tuple[Source, ...], settings: StaticTorqueSettings | 
     readings = readings_of(sources)
     names, tolerances = readings.names, chosen.tolerances
     pressure, torque, branch, weight = readings.pressure, readings.torque, readings.branch, readings.weight
-    rough, deviation = _straight_line(readings, sources)
-    slope, zero, friction = map(float, rough)
+    slope, zero, friction, size = _straight_line(readings, ", ".join(source.name for source in sources))
     span = float(np.abs(pressure).max())
-    if friction < -_SIGMAS * deviation / np.sqrt(pressure.size):
-        raise IdentificationError(
-            f"{', '.join(source.name for source in sources)}: {PROCEDURE}: the rising branch lies above the falling "
-            "one, as if friction drove the motion; reverse the sign of channel 'direction'"
-        )
-    size = max(abs(friction), deviation)
     numbers = (
         sought(names.slope_path, slope),
         sought(names.friction_path, friction, scale=size),
@@ -119,18 +112,24 @@ def static_torque(sources: tuple[Source, ...], settings: StaticTorqueSettings | 
     )
 
 
-def _straight_line(readings: "Readings", sources: tuple[Source, ...]) -> tuple[Floats, float]:
-    """Return rough slope, zero and friction, and the scatter about them; refuse a slope below zero."""
+def _straight_line(readings: "Readings", names: str) -> tuple[float, float, float, float]:
+    """Return rough slope, zero, friction and its size; refuse signs that no device has. ``names`` are the files."""
     columns = (readings.pressure, np.ones_like(readings.pressure), -readings.branch)
     design = np.stack(columns, axis=1)
     scale = np.sqrt((design**2).mean(axis=0))
-    rough = np.linalg.lstsq(design / scale, readings.torque, rcond=None)[0] / scale
-    if rough[0] <= 0.0:
+    slope, zero, friction = rough = np.linalg.lstsq(design / scale, readings.torque, rcond=None)[0] / scale
+    if slope <= 0.0:
         raise IdentificationError(
-            f"{', '.join(source.name for source in sources)}: {PROCEDURE}: the {readings.names.load} falls with the "
-            "pressure difference; reverse the sign of one channel"
+            f"{names}: {PROCEDURE}: the {readings.names.load} falls with the pressure difference; reverse the sign of "
+            "one channel"
         )
-    return rough, float(np.std(readings.torque - design @ rough))
+    deviation = float(np.std(readings.torque - design @ rough))
+    if friction < -_SIGMAS * deviation / np.sqrt(readings.pressure.size):
+        raise IdentificationError(
+            f"{names}: {PROCEDURE}: the rising branch lies above the falling one, as if friction drove the motion; "
+            "reverse the sign of channel 'direction'"
+        )
+    return float(slope), float(zero), float(friction), max(abs(float(friction)), deviation)
 
 
 def _groups(readings: "Readings") -> tuple[list[str], list[str]]:
@@ -191,14 +190,6 @@ class Readings:
     names: Names
 
 
-def load_of(sources: tuple[Source, ...]) -> str:
-    """Return the channel that all recordings have, ``torque`` or ``force``; IdentificationError where one lacks it."""
-    is_force = bool(sources) and all(_FORCE in one.recording and _TORQUE not in one.recording for one in sources)
-    load = _FORCE if is_force else _TORQUE
-    check_sources(sources, PROCEDURE, (load, "pressure_difference", "direction"), 1)
-    return load
-
-
 def slides(sources: tuple[Source, ...]) -> bool:
     """Tell whether a position or an angle moves with the direction and the pressure does not."""
     pressure = float(np.ptp(pool(sources, "pressure_difference")))
@@ -223,7 +214,9 @@ def _swept(source: Source, name: str) -> float:
 
 def readings_of(sources: tuple[Source, ...]) -> Readings:
     """Return the readings of all recordings; IdentificationError where they cannot separate slope from friction."""
-    load = load_of(sources)
+    is_force = bool(sources) and all(_FORCE in one.recording and _TORQUE not in one.recording for one in sources)
+    load = _FORCE if is_force else _TORQUE
+    check_sources(sources, PROCEDURE, (load, "pressure_difference", "direction"), 1)
     for source in sources:
         check_moves(source, PROCEDURE, load)
         check_not_clipped(source, PROCEDURE, load, "pressure_difference", source.recording["pressure_difference"])
