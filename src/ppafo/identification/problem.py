@@ -286,8 +286,17 @@ PROCEDURES = tuple(_PROCEDURES)
 
 
 def run_procedure(sources: tuple[Source, ...], problem: ProcedureProblem, setting: Setting) -> BenchResult:
-    """Return what a procedure of a problem makes of its recordings."""
-    return _PROCEDURES[problem.kind](sources, problem.settings(setting))
+    """Return what a procedure of a problem makes of its recordings.
+
+    The line of an IdentificationError begins with the recording, else with the place of the procedure.
+    """
+    settings = problem.settings(setting)
+    try:
+        return _PROCEDURES[problem.kind](sources, settings)
+    except IdentificationError as error:
+        if any(str(error).startswith(source.name) for source in sources):
+            raise
+        raise IdentificationError(f"{setting.place}: {error}") from error
 
 
 def window_of(problem: ProcedureProblem, setting: Setting) -> tuple[float, float]:

@@ -3,6 +3,7 @@
 import json
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
@@ -24,6 +25,7 @@ from ppafo.questions.identify.solve import identify
 from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 from ppafo.storage import write_csv
+from ppafo.storage.result_folder import read_recording
 from ppafo.units import to_si
 
 HEAD = 'schema_version = 1\nname = "twin"\ndevice.set = "ppafo2011"\n'
@@ -229,6 +231,15 @@ def test_a_mistake_is_one_line_that_says_where(solved: Solve, text: str, message
 def test_a_problem_without_a_device_is_refused() -> None:
     with pytest.raises(PpafoError, match=r"p\.toml: .*device"):
         parse_problem(b'schema_version = 1\nname = "a"\n', "p.toml")
+
+
+def test_a_refusal_about_all_recordings_names_the_procedure_of_the_file(solved: Solve, bench: Path) -> None:
+    leak = read_recording(bench / "leak.csv", 101325.0)
+    first, second = (leak.channels[name] for name in ("pressure_1", "pressure_2"))
+    write_csv(bench / "turned.csv", replace(leak, channels={"pressure_1": second, "pressure_2": first}))
+    both = LEAK.replace('["leak.csv"]', '["leak.csv", "turned.csv"]')
+    with pytest.raises(PpafoError, match=r"^problem\.toml: procedure 1, vane-leak: chamber 1 empties in some"):
+        solved(both)
 
 
 def test_the_leak_of_a_cylinder_is_identified_as_that_of_a_vane(bench: Path) -> None:

@@ -115,7 +115,7 @@ def vane_leak(sources: tuple[Source, ...], settings: VaneLeakSettings) -> BenchR
     closed = tuple(closed_chambers(source, settings) for source in sources)
     if len({item.fuller for item in closed}) > 1:
         raise IdentificationError(
-            f"{PROCEDURE}: chamber 1 empties in some recordings and chamber 2 in others; give each its own procedure"
+            "chamber 1 empties in some recordings and chamber 2 in others; give each its own procedure"
         )
     return _decaying_leak(sources, closed, settings)
 

@@ -16,8 +16,6 @@ from ppafo.answers.style import (
     CHAMBER_1,
     CHAMBER_2,
     GREY,
-    Margins,
-    figure_of_panels,
     house_style,
     mark_kind,
 )
@@ -70,26 +68,20 @@ class Identification(Solved):
         return kind_of_all([*kinds, *(() if self.trajectory is None else (kind_of_fit(self.trajectory.fit),))])
 
 
-_TRAJECTORY_WIDTH, _VALUES, _LEFT_OVER = 7.2, 1.5, 0.62
-_MARGINS = Margins(left=0.78, right=0.2, top=0.62, bottom=0.52, row_gap=0.36, label=0.58)
-"""Inches."""
+_TRAJECTORY_WIDTH, _VALUES, _LEFT_OVER = 7.2, 1.9, 1.0
+"""Inches, of the figure and of the panels of one channel."""
 _DOT, _SAMPLE = 1.6, 3.6
 _MAXIMUM_DOTS = 90
 """Samples shown beside the line; what is left is shown of all."""
 _KIND_WORDS = {"measured": "measured", "simulated": "simulated samples", "synthetic": "synthetic measurement"}
 
 
-@dataclass(frozen=True, slots=True)
-class _ChannelPanel:
-    """How a channel is drawn: channel, title, units, values per SI unit, zero in SI units, colour."""
-
-    channel: str
-    title: str
-    unit: str
-    unit_of_difference: str
-    factor: float
-    zero: float
-    colour: str
+_CHANNELS = {
+    "angle": ("Vane angle", "deg", "deg", 180.0 / math.pi, ACTUAL.colour),
+    "pressure_1": ("Pressure in chamber 1", "psig", "psi", 1.0 / PASCALS_PER_PSI, CHAMBER_1.colour),
+    "pressure_2": ("Pressure in chamber 2", "psig", "psi", 1.0 / PASCALS_PER_PSI, CHAMBER_2.colour),
+}
+"""Title, unit, unit of a difference, values per SI unit and colour of each channel."""
 
 
 def trajectory_fit_figure(
@@ -101,38 +93,30 @@ def trajectory_fit_figure(
     """
     if not np.array_equal(measurement.time, model.time):
         raise DataError(f"{model.label}: is not at the times of {measurement.label}")
-    shown = [one for one in _channels(atmosphere) if one.channel in measurement]
+    from matplotlib.figure import Figure as Drawing
+
+    shown = [name for name in _CHANNELS if name in measurement]
     with house_style():
         heights = [_VALUES, _LEFT_OVER] * len(shown)
-        rows = 2 * len(shown)
-        height = sum(heights) + (rows - 1) * _MARGINS.row_gap + _MARGINS.top + _MARGINS.bottom
-        figure, grid = figure_of_panels((_TRAJECTORY_WIDTH, height), _MARGINS, rows, heights=heights)
-        panels = [axes for (axes,) in grid]
-        for one, values, left in zip(shown, panels[::2], panels[1::2], strict=True):
-            _draw_trajectory(one, (values, left), measurement, model)
+        figure = Drawing(figsize=(_TRAJECTORY_WIDTH, sum(heights)), layout="constrained")
+        panels = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
+        for name, values, left in zip(shown, panels[::2], panels[1::2], strict=True):
+            zero = 0.0 if name == "angle" else atmosphere
+            _draw_trajectory(name, zero, (values, left), measurement, model)
         panels[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.1, handlelength=1.6)
         panels[-1].set_xlabel("Time (s)")
         panels[-1].set_xlim(measurement.time[0], measurement.time[-1])
-        inch = 1.0 / height
-        figure.text(
-            0.12 / _TRAJECTORY_WIDTH, 1.0 - 0.12 * inch, measurement.label, ha="left", va="top", fontweight="bold"
-        )
+        figure.suptitle(measurement.label, x=0.01, ha="left", fontsize=10, fontweight="bold")
         mark_kind(figure, measurement.kind)
         return figure
 
 
-def _channels(atmosphere: float) -> tuple[_ChannelPanel, ...]:
-    degrees, gauge = float(np.degrees(1.0)), 1.0 / PASCALS_PER_PSI
-    return (
-        _ChannelPanel("angle", "Vane angle", "deg", "deg", degrees, 0.0, ACTUAL.colour),
-        _ChannelPanel("pressure_1", "Pressure in chamber 1", "psig", "psi", gauge, atmosphere, CHAMBER_1.colour),
-        _ChannelPanel("pressure_2", "Pressure in chamber 2", "psig", "psi", gauge, atmosphere, CHAMBER_2.colour),
-    )
-
-
-def _draw_trajectory(one: _ChannelPanel, panels: "tuple[Axes, Axes]", measurement: Recording, model: Recording) -> None:
+def _draw_trajectory(
+    name: str, zero: float, panels: "tuple[Axes, Axes]", measurement: Recording, model: Recording
+) -> None:
     values, left = panels
-    samples, fitted = (one.factor * (recording[one.channel] - one.zero) for recording in (measurement, model))
+    title, unit, unit_of_difference, factor, colour = _CHANNELS[name]
+    samples, fitted = (factor * (recording[name] - zero) for recording in (measurement, model))
     some = slice(None, None, -(-measurement.time.size // _MAXIMUM_DOTS))
     times, word = measurement.time[some], _KIND_WORDS[measurement.kind]
     values.plot(
@@ -145,13 +129,13 @@ def _draw_trajectory(one: _ChannelPanel, panels: "tuple[Axes, Axes]", measuremen
         markeredgewidth=0.7,
         label=word,
     )
-    values.plot(measurement.time, fitted, color=one.colour, linewidth=1.2, label="model")
-    values.set_title(f"{one.title} ({one.unit})")
-    left.plot(measurement.time, fitted - samples, ".", color=one.colour, markersize=_DOT)
+    values.plot(measurement.time, fitted, color=colour, linewidth=1.2, label="model")
+    values.set_title(f"{title} ({unit})")
+    left.plot(measurement.time, fitted - samples, ".", color=colour, markersize=_DOT)
     left.axhline(0.0, color=GREY, linewidth=0.8)
     largest = 1.1 * float(np.max(np.abs(fitted - samples))) or 1.0
     left.set_ylim(-largest, largest)
-    left.set_title(f"model minus sample ({one.unit_of_difference})", fontsize=9)
+    left.set_title(f"model minus sample ({unit_of_difference})", fontsize=9)
     left.locator_params(axis="y", nbins=3)
 
 
