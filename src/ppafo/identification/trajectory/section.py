@@ -248,33 +248,36 @@ def candidates_of(section: TrajectorySection, setting: Setting) -> tuple[Candida
 def _experiment(item: ExperimentSection, setting: Setting) -> Experiment:
     said = f"{setting.file}: experiment '{item.label}'"
     source = setting.read(item)
+    is_replay = item.scenario is None
     if item.scenario is None:
-        made = experiment_without_scenario(item, source, setting)
+        scenario, start, inputs = _replay(item, source.recording, setting, said)
     else:
         for name in ("held", "volume"):
             if getattr(item, name) is not None:
                 raise IdentificationError(
                     f"{said}: {name} and a scenario: the scenario prescribes how the vane moves; omit one of them"
                 )
-        made = Experiment(
-            label=item.label,
-            scenario=_scenario(item.scenario, item.overrides, setting),
-            recording=source.recording,
-            start=quantity_of(f"{said}: start", item.start or "0 s", "s"),
-            channels=compared_channels(item),
-            noise=noise_of_channels(item.noise, said),
-            inputs=item.inputs or (),
-            initial_state="scenario" if item.initial_state in (None, "scenario") else "recording",
-            source=source.trace,
-        )
-    if item.step is None:
-        return made
-    step = quantity_of(f"{said}: step", item.step, "s")
-    if not SHORTEST_STEP <= step <= LONGEST_STEP:
-        raise IdentificationError(
-            f"{said}: step = '{item.step}': must be from {SHORTEST_STEP:g} s to {LONGEST_STEP:g} s"
-        )
-    return replace(made, scenario=replace(made.scenario, time_step=step))
+        scenario = _scenario(item.scenario, item.overrides, setting)
+        start, inputs = quantity_of(f"{said}: start", item.start or "0 s", "s"), item.inputs or ()
+    if item.step is not None:
+        step = quantity_of(f"{said}: step", item.step, "s")
+        if not SHORTEST_STEP <= step <= LONGEST_STEP:
+            raise IdentificationError(
+                f"{said}: step = '{item.step}': must be from {SHORTEST_STEP:g} s to {LONGEST_STEP:g} s"
+            )
+        scenario = replace(scenario, time_step=step)
+    return Experiment(
+        label=item.label,
+        scenario=scenario,
+        recording=source.recording,
+        start=start,
+        channels=compared_channels(item),
+        noise=noise_of_channels(item.noise, said),
+        inputs=inputs,
+        # The scenario of a replay has the state of the samples already.
+        initial_state="scenario" if is_replay or item.initial_state in (None, "scenario") else "recording",
+        source=source.trace,
+    )
 
 
 def _scenario(name: str, overrides: tuple[str, ...], setting: Setting) -> Scenario:
@@ -327,17 +330,17 @@ def _parameter(item: ParameterSection, scenarios: Mapping[str, Scenario], settin
     )
 
 
-def experiment_without_scenario(item: ExperimentSection, source: Source, setting: Setting) -> Experiment:
-    """Return the experiment of a recording on the device of the set; it begins at the first sample by default.
+def _replay(
+    item: ExperimentSection, recording: Recording, setting: Setting, said: str
+) -> tuple[Scenario, float, tuple[str, ...]]:
+    """Return the run of a recording on the device of the set, its start [s] and inputs; by default the first sample.
 
     IdentificationError where a scenario is needed.
     """
-    said = f"{setting.file}: experiment '{item.label}'"
     if setting.parameter_set is None:
         raise IdentificationError(f"{said}: needs a scenario, because no device was given")
     if item.initial_state == "scenario":
         raise IdentificationError(f"{said}: initial_state = 'scenario', but it has no scenario; omit it")
-    recording = source.recording
     first = float(recording.time[0]) if item.start is None else quantity_of(f"{said}: start", item.start, "s")
     used = recording.between(first, float(recording.time[-1]))
     device = build_device(apply_overrides(setting.parameter_set, item.overrides, setting.valve), setting.valve)
@@ -352,9 +355,7 @@ def experiment_without_scenario(item: ExperimentSection, source: Source, setting
         raise IdentificationError(f"{said}: has no scenario, so inputs must have '{COMMAND}'")
     start = _start_of(used, device, fixed, said)
     motion = held_vane(start.angle) if fixed else None
-    scenario = replay_scenario(recording, device, start, used.duration, said, motion)
-    noise, channels = noise_of_channels(item.noise, said), compared_channels(item)
-    return Experiment(item.label, scenario, recording, first, channels, noise, inputs, source=source.trace)
+    return replay_scenario(recording, device, start, used.duration, said, motion), first, inputs
 
 
 def compared_channels(item: ExperimentSection) -> tuple[str, ...]:
