@@ -78,6 +78,7 @@ def _with_estimate(parameter_set: ParameterSet, estimate: Estimate, quantity: Qu
         origin="identified" if estimate.is_identified else "fitted",
         source="; ".join(estimate.recordings),
         note=f"{estimate.verdict}, {interval}; {estimate.explanation.rstrip('.')}. Before, {was}.",
+        # An interval that is cut at a bound is too narrow on that side.
         uncertainty=half_width_for(CONFIDENCE, max(high - value, value - low), estimate.confidence),
     )
     # An orifice that is given as an area has no sonic conductance any more, and the other way round.

@@ -157,6 +157,7 @@ class FreeDecayProblem(StrictTable):
             deviation = setting.tolerances.deviation_of(path, inertia, 0.0)
         paths = ("friction.static_torque", "friction.dynamic_torque")
         static, dynamic = (number_in_si(setting.parameter_set, path) for path in paths)
+        # Near standstill a seal grips as hard as at rest at most.
         rise = max(static / dynamic - 1.0, 0.0) if static and dynamic else 1.0
         return FreeDecaySettings(start, end, inertia, deviation, rise, self.confidence, setting.tolerances)
 

@@ -154,6 +154,7 @@ def check_not_clipped(
     """
     values = source.recording[name]
     longest, _ = plateaus(values)
+    # A reading that stays where nothing moves is right.
     moves = float(np.ptp(driving[longest.first : longest.last + 1])) > fraction * float(np.abs(driving).max())
     if moves and longest.count >= max(_FEWEST_CLIPPED, _SHARE_THAT_IS_CLIPPED * values.size):
         raise IdentificationError(

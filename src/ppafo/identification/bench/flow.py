@@ -78,6 +78,7 @@ def flow_tolerances(gas: GasAt, tolerances: Tolerances, names: tuple[str, str], 
 
 def read_flow(at: Values, gas: GasAt, flow: Floats) -> Floats:
     """Return what a flow meter shows [kg/s] of a flow of gas as it is stated [kg/s]."""
+    # Flow through an opening goes with one over the root of the temperature.
     warm = np.sqrt(gas.temperature / (gas.temperature + at[TEMPERATURE]))
     return np.asarray((1.0 + at[GAS_LAW]) * (1.0 + at[METER]) * warm * flow + at[ZERO])
 
@@ -172,6 +173,7 @@ def solve_flow(
         first, second = (true_pressure(at, name, shown) for name, shown in pressures.items())
         return read_flow(at, opening.gas, opening.flow(at[size], at[critical], first, second))
 
+    # The flow is linear in the size: its least squares are where the search begins.
     unit = opening.flow(1.0, CRITICAL_RATIOS[0], *pressures.values())
     numbers = (
         sought(size, float(unit @ flow / (unit @ unit)), 0.0),

@@ -123,10 +123,14 @@ def _numbers(
         speed = max(float(np.abs(velocity[:_FEWEST_SMOOTHED]).max()), 1e-6)
         swept = max(abs(float(decay.angle[-1] - decay.angle[0])), 1e-9)
         starts.append(sought(f"start angle {number}", float(decay.angle[0]), scale=swept))
+        # The direction is that of the push: a speed of 0 or below would be another decay.
         starts.append(sought(f"start speed {number}", speed, 1e-9 * speed, 10.0 * speed))
+        # With viscous damping alone the way is speed over rate, with Coulomb friction alone speed^2 over twice the
+        # deceleration: half of each is a start between the two.
         rates.append((0.5 * speed / swept, 0.25 * speed**2 / swept))
     rate, deceleration = (inertia * float(item) for item in np.median(rates, axis=0))
     most, usual = settings.rise, _STRIBECK[0]
+    # Between no rise and all of it nothing is known: an even distribution, its width over the root of 12.
     rise = Free(_RISE, 0.5 * most, 0.0, 2.0 * most, most, most / np.sqrt(12.0)) if most > 0.0 else None
     return (
         sought(damping, rate, 0.0),
@@ -151,11 +155,13 @@ def course_times(
 
     From dt = -dw / (b w + d (1 + q / (1 + (w / w_s)^2))), by Gauss's rule over the speed; b [1/s], d [rad/s^2].
     """
+    # Cubed, for the slowing near standstill, where a seal grips, needs the shortest steps.
     speeds = speed * np.linspace(1.0, 0.0, _STEPS + 1) ** 3
     middle, half = 0.5 * (speeds[1:] + speeds[:-1]), 0.5 * (speeds[:-1] - speeds[1:])
     at = middle[:, None] + half[:, None] * _NODES
     more = rise / (1.0 + np.square(at / rise_velocity)) if rise_velocity > 0.0 else np.zeros_like(at)
     slowing = damping_rate * at + deceleration * (1.0 + more)
+    # Without any friction the time would be infinite.
     slowing = np.maximum(slowing, _SLOWEST * float(slowing.max()) + 1e-300)
     times = half * ((1.0 / slowing) @ _WEIGHTS)
     swept = half * ((at / slowing) @ _WEIGHTS)
@@ -253,6 +259,7 @@ def smoothed_rates(time: Floats, angle: Floats) -> tuple[Floats, Floats]:
     """Return angular velocity [rad/s] and acceleration [rad/s^2] from local parabolas, at the times of the samples."""
     from scipy.signal import savgol_filter
 
+    # The filter wants an even clock.
     even = np.linspace(time[0], time[-1], time.size)
     step, width = float(even[1] - even[0]), _smoothing_width(time.size)
     values = np.interp(even, time, angle)

@@ -21,6 +21,7 @@ def tolerance(name: str, deviation: float, start: float = 0.0) -> tuple[Free, ..
     """Return a number known to a standard deviation about its start [SI]; nothing where it is known exactly."""
     if not deviation > 0.0:
         return ()
+    # The scale of the search is the limit, so that a step of one scale is a likely one.
     limit = math.sqrt(3.0) * deviation
     width = _WIDEST * limit
     return (Free(name, start, start - width, start + width, limit, deviation),)
@@ -51,8 +52,10 @@ def solve(
     names = [one.name for one in numbers]
     keys = list(zip(*labels, strict=True))
     ranks = {key: rank for rank, key in enumerate(dict.fromkeys(keys))}
+    # A block of the fit is a slice, so that readings of one label must lie side by side.
     order = np.argsort([ranks[key] for key in keys], kind="stable")
     ends = np.cumsum([0, *np.bincount([ranks[key] for key in keys])])
+    # A meter shows six digits at most: residuals below say nothing.
     floor = 1.0e-6 * float(np.ptp(measured))
     blocks = [Block(*key, slice(int(ends[rank]), int(ends[rank + 1])), floor) for key, rank in ranks.items()]
 

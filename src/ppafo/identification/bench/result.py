@@ -119,12 +119,14 @@ def estimates_of(
         number = found.numbers[place]
         size, half = abs(value) if item.size is None else item.size, 0.5 * (high - low)
         bound = next((end for end in (number.low, number.high) if abs(value - end) <= _AT_BOUND * number.scale), None)
+        # Not 1e-17 where 0 is meant.
         value = value if bound is None else bound
         verdict: Verdict = "identified"
         sentence = f"{item.text}; {widened_by(found, item.path)}."
         if bound is not None:
             verdict = "at its bound"
             sentence = f"{sentence} The readings want a value at or beyond {value:.4g}; the interval ends there."
+        # Then zero, or twice the value, is inside the interval as well.
         elif half >= size:
             verdict, sentence = "not identifiable", f"{sentence} The interval is as wide as the value."
         elif found.conflict is not None:

@@ -116,6 +116,7 @@ def _straight_line(readings: "Readings", names: str) -> tuple[float, float, floa
     """Return rough slope, zero, friction and its size; refuse signs that no device has. ``names`` are the files."""
     columns = (readings.pressure, np.ones_like(readings.pressure), -readings.branch)
     design = np.stack(columns, axis=1)
+    # Pressures are some 1e5 times as large as the other columns.
     scale = np.sqrt((design**2).mean(axis=0))
     slope, zero, friction = rough = np.linalg.lstsq(design / scale, readings.torque, rcond=None)[0] / scale
     if slope <= 0.0:
@@ -138,6 +139,7 @@ def _groups(readings: "Readings") -> tuple[list[str], list[str]]:
     Of many repetitions it is the recording and the branch.
     """
     branches = np.where(readings.branch > 0.0, "the rising branch", "the falling branch").tolist()
+    # Each group is one more test: of very many none would be significant.
     if readings.clusters.max() >= _MOST_REPETITIONS:
         return [f"recording {number + 1}" for number in readings.files.tolist()], branches
     middle = 0.5 * float(readings.pressure.max() + readings.pressure.min())
@@ -272,6 +274,7 @@ def readings_of(sources: tuple[Source, ...]) -> Readings:
     first = np.concatenate(([0], np.cumsum(counts)[:-1]))
     pressure, torque = (np.bincount(runs, weights=values) / counts for values in (pressure, torque))
     names = names_of(load, slides(sources))
+    # The mean of n samples has the noise of one over sqrt(n).
     weight = np.sqrt(counts / counts.mean())
     return Readings(pressure, torque, direction[first], weight, clusters[first], files[first], names)
 

@@ -211,6 +211,7 @@ def fall_of_difference(opening: Opening, size: float, first: float, second: floa
     ``size`` is that of the opening, ``ratio`` V1/V2 [-], 0 beside a room, ``rate`` R T / V1 [Pa/kg].
     """
     start, conserved = max(first - second, 1.0), ratio * first + second
+    # Even in the logarithm, as a laminar fall is in time.
     logs = np.linspace(0.0, -math.log(_LOWEST), _POINTS)
     difference = start * np.exp(-logs)
     lower = (conserved - ratio * difference) / (1.0 + ratio)
@@ -261,6 +262,7 @@ def _decaying_leak(
             for name, _ in zip(names, item.fitted, strict=False)
             for one in within(f"relaxation of {name}, decay {number}", _MOST_RELAXED)
         ),
+        # Of the logarithm of a time, for only its order of magnitude is known.
         Free(_RELAXATION, 0.0, -5.0, math.log(_RELAXED), 1.0, 1.5),
         *gas_tolerances(gas, tolerances),
         *tolerance(_VOLUME, settings.volume_deviation if volumes[0] else 0.0),
@@ -315,6 +317,7 @@ def _rough_size(closed: tuple[ClosedChambers, ...], opening: Opening, rate: floa
     for item in closed:
         flow = float(np.mean(opening.flow(1.0, 0.0, item.first, item.second)))
         scatter = float(np.std(np.diff(item.first)))
+        # Of a chamber that holds, what its noise would hide.
         found.append(max(item.changes[0], 0.01 * scatter, 1.0e-9) / (rate * flow * float(item.time[-1])))
     return float(np.mean(found))
 
@@ -328,6 +331,7 @@ def _ratio_numbers(
         return ()
     if volumes[0] and volumes[1]:
         ratio = volumes[0] / volumes[1]
+        # Two volumes, each known to the deviation.
         return tolerance(_RATIO, math.sqrt(2.0) * deviation * ratio, ratio)
     return (sought(_RATIO, max(float(np.mean([rise / fall for fall, rise in shut])), 1.0e-3), 1.0e-6),)
 

@@ -194,6 +194,7 @@ def _estimate(problem: TrajectoryProblem, found: Fit, item: Number, place: int, 
     bound = next(
         (end for end in (item.free.low, item.free.high) if abs(value - end) <= _AT_BOUND * abs(end or 1.0)), None
     )
+    # A number with a small weight only accompanies a combination that is open.
     combination = next((one for one in found.unidentified if abs(one.get(name, 0.0)) >= _OWN_SHARE), None)
     verdict: Verdict = "identified"
     if combination is not None:
@@ -205,6 +206,7 @@ def _estimate(problem: TrajectoryProblem, found: Fit, item: Number, place: int, 
         end, unit = in_shown_unit(bound, item.unit)
         verdict, text = "at its bound", f"the recordings want a value at or beyond {end:.6g} {unit}".rstrip(" -")
     elif conflict:
+        # Said of every number: which of them the missing physics moves is not known.
         verdict, text = "holds for this model only", conflict
     else:
         text = widened_by(found, name)

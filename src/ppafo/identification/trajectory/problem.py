@@ -319,6 +319,7 @@ def number_of(parameter: FreeParameter, experiments: Sequence[Experiment]) -> Nu
     if path == TIME_OFFSET:
         low, high = -LONGEST_TIME_OFFSET, LONGEST_TIME_OFFSET
     else:
+        # A number above 0 is bounded by factors: with 0 as its lower bound a valve or an effect would be another model.
         low = max(quantity.minimum, start / _FURTHEST) if start > 0.0 <= quantity.minimum else quantity.minimum
         high = min(quantity.maximum, start * _FURTHEST) if start > 0.0 else quantity.maximum
     low, high = (low if parameter.low is None else parameter.low), (high if parameter.high is None else parameter.high)
@@ -328,6 +329,7 @@ def number_of(parameter: FreeParameter, experiments: Sequence[Experiment]) -> Nu
             f"{parameter.name}: bounds {low:.6g} to {high:.6g} exceed what is allowed, "
             f"{quantity.minimum:.6g} to {quantity.maximum:.6g} {quantity.unit}".rstrip()
         )
+    # Differences are a thousandth of the scale at most, which for a prior is a tenth of its deviation.
     scale = abs(start) or 0.5 * (high - low)
     if math.isfinite(parameter.deviation):
         scale = _SCALE * parameter.deviation

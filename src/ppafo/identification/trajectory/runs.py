@@ -165,6 +165,7 @@ def _place_samples(prepared: PreparedExperiment, run: Run) -> PreparedExperiment
     position = samples.time / (run.step * every)
     place = np.minimum(np.floor(position + _FITS), records).astype(np.intp)
     fraction = np.maximum(position - place, 0.0)
+    # Rounding of the clock must not make a sample lie between two records.
     fraction[fraction < _FITS] = 0.0
     frozen = replace(run, record_every=every, step_count=math.ceil(records * every - _FITS), needs_parts=True)
     if recorded is not None and recorded.has(ANGLE) and isinstance(prepared.scenario.motion, FreeMotion):
@@ -206,6 +207,7 @@ def signals_of(
     def one(prepared: PreparedExperiment) -> dict[str, Floats]:
         return signals_at(prepared, columns_in(prepared.label, numbers, points), points.shape[1])
 
+    # Compiled runs release the interpreter.
     workers = min(len(experiments), os.cpu_count() or 1)
     if workers == 1:
         return [one(prepared) for prepared in experiments]
@@ -232,6 +234,7 @@ def blocks_of(experiments: Sequence[PreparedExperiment], numbers: Sequence[Numbe
     """
     blocks, first = [], 0
     coarse = signals_of(experiments, numbers, point[:, None])
+    # What half as long steps change is about the error of the engine.
     fine = signals_of([_with_half_steps(one, numbers, point) for one in experiments], numbers, point[:, None])
     for prepared, before, after in zip(experiments, coarse, fine, strict=True):
         for channel in prepared.channels:
@@ -313,6 +316,7 @@ def signals_at(prepared: PreparedExperiment, columns: Mapping[str, Floats], coun
     }
     running = {path: column for path, column in columns.items() if path not in errors}
     together = np.array([np.broadcast_to(column, (count,)) for column in running.values()]).reshape(-1, count)
+    # A zero or a gain of a compared sensor needs no run of its own.
     _, first, place = np.unique(together, axis=1, return_index=True, return_inverse=True)
     fewer = {path: np.broadcast_to(column, (count,))[first] for path, column in running.items()}
     found = _with_inputs(prepared, fewer, len(first))
@@ -364,6 +368,7 @@ def _run_signals(prepared: PreparedExperiment, columns: Mapping[str, Floats], co
     for members, batch in batches_of(run, count):
         outcome = run_batch(batch, threads=1) if prepared.inputs is None else replay(batch, prepared.inputs)
         ends = outcome.states
+        # A run that leaves what is possible, or is no number, tells the search nothing.
         failed[members] = (ends[failure] < NEVER_FAILED) | ~np.isfinite(ends).all(axis=0)
         if records is None:
             records = np.empty((len(kept), len(outcome.record), count))

@@ -217,6 +217,7 @@ def trajectory_problem(section: TrajectorySection, setting: Setting) -> Trajecto
     """Return the problem of a section. IdentificationError where it repeats what the bench settles."""
     experiments = tuple(_experiment(item, setting) for item in section.experiments)
     scenarios = {item.label: item.scenario for item in experiments}
+    # Samples that a bench procedure used are in its interval, which is a prior here.
     twice = double_use(setting.used, map(use_of, experiments))
     if twice:
         raise IdentificationError(f"{setting.file}: {twice}; bench values are where the fit starts and what it holds")

@@ -65,6 +65,7 @@ def tolerance_parameters(
         for path, (start, deviation) in _of_run(tolerances, experiment).items():
             if path not in free and deviation > 0.0:
                 found.append(_parameter(path, start, deviation, (experiment.label,)))
+    # What is fitted is moved already; a second number for it could not be told from the first.
     given = {full_path(item.path, experiments[0].scenario) for item in fitted}
     for kind, prefix, limit_of in (("zero", ZERO_OF, tolerances.zero_of), ("gain", GAIN_OF, tolerances.gain_of)):
         for channel in (*FITTED_CHANNELS, *((SUPPLY, DORSIFLEXION_SUPPLY) if kind == "zero" else ())):
@@ -74,6 +75,7 @@ def tolerance_parameters(
                 if channel in item.channels or (kind == "zero" and channel in item.inputs)
             ]
             path, limit = f"{prefix}{channel}", limit_of(channel)
+            # A number with a prior of no width cannot be moved.
             if not labels or not limit > 0.0 or path in given:
                 continue
             groups = [(label,) for label in labels] if kind in tolerances.each_recording else [tuple(labels)]
@@ -128,6 +130,7 @@ def _of_set(
                 max(quantity.minimum, value - _WIDEST * deviation),
                 min(quantity.maximum, value + _WIDEST * deviation),
             )
+            # A volume or a friction of 0 would make no device.
             low = max(low, 0.05 * value) if quantity.minimum >= 0.0 else low
             yield FreeParameter(path, value, low, high, deviation, is_tolerance=True)
 
