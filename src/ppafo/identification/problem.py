@@ -26,7 +26,7 @@ from ppafo.identification.bench.valve_map import ValveMapSettings, valve_map
 from ppafo.identification.bench.vane_leak import VaneLeakSettings, vane_leak
 from ppafo.identification.source import Source
 from ppafo.identification.tolerances import DEFAULTS, BenchSection, Tolerances, deviation_of_limit, quantity_of
-from ppafo.identification.trajectory.section import TrajectorySection
+from ppafo.identification.trajectory.section import TrajectorySection, refuse_removed
 from ppafo.model.gas import SPECIES
 from ppafo.parameters.device import VANE
 from ppafo.parameters.parameter_set import Citation, ParameterSet, chosen_valve, number_in_si
@@ -352,6 +352,7 @@ def parse_problem(content: bytes, file: str) -> ProblemFile:
         kind = item.get("kind") if isinstance(item, dict) else None
         if isinstance(kind, str) and kind.replace("_", "-") in PROCEDURES:
             item["kind"] = kind.replace("_", "-")
+    refuse_removed(document, file)
     problem = validate(ProblemFile, document, file, IdentificationError)
     if not problem.procedure and problem.trajectory is None:
         raise IdentificationError(f"{file}: has nothing to do: neither a [[procedure]] nor a [trajectory]")

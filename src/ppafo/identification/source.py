@@ -203,10 +203,9 @@ def window(recording: Recording, start: float | None, end: float | None) -> Reco
     return recording.between(first, last)
 
 
-def kind_of(sources: tuple[Source, ...]) -> RecordingKind:
+def kind_of(kinds: Iterable[RecordingKind]) -> RecordingKind:
     """Return the kind of the whole: one synthetic recording makes the result synthetic."""
-    kinds = {source.recording.kind for source in sources}
-    return next(kind for kind in _KINDS if kind in kinds)
+    return min(kinds, key=_KINDS.index, default="measured")
 
 
 def told_of_readings(sources: tuple[Source, ...]) -> tuple[str, ...]:

@@ -305,8 +305,13 @@ def test_the_published_schema_has_the_section() -> None:
         (FIT.replace("50 g m^2", "2 g m^2"), "foot_plate.inertia: low, 0.002, must be below high, 0.002"),
         (FIT.replace(PARAMETERS, "parameters = []"), "problem.toml: trajectory.parameters"),
         (f"[trajectory]\nexperiments = []\n{PARAMETERS}", "problem.toml: trajectory.experiments"),
-        (FIT.replace("[trajectory]", "[trajectory]\nloss = 'huber'"), "unknown key 'trajectory.loss'; allowed here:"),
-        (f"{FIT}[bench.can]\nsupply_pressure = ['20 psi_g', '90 psi_g']\n", "unknown key 'bench.can'; allowed here:"),
+        (
+            FIT.replace("[trajectory]", "[trajectory]\nprofiles = ['foot_plate.inertia']"),
+            "problem.toml: trajectory: profiles: intervals are those of the table; omit it",
+        ),
+        (FIT.replace("[trajectory]", "[trajectory]\nloss = 'huber'"), "loss: the first pass is robust by itself; omit"),
+        (FIT.replace("low =", "scale = 'log'\nlow ="), "scale: the search scales numbers by itself; omit it"),
+        (f"{FIT}[bench.can]\nsupply_pressure = ['20 psi_g', '90 psi_g']\n", "write [[trajectory.candidates]]"),
     ],
 )
 def test_a_mistake_is_one_line_that_says_where(solve: Solve, text: str, message: str) -> None:

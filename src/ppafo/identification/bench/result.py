@@ -152,7 +152,9 @@ def result_of(
     """
     estimates, conflict = estimates_of(found, reported, sources, confidence), conflict_in_words(found, remedy)
     told = (*remarks, *told_of_readings(sources))
-    return BenchResult(procedure, summary, estimates, panels, kind_of(sources), conflict, told)
+    return BenchResult(
+        procedure, summary, estimates, panels, kind_of(one.recording.kind for one in sources), conflict, told
+    )
 
 
 _SIZE = (8.4, 3.7)
@@ -206,7 +208,7 @@ def synthetic_figure_3(torque: BenchResult, decay: BenchResult) -> "Figure":
     return _figure(tuple(panels), (torque.kind, decay.kind))
 
 
-def _figure(panels: tuple[Panel, ...], kinds: tuple[str, ...]) -> "Figure":
+def _figure(panels: tuple[Panel, ...], kinds: tuple[RecordingKind, ...]) -> "Figure":
     from matplotlib.figure import Figure
 
     with house_style():
@@ -214,7 +216,7 @@ def _figure(panels: tuple[Panel, ...], kinds: tuple[str, ...]) -> "Figure":
         row = figure.subplots(1, len(panels), squeeze=False)[0]
         for letter, axes, panel in zip("AB", row, panels, strict=False):
             _draw(axes, letter, panel)
-        mark_kind(figure, next((kind for kind in ("synthetic", "simulated") if kind in kinds), "measured"))
+        mark_kind(figure, kind_of(kinds))
         return figure
 
 

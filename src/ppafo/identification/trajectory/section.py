@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
@@ -158,6 +158,30 @@ class TrajectorySection(StrictTable):
         tuple[CandidateSection, ...],
         Field(strict=False, description="experiments to rank by the information that they would bring"),
     ] = ()
+
+
+_REMOVED = {
+    "loss": "the first pass is robust by itself; omit it",
+    "other_starts": "other starts are tried where the first does not explain the recordings; omit it",
+    "seed": "nothing is drawn; omit it",
+    "directions": "recordings that want other numbers are found by themselves; omit it",
+    "profiles": "intervals are those of the table; omit it",
+    "scale": "the search scales numbers by itself; omit it",
+}
+_CAN = "proposals within limits of the bench are not made; write [[trajectory.candidates]], which are ranked"
+
+
+def refuse_removed(document: Mapping[str, Any], file: str) -> None:
+    """Refuse keys that earlier versions had, with what to write instead; IdentificationError."""
+    section, bench = document.get("trajectory"), document.get("bench")
+    if isinstance(bench, dict) and "can" in bench:
+        raise IdentificationError(f"{file}: bench.can: {_CAN}")
+    if isinstance(section, dict):
+        parameters = section.get("parameters")
+        tables = [item for item in (section, *(parameters if isinstance(parameters, list) else ()))]
+        for key, instead in _REMOVED.items():
+            if any(isinstance(table, dict) and key in table for table in tables):
+                raise IdentificationError(f"{file}: trajectory: {key}: {instead}")
 
 
 _NOISE_UNITS = {"angle": "rad", "pressure_1": "Pa_d", "pressure_2": "Pa_d"}

@@ -1,7 +1,7 @@
 """The answer of an identification: estimates and checks in the units of the set, the new set, the figures."""
 
 import math
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -24,6 +24,7 @@ from ppafo.errors import DataError
 from ppafo.identification.bench.result import BenchResult, count_of, figure_3, procedure_figure
 from ppafo.identification.estimate import Estimate
 from ppafo.identification.new_set import NewSet, in_set_unit
+from ppafo.identification.source import kind_of
 from ppafo.identification.trajectory.expected import Expected
 from ppafo.identification.trajectory.fitting import Known, TrajectoryFit
 from ppafo.identification.trajectory.section import TrajectoryOutcome
@@ -65,7 +66,7 @@ class Identification(Solved):
     def kind(self) -> RecordingKind:
         """The kind of all recordings together."""
         kinds = [result.kind for result in self.results]
-        return kind_of_all([*kinds, *(() if self.trajectory is None else (kind_of_fit(self.trajectory.fit),))])
+        return kind_of([*kinds, *(() if self.trajectory is None else (kind_of_fit(self.trajectory.fit),))])
 
 
 _TRAJECTORY_WIDTH, _VALUES, _LEFT_OVER = 7.2, 1.9, 1.0
@@ -296,14 +297,9 @@ def _trajectory_figures(outcome: TrajectoryOutcome) -> list[Figure]:
     return figures
 
 
-def kind_of_all(kinds: Collection[RecordingKind]) -> RecordingKind:
-    """Return the kind of several recordings together: one synthetic recording makes a fit synthetic."""
-    return next((kind for kind in ("synthetic", "simulated") if kind in kinds), "measured")
-
-
 def kind_of_fit(fit: TrajectoryFit) -> RecordingKind:
     """Return the kind of all recordings of a fit together."""
-    return kind_of_all([recording.kind for recording in fit.measurements])
+    return kind_of([recording.kind for recording in fit.measurements])
 
 
 def _procedure_data(result: BenchResult) -> dict[str, Any]:
