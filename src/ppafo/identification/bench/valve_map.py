@@ -56,6 +56,11 @@ def valve_map(sources: tuple[Source, ...], settings: ValveMapSettings) -> BenchR
     band = f"{settings.path}.dead_band"
     # The valve is neither shut nor fully open where it has half of the largest area.
     half = float(np.abs(command[np.abs(areas) > 0.5 * largest]).min())
+    if not half > 0.0:
+        raise IdentificationError(
+            f"{sources[0].name}: {PROCEDURE}: the valve has more than half of its largest flow at command 0; check the "
+            "zero of channel 'command', or leave that reading out"
+        )
     shut = np.abs(command[np.abs(areas) < 0.05 * largest])
     start = float(np.clip(np.median(shut) if shut.size else 0.0, 0.01 * half, 0.9 * half))
     numbers = (
