@@ -148,9 +148,9 @@ def check_words(words: list[str]) -> None:
         ):
             shown = [part for part in parts if not part.isupper()]
             rest = words[len(shown) :]
-            command, dashes, option = now.partition(" --")
+            head, dashes, option = now.partition(" --")
             # An option of the new line that was given before stays as it was.
-            line = command if dashes and f"--{option.split()[0]}" in rest else now
+            line = head if dashes and f"--{option.split()[0]}" in rest else now
             full = " ".join(["ppafo", line, *map(shlex.quote, rest)])
             raise UsageError(f"'ppafo {' '.join(shown)}' is now 'ppafo {now}': {full}")
     word = given[0]
