@@ -16,7 +16,7 @@ _NUMBER = re.compile(r"[+-]?((\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|nan|inf)", re.ASCI
 _EXAMPLES = {
     "kg": ("a mass", ("g", "kg")),
     "m": ("a length", ("mm", "m")),
-    "s": ("a time", ("s", "min")),
+    "s": ("a time", ("ms", "s", "min")),
     "N m": ("a torque", ("N m",)),
     "Pa_a": ("a pressure", ("psi_g", "kPa_a")),
     "kg/s": ("a flow", ("g/s",)),

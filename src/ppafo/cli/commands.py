@@ -31,8 +31,8 @@ HEADINGS: dict[str, dict[str, Command | Group]] = {
             "list, show and audit parameter sets; list real parts",
             {
                 "list": Command(f"{_DEVICE}:sets_list"),
-                "show": Command("ppafo.cli.sets:sets_show"),
-                "audit": Command("ppafo.cli.audit:sets_audit"),
+                "show": Command(f"{_DEVICE}:sets_show"),
+                "audit": Command(f"{_DEVICE}:sets_audit"),
                 "parts": Command(f"{_DEVICE}:sets_parts"),
             },
         ),
