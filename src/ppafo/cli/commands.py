@@ -41,8 +41,8 @@ HEADINGS: dict[str, dict[str, Command | Group]] = {
         "rig": Group(
             "record a bench, or synthetic data on the simulated test bench",
             {
-                "simulate": Command(f"{_BENCH}:rig_simulate", listing="ppafo.cli.rig:list_rig", listed="experiment"),
-                "record": Command("ppafo.cli.record:rig_record"),
+                "simulate": Command(f"{_BENCH}:rig_simulate", listing=f"{_BENCH}:list_rig", listed="experiment"),
+                "record": Command(f"{_BENCH}:rig_record"),
             },
         ),
         "identify": Command(f"{_BENCH}:identify"),

@@ -1,17 +1,12 @@
 """``ppafo doctor``: compilers, compiled models and bits of this computer, schemas of files, completion of the line."""
 
 import importlib
-import time
-from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from ppafo.cli.arguments import Name
 from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, Said
 from ppafo.documents.json_text import json_text
 from ppafo.errors import DataError, SimulationError, nearest_name
-
-_DAY = 86400.0
-
 
 FORMATS: dict[str, str] = {
     "parameters": "ppafo.parameters.loading",
@@ -66,6 +61,7 @@ def doctor(
     completion: print a script instead that completes the line, with names: eval "$(ppafo doctor --completion bash)"
     """
     from ppafo.engine import cache
+    from ppafo.engine.kept_models import models_document, models_text
 
     asked = {"--warm": warm, "--clear": clear, "--bits": bits, "--schema": schema, "--completion": completion}
     given = [option for option, value in asked.items() if value]
@@ -90,22 +86,8 @@ def doctor(
         from ppafo.simulation.simulate import compile_models
 
         compile_models(load_scenario(name) for name in list_scenarios())
-    document = _document(folder, why_not) | ({"freed": cleared} if clear else {})
-    lines = [f"compilers: {', '.join(document['compilers'])}", f"folder: {document['folder'] or 'none'}"]
-    if document["not_used"]:
-        lines.append(f"not used: {document['not_used']}")
-    if "freed" in document:
-        lines.append(f"removed: {_megabytes(document['freed'])}")
-    lines.append(f"programs: {len(document['programs'])}, {_megabytes(document['size'])}")
-    if document["made_from_programs"]:
-        lines.append(f"texts of programs and their forms for pages: {_megabytes(document['made_from_programs'])}")
-    lines += [
-        f"  {item['name']}  {_megabytes(item['size']):>8}  last used {_days(item['unused_days'])}"
-        for item in document["programs"]
-    ]
-    lines += [f"left out for a day: {name}: {why}" for name, why in document["left_out"].items()]
-    limits = f"{document['kept_unused_days']:.0f} days unused, or above {_megabytes(document['most_bytes'])} in all"
-    return Said("\n".join([*lines, f"removed by themselves: after {limits}"]), document, "doctor")
+    document = models_document(folder, why_not) | ({"freed": cleared} if clear else {})
+    return Said(models_text(document), document, "doctor")
 
 
 def _bits() -> Said:
@@ -124,33 +106,3 @@ def _bits() -> Said:
     return Said(
         "\n".join(lines), {"compiler": by, "same_bits": found}, "bits", EXIT_CHECK_FAILED if others else EXIT_GOOD
     )
-
-
-def _document(folder: Path | None, why_not: str) -> dict[str, Any]:
-    from ppafo.engine.cache import LONGEST_UNUSED, MAXIMUM_BYTES, kept_sizes, list_left_out, list_programs
-    from ppafo.engine.loading import compilers_to_try
-
-    programs = [] if folder is None else list_programs(folder)
-    now = time.time()
-    return {
-        "compilers": [compiler.name for compiler in compilers_to_try()],
-        "folder": None if folder is None else str(folder),
-        "not_used": why_not or None,
-        "size": sum(program.size for program in programs),
-        "made_from_programs": 0 if folder is None else sum(kept_sizes(folder)),
-        "left_out": {} if folder is None else list_left_out(folder),
-        "kept_unused_days": LONGEST_UNUSED / _DAY,
-        "most_bytes": MAXIMUM_BYTES,
-        "programs": [
-            {"name": program.place.name, "size": program.size, "unused_days": max(0.0, (now - program.used) / _DAY)}
-            for program in programs
-        ],
-    }
-
-
-def _megabytes(size: int) -> str:
-    return f"{size / 1e6:.1f} MB"
-
-
-def _days(days: float) -> str:
-    return "today" if days < 1.0 else f"{days:.0f} day{'' if int(days + 0.5) == 1 else 's'} ago"

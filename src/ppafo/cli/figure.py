@@ -1,15 +1,11 @@
 """``ppafo export figure DIR``: draws what a folder of results holds again, without running anything again."""
 
-from pathlib import Path
-
 from ppafo.cli import output
 from ppafo.cli.arguments import File, Folder
 from ppafo.cli.output import Said
 from ppafo.errors import DataError
 
 _FORMATS = ("png", "svg")
-_PICTURES = (".png", ".gif")
-_NAMED = 6
 
 
 def export_figure(folder: Folder, *, out: File | None = None) -> Said:
@@ -31,13 +27,16 @@ def export_figure(folder: Folder, *, out: File | None = None) -> Said:
     if out is not None:
         output.check_new_file(out)
     from ppafo.answers.drawing import load_drawing
-    from ppafo.questions.stored_figures import draw_folder, names_in
+    from ppafo.questions.stored_figures import draw_folder, names_in, what_is_there
 
     names = names_in(folder)
     load_drawing()
     drawn = draw_folder(folder, names)
     if not drawn:
-        return _what_is_there(folder, out, names)
+        said, document = what_is_there(folder, names)
+        if out is not None:
+            raise DataError(f"--out {out}: nothing is drawn anew: {said}")
+        return Said(said, document)
     if out is not None and len(drawn) > 1:
         raise DataError(
             f"--out {out}: {folder} has {len(drawn)} figures, {', '.join(drawn)}; without --out each is "
@@ -55,21 +54,3 @@ def export_figure(folder: Folder, *, out: File | None = None) -> Said:
         add_to_folder(folder, files)
         written = [str(folder / name) for name in files]
     return Said(f"written: {', '.join(written)}", {"files": written})
-
-
-def _what_is_there(folder: Path, out: Path | None, names: list[str]) -> Said:
-    """Say which figures a folder of ppafo has and which file to open; DataError where the folder is another."""
-    from ppafo.storage.result_folder import MARK, marking_command
-
-    if MARK not in names:
-        raise DataError(f"{folder}: is not a result folder of ppafo")
-    command = marking_command(folder)
-    pictures = [name for name in names if name.endswith(_PICTURES)]
-    page = next((name for name in names if name.endswith(".html")), None)
-    shown = ", ".join(pictures[:_NAMED]) + (", ..." if len(pictures) > _NAMED else "")
-    has = f"has its figures ({shown})" if pictures else "has no figures"
-    opened = page or next((name for name in names if name.endswith(".txt")), MARK)
-    said = f"{folder}: the result of 'ppafo {command}' {has}; open {folder / opened}"
-    if out is not None:
-        raise DataError(f"--out {out}: nothing is drawn anew: {said}")
-    return Said(said, {"files": [], "command": command, "figures": pictures, "open": str(folder / opened)})

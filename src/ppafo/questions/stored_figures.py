@@ -9,13 +9,15 @@ from ppafo.questions.endurance.draw import WALK_FILE
 from ppafo.questions.sweep.answer import load_study_results
 from ppafo.rig.experiments import RIG_FILE
 from ppafo.storage import read_recording, read_result
-from ppafo.storage.result_folder import MARK, NETCDF_FILE, RUN_FILE, read_json
+from ppafo.storage.result_folder import MARK, NETCDF_FILE, RUN_FILE, marking_command, read_json
 from ppafo.study.manifest import MANIFEST
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _FIGURE = "figure"
+_PICTURES = (".png", ".gif")
+_NAMED = 6
 
 
 def names_in(folder: Path) -> list[str]:
@@ -65,3 +67,17 @@ def _document(file: Path) -> dict[str, Any]:
     if not isinstance(document, dict):
         raise DataError(f"{file}: is not a table of names and values")
     return document
+
+
+def what_is_there(folder: Path, names: list[str]) -> tuple[str, dict[str, Any]]:
+    """Say which figures a folder of ppafo has and which file to open; DataError where the folder is another."""
+    if MARK not in names:
+        raise DataError(f"{folder}: is not a result folder of ppafo")
+    command = marking_command(folder)
+    pictures = [name for name in names if name.endswith(_PICTURES)]
+    page = next((name for name in names if name.endswith(".html")), None)
+    shown = ", ".join(pictures[:_NAMED]) + (", ..." if len(pictures) > _NAMED else "")
+    has = f"has its figures ({shown})" if pictures else "has no figures"
+    opened = page or next((name for name in names if name.endswith(".txt")), MARK)
+    said = f"{folder}: the result of 'ppafo {command}' {has}; open {folder / opened}"
+    return said, {"files": [], "command": command, "figures": pictures, "open": str(folder / opened)}
