@@ -15,7 +15,7 @@ from typing import Annotated, Any
 _NUMBER = re.compile(r"[+-]?((\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|nan|inf)", re.ASCII)
 _EXAMPLES = {
     "kg": ("a mass", ("g", "kg")),
-    "m": ("a length", ("mm", "m")),
+    "m": ("a length", ("cm", "m")),
     "s": ("a time", ("ms", "s", "min")),
     "N m": ("a torque", ("N m",)),
     "Pa_a": ("a pressure", ("psi_g", "kPa_a")),

@@ -5,8 +5,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from ppafo.cli.output import Said, listing
+from ppafo.documents.examples import example_files, load_examples
 from ppafo.errors import DataError, nearest_name
-from ppafo.examples import example_files, load_examples
 
 
 def list_examples() -> Said:
