@@ -86,12 +86,12 @@ def test_a_full_chamber_2_that_the_foot_squeezes_is_no_fault() -> None:
     assert found(squeezed._replace(pressure_1=2.1e6)) == fault_flags.PRESSURE_RANGE
 
 
-def test_every_sign_says_what_it_goes_by_and_those_of_faults_come_first() -> None:
+def test_every_flag_says_what_it_goes_by_and_those_of_faults_come_first() -> None:
     numbers = list(fault_flags.FAULT_FLAGS)
     assert numbers == [float(number) for number in range(1, len(numbers) + 1)]
     assert len({flag.name for flag in fault_flags.FAULT_FLAGS.values()}) == len(numbers)
     levels = [fault_flags.level_of(number) for number in numbers]
-    assert levels == sorted(levels, reverse=True)
+    assert levels == sorted(levels, reverse=True) == [flag.level for flag in fault_flags.FAULT_FLAGS.values()]
     assert set(levels) == {LIFTS, PAUSED, STOPPED}
     settings = {item.name for item in SAFETY_QUANTITIES}
     assert all(set(flag.settings) <= settings for flag in fault_flags.FAULT_FLAGS.values())
