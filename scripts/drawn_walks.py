@@ -6,7 +6,7 @@
 
 The first prints for each valve how many walks without a fault stop, pause to their end, press against the wearer, or
 have no help back after two strides of steady walking.
-The second draws faults of the plant with a shut-off valve fitted, and prints how soon each is found, by which sign, and
+The second draws faults of the plant with a shut-off valve fitted, and prints how soon each is found, by which flag, and
 what is left on the wearer half a second later. The third prints how far a regulator that creeps shows in the residuals
 of the observer, beside walks without a fault. The controller believes in the nominal device, whatever device is drawn.
 All of it is simulated.
@@ -65,7 +65,7 @@ WITHOUT = (
     "| Lifted on the toes | On who stands or sits | No help in more than two steady strides |"
 )
 WITH = (
-    "| Fault | Valve | Within two strides | Last (strides) | Signs | N m until it is found later "
+    "| Fault | Valve | Within two strides | Last (strides) | Flags | N m until it is found later "
     "| Last above 2 N m (s after it is found) | N m from 0.5 s after | N m where it is not found |"
 )
 
@@ -80,10 +80,10 @@ CREEPS = (2, 3, 4)
 
 @dataclass(frozen=True)
 class Outcome:
-    """What one walk came to: stops, a pause to its end, peak torques [N m], strides to the first sign, its name.
+    """What one walk came to: stops, a pause to its end, peak torques [N m], strides to the first fault flag, its name.
 
-    ``until`` is the peak against the wearer from a fault to its sign, ``after`` that from ``SETTLED`` later on, or
-    where no sign comes; ``settles`` [s] is how long after the sign more than ``AFTER`` is left. ``flat`` is the peak in
+    ``until`` is the peak against the wearer from a fault to its flag, ``after`` that from ``SETTLED`` later on, or
+    where no flag comes; ``settles`` [s] is how long after the flag more than ``AFTER`` is left. ``flat`` is the peak in
     plantarflexion where heel or foot are down and the heel does not carry yet, ``unhelped`` the most steady strides in
     a row from strike to strike without all of the help.
     """
@@ -95,7 +95,7 @@ class Outcome:
     on_toes: float
     at_rest: float
     found: float
-    sign: str
+    flag: str
     after: float
     until: float
     settles: float
@@ -222,8 +222,8 @@ def outcome(result: WalkResult, begins: float = np.inf) -> Outcome:
     still = (contact == ground.FLAT) & (np.abs(np.gradient(shank, time)) < 1.0e-3)
     held = np.cumsum(still) - np.maximum.accumulate(np.where(still, 0, np.cumsum(still)))
     still = held * (time[1] - time[0]) > STANDS
-    event = next((item for item in result.events if item.sign is not None and item.time >= begins), None)
-    stop = next((item for item in result.events if item.sign is not None and item.level >= STOPPED), event)
+    event = next((item for item in result.events if item.fault_flag is not None and item.time >= begins), None)
+    stop = next((item for item in result.events if item.fault_flag is not None and item.level >= STOPPED), event)
     named = event or stop
     stride = walk_of(result.scenario).gait.stride_time
     against = np.where(contact == ground.TOE, -torque, torque)
@@ -238,7 +238,7 @@ def outcome(result: WalkResult, begins: float = np.inf) -> Outcome:
         on_toes=lasting_peak(-torque, contact == ground.TOE, time),
         at_rest=lasting_peak(np.abs(torque), still, time),
         found=np.inf if event is None else (event.time - begins) / stride,
-        sign="-" if named is None or named.sign is None else named.sign.name,
+        flag="-" if named is None or named.fault_flag is None else named.fault_flag.name,
         after=lasting_peak(against, late, time) if np.isfinite(begins) else 0.0,
         until=lasting_peak(against, (time > begins) & (time < alarm), time),
         settles=float(above[-1] - alarm) if above.size and event is not None else 0.0,
@@ -351,7 +351,7 @@ def row_without(valve: str, found: list[Outcome]) -> str:
     above.insert(1, sum(item.flat > ON_HEEL for item in found))
     peaks = [max(getattr(item, name) for item in found) for name in ("on_heel", "flat", "on_toes", "at_rest")]
     cells = [f"{many} (at most {peak:.2f} N m)" for many, peak in zip(above, peaks, strict=True)]
-    stops = [f"`{item.sign}` in walk {number}" for number, item in enumerate(found, start=1) if item.stopped]
+    stops = [f"`{item.flag}` in walk {number}" for number, item in enumerate(found, start=1) if item.stopped]
     words = f" ({', '.join(stops)})" if stops else ""
     stopped, paused = f"{sum(item.stopped for item in found)}{words}", str(sum(item.paused for item in found))
     late = f"{sum(item.unhelped > MOST_WITHOUT for item in found)} (at most {max(item.unhelped for item in found)})"
@@ -362,7 +362,7 @@ def row_with(valve: str, part: str, kind: str, found: list[Outcome]) -> str:
     """One row of the table of faults."""
     times = [item.found for item in found if np.isfinite(item.found)]
     quick = sum(time <= TWO_STRIDES for time in times)
-    names = ", ".join(f"`{name}` {many}" for name, many in Counter(item.sign for item in found).most_common())
+    names = ", ".join(f"`{name}` {many}" for name, many in Counter(item.flag for item in found).most_common())
     worst = max((item.after for item in found if np.isfinite(item.found)), default=0.0)
     missed = max((item.after for item in found if not np.isfinite(item.found)), default=0.0)
     last = f"{max(times):.2f}" if times else "-"

@@ -3,7 +3,7 @@
     python scripts/false_alarms.py --wearers 1000 --out out/false-alarms
 
 A stop on good sensors is a false alarm, and the exit code is then 1. A pause, and a foot that is lifted only, are for
-what walking does; they are counted apart, by the last sign of each wearer: who sat last, and the others. Every
+what walking does; they are counted apart, by the last fault flag of each wearer: who sat last, and the others. Every
 configuration and course that is done is kept in the folder, and a second call goes on where the first one ended. It
 prints a table.
 """
@@ -33,13 +33,13 @@ WEARERS = {"impaired": (), "nondisabled": ("wearer.keeps_gait=1",)}
 """Whose foot drops, and who keeps the measured gait whatever the device does."""
 
 SITS = "endless_phase"
-"""The sign of who sits: on the courses of the package before the first stride or after the last one."""
+"""The fault flag of who sits: on the courses of the package before the first stride or after the last one."""
 
-HEAD = ("Course", "Sensors", "Configuration", "Wearers", "Stops", "Sat last", "Less help else", "Last sign of these")
+HEAD = ("Course", "Sensors", "Configuration", "Wearers", "Stops", "Sat last", "Less help else", "Last flag of these")
 
 
 def counted(configuration: str, course: str, sensors: str, who: str, wearers: int) -> dict[str, object]:
-    """Walk a course with many wearers: how many there were, were stopped, had less help, and by which last sign."""
+    """Walk a course with many wearers: how many there were, were stopped, had less help, and by which last flag."""
     overrides = [f"course={course}", *SENSORS[sensors], *WEARERS[who]]
     people = walk_population(load_walk(configuration, overrides), None, wearers)
     return {
@@ -47,13 +47,13 @@ def counted(configuration: str, course: str, sensors: str, who: str, wearers: in
         "diverged": people.diverged,
         "stops": people.vented,
         "less": people.paused,
-        "signs": dict(people.signs),
+        "flags": dict(people.fault_flags),
     }
 
 
 def line(course: str, sensors: str, configuration: str, found: dict[str, object]) -> str:
     """One row of the table."""
-    seen = found["signs"]
+    seen = found["flags"]
     assert isinstance(seen, dict), "as counted"
     sat = seen.get(SITS, 0)
     others = {name: count for name, count in seen.items() if name != SITS}

@@ -1,49 +1,20 @@
-"""The runs whose bits every computer must find, and their golden hashes, in ``golden_bits.json`` beside this file.
+"""Draws about the runs of ``ppafo.golden_bits``, and the golden hashes of both made anew.
 
 The rows of a run are made by its plan. Those of a draw are theirs times factors from whole numbers alone, so that no
 library has a part in them.
 """
 
-import hashlib
-import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.engine.lanes import Batch, BatchResult, Clock, run_batch
-from ppafo.engine.run import batch_of
-from ppafo.simulation.loading import list_scenarios, load_scenario
-from ppafo.simulation.plan import plan_run
-from ppafo.walking import list_walks
-from ppafo.walking.loading import load_walk
-from ppafo.walking.motion import with_duration
-from ppafo.walking.planning import plan_walk
+from ppafo.golden_bits import Hashes, digest, hash_of, names, plain_batch
 
 Runner = Callable[[Batch], BatchResult]
-VARIED = {
-    "noisy-sensors": (
-        "torque-task-proportional",
-        ("sensors.delay=2.3 ms", "sensors.pressure_noise=0.1 psi_d", "sensors.pressure_resolution=0.05 psi_d"),
-    ),
-    "thermal-gas-behind-lines": (
-        "step-response",
-        (
-            "gas_model.kind=thermal",
-            "gas_model.heat_transfer_coefficient=50 W/(m^2 K)",
-            "gas_model.wall_area_per_volume=100 1/m",
-            "supply_line.plantarflexion.droop=3e6 Pa s/kg",
-        ),
-    ),
-}
-"""Scenarios with settings of their own, for what no shipped one has."""
-COURSES = {"first-steps": "proportional"}
-"""Courses, and the walk that takes each."""
 DRAWS = 1000
-WALKED = 4.0
-"""Seconds of a walk."""
 LONGEST_DRAWN = 200
 """Steps of a draw at most."""
 LONGEST_STEPS = 40
@@ -57,22 +28,6 @@ _IMPOSSIBLE = (-1.0, 0.0, 1.0e6, float("nan"))
 """Factors on one number in one draw of ten."""
 _TIMING_ROWS, _RESULT_ROWS = 5, 4
 """Rows of the clock and of the outcome: draws leave them as they are."""
-
-
-def names() -> tuple[str, ...]:
-    """Return the names of all runs."""
-    return (*list_scenarios(), *VARIED, *list_walks(), *COURSES)
-
-
-def plain_batch(name: str) -> Batch:
-    """Return one run of a scenario, or some seconds of a walk, by its name."""
-    if name in VARIED:
-        scenario, settings = VARIED[name]
-        return batch_of(plan_run(load_scenario(scenario, settings)))
-    if name in list_scenarios():
-        return batch_of(plan_run(load_scenario(name)))
-    walk = load_walk(COURSES[name], course=name) if name in COURSES else load_walk(name)
-    return batch_of(plan_walk(with_duration(walk, WALKED)))
 
 
 def drawn_batch(batch: Batch, runs: int = DRAWS, seed: int = SEED) -> Batch:
@@ -109,18 +64,6 @@ def _words(numbers: NDArray[np.uint64], seed: int) -> NDArray[np.uint64]:
     return mixed
 
 
-def digest(result: BatchResult) -> str:
-    """Return the hash of all numbers of a result, with one NaN for all: what a NaN is made of is free."""
-    return _hash((result.states, result.record))
-
-
-def _hash(arrays: tuple[NDArray[np.float64], ...]) -> str:
-    found = hashlib.sha256()
-    for values in arrays:
-        found.update(np.where(np.isnan(values), np.nan, values).astype("<f8").tobytes())
-    return found.hexdigest()[:16]
-
-
 def failures(result: BatchResult) -> int:
     """Return how many runs left what is possible."""
     return int((result.states[1] < 1.0e300).sum())
@@ -136,21 +79,11 @@ def hashes_of(name: str, run: Callable[[Batch], Runner], draws: int = DRAWS) -> 
     drawn = runner(drawn_batch(batch, draws))
     # The hash of the rows that a plan made.
     return {
-        "rows": _hash((batch.parameters, batch.states)),
+        "rows": hash_of((batch.parameters, batch.states)),
         "run": digest(runner(batch)),
         "draws": digest(drawn),
         "failed": failures(drawn),
     }
-
-
-GOLDEN = Path(__file__).with_name("golden_bits.json")
-Hashes = Mapping[str, Mapping[str, str | int]]
-
-
-def golden_hashes() -> Hashes:
-    """Return the hashes that every computer must find, by name."""
-    found: dict[str, dict[str, str | int]] = json.loads(GOLDEN.read_text(encoding="utf-8"))
-    return found
 
 
 def new_golden_hashes() -> Hashes:

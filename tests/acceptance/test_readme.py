@@ -10,6 +10,7 @@ import pytest
 from ppafo.answers.writing import text_of
 from ppafo.cli.commands import COMMANDS
 from ppafo.cli.main import build_parser, main
+from ppafo.golden_bits import golden_hashes
 from ppafo.questions.reproduce.answer import Reproduction, Studies
 from ppafo.questions.reproduce.solve import reproduce
 from ppafo.running import simulate
@@ -17,7 +18,6 @@ from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.walking.walk import walk
 from scripts.bits import TARGETS, title_of
-from scripts.golden_bits import golden_hashes
 from tests.judge.reference_solver import compare_with_reference
 
 ROOT = Path(__file__).parents[2]

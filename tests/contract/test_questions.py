@@ -92,8 +92,22 @@ def test_an_old_command_answers_with_the_new_line(old: str, capsys: pytest.Captu
     said = capsys.readouterr().err
     assert f"is now 'ppafo {RENAMED[old]}'" in said
     assert said.count("\n") == 1
-    now = [word for word in RENAMED[old].split() if not word.startswith("-")]
+    now = RENAMED[old].partition(" --")[0].split()
     assert " ".join(now) in VERBS or now == ["new", "example"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("montecarlo study.toml --metric gas", "sweep --statistic mean study.toml --metric gas"),
+        ("montecarlo s --metric gas --statistic mean", "sweep s --metric gas --statistic mean"),
+        ("chip torque-task-solenoid", "export firmware --try torque-task-solenoid"),
+        ("rig record leak-rate --seed 2", "rig simulate leak-rate --seed 2"),
+    ],
+)
+def test_an_old_line_answers_with_the_whole_new_one(old: str, new: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(old.split()) == 2
+    assert capsys.readouterr().err.endswith(f": ppafo {new}\n")
 
 
 def test_a_verb_that_is_mistyped_is_refused_with_the_nearest_one(capsys: pytest.CaptureFixture[str]) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from ppafo.engine.lanes import BatchResult, run_batch
+from ppafo.golden_bits import digest, golden_hashes, names, plain_batch
 from ppafo.simulation.loading import list_scenarios
 from ppafo.walking import list_walks
 from scripts import bits, golden_bits
@@ -17,8 +18,8 @@ CHEAP = "torque-task-proportional"
 
 
 def test_every_scenario_and_walk_has_golden_hashes() -> None:
-    golden = golden_bits.golden_hashes()
-    assert set(golden) == set(golden_bits.names())
+    golden = golden_hashes()
+    assert set(golden) == set(names())
     assert {*list_scenarios(), *list_walks()} <= set(golden)
     assert all(0 < hashes["failed"] < golden_bits.DRAWS // 2 for hashes in golden.values())
     assert len({hashes["draws"] for hashes in golden.values()}) == len(golden)
@@ -38,12 +39,12 @@ def test_every_scenario_and_walk_has_golden_hashes() -> None:
 )
 def test_the_golden_bits_are_found_on_this_computer(backend: str, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PPAFO_BACKEND", backend)
-    assert golden_bits.hashes_of(name, lambda _batch: run_batch) == golden_bits.golden_hashes()[name]
+    assert golden_bits.hashes_of(name, lambda _batch: run_batch) == golden_hashes()[name]
 
 
 @pytest.mark.parametrize("name", [CHEAP, "solenoid"])
 def test_a_draw_has_the_same_bits_in_a_block_and_alone(name: str) -> None:
-    batch = golden_bits.drawn_batch(golden_bits.plain_batch(name), 100)
+    batch = golden_bits.drawn_batch(plain_batch(name), 100)
     together = run_batch(batch).states
     for run in range(100):
         column = slice(run, run + 1)
@@ -54,7 +55,7 @@ def test_a_draw_has_the_same_bits_in_a_block_and_alone(name: str) -> None:
 def test_another_hash_is_named_and_the_script_ends_with_1(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    golden: dict[str, Any] = {name: dict(hashes) for name, hashes in golden_bits.golden_hashes().items()}
+    golden: dict[str, Any] = {name: dict(hashes) for name, hashes in golden_hashes().items()}
     golden[CHEAP]["draws"] = "0" * 16
     monkeypatch.setattr(bits, "golden_hashes", lambda: golden)
     assert bits.compare([bits.HERE], [CHEAP]) == 1
@@ -65,11 +66,11 @@ def test_the_last_bit_of_one_number_is_another_hash_and_what_a_nan_is_made_of_is
     result = BatchResult(np.array([[1.0, np.nan]]), np.zeros((1, 1, 2)))
     other = replace(result, states=np.array([[np.nextafter(1.0, 2.0), np.nan]]))
     signed = replace(result, states=np.array([[1.0, -np.nan]]))
-    assert golden_bits.digest(result) == golden_bits.digest(signed) != golden_bits.digest(other)
+    assert digest(result) == digest(signed) != digest(other)
 
 
 def test_draws_are_made_of_whole_numbers_and_spread_over_their_range() -> None:
-    plain = golden_bits.plain_batch(CHEAP)
+    plain = plain_batch(CHEAP)
     drawn = golden_bits.drawn_batch(plain, 1000)
     assert (drawn.parameters[:5] == plain.parameters[:5]).all()
     row = np.flatnonzero(plain.parameters[:, 0] > 0.0)[7]

@@ -13,6 +13,19 @@ from pathlib import Path
 from typing import Annotated, Any
 
 _NUMBER = re.compile(r"[+-]?((\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|nan|inf)", re.ASCII)
+_EXAMPLES = {
+    "kg": ("a mass", ("g", "kg")),
+    "m": ("a length", ("cm", "m")),
+    "s": ("a time", ("ms", "s", "min")),
+    "N m": ("a torque", ("N m",)),
+    "Pa_a": ("a pressure", ("psi_g", "kPa_a")),
+    "kg/s": ("a flow", ("g/s",)),
+    "m^3": ("a volume", ("cm^3",)),
+    "m/s": ("a speed", ("m/s", "km/h")),
+    "Hz": ("a frequency", ("Hz",)),
+    "rad": ("an angle", ("deg", "rad")),
+}
+"""What a quantity is called, and the units in which people write it."""
 _MAXIMUM_DIGITS = 40
 """A seed of 128 bits has 39; Python refuses thousands of them by an error of its own."""
 
@@ -82,13 +95,17 @@ def fraction(text: str) -> float:
 def quantity(si_unit: str, longest: float = math.inf) -> Callable[[str], float]:
     """Return what turns a text with a unit, such as ``10 min``, into a number in SI; ArgumentTypeError for others.
 
-    Where there is a ``longest`` the number is a time [s] above 0.
+    Where there is a ``longest`` the number is a time [s] above 0. A number alone is refused with examples.
     """
 
     def value_of(text: str) -> float:
         from ppafo.errors import UnitError
         from ppafo.units import parse_quantity
 
+        if si_unit in _EXAMPLES and _NUMBER.fullmatch(text.strip()):
+            what, units = _EXAMPLES[si_unit]
+            either = " or ".join(f"'{text.strip()} {unit}'" for unit in units)
+            raise argparse.ArgumentTypeError(f"{text}: {what} needs its unit: {either}")
         try:
             value = parse_quantity(text, si_unit)
         except UnitError as error:

@@ -3,6 +3,7 @@
 Commands of other packages are plain functions, found by entry points of the group ``ppafo.commands``.
 """
 
+import shlex
 from types import FunctionType
 
 from ppafo.cli.command_line import Command, Group, UsageError
@@ -30,8 +31,8 @@ HEADINGS: dict[str, dict[str, Command | Group]] = {
             "list, show and audit parameter sets; list real parts",
             {
                 "list": Command(f"{_DEVICE}:sets_list"),
-                "show": Command("ppafo.cli.sets:sets_show"),
-                "audit": Command("ppafo.cli.audit:sets_audit"),
+                "show": Command(f"{_DEVICE}:sets_show"),
+                "audit": Command(f"{_DEVICE}:sets_audit"),
                 "parts": Command(f"{_DEVICE}:sets_parts"),
             },
         ),
@@ -40,8 +41,8 @@ HEADINGS: dict[str, dict[str, Command | Group]] = {
         "rig": Group(
             "record a bench, or synthetic data on the simulated test bench",
             {
-                "simulate": Command(f"{_BENCH}:rig_simulate", listing="ppafo.cli.rig:list_rig", listed="experiment"),
-                "record": Command("ppafo.cli.record:rig_record"),
+                "simulate": Command(f"{_BENCH}:rig_simulate", listing=f"{_BENCH}:list_rig", listed="experiment"),
+                "record": Command(f"{_BENCH}:rig_record"),
             },
         ),
         "identify": Command(f"{_BENCH}:identify"),
@@ -113,7 +114,7 @@ RENAMED: dict[str, str] = {
     "examples": "new example",
     "firmware": "export firmware",
     "gait export": "export opensim",
-    "montecarlo": "sweep --statistic",
+    "montecarlo": "sweep --statistic mean",
     "parts": "sets parts",
     "plot": "export figure",
     "record": "rig record",
@@ -145,8 +146,13 @@ def check_words(words: list[str]) -> None:
         if len(words) >= len(parts) and all(
             part == word or (part.isupper() and not word.startswith("-")) for part, word in pairs
         ):
-            shown = " ".join(part for part in parts if not part.isupper())
-            raise UsageError(f"'ppafo {shown}' is now 'ppafo {now}', with the same arguments")
+            shown = [part for part in parts if not part.isupper()]
+            rest = words[len(shown) :]
+            head, dashes, option = now.partition(" --")
+            # An option of the new line that was given before stays as it was.
+            line = head if dashes and f"--{option.split()[0]}" in rest else now
+            full = " ".join(["ppafo", line, *map(shlex.quote, rest)])
+            raise UsageError(f"'ppafo {' '.join(shown)}' is now 'ppafo {now}': {full}")
     word = given[0]
     if word in MOVED:
         raise UsageError(f"'{word}' is no longer a command of the package: run {MOVED[word]} in a checkout of ppafo")

@@ -1,17 +1,12 @@
-"""``ppafo doctor``: compilers and compiled models of this computer, and the JSON Schemas of the file formats."""
+"""``ppafo doctor``: compilers, compiled models and bits of this computer, schemas of files, completion of the line."""
 
 import importlib
-import time
-from pathlib import Path
-from typing import Any
+from typing import Literal
 
 from ppafo.cli.arguments import Name
-from ppafo.cli.output import Said
+from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, Said
 from ppafo.documents.json_text import json_text
 from ppafo.errors import DataError, SimulationError, nearest_name
-
-_DAY = 86400.0
-
 
 FORMATS: dict[str, str] = {
     "parameters": "ppafo.parameters.loading",
@@ -47,19 +42,40 @@ def _schema_of(name: str) -> Said:
     return Said(json_text(document), document, f"{name}.schema")
 
 
-def doctor(*, warm: bool = False, clear: bool = False, schema: Name | None = None) -> Said:
-    """Show compilers and compiled models of this computer; print the JSON Schema of a file format.
+def doctor(
+    *,
+    warm: bool = False,
+    clear: bool = False,
+    bits: bool = False,
+    schema: Name | None = None,
+    completion: Literal["bash", "zsh"] | None = None,
+) -> Said:
+    """Show compilers and compiled models of this computer, check its bits; print a schema, or completion for a shell.
+
+    Exit code 1 where a run has other bits than on every other computer.
 
     warm: compile the models of the scenarios of the package
     clear: remove all compiled models, and try each compiler again
+    bits: run each scenario and walk of the package for a moment, and compare every bit with those it has elsewhere
     schema: print the JSON Schema of a file format instead, such as scenario
+    completion: print a script instead that completes the line, with names: eval "$(ppafo doctor --completion bash)"
     """
     from ppafo.engine import cache
+    from ppafo.engine.kept_models import models_document, models_text
 
+    asked = {"--warm": warm, "--clear": clear, "--bits": bits, "--schema": schema, "--completion": completion}
+    given = [option for option, value in asked.items() if value]
+    if len(given) > 1:
+        raise DataError(f"{given[1]}: not allowed with {given[0]}")
     if schema is not None:
         return _schema_of(schema)
-    if warm and clear:
-        raise DataError("--clear: not allowed with --warm")
+    if completion is not None:
+        from ppafo.cli.completion import completion_script
+
+        script = completion_script(completion)
+        return Said(script, {"shell": completion, "script": script}, "completion")
+    if bits:
+        return _bits()
     folder = cache.cache_folder()
     cleared = cache.clear_kept(folder) + cache.clear(folder) if clear and folder is not None else 0
     why_not = "" if clear else cache.refusal(folder)
@@ -70,49 +86,23 @@ def doctor(*, warm: bool = False, clear: bool = False, schema: Name | None = Non
         from ppafo.simulation.simulate import compile_models
 
         compile_models(load_scenario(name) for name in list_scenarios())
-    document = _document(folder, why_not) | ({"freed": cleared} if clear else {})
-    lines = [f"compilers: {', '.join(document['compilers'])}", f"folder: {document['folder'] or 'none'}"]
-    if document["not_used"]:
-        lines.append(f"not used: {document['not_used']}")
-    if "freed" in document:
-        lines.append(f"removed: {_megabytes(document['freed'])}")
-    lines.append(f"programs: {len(document['programs'])}, {_megabytes(document['size'])}")
-    if document["made_from_programs"]:
-        lines.append(f"texts of programs and their forms for pages: {_megabytes(document['made_from_programs'])}")
-    lines += [
-        f"  {item['name']}  {_megabytes(item['size']):>8}  last used {_days(item['unused_days'])}"
-        for item in document["programs"]
-    ]
-    lines += [f"left out for a day: {name}: {why}" for name, why in document["left_out"].items()]
-    limits = f"{document['kept_unused_days']:.0f} days unused, or above {_megabytes(document['most_bytes'])} in all"
-    return Said("\n".join([*lines, f"removed by themselves: after {limits}"]), document, "doctor")
+    document = models_document(folder, why_not) | ({"freed": cleared} if clear else {})
+    return Said(models_text(document), document, "doctor")
 
 
-def _document(folder: Path | None, why_not: str) -> dict[str, Any]:
-    from ppafo.engine.cache import LONGEST_UNUSED, MAXIMUM_BYTES, kept_sizes, list_left_out, list_programs
+def _bits() -> Said:
+    """Return which runs have their golden bits here."""
     from ppafo.engine.loading import compilers_to_try
+    from ppafo.golden_bits import found_bits
 
-    programs = [] if folder is None else list_programs(folder)
-    now = time.time()
-    return {
-        "compilers": [compiler.name for compiler in compilers_to_try()],
-        "folder": None if folder is None else str(folder),
-        "not_used": why_not or None,
-        "size": sum(program.size for program in programs),
-        "made_from_programs": 0 if folder is None else sum(kept_sizes(folder)),
-        "left_out": {} if folder is None else list_left_out(folder),
-        "kept_unused_days": LONGEST_UNUSED / _DAY,
-        "most_bytes": MAXIMUM_BYTES,
-        "programs": [
-            {"name": program.place.name, "size": program.size, "unused_days": max(0.0, (now - program.used) / _DAY)}
-            for program in programs
-        ],
-    }
-
-
-def _megabytes(size: int) -> str:
-    return f"{size / 1e6:.1f} MB"
-
-
-def _days(days: float) -> str:
-    return "today" if days < 1.0 else f"{days:.0f} day{'' if int(days + 0.5) == 1 else 's'} ago"
+    found = dict(found_bits())
+    others = [name for name, is_equal in found.items() if not is_equal]
+    by = compilers_to_try()[0].name
+    text = f"bits: {len(found) - len(others)} of {len(found)} runs have the bits that they have elsewhere ({by})"
+    lines = [
+        text,
+        *(f"  {name}: other bits; give its scenario, this computer and compiler in a report" for name in others),
+    ]
+    return Said(
+        "\n".join(lines), {"compiler": by, "same_bits": found}, "bits", EXIT_CHECK_FAILED if others else EXIT_GOOD
+    )

@@ -1,52 +1,18 @@
 """``ppafo new example``: the files and scripts of the how-to pages, ready to run."""
 
 import os
-import tomllib
-from dataclasses import dataclass, replace
-from importlib import resources
-from importlib.resources.abc import Traversable
-from pathlib import Path, PurePosixPath
+from dataclasses import replace
+from pathlib import Path
 
 from ppafo.cli.output import Said, listing
+from ppafo.documents.examples import example_files, load_examples
 from ppafo.errors import DataError, nearest_name
-
-_FOLDER = resources.files("ppafo") / "examples"
-
-
-@dataclass(frozen=True, slots=True)
-class Example:
-    """What an example shows, the page that explains it, and its commands in order."""
-
-    summary: str
-    page: str
-    commands: tuple[str, ...]
-
-
-def load_examples() -> dict[str, Example]:
-    """Return the examples of the package by name."""
-    content = tomllib.loads((_FOLDER / "catalogue.toml").read_text(encoding="utf-8"))
-    return {name: Example(entry["summary"], entry["page"], tuple(entry["commands"])) for name, entry in content.items()}
-
-
-def example_files(name: str) -> dict[PurePosixPath, bytes]:
-    """Return the files of an example, by their path in its folder."""
-    return dict(sorted(_contents(_FOLDER / name, PurePosixPath())))
-
-
-def _contents(folder: Traversable, path: PurePosixPath) -> list[tuple[PurePosixPath, bytes]]:
-    found: list[tuple[PurePosixPath, bytes]] = []
-    for item in folder.iterdir():
-        if item.is_file():
-            found.append((path / item.name, item.read_bytes()))
-        elif item.name != "__pycache__":
-            found += _contents(item, path / item.name)
-    return found
 
 
 def list_examples() -> Said:
     """Return the examples with what each shows."""
     said = listing(
-        "example", [{"name": name, **_document(one)} for name, one in load_examples().items()], ("name", "summary")
+        "example", [{"name": name, **one.document()} for name, one in load_examples().items()], ("name", "summary")
     )
     return replace(said, text=f"{said.text}\n\nppafo new example NAME writes one into a new folder.")
 
@@ -66,9 +32,5 @@ def write_example(name: str, folder: Path) -> Said:
     replace_folder(folder, {str(path): content for path, content in files.items()})
     lines = [f"written: {folder}, {', '.join(map(str, files))}", f"page: {example.page}"]
     lines += ["run there:", *(f"  {command}" for command in example.commands)]
-    document = {"name": name, "folder": str(folder), "files": [str(path) for path in files], **_document(example)}
+    document = {"name": name, "folder": str(folder), "files": [str(path) for path in files], **example.document()}
     return Said("\n".join(lines), document)
-
-
-def _document(example: Example) -> dict[str, object]:
-    return {"summary": example.summary, "page": example.page, "commands": list(example.commands)}

@@ -1,7 +1,7 @@
 """``ppafo export opensim``: a walk or a recording in the names and signs of OpenSim."""
 
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -11,8 +11,6 @@ from ppafo.cli.output import Said
 from ppafo.errors import DataError
 
 COMMAND = "export opensim"
-_FEW_STRIDES = 0.2
-"""Minutes of a walk without a course for OpenSim, unless given."""
 _RECORDINGS = (".csv", ".nc")
 
 
@@ -51,10 +49,12 @@ def export_opensim(
             raise DataError(f"{option}: is for {other}")
     if is_recording:
         return _recorded(path, side, body_mass, out)
+    from ppafo.exports.opensim import files_of_walk
+
     return output.export(
         out,
         COMMAND,
-        lambda: _walked(walk, overrides, gait, minutes, side, strikes),
+        lambda: files_of_walk(walk, overrides, gait, minutes, side, strikes),
         lambda _: _next(out, "device_torque.sto"),
     )
 
@@ -64,41 +64,17 @@ def _next(out: Path, file: str) -> str:
 
 
 def _recorded(path: Path, side: Side, mass: float | None, out: Path) -> Said:
-    from ppafo.storage import read_recording
-    from ppafo.storage.opensim import opensim_bytes, opensim_recording
+    from ppafo.exports.opensim import files_of_recording
 
     missing: list[str] = []
 
     def make() -> dict[str, bytes]:
-        recording, found = opensim_recording(read_recording(path), side, mass)
+        files, found = files_of_recording(path, side, mass)
         missing.extend(found)
-        return {"recording.sto": opensim_bytes(recording)}
+        return files
 
     def following(_: Sequence[str]) -> str:
         left_out = f"\nleft out: {', '.join(missing)}, which are per body mass: give --body-mass" if missing else ""
         return f"{_next(out, 'recording.sto')}{left_out}"
 
     return output.export(out, COMMAND, make, following)
-
-
-def _walked(
-    name: str,
-    overrides: Sequence[str],
-    gait: str | Path | None,
-    minutes: float | None,
-    side: Side,
-    strikes: tuple[float, ...] | None,
-) -> Mapping[str, bytes]:
-    from ppafo.exports.opensim import check_strikes, opensim_files
-    from ppafo.walking.loading import check_duration_once, load_walk
-    from ppafo.walking.motion import check_led, walk_of
-    from ppafo.walking.walk import walk
-
-    if strikes is not None:
-        check_strikes(strikes)
-    check_duration_once(overrides, minutes)
-    chosen = load_walk(name, overrides, gait)
-    check_led(chosen, "a torque file for OpenSim")
-    few_strides = _FEW_STRIDES if walk_of(chosen).course is None else None
-    result = walk(chosen, few_strides if minutes is None else minutes)
-    return opensim_files(result, side, strikes or ())

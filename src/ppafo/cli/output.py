@@ -195,6 +195,17 @@ def export(
     return Said(f"written: {out} ({', '.join(files)}); next: {said}", document)
 
 
+def export_file(out: Path, make: Callable[[], bytes], following: str) -> Said:
+    """Write the one file of a scenario for another tool, where none is yet, and return what to do next with it."""
+    from ppafo.storage.files import check_files_can_be_added, write_file
+
+    check_new_file(out)
+    with blame_out_option():
+        check_files_can_be_added(out.parent, [out.name])
+    write_file(out, make())
+    return Said(f"written: {out}; next: {following}", {"file": str(out), "next": following})
+
+
 def listing(noun: str, rows: Sequence[Mapping[str, Any]], columns: Sequence[str] = ()) -> Said:
     """Return a list of what there is: a row each, of these columns (all without), and all of it as data."""
     from ppafo.answers.writing import align_columns

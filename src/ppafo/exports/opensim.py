@@ -6,18 +6,24 @@ optimisation gives every actuator a control of its own, and gave the device 0 N 
 
 from collections.abc import Sequence
 from itertools import pairwise
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
 from ppafo.errors import ScenarioError
 from ppafo.signals import Channel, Recording
+from ppafo.storage import read_recording
 from ppafo.storage.opensim import opensim_bytes, opensim_recording
-from ppafo.walking.motion import walk_of
+from ppafo.walking.loading import check_duration_once, load_walk
+from ppafo.walking.motion import check_led, walk_of
 from ppafo.walking.result import WalkResult
 from ppafo.walking.strides import PHASES
+from ppafo.walking.walk import walk
 
 Side = Literal["right", "left"]
+FEW_STRIDES = 0.2
+"""Minutes of a walk without a course, unless given."""
 SHORTEST_STRIDE, LONGEST_STRIDE = 0.4, 5.0
 """Between two heel strikes of a foot [s]."""
 
@@ -30,6 +36,31 @@ def opensim_files(result: WalkResult, side: Side = "right", strikes: Sequence[fl
     torque = device_torque(result, side, strikes)
     named, _ = opensim_recording(result.recording, side, walk_of(result.scenario).wearer.body_mass)
     return {"device_torque.sto": opensim_bytes(torque), "walk.sto": opensim_bytes(named)}
+
+
+def files_of_walk(
+    name: str,
+    overrides: Sequence[str],
+    gait: str | Path | None,
+    minutes: float | None,
+    side: Side,
+    strikes: tuple[float, ...] | None,
+) -> dict[str, bytes]:
+    """Return the files of a walk by its name, without a course of ``minutes`` [min], ``FEW_STRIDES`` unless given."""
+    if strikes is not None:
+        check_strikes(strikes)
+    check_duration_once(overrides, minutes)
+    chosen = load_walk(name, overrides, gait)
+    check_led(chosen, "a torque file for OpenSim")
+    few_strides = FEW_STRIDES if walk_of(chosen).course is None else None
+    result = walk(chosen, few_strides if minutes is None else minutes)
+    return opensim_files(result, side, strikes or ())
+
+
+def files_of_recording(path: Path, side: Side, body_mass: float | None) -> tuple[dict[str, bytes], list[str]]:
+    """Return the file of a recording for OpenSim, and the channels left out because they need a ``body_mass`` [kg]."""
+    recording, missing = opensim_recording(read_recording(path), side, body_mass)
+    return {"recording.sto": opensim_bytes(recording)}, list(missing)
 
 
 def coordinate_of(side: Side) -> str:

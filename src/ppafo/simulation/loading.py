@@ -144,6 +144,13 @@ def read_hardware(reading: Reading, request: ScenarioRequest, overrides: tuple[s
     try:
         check_valve(in_file.get("overrides", ()), in_file.get("valve"), f"device.valve = '{in_file.get('valve')}'")
         parameter_set = request.parameter_set or load_parameter_set(set_name(section["set"], request.folder))
+        kinds = parameter_set.valve_kinds
+        if valve is not None and valve not in kinds and not nearest_name(valve, kinds):
+            # The scenario names the valve of another device.
+            raise ParameterError(
+                f"{parameter_set.file}: there is no valve '{valve}'; it has {', '.join(kinds)}: "
+                f"--set device.valve={parameter_set.default_valve}"
+            )
         name = chosen_valve(parameter_set, valve)
         parameter_set = apply_device_overrides(parameter_set, section.get("overrides", ()), valve)
     except ParameterError as error:

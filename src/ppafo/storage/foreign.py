@@ -126,6 +126,8 @@ def read_foreign(
     """
     content = read_bytes(path)
     with refused_as(DataError, path, DataError):
+        if Path(path).suffix.lower() == ".nc":
+            raise DataError("is a NetCDF file, which names its own channels and units: read it without a column map")
         lines = _lines(content, columns.encoding)
         if TIME not in columns.channels:
             raise DataError(f"the column map has no channel '{TIME}'")

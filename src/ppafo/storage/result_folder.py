@@ -46,6 +46,8 @@ MARK = "ppafo.json"
 
 _FORMAT = "ppafo files"
 _HASHES = "sha256"
+_RENAMED = {"endurance": "bottle"}
+"""Commands under their earlier names, whose folders are those of the new ones."""
 NOTHING_KEPT: Mapping[str, bytes] = MappingProxyType({})
 
 
@@ -78,7 +80,8 @@ def marking_command(folder: Path) -> str:
     """Return the command that ``MARK`` in a folder names, empty where it is not one of ours."""
     document = read_json(folder / MARK)
     is_own = isinstance(document, dict) and document.get("format") == _FORMAT
-    return str(document.get("command", "")) if is_own else ""
+    command = str(document.get("command", "")) if is_own else ""
+    return _RENAMED.get(command, command)
 
 
 def add_to_folder(folder: Path, contents: Mapping[str, bytes]) -> None:

@@ -1,6 +1,6 @@
 """What happens in a walk and when: events of the stride, true and known to the controller, and every loss of help.
 
-Less help, a pause, a stop or a return of help is listed with the sign that caused it, the readings and the settings.
+Less help, a pause, a stop or a return of help is listed with its fault flag, the readings and the settings.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.control.walking.signs import SIGNS, Sign
+from ppafo.control.walking.fault_flags import FAULT_FLAGS, FaultFlag
 from ppafo.engine.lanes import Floats
 from ppafo.model import contact as ground
 from ppafo.model.helping import HELPS, LIFTS, PAUSED, STOPPED, SWING
@@ -42,14 +42,16 @@ SAFE_ROW = "controller_state.safety.level"
 SILENT_ROW = "unpowered.silent"
 """For how long the controller has been silent, where a shut-off valve has a watchdog."""
 
-SILENT = Sign("silent_controller", "the controller takes no samples: the watchdog has shut the supply off", (), ())
+SILENT = FaultFlag(
+    "silent_controller", STOPPED, "the controller takes no samples: the watchdog has shut the supply off", (), ()
+)
 """What a watchdog sees, which no controller can."""
 
 VENTINGS_ROW = "controller_state.safety.ventings"
 """And how often they gave less help: lifted only, paused or stopped."""
 
 FINDING_ROW = "controller_state.safety.finding"
-"""And the last sign by which they did, with the readings then."""
+"""And the last fault flag by which they did, with the readings then."""
 
 REQUEST_ROW = "controller_state.request.torque"
 """Where those that follow a torque keep the one they want."""
@@ -145,7 +147,7 @@ class SafetyEvent:
 
     time: float
     level: float
-    sign: Sign | None = None
+    fault_flag: FaultFlag | None = None
     readings: Mapping[str, float] = field(default_factory=dict)
     settings: Mapping[str, float] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
@@ -154,20 +156,20 @@ class SafetyEvent:
     @property
     def message(self) -> str:
         """The event in one line."""
-        if self.sign is None:
+        if self.fault_flag is None:
             return f"{_RETURNS[self.level]} at {self.time:.2f} s"
         head = f"{_WORDS[self.level]} {self.time:.2f} s"
         zero = self.atmosphere
         shown = [f"{_word(name)} {_text(value, _UNITS[name], zero)}" for name, value in self.readings.items()]
         limits = [f"{name} {_text(value, self.units[name], zero)}" for name, value in self.settings.items()]
-        return f"{head}: {self.sign.summary}; {'; '.join(', '.join(part) for part in (shown, limits) if part)}"
+        return f"{head}: {self.fault_flag.summary}; {'; '.join(', '.join(part) for part in (shown, limits) if part)}"
 
     def to_dict(self) -> dict[str, Any]:
         """Return the event as plain data, in SI units."""
         return {
             "time": self.time,
             "kind": _NAMES[self.level],
-            "sign": None if self.sign is None else self.sign.name,
+            "fault_flag": None if self.fault_flag is None else self.fault_flag.name,
             "readings": dict(self.readings),
             "settings": dict(self.settings),
             "message": self.message,
@@ -203,15 +205,15 @@ def _silenced(configuration: Scenario, time: Floats, record: Mapping[str, Floats
 def _venting(
     configuration: Scenario, time: float, level: float, record: Mapping[str, Floats], place: int
 ) -> SafetyEvent:
-    sign = SIGNS[float(record[f"{FINDING_ROW}.sign"][place])]
+    flag = FAULT_FLAGS[float(record[f"{FINDING_ROW}.fault_flag"][place])]
     quantities = {item.name: item for item in law_of(configuration).quantities}
     return SafetyEvent(
         time=time,
         level=level,
-        sign=sign,
-        readings={name: float(record[f"{FINDING_ROW}.{name}"][place]) for name in sign.readings},
-        settings={name: configuration.control.settings[name] for name in sign.settings},
-        units={name: quantities[name].unit for name in sign.settings},
+        fault_flag=flag,
+        readings={name: float(record[f"{FINDING_ROW}.{name}"][place]) for name in flag.readings},
+        settings={name: configuration.control.settings[name] for name in flag.settings},
+        units={name: quantities[name].unit for name in flag.settings},
         atmosphere=configuration.device.supply.atmospheric_pressure,
     )
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ppafo.answers.display_units import display_values, title_with_unit
 from ppafo.answers.style import BLUE, GREY, VERMILION, house_style, mark_kind
 from ppafo.control.walking import event_on_off
-from ppafo.control.walking.signs import SIGNS
+from ppafo.control.walking.fault_flags import FAULT_FLAGS
 from ppafo.engine.lane_rows import LANES
 from ppafo.engine.lanes import STEPS_PER_CALL, Batch, BatchResult, Floats, begin_block, run_batch
 from ppafo.engine.rows import row_numbers
@@ -291,7 +291,7 @@ class Population:
 
     ``diverged`` counts the wearers whose walk left what is possible; they are not in ``outcomes`` nor in ``traits``.
     ``vented`` counts those whose controller stopped for good, ``paused`` the others who had less help for a while.
-    ``signs`` counts both by the last sign that was seen, with the most frequent first.
+    ``fault_flags`` counts both by the last one that was seen, with the most frequent first.
     """
 
     scenario: Scenario
@@ -302,7 +302,7 @@ class Population:
     diverged: int
     vented: int
     paused: int
-    signs: Mapping[str, int]
+    fault_flags: Mapping[str, int]
 
     @property
     def count(self) -> int:
@@ -369,11 +369,11 @@ def walk_population(
 
 
 def _less_help(rows: Mapping[str, Floats], good: NDArray[np.bool_]) -> tuple[int, int, dict[str, int]]:
-    """Return how many of the good walks ended stopped, how many others had less help, and the last signs of both."""
+    """Return how many of the good walks ended stopped, how many others had less help, and the last flags of both."""
     if SAFE_ROW not in rows:
         return 0, 0, {}
     stopped, less = rows[SAFE_ROW][good] == STOPPED, rows[VENTINGS_ROW][good] > 0.0
-    last = Counter(SIGNS[sign].name for sign in rows[f"{FINDING_ROW}.sign"][good][less].tolist())
+    last = Counter(FAULT_FLAGS[flag].name for flag in rows[f"{FINDING_ROW}.fault_flag"][good][less].tolist())
     return int(stopped.sum()), int((~stopped & less).sum()), dict(last.most_common())
 
 

@@ -1,10 +1,14 @@
 """``ppafo doctor`` shows, compiles and removes the compiled models."""
 
 import json
+import shutil
+import subprocess
 from pathlib import Path
 
 import pytest
 
+from ppafo import golden_bits
+from ppafo.cli.completion import completion_script
 from ppafo.cli.main import main
 from ppafo.engine import loading
 from ppafo.engine.cache import load_generated
@@ -59,3 +63,51 @@ def test_model_that_was_compiled_for_later_is_the_one_that_a_run_uses(fresh_cach
     wanted = loading._load_by.cache_info().misses
     simulate.simulate(load_scenario("torque-task-proportional", ["run.duration=10 ms"]))
     assert loading._load_by.cache_info().misses == wanted == 1
+
+
+def test_bits_are_compared_with_the_golden_ones_and_another_is_named(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    names = ("swing-foot", "torque-task-proportional")
+    monkeypatch.setattr(golden_bits, "names", lambda: names)
+    assert main(["doctor", "--bits", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["same_bits"] == dict.fromkeys(names, True)
+    golden = dict(golden_bits.golden_hashes())
+    golden["swing-foot"] = {**golden["swing-foot"], "run": "0" * 16}
+    monkeypatch.setattr(golden_bits, "golden_hashes", lambda: golden)
+    assert main(["doctor", "--bits"]) == 1
+    said = capsys.readouterr().out
+    assert "1 of 2 runs" in said
+    assert "swing-foot: other bits" in said
+
+
+def test_two_orders_to_the_doctor_at_once_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["doctor", "--bits", "--clear"]) == 2
+    assert capsys.readouterr().err == "ppafo: --bits: not allowed with --clear\n"
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="needs bash")
+@pytest.mark.parametrize(
+    ("line", "found"),
+    [
+        ("wal", ["walk"]),
+        ("sets aud", ["audit"]),
+        ("sets audit ppafo2011-", ["ppafo2011-printed"]),
+        ("simulate --check torque-task-so", ["torque-task-solenoid"]),
+        ("simulate --ch", ["--check"]),
+        ("doctor --completion ba", ["bash"]),
+    ],
+)
+def test_a_line_is_completed_in_bash(line: str, found: list[str]) -> None:
+    words = ["ppafo", *line.split()]
+    typed = f"COMP_WORDS=({' '.join(words)}); COMP_CWORD={len(words) - 1}; _ppafo; echo ${{COMPREPLY[@]}}"
+    script = f"{completion_script('bash')}\n{typed}"
+    done = subprocess.run(["bash", "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == found
+
+
+def test_the_script_for_zsh_is_that_for_bash_behind_its_own_reader(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["doctor", "--completion", "zsh"]) == 0
+    head, _, rest = capsys.readouterr().out.partition("\n")
+    assert head == "autoload -U +X bashcompinit && bashcompinit"
+    assert rest.strip() == completion_script("bash").strip()

@@ -56,6 +56,20 @@ def test_the_commands_of_the_page_write_units(
     assert "next: fmpy simulate out/unit/torque_task_proportional.fmu" in capsys.readouterr().out
 
 
+def test_a_name_that_ends_in_fmu_is_the_unit_itself(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("ppafo.exports.fmu.build", lambda *given: str(given[0]).encode())
+    file = tmp_path / "out" / "a.fmu"
+    assert main(["export", "fmu", "step-response", "--out", str(file)]) == 0
+    assert f"written: {file}; next: fmpy simulate {file}" in capsys.readouterr().out
+    with zipfile.ZipFile(file) as archive:
+        assert "modelDescription.xml" in archive.namelist()
+    assert main(["export", "fmu", "step-response", "--out", str(file)]) == 2
+    assert f"--out {file}: already exists" in capsys.readouterr().err
+    assert list(file.parent.iterdir()) == [file]
+
+
 def with_exponential(
     law: ConstantParameters, state: tuple[()], wanted: float, seen: Measurement, period: float
 ) -> tuple[float, tuple[()]]:

@@ -65,7 +65,10 @@ def test_the_schemas_describe_a_gait_file_and_a_map(capsys: pytest.CaptureFixtur
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["import", "WALK", "--body-mass", "62 kg", "--stature", "180"], "--stature 180: a number without a unit"),
+        (
+            ["import", "WALK", "--body-mass", "62 kg", "--stature", "180"],
+            "--stature 180: a length needs its unit",
+        ),
         (["import", "WALK", "--body-mass", "62 kg", "--stature", "180 m"], "a stature of 180 m is not plausible"),
         (
             ["import", "WALK", "--body-mass", "62 kg", "--minimum-strides", "-"],

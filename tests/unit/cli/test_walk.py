@@ -198,7 +198,7 @@ def test_a_stop_is_told_with_its_sign_readings_settings_and_time(
     assert "implausible foot force" in (tmp_path / "walk/report.html").read_text()
     document = json.loads((tmp_path / "walk" / "walk.json").read_text())
     (event,) = document["events"]
-    assert (event["kind"], event["sign"], event["settings"]) == (
+    assert (event["kind"], event["fault_flag"], event["settings"]) == (
         "stop",
         "force_range",
         {"lowest_force": -40.0, "largest_force": 3000.0},

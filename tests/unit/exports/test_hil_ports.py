@@ -332,6 +332,8 @@ def test_a_port_that_is_none_is_one_line(
         line = capsys.readouterr().err
         assert f"--port {text}: {said}" in line
         assert len(line.splitlines()) == 1
+        assert "Errno" not in line
+        assert line.lower().count("no such file") == text.startswith("serial:/")
     assert not list(tmp_path.iterdir())
 
 

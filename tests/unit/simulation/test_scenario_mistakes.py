@@ -256,6 +256,12 @@ def test_a_mistake_in_the_device_names_scenario_and_set() -> None:
     assert "there is no parameter set 'ppafo2012', did you mean 'ppafo2011'?" in message
 
 
+def test_a_set_without_the_valve_of_the_scenario_names_the_option_that_takes_its_own() -> None:
+    text = TEXT.replace('"ppafo2011"', '"cylinder-lever"').replace('valve = "proportional"', 'valve = "solenoid"')
+    message = problem_with(text.encode(), ParameterError)
+    assert message.endswith("there is no valve 'solenoid'; it has proportional: --set device.valve=proportional")
+
+
 def test_a_set_that_is_not_complete_says_which_one_is() -> None:
     assert "use 'ppafo2011', which completes it" in problem_after('"ppafo2011"', '"ppafo2011-printed"', ParameterError)
 

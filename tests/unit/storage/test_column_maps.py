@@ -169,6 +169,13 @@ def test_what_is_wrong_is_named_with_its_place(tmp_path: Path, text: str | bytes
     assert str(caught.value).startswith(str(tmp_path / "raw.csv"))
 
 
+def test_a_netcdf_file_is_not_taken_for_text_in_another_encoding(tmp_path: Path) -> None:
+    path = tmp_path / "damaged.nc"
+    path.write_bytes(b"\x89HDF\r\n\x1a\n\xff\xfe damaged")
+    with pytest.raises(DataError, match=r"damaged.nc: is a NetCDF file, .* read it without a column map$"):
+        read_foreign(path, mapped(channels={}))
+
+
 @pytest.mark.parametrize(
     ("channel", "message"),
     [

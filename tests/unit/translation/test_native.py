@@ -14,10 +14,11 @@ from ppafo.engine.compilers import CompilerError
 from ppafo.engine.lanes import Batch, load_program, run_batch
 from ppafo.engine.run import batch_of
 from ppafo.errors import ProgramError, SimulationError
+from ppafo.golden_bits import digest
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.translation import native
-from scripts.golden_bits import digest, drawn_batch
+from scripts.golden_bits import drawn_batch
 
 needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
 SHORT = ["run.duration=20 ms"]

@@ -26,7 +26,7 @@ MOST_PINCHED = 0.01
 """Part of drawn walks in which a vented chamber presses a heel that carries: 2 of 400 with the solenoid pair."""
 
 BEHIND_A_KINK = 0.7
-"""Time after its sign [s] in which a chamber empties whose hose is kinked: no valve reaches its gas."""
+"""Time after its flag [s] in which a chamber empties whose hose is kinked: no valve reaches its gas."""
 
 
 @pytest.mark.parametrize(("count", "seed"), [(30, SEED), pytest.param(300, 8, marks=pytest.mark.thorough)])

@@ -186,8 +186,8 @@ def test_wearers_whose_controller_paused_or_stopped_are_counted_with_the_sign() 
     given = ["faults.heel.kind=stuck", "faults.heel.time=3 s", "controller.largest_drop=10000 N"]
     people = walk_population(load_walk("solenoid", given), 0.15, 9)
     assert (people.vented, people.paused) == (0, 9)
-    assert sum(people.signs.values()) == 9
-    assert set(people.signs) <= {"no_heel", "toe_strides"}
+    assert sum(people.fault_flags.values()) == 9
+    assert set(people.fault_flags) <= {"no_heel", "toe_strides"}
     configuration = load_walk("solenoid", ["faults.toe.kind=frozen", "faults.toe.time=3.2 s"])
     people = walk_population(configuration, 0.15, 9)
     assert people.vented + people.paused == 9
@@ -199,4 +199,4 @@ def test_a_toe_channel_that_shows_the_heel_brakes_no_push_off() -> None:
     result = walk(load_walk("proportional", fault), 0.09)
     on_toes = result.recording["contact"] == TOE
     assert -result.recording["torque"][on_toes].min() < 0.5
-    assert [event.sign.name for event in result.events if event.sign is not None][:1] == ["no_toe_off"]
+    assert [event.fault_flag.name for event in result.events if event.fault_flag is not None][:1] == ["no_toe_off"]

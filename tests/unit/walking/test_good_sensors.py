@@ -78,7 +78,7 @@ def test_coarse_sensors_take_no_help_away_on_a_course_with_stops() -> None:
     """Their steps hold a reading for long: half to seven tenths of the wearers paused by a sensor that seemed still."""
     people = walk_population(load_walk("solenoid", SENSORS["coarse"], course="corridor"), None, 24)
     assert people.vented == 0
-    assert not [name for name in people.signs if name.startswith(("still_", "frozen_"))]
+    assert not [name for name in people.fault_flags if name.startswith(("still_", "frozen_"))]
 
 
 def test_an_impaired_wearer_has_no_moment_of_dorsiflexors_to_speak_of() -> None:

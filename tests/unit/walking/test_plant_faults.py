@@ -53,8 +53,8 @@ def rows_of(run) -> dict[str, int]:  # type: ignore[no-untyped-def]
 def test_a_valve_stuck_open_is_found_and_only_a_shut_off_takes_its_torque_away(part: str) -> None:
     bare, safe = broken("proportional", part, "stuck"), broken("proportional", part, "stuck", SHUT_OFF)
     for result in (bare, safe):
-        assert result.events[0].sign is not None
-        assert result.events[0].sign.name in ("valve_open", "valve_shut")
+        assert result.events[0].fault_flag is not None
+        assert result.events[0].fault_flag.name in ("valve_open", "valve_shut")
         assert result.events[0].time < FAILS + 2.0 * walk_of(result.scenario).gait.stride_time
     settled = bare.recording.time > bare.events[0].time + 0.5
     device = bare.scenario.device
@@ -71,12 +71,12 @@ def test_the_sign_names_the_cause() -> None:
         ("regulator_2", "frozen", ("supply_low",)),
         ("bottle", "empty", ("supply_low", "supply_lost")),
         ("hose_1", "off", ("supply_lost",)),
-        # It fills too little and vents too slowly: both signs name a kinked hose.
+        # It fills too little and vents too slowly: both flags name a kinked hose.
         ("hose_2", "kinked", ("supply_low", "valve_shut")),
     ):
         (event, *_) = broken("solenoid", part, kind).events
-        assert event.sign is not None
-        assert event.sign.name in names, (part, kind)
+        assert event.fault_flag is not None
+        assert event.fault_flag.name in names, (part, kind)
 
 
 def test_help_comes_back_after_a_brown_out() -> None:
@@ -98,7 +98,10 @@ def test_a_fault_that_a_part_does_not_have_and_a_regulator_behind_lines_are_refu
 def test_a_controller_that_is_silent_for_too_long_is_shut_off_by_the_watchdog_and_a_shorter_silence_is_not() -> None:
     late = ("faults.controller.kind=late", "faults.controller.time=3.2 s", SHUT_OFF)
     patient, watched = (walk("solenoid", 0.12, (*late, *more)) for more in (("shut_off.silence=1 s",), ()))
-    seen = [[(event.time, event.sign.name) for event in found.events if event.sign] for found in (patient, watched)]
+    seen = [
+        [(event.time, event.fault_flag.name) for event in found.events if event.fault_flag]
+        for found in (patient, watched)
+    ]
     assert seen[1] == [(pytest.approx(3.21, abs=2e-3), "silent_controller")]
     assert watched.events[-1].level == STOPPED
     assert "silent_controller" not in [name for _, name in seen[0]]

@@ -6,15 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from ppafo.cli.arguments import (
-    Folder,
-    Name,
-    Overrides,
-    Time,
-    Volume,
-    Whole,
-    Word,
-)
+from ppafo.cli.arguments import Count, File, Folder, Name, Overrides, Patience, Port, Time, Volume, Whole, Word
 from ppafo.progress import Report, report_nothing
 
 if TYPE_CHECKING:
@@ -62,6 +54,59 @@ def rig_simulate(
     counted = f"{len(made.recording)} samples of {', '.join(made.recording.names)}"
     text = f"{experiment}: {NOTICE}\n{counted}\nwritten: {out} ({', '.join(files)})"
     return Said(text, {"folder": str(out), "files": list(files), **made.truth})
+
+
+def rig_record(
+    *, port: Port, baud: Count = 921600, duration: Time | None = None, patience: Patience = 5.0, out: File
+) -> Said:
+    """Record a bench that speaks the protocol of 'ppafo hil'.
+
+    Exit code 1 where the port broke, 130 where Ctrl-C stopped it.
+
+    port: where the bench sends: udp:HOST:PORT or serial:DEVICE (extra 'hil'); UDP listens at the address
+    baud: bits per second of a serial line; default 921600
+    duration: end after this time of the bench, for example '10 s'
+    patience: end, or give up, after this time without a sample; default '5 s'
+    out: the .csv file to write
+    """
+    from ppafo.cli import output
+    from ppafo.errors import DataError
+
+    if duration is not None and duration <= 0.0:
+        raise DataError("--duration: must be above 0 s")
+    output.check_new_file(out)
+    if out.suffix != ".csv":
+        raise DataError(f"--out {out}: must end in .csv")
+    from ppafo.storage.files import check_files_can_be_added
+
+    with output.blame_out_option():
+        check_files_can_be_added(out.parent, [out.name])
+    from ppafo.exports.hil.loop import stop_by_interrupt
+    from ppafo.exports.hil.recording import kept_aside, record
+    from ppafo.exports.hil.wire import open_port
+    from ppafo.storage.comma_separated import write_csv
+
+    wire = open_port(port, baud, listens=True)
+    try:
+        output.tell(f"listening at {port}")
+        with stop_by_interrupt() as is_stopped, kept_aside(out) as keep:
+            found = record(wire, out.stem, duration, patience, is_stopped, keep=keep)
+            write_csv(out, found.recording)
+        is_broken = bool(wire.failure)
+    finally:
+        wire.close()
+    code = output.EXIT_INTERRUPTED if found.is_stopped else output.EXIT_CHECK_FAILED if is_broken else output.EXIT_GOOD
+    aside = f"stopped; {out} is whole" if found.is_stopped else ""
+    document = {"file": str(out), **found.document()}
+    return output.Said(f"{found.text()}\nwritten: {out}", document, exit_code=code, aside=aside)
+
+
+def list_rig() -> Said:
+    """Return the experiments and the presets with what they are."""
+    from ppafo.cli.output import Said
+    from ppafo.rig.overview import overview
+
+    return Said(*overview())
 
 
 def identify(

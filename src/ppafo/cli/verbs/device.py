@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from ppafo.cli.arguments import File, Overrides, Scenario, Word
+from ppafo.cli.arguments import File, Overrides, Scenario, SetName, Word
 
 if TYPE_CHECKING:
     from ppafo.cli.output import Said
@@ -43,6 +43,34 @@ def sets_list() -> Said:
     sets = [load_parameter_set(name) for name in list_sets()]
     rows = [{"name": item.name, "title": item.title, "valves": dict(item.valve_kinds)} for item in sets]
     return listing("set", rows, ("name", "title"))
+
+
+def sets_show(name: SetName, *, overrides: Overrides = ()) -> Said:
+    """Show every value of a parameter set with its source."""
+    from ppafo.cli.output import Said
+    from ppafo.parameters import apply_overrides, load_parameter_set
+    from ppafo.questions.sets.values import values_document, values_text
+
+    document = values_document(apply_overrides(load_parameter_set(name), overrides))
+    return Said(values_text(document), document, document["name"])
+
+
+def sets_audit(
+    names: Sequence[SetName], *, parent: SetName | None = None, all_: bool = False, overrides: Overrides = ()
+) -> Said:
+    """Check a parameter set for contradictions.
+
+    Changes and findings of one set, or a table of several; exit code 1 where a finding is an error.
+
+    names: name of a set, or a .toml file; several are shown side by side
+    parent: show what changed against this set, in place of the one that the file names
+    all_: print what concerns no changed value too, of a set with a parent or --set
+    """
+    from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, Said
+    from ppafo.questions.sets.audit import audited
+
+    found = audited(names, parent, all_, overrides)
+    return Said(found.text, found.document, found.name, EXIT_GOOD if found.passed else EXIT_CHECK_FAILED)
 
 
 def sets_parts(

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from ppafo.cli.arguments import Folder, Overrides, Scenario, Word
@@ -65,18 +67,22 @@ def export_fmu(
 
     fmi: version of FMI; default 2
     platforms: what it is to run on, separated by commas: linux64, win64, ...; default: this computer
-    out: the folder to write
+    out: the folder to write, or the unit itself: a name that ends in .fmu
     """
-    from ppafo.cli.output import export
+    from ppafo.cli.output import export, export_file
     from ppafo.exports.fmu import closed_loop, functional_unit, host_platform, plant_alone
     from ppafo.loading import load_scenario
 
     made = {"loop": closed_loop, "plant": plant_alone}[interface]
     chosen = [host_platform()] if platforms is None else platforms.split(",")
     wanted = list(dict.fromkeys(one.strip() for one in chosen if one is not None))
-    return export(
-        out,
-        "export fmu",
-        lambda: functional_unit(made(load_scenario(scenario, overrides)), int(fmi), wanted),
-        lambda files: f"fmpy simulate {shlex.quote(str(out / files[0]))} --show-plot",
-    )
+
+    def unit() -> Mapping[str, bytes]:
+        return functional_unit(made(load_scenario(scenario, overrides)), int(fmi), wanted)
+
+    def following(file: Path) -> str:
+        return f"fmpy simulate {shlex.quote(str(file))} --show-plot"
+
+    if out.suffix == ".fmu" and not out.is_dir():
+        return export_file(out, lambda: next(iter(unit().values())), following(out))
+    return export(out, "export fmu", unit, lambda files: following(out / files[0]))

@@ -12,9 +12,9 @@ from dataclasses import replace
 from typing import Any, NamedTuple, Protocol
 
 from ppafo.control.walking import phases, safety
+from ppafo.control.walking.fault_checks import SAFETY_QUANTITIES, SafetyRules
 from ppafo.control.walking.phases import PHASE_QUANTITIES, PhaseRules, PhaseState
 from ppafo.control.walking.safety import SafetyState
-from ppafo.control.walking.signs import SAFETY_QUANTITIES, SafetyRules
 from ppafo.control.walking.timing import GaitTime, follow_thresholds, threshold_time
 from ppafo.model.declaration import Quantity
 from ppafo.model.helping import MID_STANCE, PUSH_OFF

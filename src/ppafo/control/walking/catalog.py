@@ -20,9 +20,9 @@ from ppafo.control.kind import ControllerKind
 from ppafo.control.walking import assistance, event_on_off, learning, phases, safety
 from ppafo.control.walking.assistance import ASSISTING_QUANTITIES, Assistance, TorqueRequest, assess, with_defaults
 from ppafo.control.walking.estimated_timing import ESTIMATED
+from ppafo.control.walking.fault_checks import SafetyRules
 from ppafo.control.walking.phases import PhaseRules, PhaseState
 from ppafo.control.walking.safety import SafetyState
-from ppafo.control.walking.signs import SafetyRules
 from ppafo.control.walking.timing import FRACTIONAL, THRESHOLDS, ThresholdClock, ThresholdRules, TimingKind
 from ppafo.errors import ScenarioError
 from ppafo.kinds import Kinds

@@ -10,9 +10,9 @@ from typing import NamedTuple
 from ppafo.control.kind import ControllerKind
 from ppafo.control.walking import phases, safety
 from ppafo.control.walking.assistance import timed_phase
+from ppafo.control.walking.fault_checks import SAFETY_QUANTITIES, SafetyRules
 from ppafo.control.walking.phases import PHASE_QUANTITIES, PhaseRules, PhaseState
 from ppafo.control.walking.safety import SafetyState
-from ppafo.control.walking.signs import SAFETY_QUANTITIES, SafetyRules
 from ppafo.control.walking.timing import ThresholdClock, ThresholdRules
 from ppafo.model.declaration import Quantity
 from ppafo.model.helping import PUSH_OFF

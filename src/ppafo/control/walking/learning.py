@@ -24,9 +24,9 @@ from ppafo.control.walking.assistance import (
     assess,
     with_defaults,
 )
+from ppafo.control.walking.fault_checks import SafetyRules
 from ppafo.control.walking.phases import PhaseRules, PhaseState
 from ppafo.control.walking.safety import SafetyState
-from ppafo.control.walking.signs import SafetyRules
 from ppafo.control.walking.timing import ThresholdClock, ThresholdRules
 from ppafo.model.declaration import Quantity
 from ppafo.model.helping import PUSH_OFF

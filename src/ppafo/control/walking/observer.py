@@ -16,6 +16,15 @@ Every number is a setting whose default follows the device; ``nominal_flow`` 0 s
 import math
 from typing import NamedTuple
 
+from ppafo.control.walking.fault_flags import (
+    LEAK,
+    NO_FLAG,
+    SUPPLY_HIGH,
+    SUPPLY_LOST,
+    SUPPLY_LOW,
+    VALVE_OPEN,
+    VALVE_SHUT,
+)
 from ppafo.model.declaration import (
     NOMINAL,
     PRESSURE_LAG,
@@ -23,15 +32,6 @@ from ppafo.model.declaration import (
 )
 from ppafo.model.regulator import LineState, SupplyLines, step_lines
 from ppafo.model.valves.kind import VENTS_ABOVE
-
-NO_CAUSE = 0.0
-SUPPLY_HIGH = 6.0
-SUPPLY_LOW = 7.0
-SUPPLY_LOST = 8.0
-VALVE_OPEN = 9.0
-VALVE_SHUT = 10.0
-LEAK = 11.0
-"""Signs that stop, numbered among those of ``signs``."""
 
 
 class NominalDevice(NamedTuple):
@@ -426,7 +426,7 @@ def cause_of(
     vented: bool,
     period: float,
 ) -> float:
-    """The sign of a chamber with a reading [Pa] in its volume [m^3], fed from a supply [Pa] or vented; 0 for none."""
+    """The flag of a chamber with a reading [Pa] in its volume [m^3], fed from a supply [Pa] or vented; 0 for none."""
     alarm = chamber.contrary > max(ALARM_TIME, ALARM_SAMPLES * period) - SAME
     room = nominal.nominal_atmospheric_pressure
     gains = measured > chamber.pressure
@@ -436,15 +436,15 @@ def cause_of(
     in_vent = (VALVE_OPEN if into_vent else VALVE_SHUT) if gains else LEAK
     closed = VALVE_OPEN if gains else LEAK
     found = in_fill if fed else (in_vent if vented else closed)
-    return found if alarm else NO_CAUSE
+    return found if alarm else NO_FLAG
 
 
 def found_cause(
     nominal: NominalDevice, state: Observer, angle: float, pressure_1: float, pressure_2: float, period: float
 ) -> float:
-    """The sign of a sample [s] with an angle [rad] and absolute pressures [Pa]; ``NO_CAUSE`` where there is none."""
+    """The flag of a sample [s] with an angle [rad] and absolute pressures [Pa]; ``NO_FLAG`` where there is none."""
     if nominal.nominal_flow <= 0.0:
-        return NO_CAUSE
+        return NO_FLAG
     now_1, now_2 = volumes(nominal, angle)
     fed_1, fed_2 = is_fed(nominal, state.coil_1, state.spool), is_fed(nominal, state.coil_2, -state.spool)
     vented_1 = is_vented(nominal, state.coil_1, state.spool, state.command)
@@ -452,7 +452,7 @@ def found_cause(
     to_1, to_2 = supplied(nominal, state.lines)
     first = cause_of(nominal, state.chamber_1, now_1, pressure_1, to_1, fed_1, vented_1, period)
     second = cause_of(nominal, state.chamber_2, now_2, pressure_2, to_2, fed_2, vented_2, period)
-    return first if first > NO_CAUSE else second
+    return first if first > NO_FLAG else second
 
 
 def pressure_above(nominal: NominalDevice, expected: float) -> float:

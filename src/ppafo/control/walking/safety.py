@@ -10,12 +10,12 @@ the valve: no single reading is right for a filled chamber and for a vented one.
 
 Help comes back step by step: after one good stride the foot is held up, after ``resume_strides`` it is pushed too.
 
-Signs are joined by ``&`` and ``|``: ``and`` and ``or`` are branches, which keep the lanes from running side by side.
+Flags are joined by ``&`` and ``|``: ``and`` and ``or`` are branches, which keep the lanes from running side by side.
 """
 
 from typing import NamedTuple
 
-from ppafo.control.walking import observer, signs
+from ppafo.control.walking import fault_checks, fault_flags, observer
 from ppafo.control.walking.observer import Observer
 from ppafo.control.walking.phases import PhaseState
 from ppafo.model.helping import HELPS, LANDING, LIFTS, MID_STANCE, PAUSED, PUSH_OFF, STOPPED, SWING
@@ -51,9 +51,9 @@ class Stance(NamedTuple):
 
 
 class Finding(NamedTuple):
-    """The last sign that vented the chambers, and the readings then: forces [N], angle [rad], pressures [Pa]."""
+    """The last fault flag that vented the chambers, and the readings then: forces [N], angle [rad], pressures [Pa]."""
 
-    sign: float
+    fault_flag: float
     heel_force: float
     toe_force: float
     angle: float
@@ -62,7 +62,7 @@ class Finding(NamedTuple):
 
 
 class SafetyState(NamedTuple):
-    """Level of ``signs``; good strides in a row; how often help got less, and the last; what the signs remember.
+    """Level of ``fault_flags``; good strides in a row; how often help got less, and the last; what the checks remember.
 
     ``toe_strides`` are strides in a row on the toes alone, and ``steady`` is 1 where the last stride took about the
     stride time. ``slow_pressure_1`` and ``_2`` [Pa] are above a reading that falls; ``thin`` [s] is how long one of
@@ -73,14 +73,14 @@ class SafetyState(NamedTuple):
     good_strides: float
     ventings: float
     finding: Finding
-    readings: signs.LastReadings
-    landing: signs.Landing
+    readings: fault_checks.LastReadings
+    landing: fault_checks.Landing
     stance: Stance
     toe_strides: float
     steady: float
     valve_times: ValveTimes
     observer: Observer
-    emptying: signs.Emptying
+    emptying: fault_checks.Emptying
     slow_pressure_1: float
     slow_pressure_2: float
     thin: float
@@ -90,15 +90,17 @@ START = SafetyState(
     level=HELPS,
     good_strides=0.0,
     ventings=0.0,
-    finding=Finding(sign=signs.NO_SIGN, heel_force=0.0, toe_force=0.0, angle=0.0, pressure_1=0.0, pressure_2=0.0),
-    readings=signs.NOTHING_READ,
-    landing=signs.AIRBORNE,
+    finding=Finding(
+        fault_flag=fault_flags.NO_FLAG, heel_force=0.0, toe_force=0.0, angle=0.0, pressure_1=0.0, pressure_2=0.0
+    ),
+    readings=fault_checks.NOTHING_READ,
+    landing=fault_checks.AIRBORNE,
     stance=Stance(heel_seen=0.0, toe_seen=0.0, together=0.0, apart=0.0),
     toe_strides=0.0,
     steady=0.0,
     valve_times=ValveTimes(0.0, 0.0, 0.0),
     observer=observer.START,
-    emptying=signs.NOT_EMPTYING,
+    emptying=fault_checks.NOT_EMPTYING,
     slow_pressure_1=0.0,
     slow_pressure_2=0.0,
     thin=0.0,
@@ -165,8 +167,8 @@ def next_stance(
     )
 
 
-def gait_sign(rules: signs.SafetyRules, before: PhaseState, phase: PhaseState, stance: Stance) -> float:
-    """The sign of forces that do not follow each other as in a gait, at any pace."""
+def gait_flag(rules: fault_checks.SafetyRules, before: PhaseState, phase: PhaseState, stance: Stance) -> float:
+    """The fault flag of forces that do not follow each other as in a gait, at any pace."""
     longest = rules.longest_phase * phase.stride_time
     endless = max(phase.in_phase if phase.phase == SWING else 0.0, stance.apart) > longest
     stays = (before.phase != SWING) & (phase.phase != SWING) & (before.since_strike > longest)
@@ -175,27 +177,29 @@ def gait_sign(rules: signs.SafetyRules, before: PhaseState, phase: PhaseState, s
     # Who sits down unloads both alike, and may turn the ankle then, but late; the first step may begin anywhere.
     leaves = (phase.phase == SWING) & (stance.turned > 0.5) & (stance.largest > CARRIES)
     leaves = leaves & (phase.since_strike < SITS_DOWN * phase.stride_time) & (phase.strikes > 1.5)
-    found = signs.NO_TOE_OFF if leaves & (stance.rolled < 0.5) else signs.NO_SIGN
-    found = signs.NO_TOES if skips_toes else found
-    found = signs.RESTLESS if stays & returns else found
-    return signs.ENDLESS_PHASE if endless else found
+    found = fault_flags.NO_TOE_OFF if leaves & (stance.rolled < 0.5) else fault_flags.NO_FLAG
+    found = fault_flags.NO_TOES if skips_toes else found
+    found = fault_flags.RESTLESS if stays & returns else found
+    return fault_flags.ENDLESS_PHASE if endless else found
 
 
-def steady_sign(rules: signs.SafetyRules, before: PhaseState, phase: PhaseState, angle: float) -> float:
-    """The sign of forces or an angle [rad] that do not fit a stride after one that took the usual time."""
+def steady_flag(rules: fault_checks.SafetyRules, before: PhaseState, phase: PhaseState, angle: float) -> float:
+    """The fault flag of forces or an angle [rad] that do not fit a stride after one that took the usual time."""
     flat = phase.since_strike > rules.flat_from * phase.stride_time
     flat = flat & (phase.since_strike < rules.flat_to * phase.stride_time)
     enters = (before.phase == SWING) & (phase.phase != SWING)
     short = enters & (before.in_phase < rules.shortest_swing * phase.stride_time)
     bent = (angle < rules.lowest_flat_angle) | (angle > rules.highest_flat_angle)
-    found = signs.NO_HEEL if flat & (phase.heel.loaded < 0.5) else signs.NO_SIGN
-    found = signs.SHORT_SWING if short else found
-    found = signs.FLAT_ANGLE if flat & bent & (min(phase.heel.loaded, phase.toe.loaded) > 0.5) else found
-    return signs.NOT_FLAT if flat & (phase.toe.loaded < 0.5) else found
+    found = fault_flags.NO_HEEL if flat & (phase.heel.loaded < 0.5) else fault_flags.NO_FLAG
+    found = fault_flags.SHORT_SWING if short else found
+    found = fault_flags.FLAT_ANGLE if flat & bent & (min(phase.heel.loaded, phase.toe.loaded) > 0.5) else found
+    return fault_flags.NOT_FLAT if flat & (phase.toe.loaded < 0.5) else found
 
 
-def valve_sign(rules: signs.SafetyRules, now: SafetyState, phase: PhaseState, measurement: GaitMeasurement) -> float:
-    """The sign of a pressure that is not what the valve was commanded long enough, by limits that no device decides.
+def valve_flag(
+    rules: fault_checks.SafetyRules, now: SafetyState, phase: PhaseState, measurement: GaitMeasurement
+) -> float:
+    """The flag of a pressure that is not what the valve was commanded long enough, by limits that no device decides.
 
     The observer of the chambers needs but one of them, against what it expects: a pressure that a vented chamber shows.
 
@@ -208,52 +212,52 @@ def valve_sign(rules: signs.SafetyRules, now: SafetyState, phase: PhaseState, me
     no_rise_2 = (valve_times.filling_2 > rules.fill_time) & (measurement.pressure_2 < rules.filled_pressure)
     stands = (phase.phase == MID_STANCE) & (phase.heel.loaded > 0.5)
     expected_1, expected_2 = now.observer.chamber_1.pressure, now.observer.chamber_2.pressure
-    left = signs.holds_pressure(rules, measurement.pressure_1, expected_1, now.slow_pressure_1)
-    left = left | signs.holds_pressure(rules, measurement.pressure_2, expected_2, now.slow_pressure_2)
+    left = fault_checks.holds_pressure(rules, measurement.pressure_1, expected_1, now.slow_pressure_1)
+    left = left | fault_checks.holds_pressure(rules, measurement.pressure_2, expected_2, now.slow_pressure_2)
     held = stands & (valve_times.venting > rules.vent_time) & left
     late = (valve_times.venting > LATE * rules.vent_time) & (measurement.pressure_2 > rules.filled_pressure)
     no_fall = held | (stands & late)
-    found = signs.NO_FALL if no_fall | (now.emptying.rising > signs.LASTS) else signs.NO_SIGN
-    found = signs.NO_RISE if no_rise_1 | no_rise_2 else found
-    observed = signs.PRESSURE_SENSOR if held else signs.NO_SIGN
+    found = fault_flags.NO_FALL if no_fall | (now.emptying.rising > fault_checks.LASTS) else fault_flags.NO_FLAG
+    found = fault_flags.NO_RISE if no_rise_1 | no_rise_2 else found
+    observed = fault_flags.PRESSURE_SENSOR if held else fault_flags.NO_FLAG
     return observed if rules.nominal.nominal_flow > 0.0 else found
 
 
-def next_good_strides(state: SafetyState, before: PhaseState, phase: PhaseState, sign: float) -> float:
-    """Good strides in a row after a sample: in about the stride time, on heel and toes, without a sign.
+def next_good_strides(state: SafetyState, before: PhaseState, phase: PhaseState, flag: float) -> float:
+    """Good strides in a row after a sample: in about the stride time, on heel and toes, without a flag.
 
-    -1 after a sign, so that the rest of its stride does not count.
+    -1 after a flag, so that the rest of its stride does not count.
     """
     enters = (before.phase == SWING) & (phase.phase != SWING)
-    usual = (before.since_strike > signs.HALF * phase.stride_time) & (
-        before.since_strike < phase.stride_time / signs.HALF
+    usual = (before.since_strike > fault_checks.HALF * phase.stride_time) & (
+        before.since_strike < phase.stride_time / fault_checks.HALF
     )
     good = usual & (min(state.stance.heel_seen, state.stance.toe_seen) > 0.5)
     counted = (state.good_strides + 1.0 if good else 0.0) if enters else state.good_strides
-    return -1.0 if sign > signs.NO_SIGN else counted
+    return -1.0 if flag > fault_flags.NO_FLAG else counted
 
 
-def level_after(rules: signs.SafetyRules, state: SafetyState, good_strides: float, together: float) -> float:
+def level_after(rules: fault_checks.SafetyRules, state: SafetyState, good_strides: float, together: float) -> float:
     """The level after good strides in a row, and heel and toes on the ground for a time [s]; a stop lasts.
 
     A swing without end is that of who sits: standing up shows that both forces are sound.
     """
-    resting = (state.level == PAUSED) & (state.finding.sign == signs.ENDLESS_PHASE)
+    resting = (state.level == PAUSED) & (state.finding.fault_flag == fault_flags.ENDLESS_PHASE)
     resumes = (state.level < STOPPED) & (good_strides >= rules.resume_strides)
     lifted = LIFTS if (state.level == PAUSED) & (good_strides >= LIFT_STRIDES) else state.level
     return HELPS if resumes | (resting & (together > STANDS_UP)) else lifted
 
 
 def remembered(
-    rules: signs.SafetyRules,
+    rules: fault_checks.SafetyRules,
     state: SafetyState,
     before: PhaseState,
     phase: PhaseState,
     measurement: GaitMeasurement,
     period: float,
 ) -> SafetyState:
-    """The state with what the signs remember of a sample of ``period`` [s]; the level is as it was."""
-    seen = signs.next_readings(state.readings, measurement, before, phase, period)
+    """The state with what the checks remember of a sample of ``period`` [s]; the level is as it was."""
+    seen = fault_checks.next_readings(state.readings, measurement, before, phase, period)
     enters = (before.phase == SWING) & (phase.phase != SWING)
     on_toes = (state.stance.heel_seen < 0.5) & (before.strikes > 0.5)
     usual = abs(before.since_strike - phase.stride_time) < STEADY * phase.stride_time
@@ -261,7 +265,7 @@ def remembered(
     vented = state.valve_times.filling_1 + state.valve_times.venting
     return state._replace(
         readings=seen,
-        landing=signs.next_landing(rules, state.landing, seen, before, phase, steady, period),
+        landing=fault_checks.next_landing(rules, state.landing, seen, before, phase, steady, period),
         stance=next_stance(state.stance, before, phase, measurement, period),
         toe_strides=(state.toe_strides + 1.0 if on_toes else 0.0) if enters else state.toe_strides,
         steady=steady,
@@ -276,39 +280,41 @@ def remembered(
             measurement.pressure_2,
             period,
         ),
-        emptying=signs.next_emptying(rules, state.emptying, vented, measurement, period),
-        slow_pressure_1=signs.next_slow_pressure(state.slow_pressure_1, measurement.pressure_1, period),
-        slow_pressure_2=signs.next_slow_pressure(state.slow_pressure_2, measurement.pressure_2, period),
-        thin=signs.next_thin(state.thin, measurement, period),
+        emptying=fault_checks.next_emptying(rules, state.emptying, vented, measurement, period),
+        slow_pressure_1=fault_checks.next_slow_pressure(state.slow_pressure_1, measurement.pressure_1, period),
+        slow_pressure_2=fault_checks.next_slow_pressure(state.slow_pressure_2, measurement.pressure_2, period),
+        thin=fault_checks.next_thin(state.thin, measurement, period),
     )
 
 
-def found_sign(
-    rules: signs.SafetyRules,
-    last: signs.LastReadings,
+def found_flag(
+    rules: fault_checks.SafetyRules,
+    last: fault_checks.LastReadings,
     now: SafetyState,
     before: PhaseState,
     phase: PhaseState,
     measurement: GaitMeasurement,
     period: float,
 ) -> float:
-    """The sign of a sample that comes first in ``signs``; ``last`` are the readings before it, ``now`` remembers it."""
-    late = max(now.landing.late, now.landing.late_toes) > signs.LATE_STRIDES
-    sign = signs.LATE_FORCES if late else signs.NO_SIGN
-    sign = signs.TOE_STRIDES if now.toe_strides > rules.most_toe_strides else sign
-    sign = signs.first_sign(steady_sign(rules, before, phase, measurement.angle), sign) if now.steady > 0.5 else sign
-    sign = signs.first_sign(gait_sign(rules, before, phase, now.stance), sign)
-    sign = signs.first_sign(signs.still_sign(rules, now.readings, before, phase), sign)
-    sign = signs.first_sign(signs.gone_sign(rules, last, measurement, period), sign)
-    sign = signs.first_sign(signs.range_sign(rules, measurement, now.thin), sign)
-    sign = signs.first_sign(valve_sign(rules, now, phase, measurement), sign)
+    """The fault flag of a sample that comes first; ``last`` are the readings before it, ``now`` remembers it."""
+    late = max(now.landing.late, now.landing.late_toes) > fault_checks.LATE_STRIDES
+    flag = fault_flags.LATE_FORCES if late else fault_flags.NO_FLAG
+    flag = fault_flags.TOE_STRIDES if now.toe_strides > rules.most_toe_strides else flag
+    flag = (
+        fault_flags.first_flag(steady_flag(rules, before, phase, measurement.angle), flag) if now.steady > 0.5 else flag
+    )
+    flag = fault_flags.first_flag(gait_flag(rules, before, phase, now.stance), flag)
+    flag = fault_flags.first_flag(fault_checks.still_flag(rules, now.readings, before, phase), flag)
+    flag = fault_flags.first_flag(fault_checks.gone_flag(rules, last, measurement, period), flag)
+    flag = fault_flags.first_flag(fault_checks.range_flag(rules, measurement, now.thin), flag)
+    flag = fault_flags.first_flag(valve_flag(rules, now, phase, measurement), flag)
     pressure_1, pressure_2 = measurement.pressure_1, measurement.pressure_2
     cause = observer.found_cause(rules.nominal, now.observer, measurement.angle, pressure_1, pressure_2, period)
-    return signs.first_sign(cause, sign)
+    return fault_flags.first_flag(cause, flag)
 
 
 def monitor(
-    rules: signs.SafetyRules,
+    rules: fault_checks.SafetyRules,
     state: SafetyState,
     before: PhaseState,
     phase: PhaseState,
@@ -317,22 +323,22 @@ def monitor(
 ) -> SafetyState:
     """The state after a sample of ``period`` [s]; ``before`` and ``phase`` are the phases before and after it."""
     now = remembered(rules, state, before, phase, measurement, period)
-    sign = found_sign(rules, state.readings, now, before, phase, measurement, period)
-    good_strides = next_good_strides(state, before, phase, sign)
-    level = max(level_after(rules, state, good_strides, now.stance.together), signs.level_of(sign))
+    flag = found_flag(rules, state.readings, now, before, phase, measurement, period)
+    good_strides = next_good_strides(state, before, phase, flag)
+    level = max(level_after(rules, state, good_strides, now.stance.together), fault_flags.level_of(flag))
     vents = level > state.level
     return now._replace(
         level=level,
         good_strides=good_strides,
         ventings=state.ventings + (1.0 if vents else 0.0),
-        finding=later_finding(vents, sign, measurement, state.finding),
+        finding=later_finding(vents, flag, measurement, state.finding),
     )
 
 
-def later_finding(vents: bool, sign: float, measurement: GaitMeasurement, last: Finding) -> Finding:
+def later_finding(vents: bool, flag: float, measurement: GaitMeasurement, last: Finding) -> Finding:
     """The finding of this sample where it vents the chambers, else the last one."""
     return Finding(
-        sign=sign if vents else last.sign,
+        fault_flag=flag if vents else last.fault_flag,
         heel_force=measurement.heel_force if vents else last.heel_force,
         toe_force=measurement.toe_force if vents else last.toe_force,
         angle=measurement.angle if vents else last.angle,

@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import final
+from typing import Any, final
 
 import numpy as np
 
@@ -40,6 +40,34 @@ class Recorded:
     strangers: int
     ended: str
     is_stopped: bool
+
+    def text(self) -> str:
+        """Return what was recorded, lost and dropped, in words."""
+        recording, others = self.recording, [*self.ignored.items(), ("of somebody else", self.strangers)]
+        samples = f"{len(recording)} samples over {recording.duration:.6g} s"
+        return "\n".join(
+            [
+                f"{samples}, {recording.kind}: {', '.join(recording.names)}",
+                f"lost     {self.lost} samples between the first and the last",
+                f"dropped  {wire.described_refusals(self.refused, others)}",
+                f"ended    by {self.ended}",
+            ]
+        )
+
+    def document(self) -> dict[str, Any]:
+        """Return the same as plain data, in SI units."""
+        recording = self.recording
+        return {
+            "samples": len(recording),
+            "duration": recording.duration,
+            "kind": recording.kind,
+            "channels": {name: recording.unit(name) for name in recording.names},
+            "lost": self.lost,
+            "refused": dict(self.refused),
+            "ignored": dict(self.ignored),
+            "strangers": self.strangers,
+            "ended": self.ended,
+        }
 
 
 @final

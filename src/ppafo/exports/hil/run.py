@@ -28,12 +28,12 @@ from ppafo.errors import ScenarioError
 from ppafo.exports import filled, template
 from ppafo.exports.firmware import chip_controller, firmware
 from ppafo.exports.hil import wire
-from ppafo.exports.hil.loop import Bench, Exchange, Pace, Row, without_collections
+from ppafo.exports.hil.loop import Bench, Exchange, LockStep, Pace, RealTime, Row, without_collections
 from ppafo.exports.hil.wire import MICROSECONDS
 from ppafo.model.valves import dump
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.sampled import SampledRun
-from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, Scenario
+from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, Scenario, plain
 from ppafo.simulation.simulate import Result, result_of
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.version import __version__
@@ -95,6 +95,7 @@ LOG_COLUMNS = (
 )
 _LARGEST_RUN = 2**16 - 1
 _PER_THOUSAND = 1.0e3
+_SAME = 1.0e-9
 _BINS = 60
 _SHORTEST_SHOWN, _LONGEST_SHOWN = 1.0e-2, 1.0e1
 """Ends of the axis of times [ms]; longer ones make it longer."""
@@ -181,6 +182,16 @@ class HardwareRun:
             "failure": exchange.failure or None,
             "plant": self.plant.compiled_by,
             "machine": {name: getattr(self.machine, name) for name in Machine.__slots__},
+        }
+
+    def outcome(self, port: str) -> dict[str, Any]:
+        """Return scenario, port, status, link and metrics as plain data."""
+        return {
+            "scenario": self.result.scenario.name,
+            "port": port,
+            "status": plain(self.result.status),
+            "link": self.document(),
+            "metrics": {name: plain(metric) for name, metric in self.result.metrics.items()},
         }
 
     def text(self) -> str:
@@ -292,6 +303,36 @@ def run_plant(
         f"{platform.system()} {platform.machine()}", os.cpu_count() or 1, platform.python_version(), before, load_now()
     )
     return HardwareRun(plant, result_of(plant.scenario, plant.run, begun.result()), exchange, machine)
+
+
+def run_at(
+    port_name: str,
+    scenario: Scenario,
+    rate: int,
+    baud: int,
+    in_lock_step: bool,
+    patience: float,
+    is_stopped: Callable[[], bool],
+    say: Callable[[str], None],
+) -> HardwareRun:
+    """Open a port and run a scenario's plant there; ``say`` hears of a rate that does not fit, and of the call."""
+    port = wire.open_port(port_name, baud)
+    try:
+        if port.is_stream:
+            check_baud(baud, rate)
+        plant, period = plant_of(scenario, rate), scenario.control.period
+        if plant.period > period * (1.0 + _SAME):
+            apart, wanted = plant.period * _PER_THOUSAND, period * _PER_THOUSAND
+            say(
+                f"--rate {rate}: a sample every {apart:.4g} ms, for a controller of the scenario that decides every "
+                f"{wanted:.4g} ms; it has the wrong gains unless it was exported for this rate: give "
+                f"--set controller.rate={rate}Hz here and to 'ppafo export controller'"
+            )
+        say(f"calling the controller at {port_name} ...")
+        pace = (lambda _apart: LockStep()) if in_lock_step else RealTime
+        return run_plant(plant, port, pace, patience, is_stopped)
+    finally:
+        port.close()
 
 
 def spread(values: Sequence[float]) -> dict[str, float] | None:

@@ -7,6 +7,7 @@ such as ``udp:127.0.0.1:5000``.
 
 import contextlib
 import math
+import os
 import select
 import socket
 import struct
@@ -390,9 +391,15 @@ def open_port(text: str, baud: int = DEFAULT_BAUD, listens: bool = False) -> Por
             device = serial.Serial(place, baud, timeout=0.0, write_timeout=_WRITE_TIMEOUT, exclusive=True)
             device.reset_input_buffer()
         except (OSError, ValueError) as error:
-            raise ScenarioError(f"--port {one_line(text)}: cannot be opened: {one_line(error)}") from error
+            raise ScenarioError(f"--port {one_line(text)}: cannot be opened: {_why(error)}") from error
         return SerialPort(device)
     raise ScenarioError(f"--port {one_line(text)}: must be {FORMS}")
+
+
+def _why(error: OSError | ValueError) -> str:
+    """Return why a serial device cannot be opened; pyserial writes the number and the words of the system twice."""
+    number = error.errno if isinstance(error, OSError) else None
+    return one_line(error) if number is None else reason(OSError(number, os.strerror(number)))
 
 
 def _open_udp(text: str, place: str, listens: bool) -> UdpPort:

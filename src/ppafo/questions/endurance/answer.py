@@ -111,7 +111,7 @@ def _draw_temperature(axes: "Axes", found: Endurance, minutes: Floats) -> None:
     label_lines(axes)
 
 
-FORMAT = "ppafo endurance"
+FORMAT = "ppafo bottle"
 _LEFT_OUT = (
     "Not in the model: a regulator that its gas cools or ices, unless somebody walks on the bottle; liquid carried out "
     "with the vapour, a bottle held upside down, leaking connections, and ice on the outside of the bottle."

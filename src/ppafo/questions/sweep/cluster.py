@@ -1,5 +1,6 @@
 """The chunks of a study computed on a cluster."""
 
+import asyncio
 from collections.abc import Callable, Iterable
 from typing import Any
 from uuid import uuid4
@@ -19,11 +20,19 @@ def compute_on_cluster(address: str, task: Task, numbers: Iterable[int], finish:
     """
     distributed = _import_distributed()
     try:
+        # A client that did not connect complains once more when it is collected: whether one can is tried before.
+        asyncio.run(_reach(address, distributed))
         client = distributed.Client(address, timeout=_SECONDS_TO_CONNECT, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
         raise StudyError(f"--scheduler {address}: cannot be reached: {one_line(error)}") from error
     with client:
         _work_through(client, task, iter(numbers), finish, distributed)
+
+
+async def _reach(address: str, distributed: Any) -> None:
+    """Connect to a scheduler once; OSError or ValueError where that fails."""
+    secured = distributed.Security().get_connection_args("client")
+    (await distributed.comm.connect(address, timeout=_SECONDS_TO_CONNECT, **secured)).abort()
 
 
 def _work_through(client: Any, task: Task, numbers: Any, finish: Callable[[Finished], None], distributed: Any) -> None:

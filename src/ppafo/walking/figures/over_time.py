@@ -151,7 +151,7 @@ def _levels(axes: "Axes", found: Floats, time: Floats) -> None:
 def _marks(rows: "list[Axes]", result: WalkResult, scale: float) -> None:
     """Draw a line at each pause and stop, and a dashed one with names where something fails."""
     for event in result.events:
-        if event.sign is not None:
+        if event.fault_flag is not None:
             for axes in rows:
                 axes.axvline(event.time / scale, color=VERMILION, linewidth=0.9)
     end = float(result.recording.time[-1])

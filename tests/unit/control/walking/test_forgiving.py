@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ppafo.control.walking import signs
+from ppafo.control.walking import fault_flags
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.engine.rows import rebuild
 from ppafo.model.helping import HELPS, LIFTS, PAUSED, PUSH_OFF
@@ -170,7 +170,7 @@ def test_stairs_on_the_forefoot_alone_are_lifted_and_not_pushed_and_level_ground
     assert min(command for _, command in climbing) < 0.0
     assert {command for state, command in climbing if state.phase.phase == PUSH_OFF} == {VENT}
     assert seen.levels[-1] == HELPS
-    assert signs.SIGNS[seen.states[-1].safety.finding.sign].name == "no_heel"
+    assert fault_flags.FAULT_FLAGS[seen.states[-1].safety.finding.fault_flag].name == "no_heel"
     assert seen.states[-1].safety.ventings == 1.0
 
 

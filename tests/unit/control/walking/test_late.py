@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from ppafo.control.walking import phases, safety, signs
+from ppafo.control.walking import fault_flags, phases, safety
+from ppafo.control.walking.fault_checks import SAFETY_QUANTITIES, SafetyRules
 from ppafo.control.walking.phases import PHASE_QUANTITIES, PhaseRules, PhaseState, Switch
 from ppafo.control.walking.safety import SafetyState
-from ppafo.control.walking.signs import SAFETY_QUANTITIES, SafetyRules
 from ppafo.engine.rows import rebuilt
 from ppafo.model.helping import HELPS, LIFTS, PUSH_OFF, STOPPED, SWING
 from ppafo.model.sensors import GaitMeasurement
@@ -61,7 +61,7 @@ def test_who_is_flat_before_the_heel_is_seen_is_lifted_and_not_pushed_after_two_
     levels = np.array([state.level for state in states])
     assert not levels[: 1000 * BEGINS].any()
     assert 0 < np.argmax(levels > HELPS) < 1000 * (BEGINS + 2.4)
-    assert states[-1].finding.sign == signs.LATE_FORCES
+    assert states[-1].finding.fault_flag == fault_flags.LATE_FORCES
     assert states[-1].level == LIFTS
     assert safety.permits(states[-1], SWING)
     assert not safety.permits(states[-1], PUSH_OFF)
@@ -120,7 +120,7 @@ def emptied(late: float, command: float = VENT, turns: float = 0.0, noise: float
 @pytest.mark.parametrize(("late", "command"), [(0.02, VENT), (0.02, 1.0), (0.03, VENT), (0.03, 0.5)])
 def test_a_vented_chamber_whose_pressure_rises_stops(late: float, command: float) -> None:
     state = emptied(late, command)
-    assert (state.level, state.finding.sign) == (STOPPED, signs.NO_FALL)
+    assert (state.level, state.finding.fault_flag) == (STOPPED, fault_flags.NO_FALL)
 
 
 @pytest.mark.parametrize("late", [0.0, 0.005])

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from ppafo.control.walking import observer, signs
+from ppafo.control.walking import fault_flags, observer
 from ppafo.control.walking.observer import NominalDevice
 from ppafo.model.regulator import SupplyLines
 from ppafo.model.valves.kind import VENT
@@ -57,14 +57,14 @@ def test_a_valve_that_is_not_known_leaves_the_observer_off() -> None:
     off = PAIR._replace(nominal_flow=0.0)
     state = observer.next_observer(off, observer.START, STANDS, ROOM, ROOM, STANDS, 4.0e5, 4.0e5, PERIOD)
     assert state == observer.START
-    assert observer.found_cause(off, state, STANDS, 4.0e5, 4.0e5, PERIOD) == signs.NO_SIGN
+    assert observer.found_cause(off, state, STANDS, 4.0e5, 4.0e5, PERIOD) == fault_flags.NO_FLAG
 
 
 def found(nominal: NominalDevice, real: NominalDevice, commands: list[float], shown: float | None = None) -> float:
-    """The first sign while a real device follows commands at a still angle; chamber 2 may show one pressure [Pa]."""
+    """The first flag while a real device follows commands at a still angle; chamber 2 may show one pressure [Pa]."""
     volume_1, volume_2 = observer.volumes(real, STANDS)
     content_1, content_2 = ROOM * volume_1, ROOM * volume_2
-    state, cause = observer.START, signs.NO_SIGN
+    state, cause = observer.START, fault_flags.NO_FLAG
     last = (ROOM, ROOM)
     for command in commands:
         now = (content_1 / volume_1, shown or content_2 / volume_2)
@@ -89,24 +89,24 @@ def test_a_device_that_is_a_little_different_gives_no_sign(nominal: NominalDevic
             real = nominal._replace(
                 nominal_flow=flow * 1.1 * nominal.nominal_flow, nominal_dorsiflexion_pressure=supply * SUPPLY
             )
-            assert found(nominal, real, FILLS) == signs.NO_SIGN
+            assert found(nominal, real, FILLS) == fault_flags.NO_FLAG
 
 
 @pytest.mark.parametrize("nominal", [PAIR, SPOOL])
 @pytest.mark.parametrize(
-    ("pressure", "sign"),
-    [(1.9 * SUPPLY, signs.SUPPLY_HIGH), (0.45 * SUPPLY, signs.SUPPLY_LOW), (ROOM, signs.SUPPLY_LOST)],
+    ("pressure", "flag"),
+    [(1.9 * SUPPLY, fault_flags.SUPPLY_HIGH), (0.45 * SUPPLY, fault_flags.SUPPLY_LOW), (ROOM, fault_flags.SUPPLY_LOST)],
 )
-def test_a_supply_that_is_not_as_it_should_be_is_named(nominal: NominalDevice, pressure: float, sign: float) -> None:
-    assert found(nominal, nominal._replace(nominal_dorsiflexion_pressure=pressure), FILLS) == sign
+def test_a_supply_that_is_not_as_it_should_be_is_named(nominal: NominalDevice, pressure: float, flag: float) -> None:
+    assert found(nominal, nominal._replace(nominal_dorsiflexion_pressure=pressure), FILLS) == flag
 
 
 def test_gas_that_comes_or_stays_where_the_valve_vents_is_named() -> None:
-    assert found(PAIR, PAIR, FILLS, 4.3e5) == signs.VALVE_OPEN
+    assert found(PAIR, PAIR, FILLS, 4.3e5) == fault_flags.VALVE_OPEN
     closes = PAIR._replace(nominal_flow=1.0e-9)
     half = [-1.0] * 60 + [VENT] * 200
     volume = observer.volumes(PAIR, STANDS)[1]
-    state, content, cause = observer.START, ROOM * volume, signs.NO_SIGN
+    state, content, cause = observer.START, ROOM * volume, fault_flags.NO_FLAG
     for command in half:
         now = (ROOM, content / volume)
         state = observer.next_observer(PAIR, state, STANDS, *now, STANDS, *now, PERIOD)
@@ -114,12 +114,12 @@ def test_gas_that_comes_or_stays_where_the_valve_vents_is_named() -> None:
         state = state._replace(command=command)
         real = PAIR if command == -1.0 else closes
         content += PERIOD * observer.flow_into(real, content / volume, SUPPLY if command == -1.0 else ROOM, 1.0)
-    assert cause == signs.VALVE_SHUT
+    assert cause == fault_flags.VALVE_SHUT
 
 
 def test_a_closed_chamber_that_loses_gas_leaks() -> None:
     volume = observer.volumes(SPOOL, STANDS)[1]
-    state, content, cause = observer.START, ROOM * volume, signs.NO_SIGN
+    state, content, cause = observer.START, ROOM * volume, fault_flags.NO_FLAG
     for command in [-1.0] * 300 + [0.0] * 200:
         now = (ROOM, content / volume)
         state = observer.next_observer(SPOOL, state, STANDS, *now, STANDS, *now, PERIOD)
@@ -127,7 +127,7 @@ def test_a_closed_chamber_that_loses_gas_leaks() -> None:
         state = state._replace(command=command)
         leak = 0.4 if command == 0.0 else 1.0
         content += leak * PERIOD * observer.flow_into(SPOOL, content / volume, SUPPLY if command else ROOM, 1.0)
-    assert cause == signs.LEAK
+    assert cause == fault_flags.LEAK
 
 
 def test_no_movement_of_the_ankle_changes_a_content() -> None:
@@ -168,8 +168,8 @@ def test_a_supply_that_is_higher_than_the_controller_believes_stops_within_two_s
     scenario = load_walk("solenoid", [*given, "controller.nominal_dorsiflexion_pressure=50 psi_g"])
     found = walk(scenario, 0.1)
     (event,) = found.events
-    assert event.sign is not None
-    assert event.sign.name == "supply_high"
+    assert event.fault_flag is not None
+    assert event.fault_flag.name == "supply_high"
     assert event.time < 2.0 * walk_of(scenario).gait.stride_time
 
 

@@ -1,14 +1,14 @@
-"""Each sign by which a controller of walking vents the chambers, by itself: whether it pauses or stops."""
+"""Each fault flag by which a controller of walking vents the chambers, by itself: whether it pauses or stops."""
 
 import math
 from itertools import pairwise
 
 import pytest
 
-from ppafo.control.walking import phases, safety, signs
+from ppafo.control.walking import fault_checks, fault_flags, phases, safety
+from ppafo.control.walking.fault_checks import SAFETY_QUANTITIES, SafetyRules
 from ppafo.control.walking.phases import PhaseState, Switch
 from ppafo.control.walking.safety import Finding, SafetyState, Stance, ValveTimes
-from ppafo.control.walking.signs import SAFETY_QUANTITIES, SafetyRules
 from ppafo.engine.rows import leaf_paths, rebuilt
 from ppafo.model.helping import HELPS, LANDING, LIFTS, MID_STANCE, PAUSED, PUSH_OFF, STOPPED, SWING
 from ppafo.model.regulator import SupplyLines
@@ -34,12 +34,12 @@ def found(
     state: SafetyState = safety.START,
     rules: SafetyRules = RULES,
 ) -> float:
-    """The sign that vents at a sample, 0 where none does."""
+    """The fault flag that vents at a sample, 0 where none does."""
     after = now or phase(MID_STANCE, 0.1)
     watch = safety.monitor(rules, state, before or after, after, seen, PERIOD)
-    assert (watch.level > HELPS) == (watch.finding.sign > signs.NO_SIGN)
-    assert watch.level == signs.level_of(watch.finding.sign)
-    return watch.finding.sign
+    assert (watch.level > HELPS) == (watch.finding.fault_flag > fault_flags.NO_FLAG)
+    assert watch.level == fault_flags.level_of(watch.finding.fault_flag)
+    return watch.finding.fault_flag
 
 
 def vents(
@@ -49,7 +49,7 @@ def vents(
     state: SafetyState = safety.START,
     rules: SafetyRules = RULES,
 ) -> bool:
-    return found(seen, now, before, state, rules) > signs.NO_SIGN
+    return found(seen, now, before, state, rules) > fault_flags.NO_FLAG
 
 
 def test_the_rules_are_declared_in_their_order() -> None:
@@ -60,82 +60,84 @@ def test_the_rules_are_declared_in_their_order() -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "sign"),
+    ("change", "flag"),
     [
-        ({"heel_force": 3001.0}, signs.FORCE_RANGE),
-        ({"heel_force": -41.0}, signs.FORCE_RANGE),
-        ({"toe_force": -41.0}, signs.FORCE_RANGE),
-        ({"toe_force": 3001.0}, signs.FORCE_RANGE),
-        ({"angle": 0.29}, signs.ANGLE_RANGE),
-        ({"angle": 2.41}, signs.ANGLE_RANGE),
-        ({"pressure_1": 2.9e4}, signs.PRESSURE_RANGE),
-        ({"pressure_2": 2.9e4}, signs.PRESSURE_RANGE),
-        ({"pressure_1": 2.1e6}, signs.PRESSURE_RANGE),
-        ({"pressure_2": 2.1e6}, signs.PRESSURE_RANGE),
+        ({"heel_force": 3001.0}, fault_flags.FORCE_RANGE),
+        ({"heel_force": -41.0}, fault_flags.FORCE_RANGE),
+        ({"toe_force": -41.0}, fault_flags.FORCE_RANGE),
+        ({"toe_force": 3001.0}, fault_flags.FORCE_RANGE),
+        ({"angle": 0.29}, fault_flags.ANGLE_RANGE),
+        ({"angle": 2.41}, fault_flags.ANGLE_RANGE),
+        ({"pressure_1": 2.9e4}, fault_flags.PRESSURE_RANGE),
+        ({"pressure_2": 2.9e4}, fault_flags.PRESSURE_RANGE),
+        ({"pressure_1": 2.1e6}, fault_flags.PRESSURE_RANGE),
+        ({"pressure_2": 2.1e6}, fault_flags.PRESSURE_RANGE),
     ],
 )
-def test_a_reading_out_of_range_stops_at_once(change: dict[str, float], sign: float) -> None:
+def test_a_reading_out_of_range_stops_at_once(change: dict[str, float], flag: float) -> None:
     assert not vents()
-    assert found(GOOD._replace(**change)) == sign
-    assert signs.level_of(sign) == STOPPED
+    assert found(GOOD._replace(**change)) == flag
+    assert fault_flags.level_of(flag) == STOPPED
 
 
 def test_a_full_chamber_2_that_the_foot_squeezes_is_no_fault() -> None:
     squeezed = GOOD._replace(pressure_2=2.1e6, angle=2.1)
-    assert found(squeezed) == signs.NO_SIGN
-    assert found(squeezed._replace(pressure_1=2.1e6)) == signs.PRESSURE_RANGE
+    assert found(squeezed) == fault_flags.NO_FLAG
+    assert found(squeezed._replace(pressure_1=2.1e6)) == fault_flags.PRESSURE_RANGE
 
 
-def test_every_sign_says_what_it_goes_by_and_those_of_faults_come_first() -> None:
-    numbers = list(signs.SIGNS)
+def test_every_flag_says_what_it_goes_by_and_those_of_faults_come_first() -> None:
+    numbers = list(fault_flags.FAULT_FLAGS)
     assert numbers == [float(number) for number in range(1, len(numbers) + 1)]
-    assert len({sign.name for sign in signs.SIGNS.values()}) == len(numbers)
-    levels = [signs.level_of(number) for number in numbers]
-    assert levels == sorted(levels, reverse=True)
+    assert len({flag.name for flag in fault_flags.FAULT_FLAGS.values()}) == len(numbers)
+    levels = [fault_flags.level_of(number) for number in numbers]
+    assert levels == sorted(levels, reverse=True) == [flag.level for flag in fault_flags.FAULT_FLAGS.values()]
     assert set(levels) == {LIFTS, PAUSED, STOPPED}
     settings = {item.name for item in SAFETY_QUANTITIES}
-    assert all(set(sign.settings) <= settings for sign in signs.SIGNS.values())
-    assert all(set(sign.readings) < set(GaitMeasurement._fields) for sign in signs.SIGNS.values())
+    assert all(set(flag.settings) <= settings for flag in fault_flags.FAULT_FLAGS.values())
+    assert all(set(flag.readings) < set(GaitMeasurement._fields) for flag in fault_flags.FAULT_FLAGS.values())
 
 
 def test_of_two_signs_the_one_that_stops_counts() -> None:
     endless = phase(SWING, 2.0, 0.0, 0.0, in_phase=1.21)
-    assert found(now=endless) == signs.ENDLESS_PHASE
-    assert found(GOOD._replace(angle=9.0), endless) == signs.ANGLE_RANGE
+    assert found(now=endless) == fault_flags.ENDLESS_PHASE
+    assert found(GOOD._replace(angle=9.0), endless) == fault_flags.ANGLE_RANGE
     paused = safety.monitor(RULES, safety.START, endless, endless, GOOD, PERIOD)
-    assert paused.finding == Finding(signs.ENDLESS_PHASE, 300.0, 200.0, 1.5, 1.1e5, 1.05e5)
+    assert paused.finding == Finding(fault_flags.ENDLESS_PHASE, 300.0, 200.0, 1.5, 1.1e5, 1.05e5)
     stopped = safety.monitor(RULES, paused, endless, endless, GOOD._replace(angle=9.0), PERIOD)
     assert (stopped.level, stopped.ventings) == (STOPPED, 2.0)
-    assert stopped.finding == Finding(signs.ANGLE_RANGE, 300.0, 200.0, 9.0, 1.1e5, 1.05e5)
+    assert stopped.finding == Finding(fault_flags.ANGLE_RANGE, 300.0, 200.0, 9.0, 1.1e5, 1.05e5)
 
 
 ON_TOES = phase(PUSH_OFF, 0.5, heel=0.0)
 
 
 def still_for(seconds: float, now: PhaseState, still: str, slope: float, seen: GaitMeasurement = GOOD) -> float:
-    """The last sign where one reading stays the same and the others change by a slope, in N/s and mrad/s."""
+    """The last fault flag where one reading stays the same and the others change by a slope, in N/s and mrad/s."""
     state = safety.START
     slopes = {"heel_force": -slope, "toe_force": slope, "angle": 1.0e-3 * slope}
     for sample in range(round(seconds / PERIOD)):
         moved = {name: getattr(seen, name) + by * sample * PERIOD for name, by in slopes.items() if name != still}
         state = safety.monitor(RULES, state, now, now, seen._replace(**moved), PERIOD)
-    return state.finding.sign
+    return state.finding.fault_flag
 
 
 @pytest.mark.parametrize(
-    ("still", "sign"),
-    [("heel_force", signs.STILL_HEEL), ("toe_force", signs.STILL_TOE), ("angle", signs.STILL_ANGLE)],
+    ("still", "flag"),
+    [("heel_force", fault_flags.STILL_HEEL), ("toe_force", fault_flags.STILL_TOE), ("angle", fault_flags.STILL_ANGLE)],
 )
-def test_one_quiet_sensor_while_others_move_is_a_sign_and_a_foot_that_stands_is_none(still: str, sign: float) -> None:
+def test_one_quiet_sensor_while_others_move_raises_a_flag_and_a_foot_that_stands_is_none(
+    still: str, flag: float
+) -> None:
     flat = phase(MID_STANCE, 0.5)
     longest = 0.35 if still == "angle" else 0.24
     # The slow readings need some samples to show that the others move.
     heavy = GOOD._replace(heel_force=500.0)
-    assert still_for(longest + 0.07, flat, still, 900.0, heavy) == sign
-    assert still_for(longest, flat, still, 900.0, heavy) == signs.NO_SIGN
+    assert still_for(longest + 0.07, flat, still, 900.0, heavy) == flag
+    assert still_for(longest, flat, still, 900.0, heavy) == fault_flags.NO_FLAG
     for quiet in (0.0, 1.0, 100.0):
-        assert still_for(0.7, flat, still, quiet) == signs.NO_SIGN, "who stands sways little"
-    assert still_for(0.4, ON_TOES, still, 0.0) in (signs.STILL_TOE, signs.STILL_ANGLE), (
+        assert still_for(0.7, flat, still, quiet) == fault_flags.NO_FLAG, "who stands sways little"
+    assert still_for(0.4, ON_TOES, still, 0.0) in (fault_flags.STILL_TOE, fault_flags.STILL_ANGLE), (
         "on the toes nobody stands still"
     )
 
@@ -150,9 +152,9 @@ def test_standing_with_readings_that_never_change_goes_on_for_long_without_a_sig
 
 
 def test_an_unloaded_force_that_stays_the_same_is_no_sign() -> None:
-    # A dead sensor may show some newtons for ever; that the foot never loads it is another sign.
+    # A dead sensor may show some newtons for ever; that the foot never loads it is another flag.
     unloaded = GOOD._replace(heel_force=5.0, toe_force=5.0)
-    assert still_for(1.0, phase(SWING, 0.5, 0.0, 0.0), "heel_force", 0.0, unloaded) == signs.NO_SIGN
+    assert still_for(1.0, phase(SWING, 0.5, 0.0, 0.0), "heel_force", 0.0, unloaded) == fault_flags.NO_FLAG
 
 
 @pytest.mark.parametrize(("name", "is_sign"), [(SWING, False), (LANDING, False), (MID_STANCE, True), (PUSH_OFF, True)])
@@ -178,11 +180,11 @@ def test_the_time_at_one_angle_while_sitting_does_not_count_when_the_wearer_stan
     assert state.readings.angle_unchanged > 3.9
     before, stands = now, phase(MID_STANCE, 0.0)
     state = safety.monitor(RULES, state, before, stands, GOOD, PERIOD)
-    assert state.finding.sign == signs.NO_SIGN, "it is no stride"
+    assert state.finding.fault_flag == fault_flags.NO_FLAG, "it is no stride"
     for sample in range(1000):
         before, stands = stands, phase(MID_STANCE, sample * PERIOD)
         state = safety.monitor(RULES, state, before, stands, GOOD, PERIOD)
-    assert state.finding.sign == signs.NO_SIGN, "who stands does not step"
+    assert state.finding.fault_flag == fault_flags.NO_FLAG, "who stands does not step"
     assert state.readings.angle_unchanged < 0.2, "forces that have just come on count as a move"
 
 
@@ -191,44 +193,51 @@ def test_a_large_force_that_is_gone_within_a_sample_stops_and_one_that_falls_qui
     name: str, sensor: str
 ) -> None:
     def after(force: float, period: float = PERIOD) -> float:
-        last = signs.NOTHING_READ._replace(**{name: 500.0})
+        last = fault_checks.NOTHING_READ._replace(**{name: 500.0})
         seen = GOOD._replace(**{name: force})
-        return signs.gone_sign(RULES, last, seen, period)
+        return fault_checks.gone_flag(RULES, last, seen, period)
 
-    assert after(0.0) == signs.FORCE_GONE
-    assert signs.level_of(signs.FORCE_GONE) == STOPPED
-    assert after(100.0) == signs.NO_SIGN, "no step of a foot that falls flat"
-    assert after(0.0, period=0.01) == signs.NO_SIGN, "a slow controller sees a foot leave the ground in one sample"
+    assert after(0.0) == fault_flags.FORCE_GONE
+    assert fault_flags.level_of(fault_flags.FORCE_GONE) == STOPPED
+    assert after(100.0) == fault_flags.NO_FLAG, "no step of a foot that falls flat"
+    assert after(0.0, period=0.01) == fault_flags.NO_FLAG, (
+        "a slow controller sees a foot leave the ground in one sample"
+    )
 
 
 @pytest.mark.parametrize(
-    ("still", "now", "before", "sign"),
+    ("still", "now", "before", "flag"),
     [
-        ("heel", phase(MID_STANCE, 0.5, 1.0, 0.0), phase(MID_STANCE, 0.5), signs.FROZEN_HEEL),
-        ("heel", phase(LANDING, 0.1, 1.0, 0.0), phase(LANDING, 0.1, 1.0, 0.0), signs.STILL_HEEL),
-        ("toe", phase(MID_STANCE, 0.5, 0.0, 1.0), phase(MID_STANCE, 0.5), signs.FROZEN_TOE),
-        ("toe", ON_TOES, ON_TOES, signs.STILL_TOE),
-        ("angle", phase(LANDING, 0.0, 1.0, 0.0), phase(SWING, 0.9, 0.0, 0.0), signs.FROZEN_ANGLE),
-        ("angle", phase(LANDING, 0.0, 1.0, 0.0), phase(SWING, 0.4, 0.0, 0.0), signs.NO_SIGN),
-        ("angle", ON_TOES, ON_TOES, signs.STILL_ANGLE),
+        ("heel", phase(MID_STANCE, 0.5, 1.0, 0.0), phase(MID_STANCE, 0.5), fault_flags.FROZEN_HEEL),
+        ("heel", phase(LANDING, 0.1, 1.0, 0.0), phase(LANDING, 0.1, 1.0, 0.0), fault_flags.STILL_HEEL),
+        ("toe", phase(MID_STANCE, 0.5, 0.0, 1.0), phase(MID_STANCE, 0.5), fault_flags.FROZEN_TOE),
+        ("toe", ON_TOES, ON_TOES, fault_flags.STILL_TOE),
+        ("angle", phase(LANDING, 0.0, 1.0, 0.0), phase(SWING, 0.9, 0.0, 0.0), fault_flags.FROZEN_ANGLE),
+        ("angle", phase(LANDING, 0.0, 1.0, 0.0), phase(SWING, 0.4, 0.0, 0.0), fault_flags.NO_FLAG),
+        ("angle", ON_TOES, ON_TOES, fault_flags.STILL_ANGLE),
     ],
 )
 def test_a_reading_that_stays_the_same_pauses_and_stops_once_another_sensor_shows_a_step(
-    still: str, now: PhaseState, before: PhaseState, sign: float
+    still: str, now: PhaseState, before: PhaseState, flag: float
 ) -> None:
     shown = {"heel": "heel_force", "toe": "toe_force", "angle": "angle"}[still]
     readings = safety.START.readings._replace(**{shown: getattr(GOOD, shown), f"{still}_unchanged": 0.95})
-    assert found(now=now, before=before, state=safety.START._replace(readings=readings)) == sign
+    assert found(now=now, before=before, state=safety.START._replace(readings=readings)) == flag
 
 
 @pytest.mark.parametrize(
-    ("heel", "toe", "sign"),
-    [(0.0, 1.0, signs.NO_HEEL), (1.0, 0.0, signs.NOT_FLAT), (0.0, 0.0, signs.NOT_FLAT), (1.0, 1.0, signs.NO_SIGN)],
+    ("heel", "toe", "flag"),
+    [
+        (0.0, 1.0, fault_flags.NO_HEEL),
+        (1.0, 0.0, fault_flags.NOT_FLAT),
+        (0.0, 0.0, fault_flags.NOT_FLAT),
+        (1.0, 1.0, fault_flags.NO_FLAG),
+    ],
 )
-def test_a_foot_that_must_stand_flat_loads_both_sensors(heel: float, toe: float, sign: float) -> None:
+def test_a_foot_that_must_stand_flat_loads_both_sensors(heel: float, toe: float, flag: float) -> None:
     steady = safety.START._replace(steady=1.0)
     flat, early, late = (phase(MID_STANCE, since, heel, toe) for since in (0.2, 0.15, 0.26))
-    assert found(now=flat, state=steady) == sign
+    assert found(now=flat, state=steady) == flag
     assert not vents(now=early, state=steady)
     assert not vents(now=late, state=steady)
     assert not vents(now=flat), "no usual stride came before"
@@ -239,7 +248,7 @@ def test_a_foot_that_must_stand_flat_loads_both_sensors(heel: float, toe: float,
 )
 def test_a_flat_foot_in_mid_stance_bounds_the_ankle(angle: float, is_sign: bool) -> None:
     steady, seen = safety.START._replace(steady=1.0), GOOD._replace(angle=math.radians(angle))
-    assert (found(seen, phase(MID_STANCE, 0.2), state=steady) == signs.FLAT_ANGLE) is is_sign
+    assert (found(seen, phase(MID_STANCE, 0.2), state=steady) == fault_flags.FLAT_ANGLE) is is_sign
     assert not vents(seen, phase(MID_STANCE, 0.3), state=steady), "the shank leans further later"
     assert not vents(seen, phase(MID_STANCE, 0.2)), "no usual stride came before"
 
@@ -255,8 +264,8 @@ def test_strides_without_the_heel_are_counted_in_a_row_and_those_that_only_begin
     missed = safety.START._replace(stance=Stance(0.0, 1.0, 0.0, 0.0))
     once = safety.monitor(RULES, missed, swing, on_toes, GOOD, PERIOD)
     assert (once.toe_strides, once.level) == (1.0, HELPS)
-    assert found(now=on_toes, before=swing, state=once) == signs.TOE_STRIDES
-    assert signs.level_of(signs.TOE_STRIDES) == LIFTS
+    assert found(now=on_toes, before=swing, state=once) == fault_flags.TOE_STRIDES
+    assert fault_flags.level_of(fault_flags.TOE_STRIDES) == LIFTS
     came = once._replace(stance=Stance(1.0, 1.0, 0.0, 0.0))
     assert not vents(now=on_toes, before=swing, state=came), "the heel came down after the toes"
     assert safety.monitor(RULES, came, swing, on_toes, GOOD, PERIOD).toe_strides == 0.0
@@ -264,12 +273,12 @@ def test_strides_without_the_heel_are_counted_in_a_row_and_those_that_only_begin
 
 
 def test_a_phase_without_end_and_a_stride_without_toes_pause() -> None:
-    assert found(now=phase(SWING, 2.0, 0.0, 0.0, in_phase=1.21)) == signs.ENDLESS_PHASE
+    assert found(now=phase(SWING, 2.0, 0.0, 0.0, in_phase=1.21)) == fault_flags.ENDLESS_PHASE
     assert not vents(now=phase(SWING, 2.0, 0.0, 0.0, in_phase=1.19))
     one_legged = safety.START._replace(stance=Stance(0.0, 1.0, 0.0, 1.2))
-    assert found(now=phase(PUSH_OFF, 1.3, 0.0), state=one_legged) == signs.ENDLESS_PHASE
+    assert found(now=phase(PUSH_OFF, 1.3, 0.0), state=one_legged) == fault_flags.ENDLESS_PHASE
     assert not vents(now=phase(MID_STANCE, 9.0, in_phase=9.0), state=one_legged), "who stands on heel and toes"
-    assert found(now=phase(SWING, 0.4, 0.0, 0.0), before=phase(LANDING, 0.4)) == signs.NO_TOES
+    assert found(now=phase(SWING, 0.4, 0.0, 0.0), before=phase(LANDING, 0.4)) == fault_flags.NO_TOES
     assert not vents(now=phase(MID_STANCE, 0.1), before=phase(LANDING, 0.1))
 
 
@@ -278,7 +287,7 @@ def test_a_stance_without_end_in_which_a_force_comes_back_is_a_sign_and_leaving_
     heel: float, toe: float
 ) -> None:
     name = MID_STANCE if heel else PUSH_OFF
-    assert found(now=phase(MID_STANCE, 1.25), before=phase(name, 1.25, heel, toe)) == signs.RESTLESS
+    assert found(now=phase(MID_STANCE, 1.25), before=phase(name, 1.25, heel, toe)) == fault_flags.RESTLESS
     assert not vents(now=phase(MID_STANCE, 1.1), before=phase(name, 1.1, heel, toe)), "a stride is as long"
     assert not vents(now=phase(name, 5.0, heel, toe), before=phase(MID_STANCE, 5.0)), "the first step after standing"
 
@@ -296,7 +305,7 @@ def test_who_sat_is_helped_again_after_standing_up_and_not_with_one_force() -> N
 
 
 def test_after_a_pause_the_foot_is_lifted_first_and_pushed_later() -> None:
-    state = STEPS._replace(level=PAUSED, finding=safety.START.finding._replace(sign=signs.NO_TOES))
+    state = STEPS._replace(level=PAUSED, finding=safety.START.finding._replace(fault_flag=fault_flags.NO_TOES))
     swing, lands = phase(SWING, 1.05, 0.0, 0.0, in_phase=0.4), phase(LANDING, 0.0, 1.0, 0.0)
     allowed = []
     for _ in range(3):
@@ -335,36 +344,36 @@ A_STEP = [(400.0, 0.0), (350.0, 350.0), (10.0, 600.0)]
 
 
 @pytest.mark.parametrize(
-    ("forces", "sign"),
+    ("forces", "flag"),
     [
-        (A_STEP, signs.NO_SIGN),
-        ([(400.0, 400.0), (350.0, 350.0), (25.0, 25.0)], signs.NO_TOE_OFF),
-        ([(400.0, 320.0), (350.0, 350.0), (10.0, 130.0)], signs.NO_TOE_OFF),
-        ([(0.0, 400.0), (350.0, 350.0), (600.0, 10.0)], signs.NO_TOE_OFF),
-        ([(90.0, 90.0), (80.0, 80.0), (25.0, 25.0)], signs.NO_SIGN),
+        (A_STEP, fault_flags.NO_FLAG),
+        ([(400.0, 400.0), (350.0, 350.0), (25.0, 25.0)], fault_flags.NO_TOE_OFF),
+        ([(400.0, 320.0), (350.0, 350.0), (10.0, 130.0)], fault_flags.NO_TOE_OFF),
+        ([(0.0, 400.0), (350.0, 350.0), (600.0, 10.0)], fault_flags.NO_TOE_OFF),
+        ([(90.0, 90.0), (80.0, 80.0), (25.0, 25.0)], fault_flags.NO_FLAG),
     ],
     ids=["a step", "toes show the heel", "toes show 0.8 of the heel", "swapped", "who sits"],
 )
 def test_a_step_that_does_not_end_on_the_toes_pauses_before_the_foot_is_lifted(
-    forces: list[tuple[float, float]], sign: float
+    forces: list[tuple[float, float]], flag: float
 ) -> None:
     state = after_a_stance(forces)
-    assert state.finding.sign == sign
+    assert state.finding.fault_flag == flag
     assert safety.permits(state, SWING) is (forces is A_STEP)
 
 
 def test_who_sits_down_and_turns_the_foot_is_helped_again_after_standing_up() -> None:
     stands = [(350.0, 350.0), (350.0, 350.0), (300.0, 300.0)]
     state = after_a_stance(stands, since=1.1)
-    assert state.finding.sign == signs.NO_SIGN
+    assert state.finding.fault_flag == fault_flags.NO_FLAG
     assert not safety.permits(state, SWING)
     sits = phase(SWING, 2.5, 0.0, 0.0, in_phase=1.3)
     state = safety.monitor(RULES, state, sits, sits, GOOD._replace(heel_force=25.0, toe_force=25.0), PERIOD)
-    assert (state.level, state.finding.sign) == (signs.PAUSED, signs.ENDLESS_PHASE)
+    assert (state.level, state.finding.fault_flag) == (PAUSED, fault_flags.ENDLESS_PHASE)
     for sample in range(510):
         stood, seen = phase(MID_STANCE, sample * PERIOD), GOOD._replace(angle=1.5 + 1.0e-4 * sample)
         state = safety.monitor(RULES, state, stood, stood, seen, PERIOD)
-    assert state.level == signs.HELPS
+    assert state.level == HELPS
 
 
 def test_a_push_needs_toes_that_carry_in_place_of_the_heel() -> None:
@@ -376,7 +385,7 @@ def test_a_push_needs_toes_that_carry_in_place_of_the_heel() -> None:
 def test_a_swing_that_is_too_short_for_a_steady_stride_pauses() -> None:
     lands = phase(LANDING, 0.0, 1.0, 0.0)
     before = phase(SWING, 1.0, 0.0, 0.0, in_phase=0.24)
-    assert found(now=lands, before=before) == signs.SHORT_SWING
+    assert found(now=lands, before=before) == fault_flags.SHORT_SWING
     assert not vents(now=lands, before=before._replace(in_phase=0.26))
     assert not vents(now=lands, before=before._replace(since_strike=0.85)), "a scuff ends a swing early"
 
@@ -392,7 +401,7 @@ def after_commands(command: float, seconds: float) -> SafetyState:
 def test_a_chamber_that_was_filled_shows_pressure(command: float, name: str) -> None:
     filled = GOOD._replace(pressure_1=3.0e5, pressure_2=3.0e5)
     empty = filled._replace(**{name: 1.0e5})
-    assert found(empty, state=after_commands(command, 0.052)) == signs.NO_RISE
+    assert found(empty, state=after_commands(command, 0.052)) == fault_flags.NO_RISE
     assert not vents(filled, state=after_commands(command, 0.052))
     assert not vents(empty, state=after_commands(command, 0.048))
     assert not vents(empty, state=after_commands(0.5 * command, 0.098)), "half open it takes twice as long"
@@ -405,7 +414,7 @@ def test_a_chamber_that_was_filled_shows_pressure(command: float, name: str) -> 
 def test_a_vented_chamber_shows_no_pressure_while_the_foot_stands_flat(name: str) -> None:
     stuck = GOOD._replace(**{name: 1.5e5})
     flat = phase(MID_STANCE, 0.1)
-    assert found(stuck, flat, state=after_commands(VENT, 0.252)) == signs.NO_FALL
+    assert found(stuck, flat, state=after_commands(VENT, 0.252)) == fault_flags.NO_FALL
     assert not vents(stuck, flat, state=after_commands(VENT, 0.248))
     assert not vents(GOOD, flat, state=after_commands(VENT, 0.252))
     for moving in (phase(SWING, 0.8, 0.0, 0.0), phase(LANDING, 0.1, 1.0, 0.0), phase(MID_STANCE, 0.4, 0.0, 1.0)):
@@ -505,7 +514,7 @@ def pushes_that_end_at(*angles: float) -> SafetyState:
 def test_toes_that_are_seen_to_leave_when_the_foot_has_long_turned_down_lift_only_from_the_second_time_on() -> None:
     assert pushes_that_end_at(112.0, 119.0, 113.0, 125.0).level == HELPS
     late = pushes_that_end_at(119.0, 130.0)
-    assert (late.level, late.finding.sign) == (LIFTS, signs.LATE_FORCES)
+    assert (late.level, late.finding.fault_flag) == (LIFTS, fault_flags.LATE_FORCES)
     assert pushes_that_end_at(119.0, 130.0, 116.0).landing.late_toes == 2.0, "a dropped foot is not in time"
     assert pushes_that_end_at(119.0, 130.0, 114.0).landing.late_toes == 0.0
 
@@ -526,4 +535,4 @@ def test_a_chamber_may_be_thin_for_a_moment_only(sensor: str) -> None:
         state = safety.monitor(RULES, state, flat, flat, GOOD._replace(**{sensor: 5.5e4}), PERIOD)
         levels.append(state.level)
     assert max(levels[:119]) == HELPS
-    assert (levels[-1], state.finding.sign) == (STOPPED, signs.PRESSURE_RANGE)
+    assert (levels[-1], state.finding.fault_flag) == (STOPPED, fault_flags.PRESSURE_RANGE)

@@ -99,6 +99,19 @@ def test_a_scheduler_that_is_not_there_is_one_line(small: Any, tmp_path: Path, m
         sweep(small, tmp_path / "out", scheduler="tcp://127.0.0.1:9")
 
 
+@pytest.mark.parametrize("address", ["nix", "tcp://127.0.0.1:9"])
+def test_a_scheduler_that_is_not_there_leaves_no_client_that_complains_later(
+    address: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import distributed
+
+    monkeypatch.setattr(cluster, "_SECONDS_TO_CONNECT", 1)
+    monkeypatch.setattr(distributed, "Client", None)
+    with pytest.raises(StudyError, match=f"--scheduler {address}: cannot be reached: ") as refused:
+        cluster.compute_on_cluster(address, None, [], list)  # type: ignore[arg-type]
+    assert "\n" not in str(refused.value)
+
+
 def test_without_the_extra_the_option_says_what_to_install(
     small: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

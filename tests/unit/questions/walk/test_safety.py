@@ -1,4 +1,4 @@
-"""What the answer says where a wearer who reacts gets less help: sign, strides that had help, and the picture."""
+"""What the answer says where a wearer who reacts gets less help: flag, strides that had help, and the picture."""
 
 from dataclasses import replace
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ppafo.constants import PASCALS_PER_PSI
-from ppafo.control.walking.signs import NOT_FLAT, SIGNS
+from ppafo.control.walking.fault_flags import FAULT_FLAGS, NOT_FLAT
 from ppafo.model.helping import LIFTS
 from ppafo.questions.walk.reacting import reacting_answer
 from ppafo.questions.walk.safety import safety_remarks
@@ -28,8 +28,8 @@ def test_a_peak_torque_above_the_limit_of_the_controller_is_said() -> None:
 def test_the_answer_of_a_wearer_who_reacts_says_and_shows_where_help_was_less() -> None:
     compared = compare_walks(load_walk("reacting"), 0.1)
     assert "The walk over time" not in {section.heading for section in reacting_answer(compared).sections}
-    sign = SIGNS[NOT_FLAT]
-    event = SafetyEvent(2.0, LIFTS, sign, {"heel_force": 6e-33, "toe_force": 319.4})
+    flag = FAULT_FLAGS[NOT_FLAT]
+    event = SafetyEvent(2.0, LIFTS, flag, {"heel_force": 6e-33, "toe_force": 319.4})
     worn = compared.with_device
     helped = np.arange(worn.helped.size) < 1
     answer = reacting_answer(replace(compared, with_device=replace(worn, events=(event,), helped=helped)))
@@ -41,7 +41,7 @@ def test_the_answer_of_a_wearer_who_reacts_says_and_shows_where_help_was_less() 
     ends = {name for name, *_ in answer.sections[0].table.rows}  # type: ignore[union-attr]
     assert "Strides with help, of gas and push-off" in ends
     (written,) = answer.data["events"]
-    assert (written["time"], written["sign"]) == (2.0, sign.name)
+    assert (written["time"], written["fault_flag"]) == (2.0, flag.name)
 
 
 @pytest.mark.long

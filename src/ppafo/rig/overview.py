@@ -1,13 +1,13 @@
-"""``ppafo rig simulate --list``: experiments and presets of the simulated test bench."""
+"""The experiments and presets of the simulated bench, in words and as data."""
 
-from ppafo.cli.output import Said
+from typing import Any
+
+from ppafo.rig.experiments import EXPERIMENTS
+from ppafo.rig.preset import list_presets, load_preset
 
 
-def list_rig() -> Said:
-    """Return the experiments and the presets with what they are."""
-    from ppafo.rig import list_presets, load_preset
-    from ppafo.rig.experiments import EXPERIMENTS
-
+def overview() -> tuple[str, dict[str, Any]]:
+    """Return the experiments and the presets with what they are, as text and as plain data."""
     experiments = {item.name: item.summary for item in EXPERIMENTS.values()}
     presets = {name: load_preset(name).title for name in list_presets()}
     width = max(map(len, [*experiments, *presets]))
@@ -19,4 +19,4 @@ def list_rig() -> Said:
         "experiments": [{"name": name, "summary": summary} for name, summary in experiments.items()],
         "presets": [{"name": name, "title": title} for name, title in presets.items()],
     }
-    return Said("\n".join(lines), document)
+    return "\n".join(lines), document

@@ -1,63 +1,32 @@
-"""The signs by which a controller of walking helps less, and how they show in the readings.
+"""What readings of a walk can be, what is remembered of them, and the fault flags that they raise by themselves.
 
-Each sign reduces help to lifting, pauses it or stops it. Where the heel is missed the foot is still lifted in the
-swing, but not pushed. A pause vents both chambers and is for readings that walking can cause too: help comes back after
-some good strides. A stop is permanent, for what only a fault causes. A sign is a number in the lanes, and 0 is none.
+A reading raises a flag where it is out of range, lost, frozen while others change, or late. That forces are late is
+seen at the ankle: a foot on its heel turns down until it is flat, and up from then on. A foot that has turned up before
+the heel is detected, and goes on until the toes are, was on the ground long before.
 
-A reading is a sign where it is out of range, lost, frozen while others change, or late. That forces are late is seen
-at the ankle: a foot on its heel turns down until it is flat, and up from then on. A foot that has turned up before the
-heel is detected, and goes on until the toes are, was on the ground long before.
-
-Signs are joined by ``&`` and ``|``: ``and`` and ``or`` are branches, which keep the lanes from running side by side.
+Flags are joined by ``&`` and ``|``: ``and`` and ``or`` are branches, which keep the lanes from running side by side.
 """
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
-from ppafo.control.walking.observer import (
-    LEAK,
-    NOMINAL_QUANTITIES,
-    SUPPLY_HIGH,
-    SUPPLY_LOST,
-    SUPPLY_LOW,
-    VALVE_OPEN,
-    VALVE_SHUT,
-    NominalDevice,
-    pressure_above,
+from ppafo.control.walking.fault_flags import (
+    ANGLE_RANGE,
+    FORCE_GONE,
+    FORCE_RANGE,
+    FROZEN_ANGLE,
+    FROZEN_HEEL,
+    FROZEN_TOE,
+    NO_FLAG,
+    PRESSURE_RANGE,
+    STILL_ANGLE,
+    STILL_HEEL,
+    STILL_TOE,
 )
+from ppafo.control.walking.observer import NOMINAL_QUANTITIES, NominalDevice, pressure_above
 from ppafo.control.walking.phases import PhaseState, lifts
 from ppafo.model.declaration import PRESSURE_LAG, VALVE_LAG, Quantity
-from ppafo.model.helping import HELPS, LANDING, LIFTS, MID_STANCE, PAUSED, PUSH_OFF, STOPPED, SWING
+from ppafo.model.helping import LANDING, MID_STANCE, PUSH_OFF, SWING
 from ppafo.model.sensors import GaitMeasurement
-
-NO_SIGN = 0.0
-FORCE_RANGE = 1.0
-ANGLE_RANGE = 2.0
-PRESSURE_RANGE = 3.0
-NO_RISE = 4.0
-NO_FALL = 5.0
-PRESSURE_SENSOR = 12.0
-FROZEN_HEEL = 13.0
-FROZEN_TOE = 14.0
-FROZEN_ANGLE = 15.0
-FORCE_GONE = 16.0
-STILL_HEEL = 17.0
-STILL_TOE = 18.0
-STILL_ANGLE = 19.0
-ENDLESS_PHASE = 20.0
-RESTLESS = 21.0
-NO_TOES = 22.0
-NOT_FLAT = 23.0
-FLAT_ANGLE = 24.0
-SHORT_SWING = 25.0
-NO_TOE_OFF = 26.0
-NO_HEEL = 27.0
-TOE_STRIDES = 28.0
-LATE_FORCES = 29.0
-
-FORCES = ("heel_force", "toe_force")
-PRESSURES = ("pressure_1", "pressure_2")
-SEEN = ("nominal_flow", "nominal_supply_pressure")
 
 
 class SafetyRules(NamedTuple):
@@ -90,123 +59,6 @@ class SafetyRules(NamedTuple):
     follow_time: float
     highest_toe_off_angle: float
     nominal: NominalDevice
-
-
-@dataclass(frozen=True, slots=True)
-class Sign:
-    """A sign: its name, what is seen, and the names of the readings and settings that it goes by."""
-
-    name: str
-    summary: str
-    readings: tuple[str, ...]
-    settings: tuple[str, ...]
-
-
-SIGNS: dict[float, Sign] = {
-    FORCE_RANGE: Sign("force_range", "implausible foot force", FORCES, ("lowest_force", "largest_force")),
-    ANGLE_RANGE: Sign("angle_range", "an angle that no ankle has", ("angle",), ("lowest_angle", "highest_angle")),
-    PRESSURE_RANGE: Sign(
-        "pressure_range", "implausible chamber pressure", PRESSURES, ("lowest_pressure", "highest_pressure")
-    ),
-    NO_RISE: Sign(
-        "no_rise",
-        "a chamber that the open valve has filled and that shows no pressure",
-        PRESSURES,
-        ("filled_pressure", "fill_time"),
-    ),
-    NO_FALL: Sign(
-        "no_fall",
-        "a vented chamber that shows a pressure which does not fall",
-        PRESSURES,
-        ("filled_pressure", "vent_time", "follow_time"),
-    ),
-    SUPPLY_HIGH: Sign(
-        "supply_high", "more gas in a chamber than its supply can have given: supply pressure too high", PRESSURES, SEEN
-    ),
-    SUPPLY_LOW: Sign(
-        "supply_low",
-        "less gas in a chamber than its supply gives: supply pressure too low, or a hose kinked",
-        PRESSURES,
-        SEEN,
-    ),
-    SUPPLY_LOST: Sign(
-        "supply_lost", "no gas comes to a chamber: supply lost, hose off, or a valve that never opens", PRESSURES, SEEN
-    ),
-    VALVE_OPEN: Sign(
-        "valve_open",
-        "gas comes to a chamber that is given none: a valve stuck open, or a leak across the vane",
-        PRESSURES,
-        SEEN,
-    ),
-    VALVE_SHUT: Sign(
-        "valve_shut", "a vented chamber keeps its gas: a valve stuck shut, or a hose kinked", PRESSURES, SEEN
-    ),
-    LEAK: Sign("leak", "a chamber loses gas that its valve keeps in: a leak", PRESSURES, SEEN),
-    PRESSURE_SENSOR: Sign(
-        "pressure_sensor",
-        "a vented chamber that shows a pressure which does not fall and which its gas does not have",
-        PRESSURES,
-        ("filled_pressure", "vent_time"),
-    ),
-    FROZEN_HEEL: Sign("frozen_heel", "a heel force that stays the same while the toes move", FORCES, ("frozen_time",)),
-    FROZEN_TOE: Sign("frozen_toe", "a toe force that stays the same while the heel moves", FORCES, ("frozen_time",)),
-    FROZEN_ANGLE: Sign("frozen_angle", "an angle that stays the same for a whole stride", ("angle",), ()),
-    FORCE_GONE: Sign("force_gone", "a large force that is gone within a sample", FORCES, ("largest_drop",)),
-    STILL_HEEL: Sign(
-        "still_heel", "a loaded heel whose force stays the same while something else moves", FORCES, ("frozen_time",)
-    ),
-    STILL_TOE: Sign(
-        "still_toe", "loaded toes whose force stays the same while something else moves", FORCES, ("frozen_time",)
-    ),
-    STILL_ANGLE: Sign(
-        "still_angle", "an angle in stance that stays the same while something else moves", ("angle",), ("frozen_time",)
-    ),
-    ENDLESS_PHASE: Sign(
-        "endless_phase", "swing, heel-only or toe-only contact lasting too long", FORCES, ("longest_phase",)
-    ),
-    RESTLESS: Sign("restless", "a stance without end in which heel or toes come and go", FORCES, ("longest_phase",)),
-    NO_TOES: Sign("no_toes", "a swing right after the heel strike, without the toes", FORCES, ()),
-    NOT_FLAT: Sign(
-        "not_flat", "a foot that must stand flat and does not load the toes", FORCES, ("flat_from", "flat_to")
-    ),
-    FLAT_ANGLE: Sign(
-        "flat_angle",
-        "an angle that no ankle has while the foot must stand flat",
-        ("angle",),
-        ("lowest_flat_angle", "highest_flat_angle"),
-    ),
-    SHORT_SWING: Sign("short_swing", "a swing that is too short for its stride", FORCES, ("shortest_swing",)),
-    NO_TOE_OFF: Sign(
-        "no_toe_off",
-        "a step that does not end on the toes: heel and toe sensors show the same, or are swapped",
-        FORCES,
-        (),
-    ),
-    NO_HEEL: Sign(
-        "no_heel", "a foot that must stand flat and does not load the heel", FORCES, ("flat_from", "flat_to")
-    ),
-    TOE_STRIDES: Sign("toe_strides", "strides on the toes alone, one after the other", FORCES, ("most_toe_strides",)),
-    LATE_FORCES: Sign(
-        "late_forces",
-        "two strides in which the ankle shows the foot flat, or in the air, before the forces do",
-        (*FORCES, "angle"),
-        ("highest_toe_off_angle",),
-    ),
-}
-"""Every sign by its number: those up to ``FORCE_GONE`` stop, from ``NO_HEEL`` on the foot is lifted only."""
-
-
-def level_of(sign: float) -> float:
-    """The level that a sign asks for: ``HELPS`` without one, ``STOPPED``, ``PAUSED`` or ``LIFTS``."""
-    level = LIFTS if sign >= NO_HEEL else PAUSED
-    level = STOPPED if sign <= FORCE_GONE else level
-    return level if sign > NO_SIGN else HELPS
-
-
-def first_sign(some: float, others: float) -> float:
-    """The sign of two that comes first: one that stops before one that pauses, either before none."""
-    lower = min(some, others)
-    return lower if lower > NO_SIGN else max(some, others)
 
 
 SAFETY_QUANTITIES = (
@@ -437,8 +289,8 @@ def next_thin(last: float, measurement: GaitMeasurement, period: float) -> float
     return last + period if min(measurement.pressure_1, measurement.pressure_2) < THIN else 0.0
 
 
-def range_sign(rules: SafetyRules, measurement: GaitMeasurement, thin: float) -> float:
-    """The sign of a reading that no foot and no chamber gives; one is thin for a time [s]."""
+def range_flag(rules: SafetyRules, measurement: GaitMeasurement, thin: float) -> float:
+    """The fault flag of a reading that no foot and no chamber gives; one is thin for a time [s]."""
     force = max(measurement.heel_force, measurement.toe_force) > rules.largest_force
     force = force | (min(measurement.heel_force, measurement.toe_force) < rules.lowest_force)
     angle = (measurement.angle < rules.lowest_angle) | (measurement.angle > rules.highest_angle)
@@ -446,7 +298,7 @@ def range_sign(rules: SafetyRules, measurement: GaitMeasurement, thin: float) ->
     pressure = min(measurement.pressure_1, measurement.pressure_2) < rules.lowest_pressure
     pressure = pressure | (thin > THIN_TIME) | (measurement.pressure_1 > rules.highest_pressure)
     pressure = pressure | ((measurement.pressure_2 > rules.highest_pressure) & (not squeezed))
-    found = PRESSURE_RANGE if pressure else NO_SIGN
+    found = PRESSURE_RANGE if pressure else NO_FLAG
     found = ANGLE_RANGE if angle else found
     return FORCE_RANGE if force else found
 
@@ -456,15 +308,15 @@ def is_gone(rules: SafetyRules, last: float, force: float) -> bool:
     return (last > rules.largest_drop) & (force < GONE * rules.largest_drop)
 
 
-def gone_sign(rules: SafetyRules, last: LastReadings, measurement: GaitMeasurement, period: float) -> float:
-    """The sign of a loose contact: a foot takes many samples of ``period`` [s] to leave the ground."""
+def gone_flag(rules: SafetyRules, last: LastReadings, measurement: GaitMeasurement, period: float) -> float:
+    """The fault flag of a loose contact: a foot takes many samples of ``period`` [s] to leave the ground."""
     gone = is_gone(rules, last.heel_force, measurement.heel_force)
     gone = gone | is_gone(rules, last.toe_force, measurement.toe_force)
-    return FORCE_GONE if gone & (period < QUICK_PERIOD) else NO_SIGN
+    return FORCE_GONE if gone & (period < QUICK_PERIOD) else NO_FLAG
 
 
-def still_sign(rules: SafetyRules, readings: LastReadings, before: PhaseState, phase: PhaseState) -> float:
-    """The sign of a reading that does not change while another sensor moves, a fault where that one shows a step.
+def still_flag(rules: SafetyRules, readings: LastReadings, before: PhaseState, phase: PhaseState) -> float:
+    """The fault flag of a reading that does not change while another sensor moves, a fault where that one shows a step.
 
     An unloaded force sensor shows the same for long, and so does the angle of a foot that is held up.
     """
@@ -475,7 +327,7 @@ def still_sign(rules: SafetyRules, readings: LastReadings, before: PhaseState, p
     angle = min(readings.angle_unchanged, phase.since_strike) > max(rules.frozen_time, TURNS_BACK * phase.stride_time)
     whole = (before.phase == SWING) & (phase.phase != SWING)
     whole = whole & (before.since_strike > HALF * phase.stride_time) & (before.since_strike < phase.stride_time / HALF)
-    found = STILL_ANGLE if angle & (not lifts(phase.phase)) else NO_SIGN
+    found = STILL_ANGLE if angle & (not lifts(phase.phase)) else NO_FLAG
     found = STILL_TOE if toe else found
     found = STILL_HEEL if heel else found
     found = FROZEN_ANGLE if whole & (readings.angle_unchanged > MOST * before.since_strike) else found

@@ -1,59 +1,54 @@
-"""``ppafo sets audit SET``: what a parameter set changed against its parent, and where it contradicts itself."""
+"""What parameter sets changed against their parents, and where they contradict themselves, in words and as data."""
 
 import textwrap
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple
 
-from ppafo.cli.arguments import Overrides, SetName
-from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, Said
-
-if TYPE_CHECKING:
-    from ppafo.parameters import ParameterSet
-    from ppafo.parameters.audit import Finding
+from ppafo.answers.writing import align_columns
+from ppafo.errors import ParameterError, refused_as
+from ppafo.parameters import ParameterSet, apply_overrides, load_parameter_set
+from ppafo.parameters.audit import Finding, audit, changed_paths
+from ppafo.parameters.audit.changes import changes
 
 _WIDTH = 100
 _INDENT = "    "
 _SEVERITIES = ("error", "warning", "note")
 
 
-def sets_audit(
-    names: Sequence[SetName], *, parent: SetName | None = None, all_: bool = False, overrides: Overrides = ()
-) -> Said:
-    """Check a parameter set for contradictions.
+class Audited(NamedTuple):
+    """The audit of one set, or of several: text, document, name of its files, and whether no finding is an error."""
 
-    Changes and findings of one set, or a table of several; exit code 1 where a finding is an error.
+    text: str
+    document: dict[str, Any]
+    name: str
+    passed: bool
 
-    names: name of a set, or a .toml file; several are shown side by side
-    parent: show what changed against this set, in place of the one that the file names
-    all_: print what concerns no changed value too, of a set with a parent or --set
+
+def audited(names: Sequence[str], parent: str | None, is_whole: bool, overrides: Sequence[str]) -> Audited:
+    """Return changes and findings of one set, or a table of several.
+
+    Where ``is_whole`` is false, findings that concern no changed value of a set with a parent or overrides are counted.
     """
-    from ppafo.parameters import apply_overrides, load_parameter_set
-    from ppafo.parameters.audit import audit, changed_paths
-
     sets = [apply_overrides(load_parameter_set(name), overrides) for name in names]
     parents = [_parent(parameter_set, parent) for parameter_set in sets]
     found = [(one, audit(one, other)) for one, other in zip(sets, parents, strict=True)]
     documents = [
         _document(*one, overrides) | _changes_document(one[0], other) for one, other in zip(found, parents, strict=True)
     ]
-    has_errors = any(_counts(findings)["error"] for _, findings in found)
-    code = EXIT_CHECK_FAILED if has_errors else EXIT_GOOD
+    passed = not any(_counts(findings)["error"] for _, findings in found)
     if len(found) > 1:
-        return Said(_table(found), {"sets": documents}, "audit", code)
+        return Audited(_table(found), {"sets": documents}, "audit", passed)
     compares = parents[0] is not None or bool(overrides)
-    changed = changed_paths(sets[0], parents[0]) if compares and not all_ else None
+    changed = changed_paths(sets[0], parents[0]) if compares and not is_whole else None
     text = _text(*found[0], changed)
     if documents[0]["parent"] is not None:
         text = f"{_changes_text(documents[0])}\n\n{text}"
-    return Said(text, documents[0], f"audit-{sets[0].name}", code)
+    return Audited(text, documents[0], f"audit-{sets[0].name}", passed)
 
 
-def _parent(parameter_set: "ParameterSet", given: str | None) -> "ParameterSet | None":
+def _parent(parameter_set: ParameterSet, given: str | None) -> ParameterSet | None:
     """Return the set to compare with: the one given, else the one that the file names, if it names any."""
-    from ppafo.errors import ParameterError, refused_as
-    from ppafo.parameters import load_parameter_set
-
     name = given or parameter_set.parent
     if not name:
         return None
@@ -61,16 +56,12 @@ def _parent(parameter_set: "ParameterSet", given: str | None) -> "ParameterSet |
         return load_parameter_set(name)
 
 
-def _changes_document(parameter_set: "ParameterSet", parent: "ParameterSet | None") -> dict[str, Any]:
-    from ppafo.parameters.audit.changes import changes
-
+def _changes_document(parameter_set: ParameterSet, parent: ParameterSet | None) -> dict[str, Any]:
     changed = [] if parent is None else [asdict(change) for change in changes(parameter_set, parent)]
     return {"parent": None if parent is None else parent.name, "changes": changed}
 
 
 def _changes_text(document: dict[str, Any]) -> str:
-    from ppafo.answers.writing import align_columns
-
     name, parent, changed = document["set"], document["parent"], document["changes"]
     count = f"{len(changed)} value{'' if len(changed) == 1 else 's'}" if changed else "nothing"
     rows = [(one["path"], one["before"] or "-", one["after"] or "-", one["origin"]) for one in changed]
@@ -78,7 +69,7 @@ def _changes_text(document: dict[str, Any]) -> str:
     return "\n".join([f"{name} changes {count} of its parent {parent}", *(_INDENT + line for line in table)])
 
 
-def _document(parameter_set: "ParameterSet", findings: "list[Finding]", overrides: Sequence[str]) -> dict[str, Any]:
+def _document(parameter_set: ParameterSet, findings: list[Finding], overrides: Sequence[str]) -> dict[str, Any]:
     return {
         "set": parameter_set.name,
         "overrides": list(overrides),
@@ -87,25 +78,23 @@ def _document(parameter_set: "ParameterSet", findings: "list[Finding]", override
     }
 
 
-def _counts(findings: "list[Finding]") -> dict[str, int]:
+def _counts(findings: list[Finding]) -> dict[str, int]:
     return {severity: sum(finding.severity == severity for finding in findings) for severity in _SEVERITIES}
 
 
-def _table(found: "list[tuple[ParameterSet, list[Finding]]]") -> str:
+def _table(found: list[tuple[ParameterSet, list[Finding]]]) -> str:
     """Return a row for each finding and a column for each set, with how serious it is there."""
-    from ppafo.answers.writing import align_columns
-
     columns = [{finding.id: _verdict(finding) for finding in findings} for _, findings in found]
     names = dict.fromkeys(name for column in columns for name in column)
     head = ["finding", *(parameter_set.name for parameter_set, _ in found)]
     return "\n".join(align_columns([head, *([name, *(column.get(name, "-") for column in columns)] for name in names)]))
 
 
-def _verdict(finding: "Finding") -> str:
+def _verdict(finding: Finding) -> str:
     return "accepted" if finding.accepted else finding.severity
 
 
-def _text(parameter_set: "ParameterSet", findings: "list[Finding]", changed: frozenset[str] | None) -> str:
+def _text(parameter_set: ParameterSet, findings: list[Finding], changed: frozenset[str] | None) -> str:
     """Return the errors and what concerns a ``changed`` value, all findings for None, then how many there are."""
     shown = [one for one in findings if one.severity == "error" or _concerns(one, changed)]
     counts = _counts(findings)
@@ -115,11 +104,11 @@ def _text(parameter_set: "ParameterSet", findings: "list[Finding]", changed: fro
     return "\n\n".join([*("\n".join(_lines(one)) for one in shown), f"{parameter_set.name}: {summary}{rest}"])
 
 
-def _concerns(finding: "Finding", changed: frozenset[str] | None) -> bool:
+def _concerns(finding: Finding, changed: frozenset[str] | None) -> bool:
     return changed is None or not finding.values or any(value.path in changed for value in finding.values)
 
 
-def _lines(finding: "Finding") -> list[str]:
+def _lines(finding: Finding) -> list[str]:
     lines = [f"{finding.severity}: {finding.title} [{finding.id}]"]
     lines += [
         f"{_INDENT}{value.path} = {_format_value(value.value)} {value.unit} ({value.origin})"

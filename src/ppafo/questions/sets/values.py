@@ -1,28 +1,17 @@
-"""``ppafo sets show``: what is in a parameter set, value by value."""
+"""What is in a parameter set, value by value."""
 
 import textwrap
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from ppafo.cli.arguments import Overrides, SetName
-from ppafo.cli.output import Said
-
-if TYPE_CHECKING:
-    from ppafo.parameters import ParameterSet
+from ppafo.parameters import ParameterSet
 
 _WIDTH = 110
 _SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow", "effects", "valves", "reported")
 _COLUMNS = ("path", "value", "unit", "origin", "source")
 
 
-def sets_show(name: SetName, *, overrides: Overrides = ()) -> Said:
-    """Show every value of a parameter set with its source."""
-    from ppafo.parameters import apply_overrides, load_parameter_set
-
-    parameter_set = apply_overrides(load_parameter_set(name), overrides)
-    return Said(_text(parameter_set), _document(parameter_set), parameter_set.name)
-
-
-def _document(parameter_set: "ParameterSet") -> dict[str, Any]:
+def values_document(parameter_set: ParameterSet) -> dict[str, Any]:
+    """Return every value of a set with its source, as plain data."""
     citation = parameter_set.citation
     entries = sorted(parameter_set.entries().items(), key=_section_order)
     return {
@@ -45,8 +34,8 @@ def _section_order(item: tuple[str, object]) -> int:
     return _SECTIONS.index(item[0].partition(".")[0])
 
 
-def _text(parameter_set: "ParameterSet") -> str:
-    document = _document(parameter_set)
+def values_text(document: dict[str, Any]) -> str:
+    """Return the table of ``values_document``."""
     lines = [f"{document['name']}: {document['title']}"]
     lines += textwrap.wrap(document["notes"], _WIDTH)
     if document["citation"] is not None:

@@ -1,0 +1,145 @@
+"""What controllers on the simulator of a processor came to, in words and as data."""
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from ppafo.errors import ScenarioError
+from ppafo.exports.firmware.lock_step import (
+    ChipRun,
+    Comparison,
+    Cost,
+    chip_figure,
+    compare_drawn,
+    run_on_chip,
+    table_rows,
+)
+from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.scenario import Scenario
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_SHOWN = {"rms_error": ("N m", 1.0), "gas_supplied": ("g", 1.0e3)}
+SAMPLES_OF_TABLE = 1000
+
+
+class Tried(NamedTuple):
+    """Text, document, whether every decision is that of the integer controller, and what draws it where it is drawn."""
+
+    text: str
+    document: dict[str, Any]
+    agrees: bool
+    draw: "Callable[[], Figure] | None" = None
+
+
+def tried(names: Sequence[str], target: str, samples: int | None, overrides: Sequence[str]) -> Tried:
+    """Scenarios on one target."""
+    scenarios = [load_scenario(name, overrides) for name in names]
+    if len(scenarios) > 1 and samples is not None:
+        raise ScenarioError("several SCENARIOs: are run in turn and drawn in one figure; give one for --samples")
+    if samples is None:
+        return _runs(scenarios, target)
+    found = compare_drawn(scenarios[0], samples, target=target)
+    about = {"scenario": scenarios[0].name, "target": target}
+    return _drawn(found, scenarios[0].name, scenarios[0].control.period, about)
+
+
+def _runs(scenarios: Sequence[Scenario], target: str) -> Tried:
+    """Scenarios with the chip in charge, one after the other, and their figure."""
+    found = [run_on_chip(scenario, target) for scenario in scenarios]
+    texts, documents = [], []
+    for one in found:
+        metrics = {name: one.chip.metrics[name].value for name in _SHOWN if name in one.chip.metrics}
+        lines = [
+            f"{one.scenario.name} with the controller on the chip's simulator, the lanes as the plant",
+            "",
+            *_cost_lines(one.cost, one.scenario.control.period),
+            *_compared_lines(one),
+            *(f"{name:<12} {value * _SHOWN[name][1]:.4f} {_SHOWN[name][0]}" for name, value in metrics.items()),
+        ]
+        texts.append("\n".join(lines))
+        documents.append(
+            {
+                "scenario": one.scenario.name,
+                "target": one.cost.target.name,
+                **_compared(one),
+                "same_bits": one.same_bits,
+                **_cost_document(one.cost),
+                "metrics": metrics,
+            }
+        )
+    return Tried(
+        "\n\n".join(texts),
+        documents[0] if len(documents) == 1 else {"runs": documents},
+        all(one.same_bits and not one.differences for one in found),
+        lambda: chip_figure(found),
+    )
+
+
+def _drawn(found: Comparison, name: str, period: float, about: dict[str, Any]) -> Tried:
+    """Drawn samples on the chip and in Python."""
+    lines = [
+        f"{found.samples} drawn samples of the controller of {name} on the chip's simulator",
+        "",
+        *_cost_lines(found.cost, period),
+        f"decisions   {found.samples}, {found.differences} other than those of the integer controller in Python",
+        *([f"the first: {found.first_difference}"] if found.differences else []),
+    ]
+    document = {**about, **_compared(found), **_cost_document(found.cost)}
+    return Tried("\n".join(lines), document, not found.differences)
+
+
+def table(targets: Sequence[str], samples: int | None) -> Tried:
+    """Every controller on every target, as a table."""
+    lines = ["| target | controller | flash | data + stack | worst and mean | drawn samples | other decisions |"]
+    lines.append("|---|---|---|---|---|---|---|")
+    documents = []
+    for row in table_rows(targets, samples or SAMPLES_OF_TABLE):
+        found, own = row.found, {"target": row.target.name, "controller": row.law.replace("`", "")}
+        if found is None:
+            lines.append(f"| {row.target.name} | {row.law} | not run: {', '.join(row.missing)} is missing | | | | |")
+            documents.append({**own, "missing": list(row.missing)})
+            continue
+        cost = found.cost
+        lines.append(
+            f"| {row.target.name} | {row.law} | {cost.sizes.flash:,} | {cost.sizes.data} + {cost.stack} "
+            f"| {cost.worst:,}, {cost.mean:,.0f} {row.target.counted} | {found.samples:,} | {found.differences} |"
+        )
+        documents.append({**own, **_compared(found), **_cost_document(cost)})
+    return Tried("\n".join(lines), {"rows": documents}, not any(item.get("differences") for item in documents))
+
+
+def _compared(found: ChipRun | Comparison) -> dict[str, Any]:
+    return {"samples": found.samples, "differences": found.differences}
+
+
+def _compared_lines(found: ChipRun) -> list[str]:
+    return [
+        f"decisions   {found.samples}, {found.differences} other than those of the integer controller in the lanes",
+        f"recording   {'the same bits' if found.same_bits else 'NOT the same bits'} as without the chip",
+    ]
+
+
+def _cost_lines(cost: Cost, period: float) -> list[str]:
+    target, worst, mean = cost.target, cost.worst, cost.mean
+    share = f"{worst / target.clock / period:.2%} of a sample at {target.clock / 1.0e6:g} MHz"
+    interrupt = target.interrupt_stack
+    return [
+        f"flash       {cost.sizes.flash} of {target.flash.size} bytes, the whole program",
+        f"RAM         {cost.sizes.data} bytes of data, {cost.stack} of stack, {interrupt} for the timer's interrupt, "
+        f"of {target.ram.size}",
+        f"cycles      {worst} at worst, {mean:.0f} on average; {share}"
+        if target.counted == "cycles"
+        else f"cycles      not known to the simulator; {worst} {target.counted} at worst, {mean:.0f} on average; "
+        f"at one cycle each {share}",
+    ]
+
+
+def _cost_document(cost: Cost) -> dict[str, Any]:
+    return {
+        "flash": cost.sizes.flash,
+        "data": cost.sizes.data,
+        "stack": cost.stack,
+        f"worst_{cost.target.counted}": cost.worst,
+        f"mean_{cost.target.counted}": cost.mean,
+    }
