@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
-from ppafo.answers.style import BLACK, COLOURS, GREY, house_style
 from ppafo.errors import PpafoError
 from ppafo.model.orifice import isentropic_flow_function
+from ppafo.report.style import BLACK, COLOURS, GREY, house_style
 from ppafo.storage.foreign import load_column_map, read_foreign
 from ppafo.units import to_si
 

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from ppafo.analyses.endurance.draw import draw_of_numbers
+from ppafo.analyses.endurance.solve import follow_bottle
 from ppafo.live.workbench import openings_of
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
-from ppafo.questions.endurance.draw import draw_of_numbers
-from ppafo.questions.endurance.solve import follow_bottle
 from ppafo.simulation.loading import list_scenarios
 from ppafo.walking import list_walks
 from ppafo.walking.bottle import Schedule

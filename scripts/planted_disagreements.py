@@ -19,8 +19,8 @@ from pathlib import Path
 import numpy as np
 
 import ppafo
+from ppafo.analyses.validate.solve import Validation, in_words
 from ppafo.constants import PASCALS_PER_PSI
-from ppafo.questions.validate.solve import Validation, in_words
 from ppafo.rig.experiments import record
 from ppafo.signals.recording import Recording
 from ppafo.storage import write_csv

@@ -10,10 +10,10 @@ from typing import Any
 
 import pytest
 
+from ppafo.analyses.reproduce.answer import Reproduction
+from ppafo.analyses.reproduce.solve import reproduce
 from ppafo.engine import cache
 from ppafo.engine.loading import BACKEND_VARIABLE, NUMBA
-from ppafo.questions.reproduce.answer import Reproduction
-from ppafo.questions.reproduce.solve import reproduce
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
 

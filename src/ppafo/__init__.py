@@ -16,6 +16,23 @@ from ppafo.engine.compilers import Compiler, offer
 from ppafo.version import __version__ as __version__
 
 if TYPE_CHECKING:
+    from ppafo.analyses.design.front.answer import Design as Design
+    from ppafo.analyses.design.loading import load_design as load_design
+    from ppafo.analyses.design.profile.answer import Sizing as Sizing
+    from ppafo.analyses.endurance.answer import Endurance as Endurance
+    from ppafo.analyses.endurance.solve import endurance_of_walk as endurance_of_walk
+    from ppafo.analyses.identify.answer import Identification as Identification
+    from ppafo.analyses.linearise.answer import LinearModel as LinearModel
+    from ppafo.analyses.parts.solve import Parts as Parts
+    from ppafo.analyses.parts.solve import parts as parts
+    from ppafo.analyses.reproduce.answer import Reproduction as Reproduction
+    from ppafo.analyses.sweep.answer import load_study_results as load_study_results
+    from ppafo.analyses.sweep.results import StudyResults as StudyResults
+    from ppafo.analyses.sweep.solve import sweep as sweep
+    from ppafo.analyses.sweep.statistic import estimate as estimate
+    from ppafo.analyses.tune.problem import list_tunings as list_tunings
+    from ppafo.analyses.tune.problem import load_tuning as load_tuning
+    from ppafo.analyses.validate.solve import Validation as Validation
     from ppafo.cli.verbs.analyses import bottle as bottle
     from ppafo.cli.verbs.analyses import compare as compare
     from ppafo.cli.verbs.analyses import design as design
@@ -55,23 +72,6 @@ if TYPE_CHECKING:
     from ppafo.parameters.parts import Catalogue as Catalogue
     from ppafo.parameters.parts import Part as Part
     from ppafo.parameters.parts import load_catalogue as load_catalogue
-    from ppafo.questions.design.front.answer import Design as Design
-    from ppafo.questions.design.loading import load_design as load_design
-    from ppafo.questions.design.profile.answer import Sizing as Sizing
-    from ppafo.questions.endurance.answer import Endurance as Endurance
-    from ppafo.questions.endurance.solve import endurance_of_walk as endurance_of_walk
-    from ppafo.questions.identify.answer import Identification as Identification
-    from ppafo.questions.linearise.answer import LinearModel as LinearModel
-    from ppafo.questions.parts.solve import Parts as Parts
-    from ppafo.questions.parts.solve import parts as parts
-    from ppafo.questions.reproduce.answer import Reproduction as Reproduction
-    from ppafo.questions.sweep.answer import load_study_results as load_study_results
-    from ppafo.questions.sweep.results import StudyResults as StudyResults
-    from ppafo.questions.sweep.solve import sweep as sweep
-    from ppafo.questions.sweep.statistic import estimate as estimate
-    from ppafo.questions.tune.problem import list_tunings as list_tunings
-    from ppafo.questions.tune.problem import load_tuning as load_tuning
-    from ppafo.questions.validate.solve import Validation as Validation
     from ppafo.running import simulate as simulate
     from ppafo.signals import Channel as Channel
     from ppafo.signals import Recording as Recording
@@ -124,21 +124,21 @@ _HOMES = {
     "ppafo.parameters.audit": ("audit",),
     "ppafo.parameters.device": ("Device",),
     "ppafo.parameters.parts": ("Catalogue", "Part", "load_catalogue"),
-    "ppafo.questions.design.front.answer": ("Design",),
-    "ppafo.questions.design.loading": ("load_design",),
-    "ppafo.questions.design.profile.answer": ("Sizing",),
-    "ppafo.questions.endurance.answer": ("Endurance",),
-    "ppafo.questions.endurance.solve": ("endurance_of_walk",),
-    "ppafo.questions.identify.answer": ("Identification",),
-    "ppafo.questions.linearise.answer": ("LinearModel",),
-    "ppafo.questions.parts.solve": ("Parts", "parts"),
-    "ppafo.questions.reproduce.answer": ("Reproduction",),
-    "ppafo.questions.sweep.answer": ("load_study_results",),
-    "ppafo.questions.sweep.results": ("StudyResults",),
-    "ppafo.questions.sweep.solve": ("sweep",),
-    "ppafo.questions.sweep.statistic": ("estimate",),
-    "ppafo.questions.tune.problem": ("list_tunings", "load_tuning"),
-    "ppafo.questions.validate.solve": ("Validation",),
+    "ppafo.analyses.design.front.answer": ("Design",),
+    "ppafo.analyses.design.loading": ("load_design",),
+    "ppafo.analyses.design.profile.answer": ("Sizing",),
+    "ppafo.analyses.endurance.answer": ("Endurance",),
+    "ppafo.analyses.endurance.solve": ("endurance_of_walk",),
+    "ppafo.analyses.identify.answer": ("Identification",),
+    "ppafo.analyses.linearise.answer": ("LinearModel",),
+    "ppafo.analyses.parts.solve": ("Parts", "parts"),
+    "ppafo.analyses.reproduce.answer": ("Reproduction",),
+    "ppafo.analyses.sweep.answer": ("load_study_results",),
+    "ppafo.analyses.sweep.results": ("StudyResults",),
+    "ppafo.analyses.sweep.solve": ("sweep",),
+    "ppafo.analyses.sweep.statistic": ("estimate",),
+    "ppafo.analyses.tune.problem": ("list_tunings", "load_tuning"),
+    "ppafo.analyses.validate.solve": ("Validation",),
     "ppafo.running": ("simulate",),
     "ppafo.signals": ("Channel", "Recording"),
     "ppafo.simulation.loading": ("list_scenarios",),

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
+from ppafo.analyses.identify.answer import Identification
+from ppafo.analyses.identify.solve import identify
 from ppafo.cli.main import main
 from ppafo.parameters.loading import load_device
-from ppafo.questions.identify.answer import Identification
-from ppafo.questions.identify.solve import identify
 
 EXPERIMENTS = ("static-torque", "free-decay", "open-valve-flow", "valve-map", "vane-leak")
 PROBLEM = 'schema_version = 1\nname = "bench"\ndevice.set = "ppafo2011"\n' + "".join(

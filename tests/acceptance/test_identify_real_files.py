@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from ppafo.analyses.identify.answer import Identification
+from ppafo.analyses.identify.solve import identify
 from ppafo.cli.main import main
-from ppafo.questions.identify.answer import Identification
-from ppafo.questions.identify.solve import identify
 
 PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "identify-from-raw-files.md"
 EXAMPLE = Path(str(resources.files("ppafo"))) / "examples" / "measured-cylinder"

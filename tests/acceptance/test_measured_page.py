@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ppafo.analyses.identify.solve import identify
 from ppafo.errors import PpafoError
-from ppafo.questions.identify.solve import identify
 
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT))

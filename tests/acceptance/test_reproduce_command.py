@@ -14,12 +14,12 @@ from pathlib import Path
 
 import pytest
 
+from ppafo.analyses.reproduce import solve as study
+from ppafo.analyses.reproduce.answer import Reproduction
+from ppafo.analyses.reproduce.bench import bench_figure
 from ppafo.cli.main import main
 from ppafo.errors import SimulationError
 from ppafo.progress import Report
-from ppafo.questions.reproduce import solve as study
-from ppafo.questions.reproduce.answer import Reproduction
-from ppafo.questions.reproduce.bench import bench_figure
 from ppafo.rig.solution import RigSolution
 from ppafo.storage import read_csv
 

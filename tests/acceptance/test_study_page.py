@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from ppafo.questions.sweep.solve import sweep
+from ppafo.analyses.sweep.solve import sweep
 from ppafo.studies.declaration import VARIED
 from ppafo.studies.loading import load_study
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 import ppafo
+from ppafo.analyses.find.solve import find
+from ppafo.analyses.sweep.statistic import estimate
+from ppafo.analyses.tune.problem import load_tuning
+from ppafo.analyses.tune.solve import tune
 from ppafo.loading import load_scenario
-from ppafo.questions.find.solve import find
-from ppafo.questions.sweep.statistic import estimate
-from ppafo.questions.tune.problem import load_tuning
-from ppafo.questions.tune.solve import tune
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.studies.loading import load_study
 from ppafo.studies.study import with_overrides

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ppafo.answers.setting_names import setting_names
+from ppafo.analyses.linearise.solve import linearise
 from ppafo.cli.main import main
 from ppafo.engine.lanes import LaneBlock
 from ppafo.engine.rows import row_numbers
@@ -27,7 +27,7 @@ from ppafo.identification.trajectory.problem import with_numbers as with_fitted
 from ppafo.model.catalog import EFFECTS
 from ppafo.parameters.building import build_device
 from ppafo.parameters.loading import json_schema, parse_parameter_set
-from ppafo.questions.linearise.solve import linearise
+from ppafo.report.setting_names import setting_names
 from ppafo.running import simulate
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario

@@ -8,6 +8,11 @@ from typing import Any
 
 import pytest
 
+from ppafo.analyses.design.loading import read_design_file
+from ppafo.analyses.endurance.draw import read_walk_gas
+from ppafo.analyses.reproduce.publication import load_publication
+from ppafo.analyses.sweep.answer import load_study_results
+from ppafo.analyses.tune.problem import load_tuning
 from ppafo.cli.doctor import FORMATS
 from ppafo.documents.json_text import MAXIMUM_LEVELS, is_nested_too_deeply, json_document
 from ppafo.errors import DataError, PpafoError
@@ -17,11 +22,6 @@ from ppafo.identification.problem import load_problem
 from ppafo.parameters import load_parameter_set
 from ppafo.parameters.bottles.bottle import load_bottle
 from ppafo.parameters.parts import load_catalogue
-from ppafo.questions.design.loading import read_design_file
-from ppafo.questions.endurance.draw import read_walk_gas
-from ppafo.questions.reproduce.publication import load_publication
-from ppafo.questions.sweep.answer import load_study_results
-from ppafo.questions.tune.problem import load_tuning
 from ppafo.rig.experiments import check_rig_folder
 from ppafo.rig.preset import load_preset
 from ppafo.simulation.loading import load_scenario, scenario_from_dict

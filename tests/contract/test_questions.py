@@ -27,18 +27,18 @@ VERBS: dict[str, Command] = {
     for action, command in (one.actions if isinstance(one, Group) else {"": one}).items()
 }
 SOLVERS = {
-    "bottle": "ppafo.questions.endurance.solve:endurance",
-    "compare": "ppafo.questions.compare.solve:compare",
-    "design": "ppafo.questions.design.solve:design",
-    "find": "ppafo.questions.find.solve:find",
-    "identify": "ppafo.questions.identify.solve:identify",
-    "linearise": "ppafo.questions.linearise.solve:linearise",
-    "reproduce": "ppafo.questions.reproduce.solve:reproduce",
-    "sensitivity": "ppafo.questions.sensitivity.solve:sensitivity",
-    "sweep": "ppafo.questions.sweep.solve:sweep_into_folder",
-    "tune": "ppafo.questions.tune.solve:tune",
-    "validate": "ppafo.questions.validate.solve:validate",
-    "walk": "ppafo.questions.walk.answer:walk_with_and_without",
+    "bottle": "ppafo.analyses.endurance.solve:endurance",
+    "compare": "ppafo.analyses.compare.solve:compare",
+    "design": "ppafo.analyses.design.solve:design",
+    "find": "ppafo.analyses.find.solve:find",
+    "identify": "ppafo.analyses.identify.solve:identify",
+    "linearise": "ppafo.analyses.linearise.solve:linearise",
+    "reproduce": "ppafo.analyses.reproduce.solve:reproduce",
+    "sensitivity": "ppafo.analyses.sensitivity.solve:sensitivity",
+    "sweep": "ppafo.analyses.sweep.solve:sweep_into_folder",
+    "tune": "ppafo.analyses.tune.solve:tune",
+    "validate": "ppafo.analyses.validate.solve:validate",
+    "walk": "ppafo.analyses.walk.answer:walk_with_and_without",
 }
 NO_VERB_OF_THEIR_NAME = ("sweep", "walk")
 MOST_COMMANDS = 22
@@ -151,7 +151,7 @@ def test_a_function_with_plain_types_is_a_command(capsys: pytest.CaptureFixture[
         del OTHERS["plain"]
 
 
-PAGE = "how-to/add-a-question.md"
+PAGE = "how-to/add-an-analysis.md"
 WORDS = ("torque-task-proportional", "--pressure", "30 psi_g", "--pressure", "60 psi_g")
 
 
@@ -160,14 +160,14 @@ def _installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None
     """The package of the page, as an installer leaves it, with one more command that cannot be loaded."""
     (module,), (entry_points,) = code_blocks(PAGE, "python"), code_blocks(PAGE, "toml")
     write_package(
-        tmp_path / "site", "my_questions.pressures", module, f'{entry_points}broken = "my_questions.nothing:broken"\n'
+        tmp_path / "site", "my_analyses.pressures", module, f'{entry_points}broken = "my_analyses.nothing:broken"\n'
     )
     monkeypatch.syspath_prepend(tmp_path / "site")
     monkeypatch.chdir(tmp_path)
     yield
     for name in list(OTHERS):
         del OTHERS[name]
-    for name in [name for name in sys.modules if name.split(".")[0] == "my_questions"]:
+    for name in [name for name in sys.modules if name.split(".")[0] == "my_analyses"]:
         del sys.modules[name]
 
 
@@ -178,7 +178,7 @@ def test_a_function_of_another_package_is_a_command_that_answers_what_its_page_s
     (shown,) = code_blocks(PAGE, "text")
     assert main(["pressures", *WORDS]) == 0
     assert capsys.readouterr().out == shown
-    assert main(["my_questions.pressures:pressures", *WORDS, "--json", "--out", str(tmp_path / "out")]) == 0
+    assert main(["my_analyses.pressures:pressures", *WORDS, "--json", "--out", str(tmp_path / "out")]) == 0
     runs = json.loads(capsys.readouterr().out)["runs"]
     assert [run["supply.pressure"] for run in runs] == pytest.approx([308167.7, 515010.5])
     assert {"pressures.png", "pressures.json", "report.html"} <= {path.name for path in (tmp_path / "out").iterdir()}

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
+from ppafo.analyses.linearise.solve import linearise
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.model.effects.leak_opening import LeakOpening, lifted
 from ppafo.model.effects.line_resistance import fed_through_line, prepare
 from ppafo.model.effects.spool_play import SpoolPlace, SpoolPlay, behind_play, settle, spool_position
 from ppafo.model.orifice import area_conductance
 from ppafo.parameters.loading import load_device
-from ppafo.questions.linearise.solve import linearise
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run

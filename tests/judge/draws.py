@@ -73,8 +73,8 @@ def supplies(chance: Chance, low: float = 30.0, high: float = 80.0) -> list[str]
 
 def relief(chance: Chance) -> list[str]:
     """Supplies that take gas back, in half of the draws."""
-    takes_back = chance.random() < 0.5
-    return ["supply.relieving=true"] if MAY_RELIEVE and takes_back else []
+    is_relieving = chance.random() < 0.5
+    return ["supply.relieving=true"] if MAY_RELIEVE and is_relieving else []
 
 
 def orifice(chance: Chance, where: str, area: float) -> list[str]:

@@ -10,11 +10,10 @@ from ppafo.engine.led_leg import torque_lines
 from ppafo.engine.loading import ARRAY, FLOAT, HEADER, INLINE, entry_text
 from ppafo.engine.program import NoParameters, Program, link_program
 from ppafo.engine.rows import leaf_paths, row_expression
-from ppafo.engine.source_text import SourceCollector, woven
+from ppafo.engine.source_text import SourceCollector, composed_lines
 from ppafo.model.effects.kind import Moment
 from ppafo.model.leg import FootLoad
 from ppafo.model.orifice import ExactOrifice, exact_flow
-from ppafo.model.places import way_across, way_in, way_out
 from ppafo.model.plant import (
     Openings,
     PlantParameters,
@@ -23,6 +22,7 @@ from ppafo.model.plant import (
     chamber_pressures,
     chamber_volumes,
 )
+from ppafo.model.ports import exhaust_path, leakage_path, supply_path
 
 
 class GasRates(NamedTuple):
@@ -64,13 +64,13 @@ def gas_rates(
 ) -> GasRates:
     """All mass flows [kg/s] at two chamber pressures [Pa absolute]. Equations (8), (9)."""
     full = valve_orifice.conductance
-    source_1 = exact_flow(plant.supply_pressure, pressure_1, way_in(openings.source_1 * full), valve_orifice)
-    source_2 = exact_flow(plant.dorsiflexion_pressure, pressure_2, way_in(openings.source_2 * full), valve_orifice)
+    source_1 = exact_flow(plant.supply_pressure, pressure_1, supply_path(openings.source_1 * full), valve_orifice)
+    source_2 = exact_flow(plant.dorsiflexion_pressure, pressure_2, supply_path(openings.source_2 * full), valve_orifice)
     source_1 = admitted_flow(source_1, plant.relieving)
     source_2 = admitted_flow(source_2, plant.relieving)
-    vent_1 = exact_flow(pressure_1, plant.atmospheric_pressure, way_out(openings.vent_1 * full), valve_orifice)
-    vent_2 = exact_flow(pressure_2, plant.atmospheric_pressure, way_out(openings.vent_2 * full), valve_orifice)
-    leak_conductance = way_across(leak_orifice.conductance, pressure_1, pressure_2)
+    vent_1 = exact_flow(pressure_1, plant.atmospheric_pressure, exhaust_path(openings.vent_1 * full), valve_orifice)
+    vent_2 = exact_flow(pressure_2, plant.atmospheric_pressure, exhaust_path(openings.vent_2 * full), valve_orifice)
+    leak_conductance = leakage_path(leak_orifice.conductance, pressure_1, pressure_2)
     leak = exact_flow(pressure_1, pressure_2, leak_conductance, leak_orifice)
     return GasRates(
         mass_1=source_1 - vent_1 - leak,
@@ -110,12 +110,12 @@ def thermal_gas_rates(
     volume_1, volume_2 = chamber_volumes(plant, angle)
     pressure_1, pressure_2 = chamber_pressures(plant, angle, contents[0], contents[1])
     warmth_1, warmth_2 = contents[0] / masses[0], contents[1] / masses[1]
-    supply_1 = exact_flow(source_pressure_1, pressure_1, way_in(openings.source_1 * full), valve_orifice)
-    supply_2 = exact_flow(source_pressure_2, pressure_2, way_in(openings.source_2 * full), valve_orifice)
+    supply_1 = exact_flow(source_pressure_1, pressure_1, supply_path(openings.source_1 * full), valve_orifice)
+    supply_2 = exact_flow(source_pressure_2, pressure_2, supply_path(openings.source_2 * full), valve_orifice)
     supply_1, supply_2 = admitted_flow(supply_1, plant.relieving), admitted_flow(supply_2, plant.relieving)
-    outlet_1 = exact_flow(pressure_1, room, way_out(openings.vent_1 * full), valve_orifice)
-    outlet_2 = exact_flow(pressure_2, room, way_out(openings.vent_2 * full), valve_orifice)
-    leak_conductance = way_across(leak_orifice.conductance, pressure_1, pressure_2)
+    outlet_1 = exact_flow(pressure_1, room, exhaust_path(openings.vent_1 * full), valve_orifice)
+    outlet_2 = exact_flow(pressure_2, room, exhaust_path(openings.vent_2 * full), valve_orifice)
+    leak_conductance = leakage_path(leak_orifice.conductance, pressure_1, pressure_2)
     across = exact_flow(pressure_1, pressure_2, leak_conductance, leak_orifice)
     source_1 = transport(thermal, source_pressure_1, pressure_1, 1.0, warmth_1, supply_1)
     source_2 = transport(thermal, source_pressure_2, pressure_2, 1.0, warmth_2, supply_2)
@@ -225,7 +225,7 @@ def right_hand_side_source(program: Program) -> str:
         lines += [f"angle, rate, _ = {add(program.angle.value)}(path, t)"]
     lines += [*state_lines(program, add), *slope_lines(program, add)]
     fill = entry_text(
-        "fill", dict.fromkeys(ARRAYS, ARRAY) | dict.fromkeys(NUMBERS, FLOAT), woven(lines, collector.needs)
+        "fill", dict.fromkeys(ARRAYS, ARRAY) | dict.fromkeys(NUMBERS, FLOAT), composed_lines(lines, collector.needs)
     )
     return "\n\n\n".join([HEADER, collector.text(), fill])
 

@@ -27,8 +27,8 @@ from ppafo.engine.rows import leaf_paths, numbers, rebuild
 from ppafo.engine.run import Run, batch_of, states_at_start
 from ppafo.engine.scheme.actuators import measurement_of
 from ppafo.errors import SimulationError
-from ppafo.model.places import at_valve, friction_at_rest, shown_signals
 from ppafo.model.plant import gravity_torque, net_driving_torque
+from ppafo.model.ports import at_valve, friction_at_rest, shown_signals
 from ppafo.model.sensors import Measurement, measure
 from tests.judge.reference_slopes import (
     PLANT_UNKNOWNS,

@@ -11,12 +11,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from ppafo.analyses.design.loading import load_design
+from ppafo.analyses.tune.problem import load_tuning
 from ppafo.errors import PpafoError
 from ppafo.gait.document import load_gait
 from ppafo.parameters.bottles.bottle import load_bottle
 from ppafo.parameters.parts import load_catalogue
-from ppafo.questions.design.loading import load_design
-from ppafo.questions.tune.problem import load_tuning
 from ppafo.rig.preset import load_preset
 from ppafo.studies.loading import load_study
 from ppafo.walking.loading import load_walk
@@ -24,8 +24,8 @@ from ppafo.walking.loading import load_walk
 PACKAGE = resources.files("ppafo")
 FORMATS: dict[str, tuple[Callable[[str], Any], Traversable]] = {
     "study": (load_study, PACKAGE / "studies" / "library"),
-    "tuning": (load_tuning, PACKAGE / "questions" / "tune" / "library"),
-    "design": (load_design, PACKAGE / "questions" / "design" / "library"),
+    "tuning": (load_tuning, PACKAGE / "analyses" / "tune" / "library"),
+    "design": (load_design, PACKAGE / "analyses" / "design" / "library"),
     "walk": (load_walk, PACKAGE / "walking" / "configurations"),
     "bottle": (load_bottle, PACKAGE / "parameters" / "bottles" / "files"),
     "parts": (load_catalogue, PACKAGE / "parameters" / "parts" / "catalogues"),

@@ -2,9 +2,9 @@
 
 import pytest
 
-from ppafo.questions.reproduce.answer import Reproduction
-from ppafo.questions.reproduce.claim import Claim, Observation
-from ppafo.questions.reproduce.step_response import Levels, step_events, step_observations
+from ppafo.analyses.reproduce.answer import Reproduction
+from ppafo.analyses.reproduce.claim import Claim, Observation
+from ppafo.analyses.reproduce.step_response import Levels, step_events, step_observations
 from ppafo.running import simulate
 
 SHORT_LINES = ("actuator.dead_volume_1=2 cm^3", "actuator.dead_volume_2=2 cm^3")

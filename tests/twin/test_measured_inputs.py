@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ppafo.analyses.identify.solve import identify
 from ppafo.identification.trajectory import TrajectoryFit
-from ppafo.questions.identify.solve import identify
 from ppafo.rig.experiments import record
 from ppafo.storage import write_csv
 

@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 import ppafo
-from ppafo.answers.solved import Solved
 from ppafo.cli.main import main
 from ppafo.kinds import kind_at
+from ppafo.report.solved import Solved
 
 FEWEST_ANSWERS = 14
 
@@ -33,7 +33,7 @@ def test_every_public_answer_prints_its_table_and_has_a_short_form() -> None:
     for place in ppafo._HOME_OF.items():
         kind_at(":".join(reversed(place)))
     for place in ("design.wearer.solve:WearerSizing", "walk.answer:WalkPair"):
-        kind_at(f"ppafo.questions.{place}")
+        kind_at(f"ppafo.analyses.{place}")
 
     # A dataclass with slots is made from another class of its name.
     classes = [one for one in Solved.__subclasses__() if getattr(sys.modules[one.__module__], one.__name__) is one]

@@ -17,8 +17,8 @@ HEADINGS: dict[str, dict[str, Command | Group]] = {
     "the paper": {
         "reproduce": Command(
             f"{_ANALYSES}:reproduce",
-            library="ppafo.questions.reproduce.publication:FILE",
-            listing="ppafo.questions.reproduce.publication:list_studies",
+            library="ppafo.analyses.reproduce.publication:FILE",
+            listing="ppafo.analyses.reproduce.publication:list_studies",
         ),
     },
     "your device": {
@@ -52,14 +52,14 @@ HEADINGS: dict[str, dict[str, Command | Group]] = {
         "sweep": Command(
             f"{_ANALYSES}:sweep",
             library="ppafo.studies.loading:STUDY_FILES",
-            listing="ppafo.questions.sweep.solve:studies_of_the_package",
+            listing="ppafo.analyses.sweep.solve:studies_of_the_package",
         ),
         "compare": Command(f"{_ANALYSES}:compare"),
         "sensitivity": Command(f"{_ANALYSES}:sensitivity"),
         "find": Command(f"{_ANALYSES}:find"),
-        "tune": Command(f"{_ANALYSES}:tune", library="ppafo.questions.tune.problem:TUNING"),
+        "tune": Command(f"{_ANALYSES}:tune", library="ppafo.analyses.tune.problem:TUNING"),
         "linearise": Command(f"{_ANALYSES}:linearise"),
-        "design": Command(f"{_ANALYSES}:design", library="ppafo.questions.design.loading:FILE"),
+        "design": Command(f"{_ANALYSES}:design", library="ppafo.analyses.design.loading:FILE"),
         "bottle": Command(f"{_ANALYSES}:bottle", library="ppafo.parameters.bottles.bottle:FILE"),
     },
     "walk": {
@@ -75,8 +75,8 @@ HEADINGS: dict[str, dict[str, Command | Group]] = {
         "walk": Command(
             f"{_WALKING}:walk",
             library="ppafo.walking.loading:FILE",
-            listing="ppafo.questions.walk.answer:list_files",
-            default_folder="ppafo.questions.walk.answer:default_folder",
+            listing="ppafo.analyses.walk.answer:list_files",
+            default_folder="ppafo.analyses.walk.answer:default_folder",
         ),
     },
     "tools": {

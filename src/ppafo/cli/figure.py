@@ -16,8 +16,8 @@ def export_figure(folder: Folder, *, out: File | None = None) -> Said:
     folder: a result folder written by ppafo
     out: a .png, .svg or .pdf file; default figure.png and figure.svg in DIR
     """
-    from ppafo.answers.recording_figure import FIGURE_FORMATS
-    from ppafo.answers.style import render_figure
+    from ppafo.report.recording_figure import FIGURE_FORMATS
+    from ppafo.report.style import render_figure
     from ppafo.storage.files import write_file
     from ppafo.storage.result_folder import add_to_folder
 
@@ -26,8 +26,8 @@ def export_figure(folder: Folder, *, out: File | None = None) -> Said:
         raise DataError(f"--out {out}: the name must end in one of {allowed}")
     if out is not None:
         output.check_new_file(out)
-    from ppafo.answers.drawing import load_drawing
-    from ppafo.questions.stored_figures import draw_folder, names_in, what_is_there
+    from ppafo.analyses.stored_figures import draw_folder, names_in, what_is_there
+    from ppafo.report.drawing import load_drawing
 
     names = names_in(folder)
     load_drawing()

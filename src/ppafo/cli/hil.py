@@ -49,13 +49,13 @@ def hil(
         check_result_folder(folder)
     with stop_by_interrupt() as is_stopped:
         found = run_at(port, chosen, rate, baud, lock_step, patience, is_stopped, _say)
-        from ppafo.answers.drawing import load_drawing
+        from ppafo.report.drawing import load_drawing
 
         load_drawing()
-        from ppafo.answers.recording_figure import figure_files
+        from ppafo.report.recording_figure import figure_files
 
         found.save(folder, figure_files(found.plot_signals()))
-    from ppafo.answers.display_units import metrics_lines
+    from ppafo.report.display_units import metrics_lines
 
     result = found.result
     lines = metrics_lines(result.metrics, result.scenario.device.supply.atmospheric_pressure)

@@ -18,7 +18,7 @@ from ppafo.progress import ProgressLine
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ppafo.answers import Answer
+    from ppafo.report import Answer
 
 
 EXIT_GOOD = 0
@@ -102,16 +102,16 @@ def deliver(
         if found.aside:
             print(f"ppafo: {found.aside}", file=sys.stderr)
         return found.exit_code
-    from ppafo.answers import Answer
-    from ppafo.answers.writing import REPORT, text_of
+    from ppafo.report import Answer
+    from ppafo.report.writing import REPORT, text_of
 
     answer = found if isinstance(found, Answer) else found.answer()
     text, folder = text_of(answer), str(answer.data["folder"]) if has_written else None
     if out is not None:
-        from ppafo.answers.drawing import load_drawing
+        from ppafo.report.drawing import load_drawing
 
         load_drawing()
-        from ppafo.answers.writing import files_of
+        from ppafo.report.writing import files_of
 
         write_files(out, files_of(answer), command)
         folder = str(out)
@@ -127,10 +127,10 @@ def said_files(said: Said) -> dict[str, bytes]:
     files = {file: f"{content}\n".encode() for file, content in contents.items()}
     if said.draw is None:
         return files
-    from ppafo.answers.drawing import load_drawing
+    from ppafo.report.drawing import load_drawing
 
     load_drawing()
-    from ppafo.answers.style import render_figure
+    from ppafo.report.style import render_figure
 
     return files | {
         f"{said.name}.{form}": content for form, content in render_figure(said.draw(), ("png", "svg")).items()
@@ -208,7 +208,7 @@ def export_file(out: Path, make: Callable[[], bytes], following: str) -> Said:
 
 def listing(noun: str, rows: Sequence[Mapping[str, Any]], columns: Sequence[str] = ()) -> Said:
     """Return a list of what there is: a row each, of these columns (all without), and all of it as data."""
-    from ppafo.answers.writing import align_columns
+    from ppafo.report.writing import align_columns
 
     shown = [[row[name] for name in columns or row] for row in rows]
     cells = [

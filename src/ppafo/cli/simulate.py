@@ -9,7 +9,7 @@ from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, Said
 from ppafo.documents.json_text import json_text
 
 if TYPE_CHECKING:
-    from ppafo.answers import Answer
+    from ppafo.report import Answer
     from ppafo.simulation.accuracy import ErrorEstimate
     from ppafo.simulation.check import Check
     from ppafo.simulation.simulate import Result
@@ -39,11 +39,11 @@ def simulate(scenario: Scenario, *, check: bool = False, overrides: Overrides = 
     result = simulate(chosen)
     checked = result.check() if check and result.status.is_completed else None
     error = _error(result) if checked is None else checked.error
-    from ppafo.answers.drawing import load_drawing
+    from ppafo.report.drawing import load_drawing
 
     load_drawing()
-    from ppafo.answers.recording_figure import figure_files
-    from ppafo.answers.writing import REPORT, page_of
+    from ppafo.report.recording_figure import figure_files
+    from ppafo.report.writing import REPORT, page_of
 
     figures = figure_files(result.plot())
     report = page_of(_answer(result, checked), {FIGURE: figures[f"{FIGURE}.svg"]})
@@ -78,15 +78,15 @@ def _error(result: "Result") -> "ErrorEstimate | None":
 
 def _answer(result: "Result", check: "Check | None") -> "Answer":
     """Return what the page of a result says: the metrics, the figure, and the run again, to be dragged."""
-    from ppafo.answers import Answer, Figure, Section
     from ppafo.live.workbench import live_part
+    from ppafo.report import Answer, Figure, Section
 
     scenario, status = result.scenario, result.status
     device = f"device '{scenario.device.name}', valve '{scenario.device.valve_name}'"
     changed = f"; values changed for this run: {', '.join(scenario.origin.overrides)}"
     figure = Figure(FIGURE, "What the device does over time. Pressures count from the atmosphere.", result.plot)
-    from ppafo.answers import Column, Table
-    from ppafo.answers.display_units import metric_level, metric_words
+    from ppafo.report import Column, Table
+    from ppafo.report.display_units import metric_level, metric_words
 
     zero = result.scenario.device.supply.atmospheric_pressure
     shown = {name: metric_level(metric.value, metric.unit, zero) for name, metric in result.metrics.items()}

@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 from ppafo.engine.program import python_place
 from ppafo.engine.run import Run
 from ppafo.engine.scheme.real_gas import content_rate
-from ppafo.model.places import friction_in_motion, rebound
 from ppafo.model.plant import (
     PlantParameters,
     chamber_pressures,
@@ -18,6 +17,7 @@ from ppafo.model.plant import (
     holds_still,
     vane_acceleration,
 )
+from ppafo.model.ports import friction_in_motion, rebound
 
 SAME_TIME = 1.0e-12
 """Two instants [s] that are as good as one."""

@@ -5,11 +5,11 @@ from collections.abc import Callable
 from functools import lru_cache
 from typing import Any, TypeAlias, final
 
-from ppafo.engine.pieces import Phases, RarePhase
+from ppafo.engine.components import Phases, RarePhase
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, row_expression
 from ppafo.engine.run_rows import RunRows
-from ppafo.engine.source_text import Collector, woven
+from ppafo.engine.source_text import Collector, composed_lines
 
 LANES = 32
 """Most runs of a block."""
@@ -85,7 +85,7 @@ class LaneRows:
 
     def over_lanes(self, lines: list[str]) -> list[str]:
         """A loop over all lanes of the block, with the rows of effects where a function that is called needs them."""
-        lines = woven(lines, self.needs)
+        lines = composed_lines(lines, self.needs)
         words = {word for line in lines for word in re.findall(r"\w+", line)}
         return over_lanes([*[self.load(row) for row in self.program.effect_rows if row in words], *lines])
 

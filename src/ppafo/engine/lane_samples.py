@@ -14,9 +14,9 @@ from ppafo.engine.scheme.motion import SAME_INSTANT
 from ppafo.engine.scheme.pneumatics import held_pressures
 from ppafo.model.gait import foot_in_gait
 from ppafo.model.helping import STOPPED
-from ppafo.model.places import shown_signals
 from ppafo.model.plant import actuator_torque, chamber_pressures
-from ppafo.model.plant_faults import is_dark, is_due, is_silenced, next_unpowered, runs_at
+from ppafo.model.plant_faults import is_due, is_in_brown_out, is_silenced, next_unpowered, runs_at
+from ppafo.model.ports import shown_signals
 from ppafo.model.sensors import GaitMeasurement, Measurement, late_measurement, measure, measure_gait, samples_late
 from ppafo.model.valves.kind import VENT
 from ppafo.signals.meter import (
@@ -81,7 +81,7 @@ def sampled_with_faults(rows: Rows, lines: list[str]) -> list[str]:
     return [
         *[rows.load(group) for group in ("result", "plant_faults", "shut_off", "unpowered", "sensors")],
         "now = step_index * timing.step",
-        f"dark = {add(is_dark)}(plant_faults, now)",
+        f"dark = {add(is_in_brown_out)}(plant_faults, now)",
         f"runs = {add(runs_at)}(plant_faults, now, timing.period, int(sensors.seed), step_index // steps_per_sample)",
         *called,
         f"takes = {add(is_due)}(plant_faults.slow_time, plant_faults.slow_delay, now, timing.period)",
@@ -283,7 +283,7 @@ def _meter_updates(rows: Rows) -> tuple[list[str], list[str]]:
     """Lines that begin the meters with the first sample, and those that take a further one."""
     program, add = rows.program, rows.add
     groups = program.meter_groups
-    moving = {group: kind for group, kind in groups.items() if not (program.is_held and kind.of_motion)}
+    moving = {group: kind for group, kind in groups.items() if not (program.is_locked and kind.of_motion)}
     begin = [f"{group} = {add(kind.start)}(course, {_sample_for(kind)})" for group, kind in groups.items()]
     begin += [line for group in groups for line in rows.store(group)]
     update = [rows.load(group) for group in moving]

@@ -13,18 +13,18 @@ end, and the state, unless its error refuses it.
 import re
 from typing import get_type_hints
 
+from ppafo.engine.components import Phases, RarePhase
 from ppafo.engine.lane_rows import HANDED, LaneRows, Rows, count_lanes, indent
 from ppafo.engine.lane_samples import present_pressures, pressures_of, sense_end
 from ppafo.engine.led_leg import torque_lines
-from ppafo.engine.pieces import Phases, RarePhase
 from ppafo.engine.rows import leaf_paths
 from ppafo.engine.run_rows import RunRows
 from ppafo.engine.scheme import motion, pneumatics
-from ppafo.engine.source_text import woven
+from ppafo.engine.source_text import composed_lines
 from ppafo.model import plant_faults
 from ppafo.model.effects.kind import Moment, State
-from ppafo.model.places import at_valve, way_across
 from ppafo.model.plant import SinglePort
+from ppafo.model.ports import at_valve, leakage_path
 
 IMPOSSIBLE_RATE = 1.0e6
 IMPOSSIBLE_MASS = 1.0e3
@@ -52,8 +52,8 @@ def plant_loop(rows: Rows) -> list[str]:
 def opening(rows: Rows) -> list[str]:
     """Lines that load what a step needs."""
     names = ["timing", "plant", "valve", "result", "state", "valve_state"]
-    for piece in (rows.program.gas, rows.program.leg, rows.program.feed):
-        names += () if piece is None else piece.loads
+    for component in (rows.program.gas, rows.program.leg, rows.program.feed):
+        names += () if component is None else component.loads
     names += ["load", "shank"] if rows.program.shank is not None else []
     names += ["held"] if rows.program.hands_chambers_on else []
     names += ["start"] if rows.program.starts_apart else []
@@ -124,7 +124,7 @@ def leak_now(rows: Rows) -> list[str]:
     A valve that joins the chambers makes the leak between them as wide as it stands open.
     """
     program, add, lines = rows.program, rows.add, []
-    if any(way_across in effect.laws for effect in program.effects):
+    if any(leakage_path in effect.laws for effect in program.effects):
         lines.append(f"plant = {add(pneumatics.plant_with_leak_at)}(plant, pressure_1, pressure_2)")
     if program.valve.joint is not None:
         opening = f"{add(program.valve.joint.opening)}(shown)"
@@ -139,7 +139,7 @@ def lead(rows: Rows) -> list[str]:
         return program.leg.assume(rows)
     if program.angle is None:
         return [rows.load("begun"), "next_angle = begun.next_angle"]
-    if program.is_held:
+    if program.is_locked:
         return ["next_angle = state.angle", "begun = ()"]
     return [
         rows.load("path"),
@@ -171,7 +171,7 @@ def states_ahead(rows: Rows, lines: list[str]) -> list[str]:
 
     Without them the flows of the second stage would have the states of the begin, and the order would fall to one.
     """
-    words = {word for line in woven(lines, rows.needs) for word in re.findall(r"\w+", line)}
+    words = {word for line in composed_lines(lines, rows.needs) for word in re.findall(r"\w+", line)}
     asked = [(name, kind) for name, kind in rows.program.stated.items() if f"{name}_state" in words]
     if not asked:
         return []
@@ -263,7 +263,7 @@ def end_motion(rows: Rows) -> list[str]:
     if program.angle is None:
         lines = [rows.load("moved"), *program.gas.move(rows, "fed", "begun.next_angle", "moved.angle")]
         return [*lines, f"after = {add(motion.with_motion)}(fed, moved.angle, moved.rate)", "error = moved.error"]
-    if program.is_held:
+    if program.is_locked:
         return ["after = fed", "error = 0.0"]
     return [f"after = {add(motion.with_motion)}(fed, begun.next_angle, begun.next_rate)", "error = 0.0"]
 
@@ -317,8 +317,8 @@ def masses_after(rows: Rows, *others: str) -> list[str]:
 def store_all(rows: Rows, flag: str) -> list[str]:
     """Lines that write the new state, where ``flag`` names a condition only under it."""
     lines = rows.store("state", "after", flag)
-    for piece in (rows.program.gas, rows.program.leg):
-        for group, name in ({} if piece is None else piece.stored).items():
+    for component in (rows.program.gas, rows.program.leg):
+        for group, name in ({} if component is None else component.stored).items():
             lines += rows.store(group, name, flag)
     for state in rows.program.effect_states:
         lines += rows.store(state, f"{state}_after", flag)

@@ -1,4 +1,4 @@
-"""Which compiled pieces a run is made of, and what these put in the place of functions of the model."""
+"""Which compiled components a run is made of, and what these put in the place of functions of the model."""
 
 import math
 from collections import namedtuple
@@ -10,8 +10,8 @@ from typing import Any, NamedTuple, get_type_hints
 from ppafo.control.controllers import switching as constant_controller
 from ppafo.control.kind import ControllerKind, ProfileKind
 from ppafo.control.profiles import CONSTANT
+from ppafo.engine.components import Feed, GasScheme, LegScheme
 from ppafo.engine.over_samples import called_over_samples, in_columns
-from ppafo.engine.pieces import Feed, GasScheme, LegScheme
 from ppafo.engine.scheme.actuators import links_of
 from ppafo.engine.scheme.isothermal_gas import ISOTHERMAL
 from ppafo.engine.scheme.motion import FreePart, Pace, PartEnd, PartSlide, PrescribedStep
@@ -59,12 +59,12 @@ class LaneStart(NamedTuple):
 
 
 class NoParameters(NamedTuple):
-    """Stands where a program has no such piece."""
+    """Stands where a program has no such component."""
 
 
 @dataclass(frozen=True, slots=True)
 class Program:
-    """One combination of pieces; each combination is compiled once.
+    """One combination of components; each combination is compiled once.
 
     ``angle`` None leaves the vane free, otherwise that profile prescribes it. ``controller`` None leaves the command
     to the caller, sample by sample. ``ideal_sensors`` False adds noise and quantisation of the signals,
@@ -221,7 +221,7 @@ class Program:
         return self.valve.jumps and not others
 
     @property
-    def is_held(self) -> bool:
+    def is_locked(self) -> bool:
         """True where the angle is prescribed by a profile that never changes."""
         return self.angle is CONSTANT
 
@@ -233,7 +233,7 @@ class Program:
     @property
     def keeps_volumes(self) -> bool:
         """True where the chamber volumes of a held vane are computed once; all other chambers are treated as moving."""
-        return self.is_held and not (self.has_true_masses or self.has_lines or self.has_shape)
+        return self.is_locked and not (self.has_true_masses or self.has_lines or self.has_shape)
 
     @property
     def hands_chambers_on(self) -> bool:
@@ -243,7 +243,7 @@ class Program:
     def step_rows(self) -> dict[str, type]:
         """Groups of numbers that a phase of a step hands to the later ones, in order."""
         free = FreePart if self.leg is None else self.leg.begun
-        begun = free if self.angle is None else (NoParameters if self.is_held else PrescribedStep)
+        begun = free if self.angle is None else (NoParameters if self.is_locked else PrescribedStep)
         gas = self.gas.begun(self) if self.feed is None else self.feed.begun(self)
         shown = _shown_by(self.valve.connect)
         return {
@@ -275,7 +275,7 @@ def _shown_by(connect: Any) -> Any:
 
 
 def link_program(program: Program, collector: Collector) -> None:
-    """Let a collector call what the pieces of a program have in the place of functions of the model.
+    """Let a collector call what the components of a program have in the place of functions of the model.
 
     ProgramError for an effect that cannot act, or whose name is that of other rows of the program.
     """

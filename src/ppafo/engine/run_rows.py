@@ -10,10 +10,10 @@ import re
 from collections.abc import Callable
 from typing import Any, final
 
-from ppafo.engine.pieces import Phases, RarePhase
+from ppafo.engine.components import Phases, RarePhase
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, row_expression, row_numbers
-from ppafo.engine.source_text import Collector, woven
+from ppafo.engine.source_text import Collector, composed_lines
 
 KEPT = "kept"
 """``kept.state`` is the group itself, whatever lines made of its name in between; the finished text has ``state``."""
@@ -68,7 +68,7 @@ class RunRows:
         lines: list[str] = []
         common: dict[str, str] = {}
         for place, part in enumerate(parts):
-            own = woven(part.lines if isinstance(part, RarePhase) else part, self.needs)
+            own = composed_lines(part.lines if isinstance(part, RarePhase) else part, self.needs)
             written, names = self.renamed(own, common, lines)
             common = names if place < shared else common
             if isinstance(part, RarePhase):

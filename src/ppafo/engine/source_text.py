@@ -23,7 +23,7 @@ from typing import Any, Generic, NamedTuple, Protocol
 
 import numpy as np
 
-from ppafo.control.fixed.whole_numbers import each
+from ppafo.control.fixed.fixed_point import each
 from ppafo.engine.plain_python import ORIGIN, check_flow, check_grammar, parse_module, place, refusal
 from ppafo.errors import ProgramError, nearest_name, one_line
 
@@ -346,7 +346,7 @@ def without_origins(source: str) -> str:
     return "\n".join(line for line in source.split("\n") if not line.startswith(ORIGIN))
 
 
-def woven(lines: Iterable[str], needs: Mapping[str, tuple[str, ...]]) -> list[str]:
+def composed_lines(lines: Iterable[str], needs: Mapping[str, tuple[str, ...]]) -> list[str]:
     """Lines of the text around a module, in which calls hand over the rows of effects that functions need."""
     if not needs:
         return list(lines)
@@ -404,7 +404,7 @@ class SourceCollector:
 
     Where a function is among ``links``, the one that it is linked to is added and called in its place; a link under a
     pair holds inside the first of it. The ``effects`` are laws with the rows that they ask for: whoever calls one is
-    handed these rows in its turn, and so on up to the text around the module (``needs``, ``woven``).
+    handed these rows in its turn, and so on up to the text around the module (``needs``, ``composed_lines``).
     """
 
     decorator: str

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ppafo.answers import Answer, Column, Figure, Section, Table
-from ppafo.answers.display_units import display_unit, display_value, display_values, quantity_of_unit
-from ppafo.answers.style import BLACK, BLUE, GREY, ORANGE, Margins, figure_of_panels, house_style, mark_kind
 from ppafo.gait.document import gait_toml
 from ppafo.gait.gait import CURVES, Gait, clinical_angle, plain_unit
 from ppafo.gait.recorded.footfalls import Stride
 from ppafo.gait.recorded.importing import ImportedGait, phases
+from ppafo.report import Answer, Column, Figure, Section, Table
+from ppafo.report.display_units import display_unit, display_value, display_values, quantity_of_unit
+from ppafo.report.style import BLACK, BLUE, GREY, ORANGE, Margins, figure_of_panels, house_style, mark_kind
 from ppafo.signals.recording import Floats
 
 if TYPE_CHECKING:

@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
-from ppafo.answers.display_units import axis_unit, display_value, quantity_of_unit
-from ppafo.answers.style import BLACK, GREY, PAGE_COLOURS
+from ppafo.report.display_units import axis_unit, display_value, quantity_of_unit
+from ppafo.report.style import BLACK, GREY, PAGE_COLOURS
 
 _WIDTH, _HEIGHT = 720.0, 340.0
 _LEFT, _RIGHT, _TOP, _BOTTOM = 56.0, 12.0, 30.0, 44.0

@@ -8,9 +8,6 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
-from ppafo.answers import LivePart
-from ppafo.answers.setting_names import label_of
-from ppafo.answers.style import PAGE_LOOKS
 from ppafo.errors import PpafoError, ScenarioError, UnitError
 from ppafo.exports.wasm import WasmModule, module_of
 from ppafo.live.opening import computed_opening, first_settings, opening_like, opening_of
@@ -20,6 +17,9 @@ from ppafo.live.words import words
 from ppafo.loading import load_scenario
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.overrides import over
+from ppafo.report import LivePart
+from ppafo.report.setting_names import label_of
+from ppafo.report.style import PAGE_LOOKS
 from ppafo.simulation.declaration import OF_A_VANE, PRESSURE_WORDS
 from ppafo.simulation.overrides import apply_overrides, is_of_device
 from ppafo.simulation.scenario import FreeMotion, Scenario, vane_motion, worn_kind

@@ -144,13 +144,13 @@ def orifice_flow(pressure_a: float, pressure_b: float, conductance: float, curve
 
 
 def check_valve_flow(
-    pressure_a: float, pressure_b: float, conductance: float, takes_back: float, curve: FlowCurve
+    pressure_a: float, pressure_b: float, conductance: float, is_relieving: float, curve: FlowCurve
 ) -> float:
-    """As ``orifice_flow`` [kg/s], with nothing back into a where ``takes_back`` is 0, not 1. Equations (6) to (8)."""
+    """As ``orifice_flow`` [kg/s], with nothing back into a where ``is_relieving`` is 0, not 1. Equations (6) to (8)."""
     upstream = max(pressure_a, pressure_b)
     ratio = min(pressure_a, pressure_b) / upstream
     flow = conductance * upstream * fitted_flow_function(ratio, curve)
-    return flow if pressure_a >= pressure_b else -takes_back * flow
+    return flow if pressure_a >= pressure_b else -is_relieving * flow
 
 
 def orifice_flow_slopes(
@@ -161,7 +161,7 @@ def orifice_flow_slopes(
 
 
 def check_valve_flow_slopes(
-    pressure_a: float, pressure_b: float, conductance: float, takes_back: float, curve: FlowCurve
+    pressure_a: float, pressure_b: float, conductance: float, is_relieving: float, curve: FlowCurve
 ) -> tuple[float, float, float]:
     """As ``check_valve_flow``, with its derivatives with respect to both pressures [kg/(s Pa)]."""
     forward = pressure_a >= pressure_b
@@ -171,9 +171,9 @@ def check_valve_flow_slopes(
     flow = conductance * upstream * value
     by_upstream = conductance * (value - ratio * slope)
     by_downstream = conductance * slope
-    signed = flow if forward else -takes_back * flow
-    by_a = by_upstream if forward else -takes_back * by_downstream
-    by_b = by_downstream if forward else -takes_back * by_upstream
+    signed = flow if forward else -is_relieving * flow
+    by_a = by_upstream if forward else -is_relieving * by_downstream
+    by_b = by_downstream if forward else -is_relieving * by_upstream
     return signed, by_a, by_b
 
 

@@ -16,7 +16,7 @@ from typing import NamedTuple
 from ppafo.model.columns import Number
 from ppafo.model.elementary import QUARTER_TURN
 from ppafo.model.orifice import FlowCurve, check_valve_flow, check_valve_flow_slopes, orifice_flow, orifice_flow_slopes
-from ppafo.model.places import way_in, way_out
+from ppafo.model.ports import exhaust_path, supply_path
 
 
 class PlantParameters(NamedTuple):
@@ -206,32 +206,32 @@ def chamber_pressures(plant: PlantParameters, angle: Number, mass_1: Number, mas
 class SinglePort(NamedTuple):
     """One open path: conductance [kg/(s Pa)], absolute pressure of the node [Pa], and 1 if that is the source.
 
-    ``takes_back`` is 1 where gas may flow back into the node, else 0.
+    ``is_relieving`` is 1 where gas may flow back into the node, else 0.
     """
 
     conductance: float
     node_pressure: float
     source_fraction: float
-    takes_back: float
+    is_relieving: float
 
 
 class BlendedPort(NamedTuple):
     """Two open paths: conductances [kg/(s Pa)] to the source and to the atmosphere and their pressures [Pa].
 
-    ``takes_back`` is 1 where gas may flow back into the source, else 0.
+    ``is_relieving`` is 1 where gas may flow back into the source, else 0.
     """
 
     source_conductance: float
     source_pressure: float
     vent_conductance: float
     vent_pressure: float
-    takes_back: float
+    is_relieving: float
 
 
 def single_ports(plant: PlantParameters, opening: float) -> tuple[SinglePort, SinglePort]:
     """Ports of both chambers for a steady opening [-], -1 to 1: above 0 feeds chamber 1 and vents 2. Equation (8)."""
     conductance = abs(opening) * plant.valve_conductance
-    fed, vented = way_in(conductance), way_out(conductance)
+    fed, vented = supply_path(conductance), exhaust_path(conductance)
     feeds_1 = opening >= 0.0
     node_1 = plant.supply_pressure if feeds_1 else plant.atmospheric_pressure
     node_2 = plant.atmospheric_pressure if feeds_1 else plant.dorsiflexion_pressure
@@ -239,12 +239,12 @@ def single_ports(plant: PlantParameters, opening: float) -> tuple[SinglePort, Si
     back_1 = plant.relieving if feeds_1 else 1.0
     back_2 = 1.0 if feeds_1 else plant.relieving
     return SinglePort(
-        conductance=fed if feeds_1 else vented, node_pressure=node_1, source_fraction=share_1, takes_back=back_1
+        conductance=fed if feeds_1 else vented, node_pressure=node_1, source_fraction=share_1, is_relieving=back_1
     ), SinglePort(
         conductance=vented if feeds_1 else fed,
         node_pressure=node_2,
         source_fraction=1.0 - share_1,
-        takes_back=back_2,
+        is_relieving=back_2,
     )
 
 
@@ -253,18 +253,18 @@ def blended_ports(plant: PlantParameters, openings: Openings) -> tuple[BlendedPo
     full, back = plant.valve_conductance, plant.relieving
     ambient = plant.atmospheric_pressure
     port_1 = BlendedPort(
-        source_conductance=way_in(openings.source_1 * full),
+        source_conductance=supply_path(openings.source_1 * full),
         source_pressure=plant.supply_pressure,
-        vent_conductance=way_out(openings.vent_1 * full),
+        vent_conductance=exhaust_path(openings.vent_1 * full),
         vent_pressure=ambient,
-        takes_back=back,
+        is_relieving=back,
     )
     port_2 = BlendedPort(
-        source_conductance=way_in(openings.source_2 * full),
+        source_conductance=supply_path(openings.source_2 * full),
         source_pressure=plant.dorsiflexion_pressure,
-        vent_conductance=way_out(openings.vent_2 * full),
+        vent_conductance=exhaust_path(openings.vent_2 * full),
         vent_pressure=ambient,
-        takes_back=back,
+        is_relieving=back,
     )
     return port_1, port_2
 
@@ -285,20 +285,20 @@ class PortFlowSlopes(NamedTuple):
     source_slope: float
 
 
-def admitted_flow(flow: float, takes_back: float) -> float:
+def admitted_flow(flow: float, is_relieving: float) -> float:
     """Flow out of a node [kg/s], positive out of it: none back into one that takes nothing back. Equation (8)."""
-    return max(flow, flow * takes_back)
+    return max(flow, flow * is_relieving)
 
 
 def single_port_flow(pressure: float, port: SinglePort, curve: FlowCurve) -> PortFlow:
     """Flow [kg/s] into a chamber at ``pressure`` [Pa absolute] through one open path. Equations (6) to (8)."""
-    flow = check_valve_flow(port.node_pressure, pressure, port.conductance, port.takes_back, curve)
+    flow = check_valve_flow(port.node_pressure, pressure, port.conductance, port.is_relieving, curve)
     return PortFlow(flow, flow * port.source_fraction)
 
 
 def single_port_flow_slopes(pressure: float, port: SinglePort, curve: FlowCurve) -> PortFlowSlopes:
     """As ``single_port_flow``, with derivatives."""
-    flow, _, slope = check_valve_flow_slopes(port.node_pressure, pressure, port.conductance, port.takes_back, curve)
+    flow, _, slope = check_valve_flow_slopes(port.node_pressure, pressure, port.conductance, port.is_relieving, curve)
     return PortFlowSlopes(
         total=flow,
         total_slope=slope,
@@ -309,7 +309,7 @@ def single_port_flow_slopes(pressure: float, port: SinglePort, curve: FlowCurve)
 
 def blended_port_flow(pressure: float, port: BlendedPort, curve: FlowCurve) -> PortFlow:
     """Flow [kg/s] into a chamber at ``pressure`` [Pa absolute] through two open paths. Equations (6) to (8)."""
-    source = check_valve_flow(port.source_pressure, pressure, port.source_conductance, port.takes_back, curve)
+    source = check_valve_flow(port.source_pressure, pressure, port.source_conductance, port.is_relieving, curve)
     vent = orifice_flow(port.vent_pressure, pressure, port.vent_conductance, curve)
     return PortFlow(source + vent, source)
 
@@ -317,7 +317,7 @@ def blended_port_flow(pressure: float, port: BlendedPort, curve: FlowCurve) -> P
 def blended_port_flow_slopes(pressure: float, port: BlendedPort, curve: FlowCurve) -> PortFlowSlopes:
     """As ``blended_port_flow``, with derivatives."""
     source, _, source_slope = check_valve_flow_slopes(
-        port.source_pressure, pressure, port.source_conductance, port.takes_back, curve
+        port.source_pressure, pressure, port.source_conductance, port.is_relieving, curve
     )
     vent, _, vent_slope = orifice_flow_slopes(port.vent_pressure, pressure, port.vent_conductance, curve)
     return PortFlowSlopes(

@@ -50,8 +50,8 @@ class PlantFaults(NamedTuple):
     late_delay: float = 0.0
     jitter_time: float = NEVER
     jitter_share: float = 0.0
-    dark_time: float = NEVER
-    dark_duration: float = 0.0
+    brown_out_time: float = NEVER
+    brown_out_duration: float = 0.0
 
 
 SOUND = PlantFaults(ChamberFaults(), ChamberFaults())
@@ -195,7 +195,7 @@ _CATALOGUE = [
         "brown_out",
         "is without power for a time, with all valves, and starts anew",
         (TIME, Quantity("duration", "s", "for how long", 0.3, 0.0, 1.0e6)),
-        {"time": "dark_time", "duration": "dark_duration"},
+        {"time": "brown_out_time", "duration": "brown_out_duration"},
     ),
 ]
 PLANT_FAULTS: dict[str, dict[str, PlantFault]] = {}
@@ -263,7 +263,7 @@ def failed_single_port(
     fed = (own.opening > 0.0) if stuck else (port.source_fraction > 0.5)
     conductance = abs(own.opening) * plant.valve_conductance if stuck else port.conductance
     node = supply if stuck else port.node_pressure
-    back = plant.relieving if stuck else port.takes_back
+    back = plant.relieving if stuck else port.is_relieving
     is_off, vents = time >= own.off_time, (closed.since > shut_off.delay) & (shut_off.conductance > 0.0)
     through = feed_conductance(shut_off, own, conductance, time) if fed else hose_share(own, time) * conductance
     from_supply = fed & (not vents) & (not is_off)
@@ -271,7 +271,7 @@ def failed_single_port(
         conductance=plant.valve_conductance if is_off else through,
         node_pressure=set_pressure(faults, own, node, room, time) if from_supply else room,
         source_fraction=1.0 if from_supply else 0.0,
-        takes_back=back if from_supply else 1.0,
+        is_relieving=back if from_supply else 1.0,
     )
 
 
@@ -296,7 +296,7 @@ def failed_blended_port(
         source_pressure=room if lost else set_pressure(faults, own, port.source_pressure, room, time),
         vent_conductance=full if is_off else hose_share(own, time) * vent,
         vent_pressure=port.vent_pressure,
-        takes_back=1.0 if lost else port.takes_back,
+        is_relieving=1.0 if lost else port.is_relieving,
     )
 
 
@@ -325,7 +325,7 @@ def swapped_single(port: SinglePort, other: SinglePort, swapped: bool) -> Single
         conductance=other.conductance if swapped else port.conductance,
         node_pressure=other.node_pressure if swapped else port.node_pressure,
         source_fraction=other.source_fraction if swapped else port.source_fraction,
-        takes_back=other.takes_back if swapped else port.takes_back,
+        is_relieving=other.is_relieving if swapped else port.is_relieving,
     )
 
 
@@ -354,7 +354,7 @@ def swapped_blended(port: BlendedPort, other: BlendedPort, swapped: bool) -> Ble
         source_pressure=other.source_pressure if swapped else port.source_pressure,
         vent_conductance=other.vent_conductance if swapped else port.vent_conductance,
         vent_pressure=other.vent_pressure if swapped else port.vent_pressure,
-        takes_back=other.takes_back if swapped else port.takes_back,
+        is_relieving=other.is_relieving if swapped else port.is_relieving,
     )
 
 
@@ -364,9 +364,9 @@ def failed_plant(plant: PlantParameters, faults: PlantFaults, time: float) -> Pl
     return plant._replace(leak_conductance=factor * plant.leak_conductance)
 
 
-def is_dark(faults: PlantFaults, time: float) -> bool:
+def is_in_brown_out(faults: PlantFaults, time: float) -> bool:
     """True where controller and valves have no power at a time [s]."""
-    return (time >= faults.dark_time) & (time < faults.dark_time + faults.dark_duration)
+    return (time >= faults.brown_out_time) & (time < faults.brown_out_time + faults.brown_out_duration)
 
 
 def is_due(began: float, delay: float, time: float, period: float) -> bool:

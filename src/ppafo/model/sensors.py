@@ -29,8 +29,8 @@ class SensorParameters(NamedTuple):
 
     angle_noise: float
     pressure_noise: float
-    angle_quantum: float
-    pressure_quantum: float
+    angle_resolution: float
+    pressure_resolution: float
     seed: float
 
 
@@ -98,11 +98,13 @@ def unit_noise(seed: int, sample: int, channel: int) -> float:
     return float(mix_bits(mix_bits(mix_bits(seed & MASK) ^ (sample & MASK)) ^ (channel & MASK))) / 4294967296.0
 
 
-def quantise(value: float, quantum: float) -> float:
-    """``value`` rounded to a whole number of ``quantum`` of the same unit (half upwards); unchanged where that is 0."""
-    safe = quantum if quantum > 0.0 else 1.0
-    rounded = quantum * float(int(value / safe + 0.5)) if value >= 0.0 else -quantum * float(int(0.5 - value / safe))
-    return rounded if quantum > 0.0 else value
+def quantise(value: float, resolution: float) -> float:
+    """``value`` rounded to a whole number of ``resolution`` of the same unit (half up); unchanged where that is 0."""
+    safe = resolution if resolution > 0.0 else 1.0
+    rounded = (
+        resolution * float(int(value / safe + 0.5)) if value >= 0.0 else -resolution * float(int(0.5 - value / safe))
+    )
+    return rounded if resolution > 0.0 else value
 
 
 def measure(
@@ -110,9 +112,11 @@ def measure(
 ) -> Measurement:
     """Measurement of one sample with noise and quantisation; angle [rad], pressures [Pa absolute]."""
     seed = int(sensors.seed)
-    angle = quantise(angle + sensors.angle_noise * standard_noise(seed, sample, 0), sensors.angle_quantum)
-    first = quantise(pressure_1 + sensors.pressure_noise * standard_noise(seed, sample, 1), sensors.pressure_quantum)
-    second = quantise(pressure_2 + sensors.pressure_noise * standard_noise(seed, sample, 2), sensors.pressure_quantum)
+    angle = quantise(angle + sensors.angle_noise * standard_noise(seed, sample, 0), sensors.angle_resolution)
+    first = quantise(pressure_1 + sensors.pressure_noise * standard_noise(seed, sample, 1), sensors.pressure_resolution)
+    second = quantise(
+        pressure_2 + sensors.pressure_noise * standard_noise(seed, sample, 2), sensors.pressure_resolution
+    )
     return Measurement(angle=angle, pressure_1=first, pressure_2=second, torque=torque_constant * (first - second))
 
 
@@ -159,7 +163,7 @@ class GaitSensors(NamedTuple):
 
     follow_rate: float
     force_noise: float
-    force_quantum: float
+    force_resolution: float
     lost_share: float
     angle_memory: float
     pressure_memory: float
@@ -233,7 +237,7 @@ def faulty(fault: Fault, reading: float, other: float, last: float, time: float,
 def force_reading(sensors: GaitSensors, force: float, seed: int, sample: int, channel: int) -> float:
     """A force [N] with noise and steps, never below 0."""
     noisy = force + sensors.force_noise * standard_noise(seed, sample, channel)
-    return max(quantise(noisy, sensors.force_quantum), 0.0)
+    return max(quantise(noisy, sensors.force_resolution), 0.0)
 
 
 def previous_reading(last: float, reading: float, sample: int) -> float:

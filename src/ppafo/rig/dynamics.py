@@ -135,13 +135,13 @@ def ambient_node(rig: RigPhysics, pressure: float, temperature: float) -> Node:
 
 
 def orifice_exchange(
-    rig: RigPhysics, a: Node, b: Node, fraction: float, orifice: ExactOrifice, takes_back: float
+    rig: RigPhysics, a: Node, b: Node, fraction: float, orifice: ExactOrifice, is_relieving: float
 ) -> Exchange:
     """Mass [kg/s] and enthalpy [W] through a fraction of an orifice, positive from a to b. Equations (6) to (8).
 
-    The gas has the temperature upstream. ``takes_back`` is 1 where gas may flow back into a, else 0.
+    The gas has the temperature upstream. ``is_relieving`` is 1 where gas may flow back into a, else 0.
     """
-    flow = admitted_flow(exact_flow(a.pressure, b.pressure, fraction * orifice.conductance, orifice), takes_back)
+    flow = admitted_flow(exact_flow(a.pressure, b.pressure, fraction * orifice.conductance, orifice), is_relieving)
     upstream_temperature = a.temperature if flow >= 0.0 else b.temperature
     enthalpy = a.enthalpy if flow >= 0.0 else b.enthalpy
     flow = flow * temperature_flow_factor(rig.reference_temperature, upstream_temperature)
@@ -210,13 +210,13 @@ def side(
     vent_fraction: float,
     valve_orifice: ExactOrifice,
     line_orifice: ExactOrifice,
-    takes_back: float,
+    is_relieving: float,
 ) -> Side:
     """Flows [kg/s], [W] between the valve and one chamber; without a line the port is the chamber itself.
 
     ``source_fraction`` and ``vent_fraction`` are the openings of the valve [-].
     """
-    supplied = orifice_exchange(rig, source, port, rig.ports_open * source_fraction, valve_orifice, takes_back)
+    supplied = orifice_exchange(rig, source, port, rig.ports_open * source_fraction, valve_orifice, is_relieving)
     vented = orifice_exchange(rig, port, room, rig.ports_open * vent_fraction, valve_orifice, 1.0)
     mass, energy = supplied.mass - vented.mass, supplied.energy - vented.energy
     if rig.line_volume <= 0.0:

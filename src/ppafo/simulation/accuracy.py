@@ -6,8 +6,8 @@ The error of the time stepping falls with the allowed one, so nearly all of it i
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from ppafo.answers.display_units import metric_change
 from ppafo.engine.run import Run
+from ppafo.report.display_units import metric_change
 
 SHORTER = 4
 """How many times shorter the steps of a finer run are; its allowed error is smaller by the square."""

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from ppafo.answers.display_units import metric_change, metric_level
-from ppafo.answers.writing import align_columns
 from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.report.display_units import metric_change, metric_level
+from ppafo.report.writing import align_columns
 from ppafo.simulation.accuracy import ErrorEstimate
 from ppafo.simulation.scenario import plain
 

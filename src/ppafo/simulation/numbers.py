@@ -24,12 +24,12 @@ from ppafo.simulation.declaration import SUPPLY_LINE, SUPPLY_LINES, Reading
 from ppafo.simulation.overrides import apply_overrides
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, FreeMotion, PrescribedMotion, Scenario, worn_kind
 
-HELD_ANGLE = "motion.angle"
+LOCKED_ANGLE = "motion.angle"
 TIMES = ("run.duration", "run.step", "run.output_interval", "controller.rate", "controller.period")
 """Paths that decide the clock of a run."""
 
 _DEVICE_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow")
-_OF_SENSORS = {"angle_resolution": "angle_quantum", "pressure_resolution": "pressure_quantum"}
+_OF_SENSORS = {"angle_resolution": "angle_resolution", "pressure_resolution": "pressure_resolution"}
 _OF_WALLS = {"wall_area_per_volume": "area_per_volume"}
 _OF_SCENARIO = {
     "initial.pressure_1": "initial_pressure_1",
@@ -65,7 +65,7 @@ def declared_numbers(scenario: Scenario) -> dict[str, Quantity]:
         own: dict[str, Quantity] = worn.quantities(scenario)
         return device_numbers(scenario.device) | own
     kinds = declaration.quantities(_kinds(scenario))
-    return device_numbers(scenario.device) | kinds | _angle_of_held_vane(scenario)
+    return device_numbers(scenario.device) | kinds | _angle_of_locked_vane(scenario)
 
 
 def device_numbers(device: Device) -> dict[str, Quantity]:
@@ -150,8 +150,8 @@ def _kinds(scenario: Scenario) -> dict[str, Any]:
     if isinstance(scenario.motion, FreeMotion) and scenario.motion.leg is not None:
         motion = {"kind": "leg", "shank": {"kind": scenario.motion.leg.shank.kind}}
     if isinstance(scenario.motion, PrescribedMotion):
-        is_held = scenario.motion.kind == "held"
-        motion = {} if is_held else {"kind": "prescribed", "profile": {"kind": scenario.motion.profile.kind}}
+        is_locked = scenario.motion.kind == "held"
+        motion = {} if is_locked else {"kind": "prescribed", "profile": {"kind": scenario.motion.profile.kind}}
     controller = {"kind": scenario.control.kind}
     gas: dict[str, Any] = {} if scenario.thermal is None else {"gas_model": {"kind": declaration.THERMAL}}
     gas |= {} if scenario.supply_lines is None else {SUPPLY_LINE: {}}
@@ -160,16 +160,16 @@ def _kinds(scenario: Scenario) -> dict[str, Any]:
     return {"motion": motion, "controller": controller, "reference": {"kind": scenario.reference.kind}, **gas}
 
 
-def _angle_of_held_vane(scenario: Scenario) -> dict[str, Quantity]:
-    return {HELD_ANGLE: declaration.ANGLE} if path_of_held_angle(scenario) == HELD_ANGLE else {}
+def _angle_of_locked_vane(scenario: Scenario) -> dict[str, Quantity]:
+    return {LOCKED_ANGLE: declaration.ANGLE} if path_of_locked_angle(scenario) == LOCKED_ANGLE else {}
 
 
-def path_of_held_angle(scenario: Scenario) -> str | None:
+def path_of_locked_angle(scenario: Scenario) -> str | None:
     """Return the path of the angle at which a vane stays, None where it moves."""
     motion = scenario.motion
     if not isinstance(motion, PrescribedMotion) or motion.profile.kind != "constant":
         return None
-    return HELD_ANGLE if motion.kind == "held" else "motion.profile.level"
+    return LOCKED_ANGLE if motion.kind == "held" else "motion.profile.level"
 
 
 def _place(path: str, scenario: Scenario) -> tuple[str, ...]:
@@ -180,7 +180,7 @@ def _place(path: str, scenario: Scenario) -> tuple[str, ...]:
         return worn.places[path]
     if path in _OF_SCENARIO:
         return (_OF_SCENARIO[path],)
-    if path == HELD_ANGLE and not isinstance(scenario.motion, FreeMotion):
+    if path == LOCKED_ANGLE and not isinstance(scenario.motion, FreeMotion):
         return ("motion", "profile", "settings", "level")
     if section.startswith(f"{SUPPLY_LINE}."):
         return ("supply_lines", f"{name}_{1 + SUPPLY_LINES.index(section.removeprefix(f'{SUPPLY_LINE}.'))}")

@@ -13,9 +13,9 @@ import numpy as np
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.kind import ControllerKind, ProfileKind
+from ppafo.engine.components import GasScheme
 from ppafo.engine.led_leg import GAIT_SHANK, LedLeg
 from ppafo.engine.over_samples import over_samples
-from ppafo.engine.pieces import GasScheme
 from ppafo.engine.program import NoParameters, Program
 from ppafo.engine.rows import rebuilt
 from ppafo.engine.run import Lines, ReactingWalk, Run, Walk
@@ -43,8 +43,8 @@ from ppafo.model.effects.kind import Effect
 from ppafo.model.gas import wall_exchange
 from ppafo.model.leg import FootLoad
 from ppafo.model.orifice import ExactOrifice
-from ppafo.model.places import gas_density
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, chamber_mass, chamber_volumes
+from ppafo.model.ports import gas_density
 from ppafo.model.regulator import LineState, SupplyLines
 from ppafo.model.sensors import SensorParameters
 from ppafo.model.valves.kind import ValveModel
@@ -84,7 +84,7 @@ def plan_run(scenario: Scenario) -> Run:
 
 
 @dataclass(frozen=True, slots=True)
-class Pieces:
+class Components:
     """What any run is made of, scenario or walk; numbers in SI units, which may be arrays (runs,).
 
     Without a ``path`` the vane is free; without a ``controller`` the caller sets the command. ``thermal`` and
@@ -128,48 +128,50 @@ Start = Callable[[PlantParameters], PlantState]
 
 
 def compose_run(
-    pieces: Pieces,
+    components: Components,
     plant: PlantParameters,
     rule: StepRule,
     start: Start,
     walk: Walk | ReactingWalk | None = None,
 ) -> Run:
-    """Return the run of some pieces: ``rule`` says how it is stepped, ``start`` where it begins, ``walk`` adds a leg.
+    """Return the run of components: ``rule`` says how it is stepped, ``start`` where it begins, ``walk`` adds a leg.
 
-    A leg without ground is one of the pieces, and ``plant`` the bare one.
+    A leg without ground is one of the components, and ``plant`` the bare one.
 
     Every law, valve, motion, gas and supply goes with every other here.
     """
-    settings = pieces.device.valve.settings
-    delay = pieces.valve.command_delay(settings)
-    plant = plant_behind_lines(plant, pieces.supply_lines)
-    leg = None if pieces.leg is None else led_leg(plant, pieces.leg)
+    settings = components.device.valve.settings
+    delay = components.valve.command_delay(settings)
+    plant = plant_behind_lines(plant, components.supply_lines)
+    leg = None if components.leg is None else led_leg(plant, components.leg)
     plant = plant if leg is None else with_load(plant, leg.load)
     steps = rule(plant)
     return Run(
-        program=_program(pieces, steps, walk, has_delay=first(delay) > 0.0),
+        program=_program(components, steps, walk, has_delay=first(delay) > 0.0),
         plant=plant,
-        thermal=thermal_parameters(pieces.thermal, pieces.device),
-        valve_orifice=exact_orifice(pieces.device.valve.orifice, pieces.device),
-        leak_orifice=exact_orifice(pieces.device.actuator.leak, pieces.device),
+        thermal=thermal_parameters(components.thermal, components.device),
+        valve_orifice=exact_orifice(components.device.valve.orifice, components.device),
+        leak_orifice=exact_orifice(components.device.actuator.leak, components.device),
         initial=start(plant),
-        valve=valve_parameters(pieces.valve, settings),
-        controller=() if pieces.controller is None else controller_parameters(pieces.controller, pieces.settings),
-        reference=profile_parameters(pieces.reference),
-        path=() if pieces.path is None else profile_parameters(pieces.path),
-        sensors=pieces.sensors,
+        valve=valve_parameters(components.valve, settings),
+        controller=()
+        if components.controller is None
+        else controller_parameters(components.controller, components.settings),
+        reference=profile_parameters(components.reference),
+        path=() if components.path is None else profile_parameters(components.path),
+        sensors=components.sensors,
         step=steps.step,
         step_count=steps.step_count,
         steps_per_sample=steps.steps_per_sample,
         record_every=steps.record_every,
-        signal_delay=pieces.signal_delay,
+        signal_delay=components.signal_delay,
         command_delay=delay,
         needs_parts=steps.needs_parts,
         tolerance=steps.tolerance,
         walk=walk if isinstance(walk, Walk) else None,
         reacting=walk if isinstance(walk, ReactingWalk) else None,
-        lines=initial_lines(plant, pieces.supply_lines),
-        effects=effect_rows(pieces.device, pieces.sections),
+        lines=initial_lines(plant, components.supply_lines),
+        effects=effect_rows(components.device, components.sections),
         leg=leg,
     )
 
@@ -179,7 +181,7 @@ _REAL = "ppafo.engine.scheme.real_gas:REAL"
 _LINES = "ppafo.engine.scheme.supply_lines:LINES"
 _WALKING = "ppafo.engine.scheme.walking:"
 _REACTING = "ppafo.engine.scheme.reacting:"
-"""Where pieces of programs are that most runs do not have."""
+"""Where components of programs are that most runs do not have."""
 
 
 def _leg_scheme(walk: Walk | ReactingWalk) -> str:
@@ -191,15 +193,16 @@ def _leg_scheme(walk: Walk | ReactingWalk) -> str:
     return f"{_WALKING}{fails}{which}"
 
 
-def _gas_scheme(pieces: Pieces, effects: Sequence[Effect]) -> GasScheme:
+def _gas_scheme(components: Components, effects: Sequence[Effect]) -> GasScheme:
     """Return what the gas keeps or exchanges; ScenarioError for an effect on the density of gas that has no step."""
     real = next((effect for effect in effects if gas_density in effect.laws), None)
     if real is None:
-        return ISOTHERMAL if pieces.thermal is None else kind_at(_ENERGY_BALANCE)
+        return ISOTHERMAL if components.thermal is None else kind_at(_ENERGY_BALANCE)
     lacks = {
-        "gas_model.kind=thermal": pieces.thermal is not None,
-        "[supply_line]": pieces.supply_lines is not None,
-        f"actuator.kind={pieces.device.actuator.kind}": ACTUATORS[pieces.device.actuator.kind].model.shape is not None,
+        "gas_model.kind=thermal": components.thermal is not None,
+        "[supply_line]": components.supply_lines is not None,
+        f"actuator.kind={components.device.actuator.kind}": ACTUATORS[components.device.actuator.kind].model.shape
+        is not None,
     }
     for what, is_there in lacks.items():
         if is_there:
@@ -209,26 +212,26 @@ def _gas_scheme(pieces: Pieces, effects: Sequence[Effect]) -> GasScheme:
     return scheme
 
 
-def _program(pieces: Pieces, steps: Steps, walk: Walk | ReactingWalk | None, has_delay: bool) -> Program:
+def _program(components: Components, steps: Steps, walk: Walk | ReactingWalk | None, has_delay: bool) -> Program:
     """Return what the lanes are composed of."""
-    is_late, effects = first(pieces.signal_delay) > 0.0, effects_of(pieces.device, pieces.sections)
+    is_late, effects = first(components.signal_delay) > 0.0, effects_of(components.device, components.sections)
     return Program(
-        actuator=ACTUATORS[pieces.device.actuator.kind].model,
-        valve=pieces.valve,
-        reference=PROFILES[pieces.reference.kind],
-        controller=pieces.controller,
-        angle=None if pieces.path is None else PROFILES[pieces.path.kind],
-        ideal_sensors=pieces.has_ideal_sensors,
+        actuator=ACTUATORS[components.device.actuator.kind].model,
+        valve=components.valve,
+        reference=PROFILES[components.reference.kind],
+        controller=components.controller,
+        angle=None if components.path is None else PROFILES[components.path.kind],
+        ideal_sensors=components.has_ideal_sensors,
         late_commands=has_delay,
         late_signals=walk is None and is_late,
         late_readings=walk is not None and is_late,
-        gas=_gas_scheme(pieces, effects),
+        gas=_gas_scheme(components, effects),
         leg=None if walk is None else kind_at(_leg_scheme(walk)),
-        feed=None if pieces.supply_lines is None else kind_at(_LINES),
+        feed=None if components.supply_lines is None else kind_at(_LINES),
         is_adaptive=bool(first(steps.needs_parts)),
         samples_inside=bool(first(steps.record_every % 1.0)),
         effects=effects,
-        shank=None if pieces.leg is None else shank_kind(pieces.leg),
+        shank=None if components.leg is None else shank_kind(components.leg),
     )
 
 
@@ -245,7 +248,7 @@ def plan_runs(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
     plant = plant_parameters(device, outside_torque(motion))
     law = None if control.kind == PYTHON_CONTROLLER else CONTROLLERS[control.kind]
     numbers, problems = _numbers_of_law(law, scenario, plant.torque_constant)
-    pieces = Pieces(
+    components = Components(
         device=device,
         valve=VALVES[device.valve.kind].choose({name: first(value) for name, value in device.valve.settings.items()}),
         controller=law,
@@ -261,7 +264,7 @@ def plan_runs(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         leg=motion.leg if isinstance(motion, FreeMotion) else None,
     )
     run = compose_run(
-        pieces, plant, lambda fed: scenario_steps(scenario, fed), lambda fed: initial_state(scenario, fed)
+        components, plant, lambda fed: scenario_steps(scenario, fed), lambda fed: initial_state(scenario, fed)
     )
     return run, (too_many_steps(scenario, run.step, run.step_count), *problems)
 
@@ -398,8 +401,8 @@ def sensor_parameters(scenario: Scenario) -> SensorParameters:
     return SensorParameters(
         angle_noise=sensors.angle_noise,
         pressure_noise=sensors.pressure_noise,
-        angle_quantum=sensors.angle_quantum,
-        pressure_quantum=sensors.pressure_quantum,
+        angle_resolution=sensors.angle_resolution,
+        pressure_resolution=sensors.pressure_resolution,
         seed=sensors.seed,
     )
 
@@ -438,7 +441,7 @@ def is_adaptive(scenario: Scenario, plant: PlantParameters, step: float) -> Any:
     if not isinstance(motion, PrescribedMotion) or motion.profile.kind != "constant":
         return True
     stiffness = 1.0 if scenario.thermal is None else scenario.device.gas.heat_capacity_ratio
-    return np.logical_not(is_slow_held(plant, step, motion.profile.settings["level"], stiffness))
+    return np.logical_not(is_slow_locked(plant, step, motion.profile.settings["level"], stiffness))
 
 
 def profile_bounds(choice: ProfileChoice) -> tuple[float, float]:
@@ -505,7 +508,7 @@ def nearly_whole(steps: Number) -> Number:
     return found
 
 
-def is_slow_held(plant: PlantParameters, step: float, angle: float, stiffness: float) -> bool:
+def is_slow_locked(plant: PlantParameters, step: float, angle: float, stiffness: float) -> bool:
     """True where plain steps [s] follow the gas of a vane that is held at an angle [rad]; see ``is_slow``."""
     return is_slow(plant, step, larger(angle, plant.angle_min), smaller(angle, plant.angle_max), stiffness)
 

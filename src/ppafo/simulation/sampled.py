@@ -14,8 +14,8 @@ from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import Run
 from ppafo.engine.scheme.actuators import measurement_of
 from ppafo.errors import ScenarioError, SimulationError
-from ppafo.model.places import shown_signals
 from ppafo.model.plant import actuator_torque, chamber_pressures
+from ppafo.model.ports import shown_signals
 from ppafo.model.sensors import NOTHING_SEEN, GaitMeasurement, Measurement, measure, measure_gait
 from ppafo.model.valves.kind import VENT, VENTS_ABOVE
 

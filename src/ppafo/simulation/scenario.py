@@ -164,8 +164,8 @@ class Sensors:
     delay: float = 0.0
     angle_noise: float = 0.0
     pressure_noise: float = 0.0
-    angle_quantum: float = 0.0
-    pressure_quantum: float = 0.0
+    angle_resolution: float = 0.0
+    pressure_resolution: float = 0.0
     seed: int = 1
     angle_bandwidth: float = 0.0
     pressure_bandwidth: float = 0.0
@@ -173,7 +173,7 @@ class Sensors:
     @property
     def flaws(self) -> tuple[float, ...]:
         """What makes these sensors worse than ideal ones [s, rad, Pa, rad, Pa, Hz, Hz]; each 0 where it does not."""
-        noise, steps = (self.angle_noise, self.pressure_noise), (self.angle_quantum, self.pressure_quantum)
+        noise, steps = (self.angle_noise, self.pressure_noise), (self.angle_resolution, self.pressure_resolution)
         return self.delay, *noise, *steps, self.angle_bandwidth, self.pressure_bandwidth
 
 

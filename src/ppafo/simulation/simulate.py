@@ -25,8 +25,8 @@ from ppafo.metrics.metric import Metric, Metrics
 from ppafo.model.gait import foot_in_gait
 from ppafo.model.gas import energy_per_content
 from ppafo.model.leg import torque_on_foot
-from ppafo.model.places import friction_in_motion
 from ppafo.model.plant import gravity_torque, sliding_friction
+from ppafo.model.ports import friction_in_motion
 from ppafo.model.regulator import LineState, line_pressures
 from ppafo.parameters.device import Gas
 from ppafo.signals.recording import Channel, Recording
@@ -123,14 +123,14 @@ class Result:
 
     def __str__(self) -> str:
         """Return what ``ppafo simulate`` prints: status and metrics in the units that people are shown."""
-        from ppafo.answers.display_units import metrics_lines
+        from ppafo.report.display_units import metrics_lines
 
         head = f"{self.scenario.name}: {self.status.kind}"
         return "\n".join([head, "", *metrics_lines(self.metrics, self.scenario.device.supply.atmospheric_pressure)])
 
     def plot(self) -> "Figure":
         """Return a figure of angle, pressures, torque, command and gas; ``.savefig(...)`` writes it."""
-        from ppafo.answers.recording_figure import recording_figure
+        from ppafo.report.recording_figure import recording_figure
 
         remark = "" if self.status.is_completed else self.status.message
         atmosphere = self.scenario.device.supply.atmospheric_pressure

@@ -8,9 +8,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
 
-from ppafo.answers import Answer, Cell, Figure, LivePart, Section, Table
-from ppafo.answers import Column as Head
-from ppafo.answers.solved import Solved
+from ppafo.report import Answer, Cell, Figure, LivePart, Section, Table
+from ppafo.report import Column as Head
+from ppafo.report.solved import Solved
 from ppafo.simulation.scenario import plain
 from ppafo.studies.distributions import Interval
 from ppafo.study.kind import PLAIN, Kind

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ppafo.answers.display_units import (
+from ppafo.metrics import METRICS
+from ppafo.report.display_units import (
     axis_unit,
     change_text,
     display_difference,
@@ -16,8 +17,7 @@ from ppafo.answers.display_units import (
     metric_words,
     quantity_of_unit,
 )
-from ppafo.answers.setting_names import label_of
-from ppafo.metrics import METRICS
+from ppafo.report.setting_names import label_of
 from ppafo.studies.distributions import Floats, Interval
 
 

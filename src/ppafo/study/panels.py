@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ppafo.answers.style import BLUE, house_style, label_lines, mark_kind
+from ppafo.report.style import BLUE, house_style, label_lines, mark_kind
 from ppafo.study.kind import Kind
 
 if TYPE_CHECKING:

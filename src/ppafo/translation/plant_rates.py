@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 from ppafo.engine.continuous_time import free_motion, real_gas_rates
 from ppafo.engine.scheme.thermal_gas import ThermalFlows, thermal_flows
 from ppafo.model.orifice import orifice_flow
-from ppafo.model.places import gas_density, way_across
 from ppafo.model.plant import (
     Openings,
     PlantParameters,
@@ -23,6 +22,7 @@ from ppafo.model.plant import (
     chamber_volumes,
     pressures_per_mass,
 )
+from ppafo.model.ports import gas_density, leakage_path
 from ppafo.translation.symbolic import Acting, Compare, both_sides, symbolic
 
 Around = Mapping[Any, Callable[..., Any]]
@@ -56,7 +56,7 @@ def port_flows(
     port_1, port_2 = blended_ports(plant, openings)
     in_1 = blended_port_flow(pressure_1, port_1, plant.valve_curve)
     in_2 = blended_port_flow(pressure_2, port_2, plant.valve_curve)
-    leak_conductance = way_across(plant.leak_conductance, pressure_1, pressure_2)
+    leak_conductance = leakage_path(plant.leak_conductance, pressure_1, pressure_2)
     return in_1, in_2, orifice_flow(pressure_1, pressure_2, leak_conductance, plant.leak_curve)
 
 

@@ -245,9 +245,9 @@ class _Search:
                 if any(one is None for one in own):
                     left.append((None, np.zeros(0)))
                     continue
-                pieces = [piece for one in own if one is not None for piece in one]
-                squares = np.array([float(np.mean(piece * piece)) for piece in pieces])
-                left.append((squares, np.concatenate(pieces)))
+                blocks = [block for one in own if one is not None for block in one]
+                squares = np.array([float(np.mean(block * block)) for block in blocks])
+                left.append((squares, np.concatenate(blocks)))
         return left
 
     def _left(self, record: _Record, changes: Sequence[Change]) -> list[list[Floats] | None]:
@@ -301,15 +301,15 @@ class _Search:
         for _ in range(_STEPS):
             lengths = {name: _DIFFERENCE * (high - low) for name, (low, high) in between.items()}
             beside = self.evaluated([one.at(best[one.name].size + lengths[one.name]) for one in moved])
-            lanes = []
+            runs = []
             for one, (squares, left) in zip(moved, beside, strict=True):
                 if squares is not None:
                     at = best[one.name]
                     slope = (left - at.left) / lengths[one.name]
                     size = at.size - float(slope @ at.left) / max(float(slope @ slope), 1.0e-300)
                     low, high = between[one.name]
-                    lanes.append((one, min(max(size, low), high)))
-            self._keep_better(best, lanes, none)
+                    runs.append((one, min(max(size, low), high)))
+            self._keep_better(best, runs, none)
         return [
             Cause(
                 name=one.name,
@@ -323,9 +323,9 @@ class _Search:
             if len(one.sizes) == 1 or min(one.grid) < at.size < max(one.grid)
         ]
 
-    def _keep_better(self, best: "dict[str, _Tried]", lanes: Sequence[tuple[Candidate, float]], none: Floats) -> None:
+    def _keep_better(self, best: "dict[str, _Tried]", runs: Sequence[tuple[Candidate, float]], none: Floats) -> None:
         for (one, size), (squares, left) in zip(
-            lanes, self.evaluated([one.at(size) for one, size in lanes]), strict=True
+            runs, self.evaluated([one.at(size) for one, size in runs]), strict=True
         ):
             if squares is None:
                 continue

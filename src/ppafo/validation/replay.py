@@ -23,7 +23,7 @@ from ppafo.simulation.recorded import (
     RecordedInputs,
     Start,
     between_stops,
-    held_vane,
+    locked_vane,
     replay_scenario,
     sample_period,
     samples_at_rest,
@@ -103,8 +103,8 @@ def replay_together(wanted: Sequence[Replay]) -> list[Replayed | PpafoError]:
         states = np.concatenate([planned[place][2].states for place in places], axis=1)
         outcome = replay(replace(batch, parameters=parameters, states=states), steps)
         rows = state_row_numbers(first)
-        for lane, place in enumerate(places):
-            record, ends = outcome.record[:, :, lane], outcome.states[:, lane]
+        for element, place in enumerate(places):
+            record, ends = outcome.record[:, :, element], outcome.states[:, element]
             found[place] = _replayed(wanted[place], planned[place][0], rows, record, ends)
     return [found[place] for place in range(len(wanted))]
 
@@ -137,7 +137,7 @@ def replayed_scenario(one: Replay) -> Scenario:
     recording, start = one.measured.recording, one.start
     duration = recording.duration + max(one.extra, sample_period(recording.time))
     highest = with_highest_supply(one.device, recording, recording.names)
-    given: FreeMotion | PrescribedMotion | None = held_vane(start.angle) if one.motion == "held" else None
+    given: FreeMotion | PrescribedMotion | None = locked_vane(start.angle) if one.motion == "held" else None
     if one.motion == "leg":
         given = FreeMotion(start.angle, start.angular_velocity, leg=one.leg or leg_of_fixture())
     return replay_scenario(recording, highest, start, duration, one.measured.file, given)

@@ -14,8 +14,6 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from ppafo.answers.display_units import display_value
-from ppafo.answers.display_units import quantity_text as shown_text
 from ppafo.constants import GRAMS_PER_KILOGRAM
 from ppafo.engine.lane_samples import FELL
 from ppafo.engine.lanes import BatchResult, Floats, begin_block
@@ -42,6 +40,8 @@ from ppafo.parameters.bottles.bottle import PATHS, Bottle, load_bottle
 from ppafo.parameters.device import Device
 from ppafo.parameters.parameter_set import Entry
 from ppafo.parameters.plant import effect_row
+from ppafo.report.display_units import display_value
+from ppafo.report.display_units import quantity_text as shown_text
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.declaration import SUPPLY_LINE, THERMAL, Reading, kind_at, quantity_text, value_at
 from ppafo.units import format_quantity

@@ -367,8 +367,8 @@ def _sensors(reading: Reading, settings: SensorSettings) -> Sensors:
     return Sensors(
         angle_noise=values["angle_noise"],
         pressure_noise=values["pressure_noise"],
-        angle_quantum=values["angle_resolution"],
-        pressure_quantum=values["pressure_resolution"],
+        angle_resolution=values["angle_resolution"],
+        pressure_resolution=values["pressure_resolution"],
         seed=int(reading.number("sensors.seed", SEED)),
         angle_bandwidth=values["angle_bandwidth"],
         pressure_bandwidth=values["pressure_bandwidth"],

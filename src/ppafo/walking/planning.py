@@ -29,7 +29,7 @@ from ppafo.model.valves import dump
 from ppafo.model.valves.kind import ValveModel
 from ppafo.parameters.device import Device, Valve
 from ppafo.parameters.plant import plant_parameters
-from ppafo.simulation.plan import Pieces, Steps, compose_run, sensor_parameters, too_many_steps
+from ppafo.simulation.plan import Components, Steps, compose_run, sensor_parameters, too_many_steps
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, ProfileChoice, Scenario
 from ppafo.walking.course import PlannedCourse, WalkingCourse, plan_course, standing_gait
 from ppafo.walking.gait_series import heel_rocker
@@ -93,9 +93,9 @@ def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         failing=failing_of(scenario),
     )
     controller, settings = controller_of(_fitted(scenario, person))
-    pieces = _pieces_of_walk(scenario, device, controller, settings, _of_each(longest_delay, sensors) * period)
+    components = _components_of_walk(scenario, device, controller, settings, _of_each(longest_delay, sensors) * period)
     run = compose_run(
-        pieces,
+        components,
         with_leg(bare, leg),
         lambda plant: walk_steps(scenario, plant),
         lambda plant: vented_state(plant, walk.initial.now.ankle, walk.initial.now.ankle_rate),
@@ -104,11 +104,11 @@ def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
     return run, (too_many_steps(scenario, run.step, run.step_count),)
 
 
-def _pieces_of_walk(
+def _components_of_walk(
     scenario: Scenario, device: Device, controller: ControllerKind | None, settings: Mapping[str, Any], delay: Any
-) -> Pieces:
+) -> Components:
     """What the run of a walk is made of; ``delay`` [s] is the longest of its sensors."""
-    return Pieces(
+    return Components(
         device=device,
         valve=walking_valve(device.valve),
         controller=None if scenario.control.kind == PYTHON_CONTROLLER else controller,
@@ -141,7 +141,7 @@ def _plan_reacting(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
     controller, settings = controller_of(scenario)
     delay = _of_each(longest_delay, sensors) * scenario.control.period
     run = compose_run(
-        _pieces_of_walk(scenario, device, controller, settings, delay),
+        _components_of_walk(scenario, device, controller, settings, delay),
         without_leg(bare),
         lambda plant: walk_steps(scenario, plant),
         lambda plant: vented_state(plant, start.ankle, 0.0),
@@ -253,8 +253,8 @@ def sensor_settings(scenario: Scenario) -> SensorSettings:
         "pressure_bandwidth": sensors.pressure_bandwidth,
         "angle_noise": sensors.angle_noise,
         "pressure_noise": sensors.pressure_noise,
-        "angle_resolution": sensors.angle_quantum,
-        "pressure_resolution": sensors.pressure_quantum,
+        "angle_resolution": sensors.angle_resolution,
+        "pressure_resolution": sensors.pressure_resolution,
     }
     return SensorSettings({**shared, **motion.forces}, motion.faults)
 

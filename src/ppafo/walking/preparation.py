@@ -182,7 +182,7 @@ def gait_sensors(
     return GaitSensors(
         follow_rate=_TURN * settings["force_bandwidth"],
         force_noise=settings["force_noise"],
-        force_quantum=settings["force_resolution"],
+        force_resolution=settings["force_resolution"],
         lost_share=settings["lost_share"],
         angle_memory=memory_of(settings["angle_bandwidth"], period),
         pressure_memory=memory_of(settings["pressure_bandwidth"], period),

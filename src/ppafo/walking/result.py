@@ -196,7 +196,7 @@ class WalkResult:
 
     def __str__(self) -> str:
         """Return what ``ppafo simulate`` prints: status and metrics in the units that people are shown."""
-        from ppafo.answers.display_units import metrics_lines
+        from ppafo.report.display_units import metrics_lines
 
         head = f"{self.scenario.name}: {self.status.kind}"
         return "\n".join([head, "", *metrics_lines(self.metrics, self.scenario.device.supply.atmospheric_pressure)])

@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.answers.display_units import display_values, title_with_unit
-from ppafo.answers.style import BLUE, GREY, VERMILION, house_style, mark_kind
 from ppafo.control.walking import event_on_off
 from ppafo.control.walking.fault_flags import FAULT_FLAGS
 from ppafo.engine.lane_rows import LANES
@@ -24,6 +22,8 @@ from ppafo.metrics.strides import PER_STRIDE
 from ppafo.model.helping import STOPPED
 from ppafo.model.leg import passive_torque
 from ppafo.parameters.device import Actuator, FootPlate, Friction
+from ppafo.report.display_units import display_values, title_with_unit
+from ppafo.report.style import BLUE, GREY, VERMILION, house_style, mark_kind
 from ppafo.simulation.plan import MAXIMUM_STEPS
 from ppafo.simulation.sampled import run_sampled
 from ppafo.simulation.scenario import Control, Scenario

@@ -78,7 +78,7 @@ def test_a_run_of_a_scenario_loads_no_walks_studies_rigs_and_questions(
     foreign = ("walking", "gait", "studies", "rig", "identification", "validation", "worlds")
     _, after = simulated
     assert {name for name in own(after) if name.startswith(tuple(f"ppafo.{part}" for part in foreign))} == set()
-    assert {name for name in own(after) if name.startswith("ppafo.questions")} == set()
+    assert {name for name in own(after) if name.startswith("ppafo.analyses")} == set()
 
 
 def test_a_run_loads_the_valves_of_its_set_and_the_controller_and_actuator_that_it_has_and_no_others(

@@ -70,7 +70,7 @@ def test_an_unwritable_folder_is_one_line_and_exit_code_2(tmp_path: Path, capsys
         (["sets", "list"], "ppafo.parameters.load_parameter_set"),
         (["sets", "show", "ppafo2011"], "ppafo.parameters.load_parameter_set"),
         (["doctor", "--schema", "scenario"], "ppafo.loading.json_schema"),
-        (["reproduce"], "ppafo.questions.reproduce.solve.reproduce"),
+        (["reproduce"], "ppafo.analyses.reproduce.solve.reproduce"),
         (["simulate", "step-response"], "ppafo.simulation.simulate.simulate"),
     ],
 )

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ppafo.answers.recording_figure import figure_files, recording_figure
 from ppafo.cli.main import main
 from ppafo.loading import load_scenario
+from ppafo.report.recording_figure import figure_files, recording_figure
 from ppafo.running import simulate
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.scenario import Scenario

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from ppafo.analyses.walk import answer
 from ppafo.cli.main import main
 from ppafo.live.page import bundled, digest
 from ppafo.live.workbench import live_part
-from ppafo.questions.walk import answer
 from ppafo.storage import read_csv, read_netcdf
 from ppafo.storage.result_folder import read_recording
 from ppafo.walking import loading

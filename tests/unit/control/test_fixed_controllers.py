@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ppafo.control.catalog import CONTROLLERS
-from ppafo.control.fixed.torque_laws import FIXED_LAWS, PID, FixedLaw, largest_pid
-from ppafo.control.fixed.whole_numbers import (
+from ppafo.control.fixed.fixed_point import (
     COMMAND_STEPS,
     FRACTION_BITS,
     LARGEST_FRACTION,
@@ -26,6 +25,7 @@ from ppafo.control.fixed.whole_numbers import (
     read,
     shifted,
 )
+from ppafo.control.fixed.torque_laws import FIXED_LAWS, PID, FixedLaw, largest_pid
 from ppafo.engine.rows import leaf_paths, leaves, rebuilt
 from ppafo.model.sensors import Measurement
 

@@ -1,7 +1,7 @@
 """The text of a lane loop says no more than what is needed."""
 
+from ppafo.engine.components import RarePhase
 from ppafo.engine.lane_rows import FIRST_CACHE, LANES, VECTOR, LaneRows, lanes_of, over_lanes
-from ppafo.engine.pieces import RarePhase
 from ppafo.engine.source_text import SourceCollector
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run

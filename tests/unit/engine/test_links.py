@@ -7,7 +7,7 @@ import pytest
 
 from ppafo.engine.outline import Outline
 from ppafo.engine.program import link_effects, link_program
-from ppafo.engine.source_text import SourceCollector, woven
+from ppafo.engine.source_text import SourceCollector, composed_lines
 from ppafo.errors import ProgramError
 from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import Effect, effect_problem
@@ -105,7 +105,7 @@ def collected(*effects: Effect) -> SourceCollector:
 def called(collector: SourceCollector, function: Any, rows: dict[str, Row], amount: float) -> float:
     """What a composed function returns."""
     name = collector.add(function)
-    (line,) = woven([f"found = {name}(amount)"], collector.needs)
+    (line,) = composed_lines([f"found = {name}(amount)"], collector.needs)
     names: dict[str, Any] = {"amount": amount, **rows}
     exec("from collections import namedtuple\n" + collector.text() + "\n" + line, names)
     return float(names["found"])

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from ppafo.control.fixed.fixed_point import Readings
 from ppafo.control.fixed.torque_laws import FIXED_LAWS, TARGETS, FixedLaw
-from ppafo.control.fixed.whole_numbers import Readings
 from ppafo.errors import ProgramError, ScenarioError
 from ppafo.exports.firmware import chip_controller, firmware, proof
 from ppafo.exports.firmware.catalog import CATALOG

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from ppafo.control.fixed.whole_numbers import Readings
+from ppafo.control.fixed.fixed_point import Readings
 from ppafo.exports.firmware import chip_controller, firmware
 from ppafo.exports.firmware.catalog import CORTEX_M0
 from ppafo.exports.firmware.lock_step import PythonChip

@@ -9,7 +9,8 @@ from types import ModuleType
 
 import pytest
 
-from ppafo.answers.writing import files_of, text_of
+from ppafo.analyses.identify.answer import Identification
+from ppafo.analyses.identify.solve import identify
 from ppafo.cli.main import main
 from ppafo.errors import IdentificationError, PpafoError
 from ppafo.identification.estimate import Estimate
@@ -20,8 +21,7 @@ from ppafo.identification.trajectory import Experiment, tolerance_parameters
 from ppafo.identification.trajectory.tolerances import stated_by
 from ppafo.parameters import apply_overrides, build_device
 from ppafo.parameters.loading import load_device, load_parameter_set, parameter_set_toml, parse_parameter_set
-from ppafo.questions.identify.answer import Identification
-from ppafo.questions.identify.solve import identify
+from ppafo.report.writing import files_of, text_of
 from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 from ppafo.storage import write_csv

@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ppafo.answers.writing import files_of, text_of
+from ppafo.analyses.identify.answer import Identification
+from ppafo.analyses.identify.solve import identify
 from ppafo.cli.main import main
 from ppafo.errors import PpafoError
 from ppafo.identification.problem import json_schema
 from ppafo.identification.source import Use, double_use
 from ppafo.parameters.device import Orifice
 from ppafo.parameters.loading import load_device, parameter_set_toml, parse_parameter_set
-from ppafo.questions.identify.answer import Identification
-from ppafo.questions.identify.solve import identify
+from ppafo.report.writing import files_of, text_of
 from ppafo.rig.experiments import record
 from ppafo.running import simulate
 from ppafo.signals.recording import Channel, Recording

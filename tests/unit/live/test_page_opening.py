@@ -8,15 +8,15 @@ from typing import Any
 
 import pytest
 
-from ppafo.answers.style import PAGE_COLOURS
+from ppafo.analyses.endurance.draw import draw_of_numbers
+from ppafo.analyses.endurance.solve import follow_bottle
 from ppafo.live import page as pages
 from ppafo.live import workbench as workbench_module
 from ppafo.live.opening import LEAST_CHANGE, MOST_FIRST, _key
 from ppafo.live.words import words
 from ppafo.live.workbench import DEFAULT, openings_of, workbench
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
-from ppafo.questions.endurance.draw import draw_of_numbers
-from ppafo.questions.endurance.solve import follow_bottle
+from ppafo.report.style import PAGE_COLOURS
 from ppafo.walking.bottle import Schedule
 from scripts.live_page import missing, opened
 from scripts.page_tables import FLOWS

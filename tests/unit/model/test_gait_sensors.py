@@ -117,7 +117,7 @@ def test_samples_of_both_pressures_are_lost_independently() -> None:
 
 def test_noise_and_steps_come_after_the_bandwidth() -> None:
     slow = IDEAL._replace(angle_memory=0.9)
-    coarse = QUIET._replace(angle_quantum=0.1)
+    coarse = QUIET._replace(angle_resolution=0.1)
     _, last = seen(slow, 0, NOTHING_SEEN, quiet=coarse)
     shown, last = seen(slow, 1, last, (2.0, *TRUE[1:]), coarse)
     assert last.smooth_angle == pytest.approx(1.55)

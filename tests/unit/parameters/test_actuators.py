@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ppafo.analyses.tune.solve import shortfall
 from ppafo.cli.main import main
 from ppafo.engine.rows import leaves
 from ppafo.errors import ParameterError, PpafoError
 from ppafo.model.actuators.table import bases_at, level_of
 from ppafo.parameters.actuator_table import read_actuator_table, table_of
 from ppafo.parameters.loading import load_device, load_parameter_set, parameter_set_toml, parse_parameter_set
-from ppafo.questions.tune.solve import shortfall
 from ppafo.simulation.ensemble.planning import screen_columns
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.numbers import check_columns

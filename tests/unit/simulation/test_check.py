@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from ppafo.answers.display_units import metric_change
 from ppafo.cli.main import main
 from ppafo.errors import SimulationError
 from ppafo.model.sensors import Measurement
 from ppafo.parameters.overrides import over
+from ppafo.report.display_units import metric_change
 from ppafo.running import simulate
 from ppafo.simulation.accuracy import ErrorEstimate
 from ppafo.simulation.check import FINER, MOVED_MEASUREMENT, MOVED_START, Check, NumberCheck

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ppafo.control.fixed.whole_numbers import Converter, read
+from ppafo.control.fixed.fixed_point import Converter, read
 from ppafo.errors import ProgramError, ScenarioError
 from ppafo.exports.c_library import c_library
 from ppafo.exports.firmware import chip_controller, integer_form

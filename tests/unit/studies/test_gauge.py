@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import ppafo
+from ppafo.analyses.find import solve as find_module
+from ppafo.analyses.sweep import statistic as statistic_module
+from ppafo.analyses.sweep.statistic import Statistic, parse_statistic
 from ppafo.errors import StudyError
-from ppafo.questions.find import solve as find_module
-from ppafo.questions.sweep import statistic as statistic_module
-from ppafo.questions.sweep.statistic import Statistic, parse_statistic
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.numbers import check_columns
 from ppafo.studies.draws import atmosphere_of, level_of, uncertainty_of

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import ppafo
+from ppafo.analyses.compare.solve import compare
+from ppafo.analyses.sweep.statistic import Statistic, StoppingRule, draw_until, mean_of, quantile_of
 from ppafo.errors import StudyError
-from ppafo.questions.compare.solve import compare
-from ppafo.questions.sweep.statistic import Statistic, StoppingRule, draw_until, mean_of, quantile_of
 from ppafo.studies.distributions import Floats, Interval, NormalAround, noise_interval
 from ppafo.studies.draws import Uncertainty, uncertainty_of
 from ppafo.studies.loading import load_study

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from ppafo.analyses.validate.solve import validate
 from ppafo.cli.arguments import quantity
 from ppafo.errors import DataError, PpafoError
 from ppafo.parameters import load_device
 from ppafo.parameters.device import Device
-from ppafo.questions.validate.solve import validate
 from ppafo.signals import Channel, Recording
 from ppafo.validation import parse_thresholds
 from ppafo.validation.measured import check_recording, read_measured

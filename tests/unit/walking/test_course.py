@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ppafo.analyses.endurance.draw import walk_gas
+from ppafo.analyses.walk.course import course_sections
 from ppafo.engine.lane_source import lane_source
 from ppafo.errors import ScenarioError
 from ppafo.gait import load_gait
 from ppafo.model.contact import FLAT
 from ppafo.model.plant import chamber_mass, chamber_volumes
-from ppafo.questions.endurance.draw import walk_gas
-from ppafo.questions.walk.course import course_sections
 from ppafo.walking import load_walk, walk, walk_population
 from ppafo.walking.course import WalkingCourse, led_courses, load_course
 from ppafo.walking.motion import walk_of, with_duration

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from ppafo.answers.writing import text_of
-from ppafo.questions.walk.answer import comparison_table, wearers_answer
+from ppafo.analyses.walk.answer import comparison_table, wearers_answer
+from ppafo.report.writing import text_of
 from ppafo.signals import Channel, Recording
 from ppafo.walking import Comparison, WalkResult, compare_walks, load_walk, walk, walk_population
 from ppafo.walking.figures import over_time

@@ -9,6 +9,9 @@ import numpy as np
 import pytest
 
 import ppafo
+from ppafo.analyses.endurance.answer import Endurance
+from ppafo.analyses.endurance.solve import endurance
+from ppafo.analyses.walk.answer import answer_of, walk_with_and_without
 from ppafo.cli.main import main
 from ppafo.engine.lanes import BatchResult, run_batch, write_source
 from ppafo.engine.rows import leaf_paths, numbers, rebuild, row_numbers
@@ -21,9 +24,6 @@ from ppafo.metrics.metric import REACTS
 from ppafo.model.plant import PlantState
 from ppafo.model.wearer.nerves import Nerves
 from ppafo.model.wearer.walker import Walker
-from ppafo.questions.endurance.answer import Endurance
-from ppafo.questions.endurance.solve import endurance
-from ppafo.questions.walk.answer import answer_of, walk_with_and_without
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.scenario import Scenario

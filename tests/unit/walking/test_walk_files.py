@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 import ppafo
+from ppafo.analyses.sensitivity.methods import METHODS
+from ppafo.analyses.walk.answer import walk_with_and_without
 from ppafo.cli.main import main
 from ppafo.errors import DataError, PpafoError, ScenarioError
 from ppafo.loading import json_schema, list_all_scenarios, load_scenario, reloaded, scenario_from_dict
-from ppafo.questions.sensitivity.methods import METHODS
-from ppafo.questions.walk.answer import walk_with_and_without
 from ppafo.simulation.loading import load_scenario as load_vane
 from ppafo.simulation.numbers import declared_numbers
 from ppafo.simulation.scenario import Scenario

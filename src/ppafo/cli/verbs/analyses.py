@@ -30,23 +30,23 @@ from ppafo.cli.arguments import (
 )
 
 if TYPE_CHECKING:
+    from ppafo.analyses.compare.answer import Compared
+    from ppafo.analyses.design.front.answer import Design
+    from ppafo.analyses.design.front.problem import DesignProblem
+    from ppafo.analyses.design.profile.answer import Sizing
+    from ppafo.analyses.design.profile.problem import SizingProblem
+    from ppafo.analyses.design.wearer.solve import WearerSizing
+    from ppafo.analyses.endurance.answer import Endurance, Endurances
+    from ppafo.analyses.endurance.solve import GasUse
+    from ppafo.analyses.find.solve import Threshold
+    from ppafo.analyses.linearise.answer import LinearModel
+    from ppafo.analyses.reproduce.answer import Reproduction, Studies
+    from ppafo.analyses.sensitivity.solve import Influences
+    from ppafo.analyses.sweep.results import StudyResults
+    from ppafo.analyses.sweep.statistic import Estimate
+    from ppafo.analyses.tune.answer import Tuned
+    from ppafo.analyses.tune.problem import Problem
     from ppafo.progress import Report
-    from ppafo.questions.compare.answer import Compared
-    from ppafo.questions.design.front.answer import Design
-    from ppafo.questions.design.front.problem import DesignProblem
-    from ppafo.questions.design.profile.answer import Sizing
-    from ppafo.questions.design.profile.problem import SizingProblem
-    from ppafo.questions.design.wearer.solve import WearerSizing
-    from ppafo.questions.endurance.answer import Endurance, Endurances
-    from ppafo.questions.endurance.solve import GasUse
-    from ppafo.questions.find.solve import Threshold
-    from ppafo.questions.linearise.answer import LinearModel
-    from ppafo.questions.reproduce.answer import Reproduction, Studies
-    from ppafo.questions.sensitivity.solve import Influences
-    from ppafo.questions.sweep.results import StudyResults
-    from ppafo.questions.sweep.statistic import Estimate
-    from ppafo.questions.tune.answer import Tuned
-    from ppafo.questions.tune.problem import Problem
     from ppafo.simulation.scenario import Scenario
     from ppafo.studies.study import Configurations, Study
     from ppafo.study.finding import Finding
@@ -104,7 +104,7 @@ def reproduce(
 
     study: publication to run again: a name, a .toml file of claims, or 'all'; default ppafo-2011, the paper
     """
-    from ppafo.questions.reproduce.solve import reproduce
+    from ppafo.analyses.reproduce.solve import reproduce
 
     return reproduce(overrides, progress, study)
 
@@ -146,8 +146,8 @@ def sweep(
     confidence: confidence of the interval; default 95%
     maximum_failed: fraction of the runs that may fail before the statistic is refused; default 1%
     """
-    from ppafo.answers.drawing import load_drawing
-    from ppafo.questions.sweep.solve import sweep_into_folder
+    from ppafo.analyses.sweep.solve import sweep_into_folder
+    from ppafo.report.drawing import load_drawing
 
     load_drawing()
     return sweep_into_folder(
@@ -200,7 +200,7 @@ def compare(
     baseline: configuration that all others are compared with; default: the first
     draws: draws of the uncertain values; default 4096
     """
-    from ppafo.questions.compare.solve import compare
+    from ppafo.analyses.compare.solve import compare
 
     return compare(
         configurations, study, tasks, overrides, baseline, draws, seed, confidence, maximum_failed, threads, progress
@@ -233,7 +233,7 @@ def sensitivity(
     configuration: configuration of the study, needed if it has several
     independent: ignore the correlations of the study
     """
-    from ppafo.questions.sensitivity.solve import sensitivity
+    from ppafo.analyses.sensitivity.solve import sensitivity
 
     return sensitivity(
         study,
@@ -274,7 +274,7 @@ def find(
     highest: find the highest value
     grid: number of evenly spaced values to try first; default 64
     """
-    from ppafo.questions.find.solve import find
+    from ppafo.analyses.find.solve import find
 
     return find(scenario, vary, such_that, highest, grid, overrides, threads, progress)
 
@@ -294,7 +294,7 @@ def tune(
 
     tuning: name of a tuning, or a .toml file
     """
-    from ppafo.questions.tune.solve import tune
+    from ppafo.analyses.tune.solve import tune
 
     return tune(tuning, overrides, seed, threads, progress)
 
@@ -314,7 +314,7 @@ def linearise(
     at: a time of the run, such as '1.5 s', or 'equilibrium' (default): the steady state that holds the last value of
         the reference
     """
-    from ppafo.questions.linearise.solve import linearise
+    from ppafo.analyses.linearise.solve import linearise
 
     return linearise(scenario, at, overrides)
 
@@ -343,7 +343,7 @@ def design(
     pressure: supply pressure, '50 psi_g'
     minutes: minutes of walking on one bottle
     """
-    from ppafo.questions.design.solve import design
+    from ppafo.analyses.design.solve import design
 
     return design(problem, seed, threads, mass, stature, torque, pressure, minutes, progress)
 
@@ -377,6 +377,6 @@ def bottle(
     rest: time of each rest; default '0 s' (no rest)
     longest: maximum simulated time; default '1440 min'
     """
-    from ppafo.questions.endurance.solve import endurance
+    from ppafo.analyses.endurance.solve import endurance
 
     return endurance(recordings, gas_per_stride, stride_time, peak_flow, bottle, walk, rest, longest, overrides)

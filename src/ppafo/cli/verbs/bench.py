@@ -10,9 +10,9 @@ from ppafo.cli.arguments import Count, File, Folder, Name, Overrides, Patience, 
 from ppafo.progress import Report, report_nothing
 
 if TYPE_CHECKING:
+    from ppafo.analyses.identify.answer import Identification
+    from ppafo.analyses.validate.solve import Validation
     from ppafo.cli.output import Said
-    from ppafo.questions.identify.answer import Identification
-    from ppafo.questions.validate.solve import Validation
     from ppafo.storage.foreign import ColumnMap
 
 Problem = Annotated["str | Path", Word("PROBLEM", Path)]
@@ -122,7 +122,7 @@ def identify(
 
     problem: a problem file (.toml); see 'ppafo doctor --schema identification'
     """
-    from ppafo.questions.identify.solve import identify
+    from ppafo.analyses.identify.solve import identify
 
     return identify(problem, progress)
 
@@ -164,7 +164,7 @@ def validate(
     columns: file with a column map [columns.NAME], for recordings with other column names; a problem file may contain
         it
     """
-    from ppafo.questions.validate.solve import validate
+    from ppafo.analyses.validate.solve import validate
 
     return validate(
         parameter_set,

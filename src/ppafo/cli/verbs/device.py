@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 from ppafo.cli.arguments import File, Overrides, Scenario, SetName, Word
 
 if TYPE_CHECKING:
+    from ppafo.analyses.parts.solve import Parts
     from ppafo.cli.output import Said
-    from ppafo.questions.parts.solve import Parts
 
 
 def workbench(
@@ -47,9 +47,9 @@ def sets_list() -> Said:
 
 def sets_show(name: SetName, *, overrides: Overrides = ()) -> Said:
     """Show every value of a parameter set with its source."""
+    from ppafo.analyses.sets.values import values_document, values_text
     from ppafo.cli.output import Said
     from ppafo.parameters import apply_overrides, load_parameter_set
-    from ppafo.questions.sets.values import values_document, values_text
 
     document = values_document(apply_overrides(load_parameter_set(name), overrides))
     return Said(values_text(document), document, document["name"])
@@ -66,8 +66,8 @@ def sets_audit(
     parent: show what changed against this set, in place of the one that the file names
     all_: print what concerns no changed value too, of a set with a parent or --set
     """
+    from ppafo.analyses.sets.audit import audited
     from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, Said
-    from ppafo.questions.sets.audit import audited
 
     found = audited(names, parent, all_, overrides)
     return Said(found.text, found.document, found.name, EXIT_GOOD if found.passed else EXIT_CHECK_FAILED)
@@ -81,6 +81,6 @@ def sets_parts(
     part: name of a part, for all its figures and their sources
     catalogue: a .toml file; default: the catalogue of the package
     """
-    from ppafo.questions.parts.solve import parts
+    from ppafo.analyses.parts.solve import parts
 
     return parts(part, catalogue)

@@ -24,10 +24,10 @@ from ppafo.cli.arguments import (
 )
 
 if TYPE_CHECKING:
-    from ppafo.answers import Answer
+    from ppafo.analyses.walk.answer import WalkPair, Wearers
     from ppafo.cli.output import Said
     from ppafo.progress import Report
-    from ppafo.questions.walk.answer import WalkPair, Wearers
+    from ppafo.report import Answer
     from ppafo.simulation.scenario import Scenario
 
 Walk = Annotated["Scenario | str | Path", Word("WALK")]
@@ -55,7 +55,7 @@ def walk(
     wearers: number of different wearers to simulate instead of one
     seed: random seed of the wearers; default 1
     """
-    from ppafo.questions.walk.answer import walk_with_and_without
+    from ppafo.analyses.walk.answer import walk_with_and_without
 
     return walk_with_and_without(configuration, minutes, gait, course, bottle, wearers, seed, overrides, progress)
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.control.fixed.whole_numbers import SETTINGS, Converter, converter_of
+from ppafo.control.fixed.fixed_point import SETTINGS, Converter, converter_of
 from ppafo.control.kind import ControllerKind
 from ppafo.model.columns import Problem, at, over_runs
 from ppafo.model.declaration import Quantity

@@ -14,8 +14,7 @@ from typing import Any, NamedTuple
 from ppafo.control.controllers.feedback import PID as FLOAT_PID
 from ppafo.control.controllers.switching import ON_OFF as FLOAT_ON_OFF
 from ppafo.control.controllers.switching import ON_OFF_DEAD_ZONE as FLOAT_DEAD_ZONE
-from ppafo.control.fixed.planning import Numbers, on_chip
-from ppafo.control.fixed.whole_numbers import (
+from ppafo.control.fixed.fixed_point import (
     COMMAND_STEPS,
     FRACTION_BITS,
     LARGEST_FRACTION,
@@ -36,6 +35,7 @@ from ppafo.control.fixed.whole_numbers import (
     shifted,
     still_sound,
 )
+from ppafo.control.fixed.planning import Numbers, on_chip
 from ppafo.control.kind import ControllerKind
 from ppafo.model.declaration import Quantity
 from ppafo.model.sensors import Measurement

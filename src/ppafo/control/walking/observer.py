@@ -195,14 +195,14 @@ def flow_share(nominal: NominalDevice, ratio: float) -> float:
     return math.sqrt(1.0 - place * place) * min((1.0 - ratio) / (1.0 - LINEAR_RATIO), 1.0)
 
 
-def flow_into(nominal: NominalDevice, pressure: float, node: float, takes_back: float) -> float:
+def flow_into(nominal: NominalDevice, pressure: float, node: float, is_relieving: float) -> float:
     """Content [J/s] that enters a chamber at ``pressure`` from a node [Pa] through the open valve; below 0 it leaves.
 
-    A node with ``takes_back`` 0 takes no gas back. Equations (6), (7).
+    A node with ``is_relieving`` 0 takes no gas back. Equations (6), (7).
     """
     upstream = max(pressure, node)
     share = flow_share(nominal, min(pressure, node) / upstream)
-    return nominal.nominal_flow * upstream * share * (1.0 if node >= pressure else -takes_back)
+    return nominal.nominal_flow * upstream * share * (1.0 if node >= pressure else -is_relieving)
 
 
 def next_coil(nominal: NominalDevice, coil: Coil, wanted: float, period: float) -> tuple[Coil, float]:

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from ppafo.engine.pieces import GasScheme, Second
+from ppafo.engine.components import GasScheme, Second
 from ppafo.engine.scheme import actuators, pneumatics
 from ppafo.engine.scheme.motion import with_gas
 from ppafo.engine.scheme.pneumatics import GasChange, MovingGas, StillGas
@@ -25,7 +25,7 @@ def _still(rows: Any, gas: str) -> str:
 
 def _second(rows: Any, gas: str) -> Second:
     program, add, still = rows.program, rows.add, _still(rows, gas)
-    next_angle = "state.angle" if program.is_held else "begun.next_angle"
+    next_angle = "state.angle" if program.is_locked else "begun.next_angle"
     is_still = program.keeps_volumes
     stage = pneumatics.second_still_stage if is_still else pneumatics.second_moving_stage
     whole = pneumatics.still_change if is_still else pneumatics.moving_change

@@ -12,7 +12,6 @@ import math
 from typing import NamedTuple
 
 from ppafo.engine.scheme.pneumatics import GasChange, HeldChambers, held_pressures
-from ppafo.model.places import friction_at_rest, friction_in_motion, rebound
 from ppafo.model.plant import (
     PlantParameters,
     PlantState,
@@ -22,6 +21,7 @@ from ppafo.model.plant import (
     driving_torque,
     holds_still,
 )
+from ppafo.model.ports import friction_at_rest, friction_in_motion, rebound
 
 SAME_INSTANT = 1.0e-9
 SHORTEST_PART = 1.0e-6

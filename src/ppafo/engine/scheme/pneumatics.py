@@ -16,7 +16,6 @@ from typing import Any, NamedTuple
 
 from ppafo.model.columns import smaller
 from ppafo.model.orifice import FlowCurve, orifice_flow, orifice_flow_slopes
-from ppafo.model.places import way_across
 from ppafo.model.plant import (
     PlantParameters,
     PlantState,
@@ -27,6 +26,7 @@ from ppafo.model.plant import (
     chamber_volumes,
     pressures_per_mass,
 )
+from ppafo.model.ports import leakage_path
 
 
 class LeakSlopes(NamedTuple):
@@ -91,7 +91,7 @@ def plant_with_leak_at(plant: PlantParameters, pressure_1: float, pressure_2: fl
 
     The matrix of a step takes this leak as constant: the method keeps its order with any matrix.
     """
-    return plant._replace(leak_conductance=way_across(plant.leak_conductance, pressure_1, pressure_2))
+    return plant._replace(leak_conductance=leakage_path(plant.leak_conductance, pressure_1, pressure_2))
 
 
 def plant_with_joined_chambers(plant: PlantParameters, opening: float) -> PlantParameters:

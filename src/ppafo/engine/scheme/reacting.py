@@ -7,14 +7,14 @@ step, which is 0.1 ms long. What sensors, faults, controllers and metrics read o
 
 from typing import Any, NamedTuple
 
-from ppafo.engine.pieces import LegScheme, Phases, RarePhase
+from ppafo.engine.components import LegScheme, Phases, RarePhase
 from ppafo.engine.scheme.motion import clamp_angle, with_motion
 from ppafo.engine.scheme.pneumatics import HeldChambers, held_chambers, held_pressures
 from ppafo.engine.scheme.walking import NO_CLEARANCE, DeviceShare
 from ppafo.model.contact import FLAT, HEEL, SWING, TOE
-from ppafo.model.places import friction_in_motion
 from ppafo.model.plant import PlantParameters, PlantState, actuator_torque
 from ppafo.model.plant_faults import PlantFaults, ShutOff, Unpowered
+from ppafo.model.ports import friction_in_motion
 from ppafo.model.sensors import GaitSeen, GaitSensors
 from ppafo.model.wearer.metabolic import rates_of_leg
 from ppafo.model.wearer.muscle import Fibre, Muscle, tendon_force

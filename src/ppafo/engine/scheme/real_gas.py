@@ -6,7 +6,7 @@ true masses stand beside it. The equation of state is that of the places ``gas_d
 
 from typing import Any, NamedTuple
 
-from ppafo.engine.pieces import GasScheme, Second
+from ppafo.engine.components import GasScheme, Second
 from ppafo.engine.scheme.pneumatics import (
     SHORTEST,
     Flows,
@@ -23,8 +23,8 @@ from ppafo.engine.scheme.pneumatics import (
     second_moving_stage,
     solve_stage,
 )
-from ppafo.model.places import gas_density, ideal_density
 from ppafo.model.plant import PlantParameters, PlantState, TrueMasses, chamber_volumes
+from ppafo.model.ports import gas_density, ideal_density
 
 
 class RealGas(NamedTuple):
@@ -134,7 +134,7 @@ def at_angle(plant: PlantParameters, state: PlantState, masses: TrueMasses, angl
 
 
 def _second(rows: Any, gas: str) -> Second:
-    add, next_angle = rows.add, "state.angle" if rows.program.is_held else "begun.next_angle"
+    add, next_angle = rows.add, "state.angle" if rows.program.is_locked else "begun.next_angle"
     still = f"{gas}.moving.still"
     return Second(
         stage=f"{add(second_moving_stage)}({gas}.moving, passing)",

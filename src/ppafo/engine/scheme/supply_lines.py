@@ -9,7 +9,7 @@ with an energy balance of the chambers too: what a warm chamber pushes back give
 import math
 from typing import Any, NamedTuple
 
-from ppafo.engine.pieces import Feed
+from ppafo.engine.components import Feed
 from ppafo.engine.scheme.pneumatics import (
     ALLOWED_OF_PRESSURE,
     SHORTEST,

@@ -10,7 +10,7 @@ which changes no faster than a chamber fills; the method keeps its order with an
 import math
 from typing import Any, NamedTuple
 
-from ppafo.engine.pieces import GasScheme, Second
+from ppafo.engine.components import GasScheme, Second
 from ppafo.engine.scheme.pneumatics import (
     ALLOWED_OF_PRESSURE,
     GAMMA,
@@ -552,5 +552,7 @@ ENERGY_BALANCE = GasScheme(
         f"{state} = {rows.add(after_motion)}(plant, thermal, {state}, {assumed}, {reached})"
     ],
     # A held vane takes no work.
-    work=lambda rows: [] if rows.program.is_held else [f"warmed = {rows.add(with_work)}(plant, warmed, state, after)"],
+    work=lambda rows: (
+        [] if rows.program.is_locked else [f"warmed = {rows.add(with_work)}(plant, warmed, state, after)"]
+    ),
 )

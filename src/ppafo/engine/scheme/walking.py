@@ -5,7 +5,7 @@ First the torques on the ankle beside actuator, friction and damping: wearer, gr
 
 from typing import Any, NamedTuple
 
-from ppafo.engine.pieces import LegScheme, Phases, RarePhase
+from ppafo.engine.components import LegScheme, Phases, RarePhase
 from ppafo.engine.scheme.motion import (
     FreeEnd,
     FreeStep,
@@ -34,9 +34,9 @@ from ppafo.model.gait import (
     stands_on_toes,
 )
 from ppafo.model.leg import LegParameters, foot_inertia_about_ankle, passive_torque, torque_of_shank_on
-from ppafo.model.places import friction_in_motion
 from ppafo.model.plant import PlantParameters, PlantState, actuator_torque
 from ppafo.model.plant_faults import PlantFaults, ShutOff, Unpowered
+from ppafo.model.ports import friction_in_motion
 from ppafo.model.sensors import GaitSeen, GaitSensors
 
 

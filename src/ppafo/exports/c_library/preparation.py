@@ -12,7 +12,7 @@ from ppafo.engine.program import LaneResult, LaneTiming, Program
 from ppafo.engine.rows import leaf_paths, leaves, numbers, row_expression
 from ppafo.engine.run import NEVER_FAILED, moment_at_start, whole_and_rest
 from ppafo.engine.scheme.motion import Pace
-from ppafo.engine.source_text import Collector, woven
+from ppafo.engine.source_text import Collector, composed_lines
 from ppafo.exports.c_library.boundary import Boundary
 from ppafo.exports.c_library.files import Relation, Setting, c_identifier
 from ppafo.exports.c_library.program import COUNTS
@@ -34,18 +34,18 @@ from ppafo.simulation.clock import links_of_times, step_unless_given, step_with_
 from ppafo.simulation.declaration import SUPPLY_LINE, SUPPLY_LINES, value_at
 from ppafo.simulation.motion import TOLERANCE
 from ppafo.simulation.numbers import (
-    HELD_ANGLE,
+    LOCKED_ANGLE,
     TIMES,
     declared_numbers,
     links_that_hold,
     number_at,
     other_form,
-    path_of_held_angle,
+    path_of_locked_angle,
     time_texts,
 )
 from ppafo.simulation.plan import (
     foot_load,
-    is_slow_held,
+    is_slow_locked,
     lines_at_start,
     relative_tolerance,
     shank_kind,
@@ -170,7 +170,7 @@ class Writing:
         body += [f"{boundary.cell('counts', place, name)} = {counted[name]}" for place, name in enumerate(COUNTS)]
         own = [f"{name} = namedtuple({name!r}, {fields!r})" for name, fields in self.rows.items()]
         head = boundary.head("prepare", dict.fromkeys(("settings", "parameters", "states", "counts"), "float64[::1]"))
-        return "\n".join([*own, head, *indent(woven(body, self.needs))])
+        return "\n".join([*own, head, *indent(composed_lines(body, self.needs))])
 
     def _initial_rows(self) -> dict[str, type]:
         """State rows that a run begins with; those of meters begin with the first sample."""
@@ -208,8 +208,8 @@ class Writing:
             fields["actuator"] |= {"torque_constant": "0.0", "volume_per_angle": "0.0"}
         constant = f"{add(specific_gas_constant)}({UNIVERSAL_GAS_CONSTANT!r}, gas_molar_mass)"
         fields["gas"] = fields["gas"] | {"specific_gas_constant": constant}
-        takes_back = self.device.supply.relieving or self.lines is not None
-        fields["supply"] = fields["supply"] | {"relieving": repr(float(takes_back))}
+        is_relieving = self.device.supply.relieving or self.lines is not None
+        fields["supply"] = fields["supply"] | {"relieving": repr(float(is_relieving))}
         for section, inner in fields.items():
             yield f"{section} = {self.row(section.title().replace('_', ''), inner)}"
         yield f"device = {self.row('Device', {section: section for section in fields})}"
@@ -350,7 +350,7 @@ def relations_of(scenario: Scenario) -> tuple[Relation, ...]:
         ("sensors.delay", "at most", "run.duration", 0.0),
     ]
     # A vane that stays at an angle, or starts there.
-    stays = path_of_held_angle(scenario) or HELD_ANGLE
+    stays = path_of_locked_angle(scenario) or LOCKED_ANGLE
     if stays in declared_settings(scenario):
         rules.append((stays, "at least", "actuator.angle_min", TOLERANCE))
         rules.append((stays, "at most", "actuator.angle_max", TOLERANCE))
@@ -408,13 +408,13 @@ def _steps(scenario: Scenario, writing: Writing) -> Iterator[str]:
     yield f"counts_of_steps = {writing.add(step_counts)}({given})"
     yield f"tolerance = {writing.add(relative_tolerance)}(run_tolerance)"
     yield from writing.timing("sensors_delay", "tolerance")
-    if scenario.supply_lines is not None or not writing.program.is_held or writing.program.has_shape:
+    if scenario.supply_lines is not None or not writing.program.is_locked or writing.program.has_shape:
         yield "needs_parts = True"
         return
     stiffness = "1.0" if scenario.thermal is None else "gas_heat_capacity_ratio"
-    angle = c_identifier(path_of_held_angle(scenario) or HELD_ANGLE)
+    angle = c_identifier(path_of_locked_angle(scenario) or LOCKED_ANGLE)
     shortened = f"step / {writing.add(smaller)}(1.0, tolerance)"
-    yield f"needs_parts = not {writing.add(is_slow_held)}(plant, {shortened}, {angle}, {stiffness})"
+    yield f"needs_parts = not {writing.add(is_slow_locked)}(plant, {shortened}, {angle}, {stiffness})"
 
 
 def _pieces(scenario: Scenario, writing: Writing) -> Iterator[str]:
@@ -426,7 +426,7 @@ def _pieces(scenario: Scenario, writing: Writing) -> Iterator[str]:
     if program.angle is RECORDED_ANGLE:
         yield f"path = {writing.add(Segment)}(0.0, motion_angle, 0.0)"
     elif isinstance(scenario.motion, PrescribedMotion):
-        held = {"level": c_identifier(path_of_held_angle(scenario) or HELD_ANGLE)} if program.is_held else {}
+        held = {"level": c_identifier(path_of_locked_angle(scenario) or LOCKED_ANGLE)} if program.is_locked else {}
         yield f"path = {_kind(writing, 'motion.profile', PROFILES[scenario.motion.profile.kind], held)}"
     yield from writing.gas()
 

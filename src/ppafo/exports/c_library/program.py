@@ -24,7 +24,7 @@ from ppafo.engine.outline import Outline
 from ppafo.engine.program import Program, link_program
 from ppafo.engine.rows import leaf_paths
 from ppafo.engine.run_source import LOOP_ARRAYS, LOOP_NUMBERS, run_loop
-from ppafo.engine.source_text import Collector, SourceCollector, woven
+from ppafo.engine.source_text import Collector, SourceCollector, composed_lines
 from ppafo.exports.c_library.boundary import Arrays, Boundary, Structs, struct_of, struct_of_numbers
 from ppafo.metrics import METRICS
 from ppafo.metrics.metric import WALK, MetricKind, Readings
@@ -133,7 +133,7 @@ class ExportedProgram:
     @property
     def chooses_parts(self) -> bool:
         """True where the settings decide whether the error decides about the parts of a step."""
-        return self.program.is_held and not (self.program.has_lines or self.program.has_shape)
+        return self.program.is_locked and not (self.program.has_lines or self.program.has_shape)
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -390,6 +390,6 @@ def metrics_entry(item: ExportedProgram, collector: Collector, boundary: Boundar
         [
             *rows,
             boundary.head("metrics", parameters_of_metrics),
-            *indent(woven(lines, collector.needs)),
+            *indent(composed_lines(lines, collector.needs)),
         ]
     )

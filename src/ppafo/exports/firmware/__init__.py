@@ -6,8 +6,8 @@ from dataclasses import replace
 from typing import Any, NamedTuple, get_type_hints
 
 from ppafo.control.catalog import CONTROLLERS, ON_CHIP
+from ppafo.control.fixed.fixed_point import COMMAND_STEPS, LARGEST_READING, SETTINGS, Readings, converter_with
 from ppafo.control.fixed.torque_laws import FIXED_LAWS, TARGETS, FixedLaw
-from ppafo.control.fixed.whole_numbers import COMMAND_STEPS, LARGEST_READING, SETTINGS, Readings, converter_with
 from ppafo.engine.rows import is_number, leaf_paths, leaves, members, rebuilt
 from ppafo.engine.source_text import SourceCollector, is_row
 from ppafo.errors import ProgramError, ScenarioError

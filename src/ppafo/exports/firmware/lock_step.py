@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from ppafo.answers.style import BLACK, REFERENCE, Margins, figure_of_panels, house_style, look_of_valve, mark_kind
+from ppafo.control.fixed.fixed_point import COMMAND_STEPS, Readings, read
 from ppafo.control.fixed.torque_laws import TARGETS
-from ppafo.control.fixed.whole_numbers import COMMAND_STEPS, Readings, read
 from ppafo.engine.rows import rebuilt
 from ppafo.errors import SimulationError
 from ppafo.exports.firmware import ChipController, chip_controller, firmware, integer_form
@@ -24,6 +23,7 @@ from ppafo.exports.firmware.simulators import (
     chip_simulator,
     missing_tools,
 )
+from ppafo.report.style import BLACK, REFERENCE, Margins, figure_of_panels, house_style, look_of_valve, mark_kind
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Result, simulate

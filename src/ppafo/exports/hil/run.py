@@ -18,8 +18,6 @@ from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
-from ppafo.answers.recording_figure import recording_figure
-from ppafo.answers.style import ACTUAL, VERMILION, Margins, figure_of_free_panels, house_style, render_figure
 from ppafo.documents.json_text import json_text
 from ppafo.engine.lanes import load_program
 from ppafo.engine.loading import chosen_compiler
@@ -31,6 +29,8 @@ from ppafo.exports.hil import wire
 from ppafo.exports.hil.loop import Bench, Exchange, LockStep, Pace, RealTime, Row, without_collections
 from ppafo.exports.hil.wire import MICROSECONDS
 from ppafo.model.valves import dump
+from ppafo.report.recording_figure import recording_figure
+from ppafo.report.style import ACTUAL, VERMILION, Margins, figure_of_free_panels, house_style, render_figure
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.sampled import SampledRun
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, Scenario, plain

@@ -76,7 +76,6 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
 
-from ppafo.answers.display_units import display_unit, quantity_of_unit
 from ppafo.engine.cache import kept_bytes
 from ppafo.engine.outline import file_hash
 from ppafo.errors import PpafoError, ProgramError
@@ -97,9 +96,10 @@ from ppafo.parameters.device import Device
 from ppafo.parameters.graph import ATMOSPHERE_PATH, Graph, Term, itself
 from ppafo.parameters.overrides import one_path, split_override
 from ppafo.parameters.parameter_set import SOURCE, Entry, atmospheric_pressure, entry_in_si
+from ppafo.report.display_units import display_unit, quantity_of_unit
 from ppafo.simulation.declaration import SEED, value_at
 from ppafo.simulation.loading import set_name
-from ppafo.simulation.numbers import HELD_ANGLE, TIMES
+from ppafo.simulation.numbers import LOCKED_ANGLE, TIMES
 from ppafo.simulation.overrides import is_of_device
 from ppafo.simulation.scenario import Scenario, worn_kind
 from ppafo.translation.native import asked, complaint
@@ -249,7 +249,7 @@ def _origins(file: _File, device: Device, library: Library) -> dict[str, dict[st
         elif is_of_device(item.path):
             found[item.path] = dict(_of_set(parameter_set, device, item))
         else:
-            is_given = value_at(file.document, item.path) is not None or item.path in (*TIMES, HELD_ANGLE)
+            is_given = value_at(file.document, item.path) is not None or item.path in (*TIMES, LOCKED_ANGLE)
             found[item.path] = dict(_TASK if is_given else _DEFAULT)
         if item.path in file.assumed and item.name not in changed:
             found[item.path] |= {"origin": "assumed", "note": file.assumed[item.path]}

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from ppafo.answers.style import BLACK, BLUE, VERMILION, house_style, mark_kind
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.identification.estimate import Estimate, Verdict
 from ppafo.identification.fit import Fit
 from ppafo.identification.source import Source, kind_of, told_of_readings, traces
 from ppafo.identification.wording import conflict_in_words, widened_by
+from ppafo.report.style import BLACK, BLUE, VERMILION, house_style, mark_kind
 from ppafo.signals import RecordingKind
 from ppafo.signals.recording import Floats
 

@@ -1,6 +1,6 @@
 """Experiments made ready for fitting, and their runs: residuals of all recordings at many points, as one batch.
 
-Each experiment is one block of lanes, each lane one set of numbers. One clock serves all columns: the step stays as it
+Each experiment is one batch of runs, each run one set of numbers. One clock serves all columns: the step stays as it
 is during the search. Runs of a fit are allowed so little error that differences hardly see it.
 """
 
@@ -379,12 +379,12 @@ def _run_signals(prepared: PreparedExperiment, columns: Mapping[str, Floats], co
     angle, mass_1, mass_2 = (_at_samples(one, prepared, offsets) for one in records)
     found = {name: np.full(angle.shape, np.nan) for name in ("angle", "pressure_1", "pressure_2")}
     numbers = leaves(run.plant)
-    for lane in np.flatnonzero(~failed).tolist():
-        plant = rebuilt(run.program.actuator.plant, [at(number, lane) for number in numbers])
-        own = angle[:, lane], mass_1[:, lane], mass_2[:, lane]
+    for element in np.flatnonzero(~failed).tolist():
+        plant = rebuilt(run.program.actuator.plant, [at(number, element) for number in numbers])
+        own = angle[:, element], mass_1[:, element], mass_2[:, element]
         pressures = pressures_of(run.program.actuator, plant, *own)
         for name, values in zip(found, (own[0], *pressures), strict=True):
-            found[name][:, lane] = values
+            found[name][:, element] = values
     return {channel.name: found[channel.name] for channel in prepared.channels}
 
 
@@ -401,8 +401,8 @@ def _at_samples(values: Floats, prepared: PreparedExperiment, offsets: Floats) -
         # Before the first record the device stands still.
         position = np.clip((prepared.time[:, None] - offsets) / prepared.record_interval, 0.0, len(values) - 1.0)
         place = np.minimum(position.astype(np.intp), len(values) - 2)
-        lanes = np.arange(len(offsets))
-        here, following = values[place, lanes], values[place + 1, lanes]
+        elements = np.arange(len(offsets))
+        here, following = values[place, elements], values[place + 1, elements]
         return np.asarray(here + (position - place) * (following - here))
     place, fraction = prepared.place, prepared.fraction
     here = values[place]

@@ -48,7 +48,7 @@ from ppafo.simulation.recorded import (
     LONGEST_STEP,
     Start,
     between_stops,
-    held_vane,
+    locked_vane,
     replay_scenario,
     samples_at_rest,
     value_at_rest,
@@ -379,7 +379,7 @@ def _replay(
     if COMMAND not in inputs:
         raise IdentificationError(f"{said}: has no scenario, so inputs must have '{COMMAND}'")
     start = _start_of(used, device, fixed, said)
-    motion = held_vane(start.angle) if fixed else None
+    motion = locked_vane(start.angle) if fixed else None
     return replay_scenario(recording, device, start, used.duration, said, motion), first, inputs
 
 

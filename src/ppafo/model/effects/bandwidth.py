@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import Effect, Moment, State
-from ppafo.model.places import shown_signals
+from ppafo.model.ports import shown_signals
 from ppafo.model.sensors import follow, follow_rate
 
 

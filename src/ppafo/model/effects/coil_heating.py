@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import Effect, Moment, State
 from ppafo.model.elementary import logarithm
-from ppafo.model.places import opening_time
+from ppafo.model.ports import opening_time
 from ppafo.model.sensors import decay_factors
 from ppafo.model.valves.solenoid import coil_commands
 

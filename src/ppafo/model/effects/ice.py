@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import Effect, Moment, State
-from ppafo.model.places import way_out
+from ppafo.model.ports import exhaust_path
 from ppafo.model.sensors import decay_factors
 
 
@@ -28,7 +28,7 @@ def prepare(settings: Any, _device: Any) -> Ice:
 
 def narrowed(conductance: float, ice_state: IceState) -> float:
     """Conductance [kg/(s Pa)] of the way out with ice in it; ``C / (1 + s)``."""
-    return way_out(conductance / (1.0 + max(ice_state.blockage, 0.0)))
+    return exhaust_path(conductance / (1.0 + max(ice_state.blockage, 0.0)))
 
 
 def start(_ice: Ice, _now: Moment) -> IceState:
@@ -57,7 +57,7 @@ EFFECT = Effect(
     parameters=Ice,
     prepare=prepare,
     switch=("blockage_per_gas",),
-    laws={way_out: narrowed},
+    laws={exhaust_path: narrowed},
     source="assumed: the simplest balance of growth and melting, to be fitted to a valve",
     equation="C = C_v / (1 + s), ds/dt = g m'_out - s / tau",
     symbols=(

@@ -67,7 +67,7 @@ class Effect:
     set). It must be in the subset that is compiled, for an exported library has it in C. None where the row is the
     settings in their order, which columns of an ensemble then fill without a call for each run.
 
-    ``laws`` has for places of ``ppafo.model.places`` the functions that act there. A law takes what its place takes,
+    ``laws`` has for places of ``ppafo.model.ports`` the functions that act there. A law takes what its place takes,
     and its row by the effect's name as a further parameter, which whoever calls the place then hands on. A law that
     calls its own place gets the law of the effect before, or the place as it is without effects.
 

@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import Effect
-from ppafo.model.places import way_across
+from ppafo.model.ports import leakage_path
 
 
 class LeakOpening(NamedTuple):
@@ -28,7 +28,7 @@ def lifted(conductance: float, pressure_1: float, pressure_2: float, leak_openin
     opening, rise = leak_opening.opening_pressure, leak_opening.opening_rise
     above = max(abs(pressure_1 - pressure_2), opening) + (rise - 1.0) * opening
     share = max(1.0 - rise * opening / above, 0.0)
-    return way_across(conductance * share, pressure_1, pressure_2)
+    return leakage_path(conductance * share, pressure_1, pressure_2)
 
 
 EFFECT = Effect(
@@ -43,7 +43,7 @@ EFFECT = Effect(
     parameters=LeakOpening,
     prepare=prepare,
     switch=("pressure",),
-    laws={way_across: lifted},
+    laws={leakage_path: lifted},
     source="assumed: a lip that the gas lifts against a constant preload, to be fitted to an actuator",
     equation="C = C_l e / (e + w P_o), e = max(0, |P_1 - P_2| - P_o)",
     symbols=(

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import Effect
 from ppafo.model.orifice import area_conductance, conductance_in_series
-from ppafo.model.places import way_in, way_out
+from ppafo.model.ports import exhaust_path, supply_path
 
 
 class LineResistance(NamedTuple):
@@ -33,12 +33,12 @@ def fed_through_line(conductance: float, line_resistance: LineResistance) -> flo
     The volume of a line belongs to the dead volume of its chamber, and is filled at the pressure of the chamber: right
     where the line is small beside it. Gas by which a valve joins both chambers passes no line.
     """
-    return way_in(conductance_in_series(conductance, line_resistance.resistance))
+    return supply_path(conductance_in_series(conductance, line_resistance.resistance))
 
 
 def vented_through_line(conductance: float, line_resistance: LineResistance) -> float:
     """Conductance [kg/(s Pa)] from a chamber to the atmosphere, likewise."""
-    return way_out(conductance_in_series(conductance, line_resistance.resistance))
+    return exhaust_path(conductance_in_series(conductance, line_resistance.resistance))
 
 
 EFFECT = Effect(
@@ -51,7 +51,7 @@ EFFECT = Effect(
     parameters=LineResistance,
     prepare=prepare,
     switch=("area",),
-    laws={way_in: fed_through_line, way_out: vented_through_line},
+    laws={supply_path: fed_through_line, exhaust_path: vented_through_line},
     source="equation (6) of the paper, ISO 6358-3:2014, and the orifice of the simulated test bench's lines",
     equation="1/C^2 = 1/C_v^2 + 1/C_r^2",
 )

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import Effect
-from ppafo.model.places import rebound
+from ppafo.model.ports import rebound
 
 
 class Restitution(NamedTuple):

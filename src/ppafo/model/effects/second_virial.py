@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import Effect
-from ppafo.model.places import gas_density, ideal_density
+from ppafo.model.ports import gas_density, ideal_density
 
 SECOND_VIRIAL = {"CO2": -123.0e-6, "air": -7.4e-6, "N2": -4.5e-6, "He": 11.8e-6}
 """Second virial coefficient [m^3/mol] at 298 K of every gas that a set can name; J. H. Dymond and E. B. Smith, 1980."""

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import Effect
 from ppafo.model.orifice import conductance_in_series, sonic_conductance_mass
-from ppafo.model.places import way_out
+from ppafo.model.ports import exhaust_path
 
 
 class Silencer(NamedTuple):
@@ -16,7 +16,7 @@ class Silencer(NamedTuple):
 
 def behind_silencer(conductance: float, silencer: Silencer) -> float:
     """Conductance [kg/(s Pa)] of valve and silencer in a row, from that of the valve: ``1/C^2 = 1/C_v^2 + 1/C_s^2``."""
-    return way_out(conductance_in_series(conductance, silencer.resistance))
+    return exhaust_path(conductance_in_series(conductance, silencer.resistance))
 
 
 def prepare(settings: Any, device: Any) -> Silencer:
@@ -37,7 +37,7 @@ EFFECT = Effect(
     parameters=Silencer,
     prepare=prepare,
     switch=("sonic_conductance",),
-    laws={way_out: behind_silencer},
+    laws={exhaust_path: behind_silencer},
     source="ISO 6358-3:2014, restrictions in series, with equal critical ratios and far from choking",
     equation="1/C^2 = 1/C_v^2 + 1/C_s^2",
     symbols=(

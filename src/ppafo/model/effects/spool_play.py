@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import Effect, Moment, State
-from ppafo.model.places import at_valve
+from ppafo.model.ports import at_valve
 from ppafo.model.valves.kind import VENTS_ABOVE
 
 

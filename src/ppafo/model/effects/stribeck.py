@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import Effect
-from ppafo.model.places import friction_in_motion
+from ppafo.model.ports import friction_in_motion
 
 
 class Stribeck(NamedTuple):

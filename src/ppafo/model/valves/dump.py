@@ -55,13 +55,13 @@ def connect_ideal(plant: PlantParameters, shown: DumpedOpening) -> tuple[SingleP
             conductance=full if vents else port_1.conductance,
             node_pressure=room if vents else port_1.node_pressure,
             source_fraction=0.0 if vents else port_1.source_fraction,
-            takes_back=1.0 if vents else port_1.takes_back,
+            is_relieving=1.0 if vents else port_1.is_relieving,
         ),
         SinglePort(
             conductance=full if vents else port_2.conductance,
             node_pressure=room if vents else port_2.node_pressure,
             source_fraction=0.0 if vents else port_2.source_fraction,
-            takes_back=1.0 if vents else port_2.takes_back,
+            is_relieving=1.0 if vents else port_2.is_relieving,
         ),
     )
 

@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from ppafo.model.declaration import Quantity
-from ppafo.model.places import opening_time, way_in, way_out
 from ppafo.model.plant import Openings, PlantParameters, SinglePort, single_port_flow, single_port_flow_slopes
+from ppafo.model.ports import exhaust_path, opening_time, supply_path
 from ppafo.model.valves.kind import VENTS_ABOVE, ValveKind, ValveModel
 
 NEVER = -1.0e9
@@ -76,18 +76,18 @@ def connect_positions(plant: PlantParameters, shown: PairPositions) -> tuple[Sin
     node_2 = plant.dorsiflexion_pressure if open_b else plant.atmospheric_pressure
     back_1 = plant.relieving if open_a else 1.0
     back_2 = plant.relieving if open_b else 1.0
-    fed, vented = way_in(plant.valve_conductance), way_out(plant.valve_conductance)
+    fed, vented = supply_path(plant.valve_conductance), exhaust_path(plant.valve_conductance)
     port_1 = SinglePort(
         conductance=fed if open_a else vented,
         node_pressure=node_1,
         source_fraction=1.0 if open_a else 0.0,
-        takes_back=back_1,
+        is_relieving=back_1,
     )
     port_2 = SinglePort(
         conductance=fed if open_b else vented,
         node_pressure=node_2,
         source_fraction=1.0 if open_b else 0.0,
-        takes_back=back_2,
+        is_relieving=back_2,
     )
     return port_1, port_2
 

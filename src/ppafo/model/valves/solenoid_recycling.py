@@ -95,13 +95,13 @@ def connect(plant: PlantParameters, shown: RecyclingPositions) -> tuple[SinglePo
             conductance=share_1 * port_1.conductance,
             node_pressure=port_1.node_pressure,
             source_fraction=port_1.source_fraction,
-            takes_back=port_1.takes_back,
+            is_relieving=port_1.is_relieving,
         ),
         SinglePort(
             conductance=share_2 * port_2.conductance,
             node_pressure=port_2.node_pressure,
             source_fraction=port_2.source_fraction,
-            takes_back=port_2.takes_back,
+            is_relieving=port_2.is_relieving,
         ),
     )
 

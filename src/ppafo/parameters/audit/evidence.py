@@ -70,7 +70,7 @@ _SMALLEST, _LARGEST = 1e-20, 1e20
 
 
 class Interval(NamedTuple):
-    """The range of numbers that a printed number can stand for; SI, positive."""
+    """The range of numbers that a reported number can stand for; SI, positive."""
 
     low: float
     high: float
@@ -116,11 +116,11 @@ class Evidence:
         return None if entry is None else entry.value
 
     def magnitude(self, path: str) -> Interval | None:
-        """Return the range that the printed digits at a path leave open, without sign, in SI."""
+        """Return the range that the reported digits at a path leave open, without sign, in SI."""
         value, entry = self.number(path), self.parameter_set.numbers.get(path)
         if value is None or entry is None or entry.value == 0.0:
             return None
-        relative = min(printed_half_width(entry) / abs(entry.value), 0.99)
+        relative = min(reported_half_width(entry) / abs(entry.value), 0.99)
         return Interval(abs(value) * (1.0 - relative), abs(value) * (1.0 + relative))
 
     def in_set_unit(self, path: str, value: float) -> str:
@@ -175,13 +175,13 @@ class Evidence:
         return preferred if preferred in self.parameter_set.numbers else other
 
 
-def printed_half_width(entry: Entry) -> float:
-    """Return half a unit of the last printed digit, or the stated uncertainty, in the entry's unit."""
+def reported_half_width(entry: Entry) -> float:
+    """Return half a unit of the last reported digit, or the stated uncertainty, in the entry's unit."""
     return _half_digit(entry.value) if entry.uncertainty is None else entry.uncertainty
 
 
 def digits(value: float) -> Interval:
-    """Return the range that the digits of a printed positive number leave open."""
+    """Return the range that the digits of a reported positive number leave open."""
     return Interval(value - _half_digit(value), value + _half_digit(value))
 
 

@@ -157,16 +157,16 @@ def _value(node: ast.expr, k: float) -> float:
     raise ValueError("not plain arithmetic in k")
 
 
-# Do the printed constants of orifice flow follow from the gas data? Equations (6) and (7).
+# Do the reported constants of orifice flow follow from the gas data? Equations (6) and (7).
 
 _C1 = "reported.choked_flow_constant"
 _EXPONENT = "reported.choked_flow_exponent"
 _ROUNDING = 1e-3
-"""Relative room beside the printed digits: other values of R, M and 273 or 273.15."""
+"""Relative room beside the reported digits: other values of R, M and 273 or 273.15."""
 
 
 def check_choked_flow(evidence: Evidence) -> Iterator[Finding]:
-    """Yield a finding for each printed constant, a note where it holds, and one for the printed exponent."""
+    """Yield a finding for each reported constant, a note where it holds, and one for the reported exponent."""
     gas = evidence.gas()
     if gas is None:
         return
@@ -182,21 +182,21 @@ def check_choked_flow(evidence: Evidence) -> Iterator[Finding]:
 
 
 def _constant(evidence: Evidence, path: str, expected: float) -> Iterator[Finding]:
-    printed, digits = evidence.number(path), evidence.magnitude(path)
-    if printed is None or digits is None:
+    reported, digits = evidence.number(path), evidence.magnitude(path)
+    if reported is None or digits is None:
         return
     holds = digits.low * (1.0 - _ROUNDING) <= expected <= digits.high * (1.0 + _ROUNDING)
     quantity = evidence.declared[path]
-    verdict = "agree to the printed digits" if holds else f"differ by {100.0 * (printed / expected - 1.0):+.2g} %"
+    verdict = "agree to the reported digits" if holds else f"differ by {100.0 * (reported / expected - 1.0):+.2g} %"
     remedy = "" if holds else f" Reconciled by {expected:.5g}, or by other gas data."
     yield Finding(
         id=path.rpartition(".")[2].replace("_", "-"),
         severity="note" if holds else "error",
         title=f"{quantity.summary} {'follows' if holds else 'does not follow'} from the gas data",
         values=evidence.values_of(path, *GAS_PATHS),
-        sides=(Side("printed", printed, quantity.unit), Side("from the gas data", expected, quantity.unit)),
+        sides=(Side("reported", reported, quantity.unit), Side("from the gas data", expected, quantity.unit)),
         paragraph=(
-            f"Printed is {evidence.in_set_unit(path, printed)}; the gas data give {expected:.5g} "
+            f"Reported is {evidence.in_set_unit(path, reported)}; the gas data give {expected:.5g} "
             f"{quantity.unit}".rstrip()
             + f". The two {verdict}.{remedy}"
         ),
@@ -204,7 +204,7 @@ def _constant(evidence: Evidence, path: str, expected: float) -> Iterator[Findin
 
 
 def _exponent(evidence: Evidence, gas: Gas) -> Iterator[Finding]:
-    """Compare C1 with the printed exponent to C1 with (k + 1)/(k - 1)."""
+    """Compare C1 with the reported exponent to C1 with (k + 1)/(k - 1)."""
     formula = evidence.text(_EXPONENT)
     k = gas.heat_capacity_ratio
     exponent = None if formula is None else evaluate(formula, k)
@@ -213,7 +213,7 @@ def _exponent(evidence: Evidence, gas: Gas) -> Iterator[Finding]:
         return
     correct = choked_flow_constant(k, gas.specific_gas_constant, gas.temperature)
     values = evidence.values_of(_EXPONENT, _C1, *GAS_PATHS)
-    title = "the printed exponent inside C1 is not the one of choked flow"
+    title = "the reported exponent inside C1 is not the one of choked flow"
     if exponent is None:
         text = f"The formula '{formula}' cannot be read as arithmetic in k; the right exponent is (k + 1)/(k - 1)."
         yield Finding("choked-flow-exponent", "warning", title, values, (), text)
@@ -224,9 +224,9 @@ def _exponent(evidence: Evidence, gas: Gas) -> Iterator[Finding]:
         severity="error",
         title=title,
         values=values,
-        sides=(Side("C1 with the printed exponent", literal, "s/m"), Side("C1 with (k+1)/(k-1)", correct, "s/m")),
+        sides=(Side("C1 with the reported exponent", literal, "s/m"), Side("C1 with (k+1)/(k-1)", correct, "s/m")),
         paragraph=(
-            f"The printed exponent {formula} is {exponent:.4g} and gives C1 = {literal:.4g} s/m; the exponent "
+            f"The reported exponent {formula} is {exponent:.4g} and gives C1 = {literal:.4g} s/m; the exponent "
             f"(k + 1)/(k - 1) = {right:.4g} gives {correct:.4g} s/m{_agreement(evidence, literal, correct)}. "
             f"Reconciled by the exponent (k + 1)/(k - 1)."
         ),
@@ -234,14 +234,14 @@ def _exponent(evidence: Evidence, gas: Gas) -> Iterator[Finding]:
 
 
 def _agreement(evidence: Evidence, literal: float, correct: float) -> str:
-    printed = evidence.number(_C1)
-    if printed is None:
+    reported = evidence.number(_C1)
+    if reported is None:
         return ""
-    nearer = "second" if abs(printed - correct) < abs(printed - literal) else "first"
-    return f", and the printed C1 of {printed:.4g} s/m is the {nearer} of the two"
+    nearer = "second" if abs(reported - correct) < abs(reported - literal) else "first"
+    return f", and the reported C1 of {reported:.4g} s/m is the {nearer} of the two"
 
 
-# Do the printed flows follow from discharge coefficient and area? Equations (6) and (7).
+# Do the reported flows follow from discharge coefficient and area? Equations (6) and (7).
 
 _MODEL = 0.02
 """Relative room for the model itself: measured flow is rarely better."""
@@ -261,7 +261,7 @@ class _ValveFlow:
 
 
 def check_flow(evidence: Evidence) -> Iterator[Finding]:
-    """Yield an error for each valve whose printed flow its Cd A does not pass, and for a shared Cd that cannot be."""
+    """Yield an error for each valve whose reported flow its Cd A does not pass, and for a shared Cd that cannot be."""
     flows = [flow for name in evidence.parameter_set.valve_kinds if (flow := _flow(evidence, name)) is not None]
     for flow in flows:
         if not flow.agrees:
@@ -298,25 +298,25 @@ def _flow(evidence: Evidence, name: str) -> _ValveFlow | None:
 def _contradiction(evidence: Evidence, flow: _ValveFlow) -> Finding:
     area_path, _, flow_path, pressure_path = _paths(flow.name)
     needed = flow.measured / flow.per_area
-    printed = evidence.in_set_unit(flow_path, flow.measured)
+    reported = evidence.in_set_unit(flow_path, flow.measured)
     pressure = evidence.in_set_unit(pressure_path, evidence.number(pressure_path) or 0.0)
     return Finding(
         id=f"flow-of-{flow.name}",
         severity="error",
-        title=f"the printed flow of valve '{flow.name}' does not follow from Cd A",
+        title=f"the reported flow of valve '{flow.name}' does not follow from Cd A",
         values=evidence.values_of(*_paths(flow.name)),
         sides=(
-            Side("printed flow", flow.measured, "kg/s"),
+            Side("reported flow", flow.measured, "kg/s"),
             Side("Cd A C1 P", flow.predicted, "kg/s"),
-            Side("Cd A that gives the printed flow", needed, "m^2"),
+            Side("Cd A that gives the reported flow", needed, "m^2"),
         ),
         paragraph=(
             f"Fully open at {pressure} the valve '{flow.name}' passes "
             f"{evidence.in_set_unit(flow_path, flow.predicted)} by Cd A = {flow.coefficient:.4g} x "
-            f"{evidence.in_set_unit(area_path, flow.area)}, printed is {printed}: a factor "
+            f"{evidence.in_set_unit(area_path, flow.area)}, reported is {reported}: a factor "
             f"{flow.predicted / flow.measured:.3g}. Reconciled by Cd A = {1e6 * needed:.4g} mm^2, that is "
-            f"Cd = {needed / flow.area:.3g} with the printed area, or "
-            f"{evidence.in_set_unit(area_path, needed / flow.coefficient)} with the printed Cd; or by "
+            f"Cd = {needed / flow.area:.3g} with the reported area, or "
+            f"{evidence.in_set_unit(area_path, needed / flow.coefficient)} with the reported Cd; or by "
             f"{evidence.in_set_unit(flow_path, flow.predicted)} as the flow."
         ),
     )
@@ -333,55 +333,55 @@ def _check_shared_coefficient(evidence: Evidence, flows: list[_ValveFlow]) -> It
         yield Finding(
             id=f"one-coefficient-{first.name}-{other.name}",
             severity="error",
-            title=f"one Cd cannot give the printed flows of '{first.name}' and '{other.name}'",
+            title=f"one Cd cannot give the reported flows of '{first.name}' and '{other.name}'",
             values=evidence.values_of(*_paths(first.name)[:3], *_paths(other.name)[:3]),
-            sides=(Side("ratio of the areas", areas, ""), Side("ratio of the printed flows", measured, "")),
+            sides=(Side("ratio of the areas", areas, ""), Side("ratio of the reported flows", measured, "")),
             paragraph=(
                 f"With one discharge coefficient {first.coefficient:.4g} flow goes as area: '{first.name}' must pass "
-                f"{areas:.3g} times what '{other.name}' passes, the printed flows are as {measured:.3g} to 1. "
+                f"{areas:.3g} times what '{other.name}' passes, the reported flows are as {measured:.3g} to 1. "
                 f"Reconciled by a coefficient of its own for each: {first.measured / first.per_area / first.area:.3g} "
                 f"and {other.measured / other.per_area / other.area:.3g}; or by two flows, measured one by one."
             ),
         )
 
 
-# Does the printed flow of a valve in the form of ISO 6358 follow from its sonic conductance?
+# Does the reported flow of a valve in the form of ISO 6358 follow from its sonic conductance?
 
 
 def check_sonic_flow(evidence: Evidence) -> Iterator[Finding]:
-    """Yield an error for each valve whose printed flow its sonic conductance does not pass."""
+    """Yield an error for each valve whose reported flow its sonic conductance does not pass."""
     for name in evidence.parameter_set.valve_kinds:
         yield from _valve(evidence, name)
 
 
 def _valve(evidence: Evidence, name: str) -> Iterator[Finding]:
-    valve, reported = f"valves.{name}", f"reported.valves.{name}"
-    size, flow = f"{valve}.sonic_conductance", f"{reported}.mass_flow"
-    paths = (size, f"{valve}.critical_ratio", flow, f"{reported}.flow_pressure")
+    valve, entry = f"valves.{name}", f"reported.valves.{name}"
+    size, flow = f"{valve}.sonic_conductance", f"{entry}.mass_flow"
+    paths = (size, f"{valve}.critical_ratio", flow, f"{entry}.flow_pressure")
     gas, found = evidence.gas(), evidence.numbers(*paths)
-    printed, given = evidence.magnitude(flow), evidence.magnitude(size)
-    if gas is None or found is None or printed is None or given is None or min(found) <= 0.0 or found[1] >= 1.0:
+    reported, given = evidence.magnitude(flow), evidence.magnitude(size)
+    if gas is None or found is None or reported is None or given is None or min(found) <= 0.0 or found[1] >= 1.0:
         return
     conductance, critical_ratio, measured, pressure = found
     psi = iso6358_flow_function(min(evidence.atmosphere() / pressure, 1.0), critical_ratio)
     per_size = sonic_conductance_mass(1.0, gas.specific_gas_constant, gas.temperature) * pressure * psi
     room = Interval(per_size * (1.0 - _MODEL), per_size * (1.0 + _MODEL))
-    if per_size <= 0.0 or given.times(room).meets(printed):
+    if per_size <= 0.0 or given.times(room).meets(reported):
         return
     predicted, needed = conductance * per_size, measured / per_size
     yield Finding(
         id=f"flow-of-{name}",
         severity="error",
-        title=f"the printed flow of valve '{name}' does not follow from its sonic conductance",
+        title=f"the reported flow of valve '{name}' does not follow from its sonic conductance",
         values=evidence.values_of(*paths),
         sides=(
-            Side("printed flow", measured, "kg/s"),
+            Side("reported flow", measured, "kg/s"),
             Side("flow of the sonic conductance", predicted, "kg/s"),
-            Side("sonic conductance that gives the printed flow", needed, "m^3/(s Pa)"),
+            Side("sonic conductance that gives the reported flow", needed, "m^3/(s Pa)"),
         ),
         paragraph=(
             f"Fully open the valve '{name}' passes {evidence.in_set_unit(flow, predicted)} by its sonic conductance, "
-            f"printed is {evidence.in_set_unit(flow, measured)}: a factor {predicted / measured:.3g}. Reconciled by a "
+            f"reported is {evidence.in_set_unit(flow, measured)}: a factor {predicted / measured:.3g}. Reconciled by a "
             f"sonic conductance of {evidence.in_set_unit(size, needed)}, or by the other flow."
         ),
     )

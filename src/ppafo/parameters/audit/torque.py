@@ -10,7 +10,7 @@ from ppafo.parameters.audit.evidence import Evidence, Finding, Interval, Severit
 from ppafo.parameters.device import Gas
 from ppafo.units import to_si
 
-# Do damping and dynamic friction agree with the inertia and the printed ratios they were computed from?
+# Do damping and dynamic friction agree with the inertia and the reported ratios they were computed from?
 
 _INERTIA = "foot_plate.inertia"
 _DAMPING = "friction.viscous_damping"
@@ -32,10 +32,10 @@ def check_inertia(evidence: Evidence) -> Iterator[Finding]:
         (_DAMPING, decay_path, decay, "damping"),
         (_FRICTION, _DECELERATION, evidence.magnitude(_DECELERATION), "dynamic friction"),
     ):
-        printed = evidence.magnitude(product)
-        if printed is None or rate is None or inertia.times(rate).meets(printed):
+        reported = evidence.magnitude(product)
+        if reported is None or rate is None or inertia.times(rate).meets(reported):
             continue
-        implied.append(printed.over(rate))
+        implied.append(reported.over(rate))
         yield _product(evidence, product, rate_path, name, _middle(rate))
     if len(implied) > 1:
         yield from _one_inertia(evidence, implied[0], implied[1], decay_path)
@@ -59,41 +59,42 @@ def _middle(interval: Interval) -> float:
 
 
 def _product(evidence: Evidence, product: str, rate_path: str, name: str, rate: float) -> Finding:
-    inertia, printed = evidence.number(_INERTIA) or 0.0, evidence.number(product) or 0.0
-    expected, implied = inertia * rate, printed / rate
+    inertia, reported = evidence.number(_INERTIA) or 0.0, evidence.number(product) or 0.0
+    expected, implied = inertia * rate, reported / rate
     unit = evidence.declared[product].unit
     ratio = evidence.values_of(rate_path)[0]
     return Finding(
         id=f"{name.replace(' ', '-')}-against-inertia",
         severity="error",
-        title=f"{name} is not the product of inertia and the printed ratio",
+        title=f"{name} is not the product of inertia and the reported ratio",
         values=evidence.values_of(product, _INERTIA, rate_path),
         sides=(
-            Side(f"printed {name}", printed, unit),
+            Side(f"reported {name}", reported, unit),
             Side("inertia times ratio", expected, unit),
             Side("inertia that would agree", implied, "kg m^2"),
         ),
         paragraph=(
             f"Inertia {evidence.in_set_unit(_INERTIA, inertia)} times {abs(float(ratio.value)):g} {ratio.unit} is "
-            f"{evidence.in_set_unit(product, expected)}, printed is {evidence.in_set_unit(product, printed)}: a factor "
-            f"{printed / expected:.3g}. Reconciled by an inertia of {evidence.in_set_unit(_INERTIA, implied)}, or by "
+            f"{evidence.in_set_unit(product, expected)}, reported is "
+            f"{evidence.in_set_unit(product, reported)}: a factor "
+            f"{reported / expected:.3g}. Reconciled by an inertia of {evidence.in_set_unit(_INERTIA, implied)}, or by "
             f"{evidence.in_set_unit(product, expected)} as the {name}."
         ),
     )
 
 
 def _one_inertia(evidence: Evidence, damping: Interval, friction: Interval, decay_path: str) -> Iterator[Finding]:
-    """Look for one inertia within the printed digits of both products, first the printed one with a moved point."""
+    """Look for one inertia within the reported digits of both products, first the reported one with a moved point."""
     if not damping.meets(friction):
         return
     common = damping.common(friction)
-    printed = evidence.number(_INERTIA) or 0.0
-    shifted = [printed * 10.0**shift for shift in _SHIFTS if common.low <= printed * 10.0**shift <= common.high]
+    reported = evidence.number(_INERTIA) or 0.0
+    shifted = [reported * 10.0**shift for shift in _SHIFTS if common.low <= reported * 10.0**shift <= common.high]
     best = shifted[0] if shifted else _middle(common)
     written = evidence.in_set_unit(_INERTIA, best)
     slip = (
-        f" {written} is the printed {evidence.in_set_unit(_INERTIA, printed)} with the decimal point moved: either the "
-        f"inertia or both products carry the slip, and only a weighing can tell which."
+        f" {written} is the reported {evidence.in_set_unit(_INERTIA, reported)} with the decimal point moved: "
+        "either the inertia or both products carry the slip, and only a weighing can tell which."
         if shifted
         else ""
     )
@@ -103,13 +104,13 @@ def _one_inertia(evidence: Evidence, damping: Interval, friction: Interval, deca
         title=f"damping and dynamic friction both agree with an inertia of {written}",
         values=evidence.values_of(_INERTIA, _DAMPING, _FRICTION, decay_path, _DECELERATION),
         sides=(
-            Side("printed inertia", printed, "kg m^2"),
+            Side("reported inertia", reported, "kg m^2"),
             Side("reconciling inertia", best, "kg m^2"),
             Side("lowest that agrees", common.low, "kg m^2"),
             Side("highest that agrees", common.high, "kg m^2"),
         ),
         paragraph=(
-            f"Within the printed digits both products hold for any inertia from "
+            f"Within the reported digits both products hold for any inertia from "
             f"{evidence.in_set_unit(_INERTIA, common.low)} to {evidence.in_set_unit(_INERTIA, common.high)}.{slip}"
         ),
     )

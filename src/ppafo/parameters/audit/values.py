@@ -102,10 +102,10 @@ def _upside_down(evidence: Evidence, path: str) -> Finding:
         severity="error",
         title=f"{path} is upside down: its unit belongs to the inverse",
         values=evidence.values_of(path),
-        sides=(Side("as printed", value, inverse_unit), Side("taken literally", 1.0 / value, quantity.unit)),
+        sides=(Side("as reported", value, inverse_unit), Side("taken literally", 1.0 / value, quantity.unit)),
         paragraph=(
             f"{path} = {number_text(entry)} is meant as: {quantity.summary}. That has the unit "
-            f"{quantity.unit}; the printed "
+            f"{quantity.unit}; the reported "
             f"unit {entry.unit} is the one of its inverse. Reconciled by turning the ratio over and keeping the "
             f"number: taken literally it would be {1.0 / value:.3g} {quantity.unit}."
         ),
@@ -122,7 +122,7 @@ def _foreign(evidence: Evidence, paths: list[str]) -> Finding:
         sides=tuple(Side(path, evidence.number(path) or 0.0, "as given, base units") for path in paths),
         paragraph=(
             f"{described}. Reconciled by giving the same number in the unit that is needed, if only the unit was "
-            f"misprinted; the other checks use the number as it stands."
+            f"misreported; the other checks use the number as it stands."
         ),
     )
 

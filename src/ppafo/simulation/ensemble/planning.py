@@ -22,13 +22,13 @@ from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, Clock
 from ppafo.simulation.declaration import limits, quantity_text
 from ppafo.simulation.motion import TOLERANCE, profile_problem
 from ppafo.simulation.numbers import (
-    HELD_ANGLE,
+    LOCKED_ANGLE,
     TIMES,
     Columns,
     TimeTexts,
     clock_of,
     clock_with,
-    path_of_held_angle,
+    path_of_locked_angle,
     time_texts,
     varied_scenario,
 )
@@ -267,7 +267,7 @@ def _beyond_the_stops(scenario: Scenario) -> tuple[Problem, ...]:
 
         def angle_line(run: int) -> str:
             low, high = (quantity_text(at(stop, run), "rad") for stop in (actuator.angle_min, actuator.angle_max))
-            path = path_of_held_angle(scenario) or HELD_ANGLE
+            path = path_of_locked_angle(scenario) or LOCKED_ANGLE
             return f"{path} = {quantity_text(at(level, run), 'rad')}: must be between the stops, {low} to {high}"
 
         return ((outside, angle_line),)

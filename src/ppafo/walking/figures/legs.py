@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.answers.style import BLACK, CHAMBER_1, CHAMBER_2, GREY, Margins, figure_of_panels, house_style, mark_kind
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.model.valves.kind import VENTS_ABOVE
+from ppafo.report.style import BLACK, CHAMBER_1, CHAMBER_2, GREY, Margins, figure_of_panels, house_style, mark_kind
 from ppafo.signals.recording import Floats
 from ppafo.walking.figures.mean_stride import WITH, WITHOUT
 from ppafo.walking.gait_series import Posture, ankle_path, gait_timing

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from ppafo.answers.style import BLACK, BLUE, GREY, VERMILION, Margins, figure_of_panels, house_style, mark_kind
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.gait.gait import clinical_angle
 from ppafo.metrics import Metric
+from ppafo.report.style import BLACK, BLUE, GREY, VERMILION, Margins, figure_of_panels, house_style, mark_kind
 from ppafo.signals import Recording
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.motion import walk_of

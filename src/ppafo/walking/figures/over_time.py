@@ -8,8 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ppafo.answers.display_units import axis_unit, display_value, display_values
-from ppafo.answers.style import (
+from ppafo.constants import GRAMS_PER_KILOGRAM
+from ppafo.gait.gait import clinical_angle
+from ppafo.model.helping import HELPS, LIFTS, PAUSED, STOPPED
+from ppafo.model.source import Regulator
+from ppafo.report.display_units import axis_unit, display_value, display_values
+from ppafo.report.style import (
     BLACK,
     BLUE,
     GREEN,
@@ -22,10 +26,6 @@ from ppafo.answers.style import (
     label_lines,
     mark_kind,
 )
-from ppafo.constants import GRAMS_PER_KILOGRAM
-from ppafo.gait.gait import clinical_angle
-from ppafo.model.helping import HELPS, LIFTS, PAUSED, STOPPED
-from ppafo.model.source import Regulator
 from ppafo.signals.recording import Floats, Recording
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.figures.mean_stride import WITH, WITHOUT

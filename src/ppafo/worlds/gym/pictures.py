@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.answers.style import BLUE, GREY, VERMILION, house_style
+from ppafo.report.style import BLUE, GREY, VERMILION, house_style
 
 SIZE, RESOLUTION = (6.4, 3.6), 100
 """Inches, and dots an inch: 640 by 360 points, even numbers as films want them."""

@@ -29,7 +29,7 @@ def test_a_flow_that_follows_from_cd_a_is_no_finding() -> None:
 
 
 def test_the_reconciling_cd_a_gives_the_printed_flow() -> None:
-    needed = side(findings()["flow-of-proportional"], "Cd A that gives the printed flow")
+    needed = side(findings()["flow-of-proportional"], "Cd A that gives the reported flow")
     assert needed == pytest.approx(1.196e-6, rel=1e-3)
     assert "flow-of-proportional" not in findings(f"valve.discharge_coefficient={needed / 31.6e-6:.6f}")
 
@@ -47,7 +47,7 @@ def test_flows_as_areas_are_no_finding() -> None:
 def test_the_form_of_iso_6358_is_checked_too() -> None:
     iso = ("valve.sonic_conductance=1 L/(s bar)", "valve.critical_ratio=0.4")
     flow = findings(*iso)["flow-of-proportional"]
-    needed = side(flow, "sonic conductance that gives the printed flow")
+    needed = side(flow, "sonic conductance that gives the reported flow")
     matched = findings(f"valve.sonic_conductance={needed!r} m^3/(s Pa)", "valve.critical_ratio=0.4")
     assert "flow-of-proportional" not in matched
 

@@ -1,0 +1,355 @@
+"""A comparison as a finding: a table for each task, paired statistics, error against gas, the changes."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ppafo.analyses.compare.pairs import Paired, pareto_front
+from ppafo.live.workbench import live_part
+from ppafo.metrics import Metric
+from ppafo.report.style import BLACK, COLOURS, GREY
+from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.simulate import Status
+from ppafo.studies.distributions import FEWEST_EFFECTIVE, Floats, Interval, fraction_text
+from ppafo.study.finding import Column, Finding, Part
+from ppafo.study.kind import Kind, of_metric
+from ppafo.study.panels import Mark, Panel
+from ppafo.study.runs import Rows
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_ERROR, _GAS = "rms_error", "gas_supplied"
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """A configuration on a task: how the nominal run ended, its metrics, and how many draws failed and first why.
+
+    ``rows`` are its runs over the draws, ``renoised`` the first of them again with other noise; None where there are
+    none.
+    """
+
+    configuration: str
+    status: Status
+    metrics: Mapping[str, Metric]
+    failed_draws: int
+    reason: str = field(compare=False)
+    scenario: Scenario = field(compare=False, repr=False)
+    rows: Rows | None = field(compare=False, repr=False)
+    renoised: Rows | None = field(compare=False, repr=False)
+
+    def value(self, metric: str) -> float | None:
+        """Return a metric [SI] of the nominal run, None where it has none."""
+        found = self.metrics.get(metric)
+        return None if found is None else found.value
+
+
+@dataclass(frozen=True, slots=True)
+class OnTask:
+    """All configurations on one task.
+
+    ``pareto_front`` are those that no other beats in both error and gas, ``pairs`` the statistics of each against the
+    baseline, ``best`` the probability of each to be the best, by metric; both empty without draws.
+    """
+
+    task: str
+    overrides: list[str]
+    cases: list[Case]
+    pareto_front: list[str]
+    pairs: dict[str, list[Paired]]
+    best: dict[str, dict[str, Interval]]
+
+    def case(self, configuration: str) -> Case:
+        """Return what a configuration did."""
+        return next(case for case in self.cases if case.configuration == configuration)
+
+
+@dataclass(frozen=True, slots=True)
+class Compared:
+    """Configurations on tasks, one of them the ``baseline``; numbers in SI.
+
+    ``draws`` is 0 without uncertainty; ``varied`` are the uncertain paths but the noise; ``confidence`` is that of the
+    intervals.
+    """
+
+    units: str
+    configurations: list[str]
+    baseline: str
+    draws: int
+    seed: int
+    remarks: list[str]
+    varied: list[str]
+    confidence: float
+    tasks: list[OnTask]
+    metrics: tuple[str, ...] = field(compare=False)
+
+    @property
+    def others(self) -> list[str]:
+        """All configurations but the baseline."""
+        return [name for name in self.configurations if name != self.baseline]
+
+    @property
+    def has_noise(self) -> bool:
+        """True where a controller receives noise."""
+        return any(case.renoised is not None for task in self.tasks for case in task.cases)
+
+
+_READING = (
+    "The intervals of the mean difference and of the probability show how precisely the draws estimate them; they "
+    "shrink with more draws. The change from 5 to 95 % of the draws shows the effect of the uncertain values; it "
+    "does not shrink."
+)
+_NOISE = (
+    "sensors are noisy: every draw has its own noise, the same in all configurations; the nominal change is "
+    "one realisation"
+)
+_PARETO = (
+    "Marks: the nominal device; dots: draws. The line joins the configurations that no other beats in both error and "
+    "gas."
+)
+
+
+def finding_of(found: Compared) -> Finding[Compared]:
+    """Return a comparison in words, tables and panels."""
+    names = found.configurations
+    has_errors = _ERROR in found.metrics
+    said = [_READING] if found.draws else []
+    pareto, change = (
+        Part(
+            "Error against gas",
+            panels=lambda: [_pareto(found, task) for task in found.tasks],
+            name="pareto",
+            caption=_PARETO,
+            is_detail=True,
+        ),
+        Part(
+            "Spread of the change",
+            panels=lambda: [_change(found, task, metric) for task in found.tasks for metric in (_ERROR, _GAS)],
+            name="change",
+            caption="Change against the baseline in each draw; the dashed line is the nominal device.",
+            across=2,
+            size=(3.5, 2.7),
+            is_detail=True,
+        ),
+    )
+    return Finding(
+        name="compare",
+        kicker="Comparison",
+        title=" and ".join(names) if len(names) == 2 else f"{len(names)} configurations against {found.baseline}",
+        said=(_lead(found),),
+        parts=(
+            *(part for task in found.tasks for part in _parts(found, task)),
+            *([pareto] if has_errors else []),
+            *([change] if has_errors and found.draws else []),
+            Part(remarks=found.remarks),
+            Part("How to read it" if said else "", said=said, is_detail=True),
+        ),
+        found=found,
+        passed=all(case.status.is_completed for task in found.tasks for case in task.cases),
+        live=lambda: live_part([case.scenario for task in found.tasks for case in task.cases]),
+    )
+
+
+def _lead(found: Compared) -> str:
+    tasks = f"{len(found.tasks)} task{'' if len(found.tasks) == 1 else 's'}"
+    words = f"{len(found.configurations)} configurations on {tasks}, baseline {found.baseline}"
+    if not found.draws:
+        return f"{words}; the nominal device, without uncertainty"
+    if not found.varied:
+        return f"{words}; the nominal device, over {found.draws:,} draws of the sensor noise"
+    values = f"{len(found.varied)} uncertain value{'' if len(found.varied) == 1 else 's'}"
+    noise = " and of the sensor noise" if found.has_noise else ""
+    return (
+        f"{words}; {found.draws:,} draws of {values}{noise}, the same for all; "
+        f"each interval with {100.0 * found.confidence:g} % confidence"
+    )
+
+
+def _parts(found: Compared, task: OnTask) -> list[Part]:
+    """Return the metrics of all configurations, each other one against the baseline, and which is the best."""
+    where = "" if len(found.tasks) == 1 else f", {task.task}"
+    best = {
+        metric: ", ".join(f"{name} {_PROBABILITY.interval(each)}" for name, each in task.best[metric].items())
+        for metric in (_ERROR, _GAS)
+        if len(found.configurations) > 2 and task.best.get(metric)
+    }
+    return [
+        Part(
+            f"Task: {task.task}",
+            [
+                Column("configuration", [case.configuration for case in task.cases]),
+                *(_metric(name, [case.value(name) for case in task.cases]) for name in found.metrics),
+                Column("status", [case.status.kind for case in task.cases]),
+            ],
+        ),
+        *(
+            Part(f"{name} against {found.baseline}{where}", _paired(found, task, name))
+            for name, pairs in task.pairs.items()
+            if pairs
+        ),
+        *([Part(remarks=[f"best: {metric}: {text}" for metric, text in best.items()])] if best else []),
+    ]
+
+
+_PROBABILITY = Kind(form=".4g")
+
+
+def _metric(name: str, values: Sequence[float | None]) -> Column:
+    kind = of_metric(name)
+    return Column(kind.words, values, kind)
+
+
+def _paired(found: Compared, task: OnTask, name: str) -> list[Column]:
+    """Return a row for each metric: change without and with uncertainty, mean difference, probability of a gain."""
+    pairs = task.pairs[name]
+    kinds = [of_metric(item.metric, "+.3g") for item in pairs]
+    nominal = [_nominal(task, item.metric, found.baseline, name) for item in pairs]
+    spread = [
+        f"{_percent(item.change)} ({_percent(item.change_low)} to {_percent(item.change_high)})"
+        if math.isfinite(item.change)
+        else ""
+        for item in pairs
+    ]
+    better = [
+        "" if item.better is None else "equal in all" if item.equal == 1.0 else _PROBABILITY.interval(item.better)
+        for item in pairs
+    ]
+    differences = [kind.change_interval(item.difference) for kind, item in zip(kinds, pairs, strict=True)]
+    columns = [
+        Column("metric", [item.metric for item in pairs]),
+        Column("unit", [kind.shown_unit if kind.quantity else "" for kind in kinds]),
+        Column("nominal change", nominal),
+        Column("change over the draws: median (5 to 95 %)", spread),
+        Column("mean difference", differences),
+        Column("probability of being better", better),
+    ]
+    noise = ["-" if item.noise is None else fraction_text(item.noise) for item in pairs]
+    return [*columns, Column("spread due to noise", noise)] if found.has_noise else columns
+
+
+def _nominal(task: OnTask, metric: str, baseline: str, name: str) -> str:
+    first, other = (task.case(each).value(metric) for each in (baseline, name))
+    return _percent((other - first) / abs(first)) if first and other is not None else ""
+
+
+def _percent(fraction: float) -> str:
+    return "" if math.isnan(fraction) else f"{100.0 * fraction:+.3g} %"
+
+
+def remarks_of(found: Compared, tasks: Sequence[OnTask]) -> list[str]:
+    """Return what is not as one would expect: other tasks, runs that failed, means that few draws decide, noise."""
+    return [
+        *(text for task in tasks for text in _other_tasks(found.baseline, task)),
+        *(text for task in tasks for case in task.cases for text in _failures(case, task.task, found.draws)),
+        *(
+            f"{name}, task '{task.task}': the mean difference of {item.metric} has an effective sample size of "
+            f"{item.effective_size:.3g} of {item.pairs:,} draws: do not trust its interval; the probability of being "
+            "better is not affected"
+            for task in tasks
+            for name, pairs in task.pairs.items()
+            for item in pairs
+            if item.effective_size < min(FEWEST_EFFECTIVE, 0.5 * item.pairs)
+        ),
+        *([_NOISE] if found.has_noise else []),
+    ]
+
+
+def _failures(case: Case, task: str, draws: int) -> list[str]:
+    said = [] if case.status.is_completed else [f"{case.configuration}, {task}: {case.status.message}"]
+    if case.failed_draws:
+        said.append(
+            f"{case.configuration}, {task}: {case.failed_draws:,} of {draws:,} draws failed and are left out of every "
+            f"pair; the first: {case.reason}"
+        )
+    return said
+
+
+def _other_tasks(baseline: str, task: OnTask) -> list[str]:
+    asked = {case.configuration: (case.scenario.reference, case.scenario.duration) for case in task.cases}
+    others = [name for name, what in asked.items() if what != asked[baseline]]
+    return [
+        f"task '{task.task}': {', '.join(others)} follow a different reference, or run for a different time, than "
+        f"{baseline}: the differences come partly from the task"
+    ] * bool(others)
+
+
+def front_of(cases: Sequence[Case]) -> list[str]:
+    """Return the configurations that no other beats in both error and gas."""
+    points = np.array([[_or_nan(case.value(name)) for name in (_ERROR, _GAS)] for case in cases])
+    return [case.configuration for case, is_front in zip(cases, pareto_front(points), strict=True) if is_front]
+
+
+def _or_nan(value: float | None) -> float:
+    return math.nan if value is None else value
+
+
+_MARKS = "osD^vP"
+_MAXIMUM_DOTS = 1500
+_BINS = 40
+_SHOWN = (0.5, 99.5)
+"""Percentiles between which changes are drawn: a few far ones would make all others one bar."""
+
+
+def _pareto(found: Compared, task: OnTask) -> Panel:
+    """Return error over gas, a mark for each configuration that completed and a dot for each draw."""
+    cases = [case for case in task.cases if case.status.is_completed]
+    front, marks, on_front = front_of(cases), [], []
+    for number, case in enumerate(cases):
+        colour = COLOURS[number % len(COLOURS)]
+        if case.rows is not None:
+            dots = {"linestyle": "", "marker": ".", "alpha": 0.35, "markersize": 4, "markeredgewidth": 0}
+            gas, error = (case.rows[name][:_MAXIMUM_DOTS] for name in (_GAS, _ERROR))
+            marks.append(Mark("line", gas, error, colour=colour, style=dots))
+        marker = {"linestyle": "", "marker": _MARKS[number % len(_MARKS)], "markersize": 8, "markeredgecolor": "white"}
+        x, y = (_or_nan(case.value(name)) for name in (_GAS, _ERROR))
+        marks.append(Mark("line", [x], [y], label=case.configuration, colour=colour, style=marker))
+        on_front += [(x, y)] if case.configuration in front else []
+    x_front, y_front = np.array(sorted(on_front)).reshape(-1, 2).T
+    marks.append(Mark("line", x_front, y_front, colour=GREY, style={"linewidth": 1.0, "zorder": 1}))
+    title = f"Task: {task.task}" if len(found.tasks) > 1 else ""
+    return Panel(of_metric(_GAS), of_metric(_ERROR), marks, title, legend="inside")
+
+
+def _change(found: Compared, task: OnTask, metric: str) -> Panel:
+    """Return histograms of the change of a metric against the baseline; dashed: the nominal device."""
+    baseline, marks, ends = task.case(found.baseline), [], []
+    for number, name in enumerate(found.configurations):
+        own, colour = task.case(name), COLOURS[number % len(COLOURS)]
+        if name == found.baseline or own.rows is None or baseline.rows is None:
+            continue
+        change = _relative(baseline.rows[metric], own.rows[metric])
+        if change.size == 0:
+            continue
+        low, high = np.percentile(change, _SHOWN)
+        counts, edges = np.histogram(change, min(_BINS, max(8, round(1.5 * change.size**0.5))), (low, high))
+        marks.append(Mark("bars", edges, counts, label=name, colour=colour))
+        nominal = _relative(*(np.array([_or_nan(case.value(metric))]) for case in (baseline, own)))
+        dashed = {"linestyle": "--", "linewidth": 1.2}
+        marks += [Mark("at", value, label="as declared", colour=colour, style=dashed) for value in nominal]
+        ends += [float(low), float(high), *nominal.tolist()]
+    words = f"{of_metric(metric).words}, change from {found.baseline}"
+    is_first = metric == _ERROR
+    title = f"Task: {task.task}" if len(found.tasks) > 1 and is_first else ""
+    axis, draws = Kind(words, "%"), Kind("Draws" if is_first else "")
+    return Panel(axis, draws, marks, title, legend="" if is_first else "above", then=lambda axes: _reach(axes, ends))
+
+
+def _reach(axes: "Axes", ends: Sequence[float]) -> None:
+    """Show the changes, and zero where it is near: far from all changes it would squeeze them into a few pixels."""
+    if not ends:
+        return
+    low, high = min(ends), max(ends)
+    span = high - low or 1.0
+    if low - 0.5 * span <= 0.0 <= high + 0.5 * span:
+        axes.axvline(0.0, color=BLACK, linewidth=0.8)
+        low, high = min(low, 0.0), max(high, 0.0)
+    axes.set_xlim(low - 0.08 * span, high + 0.08 * span)
+
+
+def _relative(baseline: Floats, other: Floats) -> Floats:
+    both = np.isfinite(baseline) & np.isfinite(other) & (baseline != 0.0)
+    return np.asarray(100.0 * (other[both] - baseline[both]) / np.abs(baseline[both]))

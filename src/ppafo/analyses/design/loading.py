@@ -1,0 +1,50 @@
+"""A design file: one with tasks is searched for a front, one with a profile is sized for it."""
+
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from pydantic import TypeAdapter
+
+from ppafo.analyses.design.front.problem import DesignFile, DesignProblem, design_problem
+from ppafo.analyses.design.profile.problem import SizingFile, SizingProblem, sizing_problem
+from ppafo.documents.models import SCHEMA, validate
+from ppafo.documents.toml_text import TomlKind, label
+from ppafo.errors import StudyError
+
+FILE = TomlKind("design", "design", resources.files("ppafo.analyses.design") / "library", StudyError)
+
+
+def read_design_file(name_or_path: str | Path) -> tuple[DesignFile | SizingFile, str]:
+    """Return a design file by its name in the package or by its path, and what messages call it."""
+    file = label(str(name_or_path))
+    document = FILE.parse(FILE.read(name_or_path), file)
+    known = {*DesignFile.model_fields, *SizingFile.model_fields}
+    if document.keys() <= known - {"profile", "task"}:
+        raise StudyError(
+            f"{file}: says neither which torque is wanted nor in which tasks; write a table [profile] with time and "
+            "torque or recording, or tables [[task]]; 'ppafo doctor --schema design' prints the format of both"
+        )
+    if "profile" in document:
+        return validate(SizingFile, document, file, StudyError), file
+    return validate(DesignFile, document, file, StudyError), file
+
+
+def load_design(name_or_path: str | Path, seed: int | None = None) -> DesignProblem | SizingProblem:
+    """Return the problem of a design file, by its name in the package or by its path; paths in it begin in its folder.
+
+    ``seed`` replaces that of a file with tasks. StudyError or ParameterError for what is not usable, in one line.
+    """
+    document, file = read_design_file(name_or_path)
+    folder = Path(name_or_path).parent
+    if isinstance(document, DesignFile):
+        return design_problem(document, file, folder, seed)
+    if seed is not None:
+        raise StudyError(f"{file}: nothing is drawn for a profile, so there is no random seed to change")
+    return sizing_problem(document, file, folder)
+
+
+def json_schema() -> dict[str, Any]:
+    """Return the JSON Schema of a design file, with tasks or with a profile."""
+    either: TypeAdapter[Any] = TypeAdapter(DesignFile | SizingFile)
+    return {"$schema": SCHEMA, **either.json_schema(), "title": "ppafo design"}

@@ -1,0 +1,563 @@
+"""A sizing study and its answer: the valves with pressure and bottle, their margins, the suggestion, the doubts."""
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ppafo.analyses.design.profile.problem import SizingProblem
+from ppafo.analyses.design.profile.search import (
+    LIMITS,
+    Floats,
+    Limit,
+    Pressures,
+    Trials,
+    ceiling,
+    flow_margin,
+    highest_pressure,
+    limit_of,
+    try_pressures,
+)
+from ppafo.analyses.endurance.discharge import TIME_IS_UP
+from ppafo.analyses.endurance.draw import draw_of_numbers
+from ppafo.analyses.endurance.solve import follow_bottle
+from ppafo.analyses.parts.solve import doubts_data, doubts_sections, titles_section
+from ppafo.control.catalog import CONTROLLERS
+from ppafo.errors import ParameterError
+from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle, scaled_entries
+from ppafo.parameters.parts import Part
+from ppafo.progress import Progress, Report, report_nothing
+from ppafo.report import Answer, Column, Figure, Section, Table
+from ppafo.report.display_units import axis_unit, display_value, display_values, quantity_text
+from ppafo.report.solved import Solved
+from ppafo.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, REFERENCE, VERMILION, house_style, mark_kind
+from ppafo.signals import Recording
+from ppafo.simulation.numbers import with_numbers
+from ppafo.simulation.simulate import simulate
+from ppafo.storage.comma_separated import marked_csv_bytes
+from ppafo.version import __version__
+from ppafo.walking.bottle import Schedule
+
+if TYPE_CHECKING:
+    import matplotlib.figure
+    from matplotlib.axes import Axes
+
+
+@dataclass(frozen=True, slots=True)
+class Margins:
+    """How far a sized valve is from its limits, as fractions [-].
+
+    ``error``: how much smaller the RMS error is than its limit. ``torque``: how much more torque the pressure can hold
+    than the profile asks for; below 0 where the error limit lets its crest be cut. ``flow``: how much smaller the
+    opening might be if the gauge pressure were a tenth higher. ``gas``: how much more gas the bottle has than is used;
+    None without a bottle.
+    """
+
+    error: float
+    torque: float
+    flow: float
+    gas: float | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SizedValve:
+    """A valve at a supply pressure [Pa absolute] that keeps the error limit: the one with the lightest bottle.
+
+    ``works`` False: it keeps the limit at no pressure; then ``pressure`` is the one with the smallest error.
+    ``lowest_pressure`` [Pa absolute] is the lowest that works, and ``limit`` what keeps it from being lower. ``gains``
+    are those of the controller, by path, in SI. Error [N m], gas per repetition [kg], total gas with the reserve [kg];
+    ``bottle`` None where none is large enough; ``mass`` [kg] of valve, bottle, regulators, and actuator where one was
+    named. ``curve`` has pressures [Pa absolute], errors [N m] and gas per repetition [kg] with the best gains of each.
+    """
+
+    valve: Part
+    works: bool
+    pressure: float
+    lowest_pressure: float | None
+    gains: Mapping[str, float]
+    error: float
+    gas: float
+    gas_in_all: float
+    bottle: Part | None
+    mass: float | None
+    margins: Margins | None
+    limit: Limit
+    remark: str
+    curve: tuple[Floats, Floats, Floats]
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Sizing(Solved):
+    """The result of a sizing study: every valve, and the place of the lightest that works with a bottle, if any.
+
+    ``recording`` is the suggestion on the profile, None without one. ``failures`` maps reasons of failed runs to how
+    many had them.
+    ``streams`` of noise were met by every trial, its error the largest of them; 0 without noise.
+    """
+
+    problem: SizingProblem
+    valves: tuple[SizedValve, ...]
+    suggested: int | None
+    recording: Recording | None
+    runs: int
+    failures: Mapping[str, int]
+    seconds: float
+    streams: int = 0
+
+    @property
+    def choice(self) -> SizedValve | None:
+        """The suggestion."""
+        return None if self.suggested is None else self.valves[self.suggested]
+
+    @property
+    def doubtful(self) -> tuple[tuple[Part, str], ...]:
+        """Figures that are quoted or assumed, of the parts that the result rests on."""
+        problem = self.problem
+        parts = [item.valve for item in self.valves] + [item.bottle for item in self.valves if item.bottle is not None]
+        parts += [*problem.regulators, *([] if problem.actuator is None else [problem.actuator])]
+        once = {(part.group, part.name): part for part in parts}.values()
+        return tuple((part, name) for part in once for name in part.doubtful)
+
+
+_SIZE = (9.0, 6.6)
+_COLOURS = (BLUE, VERMILION, GREEN, ORANGE, "#CC79A7", "#56B4E9")
+_MAXIMUM_OF_LIMIT = 4.0
+
+
+def sizing_figure(sizing: Sizing) -> "matplotlib.figure.Figure":
+    """Return the torque over time above, error and gas over supply pressure below."""
+    import matplotlib.figure
+
+    with house_style():
+        figure = matplotlib.figure.Figure(figsize=_SIZE)
+        figure.subplots_adjust(left=0.08, right=0.98, bottom=0.085, top=0.92, wspace=0.22, hspace=0.52)
+        grid = figure.add_gridspec(2, 2)
+        axes = figure.add_subplot(grid[0, :])
+        problem = sizing.problem
+        time = np.linspace(0.0, problem.scenario.duration, 3001)
+        axes.plot(
+            time,
+            problem.profile.at(time),
+            color=REFERENCE.colour,
+            linestyle=REFERENCE.line,
+            linewidth=1.2,
+            label="prescribed",
+        )
+        title = "Torque (N m)"
+        if sizing.recording is not None and sizing.choice is not None:
+            pressure = display_value(sizing.choice.pressure, "pressure")
+            axes.plot(
+                sizing.recording.time,
+                sizing.recording["torque"],
+                color=_COLOURS[sizing.valves.index(sizing.choice) % len(_COLOURS)],
+                label=f"{sizing.choice.valve.title} at {pressure:.1f} {axis_unit('pressure')}",
+            )
+        axes.set_title(f"$\\bf{{A}}$   {title}", pad=18)
+        axes.set_xlabel("Time (s)")
+        axes.margins(x=0.0)
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.1, handlelength=1.6)
+        errors = figure.add_subplot(grid[1, 0])
+        _errors(errors, sizing)
+        _gas(figure.add_subplot(grid[1, 1], sharex=errors), sizing)
+        mark_kind(figure, "simulated")
+    return figure
+
+
+def _errors(axes: "Axes", sizing: Sizing) -> None:
+    limit = sizing.problem.largest_error
+    for number, item in enumerate(sizing.valves):
+        pressure, error, _ = item.curve
+        colour = _COLOURS[number % len(_COLOURS)]
+        axes.plot(
+            display_values(pressure, "pressure"), error, color=colour, marker=".", markersize=4, label=item.valve.title
+        )
+        _mark(axes, item, item.error, colour)
+    axes.axhline(limit, color=BLACK, linewidth=1.0, linestyle="--")
+    axes.set_ylim(0.0, _MAXIMUM_OF_LIMIT * limit)
+    axes.set_title("$\\bf{B}$   RMS error (N m), limit dashed", pad=8)
+    axes.set_xlabel(f"Supply pressure ({axis_unit('pressure')})")
+    axes.legend(loc="upper right", fontsize=8)
+
+
+def _gas(axes: "Axes", sizing: Sizing) -> None:
+    for number, item in enumerate(sizing.valves):
+        pressure, error, gas = item.curve
+        keeps = error <= sizing.problem.largest_error
+        colour = _COLOURS[number % len(_COLOURS)]
+        axes.plot(
+            display_values(pressure[keeps], "pressure"),
+            display_values(gas[keeps], "gas mass"),
+            color=colour,
+            marker=".",
+            markersize=4,
+        )
+        _mark(axes, item, display_value(item.gas, "gas mass"), colour)
+    # Valves differ by some per cent: an axis from 0 would lay their curves on each other.
+    axes.margins(y=0.15)
+    axes.set_title("$\\bf{C}$   Gas per repetition (g) within the limit", pad=8)
+    axes.set_xlabel(f"Supply pressure ({axis_unit('pressure')})")
+    if not any(item.works for item in sizing.valves):
+        axes.text(0.5, 0.5, "no valve keeps the limit", transform=axes.transAxes, ha="center", color=GREY)
+
+
+def _mark(axes: "Axes", item: SizedValve, value: float, colour: str) -> None:
+    """Ring the pressure that was chosen for a valve."""
+    if item.works:
+        axes.plot(
+            display_value(item.pressure, "pressure"),
+            value,
+            marker="o",
+            markersize=9,
+            markerfacecolor="none",
+            color=colour,
+            markeredgewidth=1.4,
+        )
+
+
+_HEAD = (
+    Column("valve"),
+    Column("pressure", "pressure", ".3g"),
+    Column("lowest", "pressure", ".3g"),
+    Column("RMS error", "torque", ".3g"),
+    Column("gas per repetition", "gas mass", ".3g"),
+    Column("total gas", "gas mass", ".3g"),
+    Column("bottle"),
+    Column("mass", "part mass"),
+    Column("limited by"),
+)
+_MARGINS = ("error", "torque", "flow", "gas")
+_MARGIN_HEAD = (
+    Column("valve"),
+    *(Column(f"{name} margin", "fraction", ".0f") for name in _MARGINS),
+    Column("gains"),
+)
+_ORIGINS = {
+    "typed": "typed, not measured",
+    "measured": "measured",
+    "simulated": "simulated, not measured",
+    "synthetic": "synthetic, not measured",
+}
+_CAPTION = (
+    "A: the prescribed torque and that of the suggestion. B, C: every valve over supply pressure, each dot with the "
+    "gains that use least gas within the limit; rings are the chosen pressures."
+)
+_READING = (
+    "The pressure is the one with the lightest bottle, of these the lowest; the lowest pressure that keeps the "
+    "error limit stands beside it.",
+    "Error margin: how much smaller the RMS error is than its limit. Torque margin: how much more torque the "
+    "pressure can hold than the profile requires; below 0 the peak is cut off, as far as the error limit allows. "
+    "Flow margin: how much smaller the opening might be if the gauge pressure were a tenth higher. Gas margin: how "
+    "much more the bottle has than is used, the reserve included.",
+)
+
+
+def answer_of(sizing: Sizing) -> Answer:
+    """Return the answer of a sizing study; it has not passed where nothing can be suggested."""
+    problem, recording = sizing.problem, sizing.recording
+    suggestion = suggestion_sentence(sizing)
+    marked = () if sizing.suggested is None else (sizing.suggested,)
+    working = [place for place, item in enumerate(sizing.valves) if item.works]
+    margins = tuple(_margin_row(sizing.problem, sizing.valves[place]) for place in working)
+    sections = [Section("Valves", table=Table(_HEAD, tuple(map(_row, sizing.valves)), marked))]
+    if margins:
+        places = tuple(working.index(place) for place in marked)
+        sections.append(Section("Margins", table=Table(_MARGIN_HEAD, margins, places)))
+    return Answer(
+        name="design",
+        kicker="Sizing study",
+        title=problem.name,
+        lead=(*([problem.description] if problem.description else []), _profile_sentence(problem)),
+        sections=(
+            *sections,
+            Section(remarks=(suggestion, *_remarks(sizing))),
+            Section(
+                "Error and gas over pressure",
+                figure=Figure("profile", _CAPTION, lambda: sizing_figure(sizing)),
+                is_detail=True,
+            ),
+            *doubts_sections(sizing.doubtful),
+            Section("How to read it", (*_READING, *_method(sizing)), is_detail=True),
+            titles_section([item.valve for item in sizing.valves]),
+        ),
+        data=_data(sizing, suggestion),
+        passed=sizing.choice is not None,
+        files={} if recording is None else {"suggested.csv": lambda: marked_csv_bytes(recording)},
+    )
+
+
+def _profile_sentence(problem: SizingProblem) -> str:
+    profile = problem.profile
+    near = (
+        f", {profile.knot_times.size} knots, to {quantity_text(profile.table_error, 'torque')}"
+        if profile.table_error
+        else ""
+    )
+    return (
+        f"profile of {quantity_text(profile.period, 'time')} with up to {quantity_text(profile.largest, 'torque')} "
+        f"({_ORIGINS[profile.kind]}{near}); {problem.repetitions:.0f} repetitions ({problem.hours:.2g} h), RMS error "
+        f"at most {quantity_text(problem.largest_error, 'torque')}, {100 * problem.reserve:.0f} % of the gas as "
+        "reserve"
+    )
+
+
+def _row(item: SizedValve) -> tuple[str | float | None, ...]:
+    if not item.works:
+        error = f"{display_value(item.error, 'torque'):.3g} at best"
+        return item.valve.name, None, None, error, None, None, None, None, item.limit
+    bottle = "none" if item.bottle is None else item.bottle.name
+    lowest = item.lowest_pressure or item.pressure
+    return item.valve.name, item.pressure, lowest, item.error, item.gas, item.gas_in_all, bottle, item.mass, item.limit
+
+
+def _margin_row(problem: SizingProblem, item: SizedValve) -> tuple[str | float | None, ...]:
+    margins = [None if item.margins is None else getattr(item.margins, name) for name in _MARGINS]
+    control = problem.scenario.control
+    units = {f"controller.{quantity.name}": quantity.unit for quantity in CONTROLLERS[control.kind].quantities}
+    gains = [
+        f"{path.rpartition('.')[2].replace('_', ' ')} {value:.3g} {units[path]}" for path, value in item.gains.items()
+    ]
+    return item.valve.name, *margins, ", ".join(gains) or "none to choose"
+
+
+def suggestion_sentence(sizing: Sizing) -> str:
+    """Return the suggestion with the reason, or why there is none."""
+    item = sizing.choice
+    if item is None:
+        if any(valve.works for valve in sizing.valves):
+            return "no suggestion: valves keep the limit, but no bottle is large enough for the use"
+        return "no suggestion: no valve keeps the error limit at any of the pressures"
+    bottle = "" if item.bottle is None else f" and {item.bottle.name}"
+    cut = 0.0 if item.margins is None else -item.margins.torque
+    peak = f", with {100.0 * cut:.0f} % of the peak cut off" if cut > 0.0 else ""
+    return (
+        f"suggested: {item.valve.name} at {quantity_text(item.pressure, 'pressure')}{bottle}, the lightest that lasts "
+        f"and keeps the error limit{peak}, {quantity_text(item.mass or 0.0, 'part mass', '.0f')}; a lower pressure is "
+        f"prevented by {LIMITS[item.limit]}"
+    )
+
+
+def _remarks(sizing: Sizing) -> list[str]:
+    failed = sum(sizing.failures.values())
+    failures = f"{failed:,} failed; the first: {next(iter(sizing.failures))}" if failed else "none failed"
+    remarks = [f"{item.valve.name}: {item.remark}" for item in sizing.valves if item.remark]
+    if sizing.streams:
+        remarks.append(
+            f"sensors are noisy: every trial was run in the same {sizing.streams} noise streams; its error is the "
+            "largest of them, its gas the mean"
+        )
+    return [*remarks, f"{sizing.runs:,} runs in {sizing.seconds:.0f} s; {failures}"]
+
+
+def _method(sizing: Sizing) -> list[str]:
+    problem = sizing.problem
+    carried = [*problem.regulators, *([] if problem.actuator is None else [problem.actuator])]
+    others = f" with {', '.join(part.title for part in carried)}" if carried else ""
+    return [
+        f"The mass is that of valve and full bottle{others}.",
+        f"{problem.simulated} repetitions of the profile were simulated from the initial state of the scenario; "
+        "error and gas cover all of them, including the first filling of the chambers. Friction, leak, dead volumes "
+        "and sensors are those of the scenario; what the data sheet of a valve does not state is taken as ideal.",
+        f"Made with: ppafo design {problem.file}",
+    ]
+
+
+def _data(sizing: Sizing, suggestion: str) -> dict[str, Any]:
+    problem = sizing.problem
+    return {
+        "format": "ppafo sizing",
+        "schema_version": 1,
+        "name": problem.name,
+        "description": problem.description,
+        "file": problem.file,
+        "units": "SI; pressures absolute, errors in N m, gas and mass in kg, margins as fractions",
+        "scenario": problem.scenario.name,
+        "profile": {
+            "kind": problem.profile.kind,
+            "period": problem.profile.period,
+            "largest": problem.profile.largest,
+            "table_error": problem.profile.table_error,
+            "times": problem.profile.knot_times.tolist(),
+            "torques": problem.profile.knot_values.tolist(),
+        },
+        "repetitions": problem.repetitions,
+        "hours": problem.hours,
+        "reserve": problem.reserve,
+        "largest_error": problem.largest_error,
+        "suggested": None if sizing.choice is None else sizing.choice.valve.name,
+        "summary": suggestion,
+        "valves": [_valve_data(item) for item in sizing.valves],
+        "noise_streams": sizing.streams,
+        "runs": sizing.runs,
+        "failures": [{"reason": reason, "runs": count} for reason, count in sizing.failures.items()],
+        "doubtful": doubts_data(sizing.doubtful),
+        "versions": {"ppafo": __version__},
+    }
+
+
+def _valve_data(item: SizedValve) -> dict[str, Any]:
+    margins = item.margins
+    return {
+        "valve": item.valve.name,
+        "works": item.works,
+        "pressure": item.pressure,
+        "lowest_pressure": item.lowest_pressure,
+        "gains": dict(item.gains),
+        "error": item.error,
+        "gas_per_repetition": item.gas,
+        "gas_in_all": item.gas_in_all,
+        "bottle": None if item.bottle is None else item.bottle.name,
+        "mass": item.mass,
+        "margins": None if margins is None else {name: getattr(margins, name) for name in _MARGINS},
+        "limited_by": item.limit,
+        "limit": LIMITS[item.limit],
+        "remark": item.remark,
+    }
+
+
+def size_for_profile(problem: SizingProblem, threads: int | None = None, report: Report = report_nothing) -> Sizing:
+    """Return the lowest pressure and smallest bottle of each valve for a profile; StudyError where all runs fail."""
+    begun = time.perf_counter()
+    trials = Trials(problem, threads)
+    sized = []
+    for place, valve in enumerate(problem.valves):
+        passed = time.perf_counter() - begun
+        report(Progress(f"trying {valve.name}", place, len(problem.valves), 0, 0, passed, "valves"))
+        sized.append(_size_valve(trials, valve))
+    good = [place for place, item in enumerate(sized) if item.works and item.mass is not None]
+    suggested = min(good, key=lambda place: (sized[place].mass, sized[place].pressure), default=None)
+    choice = None if suggested is None else sized[suggested]
+    recording = None if choice is None else _recording(trials, choice)
+    return Sizing(
+        problem=problem,
+        valves=tuple(sized),
+        suggested=suggested,
+        recording=recording,
+        runs=trials.runs,
+        failures=dict(trials.failures),
+        seconds=time.perf_counter() - begun,
+        streams=trials.seeds.size,
+    )
+
+
+def smallest_bottle(bottles: Sequence[Part], gas: float) -> Part | None:
+    """Return the lightest full bottle that holds an amount of gas [kg]; None where none does."""
+    enough = [bottle for bottle in bottles if bottle.values["content"] >= gas]
+    return min(enough, key=lambda bottle: bottle.full_mass, default=None)
+
+
+def _size_valve(trials: Trials, valve: Part) -> SizedValve:
+    problem = trials.problem
+    tried = try_pressures(trials, valve)
+    place = _place_in(problem, tried)
+    pressure, error, gas = (float(series[place]) for series in (tried.pressure, tried.trial.error, tried.trial.gas))
+    gains = int(tried.trial.gains[place])
+    works = tried.first is not None
+    bottle, is_cold = _lasting_bottle(problem, gas, pressure) if works else (None, False)
+    said = []
+    if tried.fails_above is not None:
+        said.append(f"at {quantity_text(tried.fails_above, 'pressure')} the error limit is exceeded again")
+    if highest_pressure(problem, valve) < problem.highest_pressure and tried.first is None:
+        highest = quantity_text(highest_pressure(problem, valve), "pressure")
+        said.append(f"not tried above {highest}, the rated pressure of its parts")
+    if is_cold:
+        said.append("a lighter bottle has gas enough and ends before, as it is too cold")
+    if tried.first is not None and bottle is None and _bottle(problem, gas) is None:
+        largest = max(problem.bottles, key=lambda item: item.values["content"])
+        lasts = largest.values["content"] / _gas_in_all(problem, gas)
+        said.append(f"no bottle is large enough: {largest.name} lasts for {100 * lasts:.0f} % of the use")
+    return SizedValve(
+        valve=valve,
+        works=works,
+        pressure=pressure,
+        lowest_pressure=None if tried.first is None else float(tried.pressure[tried.first]),
+        gains=trials.gain_numbers(gains),
+        error=error,
+        gas=gas,
+        gas_in_all=_gas_in_all(problem, gas),
+        bottle=bottle,
+        mass=None if bottle is None else _mass(problem, valve, bottle),
+        margins=_margins(trials, valve, pressure, (error, gas), bottle) if works else None,
+        limit=limit_of(trials, valve, tried),
+        remark="; ".join(said),
+        curve=(tried.pressure, tried.trial.error, tried.trial.gas),
+    )
+
+
+def _place_in(problem: SizingProblem, tried: Pressures) -> int:
+    """Return the place of the pressure to choose: that with the lightest bottle, of these the lowest.
+
+    Without a bottle the lowest pressure that works; where none works, the one with the minimum error.
+    """
+    if tried.first is None:
+        return int(np.argmin(np.where(np.isnan(tried.trial.error), np.inf, tried.trial.error)))
+    masses = np.full(tried.pressure.size, np.inf)
+    for place in np.flatnonzero(tried.works).tolist():
+        bottle = _bottle(problem, float(tried.trial.gas[place]))
+        masses[place] = np.inf if bottle is None else bottle.full_mass
+    return int(np.argmin(masses)) if np.isfinite(masses).any() else tried.first
+
+
+def _gas_in_all(problem: SizingProblem, gas: float) -> float:
+    return gas * problem.repetitions * (1.0 + problem.reserve)
+
+
+def _bottle(problem: SizingProblem, gas: float) -> Part | None:
+    return smallest_bottle(problem.bottles, _gas_in_all(problem, gas))
+
+
+def _lasting_bottle(problem: SizingProblem, gas: float, pressure: float) -> tuple[Part | None, bool]:
+    """Return the lightest bottle that lasts, mass and heat together, and whether a lighter one only has the gas.
+
+    The profile is repeated without a rest, ``gas`` [kg] each time, behind a regulator set to the ``pressure`` [Pa].
+    """
+    enough = [bottle for bottle in problem.bottles if bottle.values["content"] >= _gas_in_all(problem, gas)]
+    if gas <= 0.0:
+        return (min(enough, key=lambda bottle: bottle.full_mass, default=None), False)
+    period, paper = problem.profile.period, load_bottle(PAPER_BOTTLE)
+    needed = problem.repetitions * period
+    # A second more than the use, so that a bottle that lasts is one whose time is up.
+    schedule = Schedule(needed + 1.0, 0.0, max(needed, 1.0))
+    for place, part in enumerate(sorted(enough, key=lambda bottle: bottle.full_mass)):
+        scaled = scaled_entries(part, paper.entries)
+        changes = [
+            f"{path}={scaled[path].value} {scaled[path].unit}"
+            for path in scaled
+            if scaled[path] != paper.entries.get(path)
+        ]
+        full = load_bottle(PAPER_BOTTLE, [*changes, f"regulator.set_pressure={pressure} Pa_a"])
+        draw = draw_of_numbers(gas, period, None)
+        try:
+            ended = follow_bottle(full, draw, schedule).discharge.ending.kind
+        except ParameterError:
+            continue
+        if ended == TIME_IS_UP:
+            return part, place > 0
+    return None, bool(enough)
+
+
+def _mass(problem: SizingProblem, valve: Part, bottle: Part) -> float:
+    parts = [valve, bottle, *problem.regulators, *([] if problem.actuator is None else [problem.actuator])]
+    return sum(part.full_mass for part in parts)
+
+
+def _margins(
+    trials: Trials, valve: Part, pressure: float, outcome: tuple[float, float], bottle: Part | None
+) -> Margins:
+    """Return the margins at a pressure at which an error and a gas per repetition came out."""
+    problem, (error, gas) = trials.problem, outcome
+    used = gas * problem.repetitions
+    return Margins(
+        error=1.0 - error / problem.largest_error,
+        torque=ceiling(problem, pressure) / problem.profile.largest - 1.0,
+        flow=flow_margin(trials, valve, pressure),
+        gas=None if bottle is None or used <= 0.0 else bottle.values["content"] / used - 1.0,
+    )
+
+
+def _recording(trials: Trials, sized: SizedValve) -> Recording:
+    """Return the recording of a sized valve on the profile."""
+    columns = trials.columns(sized.valve, np.array([sized.pressure]), np.array([0]), np.ones(1))
+    numbers = {path: float(values[0]) for path, values in columns.items()} | dict(sized.gains)
+    return simulate(with_numbers(trials.problem.scenario, numbers)).recording

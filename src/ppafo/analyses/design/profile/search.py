@@ -1,0 +1,273 @@
+"""Which supply pressures a valve can do a task with, what it takes there, and what limits it.
+
+Each pressure is tried with many gains, and some openings, of one valve at once on the lanes. Nothing is taken for
+granted about how the error depends on the pressure.
+"""
+
+from dataclasses import dataclass
+from itertools import product
+from typing import Literal, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ppafo.analyses.design.profile.problem import SizingProblem
+from ppafo.constants import PASCALS_PER_PSI
+from ppafo.errors import StudyError
+from ppafo.parameters.parts import Part
+from ppafo.simulation.ensemble import run_ensemble
+from ppafo.studies.draws import Uncertainty
+from ppafo.studies.sampling import NOISE
+
+Limit = Literal["torque", "flow", "control", "pressure"]
+LIMITS: dict[Limit, str] = {
+    "torque": "the torque ceiling: torque constant times pressure",
+    "flow": "the flow: a larger opening would suffice",
+    "control": "the control: neither more pressure nor a larger opening would suffice",
+    "pressure": "nothing: the lowest requested pressure suffices",
+}
+"""What keeps a valve from working at a lower pressure, or from working at all."""
+Floats = NDArray[np.float64]
+ERROR, GAS = "rms_error", "gas_supplied"
+_OPENINGS = ("valve.area", "valve.sonic_conductance")
+_CHUNK = 16_384
+"""Runs handed to the lanes at once."""
+STREAMS = 16
+"""Noise streams in each of which a limit must be kept, the same for all trials, where sensors are noisy."""
+_SEED = 1
+GRID = 17
+"""Pressures of a grid."""
+FINENESS = 0.1 * PASCALS_PER_PSI
+"""Pressure [Pa] to which the lowest one is found."""
+WIDER = (2.0, 4.0, 16.0)
+"""How much larger openings are tried to see whether the flow limits."""
+NEAR_CEILING = 1.2
+"""A lowest gauge pressure of at most this many times the one that the torque ceiling alone demands is owed to it."""
+LEAST_PEAK = 0.7
+"""Share of the peak that a pressure has to hold: an RMS error over a stride that is mostly zero lets half of it go."""
+MORE_PRESSURE = 1.1
+"""Times the gauge pressure at which the margin of the flow is looked for."""
+OPENINGS = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.25, 0.2, 0.15, 0.1, 0.05)
+"""Fractions of a valve's opening that are tried, one after the other, for that margin."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trial:
+    """RMS error [N m], gas per repetition [kg] and number of the set of gains of trials; all (trials,).
+
+    Error and gas are nan where a run failed.
+    """
+
+    error: Floats
+    gas: Floats
+    gains: NDArray[np.intp]
+
+    def at(self, members: NDArray[np.intp]) -> "Trial":
+        """Return some of the trials."""
+        return Trial(self.error[members], self.gas[members], self.gains[members])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pressures:
+    """Pressures [Pa absolute] (pressures,) that were tried, growing, with the best trial of each.
+
+    ``works`` tells which keep the error limit.
+    """
+
+    pressure: Floats
+    trial: Trial
+    works: NDArray[np.bool_]
+
+    @property
+    def first(self) -> int | None:
+        """Place of the lowest pressure that works, None where none does."""
+        return int(self.works.argmax()) if self.works.any() else None
+
+    @property
+    def below(self) -> float | None:
+        """The highest pressure below the lowest that works; None where none works or none below was tried."""
+        return float(self.pressure[self.first - 1]) if self.first else None
+
+    @property
+    def fails_above(self) -> float | None:
+        """A pressure above the lowest that works at which the limit is missed again; None where there is none."""
+        failing = np.flatnonzero(~self.works[self.first :]) if self.first is not None else np.empty(0, dtype=int)
+        return float(self.pressure[(self.first or 0) + failing[0]]) if failing.size else None
+
+
+@final
+class Trials:
+    """Runs trials of a problem and counts the runs and their failures.
+
+    ``gain_sets`` (sets, gains) has every combination of the gain factors, one for each gain. ``seeds`` name the streams
+    of noise that every trial meets, its error being the largest and its gas the mean; none where there is no noise.
+    """
+
+    def __init__(self, problem: SizingProblem, threads: int | None = None) -> None:
+        self.problem = problem
+        self.gain_sets: Floats = np.array(list(product(problem.gain_factors, repeat=len(problem.gains))))
+        self.runs = 0
+        self.failures: dict[str, int] = {}
+        noise = Uncertainty(()).with_noise_of([problem.scenario])
+        self.seeds = noise.random_columns(0, STREAMS, _SEED)[NOISE] if noise.has_noise else np.zeros(0)
+        self._threads = threads
+
+    def run(self, valve: Part, pressure: Floats, gains: NDArray[np.intp], opening: Floats) -> Trial:
+        """Return what came of a valve at pressures [Pa absolute], with sets of gains and factors on its opening."""
+        chunk = max(1, _CHUNK // max(1, self.seeds.size))
+        parts = [slice(start, start + chunk) for start in range(0, pressure.size, chunk)]
+        found = [self._run(valve, pressure[part], gains[part], opening[part]) for part in parts]
+        error, gas = (np.concatenate([item[name] for item in found]) for name in (ERROR, GAS))
+        return Trial(error, gas / self.problem.simulated, gains)
+
+    def best(self, valve: Part, pressure: Floats, opening: float = 1.0) -> Trial:
+        """Return for each pressure the trial with the best set of gains.
+
+        Of those that keep the error limit the one that uses least gas; where none does, the one with the minimum error.
+        """
+        sets = self.gain_sets.shape[0]
+        pressures, gains = np.repeat(pressure, sets), np.tile(np.arange(sets), pressure.size)
+        trial = self.run(valve, pressures, gains, np.full(pressures.size, opening))
+        shape = (pressure.size, sets)
+        error = np.where(np.isnan(trial.error), np.inf, trial.error).reshape(shape)
+        works = error <= self.problem.largest_error
+        gas = np.where(works, trial.gas.reshape(shape), np.inf)
+        chosen = np.where(works.any(axis=1), gas.argmin(axis=1), error.argmin(axis=1))
+        return trial.at(np.arange(pressure.size) * sets + chosen)
+
+    def gain_numbers(self, number: int) -> dict[str, float]:
+        """Return the gains of a set in SI, by path."""
+        settings = self.problem.scenario.control.settings
+        pairs = zip(self.problem.gains, self.gain_sets[number], strict=True)
+        return {path: float(factor * settings[path.rpartition(".")[2]]) for path, factor in pairs}
+
+    def _run(self, valve: Part, pressure: Floats, gains: NDArray[np.intp], opening: Floats) -> dict[str, Floats]:
+        columns, streams = self.columns(valve, pressure, gains, opening), max(1, self.seeds.size)
+        if self.seeds.size:
+            columns = {path: np.tile(values, streams) for path, values in columns.items()}
+            columns[NOISE] = np.repeat(self.seeds, pressure.size)
+        result = run_ensemble(self.problem.scenario, columns, (ERROR, GAS), threads=self._threads)
+        self.runs += streams * pressure.size
+        for reason in result.reasons.values():
+            self.failures[reason] = self.failures.get(reason, 0) + 1
+        error, gas = (result.metrics[name].reshape(streams, pressure.size) for name in (ERROR, GAS))
+        return {ERROR: error.max(axis=0), GAS: gas.mean(axis=0)}
+
+    def columns(self, valve: Part, pressure: Floats, gains: NDArray[np.intp], opening: Floats) -> dict[str, Floats]:
+        """Return the columns of trials in SI: figures of the parts, both supply pressures, gains."""
+        problem, count = self.problem, pressure.size
+        columns = {path: np.full(count, number) for path, number in valve.model_numbers.items()}
+        columns |= {path: columns[path] * opening for path in _OPENINGS if path in columns}
+        if problem.actuator is not None:
+            for name in ("torque_constant", "volume_per_angle"):
+                columns[f"actuator.{name}"] = np.full(count, problem.actuator.values[name])
+        columns |= {"supply.pressure": pressure, "supply.dorsiflexion_pressure": pressure}
+        settings = problem.scenario.control.settings
+        for index, path in enumerate(problem.gains):
+            columns[path] = self.gain_sets[gains, index] * settings[path.rpartition(".")[2]]
+        return columns
+
+
+def highest_pressure(problem: SizingProblem, valve: Part) -> float:
+    """Return the highest pressure [Pa absolute] to try: that of the file, or what the parts are made for."""
+    parts = [valve, *problem.regulators, *([] if problem.actuator is None else [problem.actuator])]
+    return min([problem.highest_pressure, *(part.values.get("largest_pressure", np.inf) for part in parts)])
+
+
+def try_pressures(trials: Trials, valve: Part) -> Pressures:
+    """Return the pressures that were tried with a valve, the lowest that works to within a tenth of a psi."""
+    problem = trials.problem
+    pressure = np.linspace(problem.lowest_pressure, highest_pressure(problem, valve), GRID)
+    found = _pressures(trials, valve, pressure)
+    if np.isnan(found.trial.error).all():
+        reason = next(iter(trials.failures), "no reason was given")
+        raise StudyError(f"{problem.file}: every run with '{valve.name}' failed; the first: {reason}")
+    while found.first and found.pressure[found.first] - found.pressure[found.first - 1] > FINENESS:
+        lower, upper = found.pressure[found.first - 1], found.pressure[found.first]
+        finer = _pressures(trials, valve, np.linspace(lower, upper, GRID)[1:-1])
+        found = _merge(found, finer)
+    return found
+
+
+def _pressures(trials: Trials, valve: Part, pressure: Floats) -> Pressures:
+    trial = trials.best(valve, pressure)
+    problem = trials.problem
+    works = (trial.error <= problem.largest_error) & (pressure >= peak_pressure(problem))
+    return Pressures(pressure, trial, works)
+
+
+def _merge(first: Pressures, second: Pressures) -> Pressures:
+    """Return the pressures of both in order."""
+    pressure = np.concatenate([first.pressure, second.pressure])
+    order = np.argsort(pressure, kind="stable")
+    trial = Trial(
+        np.concatenate([first.trial.error, second.trial.error]),
+        np.concatenate([first.trial.gas, second.trial.gas]),
+        np.concatenate([first.trial.gains, second.trial.gains]),
+    )
+    return Pressures(pressure[order], trial.at(order), np.concatenate([first.works, second.works])[order])
+
+
+def limit_of(trials: Trials, valve: Part, tried: Pressures) -> Limit:
+    """Return what keeps a valve from a lower pressure, or from working at all.
+
+    The torque ceiling where the lowest pressure is near the one that it alone demands. Else larger openings are tried,
+    half way between the two (between that one and the highest where none works): where one works, the flow limits.
+    """
+    problem = trials.problem
+    if tried.first is not None and tried.below is None:
+        return "pressure"
+    atmosphere, alone = problem.scenario.device.supply.atmospheric_pressure, ceiling_pressure(problem)
+    reached = float(tried.pressure[-1 if tried.first is None else tried.first])
+    if reached - atmosphere <= NEAR_CEILING * (alone - atmosphere):
+        return "torque"
+    pressure = np.array([0.5 * (reached + alone)])
+    would_do = any(trials.best(valve, pressure, wider).error[0] <= problem.largest_error for wider in WIDER)
+    return "flow" if would_do else "control"
+
+
+def ceiling_pressure(problem: SizingProblem) -> float:
+    """Return the pressure [Pa absolute] below which the cut crest alone breaks the error limit; equation (2)."""
+    from scipy.optimize import brentq
+
+    atmosphere = problem.scenario.device.supply.atmospheric_pressure
+    whole = atmosphere + problem.profile.largest / problem.torque_constant
+    least = peak_pressure(problem)
+    if cut_error(problem, atmosphere) <= problem.largest_error:
+        return least
+    cut = float(brentq(lambda pressure: cut_error(problem, pressure) - problem.largest_error, atmosphere, whole))
+    return max(cut, least)
+
+
+def peak_pressure(problem: SizingProblem) -> float:
+    """Return the pressure [Pa absolute] that holds the least share of the peak; equation (2)."""
+    atmosphere = problem.scenario.device.supply.atmospheric_pressure
+    return atmosphere + LEAST_PEAK * problem.profile.largest / problem.torque_constant
+
+
+def cut_error(problem: SizingProblem, pressure: float) -> float:
+    """Return the RMS error [N m] that is left if only the torque ceiling at a pressure [Pa] cuts the profile."""
+    time = np.linspace(0.0, problem.profile.period, 2001)[:-1]
+    wanted = problem.profile.at(time)
+    most = ceiling(problem, pressure)
+    return float(np.sqrt(np.mean((wanted - np.clip(wanted, -most, most)) ** 2)))
+
+
+def ceiling(problem: SizingProblem, pressure: float) -> float:
+    """Return the largest torque [N m] that a pressure [Pa absolute] can hold; equation (2)."""
+    return problem.torque_constant * (pressure - problem.scenario.device.supply.atmospheric_pressure)
+
+
+def flow_margin(trials: Trials, valve: Part, pressure: float) -> float:
+    """Return by what fraction the opening might be smaller at a tenth more gauge pressure, with the best gains.
+
+    At the lowest pressure itself nothing might be smaller: that is what makes it the lowest.
+    """
+    atmosphere = trials.problem.scenario.device.supply.atmospheric_pressure
+    higher = np.array([atmosphere + MORE_PRESSURE * (pressure - atmosphere)])
+    smallest = 1.0
+    for opening in OPENINGS:
+        if not trials.best(valve, higher, opening).error[0] <= trials.problem.largest_error:
+            break
+        smallest = opening
+    return 1.0 - smallest

@@ -1,0 +1,308 @@
+"""The course of a bottle from full to the moment at which it no longer holds the supply pressure."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from ppafo.analyses.endurance.draw import Draw
+from ppafo.constants import GRAMS_PER_KILOGRAM
+from ppafo.errors import ParameterError, SimulationError
+from ppafo.model.source import (
+    BottleContent,
+    BottleState,
+    bottle_content,
+    bottle_rates,
+    content_energy,
+    content_temperature,
+    delivered_pressure,
+    densest_gas,
+    has_liquid,
+    pressure_reserve,
+    regulator_flow_limit,
+)
+from ppafo.parameters.bottles.bottle import Bottle
+from ppafo.signals import Channel, Recording
+from ppafo.signals.recording import Floats
+from ppafo.walking.bottle import WALKED, BottleLife, Schedule, SupplyBalance
+
+TIME_IS_UP = "time is up"
+Stop = Literal["supply", "frozen", "time"]
+"""What stopped a run: the supply pressure was not maintained, the table ended in the cold, the time was over."""
+_NEXT_TO_NOTHING = 0.01
+"""Fraction of a full bottle: less than this left to be had from a warm bottle is called empty."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ending:
+    """How a run ended: kind, a sentence, mass left [kg], and the part of it [kg] that a warm bottle would give."""
+
+    kind: str
+    message: str
+    mass_left: float
+    usable_when_warm: float
+
+
+def reserve(bottle: Bottle, draw: Draw, pressure: float, temperature: float) -> float:
+    """Return the margin of a bottle at its largest flow, as a fraction: below 0 the supply pressure is lost.
+
+    The smaller of two: pressure above what the regulator needs, and flow above the largest one.
+    """
+    to_spare = pressure_reserve(bottle.regulator, pressure, draw.peak_flow) / bottle.regulator.set_pressure
+    return min(to_spare, flow_limit(bottle, pressure, temperature) / draw.peak_flow - 1.0)
+
+
+def flow_limit(bottle: Bottle, pressure: float, temperature: float) -> float:
+    """Return the largest flow [kg/s] that the regulator passes at a pressure [Pa] and temperature [K] in the bottle."""
+    gas_constant = bottle.fluid.table.gas_constant
+    return regulator_flow_limit(bottle.regulator, pressure, temperature, bottle.heat_capacity_ratio, gas_constant)
+
+
+def smallest_mass_when_warm(bottle: Bottle, draw: Draw) -> float:
+    """Return the mass of gas [kg] with which the bottle, at room temperature, just holds the supply pressure."""
+    table, room = bottle.fluid.table, bottle.room_temperature
+    low, high = 0.0, min(bottle.mass, bottle.volume * densest_gas(table, room))
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        pressure = bottle_content(table, middle, bottle.volume, room).pressure
+        if reserve(bottle, draw, pressure, room) < 0.0:
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+def frozen_below(bottle: Bottle) -> float:
+    """Return the temperature [K] at which the liquid freezes, or below which the table knows nothing of the gas."""
+    return bottle.fluid.table.temperatures[0]
+
+
+def ending(bottle: Bottle, draw: Draw, mass: float, content: BottleContent, stopped_by: Stop) -> Ending:
+    """Return the ending for what stopped a run: the supply pressure, the cold end of the table, or the time.
+
+    A bottle that would still do at room temperature is too cold, any other is empty.
+    """
+    usable = max(0.0, mass - smallest_mass_when_warm(bottle, draw))
+    left = f"{mass * GRAMS_PER_KILOGRAM:.3g} g are left"
+    warm = f"{usable * GRAMS_PER_KILOGRAM:.3g} g of this would be usable at room temperature"
+    if stopped_by == "time":
+        return Ending(
+            TIME_IS_UP, f"the supply pressure was maintained for the whole requested time; {left}", mass, usable
+        )
+    if stopped_by == "frozen":
+        cold = "the liquid begins to freeze (dry ice)" if has_liquid(bottle.fluid.table) else "the gas is too cold"
+        return Ending("frozen", f"{cold}, and the property table ends here; {left}, {warm}", mass, usable)
+    to_spare = pressure_reserve(bottle.regulator, content.pressure, draw.peak_flow) / bottle.regulator.set_pressure
+    is_pressure = to_spare <= flow_limit(bottle, content.pressure, content.temperature) / draw.peak_flow - 1.0
+    short = "maintain the supply pressure" if is_pressure else "drive the largest flow through the regulator"
+    why = f"its pressure is too low to {short}"
+    if usable > _NEXT_TO_NOTHING * bottle.mass:
+        return Ending("too cold", f"the bottle is too cold: {why}; {left}, {warm}", mass, usable)
+    return Ending("empty", f"the bottle is empty: {why}, and would be also when warm; {left}", mass, usable)
+
+
+MAXIMUM_STRETCHES = 2000
+SAMPLES = 1001
+_RELATIVE, _ABSOLUTE = 1e-7, (1e-10, 1e-4, 1e-6, 1e-10, 1e-4, 1e-4)
+_ABOVE_FREEZING = 0.02
+"""Kelvin above the cold end of the table at which a run stops, so that the end is approached and not sat on."""
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """A time [s] of one draw [kg/s], the solution in it and at its end, and what stopped it before its time.
+
+    The solution is mass [kg] and energy [J] of the content, temperature of the wall [K], and the sums of gas [kg], its
+    enthalpy [J] and heat from the room [J] that crossed the border.
+    """
+
+    start: float
+    end: float
+    draw: float
+    solution: Callable[[Any], Any]
+    last: Floats
+    stopped_by: Stop | None
+
+
+class Balance(NamedTuple):
+    """What crossed the border of bottle and wall from start to end, and how much more there is inside.
+
+    Crossed: gas [kg], its enthalpy [J], heat from the room [J]. Inside: mass [kg], energy of content and wall [J].
+    """
+
+    drawn_mass: float
+    outflow_energy: float
+    room_heat: float
+    mass_change: float
+    content_energy_change: float
+    wall_energy_change: float
+
+
+@dataclass(frozen=True)
+class Discharge:
+    """The course of a bottle: time of walking and of all [s], strides, how it ended, the balance, and its recording."""
+
+    walking_time: float
+    total_time: float
+    strides: float
+    ending: Ending
+    balance: Balance | SupplyBalance
+    record: Callable[[], Recording] = field(repr=False, compare=False)
+
+    @cached_property
+    def recording(self) -> Recording:
+        """The course of the bottle: made when it is first read, which takes as long as following it."""
+        return self.record()
+
+
+def check_schedule(schedule: Schedule) -> None:
+    """Refuse times of walking and resting that a bottle cannot be followed over."""
+    for name, value, least in (("walk", schedule.walk, 1.0), ("longest", schedule.longest, 1.0)):
+        if not least <= value < float("inf"):
+            raise ParameterError(f"{name} must be at least {least:g} s and finite, it is {value:g} s")
+    if not 0.0 <= schedule.rest < float("inf"):
+        raise ParameterError(f"rest must be at least 0 s and finite, it is {schedule.rest:g} s")
+    if schedule.rest > 0.0 and 2.0 * schedule.longest / (schedule.walk + schedule.rest) > MAXIMUM_STRETCHES:
+        raise ParameterError(
+            f"walking {schedule.walk:g} s and resting {schedule.rest:g} s over {schedule.longest:g} s are more "
+            f"than {MAXIMUM_STRETCHES} periods: choose longer periods, or a smaller longest time"
+        )
+
+
+def discharge(bottle: Bottle, draw: Draw, schedule: Schedule) -> Discharge:
+    """Return the course of a full bottle under a draw; walking takes the mean flow of a stride.
+
+    Strides are a second long and bottles cool in minutes, so the mean stands for the pulses; the regulator is judged by
+    the largest flow. SimulationError where the solver fails.
+    """
+    check_schedule(schedule)
+    content = bottle_content(bottle.fluid.table, bottle.mass, bottle.volume, bottle.room_temperature)
+    if reserve(bottle, draw, content.pressure, content.temperature) <= 0.0:
+        most = flow_limit(bottle, content.pressure, content.temperature) * GRAMS_PER_KILOGRAM
+        raise ParameterError(
+            f"even the full bottle cannot maintain the supply pressure at the largest flow, "
+            f"{draw.peak_flow * GRAMS_PER_KILOGRAM:.3g} g/s: its regulator passes {most:.3g} g/s (regulator.area)"
+        )
+    energy = content_energy(bottle.fluid.table, bottle.mass, bottle.volume, bottle.room_temperature)
+    start = np.array([bottle.mass, energy, bottle.room_temperature, 0.0, 0.0, 0.0])
+    stretches: list[Stretch] = []
+    time, values, walking = 0.0, start, True
+    reason: Stop | None = None
+    while reason is None:
+        length = schedule.longest if schedule.rest == 0.0 else (schedule.walk if walking else schedule.rest)
+        end = min(time + length, schedule.longest)
+        stretch = solve_stretch(bottle, draw, time, end, values, walking)
+        stretches.append(stretch)
+        time, values, walking = stretch.end, stretch.last, not walking
+        reason = stretch.stopped_by or ("time" if time >= schedule.longest else None)
+    last = stretches[-1].last
+    walked = sum(stretch.end - stretch.start for stretch in stretches if stretch.draw > 0.0)
+    change = last - start
+    balance = Balance(
+        drawn_mass=float(last[3]),
+        outflow_energy=float(last[4]),
+        room_heat=float(last[5]),
+        mass_change=float(change[0]),
+        content_energy_change=float(change[1]),
+        wall_energy_change=float(change[2]) * bottle.wall.wall_heat_capacity,
+    )
+    return Discharge(
+        walking_time=walked,
+        total_time=stretches[-1].end,
+        strides=walked / draw.stride_time,
+        ending=ending(bottle, draw, float(last[0]), content_of(bottle, float(last[0]), float(last[1])), reason),
+        balance=balance,
+        record=lambda: _recording(bottle, stretches),
+    )
+
+
+def discharge_of_life(life: BottleLife, draw: Draw) -> Discharge:
+    """Return the course of a bottle on which somebody walked to its end."""
+    course = life.course
+    ended, bottle = course.ending, course.supply.bottle
+    usable = max(0.0, course.last.mass - smallest_mass_when_warm(bottle, draw))
+    return Discharge(
+        walking_time=life.walked,
+        total_time=life.total,
+        strides=life.repeats,
+        ending=Ending(TIME_IS_UP if ended.kind == WALKED else ended.kind, ended.message, course.last.mass, usable),
+        balance=course.balance,
+        record=lambda: course.recording,
+    )
+
+
+def _recording(bottle: Bottle, stretches: Sequence[Stretch]) -> Recording:
+    """Return the course at evenly spaced times, and exactly at its end."""
+    times = np.linspace(0.0, stretches[-1].end, SAMPLES)
+    ends = np.array([stretch.end for stretch in stretches])
+    places = np.minimum(np.searchsorted(ends, times, side="left"), len(stretches) - 1)
+    rows = np.array([stretches[place].solution(time) for place, time in zip(places, times, strict=True)])
+    contents = [content_of(bottle, float(row[0]), float(row[1])) for row in rows]
+    flows = [stretches[place].draw for place in places]
+    supply = [
+        delivered_pressure(bottle.regulator, content.pressure, flow)
+        for content, flow in zip(contents, flows, strict=True)
+    ]
+    channels = {
+        "bottle_mass": (rows[:, 0], "kg"),
+        "bottle_temperature": ([content.temperature for content in contents], "K"),
+        "wall_temperature": (rows[:, 2], "K"),
+        "bottle_pressure": ([content.pressure for content in contents], "Pa"),
+        "supply_pressure": (supply, "Pa"),
+        "supplied_mass": (rows[:, 3], "kg"),
+    }
+    if has_liquid(bottle.fluid.table):
+        channels["liquid_mass"] = ([content.liquid_mass for content in contents], "kg")
+    named = {name: Channel(np.asarray(values, dtype=np.float64), unit) for name, (values, unit) in channels.items()}
+    return Recording(f"bottle {bottle.name}", times, named, kind="simulated")
+
+
+def content_of(bottle: Bottle, mass: float, energy: float) -> BottleContent:
+    """Return what the bottle holds with a mass [kg] of an energy [J]."""
+    table = bottle.fluid.table
+    return bottle_content(table, mass, bottle.volume, content_temperature(table, mass, bottle.volume, energy))
+
+
+def solve_stretch(bottle: Bottle, draw: Draw, start: float, end: float, values: Floats, walking: bool) -> Stretch:
+    """Return one stretch; walking, it may end early where the supply pressure is no longer maintained."""
+    from scipy.integrate import solve_ivp
+
+    flow = draw.mean_flow if walking else 0.0
+
+    def rates(_time: float, y: Floats) -> list[float]:
+        state = BottleState(float(y[0]), float(y[1]), float(y[2]))
+        content = content_of(bottle, state.mass, state.energy)
+        now = bottle_rates(content, state, flow, bottle.wall, bottle.room_temperature)
+        inside = (now.mass_rate, now.content_energy_rate, now.wall_temperature_rate)
+        return [*inside, flow, now.outflow_power, now.room_heat]
+
+    def kelvins_above_freezing(_time: float, y: Floats) -> float:
+        return content_of(bottle, float(y[0]), float(y[1])).temperature - frozen_below(bottle) - _ABOVE_FREEZING
+
+    def to_spare(_time: float, y: Floats) -> float:
+        content = content_of(bottle, float(y[0]), float(y[1]))
+        return reserve(bottle, draw, content.pressure, content.temperature)
+
+    if walking and to_spare(start, values) <= 0.0:
+        return Stretch(start, start, flow, lambda _times: values, values, "supply")
+    events: list[Any] = [kelvins_above_freezing, *([to_spare] if walking else [])]
+    for event in events:
+        # It ends the stretch where it falls through 0.
+        event.terminal, event.direction = True, -1.0
+    solution = solve_ivp(
+        rates,
+        (start, end),
+        values,
+        method="LSODA",
+        events=events,
+        dense_output=True,
+        rtol=_RELATIVE,
+        atol=_ABSOLUTE,
+    )
+    if solution.status < 0:
+        raise SimulationError(f"the bottle could not be simulated beyond {solution.t[-1]:.4g} s: {solution.message}")
+    stopped: Stop = "frozen" if len(solution.t_events[0]) else "supply"
+    last = np.asarray(solution.y[:, -1])
+    return Stretch(start, float(solution.t[-1]), flow, solution.sol, last, stopped if solution.status == 1 else None)

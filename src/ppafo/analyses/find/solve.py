@@ -1,0 +1,319 @@
+"""The lowest or highest value that meets a condition on a metric: a grid, then ever smaller brackets."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ppafo.errors import ScenarioError, StudyError, UnitError, one_line, refused_as
+from ppafo.loading import scenario_or_load
+from ppafo.progress import Report
+from ppafo.report.style import BLACK, GREEN, VERMILION
+from ppafo.simulation.scenario import Scenario
+from ppafo.studies.distributions import Floats
+from ppafo.studies.draws import Uncertainty, atmosphere_of, check_metrics, level_of
+from ppafo.studies.sampling import NOISE, with_noise
+from ppafo.studies.study import with_overrides
+from ppafo.studies.varying import VariedPath, varied_path
+from ppafo.study.finding import Column, Finding, Part
+from ppafo.study.kind import of_metric, of_path
+from ppafo.study.panels import Mark, Panel
+from ppafo.study.runs import Runs, Tally, settled, with_companions
+from ppafo.units import split_quantity
+
+DEFAULT_GRID, FEWEST, MOST = 64, 3, 100_000
+PARTS = 32
+"""Parts into which a bracket is divided: that many runs side by side take little longer than one."""
+STREAMS = 16
+"""Noise streams over which every value is tried where sensors are noisy, the same for all."""
+ACCURACY = 1.0e-6
+"""Width of the last bracket, as a fraction of the range."""
+_SEED = 1
+_RANGE = re.compile(r"\s*([^=\s]+)\s*=\s*(.+?)\s*\.\.\s*(.+?)\s*")
+_CONDITION = re.compile(r"\s*(\w+)\s*(<=|>=)\s*(.+?)\s*")
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """A metric that must be at most (or else at least) a limit [SI]; ``text`` is how it was written."""
+
+    metric: str
+    is_upper_limit: bool
+    limit: float
+    text: str
+
+    def is_met(self, values: Floats) -> NDArray[np.bool_]:
+        """Return where values of the metric [SI] meet it; a run without a value does not."""
+        return values <= self.limit if self.is_upper_limit else values >= self.limit
+
+
+@dataclass(frozen=True, slots=True)
+class Tried:
+    """A value [SI] that was tried, and the metric there [SI], nan where the run failed."""
+
+    value: float
+    metric: float
+    is_of_grid: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Threshold:
+    """The lowest, or highest, value that meets a condition on a metric; numbers in SI.
+
+    ``value`` is None where none does, and ``not_met_at`` the next value on its outer side that was tried and does not,
+    None at the end of the range. ``changes`` counts how often the condition begins or ceases to be met along the values
+    that were tried, ``met`` are the ends of each stretch where it is. ``unsettled`` counts the runs whose loop
+    oscillates at the instant of the metric, so that their RMS error on the hold was taken in its place.
+    """
+
+    scenario: str
+    path: str
+    unit: str
+    condition: str
+    metric: str
+    limit: float
+    wanted: str
+    value: float | None
+    metric_at_value: float | None
+    not_met_at: float | None
+    changes: int
+    met: list[list[float]]
+    remarks: list[str]
+    noise_streams: int
+    runs: int
+    failed: int
+    unsettled: int
+    tried: list[Tried]
+
+
+def find(
+    scenario: Scenario | str | Path,
+    vary: str,
+    such_that: str,
+    highest: bool = False,
+    grid: int = DEFAULT_GRID,
+    overrides: Sequence[str] = (),
+    threads: int | None = None,
+    progress: Report | None = None,
+) -> Finding[Threshold]:
+    """Return the lowest value (or the ``highest``) [SI] of a number of a scenario that meets a condition on a metric.
+
+    ``vary`` is the number with its range, ``"supply.pressure=20..90 psi_g"``; ``such_that`` the condition,
+    ``"final_error <= 0.3 N m"``. A grid of values over the range is run side by side; between the last one that does
+    not meet the condition and the first one that does, the bracket is divided again and again down to 1e-6 of the
+    range. What happens between two values of the grid on one side of the condition is not seen. StudyError or
+    ScenarioError for bad input, and where every run fails.
+    """
+    base = with_overrides(scenario_or_load(scenario), overrides)
+    path, low, high = _range(vary, base)
+    parts = _CONDITION.fullmatch(such_that)
+    if parts is None:
+        raise StudyError(
+            f"'{one_line(such_that)}' is not of the form METRIC <= LIMIT or METRIC >= LIMIT, "
+            "for example 'final_error <= 0.3 N m'"
+        )
+    check_metrics([parts[1]], base)
+    condition = Condition(
+        parts[1],
+        parts[2] == "<=",
+        level_of(parts[3], parts[1], f"'{one_line(such_that)}'", atmosphere_of(base, [path.path])),
+        f"{parts[1]} {parts[2]} {parts[3]}",
+    )
+    if not FEWEST <= grid <= MOST:
+        raise StudyError(f"grid = {grid}: must be at least {FEWEST} and at most {MOST:,}")
+    noise = Uncertainty(with_noise((), None, [base], [path.path])[0])
+    seeds = noise.random_columns(0, STREAMS, _SEED)[NOISE] if noise.has_noise else np.zeros(0)
+    tally = Tally(grid * max(1, seeds.size), progress)
+    search = _Search(
+        path.path, condition, Runs(base, with_companions([condition.metric], base), tally, (), threads), seeds
+    )
+    search.run(np.linspace(low, high, grid))
+    if not np.isfinite(search.metrics).any():
+        reason = search.runs.reason
+        raise StudyError(
+            f"scenario '{base.name}': no run from {path.quote(low)} to {path.quote(high)} has a "
+            f"'{condition.metric}'{reason and '; the first: '}{reason}"
+        )
+    value, beyond = search.ends(highest)
+    while value is not None and beyond is not None and abs(value - beyond) > ACCURACY * (high - low):
+        search.run(np.linspace(value, beyond, PARTS + 1)[1:-1])
+        value, beyond = search.ends(highest)
+    return _finding(base.name, path, search, highest, grid)
+
+
+class _Search:
+    """What was tried so far: values, the metric of each and its standard deviation over the noise, in that order."""
+
+    def __init__(self, path: str, condition: Condition, runs: Runs, seeds: Floats) -> None:
+        self._path, self.condition, self.runs, self.seeds = path, condition, runs, seeds
+        self.values: Floats = np.empty(0)
+        self.metrics: Floats = np.empty(0)
+        self.spread: Floats = np.empty(0)
+        self.unsettled = 0
+
+    def run(self, values: Floats) -> None:
+        """Try values, each over all streams of noise."""
+        streams = max(1, self.seeds.size)
+        columns = {self._path: np.tile(values, streams)}
+        if self.seeds.size:
+            columns[NOISE] = np.repeat(self.seeds, values.size)
+        rows = self.runs.run(columns)
+        judged = settled(rows, self.condition.metric)
+        self.unsettled += int(np.count_nonzero(judged > rows[self.condition.metric]))
+        found = judged.reshape(streams, values.size)
+        self.values = np.concatenate([self.values, values])
+        self.metrics = np.concatenate([self.metrics, found.mean(axis=0)])
+        self.spread = np.concatenate([self.spread, found.std(axis=0, ddof=min(1, streams - 1))])
+
+    def ends(self, highest: bool) -> tuple[float | None, float | None]:
+        """Return the outermost value that meets the condition, and its neighbour on the outer side."""
+        order = np.argsort(-self.values if highest else self.values)
+        met = np.flatnonzero(self.condition.is_met(self.metrics[order]))
+        if met.size == 0:
+            return None, None
+        values = self.values[order]
+        return float(values[met[0]]), float(values[met[0] - 1]) if met[0] else None
+
+
+def _range(text: str, base: Scenario) -> tuple[VariedPath, float, float]:
+    parts = _RANGE.fullmatch(text)
+    if parts is None:
+        raise StudyError(
+            f"'{one_line(text)}' is not of the form PATH=LOW..HIGH, for example 'supply.pressure=20..90 psi_g'"
+        )
+    with refused_as(StudyError, f"'{one_line(text)}'", ScenarioError, UnitError):
+        path = varied_path(parts[1], base)
+        unit = split_quantity(parts[3])[1]
+        lower = parts[2] if split_quantity(parts[2])[1] else f"{parts[2]} {unit}".rstrip()
+        low, high = path.level(lower), path.level(parts[3])
+    if not low < high:
+        raise StudyError(f"'{one_line(text)}': the low end must be below the high end")
+    return path, low, high
+
+
+def stretches(values: Floats, is_met: NDArray[np.bool_]) -> list[list[float]]:
+    """Return the first and last value [SI] of each stretch of neighbours that meet the condition."""
+    padded = np.concatenate([[False], is_met, [False]]).astype(int)
+    first, after = np.flatnonzero(np.diff(padded) > 0), np.flatnonzero(np.diff(padded) < 0)
+    return [[float(values[low]), float(values[high - 1])] for low, high in zip(first, after, strict=True)]
+
+
+def _finding(scenario: str, path: VariedPath, search: _Search, highest: bool, grid: int) -> Finding[Threshold]:
+    """Return the search in words, a table of where the condition is met, and the metric over the value."""
+    condition, order = search.condition, np.argsort(search.values)
+    values, metrics, spread, of_grid = search.values[order], search.metrics[order], search.spread[order], order < grid
+    value, beyond = search.ends(highest)
+    is_met = condition.is_met(metrics)
+    changes = int(np.count_nonzero(np.diff(is_met)))
+    kind, of_condition = of_path(path.path, path.quantity.unit), of_metric(condition.metric)
+    at_value = None if value is None else float(metrics[np.searchsorted(values, value)])
+    ends = f"{kind.text(values[0])} to {kind.text(values[-1])}"
+    wanted, further = ("highest", "higher") if highest else ("lowest", "lower")
+    if value is None or at_value is None:
+        row = int((np.nanargmin if condition.is_upper_limit else np.nanargmax)(metrics))
+        verdict = (
+            f"no {path.path} from {ends} meets {condition.text}; the nearest is {of_condition.text(metrics[row])} at "
+            f"{kind.text(values[row])}"
+        )
+    else:
+        verdict = (
+            f"{path.path} = {kind.text(value)} is the {wanted} value that meets {condition.text}"
+            f"{', and the end of the range' if beyond is None else ''}: {condition.metric} is "
+            f"{of_condition.text(at_value)} there"
+            + (
+                f"; a wider range may have a {further} one"
+                if beyond is None
+                else f" (bracketed to {kind.change(abs(value - beyond), '.1g')})"
+            )
+        )
+    where = "everywhere" if is_met.all() else "nowhere" if value is None else f"at {np.count_nonzero(is_met)} of them"
+    remarks = [
+        f"{np.count_nonzero(of_grid)} values from {ends}, evenly, then {np.count_nonzero(~of_grid)} more in the "
+        f"bracket; the condition is met {where}"
+    ]
+    if changes > 1:
+        remarks.append(
+            f"the condition changes {changes} times over the range, so it is not met everywhere "
+            f"{'below' if highest else 'above'} this value; see the table and the figure"
+        )
+    if search.seeds.size:
+        noise = (
+            f"sensors are noisy: the metric is the mean over {search.seeds.size} noise streams, the same for all values"
+        )
+        if value is not None:
+            varies = of_condition.change(float(spread[np.searchsorted(values, value)]))
+            noise += (
+                f"; at the value that was found it varies by {varies} (standard deviation) from stream to stream, so a "
+                "single run may miss the condition there"
+            )
+        remarks.append(noise)
+    if search.unsettled:
+        remarks.append(
+            f"in {search.unsettled} runs the loop oscillates on the hold, and {condition.metric} is one instant of "
+            "that: their rms_error_hold was taken in its place"
+        )
+    if search.runs.failures:
+        remarks.append(
+            f"{search.runs.failures} of {search.runs.count} runs failed and count as not met; the first: "
+            f"{search.runs.reason}"
+        )
+    met = stretches(values, is_met)
+    panel = Panel(
+        kind,
+        of_condition,
+        (
+            Mark("line", values, metrics),
+            Mark("line", values[of_grid], metrics[of_grid], style={"linestyle": "", "marker": "o", "markersize": 3}),
+            Mark(
+                "level", (), condition.limit, label="limit", colour=BLACK, style={"linestyle": "--", "linewidth": 1.0}
+            ),
+            *(Mark("span", each, label="" if row else "condition met", colour=GREEN) for row, each in enumerate(met)),
+            *(
+                ()
+                if value is None
+                else (Mark("at", value, label=f"found: {kind.text(value, '.4g')}", colour=VERMILION),)
+            ),
+        ),
+    )
+    return Finding(
+        name="find",
+        kicker="Search",
+        title=f"The {wanted} {path.path} such that {condition.text}",
+        said=(verdict, *remarks),
+        parts=(
+            Part(
+                "Met in the range that was tried",
+                [Column(title, [kind.text(each[end]) for each in met]) for end, title in enumerate(("from", "to"))],
+            ),
+            Part(
+                "Metric over the value",
+                panels=(panel,),
+                name="find",
+                caption="The metric over the value; dashed: the limit; shaded: where the condition is met.",
+            ),
+        ),
+        found=Threshold(
+            scenario=scenario,
+            path=path.path,
+            unit=path.quantity.unit,
+            condition=condition.text,
+            metric=condition.metric,
+            limit=condition.limit,
+            wanted=wanted,
+            value=value,
+            metric_at_value=at_value,
+            not_met_at=beyond,
+            changes=changes,
+            met=met,
+            remarks=remarks,
+            noise_streams=search.seeds.size,
+            runs=search.runs.count,
+            failed=search.runs.failures,
+            unsettled=search.unsettled,
+            tried=list(map(Tried, values.tolist(), metrics.tolist(), of_grid.tolist())),
+        ),
+        passed=value is not None,
+    )

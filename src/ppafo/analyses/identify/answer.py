@@ -1,0 +1,355 @@
+"""The answer of an identification: estimates and checks in the units of the set, the new set, the figures."""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ppafo.constants import PASCALS_PER_PSI, STANDARD_ATMOSPHERE
+from ppafo.errors import DataError
+from ppafo.identification.bench.result import BenchResult, count_of, figure_3, procedure_figure
+from ppafo.identification.estimate import Estimate
+from ppafo.identification.new_set import NewSet, in_set_unit
+from ppafo.identification.source import kind_of
+from ppafo.identification.trajectory.expected import Expected
+from ppafo.identification.trajectory.fitting import Known, TrajectoryFit
+from ppafo.identification.trajectory.section import TrajectoryOutcome
+from ppafo.identification.wording import in_shown_unit, with_error
+from ppafo.parameters.loading import parameter_set_toml
+from ppafo.parameters.parameter_set import ParameterSet
+from ppafo.report import Answer, Figure, Section, Table
+from ppafo.report.solved import Solved
+from ppafo.report.style import (
+    ACTUAL,
+    BLACK,
+    CHAMBER_1,
+    CHAMBER_2,
+    GREY,
+    house_style,
+    mark_kind,
+)
+from ppafo.signals import Recording, RecordingKind
+from ppafo.simulation.scenario import plain
+from ppafo.units import percentage
+
+if TYPE_CHECKING:
+    import matplotlib.figure
+    from matplotlib.axes import Axes
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Identification(Solved):
+    """The outcome of a problem: what could be had, results in the order of making, the set before and after."""
+
+    name: str
+    results: tuple[BenchResult, ...]
+    trajectory: TrajectoryOutcome | None
+    before: ParameterSet
+    new_set: NewSet
+
+    @property
+    def estimates(self) -> tuple[Estimate, ...]:
+        """All estimates of all procedures, those of the trajectory fit last."""
+        fitted = () if self.trajectory is None else self.trajectory.fit.estimates
+        return (*bench_estimates(self.results), *fitted)
+
+    @property
+    def is_good(self) -> bool:
+        """Whether recordings agree on their numbers and the new set makes a device."""
+        is_fitted = self.trajectory is None or self.trajectory.is_good
+        return is_fitted and not self.new_set.problem and not any(result.conflict for result in self.results)
+
+    @property
+    def kind(self) -> RecordingKind:
+        """The kind of all recordings together."""
+        kinds = [result.kind for result in self.results]
+        return kind_of([*kinds, *(() if self.trajectory is None else (kind_of_fit(self.trajectory.fit),))])
+
+
+_TRAJECTORY_WIDTH, _VALUES, _LEFT_OVER = 7.2, 1.9, 1.0
+"""Inches, of the figure and of the panels of one channel."""
+_DOT, _SAMPLE = 1.6, 3.6
+_MAXIMUM_DOTS = 90
+"""Samples shown beside the line; what is left is shown of all."""
+_KIND_WORDS = {"measured": "measured", "simulated": "simulated samples", "synthetic": "synthetic measurement"}
+
+
+_CHANNELS = {
+    "angle": ("Vane angle", "deg", "deg", 180.0 / math.pi, ACTUAL.colour),
+    "pressure_1": ("Pressure in chamber 1", "psig", "psi", 1.0 / PASCALS_PER_PSI, CHAMBER_1.colour),
+    "pressure_2": ("Pressure in chamber 2", "psig", "psi", 1.0 / PASCALS_PER_PSI, CHAMBER_2.colour),
+}
+"""Title, unit, unit of a difference, values per SI unit and colour of each channel."""
+
+
+def trajectory_fit_figure(
+    measurement: Recording, model: Recording, atmosphere: float = STANDARD_ATMOSPHERE
+) -> "matplotlib.figure.Figure":
+    """Return samples, model and residuals of one experiment over time, two panels for each channel that was fitted.
+
+    Both recordings have the same times. Gauge pressure counts from ``atmosphere`` [Pa absolute].
+    """
+    if not np.array_equal(measurement.time, model.time):
+        raise DataError(f"{model.label}: is not at the times of {measurement.label}")
+    from matplotlib.figure import Figure as Drawing
+
+    shown = [name for name in _CHANNELS if name in measurement]
+    with house_style():
+        heights = [_VALUES, _LEFT_OVER] * len(shown)
+        figure = Drawing(figsize=(_TRAJECTORY_WIDTH, sum(heights)), layout="constrained")
+        panels = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
+        for name, values, left in zip(shown, panels[::2], panels[1::2], strict=True):
+            zero = 0.0 if name == "angle" else atmosphere
+            _draw_trajectory(name, zero, (values, left), measurement, model)
+        panels[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.1, handlelength=1.6)
+        panels[-1].set_xlabel("Time (s)")
+        panels[-1].set_xlim(measurement.time[0], measurement.time[-1])
+        figure.suptitle(measurement.label, x=0.01, ha="left", fontsize=10, fontweight="bold")
+        mark_kind(figure, measurement.kind)
+        return figure
+
+
+def _draw_trajectory(
+    name: str, zero: float, panels: "tuple[Axes, Axes]", measurement: Recording, model: Recording
+) -> None:
+    values, left = panels
+    title, unit, unit_of_difference, factor, colour = _CHANNELS[name]
+    samples, fitted = (factor * (recording[name] - zero) for recording in (measurement, model))
+    some = slice(None, None, -(-measurement.time.size // _MAXIMUM_DOTS))
+    times, word = measurement.time[some], _KIND_WORDS[measurement.kind]
+    values.plot(
+        times,
+        samples[some],
+        "o",
+        color=BLACK,
+        markersize=_SAMPLE,
+        markerfacecolor="none",
+        markeredgewidth=0.7,
+        label=word,
+    )
+    values.plot(measurement.time, fitted, color=colour, linewidth=1.2, label="model")
+    values.set_title(f"{title} ({unit})")
+    left.plot(measurement.time, fitted - samples, ".", color=colour, markersize=_DOT)
+    left.axhline(0.0, color=GREY, linewidth=0.8)
+    largest = 1.1 * float(np.max(np.abs(fitted - samples))) or 1.0
+    left.set_ylim(-largest, largest)
+    left.set_title(f"model minus sample ({unit_of_difference})", fontsize=9)
+    left.locator_params(axis="y", nbins=3)
+
+
+_FAR, _SHOWN = 2.0, 0.05
+"""Standard deviations from which a tolerance is said to be contradicted; least share of a variance that is shown."""
+_MINIMUM_DIGITS, _MAXIMUM_DIGITS = 4, 9
+
+
+def answer_of(identification: Identification) -> Answer:
+    """Return the answer; it has passed where recordings agree and the new set makes a device."""
+    name, new_set, fitted = identification.name, identification.new_set, identification.trajectory
+    problem = (f"it makes no device yet: {new_set.problem}",) if new_set.problem else ()
+    files = {f"{name}.toml": lambda: parameter_set_toml(new_set.parameter_set).encode()}
+    return Answer(
+        name="identify",
+        kicker="Identification",
+        title=f"The parameter set {name}",
+        lead=(),
+        sections=(
+            *(_procedure_section(result, identification.before) for result in identification.results),
+            *((_trajectory_section(fitted, identification.before),) if fitted else ()),
+            Section(paragraphs=(f"new set '{name}': {_count_sentence(identification)}", *problem)),
+            *(Section(figure=figure, is_detail=True) for figure in _figures(identification)),
+        ),
+        data={
+            "problem": identification.name,
+            "started_from": identification.before.name,
+            "is_good": identification.is_good,
+            "procedures": [_procedure_data(result) for result in identification.results],
+            **_trajectory_data(identification.trajectory),
+            "new_set": {
+                "file": f"{identification.name}.toml",
+                "identified": list(identification.new_set.written),
+                "fitted": list(identification.new_set.fitted),
+                "problem": identification.new_set.problem,
+            },
+        },
+        passed=identification.is_good,
+        kind=identification.kind,
+        files=files,
+    )
+
+
+def _count_sentence(identification: Identification) -> str:
+    """Return how many values are identified, and apart from them which are fitted only."""
+    written, fitted = identification.new_set.written, identification.new_set.fitted
+    found = f"{count_of(len(written), 'value')} identified: {', '.join(written)}" if written else "no value identified"
+    rest = f"; for this model only: {', '.join(fitted)}" if fitted else ""
+    return f"{found}{rest}"
+
+
+def _procedure_section(result: BenchResult, before: ParameterSet) -> Section:
+    kind = "" if result.kind == "measured" else f" ({result.kind})"
+    return Section(
+        f"{result.procedure}{kind}: {result.summary}",
+        table=Table((), tuple(estimate_row(item, before) for item in result.estimates)),
+        remarks=(
+            *((f"holds for this model only: {result.conflict}",) if result.conflict else ()),
+            *(f"{item.path}: {item.explanation}" for item in result.estimates),
+            *(f"remark: {remark}" for remark in result.remarks),
+        ),
+    )
+
+
+def _trajectory_section(outcome: TrajectoryOutcome, before: ParameterSet) -> Section:
+    """Return estimates, each with its sentence, then tolerances that matter, what is left, and candidates."""
+    kind, fit = kind_of_fit(outcome.fit), outcome.fit
+    origin = "" if kind == "measured" else f" ({kind})"
+    candidates = enumerate(outcome.expected, start=1)
+    return Section(
+        f"trajectory{origin}: {count_of(len(fit.estimates), 'number')} fitted to "
+        f"{count_of(len(fit.measurements), 'recording')}, {count_of(len(fit.known), 'tolerance')}",
+        table=Table((), tuple(estimate_row(item, before) for item in fit.estimates)),
+        remarks=(
+            *((f"holds for this model only: {fit.conflict}",) if fit.conflict else ()),
+            *(f"{item.path}: {item.explanation}" for item in fit.estimates if item.explanation != fit.conflict),
+            *_tolerances(fit.known, before),
+            *(f"remark: {remark}" for remark in outcome.remarks),
+            *(f"next experiment {number}: {_candidate(candidate)}" for number, candidate in candidates),
+        ),
+    )
+
+
+def _tolerances(known: Sequence[Known], before: ParameterSet) -> list[str]:
+    """Return the tolerances that widen an interval or that the recordings contradict, largest first."""
+    is_far = {one.name: abs(one.after - one.before) > _FAR * one.before_error for one in known}
+    shown = sorted((one for one in known if one.share >= _SHOWN or is_far[one.name]), key=lambda one: -one.share)
+    found = []
+    for one in shown:
+        place = one.name.partition(" of ")[0]
+        numbers = (one.before, one.before_error, one.after, one.after_error)
+        (start, unit), (error, _), (after, _), (after_error, _) = (
+            _shown(number, place, one.unit, before) for number in numbers
+        )
+        zero, _ = _shown(0.0, place, one.unit, before)
+        stated, fitted = with_error(start, error - zero), with_error(after, after_error - zero)
+        text = f"tolerance: {one.name}: stated {stated} {unit}".rstrip(" -") + f", fitted {fitted} {unit}".rstrip(" -")
+        found.append(
+            f"{text}; {percentage(one.share, 2)} of the variance of {one.widens}" if one.share >= _SHOWN else text
+        )
+    rest = len(known) - len(shown)
+    return [*found, f"tolerances that widen no interval: {rest}"] if rest else found
+
+
+def _shown(number: float, path: str, unit: str, before: ParameterSet) -> tuple[float, str]:
+    """Return a number in the unit of the set, one that the set does not have in the unit that people read."""
+    found, own = in_set_unit(number, path, unit, before)
+    return in_shown_unit(number, unit) if own == unit else (found, own)
+
+
+def estimate_row(item: Estimate, before: ParameterSet) -> tuple[str, ...]:
+    """Return path, value, interval and verdict of an estimate in the unit of the set, digits that tell its ends."""
+    if math.isnan(item.value):
+        return item.path, "no value", "", item.verdict
+    shown = [_shown(one, item.path, item.unit, before) for one in (item.value, item.low, item.high)]
+    (value, unit), (low, _), (high, _) = shown
+    digits = _digits(value, 0.5 * abs(high - low))
+    text = f"{value:#.{digits}g} {unit}".removesuffix(" -").rstrip()
+    return item.path, text, f"{low:#.{digits}g} to {high:#.{digits}g}", item.verdict
+
+
+def _candidate(one: Expected) -> str:
+    fraction = 1.0 - one.shrinkage[one.most_helped]
+    return (
+        f"{one.label}: gain {one.gain:.2f}; largest for {one.most_helped}, "
+        f"whose interval would shrink by {fraction:.0%}"
+    )
+
+
+def _digits(value: float, half_width: float) -> int:
+    """Return the digits that a number needs so that its interval can be distinguished from it, at least four."""
+    if not (half_width > 0.0 and math.isfinite(half_width) and value != 0.0):
+        return _MINIMUM_DIGITS
+    needed = math.ceil(math.log10(abs(value) / half_width)) + 1
+    return min(max(needed, _MINIMUM_DIGITS), _MAXIMUM_DIGITS)
+
+
+def _figures(identification: Identification) -> list[Figure]:
+    """Return a figure for each procedure and recording, figure 3 where both of its panels are there."""
+    figures = []
+    counts: dict[str, int] = {}
+    for result in identification.results:
+        counts[result.procedure] = counts.get(result.procedure, 0) + 1
+        number = counts[result.procedure]
+        name = result.procedure if number == 1 else f"{result.procedure}-{number}"
+        figures.append(Figure(name, result.summary, partial(procedure_figure, result)))
+    if identification.trajectory is not None:
+        figures += _trajectory_figures(identification.trajectory)
+    both = figure_3(identification.results)
+    return figures if both is None else [*figures, Figure("figure-3", "Like figure 3 of the paper.", lambda: both)]
+
+
+def _trajectory_figures(outcome: TrajectoryOutcome) -> list[Figure]:
+    figures, fit = [], outcome.fit
+    for measurement, model, scenario in zip(fit.measurements, fit.models, fit.scenarios, strict=True):
+        draw = partial(trajectory_fit_figure, measurement, model, scenario.device.supply.atmospheric_pressure)
+        figures.append(Figure(f"trajectory-fit-{measurement.label}", f"{measurement.label} and the fit.", draw))
+    return figures
+
+
+def kind_of_fit(fit: TrajectoryFit) -> RecordingKind:
+    """Return the kind of all recordings of a fit together."""
+    return kind_of([recording.kind for recording in fit.measurements])
+
+
+def _procedure_data(result: BenchResult) -> dict[str, Any]:
+    return {
+        "procedure": result.procedure,
+        "summary": result.summary,
+        "recordings_are": result.kind,
+        "estimates": [plain(item) for item in result.estimates],
+        "conflict": result.conflict,
+        "remarks": list(result.remarks),
+    }
+
+
+def _trajectory_data(outcome: TrajectoryOutcome | None) -> dict[str, Any]:
+    """Return the part ``trajectory`` of the data, empty without a fit; matrices are in the order of estimates."""
+    if outcome is None:
+        return {}
+    fit = outcome.fit
+    return {
+        "trajectory": {
+            "recordings_are": kind_of_fit(fit),
+            "recordings": [_recording(fit, index) for index in range(len(fit.measurements))],
+            "confidence": fit.problem.confidence,
+            "evaluations": fit.fit.evaluations,
+            "has_converged": fit.fit.has_converged,
+            "estimates": [plain(item) for item in fit.estimates],
+            "covariance": fit.covariance.tolist(),
+            "correlation": fit.correlation.tolist(),
+            "tolerances": [plain(item) for item in fit.known],
+            "channels": [plain(item) for item in fit.channels],
+            "conflict": None if fit.fit.conflict is None else plain(fit.fit.conflict),
+            "not_identifiable": [dict(item) for item in fit.fit.unidentified],
+            "remarks": list(outcome.remarks),
+            "next_experiments": [plain(item) for item in outcome.expected],
+        }
+    }
+
+
+def _recording(fit: TrajectoryFit, index: int) -> dict[str, Any]:
+    experiment = fit.problem.experiments[index]
+    return {
+        "label": experiment.label,
+        "source": experiment.source,
+        "kind": experiment.recording.kind,
+        "scenario": experiment.scenario.name,
+        "inputs": list(experiment.inputs),
+        "samples": len(fit.measurements[index]),
+    }
+
+
+def bench_estimates(results: Iterable[BenchResult]) -> list[Estimate]:
+    """Return the estimates of all procedures, in their order."""
+    return [estimate for result in results for estimate in result.estimates]

@@ -1,0 +1,142 @@
+"""From a problem to a parameter set: read the recordings, apply the procedures in order, put the values in."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from ppafo.analyses.identify.answer import Identification, bench_estimates
+from ppafo.errors import IdentificationError
+from ppafo.identification.bench.result import BenchResult
+from ppafo.identification.new_set import with_estimates
+from ppafo.identification.problem import (
+    PROCEDURES,
+    ProblemFile,
+    ProcedureProblem,
+    Setting,
+    load_problem,
+    run_procedure,
+    window_of,
+)
+from ppafo.identification.source import Source, Use, double_use, source_of
+from ppafo.identification.tolerances import tolerances_of
+from ppafo.identification.trajectory.section import Setting as FitSetting
+from ppafo.identification.trajectory.section import solve_section
+from ppafo.parameters.loading import list_sets, load_parameter_set
+from ppafo.parameters.overrides import check_valve
+from ppafo.parameters.parameter_set import ParameterSet, apply_overrides, atmospheric_pressure, chosen_valve
+from ppafo.progress import Report, report_nothing
+from ppafo.storage.foreign import read_foreign
+from ppafo.storage.result_folder import read_recording
+
+
+def identify(problem: str | Path, progress: Report = report_nothing) -> Identification:
+    """Return what the procedures of a problem file make of its recordings, in the recommended order.
+
+    The trajectory fit comes last and starts from what they found. ``progress`` hears what is being done. Estimates are
+    in SI units. IdentificationError for a problem that makes no sense, ParameterError for a set that does not, and
+    DataError for a recording that cannot be read; each in one line that begins with the file.
+    """
+    path = Path(problem)
+    return solve_problem(load_problem(path), path.parent, path.name, progress)
+
+
+def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Report = report_nothing) -> Identification:
+    """Return the outcome of a problem whose paths begin in ``folder``; ``file`` is what messages call it.
+
+    Errors are those of ``identify``.
+    """
+    before = _base_set(problem, folder)
+    valve = chosen_valve(before, problem.device.valve)
+    current, results = before, list[BenchResult]()
+    tasks = [
+        _Task(
+            item,
+            tuple(_source(folder, name, item.columns, problem, before) for name in item.recordings),
+            f"{file}: procedure {number}, {item.kind}",
+        )
+        for number, item in sorted(
+            enumerate(problem.procedure, start=1), key=lambda pair: PROCEDURES.index(pair[1].kind)
+        )
+    ]
+    found: list[Use] = []
+    for kind in PROCEDURES:
+        uses = [
+            Use(f"recording {number} of procedure {kind}", source.trace, source.recording, frozenset(), *times)
+            for task in tasks
+            if task.item.kind == kind
+            for times in [window_of(task.item, Setting(before, valve, task.place))]
+            for number, source in enumerate(task.sources, start=1)
+        ]
+        twice = double_use(uses)
+        if twice:
+            raise IdentificationError(f"{file}: {twice}")
+        found += uses
+    used = tuple(found)
+    stated = tolerances_of(problem.bench, file)
+    for task in tasks:
+        result = run_procedure(task.sources, task.item, Setting(current, valve, task.place, stated))
+        results.append(result)
+        current = with_estimates(current, result.estimates).parameter_set
+    bench = {estimate.path: estimate for estimate in bench_estimates(results)}
+    setting = FitSetting(
+        lambda item: _source(folder, item.recording, item.columns, problem, current),
+        folder,
+        f"{file}: trajectory",
+        current,
+        problem.device.valve,
+        bench,
+        used,
+        stated,
+    )
+    fitted = None if problem.trajectory is None else solve_section(problem.trajectory, setting, progress)
+    estimates = (*bench_estimates(results), *(() if fitted is None else fitted.fit.estimates))
+    new_set = with_estimates(before, estimates, valve)
+    outcome = Identification(problem.name, tuple(results), fitted, before, new_set)
+    return replace(outcome, new_set=replace(new_set, parameter_set=_name_set(outcome, problem)))
+
+
+@dataclass(frozen=True, slots=True)
+class _Task:
+    """A procedure with its recordings, and what messages call it."""
+
+    item: ProcedureProblem
+    sources: tuple[Source, ...]
+    place: str
+
+
+def _base_set(problem: ProblemFile, folder: Path) -> ParameterSet:
+    name = problem.device.set
+    beside = folder / name
+    base = load_parameter_set(beside if beside.suffix == ".toml" else name)
+    check_valve(problem.device.overrides, problem.device.valve, f"device.valve = '{problem.device.valve}'")
+    return apply_overrides(base, problem.device.overrides, problem.device.valve)
+
+
+def _source(folder: Path, name: str, columns: str | None, problem: ProblemFile, parameter_set: ParameterSet) -> Source:
+    path = folder / name
+    atmosphere = atmospheric_pressure(parameter_set)
+    if path.is_dir():
+        raise IdentificationError(f"{path}: is a folder, which has no hash; name the recording in it")
+    if columns is not None:
+        recording = read_foreign(path, problem.columns[columns], atmosphere=atmosphere)
+    else:
+        recording = read_recording(path, atmosphere)
+    return source_of(path, recording)
+
+
+def _name_set(found: Identification, problem: ProblemFile) -> ParameterSet:
+    old = found.new_set.parameter_set
+    recordings = "" if found.kind == "measured" else f", whose recordings are {found.kind}"
+    origins = (
+        f"Values with origin 'identified' or 'fitted' come from the problem '{problem.name}'{recordings}, the fitted "
+        f"ones being true for this model only; the others are those of '{old.name}'."
+    )
+    return replace(
+        old,
+        file=f"{problem.name}.toml",
+        name=problem.name,
+        title=problem.title or f"{old.title}, identified",
+        citation=problem.citation or old.citation,
+        # The new set may go anywhere, where the path of a file would not lead to its parent.
+        parent=problem.device.set if problem.device.set in list_sets() else "",
+        notes=f"{old.notes.rstrip()}\n{origins}".lstrip(),
+    )

@@ -1,0 +1,450 @@
+"""The answer about a linear model: the point, the poles, the matrices, which sides were taken, how far it holds."""
+
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ppafo.engine.lanes import Floats, StepInputs, replay
+from ppafo.engine.run import batch_of
+from ppafo.errors import ScenarioError, nearest_name, one_line
+from ppafo.model.plant import chamber_pressures
+from ppafo.report import Answer, Column, Figure, Section, Table
+from ppafo.report.display_units import QUANTITIES, quantity_of_unit, quantity_text
+from ppafo.report.solved import Solved
+from ppafo.report.style import (
+    BLACK,
+    BLUE,
+    GREY,
+    VERMILION,
+    Margins,
+    figure_of_free_panels,
+    figure_of_panels,
+    house_style,
+    mark_kind,
+)
+from ppafo.simulation.plan import plan_run
+from ppafo.simulation.sampled import state_row_numbers
+from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, PrescribedMotion, Scenario
+from ppafo.version import __version__
+
+if TYPE_CHECKING:
+    import matplotlib.figure
+
+MISSING_CONTROL = "a system for python-control needs the package control: pip install ppafo[control]"
+ON_THE_EDGE = 1.0e-6
+"""Two sides of a comparison that differ by less than this, over the larger one, lie on an edge of the model."""
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """A state, input or output: its name, unit in SI, and value at the point."""
+
+    name: str
+    unit: str
+    value: float
+
+
+@dataclass(frozen=True, slots=True)
+class Edge:
+    """A comparison whose two numbers are equal at the point: where it stands, and whether it counts as true.
+
+    On the other side of it the plant may have another linear model.
+    """
+
+    place: str
+    is_true: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Delays:
+    """What the linear model leaves out [s]: dead time of the valve, age of measurements, sample period."""
+
+    command: float
+    signals: float
+    period: float
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class LinearModel(Solved):
+    """The plant of a scenario near one point, x' = A x + B u, y = C x + D u, for differences from the point in SI.
+
+    ``a`` (states, states), ``b`` (states, inputs), ``c`` (outputs, states), ``d`` (outputs, inputs); ``rates``
+    (states,) are x' at the point itself, 0 in a steady state. ``time`` [s] is None for a steady state. ``sides`` say in
+    words which side of each limit of the plant was taken, ``edges`` where the point lies on one.
+    """
+
+    scenario: Scenario
+    time: float | None
+    states: tuple[Variable, ...]
+    inputs: tuple[Variable, ...]
+    outputs: tuple[Variable, ...]
+    a: Floats
+    b: Floats
+    c: Floats
+    d: Floats
+    rates: Floats
+    sides: Mapping[str, str]
+    edges: tuple[Edge, ...]
+    delays: Delays
+
+    @property
+    def is_steady(self) -> bool:
+        """True for a model about a steady state."""
+        return self.time is None
+
+    @property
+    def poles(self) -> "np.ndarray[Any, np.dtype[np.complex128]]":
+        """Poles [1/s], the slowest first."""
+        found = np.linalg.eigvals(self.a).astype(np.complex128)
+        return found[np.argsort(np.abs(found))]
+
+    def response(self, frequencies: Floats, output: str = "torque", source: str = "command") -> Any:
+        """Frequency response (frequencies,) of an output to an input, complex, in SI; frequencies [Hz].
+
+        ScenarioError for a name that is no output or input, and for a frequency at which the model has a pole.
+        """
+        row, column = _place(output, self.outputs, "output"), _place(source, self.inputs, "input")
+        eye, found = np.eye(len(self.states)), []
+        for frequency in np.asarray(frequencies, dtype=np.float64).ravel().tolist():
+            matrix = 2.0j * np.pi * frequency * eye - self.a
+            # States and their rates differ by powers of ten in SI: rank is that of rows and columns of one size.
+            rows = _sizes(np.abs(matrix), axis=1)
+            columns = _sizes(np.abs(matrix) / rows[:, None], axis=0)
+            if np.linalg.cond(matrix / rows[:, None] / columns) > _SINGULAR:
+                raise ScenarioError(
+                    f"{self.scenario.name}: the linear model has a pole at {frequency:g} Hz, where its response has no "
+                    "end; give another frequency"
+                )
+            found.append(self.c[row] @ np.linalg.solve(matrix, self.b[:, column]) + self.d[row, column])
+        return np.array(found)
+
+    def to_control(self) -> Any:
+        """Return the model as a ``control.StateSpace`` with its names; ScenarioError without the extra ``control``."""
+        if find_spec("control") is None:
+            raise ScenarioError(MISSING_CONTROL)
+        import control
+
+        names = {kind: [item.name for item in getattr(self, kind)] for kind in ("states", "inputs", "outputs")}
+        return control.ss(self.a, self.b, self.c, self.d, name=self.scenario.name.replace("-", "_"), **names)
+
+
+_SINGULAR = 1.0e13
+"""Condition number from which what a matrix says is rounding."""
+
+
+def _sizes(entries: Floats, axis: int) -> Floats:
+    """Return the largest size in each row or column of entries' sizes, 1 where all are 0."""
+    largest = np.max(entries, axis=axis, initial=0.0)
+    return np.where(largest > 0.0, largest, 1.0)
+
+
+def _place(name: str, items: Sequence[Variable], kind: str) -> int:
+    """Number of a variable; ScenarioError for a name that is none."""
+    names = [item.name for item in items]
+    if name not in names:
+        hint = nearest_name(name, names)
+        raise ScenarioError(f"the linear model has no {kind} '{one_line(name)}'{hint}; there are: {', '.join(names)}")
+    return names.index(name)
+
+
+DURATION = 1.0
+INTERVAL = 1.0e-3
+SHARES = tuple(np.geomspace(3.0e-4, 0.3, 13).tolist())
+"""Steps of the command over the command of the steady state [-]: three decades."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Steps:
+    """Torque [N m] after steps of the command, less that of the steady state: (steps, times) on the runs and linear.
+
+    ``amplitudes`` (steps,) of the command [-], ``times`` [s] after the step.
+    """
+
+    amplitudes: Floats
+    times: Floats
+    runs: Floats
+    linear: Floats
+
+    @property
+    def errors(self) -> Floats:
+        """Largest difference of the torque of each step [N m]."""
+        return np.asarray(np.max(np.abs(self.runs - self.linear), axis=1))
+
+    @property
+    def sizes(self) -> Floats:
+        """Largest change of the torque in each step [N m]."""
+        return np.asarray(np.max(np.abs(self.runs), axis=1))
+
+
+def steps_of(model: LinearModel, shares: tuple[float, ...] = SHARES) -> Steps:
+    """Steps of the command by some shares of the command of the steady state."""
+    command = _value(model, "command")
+    times: Floats = INTERVAL * np.arange(round(DURATION / INTERVAL) + 1, dtype=np.float64)
+    still, *runs = (_torque(model, command * (1.0 + share)) for share in (0.0, *shares))
+    amplitudes: Floats = command * np.array(shares, dtype=np.float64)
+    from scipy.linalg import expm
+
+    states = len(model.states)
+    column = [item.name for item in model.inputs].index("command")
+    row = [item.name for item in model.outputs].index("torque")
+    both = np.zeros((states + 1, states + 1))
+    both[:states, :states], both[:states, states] = model.a, model.b[:, column]
+    onward = expm(both * (times[1] - times[0]))
+    state, found = np.append(np.zeros(states), 1.0), []
+    for _ in times:
+        found.append(model.c[row] @ state[:states] + model.d[row, column])
+        state = onward @ state
+    linear = amplitudes[:, None] * np.array(found)
+    return Steps(amplitudes, times, np.array(runs) - still, linear)
+
+
+def _value(model: LinearModel, name: str) -> float:
+    return next(item.value for item in (*model.states, *model.inputs) if item.name == name)
+
+
+def _torque(model: LinearModel, command: float) -> Floats:
+    """Torque [N m] on the runs, from the steady state on, with another command."""
+    scenario = replace(
+        model.scenario,
+        control=Control(PYTHON_CONTROLLER, {}, INTERVAL),
+        duration=DURATION,
+        time_step=INTERVAL,
+        output_interval=INTERVAL,
+        initial_pressure_1=_value(model, "pressure_1"),
+        initial_pressure_2=_value(model, "pressure_2"),
+    )
+    run = plan_run(scenario)
+    record = replay(batch_of(run), StepInputs(np.full(run.step_count, command), {})).record[:, :, 0]
+    rows = state_row_numbers(run)
+    angle, *masses = (record[:, rows[f"state.{name}"]] for name in ("angle", "mass_1", "mass_2"))
+    pressure_1, pressure_2 = chamber_pressures(run.plant, angle, *masses)
+    every = max(1, run.steps_per_sample)
+    return np.asarray(run.plant.torque_constant * np.subtract(pressure_1, pressure_2))[::every]
+
+
+_POINTS = 400
+_DECADES = (0.1, 10.0)
+_FASTEST = 100.0
+"""Largest frequency [Hz] that is shown, unless the poles lie higher."""
+_SHOWN = (-5, -1)
+"""Which of the steps are drawn over time: one in the middle of the three decades, and the largest."""
+
+
+def frequency_figure(model: LinearModel) -> "matplotlib.figure.Figure":
+    """Return the response of the torque to the command: size and phase, and the phase with what is left out."""
+    from matplotlib.ticker import MultipleLocator
+
+    poles = np.abs(model.poles) / (2.0 * np.pi)
+    lowest = min(float(np.min(poles[poles > 0.0], initial=1.0)), 1.0)
+    frequencies = np.geomspace(_DECADES[0] * lowest, _FASTEST, _POINTS)
+    response = model.response(frequencies)
+    late = model.delays.command + model.delays.signals + 0.5 * model.delays.period
+    phase = np.degrees(np.unwrap(np.angle(response)))
+    with house_style():
+        margins = Margins(left=0.9, right=0.25, top=0.4, bottom=0.55, row_gap=0.25, label=0.6)
+        figure, panels = figure_of_panels((7.0, 5.0), margins, 2)
+        size, angle = panels[0][0], panels[1][0]
+        size.loglog(frequencies, np.abs(response), color=BLUE)
+        size.set_ylabel("torque per command (N m)")
+        angle.semilogx(frequencies, phase, color=BLUE, label="plant")
+        angle.semilogx(
+            frequencies,
+            phase - 360.0 * frequencies * late,
+            color=VERMILION,
+            linestyle="--",
+            label=f"with {1.0e3 * late:.3g} ms of dead time, late measurements and half a sample",
+        )
+        angle.set_ylim(max(-360.0, float(np.min(phase)) - 90.0), float(np.max(phase)) + 20.0)
+        angle.set_ylabel("phase (deg)")
+        angle.yaxis.set_major_locator(MultipleLocator(45.0))
+        angle.set_xlabel("frequency (Hz)")
+        angle.legend(loc="lower left")
+        mark_kind(figure, "simulated")
+        return figure
+
+
+def steps_figure(model: LinearModel) -> "matplotlib.figure.Figure":
+    """Return steps of the command on the runs and of the linear model, and their difference over the amplitude."""
+    steps = steps_of(model)
+    with house_style():
+        margins = Margins(left=0.9, right=0.25, top=0.4, bottom=0.55, row_gap=0.0, column_gap=1.0)
+        figure, panels = figure_of_free_panels((9.0, 3.8), margins, 1, 2)
+        over_time, over_amplitude = panels[0]
+        for number, colour in zip(_SHOWN, (BLUE, VERMILION), strict=True):
+            share = steps.amplitudes[number] / steps.amplitudes[-1] * 0.3
+            label = f"command {100.0 * share:+.3g} %"
+            over_time.plot(steps.times, steps.runs[number] / steps.amplitudes[number], color=colour, label=label)
+        over_time.plot(steps.times, steps.linear[-1] / steps.amplitudes[-1], "--", color=BLACK, label="linear")
+        over_time.set_xlabel("time after the step (s)")
+        over_time.set_ylabel("change of torque per command (N m)")
+        over_time.legend(loc="lower right")
+        over_amplitude.loglog(steps.sizes, steps.errors, "o", color=BLUE, markersize=4, label="largest difference")
+        square = steps.errors[0] * (steps.sizes / steps.sizes[0]) ** 2
+        over_amplitude.loglog(steps.sizes, square, "--", color=GREY, label="square of the amplitude")
+        over_amplitude.set_xlabel("largest change of torque in a step (N m)")
+        over_amplitude.set_ylabel("runs less linear model (N m)")
+        over_amplitude.legend(loc="upper left")
+        mark_kind(figure, "simulated")
+        return figure
+
+
+_FREQUENCY_CAPTION = (
+    "The torque for a small sine of the command; dashed: with the dead time, the age of the measurements and half a "
+    "sample period, which are not in the model."
+)
+_STEPS_CAPTION = (
+    "Steps of the command from the steady state, on the runs and of the linear model, in which the difference grows "
+    "with the square of the amplitude."
+)
+_SEVERAL = 1.0e-6
+"""Imaginary part of a pole, over its size, below which it is real."""
+
+
+def answer_of(model: LinearModel) -> Answer:
+    """Return the answer of a linear model."""
+    answers = bool(np.any(model.b[:, 0]) or np.any(model.d[:, 0]))
+    frequency = Figure("frequency-response", _FREQUENCY_CAPTION, lambda: frequency_figure(model)) if answers else None
+    sections = [
+        Section("The point", table=_point_table(model)),
+        Section("Which side was taken", table=Table((), tuple(model.sides.items())), remarks=_edges(model)),
+        Section("Poles", table=_pole_table(model), figure=frequency),
+        *[
+            Section(f"Matrix {name} (SI)", table=_matrix(values, rows, columns), is_detail=name in "CD")
+            for name, values, rows, columns in (
+                ("A", model.a, model.states, model.states),
+                ("B", model.b, model.states, model.inputs),
+                ("C", model.c, model.outputs, model.states),
+                ("D", model.d, model.outputs, model.inputs),
+            )
+        ],
+    ]
+    # True for a steady state of a held ankle whose valve follows at once and is open: the runs can begin there.
+    motion = model.scenario.motion
+    is_locked = isinstance(motion, PrescribedMotion) and motion.profile.kind == "constant"
+    is_gas_alone = all(item.name.startswith("pressure") for item in model.states)
+    if model.is_steady and is_locked and is_gas_alone and 0.0 < abs(_value(model, "command")) < 0.7:
+        drawn = Figure("steps", _STEPS_CAPTION, lambda: steps_figure(model))
+        sections.append(Section("How far it holds", figure=drawn))
+    size = f"{len(model.states)} states, {len(model.inputs)} inputs, {len(model.outputs)} outputs"
+    said = [f"the plant without controller and sensors: {size}; differences from the point, SI units"]
+    if model.time is not None:
+        said.append(
+            "the point is no steady state: the model is of small differences from the run itself, and holds only as "
+            "long as the run stays near the point"
+        )
+    late = (
+        ("dead time of the valve", model.delays.command),
+        ("age of the measurements", model.delays.signals),
+        ("sample period", model.delays.period),
+    )
+    left_out = ", ".join(f"{name} {1.0e3 * value:g} ms" for name, value in late if value > 0.0)
+    return Answer(
+        name="linearise",
+        kicker="Linear model",
+        title=f"Linear model of {model.scenario.name}, {_when(model)}",
+        lead=(*said, f"not in the model: {left_out}, noise, resolution and bandwidth of sensors"),
+        sections=tuple(sections),
+        data=_data(model),
+        files={"linearise.npz": lambda: _arrays(model)},
+    )
+
+
+def _when(model: LinearModel) -> str:
+    return "in its steady state" if model.time is None else f"at {model.time:g} s"
+
+
+def _shown(item: Variable) -> str:
+    """A value in the unit in which a person is shown it."""
+    quantity = quantity_of_unit(item.unit)
+    if quantity in QUANTITIES:
+        return quantity_text(item.value, quantity, ".5g")
+    return f"{item.value:.5g} {'' if item.unit == '1' else item.unit}".rstrip()
+
+
+def _point_table(model: LinearModel) -> Table:
+    states = {item.name for item in model.states}
+    kinds = (("state", model.states), ("input", model.inputs))
+    rows = [(kind, item.name, item.unit, _shown(item)) for kind, items in kinds for item in items]
+    rows += [("output", item.name, item.unit, _shown(item)) for item in model.outputs if item.name not in states]
+    return Table((Column(""), Column("name"), Column("unit in the model"), Column("at the point")), tuple(rows), left=3)
+
+
+def _edges(model: LinearModel) -> tuple[str, ...]:
+    """Where the point lies on an edge of the plant, and what was taken to hold."""
+    return tuple(
+        f"the point lies on an edge, with another linear model beyond: `{edge.place.partition(': ')[2]}` in "
+        f"{edge.place.partition(': ')[0]} was taken to be {'true' if edge.is_true else 'false'}"
+        for edge in model.edges
+    )
+
+
+def _pole_table(model: LinearModel) -> Table:
+    """Poles with their time constants; a pair of complex ones is one row with its frequency and damping."""
+    rows: list[tuple[str | float | None, ...]] = []
+    for pole in model.poles.tolist():
+        size = abs(pole)
+        if abs(pole.imag) <= _SEVERAL * size:
+            rows.append((f"{pole.real:.5g}", None if pole.real == 0.0 else -1.0 / pole.real, None, None))
+        elif pole.imag > 0.0:
+            pair = f"{pole.real:.5g} ± {pole.imag:.5g}i"
+            rows.append((pair, None, size / (2.0 * np.pi), -pole.real / size))
+    head = (
+        Column("pole (1/s)"),
+        Column("time constant", "time", ".4g"),
+        Column("frequency", "frequency", ".4g"),
+        Column("damping ratio", "", ".3f"),
+    )
+    return Table(head, tuple(rows))
+
+
+def _matrix(values: Floats, rows: Sequence[Variable], columns: Sequence[Variable]) -> Table:
+    head = (Column(""), *(Column(item.name, "", ".5g") for item in columns))
+    return Table(head, tuple((item.name, *row) for item, row in zip(rows, values.tolist(), strict=True)))
+
+
+def _data(model: LinearModel) -> dict[str, Any]:
+    rates = model.rates.tolist()
+    return {
+        "format": "ppafo linear model",
+        "schema_version": 1,
+        "ppafo": __version__,
+        "scenario": model.scenario.name,
+        "overrides": list(model.scenario.origin.overrides),
+        "at": "equilibrium" if model.time is None else model.time,
+        "states": [{**_variable(item), "rate": rate} for item, rate in zip(model.states, rates, strict=True)],
+        "inputs": [_variable(item) for item in model.inputs],
+        "outputs": [_variable(item) for item in model.outputs],
+        "A": model.a.tolist(),
+        "B": model.b.tolist(),
+        "C": model.c.tolist(),
+        "D": model.d.tolist(),
+        "poles": [{"real": pole.real, "imaginary": pole.imag} for pole in model.poles.tolist()],
+        "sides": dict(model.sides),
+        "edges": [{"place": edge.place, "is_true": edge.is_true} for edge in model.edges],
+        "left_out": {
+            "command_delay": model.delays.command,
+            "signal_delay": model.delays.signals,
+            "sample_period": model.delays.period,
+        },
+    }
+
+
+def _variable(item: Variable) -> dict[str, str | float]:
+    return {"name": item.name, "unit": item.unit, "value": item.value}
+
+
+def _arrays(model: LinearModel) -> bytes:
+    """The matrices, names, units and values at the point as a NumPy archive."""
+    arrays: dict[str, Any] = {"A": model.a, "B": model.b, "C": model.c, "D": model.d, "rates": model.rates}
+    for kind in ("states", "inputs", "outputs"):
+        items = getattr(model, kind)
+        arrays[kind] = np.array([item.name for item in items])
+        arrays[f"{kind}_units"] = np.array([item.unit for item in items])
+        arrays[f"{kind}_values"] = np.array([item.value for item in items])
+    written = io.BytesIO()
+    np.savez(written, allow_pickle=False, **arrays)
+    return written.getvalue()

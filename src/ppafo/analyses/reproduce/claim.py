@@ -1,0 +1,458 @@
+"""Claims of the paper beside our numbers, the paper's numbers as reported, and the claims that are arithmetic."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.errors import ParameterError
+from ppafo.model.gas import choked_flow_constant, critical_pressure_ratio, subsonic_flow_constant
+from ppafo.model.orifice import isentropic_flow_function
+from ppafo.parameters import ParameterSet, load_parameter_set
+from ppafo.parameters.audit.evidence import Evidence, Interval, digits
+from ppafo.parameters.device import Gas
+from ppafo.parameters.publications.publication import paper_entries
+from ppafo.report.writing import format_reported_quantity, quantity
+
+Verdict = Literal[
+    "consistent",
+    "inconsistent_as_reported",
+    "met_by_fitted_settings",
+    "plausible",
+    "undetermined",
+    "not_testable",
+]
+VERDICTS: dict[Verdict, str] = {
+    "consistent": "consistent",
+    "inconsistent_as_reported": "inconsistent as reported",
+    "met_by_fitted_settings": "met by fitted settings",
+    "plausible": "plausible",
+    "undetermined": "undetermined",
+    "not_testable": "not testable",
+}
+"""Every verdict in words. Only the first two follow from reported numbers alone."""
+MEANINGS: dict[Verdict, str] = {
+    "consistent": "the reported numbers agree with each other",
+    "inconsistent_as_reported": "the reported numbers do not agree with each other",
+    "met_by_fitted_settings": "simulated with settings that were chosen for it, which is no evidence for them",
+    "plausible": "simulated with assumed settings that were not chosen for it",
+    "undetermined": "depends on settings that are not reported",
+    "not_testable": "needs a measurement that is not published",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """A row of the comparison: what the paper states and our number, both in ``unit``; None where it is no number.
+
+    ``words`` and ``found`` say the same as they are shown where it is no single number. ``source`` is where the paper
+    says it, ``assumptions`` what our number rests on beside the paper, ``note`` why the verdict is what it is.
+    ``range`` has the least and the largest of our numbers over what is not known. A claim that has to hold for this
+    package to be sound has a window that ``value`` must fall into.
+    """
+
+    id: str
+    statement: str
+    paper: float | None
+    value: float | None
+    unit: str
+    verdict: Verdict
+    source: str
+    note: str
+    assumptions: tuple[str, ...] = ()
+    window: tuple[float, float] | None = None
+    words: str = ""
+    found: str = ""
+    range: tuple[float, float] | None = None
+
+    @property
+    def published(self) -> str:
+        """What the paper says, as it is shown."""
+        return self.words if self.paper is None else format_reported_quantity(self.paper, self.unit)
+
+    @property
+    def ours(self) -> str:
+        """What is found here, as it is shown."""
+        return self.found or quantity(self.value, self.unit, 3)
+
+    @property
+    def is_missed(self) -> bool:
+        """True where the claim has a window and our number is not in it."""
+        if self.window is None:
+            return False
+        return self.value is None or not self.window[0] <= self.value <= self.window[1]
+
+    def document(self) -> dict[str, Any]:
+        """Return the claim as plain data for ``claims.json``."""
+        return {
+            "id": self.id,
+            "statement": self.statement,
+            "paper": self.paper,
+            "words": self.words,
+            "value": self.value,
+            "found": self.found,
+            "range": None if self.range is None else list(self.range),
+            "unit": self.unit,
+            "verdict": self.verdict,
+            "assumptions": list(self.assumptions),
+            "source": self.source,
+            "note": self.note,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Observation:
+    """What the text tells, whether the simulated recording shows it, and the numbers that decide it.
+
+    ``difference`` says what the recording shows beyond the sentence, where that is not what the paper tells.
+    """
+
+    id: str
+    statement: str
+    holds: bool
+    evidence: str
+    source: str
+    difference: str = ""
+
+
+def stated_claim(
+    identifier: str,
+    value: float | None,
+    verdict: Verdict,
+    note: str,
+    assumptions: tuple[str, ...] = (),
+    window: tuple[float, float] | None = None,
+    found: str = "",
+) -> Claim:
+    """Return the claim of an entry of the paper's file with our number and the verdict on it."""
+    entry = paper_entries()[identifier]
+    return Claim(
+        id=identifier,
+        statement=entry.statement,
+        paper=entry.published,
+        value=value,
+        unit=entry.unit or "-",
+        verdict=verdict,
+        source=entry.where,
+        note=note,
+        assumptions=assumptions,
+        window=window,
+        words=entry.words,
+        found=found,
+    )
+
+
+def told_claim(
+    identifier: str, statement: str, observations: Sequence[Observation], assumptions: tuple[str, ...]
+) -> Claim:
+    """Return the claim on what the text tells, statement by statement, of a recording."""
+    missing = [item.id for item in observations if not item.holds]
+    note = "Each statement with its numbers is listed below."
+    if missing:
+        note = f"Not shown: {', '.join(missing)}."
+    return Claim(
+        id=identifier,
+        statement=statement,
+        paper=None,
+        value=float(len(observations) - len(missing)),
+        unit="-",
+        verdict="undetermined" if missing else "met_by_fitted_settings",
+        source="; ".join(dict.fromkeys(item.source for item in observations)),
+        note=note,
+        assumptions=assumptions,
+        words=f"{len(observations)} statements",
+        found=f"{len(observations) - len(missing)} shown",
+    )
+
+
+def observation(identifier: str, holds: bool, evidence: str, difference: str = "") -> Observation:
+    """Return what an entry of the paper's file tells, with whether the recording shows it."""
+    entry = paper_entries()[identifier]
+    return Observation(identifier, entry.statement, holds, evidence, entry.where, difference)
+
+
+def verdict_counts(claims: Sequence[Claim]) -> dict[Verdict, int]:
+    """Return how many claims have each verdict, in the order of ``VERDICTS``."""
+    return {verdict: sum(claim.verdict == verdict for claim in claims) for verdict in VERDICTS}
+
+
+def count_sentence(claims: Sequence[Claim]) -> str:
+    """Return how many claims have each verdict, for example ``16 claims: 2 consistent, 3 inconsistent as reported``."""
+    return count_words([claim.verdict for claim in claims])
+
+
+def count_words(verdicts: Sequence[Verdict]) -> str:
+    """Return the same of verdicts alone."""
+    found = ", ".join(f"{count} {words}" for key, words in VERDICTS.items() if (count := verdicts.count(key)))
+    return f"{len(verdicts)} claims: {found}"
+
+
+REPORTED_SET = "ppafo2011-printed"
+
+
+@dataclass(frozen=True, slots=True)
+class Reported:
+    """Read access to the reported set; every requested value has to be there."""
+
+    parameter_set: ParameterSet
+    evidence: Evidence
+
+    def number(self, path: str) -> float:
+        """Return the number as reported, in its reported unit."""
+        return self._entry_of(path)[0]
+
+    def unit(self, path: str) -> str:
+        """Return the reported unit, ``-`` for a plain number."""
+        return self._entry_of(path)[1] or "-"
+
+    def source(self, path: str) -> str:
+        """Return where the paper prints it."""
+        self._entry_of(path)
+        return self.parameter_set.numbers[path].source
+
+    def quotation(self, path: str) -> str:
+        """Return number and unit for a sentence, for example ``8.4 g m^2``."""
+        number, unit = self._entry_of(path)
+        return f"{number:g} {unit}".rstrip()
+
+    def in_si(self, path: str) -> float:
+        """Return the value in SI units."""
+        value = self.evidence.number(path)
+        if value is None:
+            raise self._lack(path)
+        return value
+
+    def in_reported_unit(self, path: str, value: float) -> float:
+        """Return an SI value in the unit in which the paper prints the quantity at a path (a unit without offset)."""
+        return value * self.number(path) / self.in_si(path)
+
+    def range(self, path: str) -> Interval:
+        """Return the range in SI that the reported digits leave open, without sign."""
+        interval = self.evidence.magnitude(path)
+        if interval is None:
+            raise self._lack(path)
+        return interval
+
+    def gas(self) -> Gas:
+        """Return the reported gas."""
+        gas = self.evidence.gas()
+        if gas is None:
+            raise self._lack("gas")
+        return gas
+
+    def _entry_of(self, path: str) -> tuple[float, str]:
+        entry = self.parameter_set.numbers.get(path)
+        if entry is None:
+            raise self._lack(path)
+        return entry.value, entry.unit
+
+    def _lack(self, path: str) -> ParameterError:
+        return ParameterError(f"{self.parameter_set.file}: '{path}' is missing; the claims of the paper need it")
+
+
+def load_reported() -> Reported:
+    """Return the paper's numbers, exactly as reported."""
+    parameter_set = load_parameter_set(REPORTED_SET)
+    return Reported(parameter_set, Evidence(parameter_set, parameter_set.declarations()))
+
+
+_INERTIA = "foot_plate.inertia"
+
+
+def arithmetic_claims(reported: Reported) -> list[Claim]:
+    """Return the claims that the reported numbers alone decide."""
+    return [
+        _orifice_constants(reported),
+        _step_percentages(),
+        _damping_and_friction(reported),
+        _discharge_coefficient(reported),
+        _swept_volume(reported),
+    ]
+
+
+def _verdict(holds: bool) -> Verdict:
+    return "consistent" if holds else "inconsistent_as_reported"
+
+
+def _orifice_constants(reported: Reported) -> Claim:
+    """Compare C1, C2 and the critical ratio with the gas as reported; equations (6), (7)."""
+    gas = reported.gas()
+    k, constant, temperature = gas.heat_capacity_ratio, gas.specific_gas_constant, gas.temperature
+    found = {
+        "reported.choked_flow_constant": choked_flow_constant(k, constant, temperature),
+        "reported.subsonic_flow_constant": subsonic_flow_constant(k, constant, temperature),
+        "reported.critical_pressure_ratio": 1.0 / critical_pressure_ratio(k),
+    }
+    holds = all(reported.range(path).meets(Interval(value, value)) for path, value in found.items())
+    return Claim(
+        id="orifice_constants",
+        statement="C1, C2 and the critical pressure ratio follow from k, molar mass and temperature of the gas.",
+        paper=None,
+        value=None,
+        unit="-",
+        verdict=_verdict(holds),
+        source=", ".join(reported.source(path) for path in found),
+        note="To the reported digits, with the exponent (k + 1)/(k - 1) under the root of C1 and not the reported one.",
+        words=", ".join(reported.quotation(path) for path in found),
+        found=", ".join(quantity(value, reported.unit(path)) for path, value in found.items()),
+    )
+
+
+STEP_ERRORS = {"position": 110.0, "pressure_1": 55.0, "pressure_2": 55.0, "pressure_difference": 110.0}
+"""Reported errors of the step response, and the full ranges [deg, psi] that the paper takes them over."""
+
+
+def _step_percentages() -> Claim:
+    """Compare the reported percentages with the reported errors over the reported ranges."""
+    entries = paper_entries()
+    errors = [entries[f"step_rms_{name}"].published or 0.0 for name in STEP_ERRORS]
+    percents = [entries[f"step_percent_{name}"].published or 0.0 for name in STEP_ERRORS]
+    ranges = list(STEP_ERRORS.values())
+    holds = all(
+        Interval(*(100.0 * end / full for end in digits(error))).meets(digits(percent))
+        for error, full, percent in zip(errors, ranges, percents, strict=True)
+    )
+    found = [100.0 * error / full for error, full in zip(errors, ranges, strict=True)]
+    return Claim(
+        id="step_percentages",
+        statement="The errors of the step response in percent of the full ranges of 110 deg, 55 psi and 110 psi.",
+        paper=None,
+        value=None,
+        unit="%",
+        verdict=_verdict(holds),
+        source=entries["step_percent_position"].where,
+        note="Reported errors over reported ranges; nothing is simulated.",
+        words=f"{', '.join(f'{percent:g}' for percent in percents)} %",
+        found=f"{', '.join(f'{percent:.2f}' for percent in found)} %",
+    )
+
+
+_RATES = {
+    "friction.viscous_damping": "reported.velocity_over_acceleration",
+    "friction.dynamic_torque": "reported.stopping_deceleration",
+}
+"""Products of the inertia, and what it is multiplied by; a rate in 1/s is one, whatever it is called."""
+
+
+def _damping_and_friction(reported: Reported) -> Claim:
+    """Compare damping and dynamic friction with inertia times the reported rates: one inertia decides both."""
+    inertia = reported.range(_INERTIA)
+    rates = {path: abs(reported.in_si(rate)) for path, rate in _RATES.items()}
+    holds = all(inertia.times(reported.range(rate)).meets(reported.range(path)) for path, rate in _RATES.items())
+    found = {path: reported.in_reported_unit(path, reported.in_si(_INERTIA) * rate) for path, rate in rates.items()}
+    needed = [reported.in_reported_unit(_INERTIA, reported.in_si(path) / rate) for path, rate in rates.items()]
+    unit = reported.unit(_INERTIA)
+    return Claim(
+        id="damping_and_friction",
+        statement=f"Damping and dynamic friction are the inertia, {reported.quotation(_INERTIA)}, "
+        "times measured rates.",
+        paper=None,
+        value=None,
+        unit="-",
+        verdict=_verdict(holds),
+        source=reported.source("friction.viscous_damping"),
+        note="The products hold to the reported digits."
+        if holds
+        else f"The reported products need inertias of {' and '.join(f'{value:.2g}' for value in needed)} {unit}: "
+        f"one slip, a factor of ten in the inertia, explains both, so that it counts once.",
+        words=", ".join(reported.quotation(path) for path in found),
+        found=", ".join(quantity(value, reported.unit(path), 3) for path, value in found.items()),
+    )
+
+
+def _discharge_coefficient(reported: Reported) -> Claim:
+    """Compare the reported Cd with what the reported flow needs through each reported area; equation (6)."""
+    found, passed, held = [], [], []
+    for valve in ("solenoid", "proportional"):
+        coefficient, area = f"valves.{valve}.discharge_coefficient", f"valves.{valve}.area"
+        flow = f"reported.valves.{valve}.mass_flow"
+        per_area = _flow_per_area(reported, f"reported.valves.{valve}.flow_pressure")
+        needed = reported.range(flow).over(reported.range(area)).over(Interval(per_area, per_area))
+        held.append(needed.meets(reported.range(coefficient)))
+        found.append(reported.in_si(flow) / (per_area * reported.in_si(area)))
+        passed.append(1e3 * reported.in_si(coefficient) * reported.in_si(area) * per_area)
+    flow, pressure = (reported.quotation(f"reported.valves.solenoid.{name}") for name in ("mass_flow", "flow_pressure"))
+    areas = " and ".join(reported.quotation(f"valves.{valve}.area") for valve in ("solenoid", "proportional"))
+    path = "valves.solenoid.discharge_coefficient"
+    return Claim(
+        id="discharge_coefficient",
+        statement=f"One discharge coefficient gives {flow} at {pressure} through {areas}.",
+        paper=reported.number(path),
+        value=None,
+        unit="-",
+        verdict=_verdict(all(held)),
+        source=reported.source(path),
+        note="Agrees to the reported digits."
+        if all(held)
+        else f"No one coefficient gives the same flow through both areas; {reported.number(path):g} passes "
+        f"{' and '.join(f'{value:.3g}' for value in passed)} g/s. It is a plain number: the reported unit "
+        f"{reported.unit(path)} does not fit equation (6).",
+        assumptions=(
+            f"supply.atmospheric_pressure = {STANDARD_ATMOSPHERE:g} Pa_a: not reported; the standard atmosphere",
+            "the measured flow leaves into the atmosphere through one opening of the reported area",
+        ),
+        found=" and ".join(f"{value:.3g}" for value in found),
+    )
+
+
+_VANE_EFFICIENCY = Interval(0.7, 0.9)
+"""Work at the shaft over the work of the gas, of vane actuators in general."""
+
+
+def _swept_volume(reported: Reported) -> Claim:
+    """Compare the volume per angle with the torque constant over the efficiency of vanes: virtual work."""
+    path, constant = "actuator.volume_per_angle", "actuator.torque_constant"
+    needed = reported.range(constant).over(_VANE_EFFICIENCY)
+    low, high = (reported.in_reported_unit(path, end) for end in needed)
+    efficiency = reported.in_si(constant) / reported.in_si(path)
+    return Claim(
+        id="swept_volume",
+        statement="The vane sweeps this volume per angle, from the data sheet of the actuator.",
+        paper=reported.number(path),
+        value=None,
+        unit=reported.unit(path),
+        verdict=_verdict(needed.meets(reported.range(path))),
+        source=reported.source(path),
+        note=f"Virtual work with the reported torque constant. {reported.quotation(path)} would give the shaft "
+        f"{100.0 * efficiency:.0f} % of the gas's work. Equation (5) is negative beyond 90 deg; figure 7 goes to 130.",
+        assumptions=("a torque efficiency of 70 to 90 %, that of vane actuators in general",),
+        range=(low, high),
+        found=f"{low:.0f} to {high:.0f} {reported.unit(path)}",
+    )
+
+
+def _flow_per_area(reported: Reported, pressure_path: str) -> float:
+    """Flow of Cd A = 1 m^2 into the atmosphere [kg/(s m^2)]; equations (6), (7)."""
+    gas, pressure = reported.gas(), reported.in_si(pressure_path)
+    k = gas.heat_capacity_ratio
+    psi = isentropic_flow_function(min(STANDARD_ATMOSPHERE / pressure, 1.0), k)
+    return choked_flow_constant(k, gas.specific_gas_constant, gas.temperature) * pressure * psi
+
+
+NOT_PUBLISHED = (
+    "k_actuator",
+    "static_friction",
+    "leak_area",
+    *(f"step_rms_{name}" for name in STEP_ERRORS),
+    "large_and_heavy",
+    "unmodelled_dynamics",
+    "temperature_would_help",
+)
+"""Statements that only recordings or masses could test, neither of which is published."""
+
+
+def not_published_claim() -> Claim:
+    """Return the one claim on all that nothing published can test."""
+    return Claim(
+        id="not_published",
+        statement="Torque constant, static friction, leak, the four RMS errors of the step response with what explains "
+        "them (dynamics beyond the model, temperature), and size and weight of the proportional valve.",
+        paper=None,
+        value=None,
+        unit="-",
+        verdict="not_testable",
+        source="sections 'Identification', 'PPAFO Model Validation' and 'Discussion'",
+        note="The recordings are not published, nor masses or sizes. That the procedures return known values is tested "
+        "in tests/, on synthetic recordings; it says nothing about the paper's device.",
+        words=f"{len(NOT_PUBLISHED)} statements",
+    )

@@ -1,0 +1,365 @@
+"""A publication as a file of claims: what it states, where, what is assumed, and how our number is computed."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ppafo.analyses.reproduce.claim import Verdict
+from ppafo.analyses.reproduce.event_times import WEARERS, rms_of, timed_events, uneven_course
+from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.documents.toml_text import label
+from ppafo.errors import ScenarioError, SimulationError, UnitError, nearest_name, refused_as
+from ppafo.parameters import load_device
+from ppafo.parameters.publications.publication import FILE, PAPER, ClaimEntry, read_publication
+from ppafo.progress import Progress, Report
+from ppafo.report.writing import format_reported_quantity, quantity
+from ppafo.units import from_si, parse_quantity
+from ppafo.walking.loading import load_walk
+from ppafo.walking.motion import walk_of
+from ppafo.walking.result import WalkResult, integral_of_a_stride
+from ppafo.walking.walk import healthy_metrics, walk
+
+DEVICE = "ppafo2011"
+MINUTES = 0.5
+"""A walk without noise repeats itself stride by stride, so that longer ones say the same."""
+PAIR, RECYCLING = "solenoid", "solenoid-recycling"
+"""The walks that direct event control and recycling stand for."""
+KEEPS_GAIT = "wearer.keeps_gait=1"
+"""A nondisabled wearer: muscles keep the measured ankle."""
+Values = Mapping[str, str | float]
+
+
+@dataclass(frozen=True, slots=True)
+class Computation:
+    """How a number comes about: what it is, its SI unit, its arguments with their SI units, and the function."""
+
+    summary: str
+    unit: str
+    arguments: Mapping[str, str]
+    compute: Callable[[Values], float]
+
+
+def _pressure(values: Values) -> float:
+    return float(values["pressure"])
+
+
+@lru_cache(maxsize=16)
+def _walked(name: str, overrides: tuple[str, ...]) -> WalkResult:
+    """Return a shipped walk; SimulationError where it does not reach its end with help."""
+    result = walk(load_walk(name, overrides), MINUTES)
+    if not (result.status.is_completed and result.is_helped):
+        raise SimulationError(f"{name}: {result.status.message}; the claims need a walk with help in most strides")
+    return result
+
+
+def _nondisabled(name: str, values: Values) -> WalkResult:
+    held = (f"valve.holding_time={values['holding_time']!r} s",) if name == RECYCLING else ()
+    return _walked(name, (KEEPS_GAIT, *held))
+
+
+def _work_of_a_stride(result: WalkResult) -> float:
+    """Return the net work [J] of the actuator torque on the ankle, mean over the strides with help."""
+    return integral_of_a_stride(result, result.recording["torque"])
+
+
+def held_torque(values: Values) -> float:
+    """Torque [N m] that a gauge pressure holds at rest: torque constant times pressure. Equation (2)."""
+    constant = load_device(DEVICE).actuator.torque_constant
+    return constant * (_pressure(values) - STANDARD_ATMOSPHERE)
+
+
+def share_of_healthy_moment(values: Values) -> float:
+    """Torque that a pressure holds over the largest ankle moment of the built-in gait [-]."""
+    configuration = load_walk(PAIR)
+    moment = walk_of(configuration).gait.curve("ankle_moment").values_at(np.linspace(0.0, 1.0, 1001))
+    return held_torque(values) / (walk_of(configuration).wearer.body_mass * float(moment.max()))
+
+
+def swept_volume(_values: Values) -> float:
+    """Volume per angle [m^3/rad] of the device."""
+    return load_device(DEVICE).actuator.volume_per_angle
+
+
+def walking_torque(values: Values) -> float:
+    """Largest torque [N m] of the mean stride of the walk 'solenoid' at a supply pressure."""
+    overrides = (f"supply.pressure={_pressure(values)!r} Pa_a",)
+    return float(_walked(PAIR, overrides).averages["torque"].mean.max())
+
+
+def dorsiflexor_share(values: Values) -> float:
+    """Moment of a nondisabled wearer's dorsiflexors with the device over that without any [-], means of a stride."""
+    worn = _nondisabled(PAIR, values)
+    return worn.metrics["dorsiflexor_moment"].value / healthy_metrics(worn.scenario)["dorsiflexor_moment"].value
+
+
+def recycling_saving(values: Values) -> float:
+    """Share [-] of the gas of a stride that the valve between the chambers saves against event-based control."""
+    plain, recycling = (_nondisabled(name, values).metrics["gas"].value for name in (PAIR, RECYCLING))
+    return 1.0 - recycling / plain
+
+
+def recycling_work(values: Values) -> float:
+    """Net work of a stride with the valve between the chambers over that of event-based control [-]."""
+    plain, recycling = (_work_of_a_stride(_nondisabled(name, values)) for name in (PAIR, RECYCLING))
+    return recycling / plain
+
+
+def event_reduction(wearer: str, _values: Values) -> float:
+    """Share [-] by which state estimation lowers the error of event times of one wearer, against thresholds."""
+    configuration = load_walk(PAIR, WEARERS[wearer])
+    course = uneven_course(2.0 / walk_of(configuration).gait.stride_time)
+    errors = []
+    for timing in ("thresholds", "estimated"):
+        walked = load_walk(PAIR, (*WEARERS[wearer], f"timing.kind={timing}"))
+        walked = replace(walked, motion=replace(walk_of(walked), course=course))
+        errors.append(rms_of([event.errors for event in timed_events(walked, 1.0).values()]))
+    return 1.0 - errors[1] / errors[0]
+
+
+_OF_PRESSURE, _OF_RECYCLING = {"pressure": "Pa_a"}, {"holding_time": "s"}
+COMPUTATIONS: dict[str, Computation] = {
+    "held_torque": Computation("torque constant times gauge pressure", "N m", _OF_PRESSURE, held_torque),
+    "share_of_healthy_moment": Computation(
+        "the same over the largest ankle moment of the built-in gait", "1", _OF_PRESSURE, share_of_healthy_moment
+    ),
+    "swept_volume": Computation("volume per angle of the chambers", "m^3/rad", {}, swept_volume),
+    "walking_torque": Computation(
+        "largest torque of the mean stride of the walk 'solenoid'", "N m", _OF_PRESSURE, walking_torque
+    ),
+    "dorsiflexor_share": Computation(
+        "moment of the dorsiflexors of a nondisabled wearer with the device over that without",
+        "1",
+        {},
+        dorsiflexor_share,
+    ),
+    "recycling_saving": Computation(
+        "gas of a stride saved by 'solenoid-recycling' against 'solenoid', nondisabled wearer",
+        "1",
+        _OF_RECYCLING,
+        recycling_saving,
+    ),
+    "recycling_work": Computation(
+        "net work of a stride with 'solenoid-recycling' over that with 'solenoid', nondisabled wearer",
+        "1",
+        _OF_RECYCLING,
+        recycling_work,
+    ),
+    "healthy_event_reduction": Computation(
+        "error of event times less with state estimation than with thresholds, nondisabled wearer, uneven strides",
+        "1",
+        {},
+        partial(event_reduction, "healthy"),
+    ),
+    "impaired_event_reduction": Computation(
+        "error of event times less with state estimation than with thresholds, drop foot, uneven strides",
+        "1",
+        {},
+        partial(event_reduction, "impaired"),
+    ),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class PublishedClaim:
+    """A claim whose computation is known to exist; ``arguments`` in SI."""
+
+    entry: ClaimEntry
+    computation: Computation | None
+    arguments: Mapping[str, str | float]
+    source: str
+
+    def value(self) -> float | None:
+        """Return our number in the unit of the claim, None where nothing is computed; SimulationError if it fails."""
+        if self.computation is None:
+            return None
+        return from_si(self.computation.compute(self.arguments), self.entry.unit, self.computation.unit)
+
+
+@dataclass(frozen=True, slots=True)
+class Publication:
+    """A publication with its claims in the order of the file."""
+
+    name: str
+    title: str
+    citation: str
+    claims: tuple[PublishedClaim, ...]
+
+
+def load_publication(name_or_path: str | Path) -> Publication:
+    """Return a publication of the package by its name, or any other by its file; ScenarioError where it is wrong."""
+    read, file = read_publication(name_or_path)
+    claims = tuple(_checked(entry, read.citation, file) for entry in read.claims)
+    return Publication(read.name, read.title, read.citation, claims)
+
+
+def _checked(entry: ClaimEntry, citation: str, file: str) -> PublishedClaim:
+    place = f"{file}: claims.{entry.id}"
+    source = f"{entry.source or citation}, {entry.where}"
+    if bool(entry.computation) == bool(entry.not_testable):
+        raise ScenarioError(f"{place}: give either computation or not_testable, which says why there is none")
+    if entry.not_testable:
+        return PublishedClaim(entry, None, {}, source)
+    if entry.computation not in COMPUTATIONS:
+        hint = nearest_name(entry.computation, COMPUTATIONS)
+        known = ", ".join(COMPUTATIONS)
+        raise ScenarioError(f"{place}.computation: there is no '{entry.computation}'{hint}; available: {known}")
+    if entry.at_least is None and entry.at_most is None:
+        raise ScenarioError(f"{place}: give at_least or at_most, or both: what agrees with the claim")
+    low = -math.inf if entry.at_least is None else entry.at_least
+    high = math.inf if entry.at_most is None else entry.at_most
+    if low > high:
+        raise ScenarioError(f"{place}: at_least = {low:g} lies above at_most = {high:g}: no number agrees")
+    if entry.published is not None and not low <= entry.published <= high:
+        name, limit = ("at_least", low) if entry.published < low else ("at_most", high)
+        raise ScenarioError(
+            f"{place}: published = {entry.published:g} does not agree with itself, {name} = {limit:g}; widen the range"
+        )
+    computation = COMPUTATIONS[entry.computation]
+    with refused_as(ScenarioError, f"{place}.unit", UnitError):
+        from_si(1.0, entry.unit, computation.unit)
+    return PublishedClaim(entry, computation, _arguments(entry, computation, place), source)
+
+
+def _arguments(entry: ClaimEntry, computation: Computation, place: str) -> dict[str, str | float]:
+    wanted = ", ".join(computation.arguments)
+    for name in entry.arguments:
+        if name not in computation.arguments:
+            hint = nearest_name(name, computation.arguments)
+            raise ScenarioError(f"{place}.arguments: '{name}' is unknown{hint}; {entry.computation} takes {wanted}")
+    values: dict[str, str | float] = {}
+    for name, unit in computation.arguments.items():
+        if name not in entry.arguments:
+            raise ScenarioError(f"{place}.arguments: '{name}' is missing; {entry.computation} takes {wanted}")
+        values[name] = _argument(entry.arguments[name], unit, f"{place}.arguments.{name}")
+    return values
+
+
+def _argument(text: str, unit: str, place: str) -> str | float:
+    with refused_as(ScenarioError, place, UnitError):
+        value = parse_quantity(text, unit)
+    # An absolute pressure and a time: neither lies below 0.
+    if not 0.0 <= value < math.inf:
+        raise ScenarioError(f"{place} = '{text}': must be at least 0 {unit} and finite")
+    return value
+
+
+SEED, ALL = PAPER, "all"
+"""The study of the paper that this package is made from, and all studies one after the other."""
+_WORDS = {
+    ALL: "every study, one table",
+}
+
+
+def published_text(entry: ClaimEntry) -> str:
+    """Return what is published as it is shown, with its direction; empty where only own arithmetic is."""
+    number = "" if entry.published is None else format_reported_quantity(entry.published, entry.unit or "-")
+    return f"up to {number}" if number and entry.direction == "maximum" else entry.words or number
+
+
+@dataclass(frozen=True, slots=True)
+class JudgedClaim:
+    """A claim of a publication with our number in its unit, None where nothing is computed, and the verdict."""
+
+    claim: PublishedClaim
+    value: float | None
+    verdict: Verdict
+
+    @property
+    def published(self) -> str:
+        """What is published, as it is shown."""
+        entry = self.claim.entry
+        return published_text(entry)
+
+    @property
+    def ours(self) -> str:
+        """Our number as it is shown."""
+        return quantity(self.value, self.claim.entry.unit or "-", 3)
+
+    @property
+    def note(self) -> str:
+        """Why the verdict is what it is."""
+        return self.claim.entry.note or self.claim.entry.not_testable
+
+    def document(self, study: str) -> dict[str, Any]:
+        """Return the claim as plain data for ``claims.json``."""
+        entry = self.claim.entry
+        return {
+            "study": study,
+            "id": entry.id,
+            "statement": entry.statement,
+            "paper": entry.published,
+            "published": self.published,
+            "direction": entry.direction,
+            "own": entry.own,
+            "value": self.value,
+            "unit": entry.unit,
+            "agrees_from": entry.at_least,
+            "agrees_to": entry.at_most,
+            "verdict": self.verdict,
+            "computation": entry.computation,
+            "arguments": dict(entry.arguments),
+            "assumptions": list(entry.assumed),
+            "source": self.claim.source,
+            "note": self.note,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Study:
+    """A publication and its judged claims."""
+
+    publication: Publication
+    claims: tuple[JudgedClaim, ...]
+
+
+def study_names() -> tuple[str, ...]:
+    """Return every name that ``--study`` takes."""
+    return (SEED, *(name for name in FILE.names() if name != SEED), ALL)
+
+
+def list_studies() -> list[dict[str, Any]]:
+    """Return name and subject of every study."""
+    words = {name: read_publication(name)[0].title for name in FILE.names()}
+    return [{"name": name, "title": ({**_WORDS, **words})[name]} for name in study_names()]
+
+
+def check_study(study: str, overrides: Sequence[str]) -> None:
+    """Refuse a study that does not exist, and changed values with any but the paper's own; ScenarioError."""
+    if study not in study_names() and Path(study).suffix != ".toml":
+        known = ", ".join(study_names())
+        hint = nearest_name(study, study_names())
+        raise ScenarioError(f"there is no study '{label(study)}'{hint}; available: {known}, or give a .toml file")
+    if overrides and study != SEED:
+        raise ScenarioError(f"--set {overrides[0]}: goes with the study '{SEED}' only; leave --set or --study out")
+
+
+def run_studies(study: str, report: Report) -> tuple[Study, ...]:
+    """Return one study, or all but that of the paper, with every claim judged; ScenarioError, SimulationError."""
+    names = study_names()[1:-1] if study == ALL else (study,)
+    return tuple(_run(load_publication(name), report) for name in names)
+
+
+def judge(claim: PublishedClaim) -> JudgedClaim:
+    """Return a claim with our number and the verdict; SimulationError where a walk fails."""
+    value, entry = claim.value(), claim.entry
+    if value is None:
+        return JudgedClaim(claim, None, "not_testable")
+    low = entry.at_least is None or value >= entry.at_least
+    high = entry.at_most is None or value <= entry.at_most
+    # A model with assumptions that does not agree is no evidence against what was measured.
+    holds: Verdict = "plausible" if entry.assumed else "consistent"
+    parts: Verdict = "undetermined" if entry.assumed else "inconsistent_as_reported"
+    return JudgedClaim(claim, value, holds if low and high else parts)
+
+
+def _run(publication: Publication, report: Report) -> Study:
+    claims = []
+    for claim in publication.claims:
+        report(Progress(f"{publication.name}: {claim.entry.id}"))
+        claims.append(judge(claim))
+    return Study(publication, tuple(claims))

@@ -1,0 +1,178 @@
+"""Runs the paper's experiments and judges what the paper claims of them."""
+
+from collections.abc import Sequence
+from typing import Any, Literal, overload
+
+from ppafo.analyses.reproduce.answer import PROPORTIONAL, SOLENOID, STEP, Reproduction, Studies
+from ppafo.analyses.reproduce.bench import assumed_values, synthetic_evidence, values_used_by
+from ppafo.analyses.reproduce.claim import arithmetic_claims, load_reported, not_published_claim, told_claim
+from ppafo.analyses.reproduce.publication import ALL, SEED, check_study, run_studies
+from ppafo.analyses.reproduce.step_response import Levels, step_events, step_observations
+from ppafo.analyses.reproduce.torque_task import (
+    control_claims,
+    phased_runs,
+    readings_of_u,
+    torque_task_claims,
+    torque_task_observations,
+)
+from ppafo.errors import ScenarioError, SimulationError
+from ppafo.parameters import load_parameter_set
+from ppafo.parameters.audit import audit
+from ppafo.parameters.overrides import override_set
+from ppafo.progress import Progress, Report, report_nothing
+from ppafo.simulation.declaration import value_at
+from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.overrides import apply_overrides, chosen_by, is_of_device, scenario_paths, unknown_value
+from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.simulate import Result, simulate
+
+EXPERIMENTS = (STEP, SOLENOID, PROPORTIONAL)
+"""Shipped scenarios that stand for the paper's experiments."""
+ORDER = (
+    "orifice_constants",
+    "step_percentages",
+    "damping_and_friction",
+    "discharge_coefficient",
+    "swept_volume",
+    "figure_7_words",
+    "torque_rms_improvement",
+    "co2_solenoid",
+    "co2_proportional",
+    "co2_saving",
+    "oscillation_words",
+    "limited_by_switching",
+    "gains_minimise_error",
+    "dead_zone_amplifies_delay",
+    "beyond_improved_control",
+    "not_published",
+)
+"""Every claim: what the reported numbers decide, what is simulated, what is left."""
+
+
+@overload
+def reproduce(
+    overrides: Sequence[str] = (),
+    progress: Report | None = None,
+    study: Literal["ppafo-2011"] = "ppafo-2011",
+) -> Reproduction: ...
+
+
+@overload
+def reproduce(
+    overrides: Sequence[str] = (),
+    progress: Report | None = None,
+    study: str = SEED,
+) -> Reproduction | Studies: ...
+
+
+def reproduce(
+    overrides: Sequence[str] = (),
+    progress: Report | None = None,
+    study: str = SEED,
+) -> Reproduction | Studies:
+    """Run the paper's experiments with the shipped scenarios and judge every claim, or those of other publications.
+
+    ``overrides`` change the experiments (not the paper's reported numbers): a path of a scenario reaches those that
+    have it, a path of the device all of them. The figures have synthetic measurements where the bench can make them.
+    ``progress`` hears what is being done; ``study`` is a publication, by name or by its file, or ``all``.
+    SimulationError where a run diverges, ScenarioError for a study that is none.
+    """
+    report = progress or report_nothing
+    check_study(study, overrides)
+    if study == SEED:
+        return _reproduce_paper(overrides, report)
+    seed = _reproduce_paper((), report) if study == ALL else None
+    return Studies(run_studies(study, report), seed)
+
+
+def _reproduce_paper(overrides: Sequence[str], report: Report) -> Reproduction:
+    """Return what came of the paper's own experiments."""
+    scenarios = _scenarios(overrides)
+    runs = {name: _run(scenario, report) for name, scenario in scenarios.items()}
+    step, solenoid, proportional = (runs[name] for name in EXPERIMENTS)
+    report(Progress("measuring on the simulated test bench (synthetic)"))
+    # The rig records with the overrides of the simulations.
+    meant = {name: scenario.origin.overrides for name, scenario in scenarios.items()}
+    tasks = {"solenoid": meant[SOLENOID], "proportional": meant[PROPORTIONAL]}
+    synthetic = synthetic_evidence(tasks, meant[STEP])
+    report(Progress("checking the paper's own numbers"))
+    reported = load_reported()
+    completed = load_parameter_set(step.scenario.origin.parameter_set)
+    assumed = assumed_values(scenarios)
+    of_step, of_task = values_used_by(assumed, STEP), values_used_by(assumed, SOLENOID, PROPORTIONAL)
+    events, supply = step_events(step.recording), step.scenario.device.supply
+    levels = Levels(supply.pressure, supply.atmospheric_pressure)
+    step_told = tuple(step_observations(step.recording, levels, events))
+    torque_told = tuple(torque_task_observations(solenoid, proportional))
+    report(Progress(f"simulating {SOLENOID} over the phase of its decisions"))
+    phased = phased_runs(solenoid)
+    claims = [
+        *arithmetic_claims(reported),
+        told_claim(
+            "figure_7_words",
+            "What the text tells of the pressures and the angle of the step response.",
+            step_told,
+            tuple(value.sentence() for value in of_step),
+        ),
+        *torque_task_claims(phased, proportional, of_task),
+        told_claim(
+            "oscillation_words",
+            "What the text tells of the oscillation with both valves.",
+            torque_told,
+            tuple(value.sentence() for value in of_task),
+        ),
+        *control_claims(solenoid, proportional, phased),
+        not_published_claim(),
+    ]
+    return Reproduction(
+        claims=tuple(sorted(claims, key=lambda claim: ORDER.index(claim.id))),
+        step_observations=step_told,
+        torque_observations=torque_told,
+        readings_of_u=readings_of_u(solenoid, proportional),
+        step=step,
+        step_events=events,
+        solenoid=solenoid,
+        proportional=proportional,
+        synthetic=synthetic,
+        assumed=assumed,
+        printed_set=reported.parameter_set.name,
+        printed_findings=tuple(audit(reported.parameter_set)),
+        completed_set=completed.name,
+        completed_findings=tuple(audit(completed)),
+        overrides=tuple(overrides),
+    )
+
+
+def _scenarios(overrides: Sequence[str]) -> dict[str, Scenario]:
+    """Return the experiments, each with the overrides that are meant for it."""
+    meant: dict[str, list[str]] = {name: [] for name in EXPERIMENTS}
+    given = override_set(overrides, ScenarioError)
+    kinds = [path for path in given if path.endswith(".kind")]
+    for path in sorted(given, key=lambda path: (path not in kinds, path.count("."), path)):
+        override = str(given[path])
+        documents = {
+            name: apply_overrides(load_scenario(name).origin.content, earlier, name).document
+            for name, earlier in meant.items()
+        }
+        known = tuple(dict.fromkeys(known for item in documents.values() for known in scenario_paths(item)))
+        if path not in known and not is_of_device(path) and not chosen_by(path, kinds):
+            raise unknown_value(override, known, f"{', '.join(EXPERIMENTS)} have")
+        having = [name for name, document in documents.items() if _has(document, path)]
+        for name in having or EXPERIMENTS:
+            meant[name].append(override)
+    return {name: load_scenario(name, chosen) for name, chosen in meant.items()}
+
+
+def _has(document: dict[str, Any], path: str) -> bool:
+    """Tell whether a scenario has a section of its own for the value at a path."""
+    section = path.rpartition(".")[0]
+    has_section = not section or value_at(document, section) is not None
+    return has_section and path in scenario_paths(document)
+
+
+def _run(scenario: Scenario, report: Report) -> Result:
+    report(Progress(f"simulating {scenario.name}"))
+    result = simulate(scenario)
+    if not result.status.is_completed:
+        raise SimulationError(f"{scenario.name}: {result.status.message}")
+    return result

@@ -1,0 +1,254 @@
+"""What the text tells of the step response, looked for in a recording. Works on measured recordings too.
+
+The text (section 'PPAFO Model Validation', figure 7): pressure 1 rises until the vane breaks away, falls while the vane
+moves, then goes to the supply; pressure 2 falls, slows while chamber 2 is compressed, then goes to the atmosphere.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ppafo.analyses.reproduce.claim import Observation, observation
+from ppafo.constants import PASCALS_PER_PSI
+from ppafo.signals import Recording
+from ppafo.signals.recording import Floats
+
+RESOLUTION = 1.0e-6
+"""Smallest part of the travel that counts as motion in a simulated recording; a measured one needs more."""
+_SMALLEST_TRAVEL = 1.0e-3
+_FIRST_ANGLE, _LAST_ANGLE, _SAME_ANGLE = 20.0, 130.0, 0.5
+"""What figure 7 says [deg], and how near to it counts."""
+_CLEAR = 0.05
+_SAME = 0.01
+_NOTABLE_TIME = 2.0e-3
+"""Fractions of the pressure range: a change has to be clear, a level reached or kept may be off by the second."""
+_SLOWED = 0.5
+"""The fall has slowed where its rate is at most this fraction of the steepest before and after."""
+_LARGEST_RISE = 1.0 * PASCALS_PER_PSI
+"""A fall that slows may turn into a rise of this much [Pa]; the text tells of none."""
+_SETS_OFF = 0.02
+"""Pressure 1 peaks before the vane has gone this fraction of its travel: it still fills while the vane sets off."""
+
+
+@dataclass(frozen=True, slots=True)
+class StepEvents:
+    """When the vane breaks away and when it comes to rest [s], as numbers of samples too."""
+
+    breakaway: int
+    stop: int
+    breakaway_time: float
+    stop_time: float
+
+
+@dataclass(frozen=True, slots=True)
+class Levels:
+    """Supply and atmosphere [Pa absolute], between which a step response runs."""
+
+    supply: float
+    atmosphere: float
+
+    @property
+    def range(self) -> float:
+        """Pressure range [Pa]."""
+        return self.supply - self.atmosphere
+
+    def gauge(self, pressure: float) -> float:
+        """Gauge pressure [psi]."""
+        return (pressure - self.atmosphere) / PASCALS_PER_PSI
+
+
+def step_events(recording: Recording, resolution: float = RESOLUTION) -> StepEvents | None:
+    """Return breakaway and stop of a vane that goes from one rest to another; None where it does not.
+
+    Breakaway is the last sample at which the angle is where it started, stop the first from which on it is where it
+    ends, both within ``resolution`` times the travel.
+    """
+    angle = recording["angle"]
+    travel = abs(float(angle[-1] - angle[0]))
+    if travel < _SMALLEST_TRAVEL:
+        return None
+    breakaway = int(np.flatnonzero(np.abs(angle - angle[0]) > resolution * travel)[0]) - 1
+    away = np.flatnonzero(np.abs(angle - angle[-1]) > resolution * travel)
+    stop = int(away[-1]) + 1
+    if stop >= len(recording) - 1 or stop - breakaway < 2 or breakaway < 1:
+        return None
+    return StepEvents(breakaway, stop, float(recording.time[breakaway]), float(recording.time[stop]))
+
+
+def step_observations(recording: Recording, levels: Levels, events: StepEvents | None) -> list[Observation]:
+    """Return each sentence of the text with whether the recording shows it; none holds where the vane does not move."""
+    found = []
+    for identifier, judge, beyond in _SAID:
+        holds, evidence, difference = False, "the vane does not move from rest to rest", ""
+        if events is not None:
+            step = _Step(recording, levels, events)
+            holds, evidence = judge(step)
+            difference = "" if beyond is None else beyond(step)
+        found.append(observation(identifier, holds, evidence, difference))
+    return found
+
+
+@dataclass(frozen=True, slots=True)
+class _Step:
+    """The values with which the sentences are compared."""
+
+    recording: Recording
+    levels: Levels
+    events: StepEvents
+
+    def gauge(self, pressure: float) -> str:
+        return f"{self.levels.gauge(pressure):.1f}"
+
+    def milliseconds(self, index: int) -> str:
+        return f"{1e3 * self.recording.time[index]:.0f} ms"
+
+    def standing(self, name: str) -> Floats:
+        return self.recording[name][: self.events.breakaway + 1]
+
+    def moving(self, name: str) -> Floats:
+        return self.recording[name][self.events.breakaway : self.events.stop + 1]
+
+    def at_stop(self, name: str) -> Floats:
+        return self.recording[name][self.events.stop :]
+
+    def peak_and_lowest(self) -> tuple[int, int]:
+        """Samples at which pressure 1 peaks while the vane sets off, and is lowest from there to the stop."""
+        pressure, angle = self.recording["pressure_1"], self.recording["angle"]
+        gone = np.abs(angle - angle[0]) > _SETS_OFF * np.abs(angle[-1] - angle[0])
+        peak = int(np.argmax(pressure[: int(np.argmax(gone)) + 1]))
+        return peak, peak + int(np.argmin(pressure[peak : self.events.stop + 1]))
+
+    def largest_rise(self, name: str) -> float:
+        """Largest rise above an earlier value, while the vane moves."""
+        moving = self.moving(name)
+        return float(np.max(moving - np.minimum.accumulate(moving)))
+
+    def is_same(self, pressure: float, other: float) -> bool:
+        return bool(abs(pressure - other) < _SAME * self.levels.range)
+
+    def only_rises(self, pressure: Floats) -> bool:
+        fallen_back = float(np.max(np.maximum.accumulate(pressure) - pressure))
+        return bool(pressure[-1] > pressure[0] and fallen_back < _SAME * self.levels.range)
+
+
+def _fills_early(step: _Step) -> str:
+    """Chamber 1 stands at the supply before the vane leaves: then it is chamber 2 that decides when."""
+    before = step.standing("pressure_1")
+    full = int(np.argmax(before > step.levels.supply - _SAME * step.levels.range))
+    waits = step.recording.time[step.events.breakaway] - step.recording.time[full]
+    if before[full] <= step.levels.supply - _SAME * step.levels.range or waits < _NOTABLE_TIME:
+        return ""
+    return (
+        f"it reaches the supply pressure after {step.milliseconds(full)} already, so small is the volume at the stop, "
+        "and what starts the vane is the falling pressure in chamber 2"
+    )
+
+
+def _rises_in_motion(step: _Step) -> str:
+    """The text has pressure 1 fall from breakaway to the stop."""
+    pressure, (peak, lowest) = step.recording["pressure_1"], step.peak_and_lowest()
+    late = float(pressure[peak] - pressure[step.events.breakaway])
+    again = float(pressure[step.events.stop] - pressure[lowest])
+    said = []
+    if late >= _SAME * step.levels.range:
+        said.append(
+            f"from breakaway it goes on rising by {late / PASCALS_PER_PSI:.1f} psi, until {step.milliseconds(peak)}"
+        )
+    if again >= _SAME * step.levels.range:
+        said.append(f"it rises again by {again / PASCALS_PER_PSI:.1f} psi before the stop")
+    return ", and ".join(said)
+
+
+def _more_than_slows(step: _Step) -> str:
+    rise = step.largest_rise("pressure_2")
+    if rise < _SAME * step.levels.range:
+        return ""
+    return f"it does more than slow: it rises by {rise / PASCALS_PER_PSI:.1f} psi"
+
+
+def _turns(step: _Step) -> tuple[bool, str]:
+    start, end = (float(np.degrees(step.recording["angle"][index])) for index in (0, -1))
+    holds = abs(start - _FIRST_ANGLE) < _SAME_ANGLE and abs(end - _LAST_ANGLE) < _SAME_ANGLE
+    taken = 1e3 * (step.events.stop_time - step.events.breakaway_time)
+    return holds, f"from {start:.1f} to {end:.1f} deg in {taken:.0f} ms"
+
+
+def _rises(step: _Step) -> tuple[bool, str]:
+    before, breakaway = step.standing("pressure_1"), step.events.breakaway
+    holds = step.only_rises(before) and before[-1] - before[0] > _CLEAR * step.levels.range
+    fraction = (before[-1] - step.levels.atmosphere) / step.levels.range
+    has_torque = "torque" in step.recording
+    torque = f", at a torque of {step.recording['torque'][breakaway]:.2f} N m" if has_torque else ""
+    return bool(holds), (
+        f"from {step.gauge(before[0])} to {step.gauge(before[-1])} psig, {100.0 * fraction:.0f} % of the supply; "
+        f"the vane breaks away after {step.milliseconds(breakaway)}{torque}"
+    )
+
+
+def _falls_in_motion(step: _Step) -> tuple[bool, str]:
+    pressure, (peak, lowest) = step.recording["pressure_1"], step.peak_and_lowest()
+    first, last = float(pressure[peak]), float(pressure[lowest])
+    holds = first - last > _CLEAR * step.levels.range
+    return holds, f"from {step.gauge(first)} psig down to {step.gauge(last)} psig at {step.milliseconds(lowest)}"
+
+
+def _to_supply(step: _Step) -> tuple[bool, str]:
+    after = step.at_stop("pressure_1")
+    holds = step.only_rises(after) and step.is_same(after[-1], step.levels.supply)
+    return holds, (
+        f"from {step.gauge(after[0])} psig at the stop ({step.milliseconds(step.events.stop)}) to "
+        f"{step.gauge(after[-1])} psig; the supply is {step.gauge(step.levels.supply)} psig"
+    )
+
+
+def _falls(step: _Step) -> tuple[bool, str]:
+    before = step.standing("pressure_2")
+    holds = step.is_same(before[0], step.levels.supply) and bool(np.all(np.diff(before) < 0.0))
+    return holds, f"from {step.gauge(before[0])} to {step.gauge(before[-1])} psig until breakaway"
+
+
+def _slows(step: _Step) -> tuple[bool, str]:
+    """The slowest fall in motion lies between two steeper ones; gas that only vents would fall ever more slowly.
+
+    Gas that is compressed far above what it was does not slow its fall: it rises.
+    """
+    rate = -np.diff(step.recording["pressure_2"]) / np.diff(step.recording.time)
+    start, end = step.events.breakaway, step.events.stop
+    slowest = start + int(np.argmin(rate[start:end]))
+    before, after = float(np.max(rate[: slowest + 1])), float(np.max(rate[slowest:]))
+    holds = rate[slowest] <= _SLOWED * min(before, after) and step.largest_rise("pressure_2") <= _LARGEST_RISE
+    first, least, last = (value / (1e3 * PASCALS_PER_PSI) for value in (before, rate[slowest], after))
+    at = step.milliseconds(slowest)
+    slowed = f"rises by {-least:.2f} psi/ms" if least < 0.0 else f"falls by {least:.2f} psi/ms"
+    return bool(
+        holds
+    ), f"falls by {first:.2f} psi/ms at first, {slowed} at {at}, falls by up to {last:.1f} psi/ms later"
+
+
+def _to_atmosphere(step: _Step) -> tuple[bool, str]:
+    last = float(step.at_stop("pressure_2")[-1])
+    return step.is_same(last, step.levels.atmosphere), f"{step.levels.gauge(last):.2f} psig at the end"
+
+
+def _builds_up(step: _Step) -> tuple[bool, str]:
+    difference = step.recording["pressure_1"] - step.recording["pressure_2"]
+    change = float(difference[-1] - difference[0])
+    first, last = (float(difference[index]) / PASCALS_PER_PSI for index in (0, -1))
+    return abs(
+        change - 2.0 * step.levels.range
+    ) < 2.0 * _SAME * step.levels.range, f"from {first:.1f} to {last:.1f} psi"
+
+
+_Judge = Callable[[_Step], tuple[bool, str]]
+_SAID: tuple[tuple[str, _Judge, Callable[[_Step], str] | None], ...] = (
+    ("vane_turns_through_its_range", _turns, None),
+    ("pressure_1_rises_until_breakaway", _rises, _fills_early),
+    ("pressure_1_falls_in_motion", _falls_in_motion, _rises_in_motion),
+    ("pressure_1_goes_to_supply", _to_supply, None),
+    ("pressure_2_falls_from_supply", _falls, None),
+    ("pressure_2_slows_in_motion", _slows, _more_than_slows),
+    ("pressure_2_goes_to_atmosphere", _to_atmosphere, None),
+    ("difference_builds_up", _builds_up, None),
+)
+"""What the text says, by its entry, how that is judged, and what says what the recording shows beyond it."""

@@ -1,0 +1,83 @@
+"""Figures of what a result folder holds, drawn anew without running anything."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ppafo.analyses.endurance.draw import WALK_FILE
+from ppafo.analyses.sweep.answer import load_study_results
+from ppafo.errors import DataError, reason
+from ppafo.report.recording_figure import draw_stored_result, draw_stored_walk, recording_figure, stated_atmosphere
+from ppafo.rig.experiments import RIG_FILE
+from ppafo.storage import read_recording, read_result
+from ppafo.storage.result_folder import MARK, NETCDF_FILE, RUN_FILE, marking_command, read_json
+from ppafo.study.manifest import MANIFEST
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_FIGURE = "figure"
+_PICTURES = (".png", ".gif")
+_NAMED = 6
+
+
+def names_in(folder: Path) -> list[str]:
+    """Return the names of what is in the folder, in order."""
+    if not folder.is_dir():
+        raise DataError(f"{folder}: is not a folder")
+    try:
+        return sorted(entry.name for entry in folder.iterdir())
+    except OSError as error:
+        raise DataError(f"{folder}: cannot be read: {reason(error)}") from error
+
+
+def draw_folder(folder: Path, names: list[str]) -> "dict[str, Figure]":
+    """Return figures by the stem of their files: of a run, a walk, a study or recordings of the rig; none of others."""
+    if RUN_FILE in names:
+        return {_FIGURE: draw_stored_result(read_result(folder))}
+    if MANIFEST in names:
+        return {_FIGURE: load_study_results(folder).plot()}
+    if RIG_FILE in names:
+        return _draw_rig(folder, names)
+    if NETCDF_FILE in names and MARK in names:
+        return {_FIGURE: _draw_walk(folder, names)}
+    return {}
+
+
+def _draw_rig(folder: Path, names: list[str]) -> "dict[str, Figure]":
+    """Return a figure of each recording of the rig; gauge pressure counts from the atmosphere of its device."""
+    file = folder / RIG_FILE
+    document, tables = _document(file), [name for name in names if name.endswith(".csv")]
+    zeros = {name: stated_atmosphere(file, document, "recordings", name, "device") for name in tables}
+    return {
+        name.removesuffix(".csv"): recording_figure(read_recording(folder / name), atmosphere=zero)
+        for name, zero in zeros.items()
+    }
+
+
+def _draw_walk(folder: Path, names: list[str]) -> "Figure":
+    """Return the figure of the end of a walk."""
+    file = folder / WALK_FILE
+    document = _document(file) if WALK_FILE in names else {}
+    return draw_stored_walk(file, document, read_recording(folder / NETCDF_FILE))
+
+
+def _document(file: Path) -> dict[str, Any]:
+    """Return the names and values of a JSON file."""
+    document = read_json(file)
+    if not isinstance(document, dict):
+        raise DataError(f"{file}: is not a table of names and values")
+    return document
+
+
+def what_is_there(folder: Path, names: list[str]) -> tuple[str, dict[str, Any]]:
+    """Say which figures a folder of ppafo has and which file to open; DataError where the folder is another."""
+    if MARK not in names:
+        raise DataError(f"{folder}: is not a result folder of ppafo")
+    command = marking_command(folder)
+    pictures = [name for name in names if name.endswith(_PICTURES)]
+    page = next((name for name in names if name.endswith(".html")), None)
+    shown = ", ".join(pictures[:_NAMED]) + (", ..." if len(pictures) > _NAMED else "")
+    has = f"has its figures ({shown})" if pictures else "has no figures"
+    opened = page or next((name for name in names if name.endswith(".txt")), MARK)
+    said = f"{folder}: the result of 'ppafo {command}' {has}; open {folder / opened}"
+    return said, {"files": [], "command": command, "figures": pictures, "open": str(folder / opened)}

@@ -1,0 +1,330 @@
+"""The results of a study as a finding: counts, metrics of each configuration, what varied, and a panel a metric."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from pydantic import BaseModel
+
+from ppafo.analyses.sweep.results import SUMMARY, StudyResults
+from ppafo.errors import DataError
+from ppafo.report.setting_names import label_of
+from ppafo.report.style import BLUE, GREEN, GREY, ORANGE, VERMILION
+from ppafo.report.writing import files_of
+from ppafo.signals.recording import CHANNELS
+from ppafo.storage.places import place_at, read_document
+from ppafo.studies.distributions import Floats
+from ppafo.studies.sampling import NOISE
+from ppafo.study.finding import Column, Finding, Part
+from ppafo.study.kind import TIME, Kind, of_channel, of_metric, of_path
+from ppafo.study.manifest import read_manifest
+from ppafo.study.panels import Mark, Panel
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+FIGURE = "figure"
+COLOURS = (BLUE, VERMILION, GREEN, ORANGE, GREY)
+MOST_METRICS, MOST_CONFIGURATIONS = 9, len(COLOURS)
+MAXIMUM_DRAWN = 4_000_000
+"""Runs from which a figure is drawn, spread evenly over all; the numbers beside it are from all of them."""
+_COLUMNS, _PANEL, _COMPARED = 3, (3.5, 2.7), (2.6, 2.3)
+_HISTOGRAM_BINS = 60
+_MAXIMUM_POINTS = 3000
+_MEDIAN = 0.5
+_OPACITIES = (0.18, 0.32, 0.45)
+_GRIDDED = ("grid", "list")
+_NAMED = 3
+"""Varied values that a title names."""
+_CAPTION = (
+    "Distributions of the metrics, their dependence on the varied values, and quantiles over time where requested."
+)
+
+
+def finding_of(results: StudyResults) -> Finding[StudyResults]:
+    """Return the results in words, tables and panels; they have passed where any run completed."""
+    study, summary = results.document["study"], results.summary
+    described = " ".join(study.get("description", "").split())
+    failed = [f"run {item['run']} ({item['configuration']}): {item['reason']}" for item in summary["failures"]]
+    said = [
+        f"Correlation of {item['between'][0]} with {item['between'][1]}: {item['coefficient']}, of their normal scores."
+        for item in study.get("correlations", ())
+    ]
+    sample = study.get("sample")
+    if sample:
+        method, seed = sample["method"].replace("_", " "), sample.get("seed", 1)
+        said.append(f"Sampled by {method}: {sample['runs']} draws, seed {seed}.")
+    facts = (
+        ("rows of all runs", "runs/*.parquet"),
+        ("summary", SUMMARY),
+        ("study", f"study.json, sha256 {results.document['sha256'][:16]}"),
+    )
+    quantile = f"Quantile: {summary['quantile_definition']}. Only completed runs that have the metric are counted."
+    return Finding(
+        name="sweep",
+        kicker="Study",
+        title=results.name,
+        said=(f"{results.name}: {count_sentence(results)}", *_failure_remarks(results)),
+        parts=(
+            _figure(results, [described] if described else [], failed),
+            *(_metrics(results, name, metrics) for name, metrics in results.metrics.items()),
+            Part("How to read it", said=[quantile], is_detail=True),
+            _detail("What varied", ("path", "kind", ""), [_varied_row(item) for item in study.get("vary", ())]),
+            Part(said=said, is_detail=True),
+            _assumptions_section(results),
+            Part("Files", [Column("", cells) for cells in zip(*facts, strict=True)], is_detail=True),
+        ),
+        found=results,
+        passed=summary["completed"] > 0,
+    )
+
+
+def write_report(results: StudyResults) -> None:
+    """Write figure, page and summary beside the results, in a folder that resumes and is known by its ``study.json``.
+
+    No file names the place: the same study makes the same bytes anywhere.
+    """
+    answer = replace(finding_of(results).answer(), name=Path(SUMMARY).stem, data=results.summary)
+    for name, content in files_of(answer).items():
+        results.place.write(name, content)
+
+
+def load_study_results(folder: str | Path) -> Finding[StudyResults]:
+    """Return the finished results of a study in a folder or at an address; DataError where there are none."""
+    place = place_at(folder)
+    document = read_manifest(place)
+    try:
+        summary = read_document(place, SUMMARY)
+        _Summary.model_validate(summary)
+    except (OSError, ValueError) as error:
+        raise DataError(
+            f"{place.address}: the study is not finished (no complete {SUMMARY}); run it again to resume"
+        ) from error
+    return finding_of(StudyResults(place, document, summary))
+
+
+class _Summary(BaseModel):
+    """What everybody may rely on in a summary."""
+
+    completed: int
+    diverged: int
+    refused: int
+    configurations: dict[str, dict[str, dict[str, Any]]]
+
+
+def count_sentence(results: StudyResults) -> str:
+    """Return how many runs there are and how they ended."""
+    parts = [f"{results.summary[key]:,} {key}" for key in ("completed", "diverged", "refused") if results.summary[key]]
+    return f"{results.document['runs']:,} runs: {', '.join(parts)}"
+
+
+def _cells(name: str, item: Mapping[str, Any], columns: int) -> tuple[str, ...]:
+    """Return the cells of a metric in shown units; empty where no run has it."""
+    kind = of_metric(name)
+    first = (name, kind.shown_unit, f"{item['count']:,}")
+    if item["count"] == 0:
+        return (*first, *[""] * (columns - len(first)))
+    deviation = kind.change_number(item["sd"]) if "sd" in item else ""
+    return (*first, kind.number(item["mean"]), deviation, *map(kind.number, item["quantiles"].values()))
+
+
+def _failure_remarks(results: StudyResults) -> list[str]:
+    runs, completed = results.document["runs"], results.summary["completed"]
+    if completed == runs:
+        return []
+    first = results.summary["failures"][0]
+    return [
+        f"{runs - completed:,} of {runs:,} runs failed and have no metrics; the first is run {first['run']}: "
+        f"{first['reason']}"
+    ]
+
+
+def _metrics(results: StudyResults, name: str, metrics: Mapping[str, Mapping[str, Any]]) -> Part:
+    described = [item for own in results.metrics.values() for item in own.values() if item["count"]]
+    fractions = list(described[0]["quantiles"]) if described else []
+    head = ("metric", "unit", "runs", "mean", "sd", *(f"{100 * float(fraction):g} %" for fraction in fractions))
+    rows = [_cells(metric, item, len(head)) for metric, item in metrics.items()]
+    columns = [Column(title, [row[place] for row in rows]) for place, title in enumerate(head)]
+    completed = f"{name}: {results.summary['completed_by_configuration'][name]:,} runs completed"
+    return Part(columns=columns, said=[completed], left=2)
+
+
+def _varied_row(item: Mapping[str, Any]) -> tuple[str, str, str]:
+    others = [f"{key.replace('_', ' ')} {value}" for key, value in item.items() if key not in ("path", "kind")]
+    return item["path"], item["kind"], ", ".join(others)
+
+
+def _assumptions_section(results: StudyResults) -> Part:
+    """Return what the base scenarios assume, once where several assume the same."""
+    names: dict[tuple[str, str, str], list[str]] = {}
+    for name, scenario in results.document["scenarios"].items():
+        for item in scenario["assumptions"]:
+            names.setdefault((item["path"], item["value"], item["note"]), []).append(name)
+    rows = [(*assumption, ", ".join(own)) for assumption, own in names.items()]
+    return _detail("What the base scenarios assume", ("value", "", "why", "in"), rows)
+
+
+def _detail(heading: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> Part:
+    if not rows:
+        return Part()
+    columns = [Column(title, cells) for title, cells in zip(head, zip(*rows, strict=True), strict=True)]
+    return Part(heading, columns, left=len(head), is_detail=True)
+
+
+def _figure(results: StudyResults, said: Sequence[str], remarks: Sequence[str]) -> Part:
+    """Return maps for a grid of two axes, points for two values that are drawn, else a panel a metric; and bands."""
+    metrics = list(results.document["metrics"])[:MOST_METRICS]
+    bands = list(results.document["study"]["outputs"].get("bands", ()))
+    names = results.configurations[:MOST_CONFIGURATIONS]
+    device = [path for path in results.varied if path != NOISE]
+    grid = [item["path"] for item in results.document["study"].get("vary", ()) if item["kind"] in _GRIDDED]
+    is_mapped = len(grid) == 2 or len(device) == 2
+    count = max(1, len(metrics) * (len(names) if is_mapped else 1) + len(bands))
+    # Maps of several configurations: a row for each metric.
+    is_compared = is_mapped and len(names) > 1
+    title = f"{results.name}, {results.summary['completed']:,} runs"
+    if not is_mapped and len(device) > 1:
+        labels = [_in_a_sentence(label_of(path)) for path in device[:_NAMED]]
+        more = f" and {len(device) - _NAMED} more" if len(device) > _NAMED else ""
+        title += f" over {len(device)} values: {', '.join(labels)}{more}"
+
+    def panels() -> list[Panel]:
+        if is_mapped:
+            draw = partial(_map, results, grid) if len(grid) == 2 else partial(_points, results, device)
+            drawn = [draw(metric, name, is_compared) for metric in metrics for name in names]
+        elif len(device) == 1:
+            drawn = [_over(results, device[0], metric, names) for metric in metrics]
+        else:
+            drawn = [_histogram(results, metric) for metric in metrics]
+        drawn += [_band(results, channel, names) for channel in bands]
+        # The first panel with curves names the configurations for all.
+        named = next((panel for panel in drawn if len(names) > 1 and any(mark.label for mark in panel.marks)), None)
+        return [replace(panel, legend="inside" if panel is named else "") for panel in drawn]
+
+    return Part(
+        said=said,
+        remarks=remarks,
+        panels=panels,
+        name=FIGURE,
+        caption=_CAPTION,
+        across=len(names) if is_compared else 2 if count == 4 else min(_COLUMNS, count),
+        size=_COMPARED if is_compared else _PANEL,
+        title=title,
+        is_detail=True,
+    )
+
+
+def _in_a_sentence(label: str) -> str:
+    """Return a label without its capital, but for a name in capitals."""
+    return label if label[:2].isupper() else label[:1].lower() + label[1:]
+
+
+def _kind(results: StudyResults, path: str) -> Kind:
+    return of_path(path, results.document["varied"][path]["unit"].removeprefix("-"))
+
+
+def _histogram(results: StudyResults, metric: str) -> Panel:
+    """Return how often each value came, for every configuration."""
+    parts = {name: values[np.isfinite(values)] for name, values in results.thin(metric, MAXIMUM_DRAWN).items()}
+    filled = [values for values in parts.values() if values.size]
+    edges = _edges(filled) if filled else np.zeros(2)
+    marks = [
+        Mark("bars", edges, np.histogram(own, edges)[0], label=name, colour=colour)
+        for (name, own), colour in zip(parts.items(), COLOURS, strict=False)
+        if filled
+    ]
+    return Panel(of_metric(metric), Kind(), marks, then=lambda axes: axes.set_yticks([]))
+
+
+def _edges(parts: list[Floats]) -> Floats:
+    """Return the edges of the bins: one for each whole number where values are counts of few kinds."""
+    low, high = min(float(part.min()) for part in parts), max(float(part.max()) for part in parts)
+    if high - low < _HISTOGRAM_BINS and all(bool(np.all(part == np.round(part))) for part in parts):
+        return np.arange(low - 0.5, high + 1.0)
+    size = sum(part.size for part in parts)
+    return np.linspace(low, high or low + 1.0, 1 + min(_HISTOGRAM_BINS, max(8, round(size**0.5))))
+
+
+def _over(results: StudyResults, path: str, metric: str, names: Sequence[str]) -> Panel:
+    """Return a metric over the one path that varies."""
+    across, values = results.thin(path, MAXIMUM_DRAWN), results.thin(metric, MAXIMUM_DRAWN)
+    marks = []
+    for name, colour in zip(names, COLOURS, strict=False):
+        order = np.argsort(across[name], kind="stable")
+        order = order[:: max(1, order.size // _MAXIMUM_POINTS)]
+        marks.append(
+            Mark("line", across[name][order], values[name][order], label=name, colour=colour, style={"marker": "."})
+        )
+    return Panel(_kind(results, path), of_metric(metric), marks)
+
+
+def _map(results: StudyResults, grid: Sequence[str], metric: str, name: str, is_compared: bool) -> Panel:
+    """Return the mean of a metric over the two paths, for one configuration; white where no run completed."""
+    (columns, column), (rows, row) = (
+        np.unique(results.thin(path, MAXIMUM_DRAWN)[name], return_inverse=True) for path in grid
+    )
+    values = results.thin(metric, MAXIMUM_DRAWN)[name]
+    place, known = row * columns.size + column, np.isfinite(values)
+    count = np.bincount(place[known], minlength=rows.size * columns.size)
+    total = np.bincount(place[known], weights=values[known], minlength=rows.size * columns.size)
+    mean = np.where(count > 0, total / np.maximum(count, 1), np.nan).reshape(rows.size, columns.size)
+    kind, items = of_metric(metric), {item["path"]: item for item in results.document["study"]["vary"]}
+    kinds, places = [], []
+    for path, levels in zip(grid, (columns, rows), strict=True):
+        of_axis, is_listed = _kind(results, path), items[path]["kind"] == "list"
+        # Values of a list are side by side, in cells of the same size.
+        kinds.append(Kind(of_axis.axis) if is_listed else of_axis)
+        places.append(np.arange(levels.size) if is_listed else levels)
+
+    def mark_axes(axes: "Axes") -> None:
+        axes.grid(visible=False)
+        for path, levels, axis in zip(grid, (columns, rows), (axes.xaxis, axes.yaxis), strict=True):
+            if items[path]["kind"] == "list":
+                shown = _kind(results, path).values(levels)
+                axis.set_ticks(np.arange(levels.size), [f"{value:g}" for value in shown])
+            elif items[path].get("spacing") == "logarithmic":
+                (axes.set_xscale if axis is axes.xaxis else axes.set_yscale)("log")
+                _mark_plainly(axis)
+
+    marks = (Mark("map", places[0], places[1], kind.values(mean)),)
+    return Panel(kinds[0], kinds[1], marks, name if is_compared else "", scale=kind, then=mark_axes)
+
+
+def _points(results: StudyResults, device: Sequence[str], metric: str, name: str, is_compared: bool) -> Panel:
+    """Return a metric as the colour of points over the two values that were drawn, for one configuration."""
+    most, kind = _MAXIMUM_POINTS * len(results.configurations), of_metric(metric)
+    x, y, values = (results.thin(path, most)[name] for path in (*device, metric))
+    marks = (Mark("points", x, y, kind.values(values)),)
+    across, upward = (_kind(results, path) for path in device)
+    return Panel(across, upward, marks, name if is_compared else "", scale=kind)
+
+
+def _mark_plainly(axis: Any) -> None:
+    """Put plain numbers at 1, 2 and 5 of every decade."""
+    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def _band(results: StudyResults, channel: str, names: Sequence[str]) -> Panel:
+    """Return the bands of a channel for every configuration: the outermost pair of quantiles light, the next darker."""
+    table = results.bands()
+    fractions = sorted(float(name[1:]) for name in table if name.startswith("q"))
+    pairs = [(low, high) for low, high in zip(fractions, reversed(fractions), strict=True) if low < high]
+    marks = []
+    for name, colour in zip(names, COLOURS, strict=False):
+        own = (table["configuration"] == name) & (table["channel"] == channel)
+        for pair, opacity in zip(pairs, _OPACITIES, strict=False):
+            ends = np.stack([table[f"q{fraction:g}"][own] for fraction in pair])
+            marks.append(Mark("band", table["time"][own], ends, colour=colour, style={"alpha": opacity}))
+        if _MEDIAN in fractions:
+            marks.append(Mark("line", table["time"][own], table["q0.5"][own], label=name, colour=colour))
+    kind = of_channel(channel, CHANNELS[channel].unit)
+    percentages = ", ".join(f"{100.0 * fraction:g}" for fraction in fractions)
+    title = f"{kind.words}: {percentages} % of runs below"
+    return Panel(TIME, kind, marks, then=lambda axes: axes.set_title(title, fontsize=9))

@@ -1,0 +1,388 @@
+"""Runs a study into a folder, from where it stands, and sums it up; chunks that are whole are not computed again.
+
+Only completed runs that have the metric count, and how many those are is said beside each. Mean, spread and quantiles
+are exact; for quantiles a column of one configuration is in memory at a time. The quantile of fraction q of n sorted
+values is the value at place (n - 1) q, on a line between its neighbours: definition 7 of Hyndman and Fan (The American
+Statistician, 1996). The standard deviation divides by n - 1.
+"""
+
+import json
+import math
+import os
+import platform
+import tempfile
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ppafo.analyses.sweep.answer import finding_of, write_report
+from ppafo.analyses.sweep.results import BANDS, SUMMARY, Columns, StudyResults
+from ppafo.analyses.sweep.statistic import MOST_DRAWS, Estimate, estimate
+from ppafo.documents.json_text import json_text
+from ppafo.errors import StudyError
+from ppafo.metrics import METRICS
+from ppafo.progress import Progress, Report
+from ppafo.signals.recording import CHANNELS
+from ppafo.storage.parquet import TableColumn, encode_texts, matrix_of, parquet_bytes, table_of
+from ppafo.storage.places import place_at
+from ppafo.storage.result_folder import check_owned_folder, marked_folder
+from ppafo.studies.distributions import Floats
+from ppafo.studies.draws import study_of
+from ppafo.studies.loading import list_studies, load_study
+from ppafo.studies.study import Study
+from ppafo.study.blocks import chunk_count, samples_of
+from ppafo.study.finding import Finding
+from ppafo.study.manifest import read_manifest
+from ppafo.study.store import (
+    STATUSES,
+    Finished,
+    Store,
+    Task,
+    completed_rows,
+    compute_chunk,
+    note_file,
+    stored_unit,
+    trace_column,
+)
+from ppafo.version import __version__
+
+_EXAMPLES = 5
+QUANTILE_DEFINITION = (
+    "value at place (n - 1) q of the n sorted values, on a line between neighbours (Hyndman and Fan 1996, definition 7)"
+)
+MAXIMUM_IN_MEMORY = 16_000_000
+"""Values of a channel over time from which bands are made at once."""
+Parts = Callable[[], Iterator[Floats]]
+"""Gives the finite values of a column anew each time, in parts whose order is always the same."""
+
+
+def _completed_runs(results: StudyResults, configuration: str) -> int:
+    parts = results.chunks(["status"], configuration)
+    return sum(int(np.count_nonzero(completed_rows(part))) for part in parts)
+
+
+def _metric(study: Study, results: StudyResults, configuration: str, metric: str) -> dict[str, Any]:
+    kind = METRICS[metric]
+    said = {"unit": kind.unit, "summary": kind.summary}
+    return said | describe(lambda: results.parts(configuration, metric), study.outputs.quantiles)
+
+
+def _failures(results: StudyResults) -> list[dict[str, Any]]:
+    """Return the first few runs that failed, with their reasons."""
+    found: list[dict[str, Any]] = []
+    for part in results.chunks(["run", "configuration", "status", "reason"]):
+        rows = [row for row in part.to_pylist() if row["status"] != STATUSES[0]]
+        found += rows[: _EXAMPLES - len(found)]
+        if len(found) == _EXAMPLES:
+            break
+    return found
+
+
+def bands_file(study: Study, results: StudyResults) -> bytes:
+    """Return the content of ``bands.parquet``: quantiles over the runs at each time, exact."""
+    fractions = study.outputs.quantiles
+    parts: list[Columns] = []
+    for number, item in enumerate(study.configurations):
+        samples = samples_of(study, item)
+        for place, channel in enumerate(study.outputs.bands):
+            counts, levels = _band(study, results, item.name, channel, samples)
+            parts.append(
+                {
+                    "configuration": np.full(samples, number),
+                    "channel": np.full(samples, place),
+                    "time": study.outputs.every * np.arange(samples),
+                    "runs": counts,
+                    **{f"q{fraction:g}": level for fraction, level in zip(fractions, levels, strict=True)},
+                }
+            )
+    joined = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    names = [item.name for item in study.configurations]
+    columns = {
+        "configuration": TableColumn(
+            encode_texts(joined.pop("configuration"), names), "-", "name of the base scenario"
+        ),
+        "channel": TableColumn(encode_texts(joined.pop("channel"), study.outputs.bands), "-", "name of the channel"),
+        "time": TableColumn(joined.pop("time"), "s", "time since the start"),
+        "runs": TableColumn(joined.pop("runs"), "-", "completed runs, without a fall so far"),
+        **{name: TableColumn(values, _si_of_channel(study), "quantile over runs") for name, values in joined.items()},
+    }
+    return parquet_bytes(table_of(columns, {"study": study.name}))
+
+
+def _band(
+    study: Study, results: StudyResults, configuration: str, channel: str, samples: int
+) -> tuple[NDArray[np.int64], Floats]:
+    """Return how many runs there are at each time, and each quantile over them (quantiles, times).
+
+    As many times are read at once as fit into the memory together with all runs.
+    """
+    column, at_once = trace_column(channel), max(1, MAXIMUM_IN_MEMORY // study.runs_of_configuration)
+    counts, levels = [], []
+    for first in range(0, samples, at_once):
+        parts = results.chunks([column], configuration)
+        values = np.concatenate([matrix_of(part.column(column))[:, first : first + at_once] for part in parts])
+        counts.append(np.count_nonzero(np.isfinite(values), axis=0))
+        levels.append(sorted_quantiles(np.sort(values, axis=0), counts[-1], study.outputs.quantiles))
+    return np.concatenate(counts), np.concatenate(levels, axis=1)
+
+
+def sorted_quantiles(ordered: Floats, counts: NDArray[np.int64], fractions: Sequence[float]) -> Floats:
+    """Return quantiles (fractions, columns) of the first ``counts`` values of sorted columns; nan without values."""
+    places = np.maximum(counts - 1, 0) * np.asarray(fractions)[:, None]
+    low = places.astype(np.int64)
+    columns = np.arange(counts.size)
+    below, above = ordered[low, columns], ordered[np.minimum(low + 1, np.maximum(counts - 1, 0)), columns]
+    return np.asarray(below + (places - low) * (above - below), dtype=np.float64)
+
+
+def _si_of_channel(study: Study) -> str:
+    units = {stored_unit(CHANNELS[name].unit) for name in study.outputs.bands}
+    return units.pop() if len(units) == 1 else "SI unit of the channel"
+
+
+def describe(parts: Parts, fractions: Sequence[float]) -> dict[str, Any]:
+    """Return count, and unless it is 0 mean, standard deviation (from 2 values on), extremes, quantiles by fraction."""
+    sums = [(part.size, float(np.sum(part)), float(part.min()), float(part.max())) for part in parts() if part.size]
+    count = sum(item[0] for item in sums)
+    if count == 0:
+        return {"count": 0}
+    mean = math.fsum(item[1] for item in sums) / count
+    levels = np.quantile(np.concatenate(list(parts())), fractions, method="linear", overwrite_input=True)
+    squares = math.fsum(float(np.sum((part - mean) ** 2)) for part in parts())
+    return {
+        "count": count,
+        "mean": mean,
+        **({"sd": math.sqrt(squares / (count - 1))} if count > 1 else {}),
+        "minimum": min(item[2] for item in sums),
+        "maximum": max(item[3] for item in sums),
+        "quantiles": dict(zip((f"{fraction:g}" for fraction in fractions), levels.tolist(), strict=True)),
+    }
+
+
+LOG = "log.jsonl"
+"""The only file that says when, where and how fast; all others are the same wherever they are made."""
+_INTERRUPTED = "interrupted; finished chunks are kept, and the same command resumes the study"
+
+
+@dataclass(frozen=True, slots=True)
+class Means:
+    """How a study is computed: threads of this process, a Dask scheduler, consent to a large folder, who watches."""
+
+    threads: int | None = None
+    scheduler: str | None = None
+    agreed: bool = False
+    progress: Report | None = None
+
+
+def sweep(
+    study: Study | str | Path | Mapping[str, Any],
+    out: str | Path | None = None,
+    overrides: Sequence[str] = (),
+    draws: int | None = None,
+    seed: int | None = None,
+    threads: int | None = None,
+    scheduler: str | None = None,
+    agreed: bool = False,
+    progress: Report | None = None,
+) -> Finding[StudyResults]:
+    """Return the results of a study: a name, a TOML file, data laid out as one, or a Study.
+
+    ``out`` is a folder, or an address that fsspec knows; a study that was begun there resumes. Without it the results
+    live in a temporary folder as long as the returned object. ``overrides`` change every configuration, ``draws``
+    and ``seed`` replace the number of draws and the random seed of the file. ``threads`` are those of this process, all
+    cores by default; ``scheduler`` is the address of a Dask scheduler whose workers do the work, ``agreed`` the consent
+    to a folder that takes much of the disk, and ``progress`` hears of every finished chunk.
+
+    Columns of the results are arrays of shape (runs,), trajectories (runs, samples), in SI units, pressures absolute;
+    nan where a run failed, which is a row that says so. StudyError for a study that cannot be used or does not fit onto
+    the disk, and where the folder has results of another one; DataError for a folder that cannot be used.
+    """
+    means = Means(threads, scheduler, agreed, progress)
+    chosen = _study_of(study, overrides, draws, seed)
+    kept = tempfile.TemporaryDirectory(prefix="ppafo-study-") if out is None else None
+    place = place_at(kept.name if kept is not None else str(out))
+    store = Store.claim(chosen, place, means.agreed, means.threads)
+    _work(Task(chosen, place.address, means.threads), store, means)
+    # Write summary and bands of a study all of whose chunks are there, and return its results.
+    results = StudyResults(place, read_manifest(place), {})
+    # The content of ``summary.json``.
+    completed = {item.name: _completed_runs(results, item.name) for item in chosen.configurations}
+    failed = chosen.runs - sum(completed.values())
+    diverged = sum(part.size for item in chosen.configurations for part in results.parts(item.name, "failure_time"))
+    summary = {
+        "study": chosen.name,
+        "runs": chosen.runs,
+        "completed": chosen.runs - failed,
+        "diverged": diverged,
+        "refused": failed - diverged,
+        "completed_by_configuration": completed,
+        "failures": _failures(results) if failed else [],
+        "quantile_definition": QUANTILE_DEFINITION,
+        "configurations": {
+            item.name: {metric: _metric(chosen, results, item.name, metric) for metric in chosen.outputs.metrics}
+            for item in chosen.configurations
+        },
+    }
+    if chosen.outputs.bands:
+        place.write(BANDS, bands_file(chosen, results))
+    place.write(SUMMARY, f"{json_text(summary)}\n".encode())
+    return finding_of(replace(results, summary=summary, kept=kept))
+
+
+def sweep_into_folder(
+    study: Study | str | Path | Mapping[str, Any],
+    out: str | Path | None = None,
+    overrides: Sequence[str] = (),
+    draws: int | None = None,
+    seed: int | None = None,
+    threads: int | None = None,
+    scheduler: str | None = None,
+    agreed: bool = False,
+    statistic: str | None = None,
+    metric: str | None = None,
+    width: str | None = None,
+    also: Sequence[str] = (),
+    configuration: str | None = None,
+    first_draws: int | None = None,
+    confidence: float | None = None,
+    maximum_failed: float | None = None,
+    progress: Report | None = None,
+) -> Finding[StudyResults] | Finding[Estimate]:
+    """Return the rows of ``sweep``, or with a statistic the ``estimate``, written into ``out`` with figure and page.
+
+    The folder is ``out/NAME`` by default, of a statistic ``out/NAME-METRIC``.
+    """
+    of_statistic: dict[str, Any] = {
+        "width": width,
+        "also": tuple(also) or None,
+        "configuration": configuration,
+        "first_draws": first_draws,
+        "confidence": confidence,
+        "maximum_failed": maximum_failed,
+    }
+    given = {name: value for name, value in of_statistic.items() if value is not None}
+    if statistic is None:
+        unused = [*(["metric"] if metric is not None else []), *given]
+        if unused:
+            raise StudyError(f"{unused[0]}: needs a statistic, for example --statistic mean --metric rms_error")
+        chosen = _study_of(study, overrides, draws, seed)
+        try:
+            swept = sweep(
+                chosen,
+                out or Path("out") / chosen.name,
+                threads=threads,
+                scheduler=scheduler,
+                agreed=agreed,
+                progress=progress,
+            )
+            write_report(swept.found)
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt(_INTERRUPTED) from None
+        return swept
+    if metric is None:
+        raise StudyError(f"statistic '{statistic}': needs the metric that it is of, for example --metric rms_error")
+    if scheduler is not None:
+        raise StudyError(f"--scheduler {scheduler}: a statistic is computed here; omit it")
+    chosen = study_of(study, overrides)
+    folder = Path(out or Path("out") / f"{chosen.name}-{metric}")
+    check_owned_folder(folder, marked_folder("sweep"))
+    most = MOST_DRAWS if draws is None else draws
+    found = estimate(chosen, metric, statistic, seed=seed, draws=most, threads=threads, progress=progress, **given)
+    found.save(folder)
+    return replace(found, found=replace(found.found, folder=str(folder)))
+
+
+def _study_of(
+    study: Study | str | Path | Mapping[str, Any], overrides: Sequence[str], draws: int | None, seed: int | None
+) -> Study:
+    """Return the study; StudyError where one that is loaded already comes with what only loading can change."""
+    if not isinstance(study, Study):
+        return load_study(study, overrides, draws, seed)
+    if overrides or draws is not None or seed is not None:
+        raise StudyError("a loaded Study takes no overrides, draws or seed; give them to load_study")
+    return study
+
+
+def studies_of_the_package() -> list[dict[str, Any]]:
+    """Return name, number of runs and description of each study that comes with the package."""
+    studies = [load_study(name) for name in list_studies()]
+    return [{"name": study.name, "runs": study.runs, "description": study.description} for study in studies]
+
+
+def _work(task: Task, store: Store, means: Means) -> None:
+    study, place, started = store.study, store.place, time.monotonic()
+    known = store.finished()
+    tally = _Tally(study, means.progress, started, known)
+    missing = sorted(set(range(chunk_count(study))) - {item.number for item in known})
+    if missing and SUMMARY in place.names():
+        place.remove(SUMMARY)
+    if means.scheduler is not None:
+        from ppafo.analyses.sweep.cluster import compute_on_cluster
+
+        compute_on_cluster(means.scheduler, task, missing, tally.add)
+        place.tidy()
+        names = place.names()
+        if any(note_file(number) not in names for number in missing):
+            raise StudyError(
+                f"--scheduler {means.scheduler}: the workers finished chunks that are not in {place.address}: "
+                "--out must be a folder that they share with this machine, or an address such as s3://bucket/study"
+            )
+    else:
+        _compute_here(task, store, missing, tally.add)
+    # Add a line on this session to the log.
+    elapsed = time.monotonic() - started
+    line = {
+        "ended": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
+        "machine": platform.platform(),
+        "processors": os.cpu_count(),
+        "versions": {"ppafo": __version__, "python": platform.python_version(), "numpy": np.__version__},
+        "scheduler": means.scheduler,
+        "threads": means.threads,
+        "runs": tally.done - tally.earlier,
+        "failed": tally.failed,
+        "seconds": round(elapsed, 3),
+    }
+    try:
+        with place.open(LOG) as file:
+            before = file.read()
+    except OSError:
+        before = b""
+    place.write(LOG, before + f"{json.dumps(line)}\n".encode())
+
+
+def _compute_here(task: Task, store: Store, numbers: Iterable[int], finish: Callable[[Finished], None]) -> None:
+    """Compute chunks one after the other; while one is written, the next one is computed."""
+    with ThreadPoolExecutor(1, "ppafo-writing") as writer:
+        writing: tuple[Finished, Future[None]] | None = None
+        for number in numbers:
+            finished, content = compute_chunk(task, number)
+            if writing is not None:
+                writing[1].result()
+                finish(writing[0])
+            writing = finished, writer.submit(store.write, finished, content)
+        if writing is not None:
+            writing[1].result()
+            finish(writing[0])
+
+
+class _Tally:
+    """What is done so far, reported to whoever watches."""
+
+    def __init__(self, study: Study, progress: Report | None, started: float, known: Sequence[Finished]) -> None:
+        self._report, self._started, self._runs = progress, started, study.runs
+        self.earlier = self.done = sum(item.runs for item in known)
+        self.failed = sum(item.failed for item in known)
+
+    def add(self, finished: Finished) -> None:
+        """Count a chunk."""
+        self.done += finished.runs
+        self.failed += finished.failed
+        if self._report is not None:
+            elapsed = time.monotonic() - self._started
+            self._report(Progress("", self.done, self._runs, self.failed, self.earlier, elapsed))

@@ -1,0 +1,387 @@
+"""A tuning: its file, and the way from a name, a file or plain data to frozen values in SI units."""
+
+import copy
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from ppafo.documents.models import NAME, StrictTable, Text, Texts, make_schema, validate
+from ppafo.documents.toml_text import TomlKind, beside, label
+from ppafo.errors import ParameterError, ScenarioError, StudyError, UnitError, first_twice, refused_as
+from ppafo.loading import load_scenario, placed, reloaded
+from ppafo.parameters.graph import ATMOSPHERE_PATH
+from ppafo.simulation.numbers import number_at
+from ppafo.simulation.scenario import Scenario
+from ppafo.studies.distributions import Floats
+from ppafo.studies.draws import Uncertainty, atmosphere_of, check_metrics, difference_of, level_of, uncertainty_of
+from ppafo.studies.loading import list_studies, load_study
+from ppafo.studies.sampling import NOISE
+from ppafo.studies.varying import VariedPath, in_its_unit, varied_path
+
+LARGEST_SEED = 2**32 - 1
+MAXIMUM_DRAWS = 4096
+_Value = Annotated[str | float | int, Field(description="text with unit; a plain number if there is no unit")]
+_Metric = Annotated[Text, Field(description="name of a metric, such as 'rms_error'")]
+
+
+class SearchRange(StrictTable):
+    """A number that is searched, with the bounds between which it may lie."""
+
+    path: Annotated[Text, Field(description="as for --set, such as 'controller.proportional_gain'")]
+    minimum: _Value
+    maximum: _Value
+    spacing: Annotated[Literal["linear", "logarithmic"], Field(description="default: linear")] = "linear"
+
+
+class Goal(StrictTable):
+    """A term of the objective: weight times metric over scale; less is better, with a weight below 0 more is."""
+
+    metric: _Metric
+    weight: float = 1.0
+    scale: Annotated[Text | None, Field(description="value that is scaled to 1; default: the value before tuning")] = (
+        None
+    )
+
+
+class Constraint(StrictTable):
+    """A metric that must not be above, or below, a value."""
+
+    metric: _Metric
+    at_most: Annotated[Text | None, Field(description="largest value with its unit")] = None
+    at_least: Annotated[Text | None, Field(description="smallest value with its unit")] = None
+
+
+class Robust(StrictTable):
+    """Every candidate is run over the same draws from a study, and judged by the bad end of what comes from it."""
+
+    study: Annotated[Text, Field(description="name of a study, or a path relative to this file")]
+    measure: Annotated[
+        Literal["mean_and_deviations", "quantile"],
+        Field(description="mean plus 'deviations' standard deviations, or the 'share' quantile"),
+    ] = "mean_and_deviations"
+    deviations: Annotated[float, Field(ge=0.0, le=10.0)] = 1.0
+    share: Annotated[float, Field(ge=0.5, lt=1.0)] = 0.9
+    draws: Annotated[int, Field(ge=8, le=MAXIMUM_DRAWS)] = 64
+
+
+class Effort(StrictTable):
+    """How long is searched: independent starts, generations of each at most, candidates of a generation per gain."""
+
+    starts: Annotated[int, Field(ge=1, le=100)] = 3
+    generations: Annotated[int, Field(ge=1, le=100_000)] = 100
+    candidates_per_gain: Annotated[int, Field(ge=4, le=1000)] = 10
+    seed: Annotated[int, Field(ge=0, le=LARGEST_SEED)] = 1
+
+
+class TuningFile(StrictTable):
+    """A tuning file, as it is written."""
+
+    schema_version: Annotated[Literal[1], Field(description="version of this layout")]
+    name: Annotated[str, Field(pattern=NAME, max_length=100)]
+    description: str = ""
+    scenario: Annotated[Text, Field(description="name of a scenario, or a path relative to this file")]
+    overrides: Annotated[Texts, Field(description="such as 'valve.area=12.6mm^2'")] = ()
+    search: Annotated[tuple[SearchRange, ...], Field(strict=False, min_length=1)]
+    objective: Annotated[tuple[Goal, ...], Field(strict=False, min_length=1)]
+    constraints: Annotated[tuple[Constraint, ...], Field(strict=False)] = ()
+    robust: Annotated[
+        Robust | None, Field(description="uncertainty to be robust against; default: the nominal device")
+    ] = None
+    effort: Effort = Effort()
+
+
+def json_schema() -> dict[str, Any]:
+    """Return the JSON Schema of a tuning file."""
+    return make_schema(TuningFile, "ppafo tuning")
+
+
+AT_BOUND = 0.01
+"""A gain has ended at a bound where it is nearer to it than this fraction of the way between the two."""
+Gains = Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Searched:
+    """A path, its bounds [SI], whether its logarithm is searched, its value before [SI], and how it is written."""
+
+    path: str
+    minimum: float
+    maximum: float
+    is_logarithmic: bool
+    before: float
+    place: VariedPath
+
+    def value(self, fraction: Floats) -> Floats:
+        """Return values [SI] at fractions of the way from the minimum to the maximum."""
+        if self.is_logarithmic:
+            return self.minimum * np.exp(math.log(self.maximum / self.minimum) * fraction)
+        return self.minimum + (self.maximum - self.minimum) * fraction
+
+    def fraction(self, value: float) -> float:
+        """Return the fraction of the way at which a value lies; outside 0 to 1 beyond the bounds."""
+        if self.is_logarithmic:
+            return math.log(value / self.minimum) / math.log(self.maximum / self.minimum) if value > 0.0 else -math.inf
+        return (value - self.minimum) / (self.maximum - self.minimum)
+
+    def bound_reached(self, value: float) -> Literal["minimum", "maximum"] | None:
+        """Return the bound at which a value lies, None where it is between them."""
+        fraction = self.fraction(value)
+        if fraction <= AT_BOUND:
+            return "minimum"
+        return "maximum" if fraction >= 1.0 - AT_BOUND else None
+
+
+@dataclass(frozen=True, slots=True)
+class Term:
+    """A term of the objective: weight times metric over scale [SI]; by default the value before tuning."""
+
+    metric: str
+    weight: float
+    scale: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """A metric with the largest value that it may have [SI], or the smallest where not ``is_most``."""
+
+    metric: str
+    limit: float
+    is_most: bool
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Spread:
+    """Draws over which a candidate is judged: distributions, how many, their seed, and the bad end of the result.
+
+    The bad end is the quantile at ``fraction``, or where that is None the mean and ``deviations`` standard deviations.
+    ``study`` is empty where the noise of the sensors is all that is drawn.
+    """
+
+    uncertainty: Uncertainty
+    study: str
+    draws: int
+    seed: int
+    deviations: float
+    fraction: float | None
+
+    @property
+    def measure(self) -> str:
+        """The measure by which candidates are judged, in words."""
+        if self.fraction is not None:
+            return f"{100.0 * self.fraction:g} % quantile"
+        if self.deviations == 0.0:
+            return "mean"
+        return f"mean and {self.deviations:g} standard deviation{'' if self.deviations == 1.0 else 's'}"
+
+    def bad_end(self, values: Floats, is_high: bool) -> Floats:
+        """Return the high, or low, end of values (candidates, draws) [SI], shape (candidates,)."""
+        if self.fraction is not None:
+            return np.asarray(np.quantile(values, self.fraction if is_high else 1.0 - self.fraction, axis=1))
+        spread = self.deviations * np.std(values, axis=1, ddof=1)
+        return np.asarray(np.mean(values, axis=1) + (spread if is_high else -spread))
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Problem:
+    """What is searched in a scenario, for what, and how long.
+
+    ``spread`` is None for the device as it is said to be, with sensors without noise.
+    """
+
+    name: str
+    description: str
+    scenario: Scenario
+    overrides: tuple[str, ...]
+    searched: tuple[Searched, ...]
+    goals: tuple[Term, ...]
+    constraints: tuple[Limit, ...]
+    spread: Spread | None
+    effort: Effort
+
+    def __repr__(self) -> str:
+        """Return name, scenario and what is searched."""
+        return f"Tuning '{self.name}' of '{self.scenario.name}': {', '.join(item.path for item in self.searched)}"
+
+    @property
+    def metrics(self) -> tuple[str, ...]:
+        """Every metric that the goals and constraints need, each once."""
+        wanted = [*(item.metric for item in self.goals), *(item.metric for item in self.constraints)]
+        return tuple(dict.fromkeys(wanted))
+
+    @property
+    def before(self) -> Gains:
+        """The values before tuning [SI]."""
+        return {item.path: item.before for item in self.searched}
+
+    @property
+    def gauge(self) -> frozenset[str]:
+        """The paths, searched and drawn, whose values count from the atmosphere of their run."""
+        drawn = frozenset[str]() if self.spread is None else self.spread.uncertainty.gauge
+        return drawn | {item.path for item in self.searched if item.place.is_gauge}
+
+    def gains(self, fractions: Sequence[float]) -> Gains:
+        """Return the values [SI] at fractions of the way, rounded as written: what is pasted is what was run."""
+        values = {
+            item.path: float(item.value(np.asarray(fraction)))
+            for item, fraction in zip(self.searched, fractions, strict=True)
+        }
+        return {item.path: item.place.level(item.place.quote(values[item.path])) for item in self.searched}
+
+    def lines(self, gains: Gains) -> list[str]:
+        """Return gains as overrides, ``PATH=VALUE``."""
+        return [f"{item.path}={item.place.quote(gains[item.path])}" for item in self.searched]
+
+
+TUNING = TomlKind("tuning", "tuning", resources.files("ppafo") / "analyses" / "tune" / "library", StudyError)
+NOISE_DRAWS = 16
+"""Noise streams over which every candidate is judged where nothing else is uncertain."""
+Refusal = Callable[[object], StudyError]
+
+
+def list_tunings() -> tuple[str, ...]:
+    """Return the names of the tunings that come with the package."""
+    return TUNING.names()
+
+
+def load_tuning(tuning: str | Path | Mapping[str, Any], overrides: Sequence[str] = ()) -> Problem:
+    """Return a tuning by its name in the package, by the path of a TOML file, or from data laid out as such a file.
+
+    ``overrides`` change the scenario. StudyError for anything that is not usable.
+    """
+    if isinstance(tuning, Mapping):
+        TUNING.check_depth(tuning, "tuning")
+        return _problem(copy.deepcopy(dict(tuning)), "tuning", Path(), overrides)
+    file = label(str(tuning))
+    return _problem(TUNING.parse(TUNING.read(tuning), file), file, Path(tuning).parent, overrides)
+
+
+def _problem(document: dict[str, Any], file: str, folder: Path, overrides: Sequence[str]) -> Problem:
+    def refusal(text: object) -> StudyError:
+        return StudyError(f"{file}: {text}")
+
+    parsed = validate(TuningFile, document, file, StudyError)
+    try:
+        scenario = load_scenario(placed(parsed.scenario, folder), parsed.overrides)
+        scenario = reloaded(scenario, overrides) if overrides else scenario
+        check_metrics(_once([*parsed.objective, *parsed.constraints]), scenario)
+    except (ScenarioError, ParameterError, StudyError) as error:
+        raise refusal(error) from error
+    spread = _spread(parsed, folder, [item.path for item in parsed.search], scenario, refusal)
+    drawn = () if spread is None else (*spread.uncertainty.paths, *spread.uncertainty.same)
+    paths = [item.path for item in parsed.search]
+    repeated = first_twice(paths)
+    if repeated is not None:
+        raise refusal(f"'{repeated}' is searched twice; give it only one [[search]]")
+    varies = ATMOSPHERE_PATH in (*paths, *drawn)
+    searched = tuple(_search_variable(item, scenario, varies, refusal) for item in parsed.search)
+    atmosphere = atmosphere_of(scenario, (*drawn, *(item.path for item in searched)))
+    return Problem(
+        name=parsed.name,
+        description=" ".join(parsed.description.split()),
+        scenario=scenario,
+        overrides=scenario.origin.overrides,
+        searched=searched,
+        goals=tuple(_goal(item, refusal) for item in parsed.objective),
+        constraints=tuple(_constraint(item, atmosphere, refusal) for item in parsed.constraints),
+        spread=spread,
+        effort=parsed.effort,
+    )
+
+
+def _once(items: Sequence[Goal | Constraint]) -> list[str]:
+    return list(dict.fromkeys(item.metric for item in items))
+
+
+def _search_variable(item: SearchRange, scenario: Scenario, atmosphere_varies: bool, refusal: Refusal) -> Searched:
+    with refused_as(refusal, f"search '{item.path}'", UnitError, ScenarioError):
+        place = varied_path(item.path, scenario)
+        place = in_its_unit(place, (item.minimum, item.maximum)) if atmosphere_varies else place
+        minimum, maximum = place.level(item.minimum), place.level(item.maximum)
+        before = present_value(item.path, scenario) - (place.atmosphere if place.is_gauge else 0.0)
+    if item.path == NOISE:
+        raise refusal(f"search '{item.path}': all candidates get the same noise, so it cannot be searched")
+    if minimum >= maximum:
+        raise refusal(f"search '{item.path}': minimum = {item.minimum!r} must be less than maximum = {item.maximum!r}")
+    is_logarithmic = item.spacing == "logarithmic"
+    if is_logarithmic and minimum <= 0.0:
+        raise refusal(f"search '{item.path}': spacing = 'logarithmic' needs a minimum above 0, not {item.minimum!r}")
+    return Searched(item.path, minimum, maximum, is_logarithmic, before, place)
+
+
+def _goal(item: Goal, refusal: Refusal) -> Term:
+    if item.weight == 0.0:
+        raise refusal(f"objective '{item.metric}': weight = 0 has no effect; omit it")
+    if item.scale is None:
+        return Term(item.metric, item.weight, None)
+    try:
+        scale = difference_of(item.scale, item.metric, f"objective '{item.metric}': scale = '{item.scale}'")
+    except StudyError as error:
+        raise refusal(error) from error
+    if scale <= 0.0:
+        raise refusal(f"objective '{item.metric}': scale = '{item.scale}' must be more than 0")
+    return Term(item.metric, item.weight, scale)
+
+
+def _constraint(item: Constraint, atmosphere: float | None, refusal: Refusal) -> Limit:
+    given = [text for text in (item.at_most, item.at_least) if text is not None]
+    if len(given) != 1:
+        raise refusal(
+            f"constraint '{item.metric}': needs either at_most or at_least, it has {'both' if given else 'none'}"
+        )
+    try:
+        limit = level_of(given[0], item.metric, f"constraint '{item.metric}' = '{given[0]}'", atmosphere)
+    except StudyError as error:
+        raise refusal(error) from error
+    return Limit(item.metric, limit, item.at_most is not None, given[0])
+
+
+def _spread(
+    parsed: TuningFile, folder: Path, searched: Sequence[str], scenario: Scenario, refusal: Refusal
+) -> Spread | None:
+    """Return what the candidates are judged over: draws of a study, of the noise, of both, or nothing."""
+    robust = parsed.robust
+    if robust is None:
+        noise = Uncertainty(()).with_noise_of([scenario])
+        return Spread(noise, "", NOISE_DRAWS, parsed.effort.seed, 0.0, None) if noise.drawn else None
+    with refused_as(refusal, "robust", StudyError):
+        study = load_study(beside(robust.study, folder, list_studies()))
+        uncertainty = _without_restriction(uncertainty_of(study), study.only).with_noise_of([scenario])
+    both = next((path for path in uncertainty.paths if path in searched), None)
+    if both is not None:
+        raise refusal(f"robust: study '{study.name}' draws '{both}', which is searched here; it cannot be both")
+    share = robust.share if robust.measure == "quantile" else None
+    return Spread(uncertainty, study.name, robust.draws, study.sample.seed, robust.deviations, share)
+
+
+def _without_restriction(uncertainty: Uncertainty, only: Mapping[str, Sequence[str]]) -> Uncertainty:
+    if only:
+        path = next(iter(only))
+        raise StudyError(
+            f"'{path}' varies only in some configurations of the study; a tuning needs a study without 'only'"
+        )
+    return uncertainty
+
+
+def present_value(path: str, scenario: Scenario) -> float:
+    """Return the value [SI] of a scenario at a path as in overrides; ScenarioError where it has none there."""
+    if path == "controller.rate":
+        return 1.0 / scenario.control.period
+    of_clock = {
+        "controller.period": scenario.control.period,
+        "run.duration": scenario.duration,
+        "run.step": scenario.time_step,
+        "run.output_interval": scenario.output_interval,
+    }
+    try:
+        return float(of_clock[path]) if path in of_clock else number_at(scenario, path)
+    except (AttributeError, KeyError, TypeError) as error:
+        raise ScenarioError(
+            f"scenario '{scenario.name}' has no value for '{path}'; set one with an override"
+        ) from error

@@ -1,0 +1,353 @@
+"""Tunes a scenario: cost and search, then both settings, before and after, over fresh draws and the nominal device.
+
+A candidate that satisfies all constraints is always better than one that does not; among those that do not, less
+violation is better; a candidate with a run that fails is worse than all (Deb's rules, 2000).
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ppafo.analyses.tune.answer import (
+    FRESH_DRAWS,
+    INFEASIBLE,
+    Ceiling,
+    Setting,
+    Start,
+    Tuned,
+    finding_of,
+    keeps,
+)
+from ppafo.analyses.tune.problem import Effort, Gains, Limit, Problem, Spread, Term, load_tuning
+from ppafo.errors import StudyError
+from ppafo.metrics import METRICS
+from ppafo.parameters.device import VANE
+from ppafo.progress import Report
+from ppafo.simulation.numbers import TIMES, absolute, with_numbers
+from ppafo.simulation.plan import profile_bounds
+from ppafo.simulation.scenario import Scenario, worn_kind
+from ppafo.simulation.simulate import OPEN_LOOP, simulate
+from ppafo.studies.distributions import Floats, Interval, noise_interval
+from ppafo.studies.draws import with_new_noise
+from ppafo.studies.study import with_overrides
+from ppafo.study.finding import Finding
+from ppafo.study.runs import FAILED, Runs, Tally, settled, with_companions
+
+UNUSABLE = 1.0e12
+"""Where the costs of candidates begin of which a run fails; the fraction of such runs is added."""
+
+
+@dataclass(frozen=True, slots=True)
+class Crossed:
+    """Metrics by name and failures of candidates, each (candidates, draws); one draw without uncertainty."""
+
+    metrics: Mapping[str, Floats]
+    failed: NDArray[np.bool_]
+
+    @property
+    def without_value(self) -> Floats:
+        """Fraction of the runs of each candidate that failed or lack a metric (candidates,)."""
+        lacking = self.failed | np.any([~np.isfinite(values) for values in self.metrics.values()], axis=0)
+        return np.asarray(np.mean(lacking, axis=1))
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """Objective, violation and what both are made of, each (candidates,): metric at its bad end by name [SI]."""
+
+    objective: Floats
+    violation: Floats
+    without_value: Floats
+
+    @property
+    def cost(self) -> Floats:
+        """One number by which candidates are compared."""
+        usual = np.where(self.violation > 0.0, INFEASIBLE + self.violation, self.objective)
+        return np.where(self.without_value > 0.0, UNUSABLE * (1.0 + self.without_value), usual)
+
+    @property
+    def is_feasible(self) -> NDArray[np.bool_]:
+        """Which candidates satisfy all constraints and never fail."""
+        return np.asarray((self.violation == 0.0) & (self.without_value == 0.0))
+
+
+def shortfall(scenario: Scenario) -> Floats:
+    """Return what the supply lacks of the largest reference [N m] in each run (runs,); 0 for nothing.
+
+    With one chamber at its supply and the other at the atmosphere the vane holds at most the torque constant times the
+    difference of the two (equation (2)), whatever the controller does. Of another actuator no such limit is known here.
+    """
+    if scenario.device.actuator.kind != VANE:
+        return np.zeros(1)
+    supply, constant = scenario.device.supply, scenario.device.actuator.torque_constant
+    lowest, highest = profile_bounds(scenario.reference)
+    above = highest - constant * (supply.pressure - supply.atmospheric_pressure)
+    below = -lowest - constant * (supply.dorsiflexion_pressure - supply.atmospheric_pressure)
+    return np.atleast_1d(np.maximum(0.0, np.maximum(above, below)))
+
+
+def bad_ends(values: Floats, spread: Spread | None, is_high: bool) -> Floats:
+    """Return the value of a metric by which candidates are judged (candidates,) from (candidates, draws) [SI]."""
+    return values[:, 0] if spread is None else spread.bad_end(values, is_high)
+
+
+def judge(runs: Crossed, problem: Problem, scales: Mapping[str, float]) -> Judgement:
+    """Return objective and violation of candidates; ``scales`` are the sizes of the goals by metric [SI]."""
+    failing = runs.without_value
+    known = {name: np.where(failing[:, None] > 0.0, 0.0, values) for name, values in runs.metrics.items()}
+    objective = sum((_term(goal, known, problem.spread, scales) for goal in problem.goals), np.zeros(failing.size))
+    violation = sum((_excess(item, known, problem.spread) for item in problem.constraints), np.zeros(failing.size))
+    return Judgement(np.asarray(objective), np.asarray(violation), failing)
+
+
+def _term(goal: Term, values: Mapping[str, Floats], spread: Spread | None, scales: Mapping[str, float]) -> Floats:
+    return goal.weight * bad_ends(values[goal.metric], spread, goal.weight > 0.0) / scales[goal.metric]
+
+
+def _excess(item: Limit, values: Mapping[str, Floats], spread: Spread | None) -> Floats:
+    """Return by how much a constraint is broken, as a fraction of its limit (candidates,); 0 where it is kept."""
+    reached = bad_ends(values[item.metric], spread, item.is_most)
+    beyond = reached - item.limit if item.is_most else item.limit - reached
+    return np.maximum(0.0, beyond) / (abs(item.limit) or 1.0)
+
+
+Costs = Callable[[Floats], Floats]
+"""Fractions of the way (candidates, gains) in, costs (candidates,) out."""
+_TOLERANCE = 1.0e-3
+"""A start has ended where the costs of its candidates differ by no more than this fraction of their mean."""
+
+
+def search(costs: Costs, before: Sequence[float], effort: Effort) -> list[Start]:
+    """Return what came of each start, the best first; the same every time for a seed.
+
+    ``before`` are the fractions of the values before tuning; they are among the first candidates where they lie within
+    the bounds. Differential evolution (Storn and Price, 1997) as in SciPy only ever compares costs.
+    """
+    seeds = np.random.SeedSequence(effort.seed).spawn(effort.starts)
+    found = [_start(costs, before, effort, np.random.default_rng(seed)) for seed in seeds]
+    return sorted(found, key=lambda start: start.cost)
+
+
+def _start(costs: Costs, before: Sequence[float], effort: Effort, random: np.random.Generator) -> Start:
+    from scipy.optimize import differential_evolution
+
+    course: list[float] = []
+    tried = 0
+
+    def generation(columns: Floats) -> Floats:
+        nonlocal tried
+        fractions = np.clip(np.atleast_2d(columns.T), 0.0, 1.0)
+        found = costs(fractions)
+        tried += len(fractions)
+        course.append(min([float(np.min(found)), *course[-1:]]))
+        return found
+
+    is_settled = False
+
+    def stop(intermediate_result: Any) -> bool:
+        nonlocal is_settled
+        is_settled = have_come_together(intermediate_result.population_energies)
+        return is_settled
+
+    is_within = all(0.0 <= fraction <= 1.0 for fraction in before)
+    result = differential_evolution(
+        generation,
+        [(0.0, 1.0)] * len(before),
+        x0=np.asarray(before) if is_within else None,
+        init="latinhypercube",
+        popsize=effort.candidates_per_gain,
+        maxiter=effort.generations,
+        tol=0.0,
+        callback=stop,
+        polish=False,
+        updating="deferred",
+        vectorized=True,
+        rng=random,
+    )
+    return Start(tuple(map(float, result.x)), float(result.fun), tried, tuple(course), is_settled)
+
+
+def have_come_together(costs: Floats) -> bool:
+    """Tell whether candidates cost the same; where all break a constraint, by how much they break it."""
+    if np.max(costs) >= UNUSABLE or np.min(costs) < INFEASIBLE <= np.max(costs):
+        return False
+    beyond = costs - INFEASIBLE if np.min(costs) >= INFEASIBLE else costs
+    return float(np.std(beyond)) <= _TOLERANCE * abs(float(np.mean(beyond)))
+
+
+MINIMUM_ERRORS = ("peak_error", "rms_error_hold")
+"""Metrics that are never below what the supply lacks of the largest reference."""
+_NOISE_DRAWS = 512
+"""Fresh draws that are run once more with other noise."""
+_NOISE_CONFIDENCE = 0.95
+
+
+def tune(
+    tuning: Problem | str | Path | Mapping[str, Any] | None = None,
+    overrides: Sequence[str] = (),
+    seed: int | None = None,
+    threads: int | None = None,
+    progress: Report | None = None,
+) -> Finding[Tuned]:
+    """Search the best values of a tuning: a name, a TOML file, data laid out as one, or a Problem.
+
+    ``overrides`` change the scenario, ``seed`` is that of the search, of the file by default. Every generation is one
+    ensemble, and every candidate sees the same draws. StudyError for bad input, and where a goal has no scale because
+    the scenario as it is gives 0 or nothing.
+    """
+    problem = _problem_of(tuning, overrides)
+    if seed is not None:
+        problem = replace(problem, effort=problem.effort.model_copy(update={"seed": seed}))
+        if problem.spread is not None and not problem.spread.study:
+            problem = replace(problem, spread=replace(problem.spread, seed=seed))
+    effort, draws = problem.effort, 1 if problem.spread is None else problem.spread.draws
+    candidates = effort.candidates_per_gain * len(problem.searched) * (effort.generations + 1) * effort.starts
+    noise = _NOISE_DRAWS if problem.spread is not None and problem.spread.uncertainty.has_noise else 0
+    tally = Tally(draws * (candidates + 3) + (2 * (FRESH_DRAWS + noise) if problem.spread is not None else 0), progress)
+    metrics = with_companions(problem.metrics, problem.scenario)
+    runs = Runs(problem.scenario, metrics, tally, problem.gauge, threads)
+    fixed = _draws(problem, 0, 1 if problem.spread is None else problem.spread.draws)
+    scales = _scales(problem, _of_gains(runs, problem, [problem.before], fixed))
+
+    def costs(fractions: Floats) -> Floats:
+        values = {item.path: item.value(fractions[:, column]) for column, item in enumerate(problem.searched)}
+        return judge(_crossed(runs, problem, values, fixed), problem, scales).cost
+
+    before = [item.fraction(item.before) for item in problem.searched]
+    starts = search(costs, before, problem.effort)
+    first, last = (
+        _setting(runs, problem, scales, gains) for gains in (problem.before, problem.gains(starts[0].fractions))
+    )
+    return finding_of(problem, scales, first, last, starts, runs.count)
+
+
+def _problem_of(tuning: Problem | str | Path | Mapping[str, Any] | None, overrides: Sequence[str]) -> Problem:
+    if tuning is None:
+        raise StudyError("no tuning was given: name one or give a .toml file; 'ppafo tune --list' shows them")
+    if not isinstance(tuning, Problem):
+        return load_tuning(tuning, overrides)
+    if overrides:
+        raise StudyError("a loaded Problem takes no overrides; give them to load_tuning")
+    return tuning
+
+
+def _draws(problem: Problem, first: int, count: int) -> dict[str, Floats]:
+    """Return draws of the uncertain values; nothing without uncertainty."""
+    spread = problem.spread
+    return {} if spread is None else spread.uncertainty.random_columns(first, count, spread.seed)
+
+
+def _of_gains(runs: Runs, problem: Problem, gains: Sequence[Gains], draws: Mapping[str, Floats]) -> Crossed:
+    values = {item.path: np.array([one[item.path] for one in gains]) for item in problem.searched}
+    return _crossed(runs, problem, values, draws)
+
+
+def _crossed(runs: Runs, problem: Problem, values: Mapping[str, Floats], draws: Mapping[str, Floats]) -> Crossed:
+    """Run every candidate (values, each (candidates,)) with every draw (columns, each (draws,))."""
+    candidates = len(next(iter(values.values())))
+    count = len(next(iter(draws.values()))) if draws else 1
+    columns = {path: np.repeat(column, count) for path, column in values.items()}
+    columns |= {path: np.tile(column, candidates) for path, column in draws.items()}
+    rows = runs.run(columns)
+    metrics = {name: settled(rows, name).reshape(candidates, count) for name in problem.metrics}
+    return Crossed(metrics, rows[FAILED].reshape(candidates, count))
+
+
+def _scales(problem: Problem, before: Crossed) -> dict[str, float]:
+    """Return the size of each goal: the given one, or its value before tuning."""
+    scales = {}
+    for goal in problem.goals:
+        found = goal.scale
+        if found is None:
+            found = abs(float(bad_ends(before.metrics[goal.metric], problem.spread, goal.weight > 0.0)[0]))
+        if not np.isfinite(found) or found == 0.0:
+            raise StudyError(
+                f"tuning '{problem.name}': objective '{goal.metric}' is {found:g} before tuning, which cannot be "
+                "the scale; give one, scale = 'VALUE UNIT'"
+            )
+        scales[goal.metric] = found
+    return scales
+
+
+def _setting(runs: Runs, problem: Problem, scales: Mapping[str, float], gains: Gains) -> Setting:
+    spread = problem.spread
+    seen = _of_gains(runs, problem, [gains], _draws(problem, 0, 1 if spread is None else spread.draws))
+    judged: Judgement = judge(seen, problem, scales)
+    columns = {} if spread is None else _draws(problem, spread.draws, FRESH_DRAWS)
+    again = seen if spread is None else _of_gains(runs, problem, [gains], columns)
+    rejudged: Judgement = judge(again, problem, scales)
+    noise: dict[str, Interval] = {}
+    if spread is not None and spread.uncertainty.has_noise:
+        other = _of_gains(runs, problem, [gains], with_new_noise(columns, _NOISE_DRAWS))
+        noise = _noise(again, other)
+    result = simulate(scenario_with(problem, gains))
+    return Setting(
+        gains=gains,
+        values=_values(seen, problem),
+        fresh={} if spread is None else _values(again, problem),
+        objective=float(judged.objective[0]),
+        violation=float(judged.violation[0]),
+        share_without_value=float(judged.without_value[0]),
+        fresh_violation=float(rejudged.violation[0]),
+        fresh_share_without_value=float(rejudged.without_value[0]),
+        torque_ceiling=_ceiling(problem, gains, columns, again),
+        share_of_noise=noise,
+        metrics=result.metrics,
+        result=result,
+    )
+
+
+def _noise(runs: Crossed, other: Crossed) -> dict[str, Interval]:
+    """Return the fraction of noise in each metric of the first candidate, where it varies."""
+    pairs = {name: (runs.metrics[name][0], values[0]) for name, values in other.metrics.items()}
+    found = {
+        name: noise_interval(first[: second.size], second, _NOISE_CONFIDENCE) for name, (first, second) in pairs.items()
+    }
+    return {name: fraction for name, fraction in found.items() if fraction is not None}
+
+
+def _ceiling(problem: Problem, gains: Gains, draws: Mapping[str, Floats], runs: Crossed) -> Ceiling:
+    """Return in how many draws the supply cannot hold the reference, and which violated constraints that explains."""
+    base = scenario_with(problem, gains)
+    given = {path: column for path, column in absolute(base, draws, problem.gauge).items() if path not in TIMES}
+    scenario = with_numbers(base, given)
+    if scenario.control.kind == OPEN_LOOP or worn_kind(scenario) is not None:
+        return Ceiling(0.0, ())
+    known = runs.metrics
+    lacking = np.broadcast_to(shortfall(scenario), known[problem.metrics[0]][:1].shape)
+    explained = [
+        item.metric
+        for item in problem.constraints
+        if "reference" in METRICS[item.metric].channels
+        and not keeps(item, float(bad_ends(known[item.metric], problem.spread, item.is_most)[0]))
+        and _is_explained(item, problem.spread, known[item.metric], lacking)
+    ]
+    return Ceiling(float(np.mean(lacking > 0.0)), tuple(explained) if lacking.any() else ())
+
+
+def _is_explained(item: Limit, spread: Spread | None, values: Floats, lacking: Floats) -> bool:
+    """Tell whether the draws below the ceiling alone break a constraint: no gains can, or the others keep it."""
+    if item.metric in MINIMUM_ERRORS and item.is_most:
+        least = np.mean(lacking, axis=1) if spread is None or spread.fraction is None else spread.bad_end(lacking, True)
+        if not keeps(item, float(least[0])):
+            return True
+    rest = values[:, lacking[0] == 0.0]
+    return rest.shape[1] < 2 or keeps(item, float(bad_ends(rest, spread, item.is_most)[0]))
+
+
+def scenario_with(problem: Problem, gains: Gains) -> Scenario:
+    """Return the scenario of a problem with gains in it, as the pasted lines give it."""
+    if gains == problem.before:
+        return problem.scenario
+    return with_overrides(problem.scenario, problem.lines(gains))
+
+
+def _values(runs: Crossed, problem: Problem) -> dict[str, float]:
+    """Return every metric of the problem as the first candidate is judged by it; nan where a run has none."""
+    less = {goal.metric: goal.weight > 0.0 for goal in problem.goals}
+    less |= {item.metric: item.is_most for item in problem.constraints if item.metric not in less}
+    return {name: float(bad_ends(runs.metrics[name], problem.spread, less[name])[0]) for name in problem.metrics}

@@ -1,0 +1,445 @@
+"""A walk and its answer, of one wearer with and without the device, or of many wearers."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ppafo.analyses.endurance.draw import FORMAT
+from ppafo.analyses.walk.course import (
+    WOULD_DRAG,
+    bottle_data,
+    bottle_files,
+    bottle_remark,
+    bottle_sections,
+    course_data,
+    course_files,
+    course_pictures,
+    course_sections,
+    trust_remark,
+)
+from ppafo.analyses.walk.document import versions, walk_data, walk_document
+from ppafo.analyses.walk.reacting import reacting_answer
+from ppafo.analyses.walk.safety import over_time_sections, safety_remarks
+from ppafo.live.workbench import live_part
+from ppafo.metrics import Metric
+from ppafo.metrics.strides import PER_STRIDE
+from ppafo.parameters.bottles.bottle import PAPER_BOTTLE
+from ppafo.progress import Progress, Report, report_nothing
+from ppafo.report import Answer, Column, Figure, Section, Table
+from ppafo.report.display_units import rounded_text, title_with_unit
+from ppafo.report.solved import Solved
+from ppafo.signals.recording import Floats
+from ppafo.simulation.scenario import UNITS, Scenario, plain
+from ppafo.storage.comma_separated import marked_csv_bytes
+from ppafo.storage.netcdf import netcdf_bytes
+from ppafo.walking import course as courses
+from ppafo.walking.figures.legs import animation, frames_figure, strip_figure
+from ppafo.walking.figures.mean_stride import walk_figure
+from ppafo.walking.loading import FILE, check_duration_once, load_walk
+from ppafo.walking.motion import person_remarks, walk_of
+from ppafo.walking.person import START_VARIATION, THRESHOLD_VARIATION
+from ppafo.walking.planning import law_of
+from ppafo.walking.result import WalkResult
+from ppafo.walking.strides import PHASES
+from ppafo.walking.walk import (
+    OUTCOMES,
+    SHOWN,
+    TRAITS,
+    Comparison,
+    Number,
+    Population,
+    compare_walks,
+    population_figure,
+    walk_population,
+)
+from ppafo.walking.wearer import CORRELATION, MASS_VARIATION, MAXIMUM_DEVIATIONS, STATURE_VARIATION
+
+QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+WEARERS_FORMAT = "ppafo wearers"
+WEARERS_SCHEMA_VERSION = 1
+_WEARERS_CAPTION = (
+    "What the wearers get, with quantiles, and how it depends on their properties. Dot: the wearer of the "
+    "configuration."
+)
+
+
+def wearers_answer(population: Population) -> Answer:
+    """Return the answer of many wearers; no figure where every walk diverged."""
+    configuration = population.scenario
+    tables = {**population.outcomes, **population.traits}
+    head = (Column(""), *(Column(f"{100.0 * fraction:.0f} %") for fraction in QUANTILES))
+    rows = [
+        (title_with_unit(title, quantity), *_cells(tables[name], quantity, digits))
+        for name, (title, quantity, digits) in SHOWN.items()
+    ]
+    figure = Figure("wearers", _WEARERS_CAPTION, lambda: population_figure(population))
+    stopped = f"safe state: the controllers of {population.vented} wearers vented both chambers permanently"
+    paused = (
+        f"less help: the controllers of {population.paused} wearers lifted the foot only, or paused, for some strides"
+    )
+    remarks = [
+        *person_remarks(configuration),
+        *[stopped] * bool(population.vented),
+        *[paused] * bool(population.paused),
+    ]
+    remarks += [population.message] * bool(population.diverged)
+    return Answer(
+        name="wearers",
+        kicker="Walks of many wearers",
+        title=f"{population.count} wearers with {configuration.name}",
+        lead=(f"{configuration.name}: {population.count} wearers, {population.minutes:.3g} min each",),
+        sections=(
+            Section(table=Table(head, tuple(rows)), remarks=tuple(remarks)),
+            *((Section("The wearers", figure=figure, is_detail=True),) if population.count else ()),
+        ),
+        data=_wearers_data(population),
+        passed=not population.diverged,
+        files={"wearers.csv": lambda: wearers_csv(population)},
+        command="walk",
+    )
+
+
+def _cells(values: Floats, quantity: str, digits: int) -> list[str | None]:
+    texts: list[str | None] = [rounded_text(value, quantity, digits) for value in _values(values).tolist()]
+    return texts or [None] * len(QUANTILES)
+
+
+def _wearers_data(population: Population) -> dict[str, Any]:
+    return {
+        "format": WEARERS_FORMAT,
+        "schema_version": WEARERS_SCHEMA_VERSION,
+        "units": UNITS,
+        "status": {"kind": "diverged" if population.diverged else "completed", "message": population.message},
+        "wearers": population.count,
+        "diverged": population.diverged,
+        "vented": population.vented,
+        "paused": population.paused,
+        "minutes": population.minutes,
+        "seed": population.seed,
+        "varied": {
+            "body_mass": MASS_VARIATION,
+            "stature": STATURE_VARIATION,
+            "correlation": CORRELATION,
+            "thresholds": THRESHOLD_VARIATION,
+            "push_off_start": START_VARIATION,
+            "gait": "stride time, stance share and series coefficients by the deviations of the gait",
+            "most_deviations": MAXIMUM_DEVIATIONS,
+        },
+        "outcomes": quantiles(population.outcomes, OUTCOMES),
+        "traits": quantiles(population.traits, TRAITS),
+        "versions": versions(),
+        "configuration": walk_document(population.scenario),
+    }
+
+
+def wearers_csv(population: Population) -> bytes:
+    """Return one line for each wearer, in SI units."""
+    columns = {f"{name} [{item.unit}]": population.traits[name] for name, item in TRAITS.items()}
+    columns |= {f"{name} [{item.unit}]": population.outcomes[name] for name, item in OUTCOMES.items()}
+    return _csv(columns)
+
+
+def quantiles(table: Mapping[str, Floats], numbers: Mapping[str, Number]) -> dict[str, dict[str, object]]:
+    """Return the quantiles of every number in SI units, with unit and meaning."""
+    return {
+        name: {
+            "unit": item.unit,
+            "summary": item.summary,
+            "mean": float(table[name].mean()) if table[name].size else None,
+            "quantiles": dict(zip(map(str, QUANTILES), _values(table[name]).tolist(), strict=False)),
+        }
+        for name, item in numbers.items()
+    }
+
+
+def _values(values: Floats) -> Floats:
+    return np.quantile(values, QUANTILES) if values.size else np.zeros(0)
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class WalkPair(Solved):
+    """A walk with the device and without it."""
+
+    comparison: Comparison
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Wearers(Solved):
+    """What many wearers get."""
+
+    population: Population
+
+
+SCHEMA_VERSION = 1
+_HEAD = ("", "with", "without", "healthy")
+_VENTED = "less help"
+_ROWS = (
+    ("body_mass", "Body mass of the wearer", "mass", 1),
+    ("gas", "Gas per stride", "gas mass", 3),
+    ("total_gas", "Gas of the whole walk", "gas mass", 2),
+    ("positive_push_off_work", "Positive work on the wearer in push-off", "energy", 2),
+    ("push_off_share", "... of the healthy ankle's positive work", "fraction", 1),
+    ("net_push_off_work", "Net work on the wearer in push-off", "energy", 2),
+    ("lowest_toes", "Lowest toes over the ground in mid-swing", "body length", 1),
+    ("toe_landing", "Strides that begin on the toes", "fraction", 0),
+    ("dorsiflexor_moment", "Moment of the wearer's dorsiflexors, mean", "torque", 2),
+    ("angle_difference", "Ankle against healthy, RMS over the stride", "angle", 1),
+    ("counted_strides", "Strides with these means", "", 0),
+)
+"""Metric, title, kind of quantity and digits behind the point of each row."""
+_EXPLAINED = (
+    "'Without' is the same wearer without a device: no plate, torque or friction, and the ankle's own range of motion. "
+    "'Healthy' is the gait itself. The swing has no ground: of toes that reach it only that they would drag is known. "
+    "The first two strides, in which the controller learns the stride time, are left out, and so is one that has begun "
+    "when the walk ends. The device is on one leg, so a "
+    "stride is one step of that leg. A stride with less help (lifted only, paused or stopped) is not in 'with' but in "
+    "'less help', where there is one."
+)
+_LEGS = "Shank and foot on the path that the gait prescribes. A cross marks toes below the ground: they would drag."
+_MOVING = "Two strides at half speed. A dark red foot drags."
+_PHASES = (
+    "The functional tasks of the paper's figure 1A: 1 control of the foot at heel strike, 2 propulsion, 3 support of "
+    "the foot in the swing, 4 free motion. A block that does not fill the height occurs only in some of the strides."
+)
+_MEAN = (
+    "Mean over the strides with the standard deviation as a band. A deterministic walk on a perfectly regular gait "
+    "has almost none."
+)
+_LIMITS = (
+    "The gait is prescribed: the device moves the ankle where the foot is free, and cannot change how the wearer walks."
+)
+
+
+def answer_of(solved: WalkPair | Wearers) -> Answer:
+    """Return the answer of one wearer's walks, or of many wearers."""
+    if isinstance(solved, WalkPair) and walk_of(solved.comparison.with_device.scenario).reacts is not None:
+        return reacting_answer(solved.comparison)
+    return wearers_answer(solved.population) if isinstance(solved, Wearers) else _pair_answer(solved)
+
+
+def _pair_answer(pair: WalkPair) -> Answer:
+    """Return the answer of a walk; one that diverged has numbers and no pictures, and has not passed."""
+    comparison = pair.comparison
+    worn, bare = comparison.with_device, comparison.without_device
+    configuration, walked = worn.scenario, walk_of(worn.scenario)
+    strides = f"{worn.metrics['strides'].value:.0f} strides" if "strides" in worn.metrics else "no strides"
+    remarks = [
+        *person_remarks(configuration),
+        _bottle(pair),
+        *safety_remarks(worn),
+        trust_remark(configuration),
+    ]
+    remarks += [f"{item.scenario.name}: {item.status.message}" for item in (worn, bare) if not item.status.is_completed]
+    return Answer(
+        name="walk",
+        kicker=f"A walk of {float(worn.recording.time[-1]) / 60.0:.3g} min",
+        title=f"Walking with {configuration.name}",
+        lead=(f"{configuration.name}: {worn.status.kind}, {strides} of {walked.gait.name}{_along(configuration)}",),
+        sections=(
+            Section(paragraphs=_set_up(comparison), is_detail=True),
+            *course_sections(comparison),
+            Section(table=comparison_table(comparison), remarks=tuple(text for text in remarks if text)),
+            *bottle_sections(worn),
+            Section("How to read it", (_EXPLAINED, _LIMITS), is_detail=True),
+            *(over_time_sections(worn) if walked.course is None else ()),
+            *(course_pictures(comparison) if walked.course is not None else _pictures(comparison)),
+            *_assumptions_section({item.path: item.note for item in configuration.assumptions}),
+        ),
+        data=_data(comparison),
+        passed=comparison.is_completed and worn.is_helped,
+        files={
+            "recording.nc": lambda: netcdf_bytes(worn.recording, None),
+            "recording.csv": lambda: marked_csv_bytes(worn.recording),
+            "recording-off.nc": lambda: netcdf_bytes(bare.recording, None),
+            "strides.csv": lambda: strides_csv(worn),
+            "strides-off.csv": lambda: strides_csv(bare),
+            "mean-stride.csv": lambda: mean_stride_csv(worn),
+            "mean-stride-off.csv": lambda: mean_stride_csv(bare),
+            **course_files(comparison),
+            **bottle_files(worn),
+        },
+        live=lambda: live_part([configuration]),
+    )
+
+
+def _set_up(comparison: Comparison) -> tuple[str, ...]:
+    configuration = comparison.with_device.scenario
+    gait, title = walk_of(configuration).gait.name, walk_of(configuration).gait.title
+    changed = (
+        f"values changed for this walk: {', '.join(configuration.origin.overrides)}"
+        if configuration.origin.overrides
+        else ""
+    )
+    worn = f"device '{configuration.device.name}', gait '{gait}'{f' ({title})' if title else ''}"
+    return tuple(text for text in (configuration.description, worn, law_of(configuration).summary, changed) if text)
+
+
+def comparison_table(comparison: Comparison) -> Table:
+    """Return a row for each number: with the device, without it, and of a healthy ankle.
+
+    Strides with less help have a column of their own, where there are any.
+    """
+    healthy = dict(comparison.healthy)
+    if "positive_push_off_work" in healthy:
+        healthy["push_off_share"] = Metric(1.0, "-", "")
+    worn, bare = comparison.with_device, comparison.without_device
+    person = {"body_mass": Metric(walk_of(worn.scenario).wearer.body_mass, "kg", "who walks")}
+    vented = (worn.vented_metrics,) if worn.vented_metrics else ()
+    columns = tuple(person | dict(metrics) for metrics in (worn.metrics, *vented, bare.metrics, healthy))
+    head = (*_HEAD[:2], *(_VENTED,) * len(vented), *_HEAD[2:])
+    rows = [
+        (
+            title_with_unit(title, quantity),
+            *(
+                None
+                if one is None
+                else WOULD_DRAG
+                if name == "lowest_toes" and one.value < 0.0
+                else rounded_text(one.value, quantity, digits)
+                for one in (metrics.get(name) for metrics in columns)
+            ),
+        )
+        for name, title, quantity, digits in _ROWS
+        if any(name in metrics for metrics in columns)
+    ]
+    return Table(tuple(map(Column, head)), tuple(rows))
+
+
+def _along(configuration: Scenario) -> str:
+    course = walk_of(configuration).course
+    return "" if course is None else f", course {course.name}"
+
+
+def _pictures(comparison: Comparison) -> tuple[Section, ...]:
+    if not (comparison.with_device.averages and comparison.without_device.averages):
+        return ()
+    legs = Figure("legs", _LEGS, lambda: frames_figure(comparison))
+    moving = Figure("legs-moving", _MOVING, lambda: animation(comparison))
+    phases = Figure("gait-phases", _PHASES, lambda: strip_figure(comparison.with_device))
+    walks = {"with the device": comparison.with_device, "without": comparison.without_device}
+    mean = Figure("mean-stride", _MEAN, lambda: walk_figure(walks))
+    return (
+        Section("The leg", figure=legs, is_detail=True),
+        Section(figure=moving, is_detail=True),
+        Section("What the device does in each phase", figure=phases, is_detail=True),
+        Section("The mean stride", figure=mean, is_detail=True),
+    )
+
+
+def _assumptions_section(assumed: Mapping[str, str]) -> tuple[Section, ...]:
+    if not assumed:
+        return ()
+    table = Table((Column("value"), Column("why")), tuple(assumed.items()), left=2)
+    return (Section("What is assumed", table=table, is_detail=True),)
+
+
+def _bottle(pair: WalkPair) -> str:
+    """Return how long the bottle of the walk lasts and what ended it, or how to see that; empty without gas."""
+    worn = pair.comparison.with_device
+    if worn.supply is not None:
+        return bottle_remark(worn)
+    gas = worn.metrics.get("gas")
+    if gas is None or gas.value <= 0.0:
+        return ""
+    return f"how long a bottle lasts: walk on it, --bottle {PAPER_BOTTLE}; here its supply pressure stays as it is set"
+
+
+def _data(comparison: Comparison) -> dict[str, Any]:
+    worn = comparison.with_device
+    return walk_data(FORMAT, SCHEMA_VERSION, comparison) | {
+        "minutes": float(worn.recording.time[-1]) / 60.0,
+        **course_data(comparison),
+        **bottle_data(worn),
+        "metrics_vented": plain(dict(worn.vented_metrics)),
+        "healthy": plain(dict(comparison.healthy)),
+    }
+
+
+def strides_csv(result: WalkResult) -> bytes:
+    """Return the numbers of each whole stride; the start of each is the sample right after its heel strike."""
+    count = result.strides["gas"].size
+    columns = {"stride [-]": np.arange(1.0, count + 1.0), "start [s]": result.recording.time[result.starts[:count]]}
+    columns |= {f"{name} [{item.unit}]": result.strides[name] for name, item in PER_STRIDE.items()}
+    columns["helped [-]"] = result.helped.astype(np.float64)
+    return _csv(columns)
+
+
+def mean_stride_csv(result: WalkResult) -> bytes:
+    """Return mean and standard deviation over strides of each channel, at every percent of the stride."""
+    columns = {"phase [-]": PHASES} if result.averages else {"phase [-]": PHASES[:0]}
+    for name, curves in result.averages.items():
+        columns[f"{name} [{curves.unit}]"] = curves.mean
+        columns[f"{name}_deviation [{curves.unit}]"] = curves.deviation
+    return _csv(columns)
+
+
+def _csv(columns: Mapping[str, Floats]) -> bytes:
+    lines = ["# simulated: a model's own output, not measured", ",".join(columns)]
+    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+    return ("\n".join([*lines, *(",".join(map(repr, row)) for row in rows)]) + "\n").encode()
+
+
+_LONG = 12.0
+"""Minutes above which a walk reports how far it is."""
+
+
+def walk_with_and_without(
+    configuration: Scenario | str | Path,
+    minutes: float | None = None,
+    gait: str | Path | None = None,
+    course: str | Path | None = None,
+    bottle: str | Path | None = None,
+    wearers: int | None = None,
+    seed: int = 1,
+    overrides: Sequence[str] = (),
+    progress: Report | None = None,
+) -> WalkPair | Wearers:
+    """Walk with the device, without it, and beside the healthy gait; or let many wearers walk with it.
+
+    ``configuration`` is a walk file, its name or a loaded one; ``minutes`` the length of the walk [min], one or
+    that of its course unless given; ``gait``, ``course`` and ``bottle`` stand in place of those of the configuration;
+    ``wearers`` the number of different wearers, drawn with ``seed``. ScenarioError
+    for bad input; a walk that diverges is an answer that has not passed.
+    """
+    chosen = configuration
+    if not isinstance(chosen, Scenario):
+        check_duration_once(overrides, minutes)
+        chosen = load_walk(chosen, overrides, gait, course, bottle)
+    report = progress or report_nothing
+    if wearers is not None:
+        advance = _reporter(report, "walking", "wearers", 0.0)
+        return Wearers(walk_population(chosen, minutes, wearers, seed, advance))
+    return WalkPair(compare_walks(chosen, minutes, _reporter(report, "walking", "min", _LONG)))
+
+
+def list_files() -> list[dict[str, Any]]:
+    """Return the walks and the courses that come with the package: name, what it is, description."""
+    found = []
+    for library in (FILE, courses.FILE):
+        files = {name: library.parse(library.read(name), name) for name in library.names()}
+        found += [
+            {"name": name, "kind": library.noun, "description": str(file.get("description", ""))}
+            for name, file in files.items()
+        ]
+    return found
+
+
+def default_folder(values: Mapping[str, Any]) -> Path:
+    """Return where the command writes by default: by the name of the configuration."""
+    configuration = load_walk(
+        values["configuration"], values["overrides"], values["gait"], values["course"], values["bottle"]
+    )
+    walked, bottled = walk_of(configuration).course, walk_of(configuration).bottle
+    along = ("" if walked is None else f"-{walked.name}") + ("" if bottled is None else f"-{bottled.bottle.name}")
+    return Path("out") / f"{'walk' if values['wearers'] is None else 'wearers'}-{configuration.name}{along}"
+
+
+def _reporter(report: Report, activity: str, noun: str, above: float) -> "Any":
+    def forward(done: float, total: float) -> None:
+        if total > above:
+            report(Progress(activity, round(done), round(total), noun=noun))
+
+    return forward

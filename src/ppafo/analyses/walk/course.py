@@ -1,0 +1,303 @@
+"""What a walk on a course or on its bottle adds to the answer: tables, remarks, data, files, pictures."""
+
+from collections.abc import Callable
+from dataclasses import asdict, fields
+from typing import Any
+
+import numpy as np
+
+from ppafo.analyses.endurance.answer import strides_text
+from ppafo.errors import DataError
+from ppafo.gait.gait import speed_range
+from ppafo.report import Column, Figure, Section, Table
+from ppafo.report.display_units import display_value, quantity_text
+from ppafo.simulation.scenario import Scenario
+from ppafo.storage.comma_separated import marked_csv_bytes
+from ppafo.walking.bottle import SupplyCourse, lasted, minutes_text
+from ppafo.walking.figures.mean_stride import walk_figure
+from ppafo.walking.figures.over_time import bottle_figure, course_figure, peak_torques
+from ppafo.walking.motion import walk_of
+from ppafo.walking.result import WalkResult
+from ppafo.walking.strides import SegmentResult, is_whole_course
+from ppafo.walking.walk import Comparison
+
+_BOTTLE_CAPTION = (
+    "The supply over the walk. A regulator holds at most its set pressure, and less once the bottle has too little. "
+    "Gas at the device is what comes out of the hose."
+)
+_BOTTLE_EXPLAINED = (
+    "The vapour of liquid CO2 lacks heat: from 20 degC it wants 95 kJ/kg to be gas of 25 degC behind the regulator. It "
+    "takes it from the regulator's body and from the hose, which take it from the room. Below the triple point dry ice "
+    "stays in the seat and narrows it. The gas in lines and chambers keeps the temperature with which it leaves the "
+    "hose; in truth their walls warm it, so its effect here is the largest that it can have.",
+    "A walk ends where the line behind the regulator no longer comes within the given share of the set pressure in two "
+    "strides, or where the content of the bottle freezes.",
+)
+
+
+def bottle_sections(worn: WalkResult) -> tuple[Section, ...]:
+    """Return the facts of the bottle of a walk, its figure and how to read them; nothing without a bottle."""
+    supply = worn.supply
+    if supply is None:
+        return ()
+    figure = Figure("bottle", _BOTTLE_CAPTION, lambda: bottle_figure(worn))
+    return (
+        Section("On the bottle", table=Table((), tuple(_facts(worn, supply)))),
+        Section("The bottle over the walk", figure=figure, is_detail=True),
+        Section("How to read the bottle", _BOTTLE_EXPLAINED, is_detail=True),
+    )
+
+
+def bottle_remark(worn: WalkResult) -> str:
+    """Return what ended a walk on its bottle, and when."""
+    supply = worn.supply
+    assert supply is not None, "said of a walk on a bottle"
+    time = lasted(supply)
+    ended = "" if time is None else f"lasts {minutes_text(time)}: "
+    return f"bottle {supply.supply.bottle.name}: {ended}{supply.ending.message}"
+
+
+def _walked(worn: WalkResult, seconds: float) -> str:
+    """Return how many strides were walked in a time [s], as ``ppafo bottle`` counts; of a course the whole ones."""
+    motion = walk_of(worn.scenario)
+    if motion.course is not None or motion.reacts is not None:
+        return f"after {worn.helped.size} whole strides"
+    return (
+        f"{strides_text(seconds / motion.gait.stride_time)} strides, {worn.helped.size} of them whole between strikes"
+    )
+
+
+def _facts(worn: WalkResult, supply: SupplyCourse) -> list[tuple[str, str]]:
+    values, peaks = supply.values, peak_torques(worn)
+    bottle = supply.supply.bottle
+    liquid = f", {_gas(float(values['liquid_mass'][-1]))} of it liquid" if "liquid_mass" in values else ""
+    rows = [
+        ("bottle", f"{bottle.title}, with {_gas(supply.supply.mass)} at {_warmth(supply.supply.temperature)}"),
+        ("what ended it", supply.ending.message),
+        ("when", f"{quantity_text(supply.ending.time, 'duration')}, {_walked(worn, supply.ending.time)}"),
+        ("gas used", f"{_gas(supply.balance.left_bottle)}, left {_gas(float(values['bottle_mass'][-1]))}{liquid}"),
+        ("bottle at the end", f"{_warmth(float(values['bottle_temperature'][-1]))}, {_pressure(supply)}"),
+        ("coldest gas behind the regulator", _warmth(float(values["outlet_temperature"].min()))),
+        ("coldest gas at the device", _warmth(float(values["gas_temperature"].min()))),
+        ("seat free of ice, at least", quantity_text(float(values["seat_open"].min()), "fraction", ".0f")),
+    ]
+    if peaks.size > 3:
+        third, last = (quantity_text(float(peak), "torque") for peak in (peaks[2], peaks[-1]))
+        rows.append(("peak torque of a stride", f"{third} in the third, {last} in the last"))
+    return rows
+
+
+def bottle_data(worn: WalkResult) -> dict[str, Any]:
+    """Return the supply as data in SI units: what ended it, what closes, all at the end; nothing without a bottle."""
+    supply = worn.supply
+    if supply is None:
+        return {}
+    return {
+        "supply": {
+            **supply.supply.to_dict(),
+            "ending": supply.ending._asdict(),
+            "balance": supply.balance._asdict(),
+            "at_end": {name: float(values[-1]) for name, values in supply.values.items()},
+            "lowest": {name: float(np.min(values)) for name, values in supply.values.items()},
+        }
+    }
+
+
+def bottle_files(worn: WalkResult) -> dict[str, Callable[[], bytes]]:
+    """Return the file with the course of the bottle; nothing without one."""
+    supply = worn.supply
+    return {} if supply is None else {"bottle.csv": lambda: marked_csv_bytes(supply.recording)}
+
+
+def _gas(mass: float) -> str:
+    return quantity_text(mass, "gas mass")
+
+
+def _warmth(temperature: float) -> str:
+    return quantity_text(temperature, "temperature", ".0f")
+
+
+def _pressure(supply: SupplyCourse) -> str:
+    return quantity_text(float(supply.values["bottle_pressure"][-1]), "pressure", ".0f")
+
+
+_HEAD = (
+    Column("Segment"),
+    Column("from (s)"),
+    Column("to (s)"),
+    Column("strides"),
+    Column("helped"),
+    Column("gas (g)"),
+    Column("work (J)"),
+    Column("lowest toes (cm)"),
+    Column("... without (cm)"),
+    Column("push, heel loaded (N m)"),
+    Column("less help at (s)"),
+)
+WOULD_DRAG = "would drag"
+"""What is said of toes that would be in the ground."""
+_WHOLE, _PART = "whole course", "as far as walked"
+_COURSE = "The course over time. Grey: every other segment. 'Without' is the same course without a device."
+_EXPLAINED = (
+    "A stride counts for the segment in which its foot strikes; it is helped where the controller neither lifts only "
+    "nor pauses nor has stopped before the next strike. Work is net work on the wearer while the foot rolls over the "
+    "toes. Lowest toes are over the ground, in the middle part of a swing. A push with the heel loaded is torque in "
+    "plantarflexion while the heel carries more than a tenth of the body weight.",
+    "Angles go with the length of the stride, which goes with the square root of the speed, as the strides per second "
+    "do: a constant walk ratio. Standing is a vertical shank over a flat foot. The forces of a stride and the fraction "
+    "of the stance stay those of the gait at every speed.",
+)
+_MEAN = (
+    "Mean over the strides at an even speed on level ground, of all speeds together, with the standard deviation as a "
+    "band."
+)
+
+
+def course_sections(comparison: Comparison) -> tuple[Section, ...]:
+    """Return the table of the segments, and how to read it; nothing for a walk without a course."""
+    worn, bare = comparison.with_device, comparison.without_device
+    if walk_of(worn.scenario).course is None:
+        return ()
+    without = {segment.start: segment for segment in bare.segments}
+    rows = [_row(segment, without.get(segment.start)) for segment in worn.segments]
+    table = Table(_HEAD, (*rows, _whole(comparison)), marked=(len(rows),))
+    means = (
+        f"The numbers below are means over the {worn.metrics['steady_strides'].value:.0f} of "
+        f"{worn.metrics['course_strides'].value:.0f} strides that are at an even speed on level ground."
+    )
+    return (
+        Section(table=table),
+        Section("How to read the course", _EXPLAINED, is_detail=True),
+        Section(paragraphs=(means,)),
+    )
+
+
+def _row(segment: SegmentResult, bare: SegmentResult | None) -> tuple[str | None, ...]:
+    return (
+        segment.title,
+        f"{segment.start:.1f}",
+        f"{segment.end:.1f}",
+        f"{segment.strides}",
+        f"{segment.helped}",
+        _text(segment.gas, "gas mass", 2),
+        _text(segment.net_push_off_work, "energy", 1),
+        _toes(segment.lowest_toes),
+        _toes(None if bare is None else bare.lowest_toes),
+        _text(segment.flat_push, "torque", 1),
+        _text(segment.safe_time, "time", 2),
+    )
+
+
+def _whole(comparison: Comparison) -> tuple[str | None, ...]:
+    worn, bare = comparison.with_device, comparison.without_device
+    numbers = {name: item.value for name, item in worn.metrics.items()}
+    toes = bare.metrics.get("course_lowest_toes")
+    is_whole = is_whole_course(numbers["course_time"], numbers["course_planned_time"])
+    return (
+        _WHOLE if is_whole else _PART,
+        "0.0",
+        f"{numbers['course_time']:.1f}",
+        f"{numbers['course_strides']:.0f}",
+        f"{sum(segment.helped for segment in worn.segments)}",
+        _text(numbers["course_gas"], "gas mass", 2),
+        _text(numbers["course_work"], "energy", 1),
+        _toes(numbers.get("course_lowest_toes")),
+        _toes(None if toes is None else toes.value),
+        _text(numbers["course_flat_push"], "torque", 1),
+        _text(numbers.get("safe_state_time"), "time", 2),
+    )
+
+
+def _toes(height: float | None) -> str | None:
+    """Return how high the toes are [cm]; of toes below the ground only that they would drag."""
+    return WOULD_DRAG if height is not None and height < 0.0 else _text(height, "body length", 1)
+
+
+def _text(value: float | None, quantity: str, digits: int) -> str | None:
+    """Return a cell, without the sign of a number that is rounded to zero."""
+    if value is None:
+        return None
+    text = f"{display_value(value, quantity):.{digits}f}"
+    return text.removeprefix("-") if float(text) == 0.0 else text
+
+
+def course_pictures(comparison: Comparison) -> tuple[Section, ...]:
+    """Return the course over time, and the mean of its even strides where there are any."""
+    worn, bare = comparison.with_device, comparison.without_device
+    over_time = Figure("course", _COURSE, lambda: course_figure(worn, bare))
+    walks = {"with the device": worn, "without": bare}
+    mean = Figure("mean-stride", _MEAN, lambda: walk_figure(walks))
+    has_mean = worn.averages and bare.averages
+    return (
+        Section("The course", figure=over_time, is_detail=True),
+        *((Section("The mean stride", figure=mean, is_detail=True),) if has_mean else ()),
+    )
+
+
+def course_files(comparison: Comparison) -> dict[str, Callable[[], bytes]]:
+    """Return the files of a course: its segments with and without the device."""
+    if walk_of(comparison.with_device.scenario).course is None:
+        return {}
+    return {
+        "segments.csv": lambda: segments_csv(comparison.with_device.segments),
+        "segments-off.csv": lambda: segments_csv(comparison.without_device.segments),
+    }
+
+
+_UNITS = {
+    "start": "s",
+    "end": "s",
+    "strides": "-",
+    "helped": "-",
+    "gas": "kg",
+    "net_push_off_work": "J",
+    "lowest_toes": "m",
+    "flat_push": "N m",
+    "safe_time": "s",
+}
+
+
+def segments_csv(segments: tuple[SegmentResult, ...]) -> bytes:
+    """Return one line for each segment, in SI units; a cell is empty where there is nothing to say."""
+    names = [field.name for field in fields(SegmentResult) if field.name != "title"]
+    lines = ["# simulated: a model's own output, not measured"]
+    lines.append(",".join(f"{name} [{_UNITS[name]}]" if name in _UNITS else name for name in names))
+    for segment in segments:
+        cells = (getattr(segment, name) for name in names)
+        lines.append(",".join("" if cell is None else cell if isinstance(cell, str) else repr(cell) for cell in cells))
+    return ("\n".join(lines) + "\n").encode()
+
+
+def course_data(comparison: Comparison) -> dict[str, Any]:
+    """Return the segments as data, in SI units; nothing for a walk without a course."""
+    worn, bare = comparison.with_device, comparison.without_device
+    course = walk_of(worn.scenario).course
+    if course is None:
+        return {}
+    return {
+        "course": course.name,
+        "segments": [asdict(segment) for segment in worn.segments],
+        "segments_off": [asdict(segment) for segment in bare.segments],
+    }
+
+
+def trust_remark(configuration: Scenario) -> str:
+    """Return which segments go beyond the speeds for which scaling the gait can be trusted; empty where none does."""
+    course, gait = walk_of(configuration).course, walk_of(configuration).gait
+    if course is None:
+        return ""
+    try:
+        low, high = speed_range(gait)
+    except DataError:
+        return f"gait '{gait.name}' has no walking speed: how far its strides can be scaled is not known"
+    given = [item.values["speed"] for item in course.segments if "speed" in item.values]
+    recorded = gait.walking_speed or 0.0
+    ratios = [0.5 * item.values["cadence"] * gait.stride_time for item in course.segments if "cadence" in item.values]
+    speeds = [*given, *(recorded * ratio * ratio for ratio in ratios)]
+    far = sorted({f"{speed:.2g}" for speed in speeds if not low - 1.0e-9 <= speed <= high + 1.0e-9})
+    if not far:
+        return ""
+    return (
+        f"gait '{gait.name}' is scaled to {', '.join(far)} m/s: beyond {low:.3g} to {high:.3g} m/s, where its angles "
+        "and forces are assumed and not measured"
+    )

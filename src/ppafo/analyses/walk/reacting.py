@@ -1,0 +1,311 @@
+"""The answer of a walk of a wearer who reacts: with the device and with it off, until a fall where there is one."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ppafo.analyses.endurance.draw import FORMAT_OF_REACTING
+from ppafo.analyses.walk.course import bottle_data, bottle_remark, bottle_sections
+from ppafo.analyses.walk.document import walk_data
+from ppafo.analyses.walk.safety import over_time_sections, safety_remarks
+from ppafo.gait.document import load_gait
+from ppafo.metrics.strides import SETTLING
+from ppafo.report import Answer, Column, Figure, Section, Table
+from ppafo.report.display_units import display_values, rounded_text, title_with_unit
+from ppafo.report.style import BLUE, GREY, VERMILION, house_style, mark_kind
+from ppafo.simulation.scenario import Scenario, plain
+from ppafo.storage.comma_separated import marked_csv_bytes
+from ppafo.storage.netcdf import netcdf_bytes
+from ppafo.walking.motion import person_remarks, walk_of
+from ppafo.walking.reacting_wearer import ReactingWearer
+from ppafo.walking.result import WalkResult
+from ppafo.walking.strides import PHASES
+from ppafo.walking.walk import Comparison
+from ppafo.walking.way import EDGE, met_by
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Drawn
+
+SCHEMA_VERSION = 2
+
+ROWS = (
+    ("walked_time", "Walked until the end or a fall", "time", 1),
+    ("strides", "Whole strides", "", 0),
+    ("walking_speed", "Speed", "velocity", 2),
+    ("stride_time", "Time of a stride", "time", 3),
+    ("lowest_toes", "Lowest toes over the ground in mid-swing, mean", "body length", 1),
+    ("toe_landing", "Strides that begin on the toes", "fraction", 0),
+    ("muscle_work", "Work of all muscles in one stride", "energy", 1),
+    ("muscle_power", "Power of all muscles", "power", 1),
+    ("metabolic_power_umberger", "Metabolic rate of all muscles, Umberger 2010", "power", 0),
+    ("metabolic_power_bhargava", "Metabolic rate of all muscles, Bhargava 2004", "power", 0),
+    ("positive_push_off_work", "Positive work of the device in push-off", "energy", 2),
+    ("net_push_off_work", "Net work of the device in push-off", "energy", 2),
+    ("gas", "Gas per stride", "gas mass", 3),
+    ("total_gas", "Gas of the whole walk", "gas mass", 2),
+    ("counted_strides", "Strides with help, of gas and push-off", "", 0),
+)
+"""Metric, title, kind of quantity and digits behind the point of each row."""
+
+_EXPLAINED = (
+    "'Device off' is the same wearer with the same device and both chambers vented: it still rubs and has inertia. The "
+    "first two strides are left out of the means, and those of gas and push-off also leave out strides with less help. "
+    "The device is on the left leg, and a stride is one step of that leg."
+)
+
+_EFFORT = (
+    "Power and metabolic rate are of one set of reflexes. Those that other searches find differ by some percent: a "
+    "difference between with and off that is smaller is none. The rate at rest is not in it, and the two models differ "
+    "by a factor of two."
+)
+_LIMITS = (
+    "The gains of the reflexes are those of the wearer's file, with the device on and off: the wearer is unadapted. "
+    "The body is planar and has no arms, and the device adds no weight, only friction, damping and the inertia of vane "
+    "and foot plate about the ankle. No number here is a benefit to a person: it is what this model does."
+)
+_CURVES = (
+    "Mean over the strides from strike to strike of the left foot, with the standard deviation as a band. The ground "
+    "force is that on the left foot."
+)
+_LIKENESS = (
+    "Of the mean stride: correlation r, root mean square of the difference, and the delay of the wearer, below 0 where "
+    "the wearer is early, at which r is largest. The measured gait is that of healthy people without a device; numbers "
+    "are printed whatever they are."
+)
+_COMPARED = (
+    ("ground_force", "vertical_force", "Vertical ground force (body weights)"),
+    ("angle", "ankle_angle", "Ankle angle (deg)"),
+    ("shank_angle", "shank_angle", "Shank angle (deg)"),
+    ("wearer_ankle_moment", "ankle_moment", "Ankle moment (N m/kg)"),
+)
+"""Channel of the wearer, curve of the gait, and title with unit."""
+MOST_LAG = 10
+"""Delays that are tried, in percent of the stride."""
+_PANELS = (
+    ("angle", "Ankle angle", "angle"),
+    ("knee_angle", "Knee angle", "angle"),
+    ("toe_height", "Toes over the ground", "body length"),
+    ("ground_force", "Vertical ground force", "force"),
+    ("torque", "Actuator torque", "torque"),
+    ("tibialis_activation", "Activation of the tibialis", ""),
+)
+
+
+def reacting_answer(comparison: Comparison) -> Answer:
+    """Return the answer; one of a wearer who falls with the device has not passed."""
+    worn, bare = comparison.with_device, comparison.without_device
+    scenario = worn.scenario
+    wearer = wearer_of_walk(scenario)
+    remarks = [*person_remarks(scenario), *weak_remarks(wearer), *fall_remarks(comparison)]
+    remarks += [] if worn.supply is None else [bottle_remark(worn)]
+    remarks += safety_remarks(worn)
+    stays = worn.metrics["stays_up"].value > 0.5
+    strides = f"{worn.metrics['strides'].value:.0f} strides"
+    ended = "walks to the end" if stays else f"falls after {worn.metrics['fall_time'].value:.1f} s"
+    return Answer(
+        name="walk",
+        kicker=f"A walk of a wearer who reacts, {scenario.duration / 60.0:.3g} min",
+        title=f"Walking with {scenario.name}",
+        lead=(f"{scenario.name}: {wearer.name} {ended}, {strides}",),
+        sections=(
+            Section(table=reacting_table(comparison), remarks=tuple(remarks)),
+            *_way_section(comparison),
+            *bottle_sections(worn),
+            *_likeness_section(comparison),
+            Section(
+                "How to read it",
+                (_EXPLAINED, _EFFORT, _LIMITS),
+                is_detail=True,
+            ),
+            *over_time_sections(worn),
+            *_curves(comparison),
+        ),
+        data=walk_data(FORMAT_OF_REACTING, SCHEMA_VERSION, comparison)
+        | {
+            "likeness": {
+                words: {name: plain(item) for name, item in likeness(walked).items()}
+                for words, walked in (("with", worn), ("off", bare))
+            },
+            **bottle_data(worn),
+        },
+        passed=comparison.is_completed and stays and worn.is_helped,
+        files={
+            "recording.nc": lambda: netcdf_bytes(worn.recording, None),
+            "recording.csv": lambda: marked_csv_bytes(worn.recording),
+            "recording-off.nc": lambda: netcdf_bytes(bare.recording, None),
+        },
+        command="walk",
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Likeness:
+    """How alike a curve of the wearer is to that of a gait: r, RMS difference [unit of the curve], and r after a delay.
+
+    ``delay`` [strides] of the wearer is that at which r is largest, ``delayed_r``.
+    """
+
+    r: float
+    rms: float
+    delay: float
+    delayed_r: float
+
+
+def likeness(walked: WalkResult) -> dict[str, Likeness]:
+    """Return how alike the mean stride is to the measured gait that is shipped, by curve; {} without strides."""
+    gait, wearer = load_gait(), wearer_of_walk(walked.scenario)
+    over = {"ground_force": wearer.weight, "wearer_ankle_moment": wearer.mass}
+    found = {}
+    for channel, curve, _ in _COMPARED:
+        measured = getattr(gait, curve)
+        if channel not in walked.averages or measured is None:
+            continue
+        own, places = walked.averages[channel].mean / over.get(channel, 1.0), np.asarray(PHASES)
+        with np.errstate(invalid="ignore"):
+            delays = np.arange(-MOST_LAG, MOST_LAG + 1) / 100.0
+            shifted = [float(np.corrcoef(own, measured.values_at(places - delay))[0, 1]) for delay in delays]
+        difference = own - measured.values_at(places)
+        best = int(np.nanargmax(shifted)) if np.isfinite(shifted).any() else MOST_LAG
+        rms = float(np.sqrt(np.mean(difference**2)))
+        found[curve] = Likeness(shifted[MOST_LAG], rms, float(delays[best]), shifted[best])
+    return found
+
+
+def _likeness_section(comparison: Comparison) -> tuple[Section, ...]:
+    found = [likeness(walked) for walked in (comparison.with_device, comparison.without_device)]
+    if not any(found):
+        return ()
+    head = [Column("Mean stride of the wearer and measured gait")]
+    for words in ("with", "device off"):
+        head += [Column(f"r {words}"), Column("RMS"), Column("delay (%)"), Column("r then")]
+    rows = []
+    for _, curve, title in _COMPARED:
+        cells: list[str | None] = []
+        for own in found:
+            if curve not in own:
+                cells += [None] * 4
+                continue
+            item, unit = own[curve], np.degrees(1.0) if curve.endswith("angle") else 1.0
+            cells += [
+                f"{item.r:.2f}",
+                f"{unit * item.rms:.3g}",
+                f"{100.0 * item.delay:.0f}",
+                f"{item.delayed_r:.2f}",
+            ]
+        rows.append((title, *cells))
+    return (Section("Compared with a measured gait", (_LIKENESS,), Table(tuple(head), tuple(rows)), is_detail=True),)
+
+
+def wearer_of_walk(scenario: Scenario) -> ReactingWearer:
+    """Return the wearer who reacts."""
+    wearer = walk_of(scenario).reacts
+    assert wearer is not None, "of a wearer who reacts"
+    return wearer
+
+
+def weak_remarks(wearer: ReactingWearer) -> list[str]:
+    """Return a line on the muscles that are weaker or stronger than those of the wearer's file."""
+    changed = [
+        f"{name.removesuffix('_strength')} {100.0 * value:.3g} %"
+        for name, value in wearer.settings.items()
+        if name.endswith("_strength") and value != 1.0
+    ]
+    return [f"strength of the left leg: {', '.join(changed)}"] if changed else []
+
+
+def fall_remarks(comparison: Comparison) -> list[str]:
+    """Return who falls, with the device and without."""
+    found = []
+    for words, walked in (
+        ("with the device", comparison.with_device),
+        ("with the device off", comparison.without_device),
+    ):
+        fall, strides = walked.metrics.get("fall_time"), max(walked.metrics["strides"].value - SETTLING, 0.0)
+        means = (
+            f", and the means are of {strides:.0f} stride{'s' if strides > 1 else ''} before that" if strides else ""
+        )
+        if fall is not None:
+            place = met_by(wearer_of_walk(walked.scenario).stretches, float(walked.recording["hip_position"][-1]))
+            found.append(f"{words}: the wearer falls {place}{' ' if place else ''}at {fall.value:.1f} s{means}")
+    return found
+
+
+def reacting_table(comparison: Comparison) -> Table:
+    """Return a row for each number, with the device and with it off."""
+    columns = (comparison.with_device.metrics, comparison.without_device.metrics)
+    rows = []
+    for name, title, quantity, digits in ROWS:
+        if not any(name in metrics for metrics in columns):
+            continue
+        head = title_with_unit(title, quantity) if quantity else title
+        found = (metrics.get(name) for metrics in columns)
+        rows.append((head, *(None if one is None else rounded_text(one.value, quantity, digits) for one in found)))
+    return Table((Column(""), Column("with"), Column("device off")), tuple(rows))
+
+
+def _way_section(comparison: Comparison) -> tuple[Section, ...]:
+    """Return what was walked on each stretch of the way, with the device and without; nothing on level ground."""
+    stretches = [item for item in wearer_of_walk(comparison.with_device.scenario).stretches if item.kind == "walk"]
+    met = [item for item in wearer_of_walk(comparison.with_device.scenario).stretches if not item.is_plain]
+    if not met:
+        return ()
+    head = [Column("On the way"), Column("from (m)")]
+    for words in ("with", "off"):
+        head += [Column(f"strides {words}"), Column("lowest toes (cm)")]
+    rows = []
+    for place, stretch in enumerate(stretches):
+        until = stretches[place + 1].start if place + 1 < len(stretches) else np.inf
+        own = [item.title for item in met if item.kind != "walk" and stretch.start <= item.start + EDGE < until]
+        cells: list[str | None] = []
+        for walked in (comparison.with_device, comparison.without_device):
+            begun = walked.recording["hip_position"][walked.starts[:-1]]
+            on_it = (begun >= stretch.start) & (begun < until)
+            toes = walked.strides["toe_clearance"][on_it]
+            cells += [str(int(on_it.sum())), f"{100.0 * float(toes.min()):.1f}" if toes.size else None]
+        rows.append((", ".join([*own, stretch.title]), f"{stretch.start:.2f}", *cells))
+    return (Section(table=Table(tuple(head), tuple(rows))),)
+
+
+def _curves(comparison: Comparison) -> tuple[Section, ...]:
+    if not comparison.with_device.averages:
+        return ()
+    figure = Figure("mean-stride", _CURVES, lambda: stride_figure(comparison))
+    return (Section("The mean stride", figure=figure, is_detail=True),)
+
+
+def stride_figure(comparison: Comparison) -> "Drawn":
+    """Return the mean stride of a wearer who reacts, with the device and with it off."""
+    from matplotlib.figure import Figure as Drawn
+
+    walks: dict[str, tuple[WalkResult, str]] = {
+        "device off (vented)": (comparison.without_device, VERMILION),
+        "with the device": (comparison.with_device, BLUE),
+    }
+    with house_style():
+        figure = Drawn(figsize=(9.4, 5.6))
+        figure.subplots_adjust(left=0.075, right=0.985, top=0.87, bottom=0.09, hspace=0.28, wspace=0.3)
+        for axes, (channel, title, quantity) in zip(figure.subplots(2, 3).ravel(), _PANELS, strict=True):
+            for label, (walked, color) in walks.items():
+                if channel not in walked.averages:
+                    continue
+                curves = walked.averages[channel]
+                mean, spread = (
+                    display_values(values, quantity) if quantity else values
+                    for values in (curves.mean, curves.mean + curves.deviation)
+                )
+                axes.plot(100.0 * PHASES, mean, color=color, linewidth=1.6, label=label)
+                axes.fill_between(100.0 * PHASES, 2.0 * mean - spread, spread, color=color, alpha=0.2, linewidth=0)
+            if channel == "toe_height":
+                axes.axhline(0.0, color=GREY, linewidth=0.8)
+            axes.set_ylabel(title_with_unit(title, quantity) if quantity else title, fontsize=9)
+            axes.set_xlim(0.0, 100.0)
+        for axes in figure.axes[3:]:
+            axes.set_xlabel("Stride (%)", fontsize=9)
+        handles, labels = figure.axes[4].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="upper center", bbox_to_anchor=(0.53, 0.955), ncols=3)
+        scenario = comparison.with_device.scenario
+        title = f"{scenario.name}: {wearer_of_walk(scenario).name}, who reacts"
+        figure.text(0.012, 0.985, title, ha="left", va="top", fontweight="bold")
+        mark_kind(figure, "simulated")
+        return figure

@@ -1,0 +1,301 @@
+"""Sizing: what is planted is found, what limits is named, and bad files are one line."""
+
+import dataclasses
+import re
+import tomllib
+from pathlib import Path
+from types import SimpleNamespace
+
+import jsonschema
+import numpy as np
+import pytest
+
+from ppafo.analyses.design.loading import json_schema, load_design
+from ppafo.analyses.design.profile import search
+from ppafo.analyses.design.profile.answer import Sizing, _lasting_bottle, smallest_bottle, suggestion_sentence
+from ppafo.analyses.design.profile.problem import choose_knots
+from ppafo.analyses.design.profile.search import Floats, Trials, ceiling, ceiling_pressure, cut_error
+from ppafo.analyses.design.solve import design
+from ppafo.control.profiles import KNOTS
+from ppafo.errors import PpafoError
+from ppafo.parameters.parts import load_catalogue
+from ppafo.signals import Channel, Recording
+from ppafo.storage import write_csv
+
+SHIPPED = Path(__file__).parents[5] / "src" / "ppafo" / "analyses" / "design" / "library" / "push-off.toml"
+ATMOSPHERE = 101325.0
+TORQUE_CONSTANT = 1.451e-5
+FILE = """
+schema_version = 1
+name = "trapezium"
+scenario = "torque-task-proportional"
+simulated = 1
+gain_factors = [1.0, 4.0]
+
+[profile]
+time = ["0 s", "0.3 s", "0.6 s", "0.8 s", "1 s"]
+torque = ["0 N m", "4 N m", "4 N m", "0 N m", "0 N m"]
+
+[use]
+repetitions = 100
+
+[limits]
+rms_error = "0.4 N m"
+
+[parts]
+valves = ["enfield-ls-v05s"]
+actuator = "smc-crb2bw40-90d"
+bottles = ["co2-3_5oz", "pipeline-jacpac-9oz"]
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    place = tmp_path_factory.mktemp("sizing")
+    (place / "trapezium.toml").write_text(FILE)
+    return place
+
+
+@pytest.fixture(scope="module")
+def sizing(folder: Path) -> Sizing:
+    return design(folder / "trapezium.toml")
+
+
+def test_the_shipped_sizing_keeps_its_published_schema_and_loads() -> None:
+    jsonschema.validate(tomllib.loads(SHIPPED.read_text(encoding="utf-8")), json_schema())
+    problem = load_design("push-off")
+    assert problem.profile.table_error == 0.0
+    assert problem.largest_error == pytest.approx(0.06 * 6.0)
+
+
+def test_the_pressure_of_the_torque_ceiling_is_the_one_that_the_cut_crest_demands(sizing: Sizing) -> None:
+    problem = sizing.problem
+    pressure = ceiling_pressure(problem)
+    most = TORQUE_CONSTANT * (pressure - ATMOSPHERE)
+    assert ceiling(problem, pressure) == pytest.approx(most)
+    assert cut_error(problem, pressure) == pytest.approx(0.4, rel=1e-6)
+    # The crest above a level L: 0.3 s at 4 N m, and two straight flanks that fall away from it.
+    flanks = (4.0 - most) ** 3 / 3.0 * (0.3 / 4.0 + 0.2 / 4.0)
+    assert (4.0 - most) ** 2 * 0.3 + flanks == pytest.approx(0.4**2, rel=2e-2)
+
+
+def test_the_lowest_pressure_is_just_above_the_torque_ceiling_and_is_said_to_be_limited_by_it(sizing: Sizing) -> None:
+    choice = sizing.choice
+    assert choice is not None
+    alone, gauge = ceiling_pressure(sizing.problem) - ATMOSPHERE, choice.pressure - ATMOSPHERE
+    assert alone < gauge < 1.2 * alone
+    assert choice.limit == "torque"
+    assert choice.error <= 0.4
+    assert choice.error == pytest.approx(0.4, rel=0.02)
+
+
+def test_a_sizing_is_drawn_and_told_as_data_like_any_answer(sizing: Sizing) -> None:
+    panels = sizing.plot().axes
+    assert [axes.get_xlabel() for axes in panels] == ["Time (s)", *["Supply pressure (psig)"] * 2]
+    legend = panels[1].get_legend()
+    assert legend is not None
+    assert [text.get_text() for text in legend.get_texts()] == ["Enfield Technologies LS-V05s"]
+    assert sizing.to_dict()["suggested"] == "enfield-ls-v05s"
+
+
+def test_a_tenth_of_a_psi_less_is_not_enough(sizing: Sizing) -> None:
+    assert sizing.choice is not None
+    below = np.array([sizing.choice.lowest_pressure or 0.0]) - 700.0
+    assert Trials(sizing.problem).best(sizing.choice.valve, below).error[0] > 0.4
+
+
+def test_gas_bottle_mass_and_margins_belong_together(sizing: Sizing) -> None:
+    choice = sizing.choice
+    assert choice is not None
+    assert choice.bottle is not None
+    assert choice.margins is not None
+    assert sizing.recording is not None
+    assert choice.gas == pytest.approx(sizing.recording["supplied_mass"][-1], rel=1e-9)
+    assert choice.gas_in_all == pytest.approx(110.0 * choice.gas)
+    assert choice.bottle.name == "co2-3_5oz"
+    assert choice.mass == pytest.approx(0.300 + 0.631 + 0.274)
+    assert choice.margins.gas == pytest.approx(0.099 / (100.0 * choice.gas) - 1.0)
+    assert choice.margins.torque == pytest.approx(TORQUE_CONSTANT * (choice.pressure - ATMOSPHERE) / 4.0 - 1.0)
+    assert 0.0 < choice.margins.flow < 1.0
+
+
+def test_a_valve_that_is_too_small_is_limited_by_its_flow(folder: Path) -> None:
+    catalogue = load_text_of_catalogue().replace("value = 31.6", "value = 2.6", 1)
+    (folder / "small.toml").write_text(catalogue)
+    (folder / "flow.toml").write_text(FILE.replace('name = "trap', 'catalogue = "./small.toml"\nname = "trap'))
+    item = design(folder / "flow.toml").valves[0]
+    assert item.limit == "flow"
+    assert not item.works or item.pressure > 1.2 * ceiling_pressure(load_design(folder / "flow.toml"))
+
+
+def load_text_of_catalogue() -> str:
+    place = Path(__file__).parents[5] / "src" / "ppafo" / "parameters" / "parts" / "catalogues" / "parts.toml"
+    return place.read_text(encoding="utf-8")
+
+
+def test_a_controller_without_gains_is_limited_by_the_control(folder: Path) -> None:
+    (folder / "idle.toml").write_text(FILE.replace("[1.0, 4.0]", "[0.0]"))
+    sized = design(folder / "idle.toml")
+    assert (sized.valves[0].works, sized.valves[0].limit, sized.choice) == (False, "control", None)
+    assert sized.recording is None
+
+
+def test_use_that_no_bottle_lasts_for_is_no_suggestion(folder: Path) -> None:
+    (folder / "long.toml").write_text(FILE.replace("repetitions = 100", "hours = 24"))
+    sized = design(folder / "long.toml")
+    assert sized.choice is None
+    assert sized.valves[0].works
+    assert "no bottle is large enough: pipeline-jacpac-9oz lasts for" in sized.valves[0].remark
+
+
+def test_the_lightest_bottle_that_holds_enough_is_chosen() -> None:
+    bottles = tuple(load_catalogue().groups["bottles"].values())
+    chosen = smallest_bottle(bottles, 0.2)
+    assert chosen is not None
+    assert chosen.name == "pipeline-jacpac-9oz"
+    assert smallest_bottle(bottles, 1.0) is None
+
+
+def test_a_recording_becomes_a_table_with_its_corners_and_says_where_it_comes_from(tmp_path: Path) -> None:
+    time = np.linspace(0.0, 1.1, 1101)
+    torque = np.interp(time, [0.0, 0.35, 0.5, 0.7, 1.1], [0.0, 30.0, 60.0, 0.0, 0.0])
+    write_csv(tmp_path / "ankle.csv", Recording("ankle", time, {"torque": Channel(torque, "N m")}, "synthetic"))
+    typed = re.sub(r"time = .*\ntorque = .*\n", 'recording = "ankle.csv"\nscale = 0.1\n', FILE)
+    (tmp_path / "recorded.toml").write_text(typed)
+    profile = load_design(tmp_path / "recorded.toml").profile
+    assert (profile.kind, profile.period) == ("synthetic", pytest.approx(1.1))
+    assert profile.largest == pytest.approx(6.0)
+    assert profile.table_error < 1e-9
+    assert profile.knot_times.size < 10
+
+
+def test_many_samples_are_thinned_to_the_knots_that_matter() -> None:
+    time = np.linspace(0.0, 1.0, 2000)
+    torque = np.sin(2.0 * np.pi * time) ** 3
+    times, values = choose_knots(time, torque)
+    assert times.size == KNOTS
+    assert np.max(np.abs(np.interp(time, times, values) - torque)) < 0.02
+
+
+def test_a_profile_that_ends_elsewhere_than_it_begins_jumps_at_its_end(tmp_path: Path) -> None:
+    (tmp_path / "saw.toml").write_text(FILE.replace('"0 N m", "0 N m"]', '"0 N m", "2 N m"]'))
+    profile = load_design(tmp_path / "saw.toml").profile
+    assert profile.at(np.array([0.9, 0.9999, 1.0])).tolist() == pytest.approx([1.0, 1.999, 0.0], abs=1e-3)
+
+
+def test_simulated_repetitions_are_covered_to_a_whole_sample(folder: Path) -> None:
+    (folder / "odd.toml").write_text(FILE.replace('"1 s"]', '"1.0007 s"]').replace("simulated = 1", "simulated = 3"))
+    problem = load_design(folder / "odd.toml")
+    assert problem.scenario.duration == pytest.approx(3.003)
+    assert dataclasses.asdict(problem.scenario.reference)["kind"] == "tabulated"
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "message"),
+    [
+        ("enfield-ls-v05s", "festo-vovg-5v-pair", "'festo-vovg-5v-pair' is a solenoid valve; scenario"),
+        ("co2-3_5oz", "co2-3oz", "bottles has no part 'co2-3oz', did you mean 'co2-3_5oz'?"),
+        ("repetitions = 100", "", "use: give either repetitions or hours"),
+        ("repetitions = 100", "repetitions = 100\nhours = 1.0", "use: give either repetitions or hours"),
+        ('"0.4 N m"', '"0.4"', "limits.rms_error = '0.4'"),
+        ('"0.4 N m"', '"0 %"', "must be more than 0"),
+        ('time = ["0 s", "0.3 s"', 'time = ["0.1 s", "0.3 s"', "must begin with '0 s' and grow"),
+        ('time = ["0 s", "0.3 s"', 'time = ["0 s", "0.7 s"', "must begin with '0 s' and grow"),
+        ('time = ["0 s", "0.3 s"', 'time = ["0 s"', "time has 4 and torque 5 entries"),
+        ('"4 N m", "4 N m"', '"0 N m", "0 N m"', "is 0 N m throughout; there is nothing to size for"),
+        ('"4 N m", "4 N m"', '"4 N", "4 N m"', "unit 'N' does not fit"),
+        ("[use]", 'recording = "a.csv"\n[use]', "give either recording, or time and torque"),
+        ("[use]", '[pressure]\nlowest = "-3 psi_g"\n[use]', "must be above the atmosphere and below"),
+        ("[use]", "[usage]", "unknown key 'usage', did you mean 'use'?"),
+        ("torque-task-proportional", "step-response", "scenario 'step-response' follows no reference"),
+        ("torque-task-proportional", "torque-task-proportionel", "there is no scenario 'torque-task-proportionel'"),
+    ],
+)
+def test_every_mistake_in_a_file_is_one_line(tmp_path: Path, before: str, after: str, message: str) -> None:
+    assert before in FILE
+    path = tmp_path / "wrong.toml"
+    path.write_text(FILE.replace(before, after, 1))
+    with pytest.raises(PpafoError, match=re.escape(message)) as caught:
+        load_design(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_runs_that_all_fail_are_said_in_one_line(folder: Path) -> None:
+    late = FILE.replace(
+        "simulated = 1", 'simulated = 1\noverrides = ["actuator.dead_volume_1=1e-6 mm^3", "motion.angle=20 deg"]'
+    )
+    (folder / "failing.toml").write_text(late)
+    with pytest.raises(PpafoError, match=r"every run with 'enfield-ls-v05s' failed; the first: ") as caught:
+        design(folder / "failing.toml")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("time [s],torque [N]\n0,1\n1,2\n", "unit 'N' does not fit"),
+        ("time [s],moment [N m]\n0,1\n1,2\n", "there is no channel 'torque'"),
+        ("time [s],torque [N m]\n0,1\n", "has one sample only"),
+    ],
+)
+def test_a_recording_that_is_no_profile_is_one_line(tmp_path: Path, content: str, message: str) -> None:
+    (tmp_path / "r.csv").write_text(content)
+    (tmp_path / "wrong.toml").write_text(re.sub(r"time = .*\ntorque = .*\n", 'recording = "r.csv"\n', FILE))
+    with pytest.raises(PpafoError, match=re.escape(message)) as caught:
+        load_design(tmp_path / "wrong.toml")
+    assert "\n" not in str(caught.value)
+
+
+def test_a_limit_is_kept_in_every_noise_stream_and_the_seed_of_the_scenario_decides_nothing(
+    sizing: Sizing, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Error [N m] and gas [kg] from the seed alone stand in for runs."""
+    problem, seen = sizing.problem, []
+
+    def run(_scenario: object, columns: dict[str, Floats], _metrics: object, threads: int | None = None) -> object:
+        seeds = columns["sensors.seed"]
+        seen.append(seeds)
+        error = np.array([np.random.default_rng(int(seed)).random() for seed in seeds])
+        return SimpleNamespace(metrics={"rms_error": error, "gas_supplied": 2.0 * error}, reasons={})
+
+    monkeypatch.setattr(search, "run_ensemble", run)
+    found = []
+    for seed in (1, 2):
+        noisy = dataclasses.replace(problem.scenario.sensors, pressure_noise=1000.0, seed=seed)
+        own = dataclasses.replace(problem, scenario=dataclasses.replace(problem.scenario, sensors=noisy))
+        found.append(Trials(own).run(problem.valves[0], np.full(3, 5e5), np.zeros(3, dtype=np.intp), np.ones(3)))
+    streams = np.array([np.random.default_rng(int(seed)).random() for seed in np.unique(seen[0])])
+    assert streams.size == 16
+    assert found[0].error == pytest.approx(np.full(3, streams.max()))
+    assert found[0].gas == pytest.approx(np.full(3, 2.0 * streams.mean() / problem.simulated))
+    assert np.array_equal(found[0].error, found[1].error)
+    assert Trials(problem).seeds.size == 0
+
+
+def test_a_pressure_that_cuts_half_of_the_peak_is_not_suggested(tmp_path: Path) -> None:
+    zeros = ", ".join(['"0 N m"'] * 2)
+    (tmp_path / "brief.toml").write_text(
+        'schema_version = 1\nname = "brief"\nscenario = "torque-task-proportional"\n'
+        '[profile]\ntime = ["0 s", "0.1 s", "0.2 s", "0.3 s", "1.1 s"]\n'
+        f'torque = ["0 N m", "2.5 N m", "5 N m", {zeros}]\n'
+        '[use]\nrepetitions = 10\n[limits]\nrms_error = "1.5 N m"\n[parts]\nvalves = ["festo-mpye-5-1-8-hf-010-b"]\n'
+        'bottles = ["pipeline-jacpac-9oz"]\n[pressure]\nlowest = "15 psi_g"\nhighest = "100 psi_g"\n'
+    )
+    sizing = design(tmp_path / "brief.toml")
+    assert isinstance(sizing, Sizing)
+    assert sizing.choice is not None
+    assert sizing.choice.margins is not None
+    assert sizing.choice.margins.torque >= -0.3
+    assert "% of the peak cut off" in suggestion_sentence(sizing)
+    assert "meets all" not in suggestion_sentence(sizing)
+
+
+def test_a_bottle_with_gas_enough_that_gets_too_cold_is_not_suggested() -> None:
+    problem = dataclasses.replace(load_design("push-off"), repetitions=500.0)
+    parts = load_catalogue().groups["bottles"]
+    bottles = tuple(parts[name] for name in ("pipeline-jacpac-9oz", "co2-20oz"))
+    gas, pressure = 0.45e-3, 101325.0 + 50.0 * 6894.757
+    bottle, is_cold = _lasting_bottle(dataclasses.replace(problem, bottles=bottles), gas, pressure)
+    assert smallest_bottle(bottles, gas * 500.0 * 1.1) is bottles[0], "its gas alone would do"
+    assert bottle is bottles[1]
+    assert is_cold

@@ -1,0 +1,273 @@
+"""The gas of a walk, from its folder as from its result, and how long a bottle lasts for it."""
+
+import json
+import re
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ppafo.analyses.endurance.answer import Endurance
+from ppafo.analyses.endurance.draw import (
+    FORMAT,
+    WalkGas,
+    draw_of_walk,
+    largest_flow,
+    read_walk_gas,
+    walk_gas,
+)
+from ppafo.analyses.endurance.solve import endurance, endurance_of_walk
+from ppafo.cli.main import main
+from ppafo.errors import DataError, ParameterError, ScenarioError
+from ppafo.parameters.bottles.bottle import PAPER_BOTTLE
+from ppafo.signals import Channel, Recording
+from ppafo.simulation.numbers import with_numbers
+from ppafo.storage.netcdf import netcdf_bytes
+from ppafo.walking import WalkResult, load_walk, walk
+from ppafo.walking.bottle import Schedule, SupplyBalance
+from ppafo.walking.loading import on_bottle
+from ppafo.walking.motion import walk_of, with_duration
+
+SMALL = ["bottle.gas_mass=20 g", "bottle.volume=30 cm^3"]
+"""A bottle that is walked to its end in a second."""
+FEW = Schedule(60.0, 0.0, 5.0)
+STRIDE = 1.0
+
+
+@cache
+def solenoid() -> WalkResult:
+    return walk("solenoid", 0.1)
+
+
+def pulses(strides: float) -> WalkGas:
+    """A made-up walk that takes 0.6 g a stride."""
+    time = np.arange(0.0, strides * STRIDE + 5e-4, 1e-3)
+    channels = {"supplied_mass": Channel(6e-4 * time / STRIDE, "kg")}
+    recording = Recording("pulses", time, channels, kind="simulated")
+    return WalkGas("pulses", recording, 6e-4, STRIDE, scenario=load_walk("solenoid"))
+
+
+def folder_of(walk: WalkGas, path: Path) -> Path:
+    """What ``ppafo walk`` writes, as far as the gas goes."""
+    path.mkdir(parents=True)
+    configuration = {"name": walk.name, "gait": {"stride_time": walk.stride_time}}
+    if walk.scenario is not None:
+        origin = walk.scenario.origin
+        said = {"content": origin.content, "overrides": list(origin.overrides), "file": origin.file}
+        configuration |= said
+    metrics = {"gas": {"value": walk.gas_per_stride, "unit": "kg"}}
+    document = {"format": FORMAT, "configuration": configuration, "metrics": metrics}
+    (path / "walk.json").write_text(json.dumps(document))
+    (path / "recording.nc").write_bytes(netcdf_bytes(walk.recording, None))
+    return path
+
+
+def test_a_folder_says_what_the_walk_says(tmp_path: Path) -> None:
+    here = walk_gas(solenoid())
+    read = read_walk_gas(folder_of(here, tmp_path / "walk"))
+    assert replace(read, recording=here.recording, scenario=here.scenario) == here
+    assert draw_of_walk(read) == draw_of_walk(here)
+    assert read.gas_per_stride == solenoid().metrics["gas"].value
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ('{"format": "ppafo endurance"}', "is not the result of a ppafo walk"),
+        ('{"format": "ppafo walk", "configuration": {}}', "has no number at 'configuration.gait.stride_time'"),
+        ('{"format": "ppafo walk", "status": {"kind": "diverged"}}', "the walk diverged, so it cannot be repeated"),
+        ("[", "is not JSON"),
+        ('{"format": "ppafo walk", "status": "completed"}', "'status' is not a table of names and values"),
+        ('{"format": "ppafo walk", "configuration": 3}', "'configuration' is not a table of names and values"),
+    ],
+)
+def test_a_folder_that_says_too_little_is_refused(tmp_path: Path, content: str, words: str) -> None:
+    (tmp_path / "walk.json").write_text(content)
+    with pytest.raises(DataError, match=words):
+        read_walk_gas(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "words"),
+    [
+        ("metrics", None, "'metrics' is not a table of names and values"),
+        ("metrics.gas", None, "has no number at 'metrics.gas.value'"),
+        ("metrics.gas.value", -1.0, "'metrics.gas.value' is -1, which is impossible for a walk"),
+        ("metrics.gas.value", 10**400, "has no number at 'metrics.gas.value'"),
+        (
+            "configuration.gait.stride_time",
+            0,
+            "'configuration.gait.stride_time' is 0, which is impossible for a walk",
+        ),
+        ("configuration.gait", [], "has no number at 'configuration.gait.stride_time'"),
+    ],
+)
+def test_a_damaged_walk_is_refused_in_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], path: str, value: object, words: str
+) -> None:
+    folder = folder_of(pulses(5.0), tmp_path / "walk")
+    file = folder / "walk.json"
+    document = json.loads(file.read_text())
+    *parts, last = path.split(".")
+    node = document
+    for part in parts:
+        node = node[part]
+    node[last] = value
+    file.write_text(json.dumps(document))
+    assert main(["bottle", str(folder)]) == 2
+    said = capsys.readouterr().err
+    assert re.search(words, said)
+    assert said.count("\n") == 1
+
+
+def test_a_recording_without_gas_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    made = pulses(5.0)
+    bare = Recording("bare", made.recording.time, {"angle": Channel(0.0 * made.recording.time, "rad")})
+    folder = folder_of(replace(made, recording=bare), tmp_path / "walk")
+    assert main(["bottle", str(folder)]) == 2
+    assert "has no channel 'supplied_mass'" in capsys.readouterr().err
+
+
+def test_a_walk_lasts_the_same_with_and_without_its_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = folder_of(walk_gas(solenoid()), tmp_path / "walk")
+    assert main(["bottle", str(folder), "--json", "--longest", "5 s"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    made = endurance(solenoid(), longest=5.0)
+    assert isinstance(made, Endurance)
+    assert document["result"]["strides"] == pytest.approx(made.discharge.strides, rel=1e-6)
+
+
+def test_several_recordings_stand_side_by_side(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    one, two = (folder_of(walk_gas(solenoid()), tmp_path / name) for name in ("one", "two"))
+    assert main(["bottle", str(one), str(two), "--longest", "5 s"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    titles = ["gas use", "gas per stride (g)", "walking (min)", "strides", "ended"]
+    assert re.split(r"\s{2,}", lines[2].replace("gas use", "gas use ")) == titles
+    assert lines[3].split()[0] == str(one)
+    assert lines[3].split()[1:] == lines[4].split()[1:]
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        (["--stride-time", "1.1 s"], "one stride of its walk"),
+        (["--peak-flow", "4 g/s"], "belongs to --gas-per-stride"),
+        (["--gas-per-stride", "1 g"], "give either a recording or --gas-per-stride"),
+    ],
+)
+def test_what_does_not_belong_to_a_walk_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], more: list[str], words: str
+) -> None:
+    folder = folder_of(pulses(5.0), tmp_path / "walk")
+    assert main(["bottle", str(folder), *more]) == 2
+    assert words in capsys.readouterr().err
+
+
+def test_several_recordings_have_one_folder_and_none_comes_twice(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = str(folder_of(pulses(5.0), tmp_path / "walk"))
+    assert main(["bottle", folder, folder, "--out", str(tmp_path / "out")]) == 2
+    assert "given twice" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+    other = str(folder_of(pulses(6.0), tmp_path / "other"))
+    assert main(["bottle", folder, other, "--longest", "2 s", "--out", str(tmp_path / "out")]) == 0
+    names = ["endurance.json", "endurance.txt", "ppafo.json", "report.html"]
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == names
+    assert set(json.loads((tmp_path / "out" / "endurance.json").read_text())["recordings"]) == {folder, other}
+
+
+def test_a_walk_without_gas_lasts_for_ever() -> None:
+    with pytest.raises(DataError, match="never be empty"):
+        draw_of_walk(replace(pulses(5.0), gas_per_stride=0.0))
+
+
+def test_the_largest_flow_is_that_of_the_bottles_regulator_where_there_are_lines() -> None:
+    recording = walk("solenoid-regulators", 0.1).recording
+    channels = {name: Channel(recording[name], recording.unit(name)) for name in ("supplied_mass", "regulated_mass")}
+    both = Recording("both", recording.time, channels)
+    alone = Recording("alone", recording.time, {"supplied_mass": channels["regulated_mass"]})
+    assert largest_flow(both) == largest_flow(alone)
+    assert largest_flow(both) != largest_flow(
+        Recording("valve", recording.time, {"supplied_mass": channels["supplied_mass"]})
+    )
+
+
+def test_every_door_says_how_long_a_device_lasts_in_the_same_words(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    words = ["--bottle", PAPER_BOTTLE]
+    assert main(["walk", "solenoid-regulators", *words, "--out", "on-bottle"]) == 0
+    said = re.search(rf"bottle {PAPER_BOTTLE}: lasts (.*?): (.*)", capsys.readouterr().out)
+    assert said is not None
+    assert re.fullmatch(r"[\d.]+ min", said[1])
+    assert said[1] in (tmp_path / "on-bottle" / "report.html").read_text()
+    assert main(["walk", "solenoid-regulators", "--minutes", "0.1", "--out", "short"]) == 0
+    assert "lasts" not in capsys.readouterr().out.replace("how long a bottle lasts", ""), "no bottle, no minutes"
+    for folder in ("on-bottle", "short"):
+        assert main(["bottle", folder]) == 0
+        out = capsys.readouterr().out
+        assert f"{said[1]} of walking" in out
+        assert said[2] in out
+    made = endurance_of_walk(walk("solenoid-regulators", 0.1))
+    assert made is not None
+    assert f"{made.discharge.walking_time / 60.0:.3g} min" == said[1]
+
+
+def test_a_time_between_rests_without_a_rest_is_refused() -> None:
+    with pytest.raises(ParameterError, match="--walk: is the time between two rests: give --rest too"):
+        endurance(gas_per_stride=3.0e-4, walk=60.0)
+
+
+def test_rests_warm_the_bottle_that_is_walked_on() -> None:
+    without, rested = (endurance(solenoid(), overrides=SMALL, walk=10.0, rest=rest) for rest in (0.0, 120.0))
+    assert isinstance(without, Endurance)
+    assert isinstance(rested, Endurance)
+    assert rested.discharge.walking_time > without.discharge.walking_time
+    assert isinstance(rested.discharge.balance, SupplyBalance)
+    assert isinstance(without.discharge.balance, SupplyBalance)
+    assert rested.discharge.balance.room > 8.0 * without.discharge.balance.room
+    rests = round((rested.discharge.total_time - rested.discharge.walking_time) / 120.0)
+    assert rests == int(rested.discharge.walking_time / 10.0)
+    mass = rested.discharge.recording["bottle_mass"]
+    assert mass[0] - mass[-1] == pytest.approx(rested.draw.mass_per_stride * rested.discharge.strides)
+
+
+def test_a_device_that_a_fault_stops_is_asked_about_without_the_fault() -> None:
+    stopped = walk("solenoid", 0.2, overrides=["faults.toe.kind=stuck", "faults.toe.time=4 s"])
+    made, sound = (endurance(one, overrides=SMALL) for one in (stopped, walk("solenoid", 0.2)))
+    assert isinstance(made, Endurance)
+    assert isinstance(sound, Endurance)
+    assert made.discharge.walking_time == sound.discharge.walking_time
+
+
+def test_a_walk_whose_numbers_were_changed_in_python_is_not_taken_for_that_of_its_file() -> None:
+    changed = walk(with_numbers(load_walk("solenoid"), {"valve.area": 1.0e-6}), 0.1)
+    with pytest.raises(ScenarioError, match="give the bottle where the walk is loaded"):
+        endurance_of_walk(changed)
+
+
+@pytest.mark.parametrize(
+    ("name", "numbers"),
+    [
+        ("reacting", {"wearer.tibialis_strength": 0.5}),
+        ("reacting", {"wearer.left_soleus_force": 1.0}),
+        ("solenoid", {"sensors.force_bandwidth": 20.0}),
+        ("solenoid-regulators", {"supply_line.plantarflexion.droop": 1.0e9}),
+    ],
+)
+def test_any_number_that_was_changed_in_python_is_noticed_and_another_length_is_none(
+    name: str, numbers: dict[str, float]
+) -> None:
+    whole = load_walk(name)
+    assert walk_of(on_bottle(with_duration(whole, 12.0), PAPER_BOTTLE)).bottle is not None
+    with pytest.raises(ScenarioError, match="a number was changed after it was loaded"):
+        on_bottle(with_numbers(whole, numbers), PAPER_BOTTLE)
+
+
+def test_the_folder_of_an_earlier_version_is_to_be_written_again(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match="does not say what was walked; write the walk again"):
+        endurance(folder_of(replace(pulses(5.0), scenario=None), tmp_path / "old"))

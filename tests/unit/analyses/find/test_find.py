@@ -1,0 +1,214 @@
+"""``ppafo find``: the lowest or highest value that meets a condition."""
+
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import ppafo
+from ppafo.analyses.find import solve
+from ppafo.analyses.find.solve import ACCURACY, Threshold, find
+from ppafo.cli.main import main
+from ppafo.errors import StudyError
+from ppafo.progress import Progress
+from ppafo.study.finding import Finding
+from ppafo.study.runs import Runs
+
+Floats = NDArray[np.float64]
+TASK = "torque-task-proportional"
+BAR = 1e5
+RANGE = "supply.pressure=2..10 bar_a"
+LIMIT = "final_error <= 1 N m"
+
+
+@pytest.fixture
+def of_curve(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Finding[Threshold]]:
+    """A search on a formula [N m] of the supply pressure [bar] in place of a simulation; nan where a run fails."""
+
+    def search(curve: Callable[[Floats], Floats], condition: str = LIMIT, **options: int) -> Finding[Threshold]:
+        metric = condition.split(maxsplit=1)[0]
+
+        def model(columns: Mapping[str, Floats]) -> dict[str, Floats]:
+            return {metric: curve(columns["supply.pressure"] / BAR)}
+
+        monkeypatch.setattr(solve, "Runs", lambda *_: Runs.of_model(model, [metric]))
+        return find(TASK, RANGE, condition, **options)
+
+    return search
+
+
+@pytest.mark.parametrize(
+    ("curve", "condition", "highest", "expected"),
+    [
+        (lambda p: 6.3 - p, LIMIT, False, 5.3),
+        (lambda p: p - 6.3, LIMIT, True, 7.3),
+        (lambda p: p**2, "final_error >= 30 N m", False, np.sqrt(30.0)),
+        (lambda p: np.where(p < 4.4444, 0.0, 9.0), LIMIT, True, 4.4444),
+    ],
+)
+def test_the_value_is_found_to_a_millionth_of_the_range(
+    of_curve: Callable[..., Finding[Threshold]],
+    curve: Callable[[Floats], Floats],
+    condition: str,
+    highest: bool,
+    expected: float,
+) -> None:
+    answer = of_curve(curve, condition, highest=highest)
+    found = answer.found
+    assert found.value is not None
+    assert found.not_met_at is not None
+    assert abs(found.value / BAR - expected) <= 8.0 * ACCURACY
+    assert min(found.value, found.not_met_at) / BAR <= expected <= max(found.value, found.not_met_at) / BAR
+    there = {item.value: item.metric for item in found.tried}
+    is_below = [there[value] <= found.limit for value in (found.value, found.not_met_at)]
+    assert is_below == ([True, False] if "<=" in condition else [False, True])
+    assert found.changes == 1
+    assert sum(item.is_of_grid for item in found.tried) == 64
+    assert np.all(np.diff([item.value for item in found.tried]) > 0.0)
+    assert "there (bracketed to " in answer.said[0]
+
+
+def test_a_condition_that_is_never_met_has_no_value_and_shows_the_nearest(
+    of_curve: Callable[..., Finding[Threshold]],
+) -> None:
+    answer = of_curve(lambda p: 2.0 + (p - 4.0) ** 2, grid=9)
+    found = answer.found
+    assert (found.value, found.not_met_at, found.changes) == (None, None, 0)
+    assert len(found.tried) == 9
+    assert answer.said[0].startswith("no supply.pressure from 14.3")
+    assert "the nearest is 2 N m at 43.3" in answer.said[0]
+    assert not answer.passed
+
+
+@pytest.mark.parametrize(("highest", "end", "word"), [(False, 2.0, "lower"), (True, 10.0, "higher")])
+def test_a_condition_that_is_always_met_ends_where_the_range_does(
+    of_curve: Callable[..., Finding[Threshold]], highest: bool, end: float, word: str
+) -> None:
+    answer = of_curve(lambda p: 0.0 * p, highest=highest)
+    assert answer.found.value == pytest.approx(end * BAR)
+    assert answer.found.not_met_at is None
+    said = f"the end of the range: final_error is 0 N m there; a wider range may have a {word} one"
+    assert said in answer.said[0]
+    assert "the condition is met everywhere" in answer.found.remarks[0]
+
+
+def test_a_condition_that_changes_more_than_once_says_so_and_shows_where_it_is_met(
+    of_curve: Callable[..., Finding[Threshold]],
+) -> None:
+    found = of_curve(lambda p: 1.0 + np.sin(p)).found
+    assert found.value is not None
+    assert found.value / BAR == pytest.approx(np.pi, abs=1e-5)
+    assert found.changes == 3
+    assert "changes 3 times over the range, so it is not met everywhere above this value" in found.remarks[1]
+    assert np.array(found.met) / BAR == pytest.approx(np.array([[3.14, 6.28], [9.42, 10.0]]), abs=0.13)
+    highest = of_curve(lambda p: 1.0 + np.sin(p), highest=True).found
+    assert (highest.value, highest.not_met_at, highest.changes) == (10.0 * BAR, None, 3)
+
+
+def test_runs_that_fail_count_as_not_met_and_are_said(of_curve: Callable[..., Finding[Threshold]]) -> None:
+    found = of_curve(lambda p: np.where(p < 3.0, np.nan, 0.0)).found
+    assert found.value is not None
+    assert found.value / BAR == pytest.approx(3.0, abs=1e-5)
+    assert found.failed > 8
+    assert "runs failed and count as not met; the first: diverged" in found.remarks[1]
+    with pytest.raises(StudyError, match="has a 'final_error'; the first: diverged"):
+        of_curve(lambda p: np.full_like(p, np.nan))
+
+
+def test_the_lower_end_takes_the_unit_of_the_upper_one() -> None:
+    base = ppafo.load_scenario(TASK)
+    for text in ("supply.pressure=20..90 psi_g", "supply.pressure = 20 psi_g .. 90 psi_g", RANGE):
+        path, low, high = solve._range(text, base)
+        assert path.path == "supply.pressure"
+        assert low < high
+    assert solve._range("valve.discharge_coefficient=0.1..0.25", base)[1:] == (0.1, 0.25)
+    assert solve._range("valve.area=1.5..2 mm^2", base)[1:] == pytest.approx((1.5e-6, 2e-6))
+
+
+def test_the_value_meets_the_condition_in_a_run_of_its_own_and_its_neighbour_does_not(tmp_path: Path) -> None:
+    heard: list[Progress] = []
+    answer = find(TASK, "supply.pressure=40..80 psi_g", "final_error <= 0.3 N m", grid=16, progress=heard.append)
+    found = answer.found
+    assert found.value is not None
+    for value, meets in ((found.value, True), (found.not_met_at, False)):
+        alone = ppafo.simulate(TASK, [f"supply.pressure={value!r} Pa_a"]).metrics["final_error"].value
+        assert (alone <= 0.3 + 1e-9) == meets or abs(alone - 0.3) < 1e-6
+    assert heard[-1].done == len(found.tried)
+    answer.save(tmp_path / "out")
+    document = json.loads((tmp_path / "out" / "find.json").read_text())
+    assert document["value"] == found.value
+    assert len(document["tried"]) == document["runs"] == found.runs
+    assert (tmp_path / "out" / "find.png").stat().st_size > 10_000
+    assert answer.plot().axes
+    assert "srcdoc" in answer._repr_html_()
+
+
+def test_the_command_prints_the_value_and_fails_where_there_is_none(capsys: pytest.CaptureFixture[str]) -> None:
+    words = [
+        "find",
+        TASK,
+        "--vary",
+        "supply.pressure=40..55 psi_g",
+        "--such-that",
+        "final_error <= 0.3 N m",
+        "--grid",
+        "4",
+    ]
+    assert main(words) == 1
+    assert "no supply.pressure from 40 psi_g to 55 psi_g meets" in capsys.readouterr().out
+    assert main([*words, "--set", "reference.level=4 N m", "--highest", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["wanted"] == "highest"
+
+
+def test_the_value_rests_on_many_noise_streams_and_not_on_the_seed_of_the_scenario(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A formula [N m] whose noise is 0.5 N m, a function of the seed alone, in place of a simulation."""
+    seen: list[Floats] = []
+
+    def noise(seeds: Floats) -> Floats:
+        return np.array([0.5 * np.random.default_rng(int(seed)).standard_normal() for seed in seeds])
+
+    def model(columns: Mapping[str, Floats]) -> dict[str, Floats]:
+        pressure, seeds = columns["supply.pressure"] / BAR, columns["sensors.seed"]
+        seen.append(seeds)
+        return {"final_error": 6.3 - pressure + noise(seeds)}
+
+    monkeypatch.setattr(solve, "Runs", lambda *_: Runs.of_model(model, ["final_error"]))
+    found = [
+        find(TASK, RANGE, LIMIT, overrides=["sensors.pressure_noise=1 kPa_d", f"sensors.seed={seed}"]).found
+        for seed in (1, 2)
+    ]
+    streams = np.unique(np.concatenate(seen))
+    assert streams.size == found[0].noise_streams == 16
+    assert found[0].value is not None
+    assert found[0].value / BAR == pytest.approx(5.3 + noise(streams).mean(), abs=8.0 * ACCURACY)
+    assert found[1].value == found[0].value
+    assert f"it varies by {noise(streams).std(ddof=1):.3g} N m" in found[0].remarks[-1]
+    assert "mean over 16 noise streams" in found[0].remarks[-1]
+
+
+def test_ideal_sensors_need_one_run_of_each_value(of_curve: Callable[..., Finding[Threshold]]) -> None:
+    found = of_curve(lambda p: 6.3 - p).found
+    assert found.noise_streams == 0
+    assert not any("noise" in remark for remark in found.remarks)
+
+
+def test_one_instant_of_a_loop_that_oscillates_is_not_met_however_small_its_error_is_there() -> None:
+    found = find("torque-task-solenoid", "supply.pressure=62..90 psi_g", "final_error <= 0.5 N m", grid=15).found
+    alone = ppafo.simulate("torque-task-solenoid", ["supply.pressure=84 psi_g"]).metrics
+    assert alone["final_error"].value < 0.5
+    assert alone["rms_error_hold"].value > 1.0
+    assert found.value is None
+    assert found.unsettled > 0
+    assert f"in {found.unsettled} runs the loop oscillates on the hold" in " ".join(found.remarks)
+
+
+def test_one_instant_of_a_loop_that_settles_is_its_error() -> None:
+    found = find(TASK, "supply.pressure=60..80 psi_g", "final_error <= 0.1 N m", grid=5).found
+    alone = ppafo.simulate(TASK, ["supply.pressure=60 psi_g"]).metrics
+    assert found.unsettled == 0
+    assert found.tried[0].metric == pytest.approx(alone["final_error"].value)

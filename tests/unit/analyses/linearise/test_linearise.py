@@ -1,0 +1,294 @@
+"""Linear models: exact derivatives, steady states that stay, the square law beside the lanes, and what is refused."""
+
+import io
+import json
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import ppafo
+from ppafo.analyses.linearise.answer import LinearModel, steps_of
+from ppafo.analyses.linearise.solve import linearise
+from ppafo.constants import STANDARD_GRAVITY
+from ppafo.engine.lanes import Floats
+from ppafo.engine.run import Run
+from ppafo.errors import ScenarioError
+from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState
+from ppafo.model.regulator import SupplyLines
+from ppafo.model.valves.proportional import openings_of, spool_acceleration
+from ppafo.report.writing import text_of
+from ppafo.simulation.plan import plan_run
+from ppafo.translation.plant_rates import gas_flows, thermal_gas_flows
+
+pytest.importorskip("casadi", reason="linear models need the extra 'control'")
+TASK = "torque-task-proportional"
+HOLD = ("reference.level=3 N m",)
+WARM = (
+    "gas_model.kind=thermal",
+    "gas_model.heat_transfer_coefficient=50 W/(m^2 K)",
+    "gas_model.wall_area_per_volume=300 1/m",
+)
+POINTS: dict[str, tuple[str, str | float, tuple[str, ...]]] = {
+    "steady": (TASK, "equilibrium", HOLD),
+    "steady, dorsiflexion": (TASK, "equilibrium", ("reference.level=-2 N m",)),
+    "on the way": (TASK, 0.5, ()),
+    "an ankle that is led": ("torque-task-moving-ankle", 0.7, ()),
+    "warm gas": (TASK, 0.5, (*HOLD, *WARM)),
+    "a slow valve": ("torque-task-slow-valve", 0.5, ()),
+    "a sliding vane": ("step-response", 0.1, ("motion.kind=free", "controller.command=0.9")),
+    "a foot that turns": ("step-response", 0.1, ("controller.command=0.9",)),
+}
+
+
+@pytest.fixture(scope="module")
+def steady() -> LinearModel:
+    """The torque task where it holds 3 N m."""
+    return linearise(TASK, overrides=HOLD)
+
+
+def of_the_textbook(run: Run, way: float | None, at: Mapping[str, float]) -> dict[str, float]:
+    """Rates and outputs in plain Python: equations (1) to (3) written out here, flows by the model's own functions."""
+    driven = ("supply_pressure", "dorsiflexion_pressure", "external_torque")
+    plant: PlantParameters = run.plant._replace(**{name: at[name] for name in driven})  # type: ignore[arg-type]
+    moves = {}
+    if "valve_opening" in at and hasattr(run.valve, "frequency"):
+        dead_band = run.valve.dead_band
+        target = math.copysign(max(abs(at["command"]) - dead_band, 0.0) / (1.0 - dead_band), at["command"])
+        bend = spool_acceleration(at["valve_opening"], at["valve_rate"], target, run.valve.frequency, 0.7)
+        moves = {"valve_opening": at["valve_rate"], "valve_rate": bend}
+    openings = openings_of(at["valve_opening"] if moves else at["command"])
+    volumes = (
+        plant.dead_volume_1 + plant.volume_per_angle * (at["angle"] - plant.angle_min),
+        plant.dead_volume_2 + plant.volume_per_angle * (plant.angle_max - at["angle"]),
+    )
+    pressures = (at["pressure_1"], at["pressure_2"])
+    growth = plant.volume_per_angle * at["angular_velocity"]
+    contents = [pressure * volume / plant.gas_product for pressure, volume in zip(pressures, volumes, strict=True)]
+    if isinstance(run.thermal, ThermalParameters):
+        warmth = [at[f"temperature_{side}"] / run.thermal.temperature for side in (1, 2)]
+        masses = [content / warm for content, warm in zip(contents, warmth, strict=True)]
+        state = PlantState(at["angle"], at["angular_velocity"], *contents, 0.0, 0.0, 0.0)
+        held = ThermalState(*masses, 0.0, 0.0, 0.0, 0.0)
+        thermal = thermal_gas_flows(plant, run.thermal, openings, state, held, *pressures)
+        gained, entered = (thermal.content_1, thermal.content_2), (thermal.mass_1, thermal.mass_2)
+        supplied, vented = thermal.supplied, thermal.supplied - sum(entered)
+        for side in (0, 1):
+            change = gained[side] / masses[side] - contents[side] * entered[side] / masses[side] ** 2
+            moves[f"temperature_{side + 1}"] = run.thermal.temperature * change
+    else:
+        flows = gas_flows(plant, openings, *pressures)
+        gained, supplied, vented = (flows.mass_1, flows.mass_2), flows.supplied, flows.vented
+    moves["pressure_1"] = (plant.gas_product * gained[0] - pressures[0] * growth) / volumes[0]
+    moves["pressure_2"] = (plant.gas_product * gained[1] + pressures[1] * growth) / volumes[1]
+    torque = plant.torque_constant * (pressures[0] - pressures[1])
+    if way:
+        slowed = way * plant.dynamic_torque + plant.viscous_damping * at["angular_velocity"]
+        moves["angle"] = at["angular_velocity"]
+        # On an upright shank at rest the foot's weight has the lever of the sine of the ankle angle.
+        weight = 0.0 if run.leg is None else run.leg.load.mass_moment * STANDARD_GRAVITY * math.sin(at["angle"])
+        moves["angular_velocity"] = (torque + weight - at["external_torque"] - slowed) / plant.inertia
+    outputs = {"torque": torque, "supplied_flow": supplied, "vented_flow": vented}
+    return {f"rate of {name}": rate for name, rate in moves.items()} | {**at, **outputs}
+
+
+def central_difference(function: Callable[[float], Floats], at: float, size: float) -> Floats:
+    """Derivative by central differences at three distances, with the first two powers of the distance removed."""
+    first, second, third = (
+        (function(at + part * size) - function(at - part * size)) / (2.0 * part * size) for part in (4.0, 2.0, 1.0)
+    )
+    one, other = (4.0 * second - first) / 3.0, (4.0 * third - second) / 3.0
+    return (16.0 * other - one) / 15.0
+
+
+@pytest.mark.parametrize("name", POINTS)
+def test_the_jacobians_are_those_of_central_differences(name: str) -> None:
+    scenario, time, overrides = POINTS[name]
+    model = linearise(scenario, time, overrides)
+    run = plan_run(model.scenario)
+    at = {item.name: item.value for item in (*model.outputs, *model.states, *model.inputs)}
+    at = {"external_torque": 0.0, "angular_velocity": 0.0, **at}
+    if "angle" not in at:
+        at["angle"] = run.initial.angle
+    way = 1.0 if any(item.name == "angular_velocity" for item in model.states) else None
+    rows = [*(f"rate of {item.name}" for item in model.states), *(item.name for item in model.outputs)]
+    exact = np.block([[model.a, model.b], [model.c, model.d]])
+    point = of_the_textbook(run, way, at)
+    assert model.rates == pytest.approx([point[row] for row in rows[: len(model.states)]], rel=1e-9, abs=1e-4)
+    changed = (*model.states, *model.inputs)
+    sizes = [_size(item.name, at) for item in changed]
+    # Rounding: entries that are nothing beside the others of their row cannot be told from none.
+    rounding = 1.0e-11 * np.max(np.abs(exact) * sizes, axis=1)
+    for column, (item, size) in enumerate(zip(changed, sizes, strict=True)):
+
+        def moved(value: float, name: str = item.name) -> Floats:
+            found = of_the_textbook(run, way, {**at, name: value})
+            return np.array([found[row] for row in rows])
+
+        expected = central_difference(moved, at[item.name], 2.0e-4 * size)
+        assert (np.abs(exact[:, column] - expected) <= 1.0e-8 * np.abs(expected) + rounding / size).all(), item.name
+
+
+def _size(name: str, at: Mapping[str, float]) -> float:
+    """How much a state or an input may change."""
+    sizes = {"pressure": 1.0e5, "temperature": 300.0, "supply": 1.0e5, "dorsiflexion": 1.0e5}
+    return abs(at["command"]) if name == "command" else sizes.get(name.partition("_")[0], 0.3)
+
+
+def test_a_steady_state_is_one_on_the_lanes(steady: LinearModel) -> None:
+    still = {item.name: item.value for item in (*steady.states, *steady.inputs)}
+    scenario = ppafo.load_scenario(TASK, ["controller.kind=constant", f"controller.command={still['command']!r}"])
+    run = replace(
+        scenario, initial_pressure_1=still["pressure_1"], initial_pressure_2=still["pressure_2"], duration=1.0
+    )
+    recording = ppafo.simulate(run).recording
+    assert recording["torque"] == pytest.approx(3.0, rel=1e-9)
+    assert recording["pressure_2"] == pytest.approx(still["pressure_2"], rel=1e-9)
+
+
+def test_the_error_of_a_step_falls_with_the_square_of_its_amplitude_over_three_decades(steady: LinearModel) -> None:
+    steps = steps_of(steady, (3e-4, 3e-3, 3e-2, 3e-1))
+    assert steps.sizes[-1] / steps.sizes[0] > 900.0
+    slopes = np.diff(np.log10(steps.errors)) / np.diff(np.log10(steps.amplitudes))
+    assert slopes[:2] == pytest.approx(2.0, abs=0.003)
+    assert slopes[2] == pytest.approx(2.0, abs=0.03)
+
+
+def test_which_side_was_taken_is_said(steady: LinearModel) -> None:
+    assert steady.sides["chamber 2 to atmosphere"].startswith("choked")
+    assert steady.sides["source to chamber 1"].startswith("below choking")
+    assert steady.sides["source to chamber 2"] == "closed"
+    assert steady.edges == ()
+    at_stop = linearise("step-response")
+    assert at_stop.sides["ankle"] == "held by a stop"
+    assert "straight line" in at_stop.sides["source to chamber 1"]
+    edges = {edge.place: edge.is_true for edge in at_stop.edges}
+    assert edges["model.valves.proportional.opening_of_command: 1.0 <= abs(command)"] is False
+    assert at_stop.b[:, 0].any(), "of a valve that is fully open the side is taken on which it closes"
+    deaf = linearise(TASK, 0.1, ["valve.dead_band=0.5"])
+    assert "the command's column is 0" in deaf.sides["valve"]
+    assert not deaf.b[:, 0].any()
+    assert deaf.answer().figures == ()
+    stuck = linearise(
+        "step-response", 0.0, ["motion.kind=free", "initial.pressure_2=atmosphere", "motion.angle=60 deg"]
+    )
+    assert stuck.sides["ankle"] == "sticks: friction holds it"
+    assert [item.name for item in stuck.states] == ["pressure_1", "pressure_2"]
+    assert linearise("step-response", 0.1).sides["ankle"] == "slides in plantarflexion"
+
+
+def test_a_valve_at_its_slew_limit_does_not_answer_and_one_that_has_arrived_does() -> None:
+    slow = ("valve.slew_limit=0.05 1/s", *HOLD)
+    moving, steady = linearise(TASK, 0.3, slow), linearise(TASK, overrides=slow)
+    assert "slew limit" in moving.sides["valve"]
+    assert [item.name for item in moving.states][-1] == "valve_opening"
+    assert moving.rates[-1] == 0.05
+    assert [item.name for item in steady.states] == ["pressure_1", "pressure_2"]
+    assert steady.b == pytest.approx(linearise(TASK, overrides=HOLD).b, rel=1e-9, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("time", "overrides"), [(0.0, ()), (0.0, ("initial.pressure_1=20 psi_g",)), (0.0, ("initial.pressure_2=20 psi_g",))]
+)
+def test_at_a_closed_valve_the_model_is_that_of_an_opening_to_chamber_1(
+    time: float, overrides: tuple[str, ...]
+) -> None:
+    model = linearise(TASK, time, overrides)
+    run = plan_run(model.scenario)
+    assert any("command >= 0.0" in edge.place and edge.is_true for edge in model.edges)
+    at = {item.name: item.value for item in (*model.outputs, *model.states, *model.inputs)} | {"external_torque": 0.0}
+    closed, opened = (of_the_textbook(run, None, {**at, "command": command}) for command in (0.0, 1e-3))
+    slopes = [1e3 * (opened[row] - closed[row]) for row in ("rate of pressure_1", "rate of pressure_2")]
+    assert model.b[:, 0] == pytest.approx(slopes, rel=1e-9, abs=1e-6)
+
+
+def test_a_closed_spool_is_taken_to_open_to_chamber_1_too() -> None:
+    model = linearise("torque-task-slow-valve", 0.0)
+    run = plan_run(model.scenario)
+    column = [item.name for item in model.states].index("valve_opening")
+    at = {item.name: item.value for item in (*model.outputs, *model.states, *model.inputs)} | {"external_torque": 0.0}
+    closed, opened = (of_the_textbook(run, None, {**at, "valve_opening": value}) for value in (0.0, 1e-3))
+    slopes = [1e3 * (opened[row] - closed[row]) for row in ("rate of pressure_1", "rate of pressure_2")]
+    assert model.a[:2, column] == pytest.approx(slopes, rel=1e-9, abs=1e-6)
+    assert slopes[0] > 1e6
+
+
+def test_a_time_is_taken_to_the_nearest_step_before_the_first_one_too() -> None:
+    times = (1e-9, 4e-4, 6e-4, 3.0, "0.5 s", "600 ms")
+    assert [linearise(TASK, at).time for at in times] == [0.0, 0.0, 1e-3, 3.0, 0.5, 0.6]
+
+
+def test_what_python_hands_over_wrongly_is_refused_in_one_line(steady: LinearModel) -> None:
+    assert steady.response([1.0]) == pytest.approx(steady.response(np.array([1.0])))  # type: ignore[arg-type]
+    with pytest.raises(ScenarioError, match=r"no output 'torqe', did you mean 'torque'.*there are: torque"):
+        steady.response(np.array([1.0]), "torqe")
+    with pytest.raises(ScenarioError, match="no input 'reference'; there are: command"):
+        steady.response(np.array([1.0]), source="reference")
+    with pytest.raises(ScenarioError, match="--at 'None' is neither a time nor 'equilibrium'"):
+        linearise(TASK, None)  # type: ignore[arg-type]
+    for answer in (linearise, ppafo.simulate):
+        with pytest.raises(ScenarioError, match="overrides are for the name or file of a scenario"):
+            answer(steady.scenario, overrides=["run.duration=1 s"])
+
+
+def test_without_a_leak_a_closed_valve_is_steady_and_its_sides_are_told_apart() -> None:
+    model = linearise(TASK, overrides=(*HOLD, "actuator.leak.area=0 mm^2"))
+    assert model.sides["valve"] == "closed"
+    assert model.inputs[0].value == 0.0
+    assert model.outputs[0].value == pytest.approx(3.0, rel=1e-9)
+    assert not model.a.any()
+    assert any("command >= 0.0" in edge.place for edge in model.edges)
+    with pytest.raises(ScenarioError, match="has a pole at 0 Hz"):
+        model.response(np.array([0.0]))
+    assert np.isfinite(model.response(np.array([1.0e-3]))).all()
+
+
+def test_what_has_no_linear_model_is_refused_in_one_line() -> None:
+    for scenario, at, overrides, line in (
+        (TASK, 9.0, (), "--at 9 s is outside the run, which lasts 3 s"),
+        (TASK, "equilibrium", (), "no equilibrium at 6 N m.*with the valve fully open the actuator comes to 5 N m"),
+        (TASK, "Equilibrium", (), "neither a time nor 'equilibrium'"),
+        ("torque-task-solenoid", 1.0, (), "valve 'solenoid' is on or off"),
+    ):
+        with pytest.raises(ppafo.PpafoError, match=line) as refused:
+            linearise(scenario, at, overrides)
+        assert "\n" not in str(refused.value)
+    fed = replace(ppafo.load_scenario(TASK), supply_lines=SupplyLines(1e9, 1e-2, 1e-5, 1e9, 1e-2, 1e-5, 0.0))
+    with pytest.raises(ScenarioError, match="constant supplies; omit"):
+        linearise(fed, 1.0)
+
+
+def test_an_energy_balance_slows_what_isothermal_gas_does_at_once() -> None:
+    """With walls that take all heat at once the warm model has the poles of the isothermal one, and two fast ones."""
+    cold = linearise(TASK, overrides=HOLD)
+    walls = ("gas_model.kind=thermal", "gas_model.heat_transfer_coefficient=1e6 W/(m^2 K)", WARM[2])
+    warm = linearise(TASK, overrides=(*HOLD, *walls))
+    assert warm.poles[:2] == pytest.approx(cold.poles, rel=1e-3)
+    assert abs(warm.poles[2]) > 1e3 * abs(cold.poles[1])
+
+
+def test_the_folder_has_names_units_and_matrices(steady: LinearModel, tmp_path: Path) -> None:
+    steady.save(tmp_path / "out")
+    data = json.loads((tmp_path / "out/linearise.json").read_text(encoding="utf-8"))
+    assert data["inputs"][0]["name"] == "command"
+    assert {item["name"]: item["unit"] for item in data["outputs"]}["torque"] == "N m"
+    arrays = np.load(io.BytesIO((tmp_path / "out/linearise.npz").read_bytes()))
+    for name, matrix in (("A", steady.a), ("B", steady.b), ("C", steady.c), ("D", steady.d)):
+        assert (arrays[name] == matrix).all()
+        assert data[name] == matrix.tolist()
+    assert arrays["states"].tolist() == ["pressure_1", "pressure_2"]
+    assert arrays["inputs_units"].tolist()[0] == "1"
+    assert (tmp_path / "out/steps.png").stat().st_size > 10_000
+    assert "Matrix A" in text_of(steady.answer())
+
+
+def test_the_system_for_python_control_has_the_same_response(steady: LinearModel) -> None:
+    pytest.importorskip("control", reason="needs the extra 'control'")
+    system = steady.to_control()
+    assert system.state_labels == ["pressure_1", "pressure_2"]
+    frequencies = np.array([0.01, 1.0, 50.0])
+    theirs = [system["torque", "command"](2.0j * math.pi * frequency) for frequency in frequencies]
+    assert steady.response(frequencies) == pytest.approx(np.array(theirs), rel=1e-12)

@@ -1,0 +1,198 @@
+"""Results of a study: statistics of what is too large for the memory, tables and columns, bands, the figure."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import ppafo
+from ppafo.analyses.sweep.answer import finding_of, load_study_results
+from ppafo.analyses.sweep.results import StudyResults
+from ppafo.analyses.sweep.solve import describe, sorted_quantiles, sweep
+from ppafo.errors import DataError, StudyError
+from ppafo.report.style import render_figure
+
+SHARES = (0.0, 0.05, 0.25, 0.5, 0.777, 0.95, 1.0)
+RANDOM = np.random.default_rng(6)
+COLUMNS = {
+    "normal": RANDOM.normal(1e5, 3.0, 5001),
+    "both signs": RANDOM.normal(0.0, 1e-9, 4000),
+    "counts": RANDOM.integers(-2, 3, 3000).astype(np.float64),
+    "wide": np.sign(RANDOM.normal(size=999)) * 10.0 ** RANDOM.uniform(-100, 100, 999),
+    "constant": np.full(77, -0.1),
+    "one": np.array([4.0]),
+}
+
+
+@pytest.mark.parametrize("name", COLUMNS)
+def test_statistics_are_those_of_numpy(name: str) -> None:
+    values = COLUMNS[name]
+    said = describe(lambda: iter(np.array_split(values, 7)), SHARES)
+    assert said["count"] == values.size
+    assert said["mean"] == pytest.approx(values.mean(), rel=1e-12)
+    assert said["minimum"] == values.min()
+    assert said["maximum"] == values.max()
+    if name not in ("one", "wide"):
+        assert said["sd"] == pytest.approx(values.std(ddof=1), rel=1e-9, abs=1e-15)
+    for share in SHARES:
+        assert said["quantiles"][f"{share:g}"] == pytest.approx(np.quantile(values, share), rel=1e-9)
+
+
+def test_nothing_has_a_count_only() -> None:
+    def parts() -> Iterator[np.ndarray]:
+        yield np.array([])
+
+    assert describe(parts, SHARES) == {"count": 0}
+
+
+def test_a_thinned_column_has_every_so_many_runs_across_chunks(small_results: StudyResults) -> None:
+    whole = small_results.by_configuration("rms_error")
+    for most, step in ((1000, 1), (11, 3), (7, 5)):
+        for name, values in small_results.thin("rms_error", most).items():
+            np.testing.assert_array_equal(values, whole[name][::step])
+
+
+def test_results_load_again_from_their_folder(small_results: StudyResults) -> None:
+    again = load_study_results(small_results.place.address).found
+    assert again.summary == small_results.summary
+    assert again.name == "small"
+    assert again.configurations == ("proportional", "solenoid")
+    assert again.varied == ("reference.level", "supply.pressure", "actuator.leak.area")
+    assert "32 runs: 32 completed, 0 diverged, 0 refused" in repr(again)
+
+
+def test_a_channel_that_was_not_kept_is_named_with_the_nearest(small_results: StudyResults) -> None:
+    with pytest.raises(StudyError, match=r"no trajectories of 'torqe' were kept, did you mean 'torque'\?"):
+        small_results.trajectories("torqe")
+
+
+def test_a_folder_without_results_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match="contains no study results"):
+        load_study_results(tmp_path)
+
+
+def test_results_do_what_everything_solved_does(small_results: StudyResults, tmp_path: Path) -> None:
+    finding = finding_of(small_results)
+    finding.save(tmp_path / "saved")
+    names = {path.name for path in (tmp_path / "saved").iterdir()}
+    assert names == {"figure.png", "figure.svg", "ppafo.json", "report.html", "sweep.json", "sweep.txt"}
+    stored = json.loads((tmp_path / "saved" / "sweep.json").read_text(encoding="utf-8"))
+    assert stored == finding.to_dict() == {**small_results.summary, "folder": small_results.place.address}
+    page = (tmp_path / "saved" / "report.html").read_text(encoding="utf-8")
+    assert "of their normal scores" in page
+    assert "Sampled by sobol: 8 draws, seed 3." in page
+    with pytest.raises(LookupError, match="there is no figure 'pareto'; available: figure"):
+        finding.plot("pareto")
+
+
+def test_the_name_of_an_earlier_version_says_the_new_one() -> None:
+    with pytest.raises(AttributeError, match=r"ppafo\.run_study is now called ppafo\.sweep"):
+        _ = ppafo.run_study
+
+
+BAND_SHARES = (0.0, 0.05, 0.25, 0.5, 0.9, 1.0)
+
+
+def test_quantiles_over_time_are_those_of_numpy_wherever_runs_failed() -> None:
+    random = np.random.default_rng(2)
+    values = np.stack([random.normal(3.0, 1.0, 500), random.exponential(2.0, 500), np.full(500, 1.0), np.ones(500)], 1)
+    values[::50, 0] = np.nan
+    values[:499, 1] = np.nan
+    values[:, 3] = np.nan
+    counts = np.count_nonzero(np.isfinite(values), axis=0)
+    found = sorted_quantiles(np.sort(values, axis=0), counts, BAND_SHARES)
+    np.testing.assert_allclose(found[:, :3], np.nanquantile(values[:, :3], BAND_SHARES, axis=0), rtol=1e-14)
+    assert np.isnan(found[:, 3]).all()
+
+
+AXIS = {"path": "reference.level", "kind": "grid", "first": "2 N m", "last": "5 N m", "count": 3}
+OTHER = {"path": "valve.area", "kind": "grid", "first": "4 mm^2", "last": "16 mm^2", "count": 3}
+DRAWN = {"path": "supply.pressure", "kind": "uniform", "minimum": "45 psi_g", "maximum": "55 psi_g"}
+LEAK = {"path": "actuator.leak.area", "kind": "uniform", "minimum": "0.2 mm^2", "maximum": "0.4 mm^2"}
+NOBODY = {"path": "actuator.angle_min", "kind": "list", "values": ["140 deg", "141 deg"]}
+
+
+def study(*vary: dict[str, Any], names: tuple[str, ...] = ("proportional",), **outputs: Any) -> dict[str, Any]:
+    """A short study."""
+    found: dict[str, Any] = {
+        "schema_version": 1,
+        "name": "drawn",
+        "configurations": [
+            {"name": name, "scenario": f"torque-task-{name}", "overrides": ["run.duration=0.2 s"]} for name in names
+        ],
+        "vary": list(vary),
+        "outputs": {"metrics": ["rms_error", "switchings"], "every": "20 ms", **outputs},
+    }
+    if DRAWN in vary:
+        found["sample"] = {"method": "random", "runs": 12}
+    return found
+
+
+BOTH = ("proportional", "solenoid")
+
+
+@pytest.mark.parametrize(
+    ("document", "panels"),
+    [
+        (study(DRAWN), ["Supply pressure (psig)"] * 2),
+        (study(DRAWN, LEAK, names=BOTH, bands=["torque"]), ["Supply pressure (psig)"] * 4 + ["Time (s)"]),
+        (study(AXIS), ["Torque to hold (N m)"] * 2),
+        (study(AXIS, OTHER), ["Torque to hold (N m)"] * 2),
+        (study(AXIS, OTHER | {"spacing": "logarithmic"}, DRAWN, names=BOTH), ["Torque to hold (N m)"] * 4),
+        (study(DRAWN, metrics=[], bands=["command"]), ["Time (s)"]),
+        (study(DRAWN, metrics=[], trajectories=["command"]), []),
+        (study(NOBODY), ["Lower stop (deg)"] * 2),
+        (study(names=BOTH), ["RMS error (N m)", "Switchings"]),
+    ],
+)
+def test_there_is_a_panel_for_everything_that_was_asked(document: dict[str, Any], panels: list[str]) -> None:
+    figure = sweep(document).plot()
+    shown = [axes for axes in figure.axes if axes.axison and axes.get_label() != "<colorbar>"]
+    assert [axes.get_xlabel() for axes in shown] == panels
+    assert render_figure(figure, ["png"])["png"].startswith(b"\x89PNG")
+    assert any("simulated" in text.get_text() for text in figure.texts)
+
+
+def test_two_values_that_were_drawn_are_the_axes_of_each_panel() -> None:
+    figure = sweep(study(DRAWN, LEAK, metrics=["gas_supplied"])).plot()
+    assert (figure.axes[0].get_xlabel(), figure.axes[0].get_ylabel()) == (
+        "Supply pressure (psig)",
+        "Leak area (mm$^2$)",
+    )
+    assert figure.axes[1].get_ylabel() == "Gas supplied (g)"
+
+
+def test_maps_of_several_configurations_have_one_scale_of_colours_for_a_metric() -> None:
+    levels = {"path": "reference.level", "kind": "list", "values": ["2 N m", "5 N m", "6 N m"]}
+    figure = sweep(study(levels, OTHER, names=BOTH, metrics=["rms_error", "gas_supplied"])).plot()
+    panels = [axes for axes in figure.axes if axes.get_label() != "<colorbar>"]
+    assert len(panels) == 4
+    for row in (panels[:2], panels[2:]):
+        limits = {axes.collections[0].get_clim() for axes in row}
+        assert len(limits) == 1
+        low, high = limits.pop()
+        assert low == min(axes.collections[0].get_array().min() for axes in row)
+        assert high == max(axes.collections[0].get_array().max() for axes in row)
+    assert [label.get_text() for label in panels[0].get_xticklabels()] == ["2", "5", "6"], "a list: cells side by side"
+
+
+def test_a_map_shows_the_mean_over_the_draws_where_it_belongs() -> None:
+    results = sweep(study(AXIS, OTHER, DRAWN, metrics=["gas_supplied"]))
+    figure = results.plot()
+    mesh = figure.axes[0].collections[0]
+    table = results.found.table()
+    for row, area in enumerate((4e-6, 10e-6, 16e-6)):
+        for column, level in enumerate((2.0, 3.5, 5.0)):
+            own = (abs(table["valve.area"] - area) < 1e-12) & (abs(table["reference.level"] - level) < 1e-9)
+            assert own.sum() == 12
+            mean = 1e3 * table["gas_supplied"][own].mean()
+            assert mesh.get_array()[row, column] == pytest.approx(mean, rel=1e-9)
+
+
+def test_the_same_results_give_the_same_figure() -> None:
+    results = sweep(study(DRAWN, LEAK, names=BOTH))
+    one, other = (render_figure(results.plot(), ["svg", "png"]) for _ in range(2))
+    assert one == other

@@ -1,0 +1,419 @@
+"""A study from its file to its rows: every run is what it is alone, failures are rows, a stopped study goes on."""
+
+import dataclasses
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import ppafo
+from ppafo.analyses.sweep import solve
+from ppafo.analyses.sweep.answer import load_study_results
+from ppafo.analyses.sweep.results import StudyResults
+from ppafo.analyses.sweep.solve import LOG, sweep
+from ppafo.errors import DataError, StudyError
+from ppafo.metrics import METRICS
+from ppafo.progress import Progress
+from ppafo.signals.recording import CHANNELS
+from ppafo.storage.places import DiskFolder
+from ppafo.studies.loading import load_study
+from ppafo.study import store
+from ppafo.study.blocks import chunk_size
+from ppafo.study.store import Task, chunk_file, compute_chunk, estimate_bytes, stored_unit
+
+AREA = {"path": "valve.area", "kind": "uniform", "minimum": "10 mm^2", "maximum": "12 mm^2"}
+
+
+def contents(folder: Path | str) -> dict[str, bytes]:
+    """Every file of a folder of results, without the log."""
+    files = {path.relative_to(folder).as_posix(): path for path in Path(folder).rglob("*") if path.is_file()}
+    return {name: path.read_bytes() for name, path in files.items() if name != LOG}
+
+
+def test_every_run_is_what_it_is_alone(small_results: StudyResults) -> None:
+    table = small_results.table()
+    assert table["run"].tolist() == list(range(32))
+    assert table["configuration"].tolist() == ["proportional"] * 16 + ["solenoid"] * 16
+    for run in (0, 13, 16, 31):
+        overrides = [
+            "run.duration=0.2 s",
+            f"supply.pressure={table['supply.pressure'][run]!r} Pa_a".replace("np.float64(", "").replace(")", ""),
+            f"actuator.leak.area={float(table['actuator.leak.area'][run])!r} m^2",
+            f"reference.level={float(table['reference.level'][run])!r} N m",
+        ]
+        alone = ppafo.simulate(f"torque-task-{table['configuration'][run]}", overrides)
+        assert table["rms_error"][run] == pytest.approx(alone.metrics["rms_error"].value, rel=1e-12)
+        assert table["gas_supplied"][run] == alone.metrics["gas_supplied"].value, "the course has the same bits"
+        kept = small_results.trajectories("torque")[run]
+        expected = np.interp(0.02 * np.arange(11), alone.recording.time, alone.recording["torque"])
+        np.testing.assert_allclose(kept, expected, rtol=1e-6, atol=1e-6)
+
+
+def test_noise_has_a_column_with_which_a_row_is_run_again(varying: Callable[..., Any]) -> None:
+    document = varying({"path": "valve.area", "kind": "uniform", "minimum": "9 mm^2", "maximum": "11 mm^2"}, runs=4)
+    noisy = ["run.duration=0.2 s", "sensors.pressure_noise=5 kPa_d"]
+    document["configurations"] = [
+        {"name": name, "scenario": "torque-task-proportional", "overrides": noisy} for name in ("one", "other")
+    ]
+    results = sweep(document).found
+    table, seeds = results.table(), results.by_configuration("sensors.seed")
+    assert np.unique(seeds["one"]).size == 4
+    assert seeds["one"].tolist() == seeds["other"].tolist()
+    again = [f"valve.area={float(table['valve.area'][2])!r} m^2", f"sensors.seed={int(table['sensors.seed'][2])}"]
+    alone = ppafo.simulate("torque-task-proportional", [*noisy, *again]).metrics
+    assert table["rms_error"][2] == pytest.approx(alone["rms_error"].value, rel=1e-12)
+
+
+def test_a_row_has_the_estimated_error_of_each_metric_where_the_study_keeps_it(varying: Callable[..., Any]) -> None:
+    document = varying({"path": "valve.area", "kind": "uniform", "minimum": "8 mm^2", "maximum": "16 mm^2"})
+    plain = sweep(document).found
+    document["outputs"] = document["outputs"] | {"metrics": ["rms_error", "largest_pressure"], "errors": True}
+    results = sweep(document).found
+    table = results.table()
+    assert np.array_equal(table["rms_error"], plain.table()["rms_error"])
+    assert "rms_error_error" not in plain.table()
+    assert all((table["rms_error_error"] > 0.0) & (table["rms_error_error"] < 1e-3 * table["rms_error"]))
+    assert all(table["largest_pressure_error"] < 10.0)
+
+
+def test_tables_tell_absolute_pressures_from_differences(varying: Callable[..., Any]) -> None:
+    document = varying(
+        {"path": "supply.pressure", "kind": "uniform", "minimum": "45 psi_g", "maximum": "55 psi_g"},
+        {"path": "sensors.pressure_resolution", "kind": "uniform", "minimum": "0 Pa_d", "maximum": "9 Pa_d"},
+    )
+    units = load_study(document).units
+    assert (units["supply.pressure"], units["sensors.pressure_resolution"]) == ("Pa_a", "Pa_d")
+    assert stored_unit(METRICS["largest_pressure"].unit) == stored_unit(CHANNELS["pressure_1"].unit) == "Pa_a"
+    assert stored_unit(CHANNELS["pressure_difference"].unit) == "Pa_d"
+
+
+def test_both_configurations_get_the_same_draws(small_results: StudyResults) -> None:
+    for path in small_results.varied:
+        one, other = small_results.by_configuration(path).values()
+        np.testing.assert_array_equal(one, other)
+
+
+def test_the_folder_opens_as_it_is_with_units_in_the_columns(small_results: StudyResults) -> None:
+    import pyarrow.dataset
+
+    folder = small_results.place.address
+    table = pyarrow.dataset.dataset(f"{folder}/runs").to_table()
+    assert table.num_rows == 32
+    units = {field.name: (field.metadata or {}).get(b"unit") for field in table.schema}
+    assert units["supply.pressure"] == b"Pa_a"
+    assert units["gas_supplied"] == b"kg"
+    assert units["failure_time"] == b"s"
+    frame = table.select(["configuration", "status", "rms_error"]).to_pylist()[0]
+    assert frame["status"] == "completed"
+    assert sorted(contents(folder)) == [
+        "bands.parquet",
+        *(f"finished/chunk-000000{number}.json" for number in range(8)),
+        *(f"runs/chunk-000000{number}.parquet" for number in range(8)),
+        "study.json",
+        "summary.json",
+    ]
+
+
+def test_the_summary_says_what_numpy_says_of_the_rows(small_results: StudyResults) -> None:
+    values = small_results.by_configuration("rms_error")["solenoid"]
+    said = small_results.metrics["solenoid"]["rms_error"]
+    assert said["count"] == 16
+    assert said["mean"] == pytest.approx(values.mean(), rel=1e-12)
+    assert said["sd"] == pytest.approx(values.std(ddof=1), rel=1e-12)
+    assert said["unit"] == "N m"
+    assert said["quantiles"]["0.25"] == pytest.approx(np.quantile(values, 0.25), rel=1e-12)
+    assert small_results.summary["completed"] == 32
+    assert small_results.summary["failures"] == []
+
+
+def test_bands_are_the_quantiles_over_the_runs(small_results: StudyResults) -> None:
+    bands = small_results.bands()
+    own = (bands["configuration"] == "solenoid") & (bands["channel"] == "torque")
+    traces = small_results.trajectories("torque")[16:]
+    assert bands["time"][own].tolist() == pytest.approx((0.02 * np.arange(11)).tolist())
+    assert bands["runs"][own].tolist() == [16] * 11
+    for share in (0.05, 0.5, 0.95):
+        np.testing.assert_allclose(bands[f"q{share:g}"][own], np.quantile(traces, share, axis=0), rtol=1e-14)
+
+
+def test_bands_read_a_few_times_at_once_are_the_same(
+    small: Any, small_results: StudyResults, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(solve, "MAXIMUM_IN_MEMORY", 40)
+    again = sweep(small).found.bands()
+    for name, values in small_results.bands().items():
+        np.testing.assert_array_equal(again[name], values)
+
+
+def test_chunks_are_the_same_in_any_order_and_on_any_number_of_threads(small_results: StudyResults, small: Any) -> None:
+    written = contents(small_results.place.address)
+    for number in (7, 2, 0, 5):
+        _, content = compute_chunk(Task(load_study(small), "nowhere", 1 + number % 2), number)
+        assert content == written[chunk_file(number)]
+
+
+class StoppedError(Exception):
+    """Stands for whatever ends a process."""
+
+
+def stopped_after(chunks: int) -> Callable[[Progress], None]:
+    """A watcher that ends the study once some chunks are finished."""
+    told: list[Progress] = []
+
+    def watch(progress: Progress) -> None:
+        told.append(progress)
+        if len(told) == chunks:
+            raise StoppedError
+
+    return watch
+
+
+@pytest.mark.parametrize("chunks", [1, 4, 8])
+def test_a_stopped_study_goes_on_to_the_same_bytes(
+    small_results: StudyResults, small: Any, tmp_path: Path, chunks: int
+) -> None:
+    out = tmp_path / "out"
+    with pytest.raises(StoppedError):
+        sweep(small, out, progress=stopped_after(chunks))
+    before = {path: path.stat().st_mtime_ns for path in (out / "finished").iterdir()}
+    assert chunks <= len(before) <= chunks + 1
+    with pytest.raises(DataError, match="the study is not finished"):
+        load_study_results(out)
+    sweep(small, out)
+    assert contents(out) == contents(small_results.place.address)
+    assert {path: path.stat().st_mtime_ns for path in before} == before
+
+
+def test_what_a_killed_process_left_half_written_goes_away(
+    small_results: StudyResults, small: Any, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    (out / "runs").mkdir(parents=True)
+    (out / ".study.json.writing-0badcafe").write_bytes(b"{")
+    (out / "runs" / ".chunk-0000001.parquet.writing-0badcafe").write_bytes(b"PAR1")
+    for path in out.rglob("*.writing-*"):
+        os.utime(path, (0.0, 0.0))
+    sweep(small, out)
+    assert contents(out) == contents(small_results.place.address)
+
+
+def cut(content: bytes) -> bytes:
+    """The first half."""
+    return content[: len(content) // 2]
+
+
+def flipped(content: bytes) -> bytes:
+    """One bit changed early in the data, which leaves the footer whole."""
+    return content[:60] + bytes([content[60] ^ 1]) + content[61:]
+
+
+def nothing(content: bytes) -> bytes:
+    """An empty file."""
+    return content[:0]
+
+
+@pytest.mark.parametrize("folder", ["runs", "finished"])
+@pytest.mark.parametrize("damage", [cut, flipped, nothing])
+def test_damaged_chunks_are_found_and_computed_again(
+    small_results: StudyResults, small: Any, tmp_path: Path, folder: str, damage: Callable[[bytes], bytes]
+) -> None:
+    out = copied(small_results, tmp_path)
+    path = next((out / folder).glob("chunk-0000003.*"))
+    path.write_bytes(damage(path.read_bytes()))
+    told: list[Progress] = []
+    sweep(small, out, progress=told.append)
+    assert [progress.done - progress.earlier for progress in told] == [1]
+    assert contents(out) == contents(small_results.place.address)
+
+
+def test_a_chunk_in_the_place_of_another_is_found(small_results: StudyResults, small: Any, tmp_path: Path) -> None:
+    out = copied(small_results, tmp_path)
+    (out / "runs" / "chunk-0000002.parquet").write_bytes((out / "runs" / "chunk-0000001.parquet").read_bytes())
+    sweep(small, out)
+    assert contents(out) == contents(small_results.place.address)
+
+
+def test_damage_is_named_where_results_are_read(small_results: StudyResults, tmp_path: Path) -> None:
+    out = copied(small_results, tmp_path)
+    path = out / "runs" / "chunk-0000003.parquet"
+    path.write_bytes(cut(path.read_bytes()))
+    with pytest.raises(DataError, match=r"chunk-0000003\.parquet: is missing or damaged; run the study again"):
+        load_study_results(out).found.table()
+
+
+def copied(results: StudyResults, tmp_path: Path) -> Path:
+    """A copy of finished results."""
+    out = tmp_path / "out"
+    for name, content in contents(results.place.address).items():
+        DiskFolder(out).write(name, content)
+    return out
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        (lambda study: study["sample"].update(seed=4), "sample.seed was 3 and is now 4"),
+        (lambda study: study["sample"].update(runs=16), "sample.runs was 8 and is now 16"),
+        (
+            lambda study: study["vary"][1].update(maximum="70 psi_g"),
+            r"vary\[supply.pressure\].maximum was '60 psi_g' and is now '70 psi_g'",
+        ),
+        (lambda study: study["outputs"].update(bands=["torque"]), "outputs.bands was"),
+        (lambda study: study.update(runs_of_chunk=6), "runs_of_chunk was 5 and is now 6"),
+        (
+            lambda study: study["configurations"][0].update(overrides=["run.duration=0.2 s", "valve.area=9 mm^2"]),
+            r"scenarios.proportional.device.valve.orifice.area was .* and is now 9e-06",
+        ),
+    ],
+)
+def test_a_changed_study_is_refused_with_what_changed(
+    small_results: StudyResults, small: Any, change: Callable[[Any], None], expected: str
+) -> None:
+    before = contents(small_results.place.address)
+    change(small)
+    with pytest.raises(StudyError, match=expected) as caught:
+        sweep(small, small_results.place.address)
+    assert "\n" not in str(caught.value)
+    assert contents(small_results.place.address) == before
+
+
+def test_the_folder_of_another_study_is_refused(small_results: StudyResults, small: Any) -> None:
+    small["name"] = "other"
+    with pytest.raises(StudyError, match="contains the results of the study 'small', not of 'other'"):
+        sweep(small, small_results.place.address)
+
+
+def test_a_study_whose_draws_were_changed_in_python_is_refused(small_results: StudyResults, small: Any) -> None:
+    study = load_study(small)
+    other = dataclasses.replace(study, sample=dataclasses.replace(study.sample, seed=study.sample.seed + 1))
+    with pytest.raises(StudyError, match=r"drawn\.sample\.seed was 3 and is now 4"):
+        sweep(other, small_results.place.address)
+
+
+def test_a_folder_of_something_else_is_refused_and_left_alone(small: Any, tmp_path: Path) -> None:
+    (tmp_path / "thesis.txt").write_text("mine", encoding="utf-8")
+    with pytest.raises(StudyError, match="is not empty and contains no study results"):
+        sweep(small, tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis.txt"]
+    with pytest.raises(DataError, match="is a file; the results need a folder"):
+        sweep(small, tmp_path / "thesis.txt")
+
+
+def test_a_foreign_or_newer_manifest_is_refused(small: Any, tmp_path: Path) -> None:
+    for text, expected in (("{}", "is not a manifest of study results"), ("{", "cannot be read")):
+        (tmp_path / "study.json").write_text(text, encoding="utf-8")
+        with pytest.raises(DataError, match=expected):
+            sweep(small, tmp_path)
+
+
+def test_more_disk_than_there_is_is_refused_before_anything_is_written(
+    small: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(DiskFolder, "free_bytes", lambda _: 1000)
+    with pytest.raises(StudyError, match=r"32 runs of 'small' need about .* kB, but only 1 kB are free"):
+        sweep(small, tmp_path / "out", agreed=True)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_large_study_asks_for_consent(small: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(store, "ASKED_ABOVE", 1000)
+    with pytest.raises(StudyError, match="give --yes to start it anyway"):
+        sweep(small, tmp_path / "out")
+    assert sweep(small, tmp_path / "out", agreed=True).found.summary["completed"] == 32
+
+
+def test_the_estimate_of_the_disk_is_near_and_above_what_is_written(
+    varying: Callable[..., Any], tmp_path: Path
+) -> None:
+    study = load_study(varying(AREA, AREA | {"path": "actuator.leak.area"}, runs=600))
+    study_results = sweep(study, tmp_path / "out").found
+    written = sum(len(content) for name, content in contents(tmp_path / "out").items() if name.startswith("runs/"))
+    assert written <= estimate_bytes(study) <= 4 * written + 10_000 * study_results.document["chunks"]
+
+
+def test_runs_that_fail_are_rows_with_status_and_reason(varying: Callable[..., Any], tmp_path: Path) -> None:
+    stops = {"path": "actuator.angle_min", "kind": "list", "values": ["20 deg", "140 deg"]}
+    document = varying(stops)
+    del document["sample"]
+    results = sweep(document, tmp_path / "out").found
+    table = results.table()
+    assert table["status"].tolist() == ["completed", "refused"] * 2
+    assert np.isnan(table["rms_error"][[1, 3]]).all()
+    assert np.isfinite(table["rms_error"][[0, 2]]).all()
+    assert table["reason"][0] is None
+    assert "angle_m" in table["reason"][1]
+    assert results.summary["refused"] == 2
+    assert [item["run"] for item in results.summary["failures"]] == [1, 3]
+    assert results.metrics["proportional"]["rms_error"]["count"] == 1
+
+
+def test_a_path_that_varies_in_one_configuration_has_no_value_in_the_others(
+    varying: Callable[..., Any], tmp_path: Path
+) -> None:
+    gain = {"path": "controller.proportional_gain", "kind": "uniform", "minimum": "0.05 1/(N m)"}
+    document = varying(gain | {"maximum": "0.2 1/(N m)", "only": ["proportional"]}, runs=3)
+    values = sweep(document, tmp_path / "out").found.by_configuration("controller.proportional_gain")
+    assert np.isfinite(values["proportional"]).all()
+    assert np.isnan(values["solenoid"]).all()
+
+
+def test_without_a_folder_the_results_live_as_long_as_their_object(varying: Callable[..., Any]) -> None:
+    results = sweep(varying(AREA, runs=4)).found
+    folder = Path(results.place.address)
+    rows = results.table(["run"])["run"].size
+    del results
+    assert rows == 8
+    assert not folder.exists()
+
+
+def test_the_log_has_a_line_for_every_session_and_nothing_else_tells_the_time(small: Any, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    with pytest.raises(StoppedError):
+        sweep(small, out, progress=stopped_after(2))
+    sweep(small, out)
+    sweep(small, out)
+    lines = [json.loads(line) for line in (out / LOG).read_text(encoding="utf-8").splitlines()]
+    assert [line["runs"] for line in lines][-1] == 0
+    assert all(line["seconds"] >= 0.0 for line in lines)
+
+
+def test_results_go_to_any_address_of_fsspec(small_results: StudyResults, small: Any) -> None:
+    fsspec = pytest.importorskip("fsspec")
+    address = "memory://ppafo-test/study"
+    results = sweep(small, address).found
+    try:
+        system = fsspec.filesystem("memory")
+        names = [name for name in system.find("/ppafo-test/study") if not name.endswith(LOG)]
+        found = {name.removeprefix("/ppafo-test/study/"): system.cat_file(name) for name in names}
+        assert found == contents(small_results.place.address)
+        assert load_study_results(address).found.table(["run"])["run"].size == 32
+        assert results.place.address == address
+    finally:
+        system.rm("/ppafo-test", recursive=True)
+
+
+def test_a_study_object_can_be_run_as_it_is(small: Any, small_results: StudyResults) -> None:
+    assert sweep(load_study(small)).found.summary == small_results.summary
+
+
+def test_a_seed_takes_the_place_of_that_of_the_file(varying: Callable[..., Any]) -> None:
+    document = varying(AREA, runs=4)
+    seeds = (None, document["sample"]["seed"], document["sample"]["seed"] + 1)
+    first, same, other = (sweep(document, seed=seed).found.table(["valve.area"])["valve.area"] for seed in seeds)
+    assert (first == same).all()
+    assert (first != other).all()
+
+
+def test_a_loaded_study_is_not_changed_by_what_stands_beside_it(small: Any) -> None:
+    with pytest.raises(StudyError, match="a loaded Study takes no overrides, draws or seed; give them to load_study"):
+        sweep(load_study(small), draws=3)
+
+
+def test_a_thousand_wearers_who_react_are_kept_in_pieces_of_seconds() -> None:
+    study = load_study("weak-wearers-who-react", draws=1000)
+    assert study.runs == 3000
+    assert chunk_size(study) == 64

@@ -1,0 +1,159 @@
+"""``ppafo sweep``, from a study file to files."""
+
+import json
+from importlib import resources
+from pathlib import Path
+
+import pytest
+
+from ppafo.analyses.sweep import solve as solve_module
+from ppafo.cli.main import main
+
+STUDY = """
+schema_version = 1
+name = "mine"
+description = "A few runs."
+[[configurations]]
+name = "base"
+scenario = "scenarios/base.toml"
+[sample]
+method = "latin_hypercube"
+runs = 6
+[[vary]]
+path = "reference.level"
+kind = "uniform"
+minimum = "3 N m"
+maximum = "5 N m"
+[outputs]
+metrics = ["rms_error"]
+bands = ["torque"]
+every = "20 ms"
+"""
+
+
+@pytest.fixture
+def study(tmp_path: Path) -> Path:
+    """A study file beside its scenario, to which its path is relative."""
+    shipped = resources.files("ppafo") / "scenarios" / "torque-task-proportional.toml"
+    (tmp_path / "scenarios").mkdir()
+    (tmp_path / "scenarios" / "base.toml").write_bytes(shipped.read_bytes())
+    path = tmp_path / "mine.toml"
+    path.write_text(STUDY, encoding="utf-8")
+    return path
+
+
+def swept(study: Path, out: Path, *words: str) -> int:
+    """The exit code of the command, with short runs."""
+    return main(["sweep", str(study), "--out", str(out), "--set", "run.duration=0.2 s", *words])
+
+
+def test_a_study_is_run_printed_and_written(study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out"
+    assert swept(study, out) == 0
+    printed = capsys.readouterr()
+    assert "mine: 6 runs: 6 completed" in printed.out
+    assert "rms_error" in printed.out
+    assert "ppafo: 6 of 6 runs (100 %)" in printed.err
+    names = {path.relative_to(out).as_posix() for path in out.rglob("*") if path.is_file()}
+    assert {
+        "report.html",
+        "summary.txt",
+        "figure.png",
+        "figure.svg",
+        "summary.json",
+        "study.toml",
+        "study.json",
+    } <= names
+    assert f"report: {out}/report.html" in printed.out
+    assert (out / "study.toml").read_bytes() == study.read_bytes()
+    drawn = (out / "figure.svg").read_bytes()
+    (out / "figure.svg").unlink()
+    assert main(["export", "figure", str(out)]) == 0
+    assert (out / "figure.svg").read_bytes() == drawn
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert "A few runs." in page
+    assert "The numbers are in summary.json" in page
+    assert str(out) not in page + (out / "summary.txt").read_text(encoding="utf-8")
+    assert "reference.level" in page
+    assert "a usual rate for a proportional valve" in page
+    assert "<script" not in page
+
+
+def test_json_has_the_summary(study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert swept(study, tmp_path / "out", "--json", "--threads", "1", "--draws", "3") == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["completed"] == 3
+    assert document["configurations"]["base"]["rms_error"]["count"] == 3
+    assert document["folder"] == str(tmp_path / "out")
+
+
+def test_the_same_command_again_changes_no_byte(study: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    assert swept(study, out) == 0
+    before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file() and path.name != "log.jsonl"}
+    assert swept(study, out) == 0
+    assert {path: path.read_bytes() for path in before} == before
+
+
+def test_failed_runs_are_told_and_only_all_of_them_are_a_failure(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = study.read_text(encoding="utf-8")
+    vary = '[[vary]]\npath = "actuator.angle_min"\nkind = "list"\nvalues = ["20 deg", "140 deg"]\n[outputs]'
+    study.write_text(text.replace("[outputs]", vary), encoding="utf-8")
+    assert swept(study, tmp_path / "some") == 0
+    said = capsys.readouterr()
+    assert "12 runs: 6 completed, 6 refused" in said.out
+    assert "\n6 of 12 runs failed and have no metrics; the first is run 6: " in said.out
+    study.write_text(study.read_text(encoding="utf-8").replace('"20 deg", ', ""), encoding="utf-8")
+    assert swept(study, tmp_path / "none") == 1
+    assert "6 runs: 6 refused" in capsys.readouterr().out
+
+
+def test_an_interruption_says_that_the_command_goes_on(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*words: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(solve_module, "_compute_here", interrupted)
+    assert swept(study, tmp_path / "out") == 130
+    assert "the same command resumes" in capsys.readouterr().err
+    monkeypatch.undo()
+    assert swept(study, tmp_path / "out") == 0
+
+
+def test_interruption_after_the_last_chunk_says_that_the_chunks_are_kept(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*words: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(solve_module, "write_report", interrupted)
+    assert swept(study, tmp_path / "out") == 130
+    assert "finished chunks are kept" in capsys.readouterr().err
+    assert list((tmp_path / "out" / "runs").iterdir())
+
+
+def test_studies_of_the_package_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["sweep", "--list", "--json"]) == 0
+    listed = json.loads(capsys.readouterr().out)["studies"]
+    names = [item["name"] for item in listed]
+    assert all(item["runs"] > 0 and item["description"] for item in listed)
+    assert names == sorted(names)
+    assert "pressure-and-area" in names
+
+
+def test_the_schema_describes_the_studies_of_the_package(capsys: pytest.CaptureFixture[str]) -> None:
+    import jsonschema
+
+    from ppafo.studies.loading import list_studies, load_study
+
+    assert main(["doctor", "--schema", "study"]) == 0
+    schema = json.loads(capsys.readouterr().out)
+    for name in list_studies():
+        jsonschema.validate(json.loads(json.dumps(load_study(name).document)), schema)
+    broken = json.loads(json.dumps(load_study("pressure-and-area").document))
+    broken["outputs"]["metric"] = []
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(broken, schema)

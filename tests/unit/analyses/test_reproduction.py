@@ -1,0 +1,239 @@
+"""How the claims of the paper are judged, and how overrides reach the experiments."""
+
+import dataclasses
+import json
+
+import pytest
+
+from ppafo.analyses.reproduce import solve as study
+from ppafo.analyses.reproduce.answer import PROPORTIONAL, SOLENOID, STEP, Reproduction
+from ppafo.analyses.reproduce.bench import SyntheticEvidence
+from ppafo.analyses.reproduce.claim import (
+    NOT_PUBLISHED,
+    VERDICTS,
+    Claim,
+    Reported,
+    arithmetic_claims,
+    count_sentence,
+    load_reported,
+    verdict_counts,
+)
+from ppafo.analyses.reproduce.solve import EXPERIMENTS, ORDER, reproduce
+from ppafo.analyses.reproduce.torque_task import phased_runs, readings_of_u, torque_task_observations
+from ppafo.errors import PpafoError, SimulationError
+from ppafo.parameters.audit.evidence import Evidence
+from ppafo.simulation.simulate import Result, Status, simulate
+
+
+def printed_with(**values: float) -> Reported:
+    """The printed set with some numbers exchanged, each in its printed unit; ``__`` stands for a dot."""
+    printed = load_reported()
+    numbers = dict(printed.parameter_set.numbers)
+    for name, value in values.items():
+        path = name.replace("__", ".")
+        numbers[path] = numbers[path].model_copy(update={"value": value})
+    changed = dataclasses.replace(printed.parameter_set, numbers=numbers)
+    return Reported(changed, Evidence(changed, changed.declarations()))
+
+
+def arithmetic(**values: float) -> dict[str, Claim]:
+    return {claim.id: claim for claim in arithmetic_claims(printed_with(**values))}
+
+
+def test_every_claim_is_there_once_in_the_order_of_the_paper(reproduction: Reproduction) -> None:
+    assert tuple(claim.id for claim in reproduction.claims) == ORDER
+
+
+def test_a_claim_as_a_document_is_plain_data_with_all_that_a_reader_needs(reproduction: Reproduction) -> None:
+    document = json.loads(json.dumps([claim.document() for claim in reproduction.claims], allow_nan=False))
+    needed = {"id", "statement", "paper", "value", "unit", "verdict", "assumptions", "source"}
+    assert all(needed <= set(claim) for claim in document)
+    assert all(claim["verdict"] in VERDICTS and claim["source"] and claim["statement"] for claim in document)
+
+
+def test_sixteen_rows_have_six_verdicts(reproduction: Reproduction) -> None:
+    counts = verdict_counts(reproduction.claims)
+    assert tuple(counts.values()) == (2, 3, 6, 1, 3, 1)
+    assert reproduction.to_dict()["counts"] == counts
+    assert count_sentence(reproduction.claims).startswith("16 claims: 2 consistent, 3 inconsistent as reported, 6 met")
+
+
+def test_every_statement_that_needs_a_measurement_is_in_the_one_row_that_is_not_testable(
+    reproduction: Reproduction,
+) -> None:
+    (row,) = (claim for claim in reproduction.claims if claim.verdict == "not_testable")
+    assert row.words == f"{len(NOT_PUBLISHED)} statements"
+    assert (row.value, row.found) == (None, "")
+
+
+def test_no_claim_rests_on_a_synthetic_measurement(reproduction: Reproduction) -> None:
+    resting = [claim.id for claim in reproduction.claims if any("synthetic" in text for text in claim.assumptions)]
+    assert resting == []
+
+
+def test_what_the_rig_records_is_marked_synthetic(reproduction: Reproduction) -> None:
+    evidence = reproduction.synthetic
+    assert isinstance(evidence, SyntheticEvidence)
+    recordings = (evidence.solenoid, evidence.proportional, evidence.step)
+    assert {recording.kind for recording in recordings} == {"synthetic"}
+    assert {evidence.torque.kind, evidence.decay.kind} == {"synthetic"}
+
+
+def test_overrides_reach_the_rig_s_torque_task_but_not_the_identification(reproduction: Reproduction) -> None:
+    changed = reproduce(["reference.level=4 N m"])
+    assert isinstance(changed.synthetic, SyntheticEvidence)
+    assert isinstance(reproduction.synthetic, SyntheticEvidence)
+    assert changed.synthetic.proportional["reference"].max() == pytest.approx(4.0)
+    before, after = (run.decay["friction.viscous_damping"].value for run in (reproduction.synthetic, changed.synthetic))
+    assert after == before
+
+
+def test_the_counts_of_the_verdicts_add_up(reproduction: Reproduction) -> None:
+    assert sum(verdict_counts(reproduction.claims).values()) == len(ORDER)
+
+
+def test_a_constant_that_does_not_follow_from_the_gas_is_inconsistent() -> None:
+    assert arithmetic()["orifice_constants"].verdict == "consistent"
+    for changed in ({"reported__choked_flow_constant": 0.00283}, {"gas__heat_capacity_ratio": 1.4}):
+        assert arithmetic(**changed)["orifice_constants"].verdict == "inconsistent_as_reported"
+
+
+def test_damping_and_friction_hold_with_ten_times_the_inertia_and_not_with_one_of_them_mended() -> None:
+    assert arithmetic()["damping_and_friction"].verdict == "inconsistent_as_reported"
+    assert arithmetic(friction__viscous_damping=3.4)["damping_and_friction"].verdict == "inconsistent_as_reported"
+    mended = arithmetic(foot_plate__inertia=84.0)["damping_and_friction"]
+    assert mended.verdict == "consistent"
+    assert mended.found == "33.6 g m^2/s, 0.0109 N m"
+
+
+def test_one_discharge_coefficient_is_consistent_where_both_valves_have_one_area() -> None:
+    assert arithmetic(valves__solenoid__discharge_coefficient=0.095)["discharge_coefficient"].verdict != "consistent"
+    same = {"valves__proportional__area": 12.6}
+    both = {f"valves__{valve}__discharge_coefficient": 0.095 for valve in ("solenoid", "proportional")}
+    claim = arithmetic(**same, **both)["discharge_coefficient"]
+    assert claim.verdict == "consistent"
+    assert any("atmospheric_pressure" in assumption for assumption in claim.assumptions)
+
+
+@pytest.mark.parametrize(("volume", "verdict"), [(51.0, "inconsistent_as_reported"), (18.0, "consistent")])
+def test_the_swept_volume_is_judged_by_virtual_work(volume: float, verdict: str) -> None:
+    assert arithmetic(actuator__volume_per_angle=volume)["swept_volume"].verdict == verdict
+
+
+def test_the_last_phase_with_valve_a_first_is_the_run_as_its_scenario_has_it(reproduction: Reproduction) -> None:
+    runs = phased_runs(reproduction.solenoid)
+    assert runs.count == 40
+    assert runs.errors[19] == pytest.approx(reproduction.solenoid.metrics["rms_error"].value, rel=1e-5)
+    assert runs.gas[19] == pytest.approx(1e3 * reproduction.solenoid.metrics["gas_supplied"].value, rel=1e-5)
+    assert runs.errors[39] > 1.05 * runs.errors[19], "valve B first costs one switching more"
+
+
+def test_a_task_without_a_tie_at_its_start_has_no_phase(reproduction: Reproduction) -> None:
+    scenario = reproduction.solenoid.scenario
+    settings = {**scenario.reference.settings, "start_level": 1.0}
+    changed = dataclasses.replace(scenario, reference=dataclasses.replace(scenario.reference, settings=settings))
+    assert phased_runs(simulate(changed)).count == 1
+
+
+def test_what_u_is_decides_about_the_error_and_not_about_the_saving(reproduction: Reproduction) -> None:
+    opening, five, ten = readings_of_u(reproduction.solenoid, reproduction.proportional)
+    assert (round(opening.error), round(five.error), round(ten.error)) == (16, -26, -72)
+    assert [round(row.error_within_reach) for row in (opening, five, ten)] == [84, 39, 9]
+    assert all(64.0 < row.gas < 66.5 for row in (opening, five, ten))
+    assert readings_of_u(reproduction.step, reproduction.proportional) == ()
+
+
+def test_a_claim_is_missed_only_outside_its_window(reproduction: Reproduction) -> None:
+    claim = next(claim for claim in reproduction.claims if claim.id == "co2_solenoid")
+    assert claim.window == (1.0, 1.2)
+    values = {1.0: False, 1.2: False, 0.99: True, 1.21: True, None: True}
+    for value, is_missed in values.items():
+        assert dataclasses.replace(claim, value=value).is_missed is is_missed
+    assert dataclasses.replace(claim, value=2.0, window=None).is_missed is False
+
+
+def test_simulated_claims_name_every_assumption_of_scenario_and_set(reproduction: Reproduction) -> None:
+    claim = next(claim for claim in reproduction.claims if claim.id == "co2_saving")
+    named = {text.partition(" = ")[0] for text in claim.assumptions}
+    for run in (reproduction.solenoid, reproduction.proportional):
+        assert {item.path for item in run.scenario.assumptions} <= named
+    assert {"actuator.dead_volume_1", "valves.solenoid.discharge_coefficient"} <= named
+    assert all(": " in text for text in claim.assumptions)
+
+
+def test_what_a_held_vane_does_not_use_is_no_assumption_of_the_torque_task(reproduction: Reproduction) -> None:
+    users = {value.path: value.used_by for value in reproduction.assumed}
+    assert users["actuator.restitution"] == (STEP,)
+    assert users["actuator.dead_volume_1"] == EXPERIMENTS
+
+
+def test_what_the_file_of_an_experiment_sets_is_no_assumption(reproduction: Reproduction) -> None:
+    assert "supply.pressure" not in {value.path for value in reproduction.assumed}
+
+
+def test_an_override_of_the_device_reaches_all_experiments_and_is_listed() -> None:
+    changed = reproduce(["supply.atmospheric_pressure=100 kPa_a"])
+    for run in (changed.step, changed.solenoid, changed.proportional):
+        assert run.scenario.device.supply.atmospheric_pressure == pytest.approx(1.0e5)
+    listed = next(value for value in changed.assumed if value.path == "supply.atmospheric_pressure")
+    assert listed.value == "100 kPa_a"
+    assert listed.reason.startswith("set for this run")
+
+
+def test_an_override_of_a_scenario_reaches_those_that_have_the_value() -> None:
+    changed = reproduce(["controller.proportional_gain=0.2 1/(N m)"])
+    assert changed.proportional.scenario.control.settings["proportional_gain"] == pytest.approx(0.2)
+    assert changed.step.scenario.origin.overrides == changed.solenoid.scenario.origin.overrides == ()
+
+
+def test_an_override_that_nothing_knows_is_refused_with_the_nearest_name() -> None:
+    with pytest.raises(PpafoError, match=r"did you mean 'supply\.pressure'"):
+        reproduce(["supply.presure=60 psi_g"])
+
+
+def test_overrides_leave_the_paper_s_own_arithmetic_alone(reproduction: Reproduction) -> None:
+    changed = reproduce(["gas.species=air"])
+    before, after = ({claim.id: claim.found for claim in run.claims} for run in (reproduction, changed))
+    assert after["swept_volume"] == before["swept_volume"]
+    assert after["co2_solenoid"] != before["co2_solenoid"]
+
+
+def test_a_window_that_is_missed_leaves_the_claim_undetermined() -> None:
+    changed = reproduce(["valves.solenoid.area=31.6 mm^2"])
+    assert "co2_solenoid" in {claim.id for claim in changed.missed}
+    assert {claim.verdict for claim in changed.missed} == {"undetermined"}
+
+
+@pytest.mark.thorough
+def test_a_task_without_a_ramp_has_nothing_to_oscillate_on() -> None:
+    changed = reproduce(["reference.kind=constant", "reference.level=3 N m"])
+    told = {item.id: item for item in changed.torque_observations}
+    assert told["solenoid_oscillates_on_ramp"].holds is False
+    assert "no ramp" in told["solenoid_oscillates_on_ramp"].evidence
+
+
+def test_a_restless_hold_is_not_called_quiet(reproduction: Reproduction) -> None:
+    metrics = dict(reproduction.solenoid.metrics)
+    metrics["oscillations_hold"] = dataclasses.replace(metrics["oscillations_hold"], value=7.0)
+    restless = dataclasses.replace(reproduction.solenoid, metrics=metrics)
+    told = {item.id: item for item in torque_task_observations(restless, reproduction.proportional)}
+    assert told["solenoid_quiet_on_hold"].holds is False
+    assert told["solenoid_quiet_on_hold"].evidence == "7 torque reversals on the hold"
+
+
+def test_a_run_that_diverges_stops_the_reproduction_with_its_name(
+    reproduction: Reproduction, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def diverged(scenario: object) -> Result:
+        return dataclasses.replace(reproduction.step, status=Status("diverged", 0.1, "diverged at t = 0.1 s"))
+
+    monkeypatch.setattr(study, "simulate", diverged)
+    with pytest.raises(SimulationError, match="step-response: diverged at t"):
+        reproduce()
+
+
+@pytest.mark.thorough
+def test_every_experiment_is_told_of_before_it_runs() -> None:
+    heard: list[str] = []
+    reproduce(progress=lambda progress: heard.append(progress.activity))
+    assert [name for name in (STEP, SOLENOID, PROPORTIONAL) if not any(name in text for text in heard)] == []

@@ -1,0 +1,207 @@
+"""Tunings of the torque task, from a file to lines to paste."""
+
+import copy
+from dataclasses import replace
+from typing import Any
+
+import jsonschema
+import pytest
+
+import ppafo
+from ppafo.analyses.tune.answer import Tuned, verdict
+from ppafo.analyses.tune.problem import json_schema, list_tunings, load_tuning, present_value
+from ppafo.analyses.tune.solve import tune
+from ppafo.errors import StudyError
+
+DOCUMENT: dict[str, Any] = {
+    "schema_version": 1,
+    "name": "trial",
+    "scenario": "torque-task-proportional",
+    "overrides": ["reference.level=4 N m", "run.duration=1 s", "reference.ramp_time=0.5 s"],
+    "search": [
+        {"path": "controller.proportional_gain", "minimum": "0.05 1/(N m)", "maximum": "1 1/(N m)"},
+        {
+            "path": "controller.integral_gain",
+            "minimum": "0.01 1/(N m s)",
+            "maximum": "2 1/(N m s)",
+            "spacing": "logarithmic",
+        },
+    ],
+    "objective": [{"metric": "rms_error"}],
+    "effort": {"starts": 2, "generations": 8, "candidates_per_gain": 5},
+}
+
+
+def changed(**changes: Any) -> dict[str, Any]:
+    return copy.deepcopy(DOCUMENT) | changes
+
+
+def test_gains_are_found_that_are_better_and_can_be_pasted() -> None:
+    finding = tune(DOCUMENT)
+    tuning = finding.found
+    assert tuning.before.objective == pytest.approx(1.0)
+    assert tuning.after.objective < 0.5
+    pasted = ppafo.simulate("torque-task-proportional", [*DOCUMENT["overrides"], *tuning.lines])
+    assert pasted.metrics["rms_error"].value == pytest.approx(tuning.after.values["rms_error"], rel=1e-9)
+    assert tuning.before.result.metrics["rms_error"].value == pytest.approx(tuning.before.values["rms_error"], rel=1e-9)
+    assert tuning.bounds_reached["controller.proportional_gain"] == "maximum"  # no delay: any gain is taken
+    assert tune(DOCUMENT).found.lines == tuning.lines
+    _, places = finding.plot("search").axes
+    assert [label.get_text() for label in places.get_yticklabels()] == ["Proportional gain", "Integral gain"]
+
+
+def test_a_constraint_is_kept_or_said_to_be_out_of_reach() -> None:
+    free = tune(DOCUMENT).found
+    least = free.before.result.metrics["peak_error"].value * 0.8
+    kept = tune(
+        changed(
+            objective=[{"metric": "gas_supplied"}], constraints=[{"metric": "peak_error", "at_most": f"{least} N m"}]
+        )
+    ).found
+    assert kept.after.is_feasible
+    assert kept.after.values["peak_error"] <= least
+    assert not kept.before.is_feasible
+    never = tune(changed(constraints=[{"metric": "gas_supplied", "at_most": "0.001 g"}])).found
+    assert not never.after.is_feasible
+    assert never.after.violation > 1.0
+
+
+def test_a_robust_tuning_judges_every_candidate_over_the_same_draws() -> None:
+    robust = {"study": "torque-task-uncertainty", "measure": "quantile", "share": 0.9, "draws": 16}
+    tuning = tune(changed(robust=robust, effort={"starts": 1, "generations": 3, "candidates_per_gain": 4})).found
+    assert tuning.after.objective < tuning.before.objective
+    assert tuning.after.fresh["rms_error"] < tuning.before.fresh["rms_error"]
+    assert tuning.before.values["rms_error"] > tuning.before.result.metrics["rms_error"].value
+    assert tuning.before.fresh["rms_error"] == pytest.approx(tuning.before.values["rms_error"], rel=0.2)
+
+
+CEILING = "the torque ceiling is the cause"
+
+
+def held_by(level: str, share: float) -> Tuned:
+    """A robust tuning that asks an uncertain device to hold a torque."""
+    robust = {"study": "torque-task-uncertainty", "measure": "quantile", "share": share, "draws": 16}
+    return tune(
+        changed(
+            overrides=[f"reference.level={level}", "run.duration=1 s", "reference.ramp_time=0.5 s"],
+            constraints=[{"metric": "rms_error_hold", "at_most": "0.1 N m"}],
+            robust=robust,
+            effort={"starts": 1, "generations": 5, "candidates_per_gain": 4},
+        )
+    ).found
+
+
+def test_a_goal_above_the_ceiling_of_some_draws_is_missed_and_the_ceiling_is_named() -> None:
+    never, always = held_by("5 N m", 0.9), held_by("3.5 N m", 0.9)
+    assert not never.after.is_feasible
+    assert 0.3 < never.after.torque_ceiling.fraction < 0.7
+    assert never.after.torque_ceiling.explains == ("rms_error_hold",)
+    assert CEILING in never.verdict
+    assert always.after.is_feasible
+    assert always.after.torque_ceiling.fraction == 0.0
+    assert CEILING not in always.verdict
+
+
+def test_what_only_the_draws_of_the_search_keep_is_not_kept() -> None:
+    found = held_by("3.5 N m", 0.9)
+    lucky = replace(found.after, violation=0.0, fresh_violation=0.02)
+    assert lucky.is_feasible_in_search
+    assert not lucky.is_feasible
+    said = verdict(found.problem, found.before, lucky)
+    assert "over the draws of the search, but not over 1,024 fresh ones" in said
+
+
+def test_noise_is_drawn_for_every_candidate_alike_and_judged_on_fresh_draws() -> None:
+    overrides = [*DOCUMENT["overrides"], "sensors.pressure_noise=3 kPa_d"]
+    quick = {"starts": 1, "generations": 1, "candidates_per_gain": 4}
+    one, other = (tune(changed(overrides=[*overrides, f"sensors.seed={seed}"], effort=quick)).found for seed in (1, 2))
+    assert one.after.values == other.after.values, "the seed of the scenario does not decide"
+    assert one.after.values["rms_error"] != one.after.result.metrics["rms_error"].value
+    assert one.after.fresh["rms_error"] == pytest.approx(one.after.values["rms_error"], rel=0.1)
+    assert one.after.share_of_noise["rms_error"].high == pytest.approx(1.0)
+    assert any("due to sensor noise" in line for line in one.remarks)
+    with pytest.raises(StudyError, match="all candidates get the same noise"):
+        load_tuning(changed(search=[{"path": "sensors.seed", "minimum": 1, "maximum": 5}]))
+
+
+def test_the_tunings_of_the_package_load_and_fit_the_published_schema() -> None:
+    import tomllib
+    from importlib import resources
+
+    folder = resources.files("ppafo") / "analyses" / "tune" / "library"
+    assert list_tunings() == ("pid-gains", "pid-gains-robust", "push-off")
+    for name in list_tunings():
+        assert load_tuning(name).name == name
+        jsonschema.validate(tomllib.loads((folder / f"{name}.toml").read_text()), json_schema())
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"search": []}, "search"),
+        ({"objective": []}, "objective"),
+        ({"surch": []}, "unknown key 'surch', did you mean 'search'"),
+        ({"scenario": "torque-task-proportionel"}, "did you mean 'torque-task-proportional'"),
+        ({"search": [DOCUMENT["search"][0]] * 2}, "'controller.proportional_gain' is searched twice"),
+        ({"search": [DOCUMENT["search"][0] | {"path": "controller.proportional"}]}, "did you mean"),
+        ({"search": [DOCUMENT["search"][0] | {"minimum": "2 1/(N m)"}]}, "must be less than maximum"),
+        ({"search": [DOCUMENT["search"][0] | {"minimum": "2 kg"}]}, "search 'controller.proportional_gain'"),
+        ({"search": [DOCUMENT["search"][0] | {"minimum": "0 1/(N m)", "spacing": "logarithmic"}]}, "a minimum above 0"),
+        ({"search": [DOCUMENT["search"][0] | {"maximum": "1e9 1/(N m)"}]}, "at most 1000 1/(N m)"),
+        (
+            {"search": [{"path": "controller.integral_gain"}]},
+            "tuning: 'search.0.minimum' and 'search.0.maximum' are missing",
+        ),
+        ({"objective": [{"metric": "rms_eror"}]}, "no metric 'rms_eror', did you mean 'rms_error'"),
+        ({"objective": [{"metric": "rms_error", "weight": 0.0}]}, "weight = 0 has no effect"),
+        ({"objective": [{"metric": "rms_error", "scale": "2 g"}]}, "objective 'rms_error': scale = '2 g'"),
+        ({"objective": [{"metric": "rms_error", "scale": "0 N m"}]}, "must be more than 0"),
+        ({"constraints": [{"metric": "rms_error"}]}, "needs either at_most or at_least, it has none"),
+        ({"constraints": [{"metric": "rms_error", "at_most": "2 g"}]}, "constraint 'rms_error' = '2 g'"),
+        (
+            {"robust": {"study": "torque-task-uncertain"}},
+            "robust: there is no study 'torque-task-uncertain', did you mean",
+        ),
+        (
+            {
+                "robust": {"study": "torque-task-uncertainty"},
+                "search": [{"path": "supply.pressure", "minimum": "40 psi_g", "maximum": "60 psi_g"}],
+            },
+            "draws 'supply.pressure', which is searched here",
+        ),
+    ],
+)
+def test_a_file_that_makes_no_sense_is_one_line(changes: dict[str, Any], text: str) -> None:
+    with pytest.raises(StudyError) as caught:
+        load_tuning(changed(**changes))
+    assert text in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_goal_that_is_zero_before_needs_a_scale() -> None:
+    document = changed(objective=[{"metric": "mechanical_work"}])
+    with pytest.raises(StudyError, match="'mechanical_work' is 0 before tuning, which cannot be the scale; give one"):
+        tune(document)
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        ("controller.rate", 1000.0),
+        ("controller.period", 0.001),
+        ("controller.integral_gain", 0.25),
+        ("reference.ramp_time", 1.0),
+        ("motion.angle", 1.30899693899),
+        ("valve.discharge_coefficient", 0.113),
+        ("sensors.angle_resolution", 0.0),
+        ("run.duration", 3.0),
+        ("initial.pressure_1", 101325.0),
+    ],
+)
+def test_present_values_are_found(path: str, value: float) -> None:
+    assert present_value(path, ppafo.load_scenario("torque-task-proportional")) == pytest.approx(value)
+
+
+def test_a_value_that_is_not_there_yet_is_said() -> None:
+    with pytest.raises(ppafo.ScenarioError, match=r"has no value for 'valve.sonic_conductance'; set one"):
+        present_value("valve.sonic_conductance", ppafo.load_scenario("torque-task-proportional"))

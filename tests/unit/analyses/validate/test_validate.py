@@ -1,0 +1,172 @@
+"""``ppafo validate``, from files to files."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import ppafo
+from ppafo.cli.main import main
+from ppafo.running import simulate
+from ppafo.signals import Channel, Recording
+from ppafo.simulation.loading import load_scenario
+from ppafo.storage import read_csv, write_csv, write_netcdf
+
+SUPPLY = ["--set", "supply.pressure=55 psi_g", "--set", "supply.dorsiflexion_pressure=55 psi_g"]
+SET = ["validate", "ppafo2011", *SUPPLY]
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with one step response as CSV and NetCDF, measured late and with noise by a device like the set."""
+    folder = tmp_path_factory.mktemp("bench")
+    run = simulate(load_scenario("step-response", ["motion.kind=free"])).recording
+    random = np.random.default_rng(4)
+    channels = {
+        name: Channel(np.interp(run.time - 0.003, run.time, run[name]) + noise * random.standard_normal(len(run)), unit)
+        for name, noise, unit in (("angle", 2e-3, "rad"), ("pressure_1", 1e3, "Pa"), ("pressure_2", 1e3, "Pa"))
+    }
+    channels["command"] = Channel(run["command"], "-")
+    recording = Recording("step", run.time, channels, "synthetic")
+    write_csv(folder / "step.csv", recording)
+    write_netcdf(folder / "step.nc", recording)
+    return folder
+
+
+def test_agreement_is_printed_and_written(bench: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out"
+    assert main([*SET, str(bench / "step.csv"), "--out", str(out)]) == 0
+    printed = capsys.readouterr().out
+    assert "(synthetic measurement)" in printed
+    assert "every RMS error is within its limit" in printed
+    assert sorted(entry.name for entry in out.iterdir()) == [
+        "ppafo.json",
+        "report.html",
+        "step-agreement.png",
+        "step-agreement.svg",
+        "step-replayed.csv",
+        "validate.json",
+        "validate.txt",
+    ]
+    document = json.loads((out / "validate.json").read_text())
+    recording = document["recordings"][0]
+    assert document["passes"]
+    assert recording["kind"] == "synthetic"
+    assert recording["delay"] == pytest.approx(0.003, abs=5e-4)
+    assert recording["channels"]["angle"]["shown"]["unit"] == "deg"
+    assert recording["channels"]["angle"]["rms_share"] < 0.01
+    assert len(recording["sha256"]) == 64
+    assert read_csv(out / "step-replayed.csv").kind == "simulated"
+    page = (out / "report.html").read_text()
+    assert "synthetic measurement" in page
+    assert "Not everything here was measured" in page
+    assert page.count("<img") == 1
+    assert "http" not in page
+
+
+def test_several_recordings_of_any_format_are_compared_at_once(
+    bench: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = tmp_path / "run"
+    assert main(["simulate", "step-response", "--set", "motion.kind=free", "--out", str(run)]) == 0
+    capsys.readouterr()
+    files = [str(bench / "step.csv"), str(bench / "step.nc"), str(run)]
+    out = tmp_path / "out"
+    assert main([*SET, *files, "--out", str(out), "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert [item["kind"] for item in document["recordings"]] == ["synthetic", "synthetic", "simulated"]
+    first, second, own = (item["channels"]["angle"]["rms"] for item in document["recordings"])
+    assert first == second
+    assert own < 1e-12
+    assert {"step-1-replayed.csv", "step-2-replayed.csv", "run-replayed.csv"} <= {p.name for p in out.iterdir()}
+
+
+def test_a_wrong_parameter_and_a_strict_threshold_give_exit_code_1(
+    bench: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    step = str(bench / "step.csv")
+    assert main([*SET, step, "--set", "valve.area=8 mm^2"]) == 1
+    # Only the product of area and discharge coefficient acts.
+    orifice = r"valve\.(area|discharge_coefficient)"
+    assert re.search(rf"does not agree: {orifice} seems to be 3\.9\d times", capsys.readouterr().out)
+    assert main([*SET, step, "--threshold", "angle=10%", "--threshold", "pressure_1=0.01 psi_d"]) == 1
+    printed = capsys.readouterr().out
+    assert "does not agree: pressure_1 in" in printed
+    assert printed.count("FAIL") == 1
+
+
+def test_a_prescribed_vane_is_compared_in_its_pressures(bench: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([*SET, str(bench / "step.csv"), "--motion", "measured", "--longest-delay", "5 ms", "--json"]) == 0
+    recording = json.loads(capsys.readouterr().out)["recordings"][0]
+    assert set(recording["channels"]) == {"pressure_1", "pressure_2", "pressure_difference"}
+    assert recording["inputs"] == ["command", "angle"]
+
+
+def test_the_verb_of_python_takes_what_the_command_takes(
+    bench: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["--motion", "measured", "--longest-delay", "5 ms", "--threshold", "5%", "--json"]
+    assert main([*SET, str(bench / "step.csv"), *words]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    validation = ppafo.validate(
+        "ppafo2011",
+        [bench / "step.csv"],
+        overrides=SUPPLY[1::2],
+        motion="measured",
+        longest_delay=0.005,
+        thresholds=["5%"],
+    )
+    assert json.loads(json.dumps(validation.to_dict())) == printed
+    assert validation.plot().axes[0].get_title(loc="left").startswith("Pressure in chamber 1: RMS")
+    validation.save(tmp_path / "saved")
+    assert json.loads((tmp_path / "saved" / "validate.json").read_text()) == printed
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["validate", "ppafo2012", "step.csv"], "ppafo2012"),
+        ([*SET, "other.csv"], "other.csv: cannot be read"),
+        ([*SET, "step.csv", "--valve", "soleniod"], "solenoid"),
+        ([*SET, "step.csv", "--threshold", "angel=5%"], "did you mean 'angle'"),
+        ([*SET, "step.csv", "--motion", "fre"], "did you mean 'free'"),
+        ([*SET, "step.csv", "--initial", "angle=3"], "initial value"),
+        ([*SET, "step.csv", "--longest-delay", "soon"], "--longest-delay soon"),
+        (
+            ["validate", "ppafo2011", "step.csv"],
+            'above the supply of ppafo2011, 50 psi_g: record it, or give --set "supply',
+        ),
+        ([*SET, "step.csv", "broken.csv"], "broken.csv: line 2"),
+    ],
+)
+def test_bad_input_is_one_line_and_nothing_is_written(
+    arguments: list[str],
+    words: str,
+    bench: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "step.csv").write_bytes((bench / "step.csv").read_bytes())
+    (tmp_path / "broken.csv").write_text("time [s],command [-]\n0,x\n")
+    assert main([*arguments, "--out", "out"]) == 2
+    printed = capsys.readouterr()
+    lines = [line for line in printed.err.splitlines() if not line.endswith("...")]
+    assert len(lines) == 1
+    assert words in lines[0]
+    assert printed.out == ""
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_recording_given_twice_is_refused_under_another_name_too(
+    bench: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    copy = tmp_path / "copy.csv"
+    copy.write_bytes((bench / "step.csv").read_bytes())
+    for second in (copy, bench / "step.csv"):
+        assert main([*SET, str(bench / "step.csv"), str(second)]) == 2
+        said = capsys.readouterr().err
+        assert said == f"ppafo: {second}: the same recording as {bench / 'step.csv'}; give each once\n"
