@@ -12,7 +12,7 @@ from typing import Any
 
 import gymnasium
 
-import ppafo.worlds.gym
+import ppafo.gym
 from benchmarks.command import run_command
 from benchmarks.report import describe_machine
 from ppafo.cli.output import EXIT_GOOD, add_json_argument, print_result
@@ -40,7 +40,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise SimulationError("--count and --repetitions are to be 1 or more")
     found = {
         name: (*measure(name, arguments.count, arguments.repetitions), measure_one(name, arguments.repetitions))
-        for name in ppafo.worlds.gym.TASKS
+        for name in ppafo.gym.TASKS
     }
     head = f"{arguments.count} environments, and one, on one core of {describe_machine().processor}"
     lines = [

@@ -34,6 +34,8 @@ from ppafo.exports.c_library import library_of
 from ppafo.exports.c_library.files import library_files
 from ppafo.exports.c_library.program import COUNTS
 from ppafo.exports.wasm import description_of
+from ppafo.gym.environments import TARGETS
+from ppafo.gym.episodes import FromOutside, scenario_episodes
 from ppafo.live.workbench import page_content, program_content
 from ppafo.loading import load_scenario
 from ppafo.model.catalog import ACTUATORS, EFFECTS, VALVES
@@ -48,8 +50,6 @@ from ppafo.studies.varying import varied_path
 from ppafo.study.blocks import drawn_values, varied_columns
 from ppafo.units import parse_quantity
 from ppafo.walking import list_walks
-from ppafo.worlds.gym.environments import TARGETS
-from ppafo.worlds.gym.episodes import FromOutside, scenario_episodes
 from scripts.typed_words import (
     ROWS,
     Judged,

@@ -248,8 +248,8 @@ SECTIONS: Mapping[str, Mapping[str, Check]] = {
     },
     "Published studies": {"claims": claims},
     "Walking": {"alarms": alarms},
-    "The worlds of others": {
-        "worlds": tested("The device in Gymnasium", "Gymnasium; the lanes", "tests/unit/worlds"),
+    "Environments": {
+        "gym": tested("The device in Gymnasium", "Gymnasium; the lanes", "tests/unit/gym"),
     },
 }
 

@@ -15,7 +15,7 @@ MAY_IMPORT = {"engine/numba_compiler.py"}
 USES = """
 import sys
 
-import gymnasium, ppafo.worlds.gym
+import gymnasium, ppafo.gym
 env = gymnasium.make_vec("ppafo/TorqueTask-v0", num_envs=3)
 env.reset(seed=1)
 for _ in range(5):

@@ -1,7 +1,6 @@
-"""``ppafo doctor``: compilers, compiled models and bits of this computer, schemas of files, completion of the line."""
+"""``ppafo doctor``: compilers, compiled models and bits of this computer, schemas of files."""
 
 import importlib
-from typing import Literal
 
 from ppafo.cli.arguments import Name
 from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, Said
@@ -48,9 +47,8 @@ def doctor(
     clear: bool = False,
     bits: bool = False,
     schema: Name | None = None,
-    completion: Literal["bash", "zsh"] | None = None,
 ) -> Said:
-    """Show compilers and compiled models of this computer, check its bits; print a schema, or completion for a shell.
+    """Show compilers and compiled models of this computer, check its bits; print the schema of a file.
 
     Exit code 1 where a run has other bits than on every other computer.
 
@@ -58,22 +56,16 @@ def doctor(
     clear: remove all compiled models, and try each compiler again
     bits: run each scenario and walk of the package for a moment, and compare every bit with those it has elsewhere
     schema: print the JSON Schema of a file format instead, such as scenario
-    completion: print a script instead that completes the line, with names: eval "$(ppafo doctor --completion bash)"
     """
     from ppafo.engine import cache
     from ppafo.engine.kept_models import models_document, models_text
 
-    asked = {"--warm": warm, "--clear": clear, "--bits": bits, "--schema": schema, "--completion": completion}
+    asked = {"--warm": warm, "--clear": clear, "--bits": bits, "--schema": schema}
     given = [option for option, value in asked.items() if value]
     if len(given) > 1:
         raise DataError(f"{given[1]}: not allowed with {given[0]}")
     if schema is not None:
         return _schema_of(schema)
-    if completion is not None:
-        from ppafo.cli.completion import completion_script
-
-        script = completion_script(completion)
-        return Said(script, {"shell": completion, "script": script}, "completion")
     if bits:
         return _bits()
     folder = cache.cache_folder()

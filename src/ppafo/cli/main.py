@@ -17,6 +17,7 @@ from ppafo.cli.command_line import (
     run,
 )
 from ppafo.cli.commands import COMMANDS, OTHERS, check_words, list_commands
+from ppafo.cli.completion import SHELLS, completion_script
 from ppafo.cli.output import EXIT_INTERRUPTED
 from ppafo.errors import PpafoError, one_line
 from ppafo.version import __version__
@@ -54,7 +55,8 @@ def build_parser(words: Sequence[str]) -> CommandParser:
         prog="ppafo",
         usage="ppafo [-h] [--version] COMMAND ...",
         description="Model-based design of pneumatic powered orthoses.",
-        epilog="'ppafo COMMAND --help' shows what a command takes.",
+        epilog="'ppafo COMMAND --help' shows what a command takes.\n"
+        "'ppafo --completion bash' (or zsh) prints a script that completes commands, options and names.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.list_commands = list_commands
@@ -106,6 +108,8 @@ def _run(words: list[str]) -> int:
         for word in words:
             if not word.isascii() and any("\ud800" <= character <= "\udfff" for character in word):
                 raise UsageError(f"'{one_line(word)}' is not text in UTF-8; give the file or folder another name")
+        if words[:1] == ["--completion"]:  # its shell is a word that is no command
+            return _complete(words[1:])
         check_words(words)
         parser = build_parser(words)
         check_options(words, parser)
@@ -125,6 +129,13 @@ def _run(words: list[str]) -> int:
     except KeyboardInterrupt as interrupt:
         print(f"ppafo: {str(interrupt) or 'interrupted; nothing is half written'}", file=sys.stderr)
         return EXIT_INTERRUPTED
+
+
+def _complete(words: list[str]) -> int:
+    if len(words) != 1 or words[0] not in SHELLS:
+        raise UsageError(f"--completion {' '.join(words)}: must be {' or '.join(SHELLS)}")
+    print(completion_script(words[0]))
+    return 0
 
 
 def _readable(message: str) -> str:

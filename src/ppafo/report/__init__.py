@@ -1,4 +1,4 @@
-"""What a question came to, and the one way in which it becomes text, JSON, a page and a folder."""
+"""What an analysis found, and the one way in which it becomes text, JSON, a page and a folder."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -79,7 +79,7 @@ class LivePart:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What a question came to.
+    """What an analysis found.
 
     ``name`` is the stem of its files, and the command's name unless ``command`` says another; ``kicker`` says above
     the title what kind of page this is. ``lead`` are the first paragraphs. ``data`` is plain and in SI. ``passed`` is

@@ -95,7 +95,7 @@ def test_two_orders_to_the_doctor_at_once_are_refused(capsys: pytest.CaptureFixt
         ("sets audit ppafo2011-", ["ppafo2011-printed"]),
         ("simulate --check torque-task-so", ["torque-task-solenoid"]),
         ("simulate --ch", ["--check"]),
-        ("doctor --completion ba", ["bash"]),
+        ("doctor --bi", ["--bits"]),
     ],
 )
 def test_a_line_is_completed_in_bash(line: str, found: list[str]) -> None:
@@ -107,7 +107,12 @@ def test_a_line_is_completed_in_bash(line: str, found: list[str]) -> None:
 
 
 def test_the_script_for_zsh_is_that_for_bash_behind_its_own_reader(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["doctor", "--completion", "zsh"]) == 0
+    assert main(["--completion", "zsh"]) == 0
     head, _, rest = capsys.readouterr().out.partition("\n")
     assert head == "autoload -U +X bashcompinit && bashcompinit"
     assert rest.strip() == completion_script("bash").strip()
+
+
+def test_a_shell_that_has_no_completion_is_refused_with_those_that_have(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--completion", "fish"]) == 2
+    assert capsys.readouterr().err == "ppafo: --completion fish: must be bash or zsh\n"

@@ -75,7 +75,7 @@ def test_a_run_loads_no_library_that_it_does_not_use(simulated: tuple[list[str],
 def test_a_run_of_a_scenario_loads_no_walks_studies_rigs_and_questions(
     simulated: tuple[list[str], list[str]],
 ) -> None:
-    foreign = ("walking", "gait", "studies", "rig", "identification", "validation", "worlds")
+    foreign = ("walking", "gait", "studies", "rig", "identification", "validation", "gym")
     _, after = simulated
     assert {name for name in own(after) if name.startswith(tuple(f"ppafo.{part}" for part in foreign))} == set()
     assert {name for name in own(after) if name.startswith("ppafo.analyses")} == set()

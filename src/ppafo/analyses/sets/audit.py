@@ -3,7 +3,7 @@
 import textwrap
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import Any, NamedTuple
+from typing import Any
 
 from ppafo.errors import ParameterError, refused_as
 from ppafo.parameters import ParameterSet, apply_overrides, load_parameter_set
@@ -16,7 +16,8 @@ _INDENT = "    "
 _SEVERITIES = ("error", "warning", "note")
 
 
-class Audited(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Audited:
     """The audit of one set, or of several: text, document, name of its files, and whether no finding is an error."""
 
     text: str

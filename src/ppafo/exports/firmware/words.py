@@ -1,7 +1,8 @@
 """What controllers on the simulator of a processor came to, in words and as data."""
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 from ppafo.errors import ScenarioError
 from ppafo.exports.firmware.lock_step import (
@@ -23,7 +24,8 @@ _SHOWN = {"rms_error": ("N m", 1.0), "gas_supplied": ("g", 1.0e3)}
 SAMPLES_OF_TABLE = 1000
 
 
-class Tried(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Tried:
     """Text, document, whether every decision is that of the integer controller, and what draws it where it is drawn."""
 
     text: str

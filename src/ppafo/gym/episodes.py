@@ -27,6 +27,17 @@ from ppafo.engine.run import batch_of
 from ppafo.engine.scheme.pneumatics import HeldChambers, held_chambers
 from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import ScenarioError, UnitError
+from ppafo.gym.tasks import (
+    Goal,
+    Memory,
+    Requested,
+    Task,
+    finite,
+    reward_of,
+    valve_command,
+    valve_or_dump,
+    within,
+)
 from ppafo.model.plant import actuator_torque
 from ppafo.model.sensors import Measurement
 from ppafo.parameters import load_parameter_set
@@ -45,17 +56,6 @@ from ppafo.walking.motion import check_led, walk_of, with_duration
 from ppafo.walking.person import draw_gaits
 from ppafo.walking.planning import batch_of_many, plan_walk
 from ppafo.walking.wearer import draw_builds
-from ppafo.worlds.gym.tasks import (
-    Goal,
-    Memory,
-    Requested,
-    Task,
-    finite,
-    reward_of,
-    valve_command,
-    valve_or_dump,
-    within,
-)
 
 Flags = NDArray[np.bool_]
 Places = NDArray[np.intp]

@@ -12,12 +12,7 @@ from gymnasium.vector.utils import batch_space
 
 from ppafo.engine.lanes import Floats
 from ppafo.errors import ScenarioError, SimulationError, nearest_name
-from ppafo.parameters.device import Device
-from ppafo.parameters.overrides import over
-from ppafo.simulation.loading import load_scenario
-from ppafo.walking.loading import load_walk
-from ppafo.walking.walk import lasting
-from ppafo.worlds.gym.episodes import (
+from ppafo.gym.episodes import (
     Environments,
     Episodes,
     Flags,
@@ -28,8 +23,13 @@ from ppafo.worlds.gym.episodes import (
     scenario_episodes,
     walk_episodes,
 )
-from ppafo.worlds.gym.pictures import picture
-from ppafo.worlds.gym.tasks import BAR, LONGEST_SINCE, TASKS, Task
+from ppafo.gym.pictures import picture
+from ppafo.gym.tasks import BAR, LONGEST_SINCE, TASKS, Task
+from ppafo.parameters.device import Device
+from ppafo.parameters.overrides import over
+from ppafo.simulation.loading import load_scenario
+from ppafo.walking.loading import load_walk
+from ppafo.walking.walk import lasting
 
 FLAWED_SENSORS = (
     "sensors.delay=3 ms",

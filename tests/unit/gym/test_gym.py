@@ -16,12 +16,12 @@ gymnasium = pytest.importorskip("gymnasium")
 from gymnasium.utils.env_checker import check_env  # noqa: E402
 from gymnasium.vector import AutoresetMode, SyncVectorEnv  # noqa: E402
 
-import ppafo.worlds.gym  # noqa: E402
-from ppafo.worlds.gym.environments import PneumaticEnv, PneumaticVectorEnv  # noqa: E402
-from ppafo.worlds.gym.tasks import BAR, TASKS, finite, reward_of, within  # noqa: E402
+import ppafo.gym  # noqa: E402
+from ppafo.gym.environments import PneumaticEnv, PneumaticVectorEnv  # noqa: E402
+from ppafo.gym.tasks import BAR, TASKS, finite, reward_of, within  # noqa: E402
 from tests.compilers_here import compilers_here  # noqa: E402
 
-TORQUE, ANGLE, WALK = TASK_NAMES = tuple(ppafo.worlds.gym.TASKS)
+TORQUE, ANGLE, WALK = TASK_NAMES = tuple(ppafo.gym.TASKS)
 SHORT = {TORQUE: 0.02, ANGLE: 0.02, WALK: 6.0}
 CHANNELS = ("angle", "mass_1", "mass_2", "supplied_mass", "vented_mass", "leaked_mass")
 
