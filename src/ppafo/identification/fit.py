@@ -153,8 +153,16 @@ def fit(
     Squares are minimised within bounds, at first with a loss that is robust (soft L1); weights follow from what is left
     in each channel. Then residuals are whitened by one autoregression per channel and the numbers take one more step.
     Other starts are tried only where the recordings disagree. IdentificationError where no run succeeds, and where
-    samples are no more than the numbers that are sought.
+    samples are no more than the numbers that are sought, and for bounds that leave a number no room about its start.
     """
+    if not numbers or not blocks:
+        raise IdentificationError(f"a fit of {len(numbers)} numbers to {len(blocks)} blocks: each needs at least one")
+    for one in numbers:
+        if not (one.low <= one.start <= one.high and one.low < one.high):
+            raise IdentificationError(
+                f"{one.name}: bounds {one.low:g} to {one.high:g} with the start {one.start:g}: the lower must be below "
+                "the upper and the start between them"
+            )
     work = _Work(residuals, tuple(numbers), tuple(blocks), report)
     samples, sought = (
         sum(one.rows.stop - one.rows.start for one in blocks),

@@ -152,3 +152,18 @@ def test_a_law_that_fits_exactly_leaves_numbers_and_a_channel_of_small_units_kee
 def test_as_many_samples_as_numbers_are_refused() -> None:
     with pytest.raises(IdentificationError, match="1 samples for 1 numbers"):
         fit(lambda points: 2.5 - points[:1], (Free("a", 1.0, -9.0, 9.0, 1.0),), [Block("a", "first", slice(0, 1))])
+
+
+@pytest.mark.parametrize(
+    ("numbers", "blocks", "said"),
+    [
+        ((), _BLOCKS, "a fit of 0 numbers to 4 blocks"),
+        (_NUMBERS, (), "a fit of 6 numbers to 0 blocks"),
+        ((Free("rate", 2.0, 2.0, 2.0, 2.0),), _BLOCKS, "rate: bounds 2 to 2 with the start 2"),
+        ((Free("rate", 9.0, 0.1, 5.0, 2.0),), _BLOCKS, "rate: bounds 0.1 to 5 with the start 9"),
+    ],
+    ids=["no number", "no block", "equal bounds", "start outside"],
+)
+def test_a_fit_that_cannot_begin_says_why(numbers: tuple[Free, ...], blocks: tuple[Block, ...], said: str) -> None:
+    with pytest.raises(IdentificationError, match=said):
+        fit(lambda points: np.zeros((_COUNT, points.shape[1])), numbers, blocks)
