@@ -399,6 +399,11 @@ def minutes_text(seconds: float) -> str:
     return shown_text(seconds, "duration", ".0f" if display_value(seconds, "duration") >= 999.5 else ".3g")
 
 
+def strides_text(strides: float) -> str:
+    """Return a number of strides as it is shown: a decimal of few, such as of courses, whole ones of many."""
+    return f"{strides:.1f}" if strides < 99.5 else f"{strides:.0f}"
+
+
 def run_on_bottle(
     run: Run,
     device: Device,

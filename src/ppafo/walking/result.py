@@ -157,6 +157,10 @@ def swing_knee_torque(run: Run, time: Floats, record: Mapping[str, Any]) -> Floa
     return np.where(record["walk.contact"] == SWING, inertial + turning.knee + weight.knee, 0.0)
 
 
+WALK_FORMAT, REACTING_WALK_FORMAT = "ppafo walk", "ppafo walk of a wearer who reacts"
+"""What the results of walks say of themselves on the disk; analyses read them by it."""
+
+
 @dataclass(frozen=True, slots=True, repr=False, eq=False)
 class WalkResult:
     """A finished walk: recording, numbers of each stride (strides,), curves over the stride, and numbers of the whole.

@@ -30,7 +30,7 @@ from ppafo.signals.recording import Floats
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.units import format_quantity
 from ppafo.version import __version__
-from ppafo.walking.bottle import Schedule, minutes_text
+from ppafo.walking.bottle import Schedule, minutes_text, strides_text
 from ppafo.walking.figures.over_time import draw_bottle_pressure, draw_gas_left
 
 if TYPE_CHECKING:
@@ -251,11 +251,6 @@ def _bottle_data(found: Endurance) -> dict[str, Any]:
         "volume": bottle.volume,
         "values": {path: entry.model_dump() for path, entry in bottle.entries.items()},
     }
-
-
-def strides_text(strides: float) -> str:
-    """Return a number of strides as it is shown: a decimal of few, such as of courses, whole ones of many."""
-    return f"{strides:.1f}" if strides < 99.5 else f"{strides:.0f}"
 
 
 def _gas(mass: float) -> str:

@@ -19,13 +19,13 @@ from ppafo.storage.result_folder import read_json, read_recording
 from ppafo.walking import WalkResult
 from ppafo.walking.loading import WALKING
 from ppafo.walking.motion import walk_of
+from ppafo.walking.result import REACTING_WALK_FORMAT, WALK_FORMAT
 
 PEAK_WINDOW = 0.1
 """Seconds over which the largest flow of a recording is averaged; lines and regulator even out what is shorter."""
 _MAXIMUM_FALLEN = 0.1
 """Fraction of the gas used that may flow back: it waits in the line before the valve, and the next stride takes it."""
 WALK_FILE = "walk.json"
-FORMAT, FORMAT_OF_REACTING = "ppafo walk", "ppafo walk of a wearer who reacts"
 _LEAST = 1.0e-12
 """Gas [kg] by which a walk that takes none may come out below 0: rounding of its totals."""
 
@@ -144,13 +144,13 @@ def read_walk_gas(folder: Path) -> WalkGas:
     """Return the gas of a walk from the folder that ``ppafo walk`` wrote; DataError where it says too little."""
     path = folder / WALK_FILE
     document = read_json(path)
-    if isinstance(document, dict) and document.get("format") == FORMAT_OF_REACTING:
+    if isinstance(document, dict) and document.get("format") == REACTING_WALK_FORMAT:
         raise DataError(
             f"{path}: is the walk of a wearer who reacts: walk on the bottle, with 'ppafo walk --bottle', or give gas "
             "and time of a stride, with --gas-per-stride and --stride-time"
         )
-    if not isinstance(document, dict) or document.get("format") != FORMAT:
-        raise DataError(f"{path}: is not the result of a ppafo walk (its 'format' is not '{FORMAT}')")
+    if not isinstance(document, dict) or document.get("format") != WALK_FORMAT:
+        raise DataError(f"{path}: is not the result of a ppafo walk (its 'format' is not '{WALK_FORMAT}')")
     status = _table(document, "status", path).get("kind", "completed")
     if status != "completed":
         raise DataError(f"{path}: the walk {status}, so it cannot be repeated")

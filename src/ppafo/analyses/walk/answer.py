@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.analyses.endurance.draw import FORMAT
 from ppafo.analyses.walk.course import (
     WOULD_DRAG,
     bottle_data,
@@ -42,7 +41,7 @@ from ppafo.walking.loading import FILE, check_duration_once, load_walk
 from ppafo.walking.motion import person_remarks, walk_of
 from ppafo.walking.person import START_VARIATION, THRESHOLD_VARIATION
 from ppafo.walking.planning import law_of
-from ppafo.walking.result import WalkResult
+from ppafo.walking.result import WALK_FORMAT, WalkResult
 from ppafo.walking.strides import PHASES
 from ppafo.walking.walk import (
     OUTCOMES,
@@ -349,7 +348,7 @@ def _bottle(pair: WalkPair) -> str:
 
 def _data(comparison: Comparison) -> dict[str, Any]:
     worn = comparison.with_device
-    return walk_data(FORMAT, SCHEMA_VERSION, comparison) | {
+    return walk_data(WALK_FORMAT, SCHEMA_VERSION, comparison) | {
         "minutes": float(worn.recording.time[-1]) / 60.0,
         **course_data(comparison),
         **bottle_data(worn),

@@ -6,14 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.analyses.endurance.answer import strides_text
 from ppafo.errors import DataError
 from ppafo.gait.gait import speed_range
 from ppafo.report import Column, Figure, Section, Table
 from ppafo.report.display_units import display_value, quantity_text
 from ppafo.simulation.scenario import Scenario
 from ppafo.storage.comma_separated import marked_csv_bytes
-from ppafo.walking.bottle import SupplyCourse, lasted, minutes_text
+from ppafo.walking.bottle import SupplyCourse, lasted, minutes_text, strides_text
 from ppafo.walking.figures.mean_stride import walk_figure
 from ppafo.walking.figures.over_time import bottle_figure, course_figure, peak_torques
 from ppafo.walking.motion import walk_of

@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ppafo.analyses.endurance.draw import FORMAT_OF_REACTING
 from ppafo.analyses.walk.course import bottle_data, bottle_remark, bottle_sections
 from ppafo.analyses.walk.document import walk_data
 from ppafo.analyses.walk.safety import over_time_sections, safety_remarks
@@ -19,7 +18,7 @@ from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.walking.motion import person_remarks, walk_of
 from ppafo.walking.reacting_wearer import ReactingWearer
-from ppafo.walking.result import WalkResult
+from ppafo.walking.result import REACTING_WALK_FORMAT, WalkResult
 from ppafo.walking.strides import PHASES
 from ppafo.walking.walk import Comparison
 from ppafo.walking.way import EDGE, met_by
@@ -121,7 +120,7 @@ def reacting_answer(comparison: Comparison) -> Answer:
             *over_time_sections(worn),
             *_curves(comparison),
         ),
-        data=walk_data(FORMAT_OF_REACTING, SCHEMA_VERSION, comparison)
+        data=walk_data(REACTING_WALK_FORMAT, SCHEMA_VERSION, comparison)
         | {
             "likeness": {
                 words: {name: plain(item) for name, item in likeness(walked).items()}

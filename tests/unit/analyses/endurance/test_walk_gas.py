@@ -11,7 +11,6 @@ import pytest
 
 from ppafo.analyses.endurance.answer import Endurance
 from ppafo.analyses.endurance.draw import (
-    FORMAT,
     WalkGas,
     draw_of_walk,
     largest_flow,
@@ -29,6 +28,7 @@ from ppafo.walking import WalkResult, load_walk, walk
 from ppafo.walking.bottle import Schedule, SupplyBalance
 from ppafo.walking.loading import on_bottle
 from ppafo.walking.motion import walk_of, with_duration
+from ppafo.walking.result import WALK_FORMAT
 
 SMALL = ["bottle.gas_mass=20 g", "bottle.volume=30 cm^3"]
 """A bottle that is walked to its end in a second."""
@@ -58,7 +58,7 @@ def folder_of(walk: WalkGas, path: Path) -> Path:
         said = {"content": origin.content, "overrides": list(origin.overrides), "file": origin.file}
         configuration |= said
     metrics = {"gas": {"value": walk.gas_per_stride, "unit": "kg"}}
-    document = {"format": FORMAT, "configuration": configuration, "metrics": metrics}
+    document = {"format": WALK_FORMAT, "configuration": configuration, "metrics": metrics}
     (path / "walk.json").write_text(json.dumps(document))
     (path / "recording.nc").write_bytes(netcdf_bytes(walk.recording, None))
     return path
