@@ -92,7 +92,7 @@ class Law(NamedTuple):
     filter: float
     anti_windup: float
     delay: float
-    pressure_quantum: float
+    pressure_resolution: float
     bias: float
 
 
@@ -425,9 +425,9 @@ def what_follows(rig: Rig, time: float, y: Any, way: float) -> tuple[float, bool
 
 
 @njit(cache=True)
-def rounded(value: float, quantum: float) -> float:
+def rounded(value: float, resolution: float) -> float:
     """The nearest whole number of quanta, a half away from 0."""
-    return math.copysign(math.floor(abs(value) / quantum + 0.5) * quantum, value) if quantum > 0.0 else value
+    return math.copysign(math.floor(abs(value) / resolution + 0.5) * resolution, value) if resolution > 0.0 else value
 
 
 @njit(cache=True)
@@ -436,8 +436,8 @@ def decide(rig: Rig, time: float, seen: Any, memory: Any) -> float:
     law = rig.law
     if law.kind == 0.0:
         return law.command
-    measured_1 = rounded(seen[0] + law.bias, law.pressure_quantum)
-    measured_2 = rounded(seen[1] - law.bias, law.pressure_quantum)
+    measured_1 = rounded(seen[0] + law.bias, law.pressure_resolution)
+    measured_2 = rounded(seen[1] - law.bias, law.pressure_resolution)
     wish, _ = follow(rig.wish, time)
     error = wish - rig.torque_constant * (measured_1 - measured_2)
     if law.kind == 1.0:
@@ -687,7 +687,7 @@ def law_of(scenario: Scenario, bias: float) -> Law:
         raise ValueError("the judge knows no noise")
     names = ("proportional_gain", "integral_gain", "derivative_gain", "derivative_filter", "anti_windup")
     gains = (s.get(name, 0.0) for name in names)
-    seen = (sensors.delay, sensors.pressure_quantum, bias)
+    seen = (sensors.delay, sensors.pressure_resolution, bias)
     return Law(CONTROLLERS[scenario.control.kind], scenario.control.period, s.get("command", 0.0), *gains, *seen)
 
 
