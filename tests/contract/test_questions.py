@@ -195,7 +195,7 @@ def test_a_command_of_another_package_is_in_the_help_and_in_hints_and_is_refused
         (["pressures", "torque-task"], "the following arguments are required: --pressure"),
         (["pressures", "torque-task", "--pressure", "40"], "there is no scenario or walk 'torque-task'"),
         (["pressures", "torque-task-solenoid", "--presure", "40"], "no option '--presure', did you mean '--pressure'"),
-        (["broken"], "command 'broken' of package 'my-questions' cannot be loaded: ModuleNotFoundError"),
+        (["broken"], "command 'broken' of package 'my-analyses' cannot be loaded: ModuleNotFoundError"),
     ):
         assert main(words) == 2
         printed = capsys.readouterr().err

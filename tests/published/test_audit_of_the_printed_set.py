@@ -1,4 +1,4 @@
-"""What the paper's own numbers do: each contradiction is found by the audit from the printed values alone."""
+"""What the paper's own numbers do: each contradiction is found by the audit from the reported values alone."""
 
 import pytest
 
@@ -39,30 +39,30 @@ def test_the_discharge_coefficient_is_printed_with_a_unit_that_it_cannot_have() 
 def test_the_printed_flow_does_not_follow_from_either_valve(valve: str, flow: float) -> None:
     finding = FOUND[f"flow-of-{valve}"]
     assert finding.severity == "error"
-    assert side(finding, "printed flow") == pytest.approx(1.5e-3)
+    assert side(finding, "reported flow") == pytest.approx(1.5e-3)
     assert side(finding, "Cd A C1 P") == pytest.approx(flow, rel=3e-3)
-    assert side(finding, "Cd A that gives the printed flow") == pytest.approx(1.196e-6, rel=1e-3)
+    assert side(finding, "Cd A that gives the reported flow") == pytest.approx(1.196e-6, rel=1e-3)
 
 
 def test_one_coefficient_cannot_give_one_flow_through_both_areas() -> None:
     finding = FOUND["one-coefficient-proportional-solenoid"]
     assert finding.severity == "error"
     assert side(finding, "ratio of the areas") == pytest.approx(31.6 / 12.6)
-    assert side(finding, "ratio of the printed flows") == pytest.approx(1.0)
+    assert side(finding, "ratio of the reported flows") == pytest.approx(1.0)
 
 
 def test_damping_is_ten_times_inertia_times_the_decay() -> None:
     finding = FOUND["damping-against-inertia"]
     assert finding.severity == "error"
     assert side(finding, "inertia times ratio") == pytest.approx(3.36e-3)
-    assert side(finding, "printed damping") == pytest.approx(32e-3)
+    assert side(finding, "reported damping") == pytest.approx(32e-3)
 
 
 def test_dynamic_friction_is_ten_times_inertia_times_the_deceleration() -> None:
     finding = FOUND["dynamic-friction-against-inertia"]
     assert finding.severity == "error"
     assert side(finding, "inertia times ratio") == pytest.approx(0.0011, rel=0.01)
-    assert side(finding, "printed dynamic friction") == pytest.approx(0.011)
+    assert side(finding, "reported dynamic friction") == pytest.approx(0.011)
 
 
 def test_both_agree_with_an_inertia_of_84() -> None:
@@ -111,7 +111,7 @@ def test_the_ideal_gas_law_under_counts_by_2_3_percent() -> None:
 def test_the_printed_exponent_of_c1_does_not_give_the_printed_c1() -> None:
     finding = FOUND["choked-flow-exponent"]
     assert finding.severity == "error"
-    assert side(finding, "C1 with the printed exponent") == pytest.approx(0.003182, rel=1e-3)
+    assert side(finding, "C1 with the reported exponent") == pytest.approx(0.003182, rel=1e-3)
     assert side(finding, "C1 with (k+1)/(k-1)") == pytest.approx(0.002812, rel=1e-3)
 
 
