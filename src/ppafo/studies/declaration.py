@@ -10,8 +10,11 @@ from pydantic import Field
 
 from ppafo.documents.models import NAME, StrictTable, Text, Texts, make_schema
 
+# A Sobol sequence of 32 bits repeats after 2**32 draws; no other method needs a lower limit.
 MAXIMUM_RUNS = 2**32
+# A million rows of some ten columns are about 100 MB, held in memory until the block is on the disk.
 MAXIMUM_RUNS_OF_CHUNK = 1_000_000
+# 32 bits, so that a seed is exact in a column of floats.
 LARGEST_SEED = 2**32 - 1
 MAXIMUM_GRID_VALUES = 1_000_000
 DEFAULT_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
@@ -142,7 +145,7 @@ class Stated(StrictTable):
 
 
 class Correlation(StrictTable):
-    """Correlation of two distributions, as that of the normal scores behind them (a Gaussian copula)."""
+    """Correlation of two distributions: the correlation of their normal scores (a Gaussian copula)."""
 
     between: Annotated[tuple[Text, Text], Field(strict=False, description="two paths that have distributions")]
     coefficient: Annotated[float, Field(gt=-1.0, lt=1.0)]

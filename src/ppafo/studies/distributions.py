@@ -72,6 +72,7 @@ class NormalBetween:
         """Return the quantile [SI] at each probability; computed in the tail that keeps its digits."""
         from scipy.special import ndtr, ndtri
 
+        # Above the mean, 1 - ndtr would cancel: the upper tail is the lower tail of the mirrored distribution.
         low = (self.minimum - self.mean) / self.standard_deviation
         high = (self.maximum - self.mean) / self.standard_deviation
         if low > 0.0:
@@ -133,6 +134,7 @@ class OneOf:
 
     def values(self, uniform: Floats) -> Floats:
         """Return the quantile [SI] at each probability."""
+        # Without the last weight: rounding may leave the sum just below 1, and a draw above it would have no value.
         number = np.searchsorted(np.asarray(self.cumulated[:-1]), uniform, side="right")
         return np.asarray(self.choices)[number]
 
@@ -186,10 +188,10 @@ def replicates_interval(values: Floats, replicates: int, confidence: float) -> I
 
 
 def floored_interval(values: Floats, replicates: int, confidence: float) -> Interval:
-    """Return the mean with the interval of replicates or, where that is narrower, that of as many independent draws.
+    """Return the mean with the wider of two intervals: spread between replicates, and as many independent draws.
 
     Evenly placed draws make replicates agree on what all of them miss: where rare values decide, the spread between
-    them says less than that of the values, and nobody knows beforehand that none do.
+    replicates is smaller than the error, and nobody knows beforehand that none decide.
     """
     from scipy.special import ndtri
 
@@ -234,7 +236,7 @@ def noise_interval(values: Floats, others: Floats, confidence: float) -> Interva
     """Return the fraction of the variance that is due to noise, with its interval; None where nothing varies.
 
     ``values`` and ``others`` (draws,) are the same draws with two independent noise streams: half the mean square of
-    their difference is the variance within a draw. The interval is that of a ratio of means by the delta method.
+    their difference is the variance within a draw. The interval of this ratio of means is by the delta method.
     """
     from scipy.special import ndtri
 
@@ -268,10 +270,11 @@ def share_interval(hits: Floats, replicates: int, confidence: float) -> Interval
     """Return the fraction of draws with a property, and its interval from the spread between replicates.
 
     ``hits`` (draws,) is 1 where a draw has it, 0 where not, nan where that is not known. Where fewer than two draws for
-    each replicate have it, or have it not, the spread says too little: the interval is that of independent draws.
+    each replicate have it, or have it not, the spread says too little: the interval is exact for independent draws.
     """
     known = hits[np.isfinite(hits)]
     count = int(np.count_nonzero(known))
+    # With fewer, a replicate often has none at all, and Student's interval of 16 small counts is too narrow.
     if min(count, known.size - count) < 2 * replicates:
         return fraction_interval(count, known.size, confidence)
     found = replicates_interval(hits, replicates, confidence)

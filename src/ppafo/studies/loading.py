@@ -81,7 +81,7 @@ class _Source:
 def _apply_overrides(
     document: dict[str, Any], overrides: Sequence[str], sample: Mapping[str, int | None], source: _Source
 ) -> dict[str, Any]:
-    """Return the document as if what the command line changes stood in the file."""
+    """Return the document with the changes of the command line, as if they stood in the file."""
     file = source.file
     parsed = _parse(document, file)
     if overrides:
@@ -91,7 +91,7 @@ def _apply_overrides(
     given = {key: value for key, value in sample.items() if value is not None}
     if given and parsed.sample is None:
         raise StudyError(
-            f"{file}: has no [sample], so the number of runs is that of its grid and nothing is random: "
+            f"{file}: has no [sample], so it runs its grid alone and nothing is random: "
             "it takes neither draws nor a seed"
         )
     if given:
@@ -146,6 +146,7 @@ def _check_set_or_varied(parsed: declared.StudyFile, configurations: Sequence[Co
         given = override_set(each.overrides, StudyError, valve=loaded.scenario.device.valve_name)
         for item in parsed.vary:
             path = chosen_path(item.path, loaded.scenario)
+            # The varied column replaces the value in every run, whichever form of it (area or conductance) is set.
             unused = [other for other in (path, *other_forms(path)) if other in given]
             if (
                 not unused
@@ -208,6 +209,7 @@ def _place(
         raise source.refusal(
             f"vary '{item.path}': has different units, limits or atmospheres in different configurations"
         )
+    # Where the atmosphere is fixed, gauge is a constant away from absolute; where it varies, each run has its own zero.
     if isinstance(item, declared.SameAs) or ATMOSPHERE_PATH not in {other.path for other in parsed.vary}:
         return places[0]
     with refused_as(source.refusal, f"vary '{item.path}'", UnitError):
@@ -227,6 +229,7 @@ def _axis_or_drawn(
 
 
 def _stated_distribution(item: declared.Stated, place: VariedPath, configurations: Iterable[Configuration]) -> Drawn:
+    # One draw is run in every configuration, so all of them must mean the same distribution.
     found = {stated_normal(place, each.scenario)[0] for each in configurations}
     if len(found) > 1:
         raise UnitError(

@@ -4,9 +4,9 @@ Random numbers come from Philox, a generator that can start anywhere (Salmon et 
 can only be wound forward, which is kept cheap by remembering where it stands. SciPy's Latin hypercube holds all draws
 in memory at once; here the order of the strata is a permutation of 0 .. n - 1 that gives the place of one number
 without making the others: a Feistel network on the next even number of bits, followed until the result is below n
-(cycle walking; Black and Rogaway, CT-RSA 2002). The mixing is that of SplitMix64 (Steele et al., OOPSLA 2014).
+(cycle walking; Black and Rogaway, CT-RSA 2002). Words are mixed as in SplitMix64 (Steele et al., OOPSLA 2014).
 
-Correlations are those of normal scores: a Gaussian copula, which leaves each distribution as it was.
+Correlations hold for normal scores: a Gaussian copula, which leaves each distribution as it was.
 
 A scenario has one seed, so that a single run can be repeated. A statement about a device must not depend on that one
 realisation: where sensors are noisy, every draw gets a noise stream of its own.
@@ -29,6 +29,7 @@ from ppafo.studies.study import Drawn, Sample
 
 Words = NDArray[np.uint64]
 Factor = tuple[tuple[float, ...], ...]
+# Four rounds of a Feistel network are a pseudo-random permutation (Luby and Rackoff, 1988); six leave a margin.
 _ROUNDS = 6
 _WORDS_PER_STEP = 4
 _FRACTION_BITS = 53
@@ -43,9 +44,12 @@ def uniform_numbers(sample: Sample, dimensions: int, first: int, count: int) -> 
     if sample.method == "sobol":
         return _sobol(sample, dimensions, first, count)
     uniform = _random(sample.seed, dimensions, first, count)
-    if sample.method == "latin_hypercube":
-        return _in_strata(uniform, sample, first)
-    return uniform
+    if sample.method != "latin_hypercube":
+        return uniform
+    # A Latin hypercube: in every dimension each of the ``runs`` strata holds one draw.
+    draws = np.arange(first, first + count, dtype=np.uint64)
+    strata = np.stack([permute(draws, sample.runs, sample.seed, axis) for axis in range(dimensions)], axis=1)
+    return (strata.astype(np.float64) + uniform) / sample.runs
 
 
 def _random(seed: int, dimensions: int, first: int, count: int) -> Floats:
@@ -54,16 +58,10 @@ def _random(seed: int, dimensions: int, first: int, count: int) -> Floats:
     generator = np.random.Philox(key=seed)
     generator.advance(first * steps)
     words = np.asarray(generator.random_raw(count * steps * _WORDS_PER_STEP), dtype=np.uint64)
+    # Middles of 2**53 equal cells: neither 0 nor 1 is drawn, whose normal scores would be infinite.
     top = (words >> np.uint64(64 - _FRACTION_BITS)).astype(np.float64)
     uniform = np.clip((top + 0.5) * 2.0**-_FRACTION_BITS, None, 1.0 - 2.0**-_FRACTION_BITS)
     return uniform.reshape(count, steps * _WORDS_PER_STEP)[:, :dimensions]
-
-
-def _in_strata(uniform: Floats, sample: Sample, first: int) -> Floats:
-    """Return a Latin hypercube: in every dimension each of the ``runs`` strata holds one draw."""
-    draws = np.arange(first, first + uniform.shape[0], dtype=np.uint64)
-    strata = np.stack([permute(draws, sample.runs, sample.seed, axis) for axis in range(uniform.shape[1])], axis=1)
-    return (strata.astype(np.float64) + uniform) / sample.runs
 
 
 @dataclass(slots=True)
@@ -179,7 +177,7 @@ def is_noisy(scenarios: Iterable[Scenario], paths: Sequence[str] = ()) -> bool:
 
 
 def _noise_of(scenario: Scenario) -> Any:
-    """Return the sum of the levels of noise of a scenario, which may be an array (runs,)."""
+    """Return the summed noise levels of a scenario, which may be an array (runs,)."""
     worn = worn_kind(scenario)
     return scenario.sensors.angle_noise + scenario.sensors.pressure_noise if worn is None else worn.noise(scenario)
 
@@ -201,5 +199,5 @@ def with_noise(
 
 
 def other_noise(seeds: Floats) -> Floats:
-    """Return for each seed that of another stream."""
+    """Return for each seed the seed of another stream."""
     return permute(seeds.astype(np.uint64), LARGEST_SEED + 1, _KEY, 0).astype(np.float64)

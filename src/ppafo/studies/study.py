@@ -69,7 +69,7 @@ def valid_outputs(outputs: declared.Outputs, scenarios: Sequence[Scenario], refu
 def _check_names(
     key: str, given: Sequence[str], known: Collection[str], refusal: Refusal, shown: Collection[str] = ()
 ) -> None:
-    """Refuse a name that is not known, or that is there twice; ``shown`` are those that apply, all unless given."""
+    """Refuse an unknown or repeated name; ``shown`` are the names that apply here, by default all that are known."""
     for name in given:
         if name not in known:
             what, apply = "metric" if key == "metrics" else "channel", shown or known
@@ -134,8 +134,8 @@ class Study:
     """Configurations, each run at every grid point with every draw.
 
     ``same`` has the path that a path follows, by path; ``units`` the SI unit of every varied path, ``only`` the
-    configurations of those that do not vary in all; values of the paths in ``gauge`` count from the atmosphere of their
-    run [Pa], all others are absolute; ``scores`` is the lower Cholesky factor of the correlation of the
+    configurations of the paths that do not vary in all; values of the paths in ``gauge`` count from the atmosphere of
+    their run [Pa], all others are absolute; ``scores`` is the lower Cholesky factor of the correlation of the
     normal scores, None where there is none; ``runs_of_chunk`` is how many runs are computed together, None for a
     choice that keeps memory small; ``document`` is the study file as plain data, with what was changed on the command
     line; ``text`` the bytes of the file, none where the study came as data.
@@ -194,10 +194,11 @@ class Study:
 
 
 def with_followers(columns: Mapping[str, Any], same: Mapping[str, str]) -> dict[str, Any]:
-    """Return the columns, and beside them those of the paths that follow one of them."""
+    """Return the columns, with a column for each path that follows one of them."""
     return {**columns, **{path: columns[other] for path, other in same.items() if other in columns}}
 
 
+# Settings of a law: an object in its place ignores them, except rate and period, at which it is called.
 _SETTING = re.compile(r"\s*controller\.(?!rate|period)")
 Configurations = Mapping[str, Scenario | str | Path] | Sequence[Scenario | str | Path]
 
@@ -214,13 +215,18 @@ class ConfiguredTask:
 def choose_configurations(
     configurations: Configurations | None, study: Study | None, overrides: Sequence[str]
 ) -> tuple[Configuration, ...]:
-    """Return what is compared: the given scenarios, else those of the study; at least two, each with its own name."""
+    """Return the given scenarios, else the configurations of the study; at least two, each with its own name."""
     if configurations is None:
         if study is None:
             raise StudyError("nothing to compare: give scenarios, a study, or both")
         found = study.configurations
     else:
-        _check_no_restriction(study)
+        if study is not None and study.only:
+            path, varying = next(iter(study.only.items()))
+            raise StudyError(
+                f"study '{study.name}': '{path}' varies only in {', '.join(varying)}; "
+                "compare the study's own configurations"
+            )
         pairs = configurations.items() if isinstance(configurations, Mapping) else _with_names(configurations)
         found = tuple(Configuration(name, scenario_or_load(item)) for name, item in pairs)
     if len(found) < 2:
@@ -247,6 +253,7 @@ def with_overrides(scenario: Scenario, overrides: Sequence[str]) -> Scenario:
     of_object = [text for text in overrides if scenario.control.custom is not None and _SETTING.match(text)]
     if of_object:
         raise StudyError(f"override '{of_object[0]}': scenario '{scenario.name}' is controlled by a Python object")
+    # Overrides load the file anew, so what was replaced in Python would silently come back.
     if reloaded(scenario, ()) != scenario:
         raise StudyError(
             f"scenario '{scenario.name}' was changed in Python; overrides need the scenario as it is in its file"
@@ -262,11 +269,3 @@ def _with_names(scenarios: Sequence[Scenario | str | Path]) -> list[tuple[str, S
     if repeated is not None:
         raise StudyError(f"two of the scenarios are named '{repeated}'; give them different names in a study file")
     return list(zip(names, found, strict=True))
-
-
-def _check_no_restriction(study: Study | None) -> None:
-    if study is not None and study.only:
-        path, names = next(iter(study.only.items()))
-        raise StudyError(
-            f"study '{study.name}': '{path}' varies only in {', '.join(names)}; compare the study's own configurations"
-        )

@@ -97,7 +97,7 @@ class VariedPath:
 
 def _parse(text: str, quantity: Quantity, atmosphere: float) -> float:
     """Return a text in SI, in any of the units that a parameter set may use too."""
-    refused: UnitError | None = None
+    refused: UnitError | None = None  # the first refusal: it names the unit that the declaration prefers
     for unit in alternatives(quantity):
         try:
             return parse_quantity(text, unit, atmosphere)
@@ -186,7 +186,7 @@ def _log_uniform(item: declared.LogUniform, place: VariedPath) -> Distribution:
 
 
 def _above(absolute: Distribution, place: VariedPath) -> Distribution:
-    """Return a distribution whose logarithms are of absolute pressures as that of the values of a place."""
+    """Return a distribution of absolute pressures, whose logarithms exist, as values of a place that may be gauge."""
     return Above(absolute, place.atmosphere) if place.is_gauge else absolute
 
 
