@@ -1,4 +1,4 @@
-"""Catalogues of kinds: those of this package, and those that other packages offer, found when they are requested.
+"""Catalogues of kinds: kinds of this package, and kinds that other packages offer, found when they are requested.
 
 A catalogue names the place of a kind of this package, ``module:KIND``, which is loaded when the kind is looked up: a
 run loads the valve and the controller that it has, and no other. Another package offers a kind as an entry point of the
@@ -31,10 +31,10 @@ Kind = TypeVar("Kind")
 
 
 class Kinds(MutableMapping[str, Kind], Generic[Kind]):
-    """Kinds by name. Looking a name up loads its kind, that of another package too; names are those that are known.
+    """Kinds by name. Looking a name up loads its kind, also from another package; names are known without loading.
 
-    ``group`` is that of the entry points, ``word`` what messages call a kind, ``kind_type`` what each of them is.
-    ``own`` are those of this package by name, in their order: kinds, or where each is, as ``module:KIND``.
+    ``group`` is the group of entry points, ``word`` what messages call a kind, ``kind_type`` what each of them is.
+    ``own`` are the kinds of this package by name, in their order: kinds, or where each is, as ``module:KIND``.
     """
 
     def __init__(self, group: str, word: str, kind_type: type[Kind], own: Mapping[str, Kind | str]) -> None:
@@ -63,7 +63,7 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
         del self._kinds[name]
 
     def __iter__(self) -> Iterator[str]:
-        """Names of the kinds of this package, then of those of others that are loaded."""
+        """Names of the kinds of this package, then of loaded kinds of other packages."""
         return iter((*self._own, *(name for name in self._kinds if name not in self._own)))
 
     def __len__(self) -> int:
@@ -71,7 +71,7 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
         return len(self._own.keys() | self._kinds.keys())
 
     def loaded(self) -> dict[str, Kind]:
-        """Return the kinds that are loaded by name, those of this package first, in their order."""
+        """Return the loaded kinds by name: kinds of this package first, in their order."""
         return {name: self._kinds[name] for name in self if name in self._kinds}
 
     def loaded_or_own(self) -> dict[str, Kind]:
@@ -81,7 +81,7 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
         return self.loaded()
 
     def is_own(self, name: str) -> bool:
-        """Tell whether a name is that of a kind of this package."""
+        """Tell whether a name belongs to a kind of this package."""
         return name in self._own
 
     def load_own(self) -> None:

@@ -19,13 +19,13 @@ from ppafo.simulation.overrides import over_layer
 from ppafo.simulation.scenario import Scenario
 
 _OF_A_VANE = ("motion", "initial", "reference")
-"""Sections of which the file of a vane has one, and that of a walk none unless its motion says that it is a walk."""
+"""Sections of which the file of a vane has one; a walk has none of them unless its motion says that it is a walk."""
 _OF_A_LEG = ("wearer", "timing", "faults", "bottle", "gait", "course")
 """Sections that only the file of a walk has."""
 
 
 def list_all_scenarios() -> tuple[str, ...]:
-    """Return the names of the scenarios that come with the package: those of a vane alone, then walks."""
+    """Return the names of the scenarios that come with the package: vanes alone first, then walks."""
     from ppafo.walking.loading import list_walks
 
     return *of_vanes.list_scenarios(), *list_walks()

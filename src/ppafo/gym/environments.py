@@ -313,7 +313,7 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
 class PneumaticVectorEnv(VectorEnv[Observations, Any, Any]):
     """Many such devices on the lanes of one program; each goes as it would alone with its seed.
 
-    The arguments are those of ``PneumaticEnv``; ``autoreset_mode`` is one of Gymnasium's, or its name.
+    Takes the arguments of ``PneumaticEnv``; ``autoreset_mode`` is one of Gymnasium's, or its name.
     """
 
     def __init__(
@@ -366,7 +366,7 @@ class PneumaticVectorEnv(VectorEnv[Observations, Any, Any]):
     ) -> tuple[Observations, dict[str, Any]]:
         """Begin episodes of all, or of those that are true in ``options["reset_mask"]`` (environments,).
 
-        A number as ``seed`` is that of the first; the others count up from it.
+        A number as ``seed`` seeds the first one; the others count up from it.
         """
         mask = (options or {}).get("reset_mask", np.ones(self.num_envs, dtype=np.bool_))
         if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (self.num_envs,):

@@ -2,8 +2,8 @@
 
 One compiled call for one step of all environments: commands in; physics, sensors, observations and rewards out.
 
-The lane loop is that of every other run; what stands around it is written from the same pieces. Each environment is a
-lane, whose episode began at a step of its own.
+The lane loop of every other run steps them; sensors, observations and rewards around it are written from the same
+components. Each environment is a lane, whose episode began at a step of its own.
 """
 
 from collections.abc import Mapping, Sequence
@@ -61,7 +61,7 @@ Flags = NDArray[np.bool_]
 Places = NDArray[np.intp]
 
 OWN = {"goal": Goal, "memory": Memory}
-"""Rows of an environment beside those of its run."""
+"""Rows of an environment beside the rows of its run."""
 OWN_PATHS = [path for name, row in OWN.items() for path in leaf_paths(row, name)]
 OUTCOMES = 5
 REWARD, ERROR, SUPPLIED, FAILED, THROUGH = range(OUTCOMES)
@@ -74,7 +74,7 @@ _PARAMETERS = {
     **dict.fromkeys(("error_weight", "gas_weight"), FLOAT),
     **dict.fromkeys(("now", "steps", "steps_in_all", "steps_per_sample", "signal_delay", "command_delay"), INT),
 }
-"""Of ``go_on``; what begins with ``all`` has the rows of all blocks, one block after another."""
+"""Parameters of ``go_on``; a name that begins with ``all`` holds the rows of all blocks, one block after another."""
 
 
 @lru_cache(maxsize=16)
@@ -88,7 +88,7 @@ def kernel_source(program: Program, task: Task) -> str:
 
 def _step(rows: LaneRows, task: Task) -> list[str]:
     """Lines of ``go_on``: block by block the commands, the lane loop, and what is observed at its end."""
-    # The rows are those of the arrays between two calls of the lane loop, the held chambers those of now.
+    # Between two calls of the lane loop, rows stand in the arrays; chambers of a locked vane are computed when read.
     rows.cells.update({path: f"states[{row}, lane]" for path, row in rows.state_at.items()})
     first = len(rows.state_at)
     rows.cells.update({path: f"parameters[{row - first}, lane]" for path, row in rows.parameter_at.items()})
@@ -169,7 +169,7 @@ def _observed(rows: LaneRows, task: Task) -> list[str]:
 
 
 def _signals_at_start(rows: LaneRows) -> list[str]:
-    """Lines that fill the late signals of an episode that begins with those at its start."""
+    """Lines that fill the late signals of an episode that begins with the readings at its start."""
     if not rows.program.late_signals:
         return []
     stored = [f"signal_history[{row}, slot, lane] = {name}" for row, name in enumerate(SIGNALS)]
@@ -507,10 +507,10 @@ class WalkEpisodes:
         return self.configuration.device
 
     def draw(self, generators: Generators) -> tuple[Columns, Floats]:
-        """Return an episode for each generator; a wearer is no list of numbers, so that nothing more is told."""
+        """Return an episode for each generator, and no drawn numbers: a wearer is not a list of numbers."""
         columns = _repeated(self.plain, len(generators))
         for place, generator in enumerate(generators if self.randomise else ()):
-            # Two wearers: that of the configuration, and one who is drawn, with noise of his or her own.
+            # Person 0 of a population is always the one of the configuration; the second one is drawn.
             seed = float(generator.integers(0, LARGEST_SEED))
             drawn = replace(self.commanded, sensors=replace(self.commanded.sensors, seed=int(seed)))
             build = draw_builds(2, generator)
@@ -525,7 +525,7 @@ class WalkEpisodes:
 
 
 def walk_episodes(configuration: Scenario, randomise: bool, seconds: float) -> WalkEpisodes:
-    """Return the episodes of a walk of some length [s]; the profile of its controller is the torque that is asked for.
+    """Return the episodes of a walk of some length [s]; the profile of its controller is the requested torque.
 
     ScenarioError for a walk with a course or a bottle, or whose controller has no profile.
     """

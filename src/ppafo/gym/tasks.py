@@ -1,4 +1,4 @@
-"""What an agent is asked to do: what it observes, what its error is, and what a command means.
+"""Tasks of an agent: what it observes, what its error is, and what a command means.
 
 Pure functions of floats, which the kernel has beside the physics.
 """
@@ -15,7 +15,7 @@ from ppafo.model.valves.kind import VENT
 BAR = 1.0e5
 GRAM = 1.0e-3
 LOADED, UNLOADED = 60.0, 30.0
-"""Force under the heel [N] above which it counts as loaded and below which it does not: those of the walking laws."""
+"""Force under the heel [N] above which it counts as loaded and below which it does not, as in the walking laws."""
 LONGEST_SINCE = 10.0
 """Longest time since a heel strike that is observed [s]."""
 
@@ -71,7 +71,7 @@ class AngleView(NamedTuple):
 class WalkView(NamedTuple):
     """What the sensors show, forces of heel and toe [N], time since the heel was loaded [s], last command [-].
 
-    The time is that of the heel sensor; a command is -1 to 1, or 2 for venting.
+    The time counts from the last strike that the heel sensor showed; a command is -1 to 1, or 2 for venting.
     """
 
     sensed: Sensed
@@ -115,7 +115,8 @@ def remember(memory: Memory, supplied_mass: float) -> Memory:
 
 
 def remember_strike(memory: Memory, supplied_mass: float, heel_force: float, time: float) -> Memory:
-    """The same of a walk, where the heel sensor shows a force [N] at a time [s]."""
+    """The memory of a walk after a sample, where the heel sensor shows a force [N] at a time [s]."""
+    # Two thresholds, so that noise about one of them is not counted as a row of strikes.
     strikes = (memory.loaded < 0.5) & (heel_force > LOADED)
     stays = 0.0 if heel_force < UNLOADED else memory.loaded
     return Memory(supplied_mass, time if strikes else memory.strike, 1.0 if strikes else stays)
@@ -142,12 +143,12 @@ def reward_of(error: float, gas: float, error_weight: float, gas_weight: float, 
 
 
 def finite(value: float) -> float:
-    """The value, 0 for what is not finite: of a run that failed nothing else can be said."""
-    return value if value - value == 0.0 else 0.0
+    """The value, 0 where it is not finite: an agent can use nothing of a run that failed."""
+    return value if value - value == 0.0 else 0.0  # inf - inf and nan - nan are nan
 
 
 def within(value: float, lowest: float, highest: float) -> float:
-    """The value between two bounds, the lowest for what is no number: a converter shows nothing else."""
+    """The value between two bounds, the lowest one for nan: a converter shows nothing else."""
     above = value if value >= lowest else lowest
     return above if above <= highest else highest
 
@@ -167,8 +168,8 @@ class Task:
     """A task: what is observed, and the source text of what differs in the kernel.
 
     ``view`` has the observed numbers. ``observed`` makes one of them, ``error`` the error, ``kept`` the memory; each
-    is a function, and the names in the kernel that it gets. ``unit`` is that of the error. One that ``walks`` is on a
-    leg that walks.
+    is a function, and the names in the kernel that it gets. ``unit`` is the unit of the error. A task that ``walks``
+    is on a leg that walks.
     """
 
     name: str
