@@ -5,7 +5,7 @@ import { dirname, join } from "node:path";
 import { fileURLToPath } from "node:url";
 
 const here = dirname(fileURLToPath(import.meta.url));
-const folder = process.argv[2] ?? join(here, "..", "src", "ppafo", "live", "bundle");
+const folder = process.argv[2] ?? join(here, "..", "src", "ppafo", "page", "bundle");
 mkdirSync(folder, { recursive: true });
 
 const licence = readFileSync(join(here, "vendor", "uplot", "LICENSE"), "utf8").trim();

@@ -1,4 +1,4 @@
-"""Writes the intervals that a live page shows into ``live/intervals.json``: ``python scripts/known_intervals.py``.
+"""Writes the intervals that a live page shows into ``page/intervals.json``: ``python scripts/known_intervals.py``.
 
 They are those in which the study ``torque-task-uncertainty`` draws numbers of which the set does not say how well they
 are known.
@@ -25,7 +25,7 @@ def known_intervals() -> dict[str, list[float]]:
 def main() -> int:
     """Write the file."""
     text = ",\n".join(f"{json.dumps(path)}: {json.dumps(ends)}" for path, ends in known_intervals().items())
-    Path(str(files("ppafo.live").joinpath("intervals.json"))).write_text(f"{{\n{text}\n}}\n", encoding="utf-8")
+    Path(str(files("ppafo.page").joinpath("intervals.json"))).write_text(f"{{\n{text}\n}}\n", encoding="utf-8")
     return 0
 
 

@@ -27,7 +27,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from ppafo.errors import PpafoError
-from ppafo.live.workbench import DEFAULT, workbench
+from ppafo.page.workbench import DEFAULT, workbench
 from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.simulate import Result

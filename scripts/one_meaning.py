@@ -33,12 +33,12 @@ from ppafo.errors import PpafoError
 from ppafo.exports.c_library import library_of
 from ppafo.exports.c_library.files import library_files
 from ppafo.exports.c_library.program import COUNTS
-from ppafo.exports.wasm import description_of
 from ppafo.gym.environments import TARGETS
 from ppafo.gym.episodes import FromOutside, scenario_episodes
-from ppafo.live.workbench import page_content, program_content
 from ppafo.loading import load_scenario
 from ppafo.model.catalog import ACTUATORS, EFFECTS, VALVES
+from ppafo.page.wasm import description_of
+from ppafo.page.workbench import page_content, program_content
 from ppafo.parameters.graph import ATMOSPHERE_PATH, counts_from
 from ppafo.simulation.ensemble.planning import plan_ensemble
 from ppafo.simulation.loading import list_scenarios

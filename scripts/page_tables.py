@@ -1,7 +1,7 @@
 """Writes what the page that simulates looks up: ``python scripts/page_tables.py``.
 
-``live/opening.json`` has what each setting of a shipped scenario changes where a page opens with it,
-``live/minutes.json`` how long the paper's bottle lasts, by the mean flow that is taken from it.
+``page/opening.json`` has what each setting of a shipped scenario changes where a page opens with it,
+``page/minutes.json`` how long the paper's bottle lasts, by the mean flow that is taken from it.
 """
 
 import json
@@ -13,7 +13,7 @@ import numpy as np
 
 from ppafo.analyses.endurance.draw import draw_of_numbers
 from ppafo.analyses.endurance.solve import follow_bottle
-from ppafo.live.workbench import openings_of
+from ppafo.page.workbench import openings_of
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
 from ppafo.simulation.loading import list_scenarios
 from ppafo.walking import list_walks
@@ -45,7 +45,7 @@ def main() -> int:
         ("opening", "{\n" + ",\n".join(lines) + "\n}"),
         ("minutes", json.dumps(minutes_of_bottle(), ensure_ascii=False)),
     ):
-        Path(str(files("ppafo.live").joinpath(f"{name}.json"))).write_text(f"{text}\n", encoding="utf-8")
+        Path(str(files("ppafo.page").joinpath(f"{name}.json"))).write_text(f"{text}\n", encoding="utf-8")
     return 0
 
 

@@ -5,7 +5,7 @@
     python scripts/wasm_programs.py --compare 1000 --names torque-task-solenoid step-response
     python scripts/wasm_programs.py --time
 
-Writes one program for each shipped scenario and walk into ``src/ppafo/exports/wasm/programs``, with an index that says
+Writes one program for each shipped scenario and walk into ``src/ppafo/page/wasm/programs``, with an index that says
 of which text each was made; needs the package ziglang of the lock file. ``--check`` writes nothing and says what
 differs.
 
@@ -28,10 +28,10 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from ppafo.exports import wasm
 from ppafo.exports.c_library import library_of
-from ppafo.exports.wasm import module_of
 from ppafo.loading import load_scenario
+from ppafo.page import wasm
+from ppafo.page.wasm import module_of
 from ppafo.simulation.loading import list_scenarios
 from ppafo.walking.loading import list_walks
 from tests.modules_under_node import compared, drawn, drawn_walks

@@ -7,8 +7,8 @@ import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
-from ppafo.exports.hil.run import example_controller
 from ppafo.exports.hil.wire import Answer, Reader, Sample, sample_bytes
+from ppafo.processor.link import example_controller
 from ppafo.simulation.loading import load_scenario
 from tests.virtual_wire import free_port
 

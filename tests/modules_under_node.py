@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.errors import PpafoError
-from ppafo.exports.wasm import WasmModule
+from ppafo.page.wasm import WasmModule
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Result, simulate_many

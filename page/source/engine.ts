@@ -4,7 +4,7 @@ import type { Program } from "./content";
 import type { Values } from "./settings";
 import { plain } from "./units";
 
-/** What a module exports: see `ppafo.exports.wasm`. */
+/** What a module exports: see `ppafo.page.wasm`. */
 interface Exports extends WebAssembly.Exports {
   readonly memory: WebAssembly.Memory;
   readonly reserve: (bytes: number) => number;

@@ -56,12 +56,12 @@ if TYPE_CHECKING:
     from ppafo.gait import Gait as Gait
     from ppafo.gait import list_gaits as list_gaits
     from ppafo.gait import load_gait as load_gait
-    from ppafo.live.workbench import workbench as workbench
     from ppafo.loading import load_scenario as load_scenario
     from ppafo.loading import scenario_from_dict as scenario_from_dict
     from ppafo.metrics import Metric as Metric
     from ppafo.metrics import evaluate as evaluate
     from ppafo.model.sensors import Measurement as Measurement
+    from ppafo.page.workbench import workbench as workbench
     from ppafo.parameters import ParameterSet as ParameterSet
     from ppafo.parameters import apply_overrides as apply_overrides
     from ppafo.parameters import list_sets as list_sets
@@ -116,7 +116,7 @@ _HOMES = {
         "UnitError",
     ),
     "ppafo.gait": ("Gait", "list_gaits", "load_gait"),
-    "ppafo.live.workbench": ("workbench",),
+    "ppafo.page.workbench": ("workbench",),
     "ppafo.loading": ("load_scenario", "scenario_from_dict"),
     "ppafo.metrics": ("Metric", "evaluate"),
     "ppafo.model.sensors": ("Measurement",),
@@ -190,7 +190,14 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"ppafo.{name} is now called ppafo.{_RENAMED[name]}")
     if name not in _HOME_OF:
         raise AttributeError(f"module 'ppafo' has no attribute '{name}'")
-    value = getattr(importlib.import_module(_HOME_OF[name]), name)
+    home = _HOME_OF[name]
+    try:
+        module = importlib.import_module(home)
+    except ModuleNotFoundError as error:
+        if error.name != home.rpartition(".")[0]:
+            raise
+        raise AttributeError(f"ppafo.{name} is part of {error.name}, which is not installed") from None
+    value = getattr(module, name)
     globals()[name] = value
     return value
 

@@ -1,12 +1,13 @@
 """Catalogues of kinds: kinds of this package, and kinds that other packages offer, found when they are requested.
 
 A catalogue names the place of a kind of this package, ``module:KIND``, which is loaded when the kind is looked up: a
-run loads the valve and the controller that it has, and no other. Another package offers a kind as an entry point of the
-catalogue's group; a module that is no package is named with its object, ``my_module:KIND``. Nothing is looked for
-before a name is requested that is not here.
+run loads the valve and the controller that it has, and no other. A guest, a room that no other imports, is reached by
+such a name alone; where its folder is not installed its kinds are not listed. Another package offers a kind as an
+entry point of the catalogue's group; a module that is no package is named with its object, ``my_module:KIND``. Nothing
+is looked for before a name is requested that is not here.
 """
 
-import importlib
+import importlib.util
 import logging
 import re
 import sys
@@ -44,9 +45,14 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
         self._places = {name: kind for name, kind in own.items() if isinstance(kind, str)}
         self._kinds = {name: kind for name, kind in own.items() if not isinstance(kind, str)}
         self._own = dict.fromkeys(own)
+        self._absent = {name: room_of(place) for name, place in self._places.items() if not is_installed(place)}
+        for name in self._absent:
+            del self._own[name], self._places[name]
 
     def __getitem__(self, name: str) -> Kind:
         """Return a kind; KeyError where there is none, KindError where it is there and cannot be used."""
+        if name in self._absent:
+            raise KindError(f"{self.word} '{name}' is part of {self._absent[name]}, which is not installed")
         if name not in self._kinds:
             found = kind_at(self._places[name]) if name in self._places else self._find(name)
             if found is None:
@@ -140,6 +146,21 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
         if ":" not in point.name and name != point.name:
             raise KindError(f"{where} calls itself '{one_line(name)}'; entry point and kind need one name")
         return kind
+
+
+def room_of(place: str) -> str:
+    """Return the room of a place, ``ppafo.page`` of ``ppafo.page.workbench:live_part``."""
+    return ".".join(place.partition(":")[0].split(".")[:2])
+
+
+@lru_cache(maxsize=256)
+def is_installed(place: str) -> bool:
+    """Tell whether the room of a place is there; a folder without modules is none."""
+    room = room_of(place)
+    if room in sys.modules:
+        return True
+    found = importlib.util.find_spec(room)
+    return found is not None and found.origin is not None
 
 
 def kind_at(place: str) -> Any:

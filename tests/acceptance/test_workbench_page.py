@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from ppafo.cli.main import main
-from ppafo.live.page import is_page
+from ppafo.page.html import is_page
 
 DOCS = Path(__file__).parents[2] / "docs"
 TEXT = (DOCS / "how-to" / "export.md").read_text(encoding="utf-8")

@@ -25,7 +25,7 @@ def test_the_bill_of_materials_has_what_is_vendored_in_its_version() -> None:
 def test_the_licences_of_what_is_vendored_go_with_the_wheel_and_stand_in_the_page() -> None:
     licence = (ROOT / "page" / "vendor" / "uplot" / "LICENSE").read_text(encoding="utf-8")
     assert '"page/vendor/uplot/LICENSE"' in (ROOT / "pyproject.toml").read_text(encoding="utf-8")
-    bundle = (ROOT / "src" / "ppafo" / "live" / "bundle" / "page.js").read_text(encoding="utf-8")
+    bundle = (ROOT / "src" / "ppafo" / "page" / "bundle" / "page.js").read_text(encoding="utf-8")
     assert " ".join(licence.split()) in " ".join(bundle[:3000].split())
 
 

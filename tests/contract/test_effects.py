@@ -21,10 +21,10 @@ from ppafo.exports.c_library import c_library, library_of
 from ppafo.exports.c_library.files import c_identifier
 from ppafo.exports.c_library.program import COUNTS
 from ppafo.exports.fmu import closed_loop, functional_unit, host_platform
-from ppafo.exports.wasm import module_of
 from ppafo.identification.trajectory.problem import declaration_of
 from ppafo.identification.trajectory.problem import with_numbers as with_fitted
 from ppafo.model.catalog import EFFECTS
+from ppafo.page.wasm import module_of
 from ppafo.parameters.building import build_device
 from ppafo.parameters.loading import json_schema, parse_parameter_set
 from ppafo.report.setting_names import setting_names

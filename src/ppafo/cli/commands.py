@@ -8,12 +8,12 @@ from types import FunctionType
 
 from ppafo.cli.command_line import Command, Group, UsageError
 from ppafo.errors import nearest_name
-from ppafo.kinds import Kinds
+from ppafo.kinds import Kinds, is_installed, room_of
 
 _ANALYSES, _BENCH, _DEVICE = "ppafo.cli.verbs.analyses", "ppafo.cli.verbs.bench", "ppafo.cli.verbs.device"
 _TOOLS, _WALKING = "ppafo.cli.verbs.tools", "ppafo.cli.verbs.walking"
 
-HEADINGS: dict[str, dict[str, Command | Group]] = {
+_EVERY: dict[str, dict[str, Command | Group]] = {
     "the paper": {
         "reproduce": Command(
             f"{_ANALYSES}:reproduce",
@@ -26,7 +26,7 @@ HEADINGS: dict[str, dict[str, Command | Group]] = {
         "simulate": Command(
             "ppafo.cli.simulate:simulate", listing="ppafo.cli.simulate:list_descriptions", listed="scenario"
         ),
-        "workbench": Command(f"{_DEVICE}:workbench"),
+        "workbench": Command("ppafo.page.commands:workbench"),
         "sets": Group(
             "list, show and audit parameter sets; list real parts",
             {
@@ -84,8 +84,8 @@ HEADINGS: dict[str, dict[str, Command | Group]] = {
             "write a scenario or a walk for other tools: C, an FMU, OpenSim, firmware; figures of a result",
             {
                 "c": Command(f"{_TOOLS}:export_c"),
-                "controller": Command(f"{_TOOLS}:export_controller"),
-                "firmware": Command("ppafo.cli.firmware:export_firmware"),
+                "controller": Command("ppafo.processor.commands:export_controller"),
+                "firmware": Command("ppafo.processor.commands:export_firmware"),
                 "fmu": Command(f"{_TOOLS}:export_fmu"),
                 "opensim": Command("ppafo.cli.opensim:export_opensim"),
                 "figure": Command("ppafo.cli.figure:export_figure"),
@@ -95,7 +95,21 @@ HEADINGS: dict[str, dict[str, Command | Group]] = {
         "doctor": Command("ppafo.cli.doctor:doctor"),
     },
 }
-"""Headings of the help, by what somebody has come for, and under each the commands."""
+"""Headings of the help, by what somebody has come for, and under each the commands, those of guests too."""
+
+
+def _installed(one: Command | Group) -> Command | Group | None:
+    """Return a command, a group without the commands that are not there, or None where nothing is left."""
+    if isinstance(one, Command):
+        return one if is_installed(one.verb) else None
+    return Group(one.summary, {name: action for name, action in one.actions.items() if is_installed(action.verb)})
+
+
+HEADINGS: dict[str, dict[str, Command | Group]] = {
+    heading: {name: there for name, one in group.items() if (there := _installed(one)) is not None}
+    for heading, group in _EVERY.items()
+}
+"""The headings with the commands that are installed."""
 
 COMMANDS: dict[str, Command | Group] = {name: one for group in HEADINGS.values() for name, one in group.items()}
 """The commands of this package by name."""
@@ -153,6 +167,7 @@ def check_words(words: list[str]) -> None:
             line = head if dashes and f"--{option.split()[0]}" in rest else now
             full = " ".join(["ppafo", line, *map(shlex.quote, rest)])
             raise UsageError(f"'ppafo {' '.join(shown)}' is now 'ppafo {now}': {full}")
+    _check_installed(given)
     word = given[0]
     if word in MOVED:
         raise UsageError(f"'{word}' is no longer a command of the package: run {MOVED[word]} in a checkout of ppafo")
@@ -167,6 +182,16 @@ def check_words(words: list[str]) -> None:
         if action not in actions:
             hint = nearest_name(action, actions)
             raise UsageError(f"there is no 'ppafo {word} {action}'{hint}; available: {', '.join(actions)}")
+
+
+def _check_installed(given: list[str]) -> None:
+    """Refuse a command of a guest that is not there."""
+    one = next((group[given[0]] for group in _EVERY.values() if given[0] in group), None)
+    shown = given[: 2 if isinstance(one, Group) else 1]
+    if isinstance(one, Group):
+        one = one.actions.get(shown[-1])
+    if one is not None and not is_installed(one.verb):
+        raise UsageError(f"'ppafo {' '.join(shown)}' is part of {room_of(one.verb)}, which is not installed")
 
 
 def list_commands() -> str:

@@ -78,8 +78,8 @@ def _error(result: "Result") -> "ErrorEstimate | None":
 
 def _answer(result: "Result", check: "Check | None") -> "Answer":
     """Return what the page of a result says: the metrics, the figure, and the run again, to be dragged."""
-    from ppafo.live.workbench import live_part
     from ppafo.report import Answer, Figure, Section
+    from ppafo.report.live_parts import live_part
 
     scenario, status = result.scenario, result.status
     device = f"device '{scenario.device.name}', valve '{scenario.device.valve_name}'"

@@ -20,9 +20,9 @@ CONTROLLERS: Kinds[ControllerKind] = Kinds(
         "sliding_mode": "ppafo.control.controllers.feedback:SLIDING_MODE",
         "damped_proportional": "ppafo.control.controllers.feedback:DAMPED_PROPORTIONAL",
         "feedback_linearisation": "ppafo.control.controllers.model_based:FEEDBACK_LINEARISATION",
-        "pid_on_chip": "ppafo.control.fixed.torque_laws:PID_ON_CHIP",
-        "on_off_on_chip": "ppafo.control.fixed.torque_laws:ON_OFF_ON_CHIP",
-        "on_off_dead_zone_on_chip": "ppafo.control.fixed.torque_laws:DEAD_ZONE_ON_CHIP",
+        "pid_on_chip": "ppafo.processor.torque_laws:PID_ON_CHIP",
+        "on_off_on_chip": "ppafo.processor.torque_laws:ON_OFF_ON_CHIP",
+        "on_off_dead_zone_on_chip": "ppafo.processor.torque_laws:DEAD_ZONE_ON_CHIP",
     },
 )
 

@@ -19,17 +19,17 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from copy import deepcopy
 from dataclasses import dataclass, field
 from types import CodeType, FunctionType, ModuleType
-from typing import Any, Generic, NamedTuple, Protocol
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
-from ppafo.control.fixed.fixed_point import each
 from ppafo.engine.plain_python import ORIGIN, check_flow, check_grammar, parse_module, place, refusal
 from ppafo.errors import ProgramError, nearest_name, one_line
 
 COMPILED_BUILTINS = frozenset(
     {"abs", "bool", "divmod", "enumerate", "float", "int", "len", "max", "min", "pow", "range", "round", "sum", "zip"}
 )
+Row = TypeVar("Row", bound=tuple[Any, ...])
 _INSIDE = object()
 """Stands for a value that is known only while the function runs."""
 
@@ -37,6 +37,16 @@ _INSIDE = object()
 def is_row(candidate: object) -> bool:
     """True for a NamedTuple class."""
     return isinstance(candidate, type) and issubclass(candidate, tuple) and hasattr(candidate, "_fields")
+
+
+def each(convert: Callable[[float], float], row: Row) -> Row:
+    """A row with each of its numbers, those of nested rows too, converted: whole numbers from floats, and back.
+
+    The engine writes it out number by number, by the class that the row is declared to be.
+    """
+    make: Any = type(row)
+    found: Row = make(*(each(convert, item) if isinstance(item, tuple) else convert(item) for item in row))
+    return found
 
 
 class Composer(ast.NodeTransformer):

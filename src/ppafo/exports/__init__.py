@@ -14,8 +14,8 @@ _OF_MARKDOWN = re.compile(r"([\\`*_{}\[\]()#+\-!|~<>&:])")
 
 
 def template(package: str, name: str) -> str:
-    """The text of a file in the folder ``templates`` of a package of ``ppafo.exports``."""
-    return files(f"ppafo.exports.{package}").joinpath("templates", name).read_text(encoding="utf-8")
+    """The text of a file in the folder ``templates`` of a package, ``ppafo.exports.c_library``."""
+    return files(package).joinpath("templates", name).read_text(encoding="utf-8")
 
 
 def filled(text: str, words: Mapping[str, str]) -> str:
@@ -35,4 +35,4 @@ def in_comment(text: str) -> str:
 
 def licence() -> str:
     """The licence of what is exported."""
-    return template("c_library", "LICENSE")
+    return template("ppafo.exports.c_library", "LICENSE")

@@ -69,12 +69,13 @@ class Section:
 class LivePart:
     """A part of a page that simulates: HTML with its own script, and the policy that allows that script alone.
 
-    ``difference`` is a sentence on how its runs begin otherwise than those of the page, empty where they do not.
+    ``remark`` is a sentence on how its runs begin otherwise than those of the page, empty where they do not; without
+    ``html`` it says why nothing simulates.
     """
 
-    policy: str
-    html: str
-    difference: str = ""
+    policy: str = ""
+    html: str = ""
+    remark: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,7 +21,7 @@ from ppafo.analyses.reproduce.bench import NoEvidence, SyntheticEvidence
 from ppafo.analyses.reproduce.figures import step_response_figure, torque_task_figure
 from ppafo.analyses.reproduce.step_response import Levels
 from ppafo.identification.bench.result import synthetic_figure_3
-from ppafo.live.page import bundled, digest
+from ppafo.page.html import bundled, digest
 from ppafo.report.writing import text_of, typeset
 
 LEVELS = Levels(480536.0, 101325.0)

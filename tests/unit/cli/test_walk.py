@@ -12,8 +12,8 @@ import pytest
 
 from ppafo.analyses.walk import answer
 from ppafo.cli.main import main
-from ppafo.live.page import bundled, digest
-from ppafo.live.workbench import live_part
+from ppafo.page.html import bundled, digest
+from ppafo.page.workbench import live_part
 from ppafo.storage import read_csv, read_netcdf
 from ppafo.storage.result_folder import read_recording
 from ppafo.walking import loading
@@ -296,6 +296,6 @@ def test_the_page_says_that_its_live_part_begins_with_a_shorter_walk() -> None:
     scenario = load_walk("solenoid")
     found, same = live_part([scenario]), live_part([replace(scenario, duration=6.0)])
     assert found is not None
-    assert found.difference.startswith("It begins with 6 s of the 60 s above")
+    assert found.remark.startswith("It begins with 6 s of the 60 s above")
     assert same is not None
-    assert same.difference == ""
+    assert same.remark == ""

@@ -9,7 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ppafo.control.catalog import CONTROLLERS
-from ppafo.control.fixed.fixed_point import (
+from ppafo.engine.rows import leaf_paths, leaves, rebuilt
+from ppafo.model.sensors import Measurement
+from ppafo.processor.fixed_point import (
     COMMAND_STEPS,
     FRACTION_BITS,
     LARGEST_FRACTION,
@@ -25,9 +27,7 @@ from ppafo.control.fixed.fixed_point import (
     read,
     shifted,
 )
-from ppafo.control.fixed.torque_laws import FIXED_LAWS, PID, FixedLaw, largest_pid
-from ppafo.engine.rows import leaf_paths, leaves, rebuilt
-from ppafo.model.sensors import Measurement
+from ppafo.processor.torque_laws import FIXED_LAWS, PID, FixedLaw, largest_pid
 
 TORQUE_CONSTANT = 1.451e-5
 PERIOD = 1.0e-3

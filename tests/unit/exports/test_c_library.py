@@ -19,9 +19,9 @@ from ppafo.engine.run import batch_of, batches_of
 from ppafo.exports.c_library import c_library, scenario_library
 from ppafo.exports.c_library.files import c_identifier
 from ppafo.exports.c_library.plant import plant_library
-from ppafo.exports.firmware import firmware
 from ppafo.metrics import METRICS
 from ppafo.metrics.metric import Readings
+from ppafo.processor.firmware import firmware
 from ppafo.running import simulate
 from ppafo.signals.meter import SAME_LEVEL, Course, FootSample, Sample, StrideSample, advance_course
 from ppafo.simulation.loading import load_scenario

@@ -9,13 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from ppafo.control.fixed.fixed_point import Readings
-from ppafo.control.fixed.torque_laws import FIXED_LAWS, TARGETS, FixedLaw
 from ppafo.errors import ProgramError, ScenarioError
-from ppafo.exports.firmware import chip_controller, firmware, proof
-from ppafo.exports.firmware.catalog import CATALOG
-from ppafo.exports.firmware.lock_step import PythonChip, compare_drawn, drawn_readings, run_on_chip
-from ppafo.exports.firmware.simulators import (
+from ppafo.processor.catalog import CATALOG
+from ppafo.processor.firmware import chip_controller, firmware, proof
+from ppafo.processor.fixed_point import Readings
+from ppafo.processor.lock_step import PythonChip, compare_drawn, drawn_readings, run_on_chip
+from ppafo.processor.simulators import (
     QemuSimulator,
     Target,
     built,
@@ -24,6 +23,7 @@ from ppafo.exports.firmware.simulators import (
     read_image,
     sizes,
 )
+from ppafo.processor.torque_laws import FIXED_LAWS, TARGETS, FixedLaw
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
 from ppafo.translation.widths import Interval
@@ -200,7 +200,7 @@ def test_a_chip_with_other_numbers_is_found_out(
 ) -> None:
     scenario = scenario_of("pid")
     wrong = firmware(scenario_of("pid", "controller.proportional_gain=0.0951 1/(N m)"), target.name)
-    monkeypatch.setattr("ppafo.exports.firmware.lock_step.firmware", lambda *_: wrong)
+    monkeypatch.setattr("ppafo.processor.lock_step.firmware", lambda *_: wrong)
     found = compare_drawn(scenario, 400, target=target.name)
     assert found.differences > 0
     assert "on the chip" in found.first_difference

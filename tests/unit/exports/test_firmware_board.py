@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from ppafo.control.fixed.fixed_point import Readings
-from ppafo.exports.firmware import chip_controller, firmware
-from ppafo.exports.firmware.catalog import CORTEX_M0
-from ppafo.exports.firmware.lock_step import PythonChip
-from ppafo.exports.firmware.simulators import Debugger, built, missing_tools, read_image
+from ppafo.processor.catalog import CORTEX_M0
+from ppafo.processor.firmware import chip_controller, firmware
+from ppafo.processor.fixed_point import Readings
+from ppafo.processor.lock_step import PythonChip
+from ppafo.processor.simulators import Debugger, built, missing_tools, read_image
 from tests.unit.exports.test_firmware import scenario_of
 
 MISSING = missing_tools(CORTEX_M0)

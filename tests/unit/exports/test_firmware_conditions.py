@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import pytest
 
-from ppafo.exports.firmware import chip_controller, firmware
-from ppafo.exports.firmware.lock_step import EPISODE, drawn_readings
+from ppafo.processor.firmware import chip_controller, firmware
+from ppafo.processor.lock_step import EPISODE, drawn_readings
 from tests.unit.exports.test_firmware import SCENARIOS, scenario_of
 
 SAMPLES = 4000

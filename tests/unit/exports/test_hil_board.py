@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from ppafo.cli.main import main
-from ppafo.exports.hil.run import example_controller
 from ppafo.exports.hil.wire import Sample, sample_bytes
+from ppafo.processor.link import example_controller
 from ppafo.simulation.loading import load_scenario
 from tests.example_board import COMPILER, SENT, WHOLE, built, plug, running
 from tests.virtual_wire import free_port

@@ -21,8 +21,8 @@ from hypothesis import strategies as st
 
 from ppafo.cli.main import main
 from ppafo.errors import ScenarioError
-from ppafo.exports.hil.run import example_controller
 from ppafo.exports.hil.wire import Answer, Reader, Sample, answer_bytes, open_port, sample_bytes
+from ppafo.processor.link import example_controller
 from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 from ppafo.storage import read_recording

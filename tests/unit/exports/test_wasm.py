@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from ppafo.errors import ProgramError
-from ppafo.exports import wasm
 from ppafo.exports.c_library import library_of
-from ppafo.exports.wasm import module_of
 from ppafo.loading import load_scenario
+from ppafo.page import wasm
+from ppafo.page.wasm import module_of
 from ppafo.running import simulate
 from ppafo.simulation.loading import list_scenarios
 from ppafo.simulation.numbers import with_numbers

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from ppafo.live.workbench import workbench
+from ppafo.page.workbench import workbench
 from scripts.live_page import browser
 
 

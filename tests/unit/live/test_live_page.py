@@ -12,10 +12,10 @@ from typing import Any
 
 import pytest
 
-from ppafo.exports import wasm
-from ppafo.live import page as pages
-from ppafo.live.page import packed, packed_once
-from ppafo.live.workbench import DEFAULT, known_intervals, workbench
+from ppafo.page import html as pages
+from ppafo.page import wasm
+from ppafo.page.html import packed, packed_once
+from ppafo.page.workbench import DEFAULT, known_intervals, workbench
 from ppafo.simulation.loading import load_scenario
 from ppafo.units import parse_quantity
 from ppafo.walking import list_walks, load_walk
@@ -84,8 +84,8 @@ def test_the_same_scenarios_give_the_same_page(file: Path) -> None:
 
 
 def test_every_default_of_the_page_is_what_its_text_says() -> None:
-    from ppafo.exports.wasm import module_of
-    from ppafo.live.workbench import Simulated, program_content
+    from ppafo.page.wasm import module_of
+    from ppafo.page.workbench import Simulated, program_content
 
     for name in DEFAULT:
         scenario = load_walk(name) if name in list_walks() else load_scenario(name)

@@ -10,11 +10,11 @@ import pytest
 
 from ppafo.analyses.endurance.draw import draw_of_numbers
 from ppafo.analyses.endurance.solve import follow_bottle
-from ppafo.live import page as pages
-from ppafo.live import workbench as workbench_module
-from ppafo.live.opening import LEAST_CHANGE, MOST_FIRST, _key
-from ppafo.live.words import words
-from ppafo.live.workbench import DEFAULT, openings_of, workbench
+from ppafo.page import html as pages
+from ppafo.page import workbench as workbench_module
+from ppafo.page.opening import LEAST_CHANGE, MOST_FIRST, _key
+from ppafo.page.words import words
+from ppafo.page.workbench import DEFAULT, openings_of, workbench
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
 from ppafo.report.style import PAGE_COLOURS
 from ppafo.walking.bottle import Schedule
@@ -28,7 +28,7 @@ FAULTS = "[...document.querySelectorAll('.fault')].filter(one => one.checkVisibi
 
 
 def _opening() -> dict[str, Any]:
-    found: dict[str, Any] = json.loads(files("ppafo.live").joinpath("opening.json").read_text(encoding="utf-8"))
+    found: dict[str, Any] = json.loads(files("ppafo.page").joinpath("opening.json").read_text(encoding="utf-8"))
     return found
 
 
@@ -57,7 +57,7 @@ def test_every_first_slider_changes_something_and_the_largest_change_is_first(ch
 
 
 def test_minutes_of_the_bottle_are_those_of_endurance() -> None:
-    table = json.loads(files("ppafo.live").joinpath("minutes.json").read_text(encoding="utf-8"))
+    table = json.loads(files("ppafo.page").joinpath("minutes.json").read_text(encoding="utf-8"))
     bottle, schedule = load_bottle(PAPER_BOTTLE), Schedule(3e6, 0.0, 3e6)
     assert table["flows"] == [float(f"{flow:.4g}") for flow in FLOWS]
     for place in (9, 16, 22):

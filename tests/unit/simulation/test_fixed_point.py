@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from ppafo.control.fixed.fixed_point import Converter, read
 from ppafo.errors import ProgramError, ScenarioError
 from ppafo.exports.c_library import c_library
-from ppafo.exports.firmware import chip_controller, integer_form
-from ppafo.exports.firmware.lock_step import PythonChip
 from ppafo.model.sensors import Measurement
+from ppafo.processor.firmware import chip_controller, integer_form
+from ppafo.processor.fixed_point import Converter, read
+from ppafo.processor.lock_step import PythonChip
 from ppafo.running import simulate
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario, scenario_from_dict

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ppafo.analyses.compare.pairs import Paired, pareto_front
-from ppafo.live.workbench import live_part
 from ppafo.metrics import Metric
+from ppafo.report.live_parts import live_part
 from ppafo.report.style import BLACK, COLOURS, GREY
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Status

@@ -32,13 +32,13 @@ from ppafo.analyses.reproduce.publication import ALL, SEED, Study
 from ppafo.analyses.reproduce.step_response import Levels, StepEvents
 from ppafo.analyses.reproduce.torque_task import WITHIN_REACH, InterpretationOfU
 from ppafo.identification.bench.result import synthetic_figure_3
-from ppafo.live.workbench import live_part
 from ppafo.metrics import Metric
 from ppafo.parameters import load_parameter_set
 from ppafo.parameters.audit import Finding
 from ppafo.parameters.publications.publication import paper_entries
 from ppafo.report import Answer, Column, Figure, Section, Table
 from ppafo.report.display_units import metric_level
+from ppafo.report.live_parts import live_part
 from ppafo.report.solved import Solved
 from ppafo.report.writing import inline_figure, quantity, render_page, sentence
 from ppafo.simulation.simulate import Result

@@ -22,13 +22,13 @@ from ppafo.analyses.walk.course import (
 from ppafo.analyses.walk.document import versions, walk_data, walk_document
 from ppafo.analyses.walk.reacting import reacting_answer
 from ppafo.analyses.walk.safety import over_time_sections, safety_remarks
-from ppafo.live.workbench import live_part
 from ppafo.metrics import Metric
 from ppafo.metrics.strides import PER_STRIDE
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.report import Answer, Column, Figure, Section, Table
 from ppafo.report.display_units import rounded_text, title_with_unit
+from ppafo.report.live_parts import live_part
 from ppafo.report.solved import Solved
 from ppafo.signals.recording import Floats
 from ppafo.simulation.scenario import UNITS, Scenario, plain

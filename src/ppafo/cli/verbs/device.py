@@ -1,4 +1,4 @@
-"""Your device: files to start from, runs, the page that simulates, parameter sets and parts."""
+"""Your device: parameter sets and parts."""
 
 from __future__ import annotations
 
@@ -6,33 +6,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from ppafo.cli.arguments import File, Overrides, Scenario, SetName, Word
+from ppafo.cli.arguments import Overrides, SetName, Word
 
 if TYPE_CHECKING:
     from ppafo.analyses.parts.solve import Parts
     from ppafo.cli.output import Said
-
-
-def workbench(
-    scenarios: Sequence[Scenario] = (), *, overrides: Overrides = (), out: File = Path("out/workbench.html")
-) -> Said:
-    """Write scenarios as one page that simulates them while sliders are dragged.
-
-    scenarios: names of scenarios and walks, or .toml files; default: the torque task, step response and a walk
-    out: the page to write; default out/workbench.html
-    """
-    from ppafo.cli.output import Said, check_new_file
-    from ppafo.live.page import is_page
-    from ppafo.live.workbench import DEFAULT, workbench
-    from ppafo.storage.files import write_file
-
-    if not is_page(out):
-        check_new_file(out)
-    names = list(scenarios) or list(DEFAULT)
-    page = workbench(names, overrides)
-    write_file(out, page)
-    document = {"file": str(out), "bytes": len(page), "scenarios": names}
-    return Said(f"written: {out} ({len(page) / 1e3:.0f} kB, {', '.join(names)})", document)
 
 
 def sets_list() -> Said:

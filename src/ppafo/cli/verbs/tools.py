@@ -36,24 +36,6 @@ def export_c(scenario: Scenario, *, interface: Interface = "loop", overrides: Ov
     return export(out, "export c", lambda: library(load_scenario(scenario, overrides)), lambda _: following)
 
 
-def export_controller(scenario: Scenario, *, overrides: Overrides = (), out: Folder) -> Said:
-    """Write a scenario's integer controller in C behind the protocol of 'ppafo hil'.
-
-    scenario: name of a scenario, or a .toml file
-    out: the folder to write
-    """
-    from ppafo.cli.output import export
-    from ppafo.exports.hil.run import example_controller
-    from ppafo.simulation.loading import load_scenario
-
-    return export(
-        out,
-        "export controller",
-        lambda: example_controller(load_scenario(scenario, overrides)),
-        lambda _: f"make -C {shlex.quote(str(out))}",
-    )
-
-
 def export_fmu(
     scenario: Scenario,
     *,

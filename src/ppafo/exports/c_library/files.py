@@ -29,6 +29,9 @@ if TYPE_CHECKING:
     from ppafo.walking.preparation import FaultSettings
 
 
+_FOLDER = "ppafo.exports.c_library"
+"""The package whose templates these are."""
+
 OUTPUTS = {
     "angle": ("rad", "angle of the vane"),
     "angular_velocity": ("rad/s", "its rate"),
@@ -176,7 +179,7 @@ def library_files(library: Library) -> dict[str, bytes]:
     words = _words(library, name)
     surface = library.surface
     sources = {surface.header: f"{name}.h", surface.main: "main.c", surface.page: "README.md", **_FILES}
-    texts = {target: filled(template("c_library", source), words) for source, target in sources.items()}
+    texts = {target: filled(template(_FOLDER, source), words) for source, target in sources.items()}
     texts["LICENSE"] = licence()
     head = f'#include "{name}.h"\n\n#include <string.h>\n\n'
     title = f"{library.title}: the functions of ppafo {__version__} that a run is made of. Not to be edited."
@@ -186,7 +189,7 @@ def library_files(library: Library) -> dict[str, bytes]:
         return "\n\n".join(add(collector, boundary) for add in written)
 
     settings = [item.name for item in library.settings]
-    interface = "".join(filled(template("c_library", file), words) for file in ("interface.c", surface.source))
+    interface = "".join(filled(template(_FOLDER, file), words) for file in ("interface.c", surface.source))
     functions = c_text_of_run(program, title, name, settings, further if written else None, interface)
     texts[f"{name}.c"] = f"{head}{functions}\n{interface}"
     return {file: text.encode() for file, text in sorted(texts.items())}
@@ -217,7 +220,7 @@ def _words(library: Library, name: str) -> dict[str, str]:
         "about": in_markdown(library.description),
         "version": __version__,
         "in_parts": in_parts(program),
-        "run": filled(template("c_library", "run.h"), {"name": name}),
+        "run": filled(template(_FOLDER, "run.h"), {"name": name}),
         "steps": steps_source(library),
         "first": "".join(f"    before.{item} = before.{library.surface.step};\n" for item in library.surface.as_step),
         "follow": "" if library.following is None else "    follow(&before, &all);",
@@ -256,7 +259,7 @@ def in_parts(program: ExportedProgram) -> str:
 def steps_source(library: Library) -> str:
     """The function that does some steps of a run and takes a sample, for what stands behind the source of a library."""
     words = {"name": library.name, "signal_rows": str(SIGNAL_ROWS), "in_parts": in_parts(library.program)}
-    return filled(template("c_library", "steps.c"), words)
+    return filled(template(_FOLDER, "steps.c"), words)
 
 
 def _members(items: Iterable[tuple[str, str, str]]) -> str:

@@ -207,14 +207,14 @@ def _sources(interface: Interface, fmi: int) -> dict[str, bytes]:
         "checked": "inertia, volumes and areas",
         **interface.words,
     }
-    unit = "\n".join(filled(template("fmu", file), words) for file in ("unit.c", *interface.templates))
+    unit = "\n".join(filled(template("ppafo.exports.fmu", file), words) for file in ("unit.c", *interface.templates))
     calls = {3: ["fmi3.c"], 2: ["fmi2.c", "fmi2_steps.c"]}
     headers = files("ppafo.exports.fmu").joinpath("headers")
     return {
         f"{name}.h": written[f"{name}.h"],
         f"{name}.c": written[f"{name}.c"],
         "unit.c": unit.encode(),
-        f"fmi{fmi}.c": "".join(filled(template("fmu", file), words) for file in calls[fmi]).encode(),
+        f"fmi{fmi}.c": "".join(filled(template("ppafo.exports.fmu", file), words) for file in calls[fmi]).encode(),
         **{file: headers.joinpath(file).read_bytes() for file in _HEADERS[fmi]},
     }
 
@@ -232,7 +232,7 @@ def _page(interface: Interface, platforms: Mapping[str, Platform], main: str) ->
         "main": main,
         "flags": " ".join(FLAGS),
     }
-    return filled(template("fmu", "index.html"), words).encode()
+    return filled(template("ppafo.exports.fmu", "index.html"), words).encode()
 
 
 def _archive(contents: Mapping[str, bytes]) -> bytes:

@@ -1,4 +1,4 @@
-"""A scenario at the wire, from its settings to a folder: plant, run, result, log, how the link did; a controller.
+"""A scenario at the wire, from its settings to a folder: plant, run, result, log, how the link did.
 
 The plant is the lanes of one run, whose command comes from outside. Why in this process and not in one of its own:
 docs/decisions/0022-processor-and-hardware-in-the-loop.md.
@@ -23,11 +23,8 @@ from ppafo.engine.lanes import load_program
 from ppafo.engine.loading import chosen_compiler
 from ppafo.engine.run import Run, batch_of
 from ppafo.errors import ScenarioError
-from ppafo.exports import filled, template
-from ppafo.exports.firmware import chip_controller, firmware
 from ppafo.exports.hil import wire
 from ppafo.exports.hil.loop import Bench, Exchange, LockStep, Pace, RealTime, Row, without_collections
-from ppafo.exports.hil.wire import MICROSECONDS
 from ppafo.model.valves import dump
 from ppafo.report.recording_figure import recording_figure
 from ppafo.report.style import ACTUAL, VERMILION, Margins, figure_of_free_panels, house_style, render_figure
@@ -36,7 +33,6 @@ from ppafo.simulation.sampled import SampledRun
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, Scenario, plain
 from ppafo.simulation.simulate import Result, result_of
 from ppafo.storage.comma_separated import marked_csv_bytes
-from ppafo.version import __version__
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -377,31 +373,3 @@ def _histogram(axes: "Axes", values: Sequence[float], title: str) -> None:
     axes.set_ylim(0.5, None)
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_formatter("{x:g}")
-
-
-_OF_FIRMWARE = ("controller.c", "controller.h", "parameters.h", "LICENSE")
-_TEMPLATES = ("Makefile", "README.md", "host.c", "link.c", "link.h", "plant.h")
-
-
-def example_controller(scenario: Scenario) -> dict[str, bytes]:
-    """Files of a controller at the wire, by name. ScenarioError where it has no form on whole numbers."""
-    chip = chip_controller(scenario)
-    written = firmware(scenario)
-    period = round(scenario.control.period * MICROSECONDS)
-    if abs(period / MICROSECONDS - scenario.control.period) > 1.0e-9 * scenario.control.period:
-        raise ScenarioError(
-            f"{scenario.name}: controller.period = {scenario.control.period:.9g} s: must be a whole number of us"
-        )
-    words = {
-        "title": scenario.name,
-        "kind": chip.law.name,
-        "version": __version__,
-        "period": str(period),
-        "pressure_step": repr(chip.converter.pressure_step),
-        "torque_step": repr(chip.converter.torque_step),
-        "top": repr(chip.converter.top),
-        "middle": repr(chip.converter.middle),
-        "next": f"ppafo hil {scenario.name} --port udp:127.0.0.1:5000 --out out/hil",
-    }
-    own = {name: filled(template("hil", name), words).encode() for name in _TEMPLATES}
-    return dict(sorted({**own, **{name: written[name] for name in _OF_FIRMWARE}}.items()))

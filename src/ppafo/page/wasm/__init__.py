@@ -336,7 +336,7 @@ def program_of(library: Library) -> bytes:
     hashes = sorted(f"{Path(str(file)).name} {file_hash(str(file))}" for file in translators)
     digest = kept_bytes(
         "digest",
-        "\n".join([__version__, *hashes, *FLAGS, template("wasm", "math.h"), outline]),
+        "\n".join([__version__, *hashes, *FLAGS, template(__name__, "math.h"), outline]),
         lambda: digest_of(source_of(library)).encode(),
     ).decode()
     prebuilt = prebuilt_programs().get(digest)
@@ -365,7 +365,7 @@ def _unit(library: Library, functions: str) -> str:
         "members": "\n".join(f"    double {name};" for name in names),
         "conditions": "\n".join(_REFUSED.format(f"!({holds})", name.upper()) for holds, name in conditions_of(library)),
     }
-    return filled(template("wasm", "module.c"), words)
+    return filled(template(__name__, "module.c"), words)
 
 
 _REFUSED = "    if ({}) {{\n        return SETTING_{};\n    }}"
@@ -396,7 +396,7 @@ def _array_words(library: Library) -> dict[str, str]:
             "\n".join(_REFUSED.format(condition, name.upper()) for condition, name in conditions_of_program(library)),
         ),
     }
-    return {**words, "prepared_run": filled(template("wasm", "prepared_run.c"), words)}
+    return {**words, "prepared_run": filled(template(__name__, "prepared_run.c"), words)}
 
 
 def _chosen_loop(program: ExportedProgram, ending: str) -> str:
@@ -413,7 +413,7 @@ def digest_of(text: str) -> str:
     Comments do not, nor lines, nor what functions and types inside are called: those have the place of their Python
     in their names, and a program of the package stays good where that is moved.
     """
-    code = _COMMENT.sub("", "\n".join([*FLAGS, template("wasm", "math.h"), text]))
+    code = _COMMENT.sub("", "\n".join([*FLAGS, template(__name__, "math.h"), text]))
     places = {name: f"n{place}" for place, name in enumerate(dict.fromkeys(_INSIDE.findall(code)))}
     renamed = re.sub(r"\w+", lambda found: places.get(found[0], found[0]), code)
     return hashlib.sha256(" ".join(renamed.split()).encode()).hexdigest()[:16]
@@ -432,7 +432,7 @@ def build(text: str) -> bytes:
     """A module of a translation unit. ProgramError where ziglang is not there, or refuses."""
     check_can_build()
     with tempfile.TemporaryDirectory() as folder:
-        for name, content in {"module.c": text, "math.h": template("wasm", "math.h")}.items():
+        for name, content in {"module.c": text, "math.h": template(__name__, "math.h")}.items():
             (Path(folder) / name).write_text(content, encoding="utf-8")
         line = [sys.executable, "-m", "ziglang", "cc", *FLAGS, "module.c", "-o", "module.wasm"]
         done, made = asked(line, _HOW_TO_INSTALL, folder), Path(folder) / "module.wasm"
@@ -451,7 +451,7 @@ def compiler_version() -> str:
 
 
 def _programs() -> Path:
-    return Path(str(files("ppafo.exports.wasm").joinpath("programs")))
+    return Path(str(files("ppafo.page.wasm").joinpath("programs")))
 
 
 @cache

@@ -15,7 +15,7 @@ import numpy as np
 
 from ppafo.engine.cache import kept_bytes
 from ppafo.errors import ScenarioError
-from ppafo.exports.wasm import WasmModule
+from ppafo.page.wasm import WasmModule
 from ppafo.signals.recording import Floats
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.scenario import Scenario
@@ -73,7 +73,7 @@ def _key(module: WasmModule, given: Mapping[str, float], claims: Sequence[str]) 
 
 @cache
 def _known() -> dict[str, Any]:
-    found: dict[str, Any] = json.loads(files("ppafo.live").joinpath("opening.json").read_text(encoding="utf-8"))
+    found: dict[str, Any] = json.loads(files("ppafo.page").joinpath("opening.json").read_text(encoding="utf-8"))
     return found
 
 

@@ -9,4 +9,4 @@ from typing import Any
 @cache
 def words() -> dict[str, Any]:
     """Return the claims, sliders and questions of pages."""
-    return tomllib.loads(files("ppafo.live").joinpath("words.toml").read_text(encoding="utf-8"))
+    return tomllib.loads(files("ppafo.page").joinpath("words.toml").read_text(encoding="utf-8"))

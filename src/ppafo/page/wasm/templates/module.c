@@ -4,7 +4,7 @@
 
 @functions@
 
-/* ---- From here on what the module shows; src/ppafo/exports/wasm/__init__.py says how it is called. ---- */
+/* ---- From here on what the module shows; src/ppafo/page/wasm/__init__.py says how it is called. ---- */
 
 #define SHOWN(name) __attribute__((export_name(#name))) name
 

@@ -14,7 +14,11 @@ from typing import Any, NamedTuple
 from ppafo.control.controllers.feedback import PID as FLOAT_PID
 from ppafo.control.controllers.switching import ON_OFF as FLOAT_ON_OFF
 from ppafo.control.controllers.switching import ON_OFF_DEAD_ZONE as FLOAT_DEAD_ZONE
-from ppafo.control.fixed.fixed_point import (
+from ppafo.control.kind import ControllerKind
+from ppafo.engine.source_text import each
+from ppafo.model.declaration import Quantity
+from ppafo.model.sensors import Measurement
+from ppafo.processor.fixed_point import (
     COMMAND_STEPS,
     FRACTION_BITS,
     LARGEST_FRACTION,
@@ -26,7 +30,6 @@ from ppafo.control.fixed.fixed_point import (
     Readings,
     Steps,
     converter_with,
-    each,
     error_of,
     fraction_of,
     gain_of,
@@ -35,10 +38,7 @@ from ppafo.control.fixed.fixed_point import (
     shifted,
     still_sound,
 )
-from ppafo.control.fixed.planning import Numbers, on_chip
-from ppafo.control.kind import ControllerKind
-from ppafo.model.declaration import Quantity
-from ppafo.model.sensors import Measurement
+from ppafo.processor.planning import Numbers, on_chip
 
 TARGETS = ("msp430f2013", "cortex-m0", "cortex-m4")
 """Processors that an integer controller can be written for."""

@@ -1,4 +1,4 @@
-"""``ppafo export firmware``: the controller of a scenario for a small processor, or on the simulator of that one."""
+"""``ppafo export firmware`` and ``export controller``: the controller of a scenario for a small processor."""
 
 import shlex
 from collections.abc import Sequence
@@ -37,7 +37,7 @@ def export_firmware(
     table: with --try: compare every integer controller on every target instead (with 1000 samples each)
     out: the folder to write; with --try text, JSON and figure
     """
-    from ppafo.control.fixed.torque_laws import TARGETS
+    from ppafo.processor.torque_laws import TARGETS
 
     if target is not None and target not in TARGETS:
         hint = nearest_name(target, TARGETS)
@@ -53,7 +53,7 @@ def export_firmware(
     if not table and not scenarios:
         raise ScenarioError("give a SCENARIO, or --table; see 'ppafo export firmware --help'")
     output.check_output(out, COMMAND)
-    from ppafo.exports.firmware import words
+    from ppafo.processor import words
 
     if table:
         found = words.table(TARGETS if target is None else (target,), samples)
@@ -67,7 +67,7 @@ def export_firmware(
 
 
 def _firmware_of(name: str, target: str, overrides: Sequence[str], out: Path) -> Said:
-    from ppafo.exports.firmware import firmware
+    from ppafo.processor.firmware import firmware
     from ppafo.simulation.loading import load_scenario
 
     return output.export(
@@ -76,4 +76,21 @@ def _firmware_of(name: str, target: str, overrides: Sequence[str], out: Path) ->
         lambda: firmware(load_scenario(name, overrides), target),
         lambda _: f"make -C {shlex.quote(str(out))}",
         target=target,
+    )
+
+
+def export_controller(scenario: Scenario, *, overrides: Overrides = (), out: Folder) -> Said:
+    """Write a scenario's integer controller in C behind the protocol of 'ppafo hil'.
+
+    scenario: name of a scenario, or a .toml file
+    out: the folder to write
+    """
+    from ppafo.processor.link import example_controller
+    from ppafo.simulation.loading import load_scenario
+
+    return output.export(
+        out,
+        "export controller",
+        lambda: example_controller(load_scenario(scenario, overrides)),
+        lambda _: f"make -C {shlex.quote(str(out))}",
     )

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from ppafo.errors import ScenarioError
-from ppafo.exports.firmware.lock_step import (
+from ppafo.processor.lock_step import (
     ChipRun,
     Comparison,
     Cost,

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.control.fixed.fixed_point import SETTINGS, Converter, converter_of
 from ppafo.control.kind import ControllerKind
 from ppafo.model.columns import Problem, at, over_runs
 from ppafo.model.declaration import Quantity
+from ppafo.processor.fixed_point import SETTINGS, Converter, converter_of
 
 Settings = Mapping[str, float]
 _ROUNDING = 1.0e-9

@@ -6,15 +6,15 @@ from dataclasses import replace
 from typing import Any, NamedTuple, get_type_hints
 
 from ppafo.control.catalog import CONTROLLERS, ON_CHIP
-from ppafo.control.fixed.fixed_point import COMMAND_STEPS, LARGEST_READING, SETTINGS, Readings, converter_with
-from ppafo.control.fixed.torque_laws import FIXED_LAWS, TARGETS, FixedLaw
 from ppafo.engine.rows import is_number, leaf_paths, leaves, members, rebuilt
 from ppafo.engine.source_text import SourceCollector, is_row
 from ppafo.errors import ProgramError, ScenarioError
 from ppafo.exports import filled, in_markdown, licence, template
-from ppafo.exports.firmware.catalog import target_of
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.plant import plant_parameters
+from ppafo.processor.catalog import target_of
+from ppafo.processor.fixed_point import COMMAND_STEPS, LARGEST_READING, SETTINGS, Readings, converter_with
+from ppafo.processor.torque_laws import FIXED_LAWS, TARGETS, FixedLaw
 from ppafo.simulation.declaration import quantity_text
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
@@ -223,8 +223,8 @@ def firmware(scenario: Scenario, target: str = TARGETS[0]) -> dict[str, bytes]:
         "silence": f"{(2 * chip.ticks * TICK + 2.05e-3) * 1.0e3:.4g} ms",
         **chosen.words,
     }
-    words["wiring"] = filled(template("firmware", chosen.wiring), words).rstrip()
-    texts = {name: filled(template("firmware", name), words) for name in (*_TEMPLATES, *chosen.templates)}
+    words["wiring"] = filled(template("ppafo.processor", chosen.wiring), words).rstrip()
+    texts = {name: filled(template("ppafo.processor", name), words) for name in (*_TEMPLATES, *chosen.templates)}
     texts["LICENSE"] = licence()
     texts["controller.c"] = law_source(
         chip.law,

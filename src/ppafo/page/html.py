@@ -45,7 +45,7 @@ _MARKED = 2000
 
 def bundled(name: str) -> str:
     """Return a script (``loader.js``, ``page.js``) or ``page.css``; their source is ``page/`` of the repository."""
-    return files("ppafo.live").joinpath("bundle", name).read_text(encoding="utf-8").strip()
+    return files("ppafo.page").joinpath("bundle", name).read_text(encoding="utf-8").strip()
 
 
 def is_page(path: Path) -> bool:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from ppafo.errors import ScenarioError
-from ppafo.exports.firmware.simulators import Machine, Memory, MspdebugSimulator, QemuSimulator, Target
+from ppafo.processor.simulators import Machine, Memory, MspdebugSimulator, QemuSimulator, Target
 
 _VARIABLES = """\
 # Others do as well: make COMPILER="clang --target=arm-none-eabi" LINKER='$(COMPILER) -fuse-ld=lld',

@@ -9,12 +9,12 @@ from importlib.resources import files
 from typing import Any
 
 from ppafo.errors import PpafoError, ScenarioError, UnitError
-from ppafo.exports.wasm import WasmModule, module_of
-from ppafo.live.opening import computed_opening, first_settings, opening_like, opening_of
-from ppafo.live.page import block_of, packed_once, page_of, policy_of_block
-from ppafo.live.still import still_of
-from ppafo.live.words import words
 from ppafo.loading import load_scenario
+from ppafo.page.html import block_of, packed_once, page_of, policy_of_block
+from ppafo.page.opening import computed_opening, first_settings, opening_like, opening_of
+from ppafo.page.still import still_of
+from ppafo.page.wasm import WasmModule, module_of
+from ppafo.page.words import words
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.overrides import over
 from ppafo.report import LivePart
@@ -190,7 +190,7 @@ def page_content(
         "title": title,
         "form": form,
         "tabs": list(tabs),
-        "bottle": json.loads(files("ppafo.live").joinpath("minutes.json").read_text(encoding="utf-8")),
+        "bottle": json.loads(files("ppafo.page").joinpath("minutes.json").read_text(encoding="utf-8")),
         "programs": list(programs),
         "units": _scales(shown | recorded),
     }
@@ -435,7 +435,7 @@ def known_intervals() -> Mapping[str, Interval]:
 
     They are those of a study, which takes long to read: ``scripts/known_intervals.py`` writes the file.
     """
-    described = json.loads(files("ppafo.live").joinpath("intervals.json").read_text(encoding="utf-8"))
+    described = json.loads(files("ppafo.page").joinpath("intervals.json").read_text(encoding="utf-8"))
     return {path: (low, high) for path, (low, high) in described.items()}
 
 

@@ -4,8 +4,7 @@ A gain is a fraction of 15 bits and a number of places: ``(value * fraction >> 1
 """
 
 import math
-from collections.abc import Callable
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple
 
 from ppafo.model.declaration import Quantity
 from ppafo.model.sensors import Measurement
@@ -15,18 +14,6 @@ LARGEST_FRACTION: int = 2**FRACTION_BITS - 1
 MOST_PLACES = 30
 WIDEST = 2**30
 """Size of the largest value that ``fraction_of`` takes without leaving 32 bits."""
-
-Row = TypeVar("Row", bound=tuple[Any, ...])
-
-
-def each(convert: Callable[[float], float], row: Row) -> Row:
-    """A row with each of its numbers, those of nested rows too, converted: whole numbers from floats, and back.
-
-    The engine writes it out number by number, by the class that the row is declared to be.
-    """
-    make: Any = type(row)
-    found: Row = make(*(each(convert, item) if isinstance(item, tuple) else convert(item) for item in row))
-    return found
 
 
 class Gain(NamedTuple):

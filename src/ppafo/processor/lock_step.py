@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from ppafo.control.fixed.fixed_point import COMMAND_STEPS, Readings, read
-from ppafo.control.fixed.torque_laws import TARGETS
 from ppafo.engine.rows import rebuilt
 from ppafo.errors import SimulationError
-from ppafo.exports.firmware import ChipController, chip_controller, firmware, integer_form
-from ppafo.exports.firmware.catalog import target_of
-from ppafo.exports.firmware.simulators import (
+from ppafo.processor.catalog import target_of
+from ppafo.processor.firmware import ChipController, chip_controller, firmware, integer_form
+from ppafo.processor.fixed_point import COMMAND_STEPS, Readings, read
+from ppafo.processor.simulators import (
     ChipSimulator,
     Decision,
     Image,
@@ -23,6 +22,7 @@ from ppafo.exports.firmware.simulators import (
     chip_simulator,
     missing_tools,
 )
+from ppafo.processor.torque_laws import TARGETS
 from ppafo.report.style import BLACK, REFERENCE, Margins, figure_of_panels, house_style, look_of_valve, mark_kind
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario

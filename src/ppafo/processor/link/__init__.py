@@ -1,0 +1,35 @@
+"""A scenario's integer controller in C behind the protocol of ``ppafo hil``: the other side of the wire."""
+
+from ppafo.errors import ScenarioError
+from ppafo.exports import filled, template
+from ppafo.exports.hil.wire import MICROSECONDS
+from ppafo.processor.firmware import chip_controller, firmware
+from ppafo.simulation.scenario import Scenario
+from ppafo.version import __version__
+
+_OF_FIRMWARE = ("controller.c", "controller.h", "parameters.h", "LICENSE")
+_TEMPLATES = ("Makefile", "README.md", "host.c", "link.c", "link.h", "plant.h")
+
+
+def example_controller(scenario: Scenario) -> dict[str, bytes]:
+    """Files of a controller at the wire, by name. ScenarioError where it has no form on whole numbers."""
+    chip = chip_controller(scenario)
+    written = firmware(scenario)
+    period = round(scenario.control.period * MICROSECONDS)
+    if abs(period / MICROSECONDS - scenario.control.period) > 1.0e-9 * scenario.control.period:
+        raise ScenarioError(
+            f"{scenario.name}: controller.period = {scenario.control.period:.9g} s: must be a whole number of us"
+        )
+    words = {
+        "title": scenario.name,
+        "kind": chip.law.name,
+        "version": __version__,
+        "period": str(period),
+        "pressure_step": repr(chip.converter.pressure_step),
+        "torque_step": repr(chip.converter.torque_step),
+        "top": repr(chip.converter.top),
+        "middle": repr(chip.converter.middle),
+        "next": f"ppafo hil {scenario.name} --port udp:127.0.0.1:5000 --out out/hil",
+    }
+    own = {name: filled(template(__name__, name), words).encode() for name in _TEMPLATES}
+    return dict(sorted({**own, **{name: written[name] for name in _OF_FIRMWARE}}.items()))

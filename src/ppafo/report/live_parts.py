@@ -1,0 +1,24 @@
+"""The part of a page that simulates: made by a guest, which is loaded where a page is written."""
+
+from collections.abc import Sequence
+from types import FunctionType
+from typing import Any
+
+from ppafo.errors import KindError
+from ppafo.kinds import Kinds
+from ppafo.report import LivePart
+
+LIVE_PARTS: Kinds[FunctionType] = Kinds(
+    "ppafo.live_parts", "live part", FunctionType, {"workbench": "ppafo.page.workbench:live_part"}
+)
+"""What makes a part of a page from scenarios: each returns a ``LivePart``, or None where there can be none."""
+
+
+def live_part(scenarios: Sequence[Any], name: str = "workbench") -> LivePart | None:
+    """Return the live part of some scenarios; one line in its place where what makes it is not installed."""
+    try:
+        make = LIVE_PARTS[name]
+    except KindError as error:
+        return LivePart(remark=f"Nothing simulates on this page: the {error}.")
+    found: LivePart | None = make(scenarios)
+    return found
