@@ -17,9 +17,9 @@ import numpy as np
 
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.walking import load_walk
-from ppafo.walking.reacting_wearer import LONGEST_STEP
+from ppafo.wearer.settings import LONGEST_STEP
 from ppafo.walking.walk import with_device_off
-from ppafo.wearers.loading import list_wearers
+from ppafo.wearer.loading import list_wearers
 
 MEANS = {
     "walking_speed": ("speed (m/s)", 1.0, ".2f"),
@@ -40,7 +40,7 @@ Walks = dict[str, list[float]]
 
 def walked(wearer: str, strengths: Sequence[float], is_off: bool, step: float = LONGEST_STEP) -> Walks:
     """Return the metrics of walks of a minute with shares of the left tibialis, by steps [s]."""
-    scenario = load_walk("reacting", [f"wearer.reacts={wearer}", "run.duration=60 s", f"run.step={step} s"])
+    scenario = load_walk("reacting", [f"wearer.name={wearer}", "run.duration=60 s", f"run.step={step} s"])
     columns = {"wearer.tibialis_strength": np.array(strengths)}
     found = run_ensemble(
         with_device_off(scenario) if is_off else scenario, columns, ["stays_up", "walked_time", *MEANS]

@@ -13,7 +13,7 @@ import numpy as np
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.walking import load_walk
 from ppafo.walking.walk import with_device_off
-from ppafo.wearers.loading import list_wearers
+from ppafo.wearer.loading import list_wearers
 
 WEARERS = tuple(name for name in list_wearers() if name.startswith(("geyer", "healthy")))
 PLACES = np.linspace(6.0, 7.2, 8)
@@ -29,7 +29,7 @@ CONDITIONS = {
 
 def staying(wearer: str, is_off: bool, path: str, values: tuple[float, ...]) -> list[int]:
     """Return of how many places a wearer walks on, for each value."""
-    scenario = load_walk("reacting", [f"wearer.reacts={wearer}", "run.duration=20 s"])
+    scenario = load_walk("reacting", [f"wearer.name={wearer}", "run.duration=20 s"])
     place = "wearer.push_from" if path == "wearer.push" else "wearer.ground_from"
     columns = {path: np.repeat(values, PLACES.size), place: np.tile(PLACES, len(values))}
     found = run_ensemble(with_device_off(scenario) if is_off else scenario, columns, ["stays_up"])

@@ -24,7 +24,7 @@ def test_the_pressures_of_the_page_keep_the_toes_clear_at_its_gas() -> None:
     strength = np.array([float(row[0]) / 100.0 for row in rows])
     pressure = np.array([float(row[2]) for row in rows])
     found = run_ensemble(
-        load_walk("reacting", ["wearer.reacts=healthy-128", "run.duration=20 s"]),
+        load_walk("reacting", ["wearer.name=healthy-128", "run.duration=20 s"]),
         {
             "wearer.tibialis_strength": np.tile(strength, 3),
             "supply.dorsiflexion_pressure": np.array(

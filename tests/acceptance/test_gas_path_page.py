@@ -13,7 +13,7 @@ PAGE = (Path(__file__).parents[2] / "docs" / "evidence.md").read_text(encoding="
 ROWS = re.findall(
     r"^\| [^|]+ \| (`[^|]+`)? ?\| ([\d.]+) cm \| ([\d.]+) g \| ([\d.]+) s \| ([\d.]+) min \|$", PAGE, re.M
 )
-WEARER = ("wearer.reacts=healthy-128", "wearer.tibialis_strength=0.1", "supply.dorsiflexion_pressure=32 psi_g")
+WEARER = ("wearer.name=healthy-128", "wearer.tibialis_strength=0.1", "supply.dorsiflexion_pressure=32 psi_g")
 
 
 @pytest.mark.long

@@ -14,14 +14,14 @@ import mujoco
 import numpy as np
 import pytest
 
-from ppafo.model.wearer.ground import Point, contact
-from ppafo.model.wearer.muscle import Fibre, next_fibre
-from ppafo.model.wearer.reflexes import Balance, Felt, Gait, stimulation
-from ppafo.model.wearer.segments import Damping, Limb, Pose, accelerations, circle, freed, leg_matrix
-from ppafo.model.wearer.walker import Assist, Fibres, Joints, Walker, Wearer, next_walker, pull
-from ppafo.model.wearer.way import LEVEL, Piece, Way, footing
-from ppafo.wearers.loading import find_wearer, wearer_of, with_strengths
-from ppafo.wearers.published import first_answer, start_of
+from ppafo.wearer.loading import find_wearer, wearer_of, with_strengths
+from ppafo.wearer.model.ground import Point, contact
+from ppafo.wearer.model.muscle import Fibre, next_fibre
+from ppafo.wearer.model.reflexes import Balance, Felt, Gait, stimulation
+from ppafo.wearer.model.segments import Damping, Limb, Pose, accelerations, circle, freed, leg_matrix
+from ppafo.wearer.model.walker import Assist, Fibres, Joints, Walker, Wearer, next_walker, pull
+from ppafo.wearer.model.way import LEVEL, Piece, Way, footing
+from ppafo.wearer.published import first_answer, start_of
 from tests.judge import wearer as judge
 from tests.judge.wearer_comparison import STEPS, Columns, by_judge, by_package, gap, strides_of
 
@@ -279,7 +279,7 @@ def test_the_judge_has_nothing_of_the_package_but_the_numbers_of_wearers() -> No
     tree = ast.parse(Path(judge.__file__).read_text(encoding="utf-8"))
     taken = [item.module for item in ast.walk(tree) if isinstance(item, ast.ImportFrom)]
     taken += [name.name for item in ast.walk(tree) if isinstance(item, ast.Import) for name in item.names]
-    assert {name for name in taken if name and name.startswith("ppafo")} == {"ppafo.wearers.loading"}
+    assert {name for name in taken if name and name.startswith("ppafo")} == {"ppafo.wearer.loading"}
 
 
 @pytest.mark.thorough

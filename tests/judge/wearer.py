@@ -19,7 +19,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from ppafo.wearers.loading import find_wearer, wearer_of
+from ppafo.wearer.loading import find_wearer, wearer_of
 
 Floats = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking import load_walk, walk
 from ppafo.walking.planning import plan_walk
-from ppafo.wearers.published import WEIGHT
+from ppafo.wearer.published import WEIGHT
 from tests.judge.wearer import COLUMNS, SAMPLE, Device, walk_of_judge
 
 Floats = NDArray[np.float64]
@@ -59,7 +59,7 @@ class Gap(NamedTuple):
 
 def light_walk(name: str, step: float, seconds: float = SECONDS, changes: Sequence[str] = ()) -> Scenario:
     """The walk of a wearer with the lightest device, at a step [ms], recorded with each sample of the reflexes."""
-    given = [f"wearer.reacts={name}", *LIGHT, f"run.duration={seconds} s", f"run.step={step} ms", *changes]
+    given = [f"wearer.name={name}", *LIGHT, f"run.duration={seconds} s", f"run.step={step} ms", *changes]
     return replace(load_walk("reacting", given), output_interval=SAMPLE)
 
 

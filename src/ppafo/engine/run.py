@@ -2,11 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.engine.components import LegScheme
 from ppafo.engine.lane_step import MAXIMUM_PARTS
 from ppafo.engine.lanes import Batch, BatchResult, Clock, load_programs, run_blocks
 from ppafo.engine.led_leg import LedLeg
@@ -14,6 +15,7 @@ from ppafo.engine.program import LaneResult, LaneTiming, NoParameters, Program, 
 from ppafo.engine.rows import leaves, rebuilt, table
 from ppafo.engine.scheme.actuators import pressures_of
 from ppafo.engine.scheme.motion import Pace
+from ppafo.kinds import kind_at
 from ppafo.model.columns import larger, over_runs, truncated
 from ppafo.model.effects.kind import Moment, State
 from ppafo.model.gait import Course, GaitSeries, GaitTiming
@@ -25,11 +27,7 @@ from ppafo.model.regulator import LineState, SupplyLines
 from ppafo.model.sensors import NOTHING_SEEN, GaitSensors, SensorParameters
 
 if TYPE_CHECKING:  # for most runs know no walk
-    from ppafo.engine.scheme.reacting import ReactingState, Reflexes
     from ppafo.engine.scheme.walking import DeviceShare, WalkState
-    from ppafo.model.wearer.nerves import Nerves
-    from ppafo.model.wearer.walker import Walker
-    from ppafo.model.wearer.walker import Wearer as Body
 
 Members = NDArray[np.intp]
 Floats = NDArray[np.float64]
@@ -45,9 +43,25 @@ TOO_MANY_PARTS = (
 WHOLE = 1.0e-9
 
 
+class WornLeg(Protocol):
+    """A leg that walks with the device: its scheme, and its rows in the order of ``Program``."""
+
+    @property
+    def scheme(self) -> LegScheme:
+        """How it goes through a step."""
+
+    @property
+    def parameters(self) -> list[Any]:
+        """Its groups of parameters."""
+
+    @property
+    def states(self) -> list[Any]:
+        """Its groups of states at the start."""
+
+
 @dataclass(frozen=True, slots=True)
 class Walk:
-    """What a walking leg adds to a run; ``course`` None where it walks stride after equal stride.
+    """A leg that a gait leads; ``course`` None where it walks stride after equal stride.
 
     ``failing`` are the faults of the plant and its shut-off valve, None where it has neither.
     """
@@ -61,19 +75,23 @@ class Walk:
     course: Course | None = None
     failing: tuple[PlantFaults, ShutOff] | None = None
 
+    @property
+    def scheme(self) -> LegScheme:
+        """How it goes through a step."""
+        fails, which = "" if self.failing is None else "FAILING_", "STRIDES" if self.course is None else "COURSE"
+        found: LegScheme = kind_at(f"ppafo.engine.scheme.walking:{fails}{which}")
+        return found
 
-@dataclass(frozen=True, slots=True)
-class ReactingWalk:
-    """What a wearer who reacts adds to a run: the device on the left leg, the body, and where all of it begins."""
+    @property
+    def parameters(self) -> list[Any]:
+        """Its groups of parameters."""
+        course, failing = [] if self.course is None else [self.course], self.failing or ()
+        return [self.leg, self.share, self.gait, self.timing, self.sensors, *course, *failing]
 
-    share: "DeviceShare"
-    body: "Body"
-    sensors: GaitSensors
-    initial: "ReactingState"
-    walker: "Walker"
-    reflexes: "Reflexes"
-    nerves: "Nerves"
-    failing: tuple[PlantFaults, ShutOff] | None = None
+    @property
+    def states(self) -> list[Any]:
+        """Its groups of states at the start."""
+        return [self.initial, NOTHING_SEEN, *([] if self.failing is None else [POWERED])]
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,8 +133,7 @@ class Run:
     command_delay: float
     needs_parts: bool = False
     tolerance: float = 1.0
-    walk: Walk | None = None
-    reacting: ReactingWalk | None = None
+    walk: WornLeg | None = None
     lines: Lines | None = None
     effects: tuple[Any, ...] = ()
     leg: LedLeg | None = None
@@ -151,7 +168,7 @@ def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:
         step=run.step, period=run.period, command_lag=command_lag, signal_lag=signal_lag, tolerance=run.tolerance
     )
     plant, valve = [run.plant, run.thermal], [run.valve]
-    walk, walk_states = _walk_groups(run.walk) if run.reacting is None else _reacting_groups(run.reacting)
+    walk, walk_states = ([], []) if run.walk is None else (run.walk.parameters, run.walk.states)
     lines, line_states = ([], []) if run.lines is None else ([run.lines.parameters], [run.lines.initial])
     leg = [] if run.leg is None else [run.leg.load, run.leg.shank]
     rest = [run.controller, run.reference, run.path, run.sensors, *walk, *lines, *leg, *run.effects]
@@ -259,23 +276,6 @@ def _at_rest(initial: PlantState, pressure_1: float, pressure_2: float) -> Momen
         vented_flow=0.0,
         command=0.0,
     )
-
-
-def _walk_groups(walk: Walk | None) -> tuple[list[Any], list[Any]]:
-    """Parameters and initial states of a walking leg, in the order of ``Program``."""
-    if walk is None:
-        return [], []
-    parameters = [walk.leg, walk.share, walk.gait, walk.timing, walk.sensors]
-    parameters += [] if walk.course is None else [walk.course]
-    parameters += [] if walk.failing is None else [*walk.failing]
-    return parameters, [walk.initial, NOTHING_SEEN, *([] if walk.failing is None else [POWERED])]
-
-
-def _reacting_groups(walk: ReactingWalk) -> tuple[list[Any], list[Any]]:
-    """The same of a wearer who reacts."""
-    failing = [] if walk.failing is None else [*walk.failing]
-    states = [walk.initial, NOTHING_SEEN, walk.walker, walk.reflexes, walk.nerves]
-    return [walk.share, walk.body, walk.sensors, *failing], [*states, *([POWERED] if failing else [])]
 
 
 def _device_at_start(run: Run) -> list[Any]:

@@ -23,6 +23,7 @@ from ppafo.model.declaration import Quantity, range_rule
 from ppafo.model.effects.bandwidth import EFFECT as BANDWIDTH
 from ppafo.parameters.declaration import is_within
 from ppafo.parameters.parameter_set import Entry
+from ppafo.simulation.motion_kind import WALKS
 from ppafo.units import format_quantity, from_si, parse_quantity, to_si
 
 LARGEST_SEED = 2**32 - 1
@@ -115,8 +116,6 @@ _REGULATED = (
 )
 
 MOTIONS = ("free", "held", "prescribed", "leg")
-WALK = "walk"
-"""The motion of a leg that walks, whose files have sections of their own (``walking/declaration.py``)."""
 OLD_PRESCRIBED = "led"
 """What version 0.1 called a prescribed motion."""
 SECTIONS = (
@@ -243,7 +242,7 @@ def no_arithmetic(kind: str, text: object) -> str:
 
 def check_known_motion(kind: str, file: str) -> None:
     """Raise ScenarioError for a kind of motion that no scenario has, walks among them; none is an empty text."""
-    known = (*MOTIONS, WALK)
+    known = (*MOTIONS, *WALKS)
     if kind and kind not in known:
         hint = nearest_name(kind, known)
         raise ScenarioError(f"{file}: motion.kind = {quote(kind)} is not known{hint}; allowed: {', '.join(known)}")
@@ -253,7 +252,7 @@ def check_motion_kind(kind: object, place: str) -> None:
     """Raise ScenarioError for an old name, or for the motion of a leg that walks; ``place`` begins the message."""
     if kind == OLD_PRESCRIBED:
         raise ScenarioError(f"{place}: the kind of motion 'led' is now called 'prescribed'")
-    if kind == WALK:
+    if kind in tuple(WALKS):
         raise ScenarioError(
             f"{place}: a walk has a gait and a wearer, and here the motion of a vane alone is needed; 'ppafo new walk' "
             "writes the file of a walk"

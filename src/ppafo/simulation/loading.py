@@ -364,17 +364,17 @@ FILE = TomlKind("scenario", "scenario", resources.files("ppafo") / "scenarios", 
 class Layout:
     """How the files of one kind of scenario are laid out and built: the kind of file, what it holds, model, builder.
 
-    ``model`` has the kinds that are loaded, ``whole`` all of them: messages speak of these.
+    ``model`` has, of a document, the kinds that are loaded, ``whole`` all of them: messages speak of these.
     """
 
     file: TomlKind
     declared: Declared
-    model: Callable[[], type[BaseModel]]
-    whole: Callable[[], type[BaseModel]]
+    model: Callable[[Mapping[str, Any]], type[BaseModel]]
+    whole: Callable[[Mapping[str, Any]], type[BaseModel]]
     build: Callable[[ScenarioRequest, OverriddenDocument], Scenario]
 
 
-VANE = Layout(FILE, OF_A_VANE, scenario_file, whole_scenario_file, build_scenario)
+VANE = Layout(FILE, OF_A_VANE, lambda _: scenario_file(), lambda _: whole_scenario_file(), build_scenario)
 """Scenarios of a vane alone; a room above this one has those of a leg."""
 
 
@@ -441,10 +441,10 @@ def scenario_of(request: ScenarioRequest, layout: Layout) -> Scenario:
     declared.find_kinds(request.content, request.file)
     if request.overrides:
         wrong = [item for item in _problems(request.content, layout) if not is_gap(item)]
-        _refuse(wrong, request.file, layout)
+        _refuse(wrong, request.file, layout.whole(request.content))
     changed = apply_overrides(request.content, request.overrides, request.file, declared)
     declared.find_kinds(changed.document, request.file)
-    _refuse(_problems(changed.document, layout), request.file, layout)
+    _refuse(_problems(changed.document, layout), request.file, layout.whole(changed.document))
     _check_forms(Reading(request.file, changed.document, changed.paths))
     return layout.build(request, changed)
 
@@ -461,7 +461,7 @@ def _problems(document: dict[str, Any], layout: Layout) -> list[ErrorDetails]:
     """Return unknown keys, unknown kinds and gaps."""
     for model in (layout.model, layout.whole):
         try:
-            model().model_validate(document)
+            model(document).model_validate(document)
         except ValidationError as error:
             found = error.errors(include_url=False)
         else:
@@ -469,6 +469,6 @@ def _problems(document: dict[str, Any], layout: Layout) -> list[ErrorDetails]:
     return found
 
 
-def _refuse(problems: list[ErrorDetails], file: str, layout: Layout) -> None:
+def _refuse(problems: list[ErrorDetails], file: str, model: type[BaseModel]) -> None:
     if problems:
-        raise ScenarioError(f"{file}: {all_problems(problems, layout.whole())}")
+        raise ScenarioError(f"{file}: {all_problems(problems, model)}")

@@ -25,13 +25,16 @@ from ppafo.parameters.overrides import (
     split_override,
 )
 from ppafo.simulation.declaration import ARITHMETIC, OF_A_VANE, Declared, kind_at, no_arithmetic, value_at
+from ppafo.simulation.motion_kind import RENAMED_KEYS, renamed_key
 from ppafo.units import number_text
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _SEED, _VALVE = "sensors.seed", "device.valve"
 _OF_ANY_KIND = {"controller": frozenset({"kind", "rate", "period"})}
-_CHOOSING = ("kind", "reacts")
-"""Last names of paths that decide which other values their section has."""
+_KIND = "kind"
+"""Last name of paths that decide which other values their section has."""
+_OF_MOTION, _WEARER = "motion.kind", "wearer."
+"""The kind of motion decides about the wearer too."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +70,8 @@ def apply_overrides(
             if path == ARITHMETIC:
                 instead = no_arithmetic(kind_at(changed, "controller"), own[path].text)
                 raise ScenarioError(f"override '{own[path]}': {instead}")
+            if path in RENAMED_KEYS:
+                raise ScenarioError(f"override '{own[path]}': {renamed_key(path, own[path].text)}")
             raise _unused(path, own, known, file)
     for path in waiting:
         if path in declared.appended:
@@ -108,13 +113,19 @@ def over_layer(
 
 def _is_choosing(path: str) -> bool:
     section, _, name = path.rpartition(".")
-    return bool(section) and name in _CHOOSING
+    return bool(section) and name == _KIND
 
 
 def chosen_by(path: str, choosing: Iterable[str]) -> list[str]:
     """Return the paths that decide whether there is a value at a path, the nearest one last."""
-    found = (chosen for chosen in choosing if chosen != path and path.startswith(f"{chosen.rpartition('.')[0]}."))
+    found = (chosen for chosen in choosing if chosen != path and path.startswith(_sections(chosen)))
     return sorted(found, key=len)
+
+
+def _sections(chosen: str) -> tuple[str, ...]:
+    """Return how the paths begin about which a kind decides."""
+    own = f"{chosen.rpartition('.')[0]}."
+    return (own, _WEARER) if chosen == _OF_MOTION else (own,)
 
 
 def _choose_kinds(
@@ -124,8 +135,7 @@ def _choose_kinds(
 
     A kind whose section is not there remains.
     """
-    places = {path: (not path.endswith(".kind"), path.count("."), path) for path in filter(_is_choosing, given)}
-    first = sorted(places, key=lambda path: places[path])
+    first = sorted(filter(_is_choosing, given), key=lambda path: (path.count("."), path))
     done = set()
     for path in first:
         if path in declared.paths(document):

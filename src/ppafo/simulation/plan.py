@@ -18,7 +18,7 @@ from ppafo.engine.led_leg import GAIT_SHANK, LedLeg
 from ppafo.engine.over_samples import over_samples
 from ppafo.engine.program import NoParameters, Program
 from ppafo.engine.rows import rebuilt
-from ppafo.engine.run import Lines, ReactingWalk, Run, Walk
+from ppafo.engine.run import Lines, Run, WornLeg
 from ppafo.engine.scheme.actuators import volumes_of
 from ppafo.engine.scheme.isothermal_gas import ISOTHERMAL
 from ppafo.engine.scheme.pneumatics import KEPT_OF_PRESSURE, is_slow
@@ -132,7 +132,7 @@ def compose_run(
     plant: PlantParameters,
     rule: StepRule,
     start: Start,
-    walk: Walk | ReactingWalk | None = None,
+    walk: WornLeg | None = None,
 ) -> Run:
     """Return the run of components: ``rule`` says how it is stepped, ``start`` where it begins, ``walk`` adds a leg.
 
@@ -168,8 +168,7 @@ def compose_run(
         command_delay=delay,
         needs_parts=steps.needs_parts,
         tolerance=steps.tolerance,
-        walk=walk if isinstance(walk, Walk) else None,
-        reacting=walk if isinstance(walk, ReactingWalk) else None,
+        walk=walk,
         lines=initial_lines(plant, components.supply_lines),
         effects=effect_rows(components.device, components.sections),
         leg=leg,
@@ -179,18 +178,7 @@ def compose_run(
 _ENERGY_BALANCE = "ppafo.engine.scheme.thermal_gas:ENERGY_BALANCE"
 _REAL = "ppafo.engine.scheme.real_gas:REAL"
 _LINES = "ppafo.engine.scheme.supply_lines:LINES"
-_WALKING = "ppafo.engine.scheme.walking:"
-_REACTING = "ppafo.engine.scheme.reacting:"
 """Where components of programs are that most runs do not have."""
-
-
-def _leg_scheme(walk: Walk | ReactingWalk) -> str:
-    """Return where the scheme of a walking leg is."""
-    fails = "" if walk.failing is None else "FAILING_"
-    if isinstance(walk, ReactingWalk):
-        return f"{_REACTING}{fails}REACTING"
-    which = "STRIDES" if walk.course is None else "COURSE"
-    return f"{_WALKING}{fails}{which}"
 
 
 def _gas_scheme(components: Components, effects: Sequence[Effect]) -> GasScheme:
@@ -212,7 +200,7 @@ def _gas_scheme(components: Components, effects: Sequence[Effect]) -> GasScheme:
     return scheme
 
 
-def _program(components: Components, steps: Steps, walk: Walk | ReactingWalk | None, has_delay: bool) -> Program:
+def _program(components: Components, steps: Steps, walk: WornLeg | None, has_delay: bool) -> Program:
     """Return what the lanes are composed of."""
     is_late, effects = first(components.signal_delay) > 0.0, effects_of(components.device, components.sections)
     return Program(
@@ -226,7 +214,7 @@ def _program(components: Components, steps: Steps, walk: Walk | ReactingWalk | N
         late_signals=walk is None and is_late,
         late_readings=walk is not None and is_late,
         gas=_gas_scheme(components, effects),
-        leg=None if walk is None else kind_at(_leg_scheme(walk)),
+        leg=None if walk is None else walk.scheme,
         feed=None if components.supply_lines is None else kind_at(_LINES),
         is_adaptive=bool(first(steps.needs_parts)),
         samples_inside=bool(first(steps.record_every % 1.0)),

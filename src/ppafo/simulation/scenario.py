@@ -7,7 +7,7 @@ an object of your own in charge of the valve.
 import dataclasses
 import math
 import numbers
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
@@ -18,6 +18,7 @@ from ppafo.model.gait import ShankSeries
 from ppafo.model.regulator import SupplyLines
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import Graph
+from ppafo.simulation.motion_kind import MotionKind
 
 PYTHON_CONTROLLER = "python"
 
@@ -97,32 +98,6 @@ class PrescribedMotion:
         if self.profile.kind == "constant":
             return f"held at {math.degrees(level):.4g} deg"
         return f"prescribed, along the profile {self.profile.kind}"
-
-
-@dataclass(frozen=True, slots=True)
-class MotionKind:
-    """What a motion of a leg that wears the device brings to the runs of its scenarios, as functions of the scenario.
-
-    ``plan`` gives the run and what may be wrong with it, as ``plan_runs`` does; ``rules`` which numbers contradict each
-    other. Any number may be an array (runs,) in both. ``quantities`` declares the numbers of the scenario beside those
-    of its device, ``places`` says by path which attributes lead to those that are not where all scenarios have them.
-    ``clock(scenario, times)`` gives the clock with other times [s], which may be arrays too, and what is wrong with it.
-    ``noise`` is the sum of all levels of noise that its controller receives, ``switches`` are settings that are 0 for
-    all runs of a program or for none. ``lacks(scenario, metric)`` says why it has not what a metric needs, an empty
-    text where it has it. ``measured(scenario, run, times, rows)`` gives recording and metrics of rows (samples,) by
-    path, and how a run that was completed ended, in words.
-    """
-
-    name: str
-    plan: Callable[..., Any]
-    rules: Callable[..., Any]
-    quantities: Callable[..., Any]
-    places: Mapping[str, tuple[str, ...]]
-    clock: Callable[..., Any]
-    switches: Callable[..., tuple[Any, ...]]
-    noise: Callable[..., Any]
-    lacks: Callable[..., str]
-    measured: Callable[..., Any]
 
 
 class WornMotion(Protocol):

@@ -438,7 +438,7 @@ def life_on_bottle(
     use = _Use([(0.0, supply.start(), supply.offers_first())])
     while use.ending is None and use.walked + use.rested < schedule.longest:
         _use_bottle(run, device, supply, stride_time, use, progress, schedule)
-    length = stride_time if run.walk is None or run.walk.course is None else batch_of(run).clock.step_count * run.step
+    length = batch_of(run).clock.step_count * run.step if run.program.takes_course else stride_time
     return BottleLife(_course_of_use(supply, use), use.walked, use.walked + use.rested, use.walked / length)
 
 

@@ -22,6 +22,7 @@ from ppafo.model.gait import NEVER, PARTS, STANDS_AT, Course, CoursePart, GaitNo
 from ppafo.model.leg import LegParameters
 from ppafo.signals.recording import Floats
 from ppafo.simulation.declaration import Reading
+from ppafo.simulation.motion_kind import REACT
 from ppafo.simulation.schema import kind_field, model_name, number_type, quantity_fields
 from ppafo.walking.preparation import standing_on
 
@@ -110,7 +111,7 @@ class WalkingCourse:
 
 def led_courses() -> tuple[str, ...]:
     """Return the names of the courses of the package that a wearer with a prescribed gait can walk."""
-    return tuple(name for name in FILE.names() if _only_of_reflexes(load_course(name)) is None)
+    return tuple(name for name in FILE.names() if _without_gait(load_course(name)) is None)
 
 
 def load_course(name_or_path: str | Path) -> WalkingCourse:
@@ -167,46 +168,25 @@ def _contradictions(segments: Iterable[Segment]) -> Iterator[tuple[int, str]]:
         walks = segment.kind not in _STANDING
 
 
-_REFLEXES = ("walk", "step", "push")
-"""What a wearer who reacts can do, or what can be done to one."""
-_LEVEL_START = 1.0
-"""Way [m] on level ground with which a course of a wearer who reacts begins."""
+_WITHOUT_GAIT = ("step", "push")
+"""What is for a body that walks by itself."""
 
 
 def check_led_course(course: WalkingCourse) -> None:
     """Raise ScenarioError for what a wearer with a prescribed gait cannot do."""
-    index = _only_of_reflexes(course)
+    index = _without_gait(course)
     if index is not None:
         kind = course.segments[index].kind
         what = "distance" if kind == "walk" else f"a {kind}"
         raise course.refusal(
-            index, f"{what} is for a wearer who reacts, and this gait is prescribed: set wearer.reacts"
+            index, f"{what} is for a wearer who reacts, and this gait is prescribed: set motion.kind = '{REACT}'"
         )
 
 
-def _only_of_reflexes(course: WalkingCourse) -> int | None:
-    """The first segment, from 0, that only a wearer who reacts takes, None where there is none."""
-    only = (segment.kind in _REFLEXES[1:] or DISTANCE.name in segment.values for segment in course.segments)
+def _without_gait(course: WalkingCourse) -> int | None:
+    """The first segment, from 0, that a gait does not take, None where there is none."""
+    only = (segment.kind in _WITHOUT_GAIT or DISTANCE.name in segment.values for segment in course.segments)
     return next((index for index, is_so in enumerate(only) if is_so), None)
-
-
-def check_reacting_course(course: WalkingCourse) -> None:
-    """Raise ScenarioError for what a wearer who reacts cannot do."""
-    for index, segment in enumerate(course.segments):
-        if segment.kind not in _REFLEXES:
-            raise course.refusal(
-                index,
-                "a wearer who reacts walks on, for the reflexes know nothing else; such a course has walk (with "
-                "distance and slope), step and push",
-            )
-        others = [name for name in segment.values if segment.kind == "walk" and name not in ("distance", "slope")]
-        if others:
-            raise course.refusal(
-                index, f"{others[0]}: the reflexes set the pace of a wearer who reacts: give distance, and slope"
-            )
-    first = course.segments[0]
-    if first.kind != "walk" or first.values["distance"] < _LEVEL_START or first.values.get("slope"):
-        raise course.refusal(0, f"a wearer who reacts begins with a level walk of {_LEVEL_START:g} m or more")
 
 
 @functools.cache

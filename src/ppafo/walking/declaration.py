@@ -13,7 +13,7 @@ from ppafo.control.walking.catalog import (
     load_walking_controller,
     walking_controllers,
 )
-from ppafo.documents.models import make_schema, one_of, optional, table
+from ppafo.documents.models import make_schema, one_of, optional, quote, table
 from ppafo.errors import KindError, ScenarioError, refused_as
 from ppafo.model.declaration import Quantity
 from ppafo.model.plant_faults import PLANT_FAULTS, SHUT_OFF
@@ -24,7 +24,6 @@ from ppafo.simulation.declaration import (
     SENSORS,
     TEXTS,
     THERMAL_GAS,
-    WALK,
     Declared,
     check_known_motion,
     gas_settings,
@@ -32,6 +31,7 @@ from ppafo.simulation.declaration import (
     line_paths,
     value_at,
 )
+from ppafo.simulation.motion_kind import RENAMED_KEYS, WALK, WALKS, renamed_key
 from ppafo.simulation.schema import (
     controller_table,
     file_model,
@@ -41,17 +41,10 @@ from ppafo.simulation.schema import (
     quantity_fields,
 )
 from ppafo.walking.bottle import BOTTLE, BOTTLE_NAME, BOTTLE_NUMBERS, BOTTLE_OVERRIDES
-from ppafo.walking.reacting_wearer import REACTIONS, REACTS
-from ppafo.walking.wearer import WEARER
+from ppafo.walking.kind import WalkKind, kind_of_walk, walk_kind_of
 
 THRESHOLDS = next(iter(TIMINGS))
 """The way to know the time in the stride of a walk file that names none."""
-
-REACTS_SUMMARY = (
-    "name of a wearer who reacts, or the path of its file; the gait is prescribed unless given, and strengths of "
-    "muscles, gains and the start speed are for a wearer who reacts alone"
-)
-
 
 LARGEST_SEED = 2**32 - 1
 SEED = Quantity("seed", "", "seed of noise and lost samples, a whole number", 1.0, 0.0, float(LARGEST_SEED))
@@ -141,10 +134,10 @@ def timing_settings(kind: str) -> tuple[Quantity, ...]:
     return TIMINGS[kind].quantities if kind in TIMINGS else ()
 
 
-def quantities(controller: str, timing: str = THRESHOLDS) -> dict[str, Quantity]:
-    """Return the declaration of every number that a walk file with this controller and timing can hold, by path."""
+def quantities(kind: WalkKind, controller: str, timing: str = THRESHOLDS) -> dict[str, Quantity]:
+    """Return the declaration of every number that a file of a kind of walk can hold, by path."""
     sections = {
-        "wearer": (*WEARER, PERSON, *REACTIONS),
+        "wearer": kind.numbers,
         "controller": (RATE, PERIOD, *controller_settings(controller)),
         "timing": timing_settings(timing),
         "sensors": (*WALK_SENSORS, SEED),
@@ -169,7 +162,14 @@ def timing_of(document: Mapping[str, Any]) -> str:
 
 def find_kinds(document: Mapping[str, Any], file: str) -> None:
     """Load the controller that a document names, where another package has it; ScenarioError where that fails."""
-    check_known_motion(kind_at(document, "motion"), file)
+    motion = kind_at(document, "motion")
+    for path in RENAMED_KEYS:
+        old = value_at(document, path)
+        if old is not None:
+            raise ScenarioError(f"{file}: {path} = {quote(old)}: {renamed_key(path, old)}")
+    with refused_as(ScenarioError, f"{file}: motion.kind", KindError):
+        WALKS.get(motion)
+    check_known_motion(motion, file)
     with refused_as(ScenarioError, f"{file}: controller.kind", KindError):
         load_walking_controller(kind_at(document, "controller"))
 
@@ -183,7 +183,7 @@ def _check_motion(kind: object, place: str) -> None:
         )
 
 
-def _texts(_document: Mapping[str, Any]) -> tuple[str, ...]:
+def _texts(document: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the paths of every text that a document can hold."""
     kinds = (
         "controller.kind",
@@ -191,22 +191,16 @@ def _texts(_document: Mapping[str, Any]) -> tuple[str, ...]:
         "gas_model.kind",
         *(f"faults.{part}.kind" for part in (*FAULTY, *PLANT_FAULTS)),
     )
-    return (*TEXTS, "motion.kind", "gait", "course", REACTS, BOTTLE_NAME, *kinds)
-
-
-def others_wearer(reacts: bool) -> set[str]:
-    """Return the paths that the other kind of wearer has: one who reacts, or one whom a gait leads."""
-    return {f"wearer.{item.name}" for item in ((*WEARER, PERSON) if reacts else REACTIONS)}
+    return (*TEXTS, "motion.kind", "gait", "course", *walk_kind_of(document).texts, BOTTLE_NAME, *kinds)
 
 
 def _quantities(document: Mapping[str, Any]) -> dict[str, Quantity]:
     """Return the declaration of every number that a document with its kinds can hold, by path."""
     find_kinds(document, "the file of a walk")
-    found = quantities(kind_at(document, "controller"), timing_of(document))
+    found = quantities(walk_kind_of(document), kind_at(document, "controller"), timing_of(document))
     lost = {
         f"gas_model.{item.name}" for item in THERMAL_GAS if item not in gas_settings(kind_at(document, "gas_model"))
     }
-    lost |= others_wearer(reacts=value_at(document, REACTS) is not None)
     return {path: item for path, item in found.items() if path not in lost}
 
 
@@ -263,13 +257,13 @@ def _bottle() -> dict[str, Any]:
     return {"name": optional(str, "name of a bottle, or the path of its file"), **numbers, "overrides": changes}
 
 
-def walk_file() -> type[BaseModel]:
-    """Return the model of a walk file, for the controllers that are loaded."""
-    return _walk_file(tuple(walking_controllers().items()))
+def walk_file(document: Mapping[str, Any]) -> type[BaseModel]:
+    """Return the model of the file of a kind of walk, for the controllers that are loaded."""
+    return _walk_file(tuple(walking_controllers().items()), (walk_kind_of(document),))
 
 
-@functools.lru_cache(maxsize=4)
-def _walk_file(_kinds: Any) -> type[BaseModel]:
+@functools.lru_cache(maxsize=8)
+def _walk_file(_controllers: Any, walks: tuple[WalkKind, ...]) -> type[BaseModel]:
     seed = Annotated[int, Field(ge=0, le=LARGEST_SEED)]
     sensors = quantity_fields(WALK_SENSORS)
     sensors["seed"] = (seed, Field(1, description=SEED.summary))
@@ -285,7 +279,13 @@ def _walk_file(_kinds: Any) -> type[BaseModel]:
             str, "name of a course, or the path of its file; stride after equal stride unless one is given"
         ),
     }
-    motion = table("WalkMotion", kind_field(WALK, "the device on a leg that walks") | which)
+    motion = one_of(
+        [table(f"{model_name(kind.name)}Motion", kind_field(kind.name, kind.summary) | which) for kind in walks]
+    )
+    wearer: dict[str, Any] = {}
+    for kind in walks:
+        texts = {path.partition(".")[2]: optional(str, summary) for path, summary in kind.texts.items()}
+        wearer |= texts | quantity_fields(kind.numbers)
     own: dict[str, Any] = {
         "run": optional(table("WalkRun", run), "how long it is, and how it is computed"),
         "motion": optional(motion, "that it is a walk; gait and course may stand here"),
@@ -296,14 +296,7 @@ def _walk_file(_kinds: Any) -> type[BaseModel]:
         ),
         "timing": optional(_timing(), "how the controller knows the time in the stride; thresholds unless given"),
         "wearer": optional(
-            table(
-                "Wearer",
-                {
-                    "reacts": optional(str, REACTS_SUMMARY),
-                    **quantity_fields((*WEARER, PERSON, *REACTIONS)),
-                },
-            ),
-            "who walks; the subject of the gait that is named, else the paper's, unless given",
+            table("Wearer", wearer), "who walks; the subject of the gait that is named, else the paper's, unless given"
         ),
         "sensors": optional(table("WalkSensors", sensors), "sensors of the controller; ideal unless given"),
         "faults": optional(table("Faults", faults), "sensors and parts of the plant that fail during the walk"),
@@ -322,4 +315,6 @@ def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a walk file."""
     WALKING_CONTROLLERS.load_all()
     CONTROLLERS.load_all()
-    return make_schema(walk_file(), "ppafo walk")
+    WALKS.load_all()
+    walks = tuple(kind_of_walk(name) for name in WALKS)
+    return make_schema(_walk_file(tuple(walking_controllers().items()), walks), "ppafo walk")

@@ -33,48 +33,38 @@ from ppafo.simulation.loading import (
     read_thermal,
     scenario_of,
 )
+from ppafo.simulation.motion_kind import WALK, WALKS
 from ppafo.simulation.numbers import device_number_at
 from ppafo.simulation.overrides import OverriddenDocument, over_layer
-from ppafo.simulation.scenario import Assumption, Control, MotionKind, Origin, Scenario, Sensors
+from ppafo.simulation.scenario import Assumption, Control, Origin, Scenario, Sensors
 from ppafo.walking.bottle import BOTTLE, BOTTLE_NAME, BottleSupply, read_bottle
-from ppafo.walking.contradictions import check_walk, rules
-from ppafo.walking.course import check_led_course, check_reacting_course, load_course
+from ppafo.walking.contradictions import check_walk
+from ppafo.walking.course import load_course
 from ppafo.walking.declaration import (
     DURATION,
     FAULTY,
     FORCES,
     OF_A_WALK,
-    PERSON,
     SEED,
-    STEP,
     WALK_SENSORS,
     fault_numbers,
     timing_of,
     timing_settings,
     walk_file,
 )
+from ppafo.walking.kind import WalkKind
 from ppafo.walking.motion import (
-    PLACES,
     WalkMotion,
-    clock_with,
     duration_problems,
-    numbers_of_scenario,
-    record_interval,
     walk_of,
     with_duration,
 )
 from ppafo.walking.nominal import nominal_terms
-from ppafo.walking.planning import NO_REFERENCE, course_of_walk, noise, plan_walks, switches, walking_valve
+from ppafo.walking.planning import NO_REFERENCE, walking_valve
 from ppafo.walking.preparation import FaultSettings, SensorSettings
-from ppafo.walking.reacting_wearer import REACTS, START_SPEED, STEP_OF_BODY, read_reacting
-from ppafo.walking.result import lacks, measured
-from ppafo.walking.way import length_of
-from ppafo.walking.wearer import links_of_stature, read_wearer, wearer_origin
 
 FILE = TomlKind("walk", "walk", resources.files("ppafo.walking") / "configurations", ScenarioError)
 DEFAULT_PERIOD = 1.0e-3
-SHORTEST_WAY = 6.0
-"""Shortest walk [s] of a wearer who reacts on a course, unless given."""
 DEFAULT_DURATION, BOTTLE_DURATION = 60.0, 600.0
 """Length of a walk [s], and of one on a bottle, unless given or ended by the bottle before."""
 
@@ -165,6 +155,8 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     if BOTTLE_NAME in instead:
         document.setdefault(BOTTLE, {})["name"] = instead[BOTTLE_NAME]
     reading = Reading(request.file, document, changed.paths)
+    kind = WALKS[kind_at(document, "motion") or WALK]
+    who: WalkKind = kind.walk
     law = walking_controllers()[kind_at(document, "controller")]
     hardware = read_hardware(reading, request, changed.device)
     device = _device(reading, hardware)
@@ -172,9 +164,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     with _named_by("course", reading, request, ScenarioError):
         course = None if named_course is None else load_course(named_course)
         if course is not None:
-            check = check_led_course if value_at(document, REACTS) is None else check_reacting_course
-            check(course)
-    reacts = read_reacting(reading, request.folder, request.instead, course)
+            who.check_course(course)
     with _named_by("gait", reading, request, DataError):
         walked = load_gait(_named_file("gait", request, document) or NORMATIVE)
     is_named = "gait" in instead or "gait" in document
@@ -185,33 +175,28 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     timing = timing_settings(timing_of(reading.document))
     found = links_of_defaults({"controller": law.quantities, "timing": timing}, device, lines)
     links = {path: links for path, links in found.items() if value_at(reading.document, path) is None}
-    of_wearer = links_of_stature(reading.document) if reacts is None else {}
     _check_timing(law, reading)
     motion = WalkMotion(
-        kind=WALK,
+        kind=kind,
         gait=walked,
-        wearer=read_wearer(reading, walked, is_named),
         timing=timing_of(document),
         forces={name: number for name, number in settings.numbers.items() if name in FORCES},
         faults=settings.faults,
-        course=course if reacts is None else None,
         bottle=carried,
-        wearer_origin=wearer_origin(reading, walked, is_named),
-        person=_person(reading),
         broken=_broken(reading, lines),
         shut_off=_shut_off(reading),
-        reacts=reacts,
+        **who.read(reading, request, walked, is_named, course),
     )
     more = tuple(f"{path}={_absolute(item)}" for path, item in instead.items())
     supply = device.supply
-    step = reading.number("run.step", STEP if reacts is None else STEP_OF_BODY)
+    step = reading.number("run.step", who.step)
     scenario = Scenario(
         name=document["name"],
         description=document.get("description", ""),
         device=device,
         duration=DEFAULT_DURATION,
         time_step=step,
-        output_interval=record_interval(DEFAULT_DURATION),
+        output_interval=who.interval(DEFAULT_DURATION),
         motion=motion,
         initial_pressure_1=supply.atmospheric_pressure,
         initial_pressure_2=supply.atmospheric_pressure,
@@ -224,7 +209,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
         ),
         thermal=read_thermal(reading),
         supply_lines=lines,
-        links={**links, **of_wearer},
+        links={**links, **who.links(reading.document)},
     )
     check_walk(scenario, reading)
     return with_duration(scenario, _duration(reading, scenario))
@@ -253,31 +238,19 @@ def _absolute(name: str) -> str:
     return str(Path(name).absolute()) if Path(name).suffix == ".toml" else name
 
 
-def _person(reading: Reading) -> float:
-    """Return the number of the person who walks."""
-    person = reading.number("wearer.person", PERSON)
-    if person != int(person):
-        raise reading.refusal("wearer.person", "must be a whole number")
-    return person
-
-
 def _duration(reading: Reading, scenario: Scenario) -> float:
     """Return the length of a walk [s]: that of its file, else of its course, else a minute, or ten on a bottle."""
-    # As long as the wearer with the gait as it is takes for it, whoever walks.
-    course = course_of_walk(replace(scenario, motion=replace(walk_of(scenario), person=0.0)))
+    motion = walk_of(scenario)
+    of_course = motion.who.duration(motion)
     if value_at(reading.document, "run.duration") is not None:
         duration = reading.number("run.duration", DURATION)
         for is_bad, line in duration_problems(scenario, duration):
             if is_bad:
                 raise ScenarioError(f"{reading.file}: {line(0)}")
         return duration
-    if course is not None:
-        return float(course.duration)
-    reacts = walk_of(scenario).reacts
-    if reacts is not None and reacts.course is not None:
-        # The reflexes set the pace: at the speed of the start, to the next whole second.
-        return max(SHORTEST_WAY, float(math.ceil(length_of(reacts.course) / reacts.settings[START_SPEED.name])))
-    return DEFAULT_DURATION if walk_of(scenario).bottle is None else BOTTLE_DURATION
+    if of_course is not None:
+        return of_course
+    return DEFAULT_DURATION if motion.bottle is None else BOTTLE_DURATION
 
 
 def _assumed(reading: Reading, carried: BottleSupply | None) -> tuple[Assumption, ...]:
@@ -422,22 +395,8 @@ def _period(reading: Reading) -> float:
     return DEFAULT_PERIOD if period is None else reading.number("controller.period", PERIOD)
 
 
-WALK = MotionKind(
-    name="walk",
-    plan=plan_walks,
-    rules=rules,
-    quantities=numbers_of_scenario,
-    places=PLACES,
-    clock=clock_with,
-    switches=switches,
-    noise=noise,
-    lacks=lacks,
-    measured=measured,
-)
-"""The motion of a scenario that walks."""
-
 WALKING = Layout(FILE, OF_A_WALK, walk_file, walk_file, build_walk)
-"""Scenarios whose motion is a walk."""
+"""Scenarios whose motion is a walk of any kind."""
 
 
 def lag_of_bandwidth(bandwidth: float) -> float:

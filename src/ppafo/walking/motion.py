@@ -3,22 +3,22 @@
 What may vary in it stands below: its numbers by path, and its times, one by one or as columns of an ensemble.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from ppafo.control.walking.catalog import TIMINGS
 from ppafo.errors import ScenarioError
 from ppafo.gait import Gait
-from ppafo.gait.plausible import gait_file_remarks
 from ppafo.model.columns import Problem, at, over_runs
 from ppafo.model.declaration import Quantity
 from ppafo.model.plant_faults import PLANT_FAULTS, SHUT_OFF
 from ppafo.simulation.clock import Clock
 from ppafo.simulation.declaration import gas_settings, line_paths
-from ppafo.simulation.scenario import MotionKind, Scenario
+from ppafo.simulation.motion_kind import WALK, MotionKind
+from ppafo.simulation.scenario import Scenario
 from ppafo.walking.bottle import BottleSupply
 from ppafo.walking.course import WalkingCourse
 from ppafo.walking.declaration import (
@@ -27,13 +27,24 @@ from ppafo.walking.declaration import (
     PERSON,
     controller_settings,
     fault_numbers,
-    others_wearer,
     quantities,
     timing_settings,
 )
+from ppafo.walking.kind import WalkKind
 from ppafo.walking.preparation import FaultSettings
-from ppafo.walking.reacting_wearer import REACTIONS, ReactingWearer
-from ppafo.walking.wearer import WEARER, Wearer, who_walks
+from ppafo.walking.wearer import WEARER, Wearer
+
+
+class WalkingBody(Protocol):
+    """What walks by itself: its numbers by name, any of which may be an array (runs,), and the course of its way."""
+
+    @property
+    def settings(self) -> Mapping[str, Any]:
+        """Numbers of ``[wearer]`` by name."""
+
+    @property
+    def course(self) -> WalkingCourse | None:
+        """The course, None without one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +55,7 @@ class WalkMotion:
     vane has, by name, and ``faults`` those that fail, by sensor; ``broken`` are parts of the plant that fail, and
     ``shut_off`` is the valve of the safe state, {} where none is fitted. ``course`` is what the wearer does one after
     the other, None where stride follows equal stride; ``bottle`` the one that the device hangs on, None where its
-    supply does not end. ``reacts`` is a wearer whose reflexes answer the device, None where the gait is prescribed.
+    supply does not end. ``body`` is what walks by itself in a kind of walk without a prescribed gait, else None.
     ``wearer_origin`` says in words whose body mass it is. ``person`` is the number of the person
     of the population who walks, 0 for the wearer with the gait as it is, or a ``Person`` who is drawn already. It, and
     numbers of wearer, ``forces`` and ``faults``, may be arrays (runs,).
@@ -62,17 +73,23 @@ class WalkMotion:
     person: Any = 0.0
     broken: Mapping[str, FaultSettings] = field(default_factory=dict)
     shut_off: Mapping[str, Any] = field(default_factory=dict)
-    reacts: ReactingWearer | None = None
+    body: WalkingBody | None = None
 
     @property
     def label(self) -> str:
         """The motion in a few words."""
-        if self.reacts is not None:
-            way = self.reacts.course
-            return f"a walk of a wearer who reacts, {self.reacts.name}" + (
-                "" if way is None else f", course {way.name}"
-            )
-        return f"a walk, gait {self.gait.name}" + ("" if self.course is None else f", course {self.course.name}")
+        return self.who.label(self)
+
+    @property
+    def who(self) -> WalkKind:
+        """What this kind of walk differs in from others."""
+        found: WalkKind = self.kind.walk
+        return found
+
+    @property
+    def is_led(self) -> bool:
+        """True where a gait leads the leg."""
+        return self.body is None
 
 
 def walk_of(scenario: Scenario) -> WalkMotion:
@@ -83,22 +100,19 @@ def walk_of(scenario: Scenario) -> WalkMotion:
 
 
 def check_led(scenario: Scenario, doing: str) -> None:
-    """Raise ScenarioError for a wearer who reacts, where ``doing`` needs a gait that is prescribed."""
-    if walk_of(scenario).reacts is not None:
+    """Raise ScenarioError for a body that walks by itself, where ``doing`` needs a gait that is prescribed."""
+    motion = walk_of(scenario)
+    if not motion.is_led:
         raise ScenarioError(
-            f"{scenario.name}: {doing} needs a prescribed gait, and its wearer reacts; leave wearer.reacts out "
-            "(simulate, walk, find, sweep, sensitivity and tune take a wearer who reacts)"
+            f"{scenario.name}: {doing} needs a prescribed gait, and motion.kind = '{motion.kind.name}' has none: "
+            f"set it to '{WALK}' (simulate, walk, find, sweep, sensitivity and tune take both)"
         )
 
 
 def person_remarks(scenario: Scenario) -> list[str]:
-    """Return who walks, and what is odd about the zero of the gait's ankle."""
+    """Return who walks."""
     motion = walk_of(scenario)
-    if motion.reacts is not None:
-        mass = f"{motion.reacts.mass:.4g} kg"
-        return [f"wearer: {motion.reacts.name}, who reacts, {mass}; the device is on the left leg"]
-    remarks = [f"remark: {text}" for text in gait_file_remarks(motion.gait)]
-    return [who_walks(motion.wearer, motion.gait, motion.wearer_origin), *remarks]
+    return motion.who.remarks(motion)
 
 
 SHORTEST_STRIDES = 5
@@ -109,7 +123,6 @@ PLACES: Mapping[str, tuple[str, ...]] = {
     **{f"wearer.{item.name}": ("motion", "wearer", item.name) for item in WEARER},
     **{f"timing.{item.name}": ("control", "settings", item.name) for kind in TIMINGS for item in timing_settings(kind)},
     f"wearer.{PERSON.name}": ("motion", PERSON.name),
-    **{f"wearer.{item.name}": ("motion", "reacts", "settings", item.name) for item in REACTIONS},
     **{f"sensors.{name}": ("motion", "forces", name) for name in FORCES},
     **{
         f"faults.{sensor}.{item.name}": ("motion", "faults", sensor, "numbers", item.name)
@@ -132,7 +145,7 @@ def numbers_of_scenario(scenario: Scenario) -> dict[str, Quantity]:
     """The declaration of every number of a walk beside those of its device, by path."""
     motion, control = walk_of(scenario), scenario.control
     own = controller_settings(control.kind)
-    known = quantities(control.kind, motion.timing)
+    known = quantities(motion.who, control.kind, motion.timing)
     kept = {f"controller.{item.name}" for item in own} | {"controller.rate", "controller.period"}
     kept |= {path for path in known if path.partition(".")[0] in ("wearer", "timing", "sensors", "run")}
     kept |= {f"gas_model.{item.name}" for item in gas_settings("" if scenario.thermal is None else "thermal")}
@@ -142,9 +155,8 @@ def numbers_of_scenario(scenario: Scenario) -> dict[str, Quantity]:
     for part, fault in motion.broken.items():
         kept |= {f"faults.{part}.{name}" for name in fault.numbers}
     kept |= {f"shut_off.{name}" for name in motion.shut_off}
-    kept -= others_wearer(reacts=motion.reacts is not None)
-    if motion.reacts is not None:
-        kept -= {f"wearer.{item.name}" for item in REACTIONS if item.name not in motion.reacts.settings}
+    if motion.body is not None:
+        kept -= {f"wearer.{item.name}" for item in motion.who.numbers if item.name not in motion.body.settings}
     # An object in charge has no settings, and a timing is one of a controller that has some.
     lost = {path for path in kept if path.startswith("timing.") and path.partition(".")[2] not in control.settings}
     return {path: item for path, item in known.items() if path in kept - lost}
@@ -155,19 +167,9 @@ def record_interval(seconds: float) -> float:
     return 1.0e-3 if seconds <= 61.0 else (5.0e-3 if seconds <= 601.0 else 2.0e-2)
 
 
-def interval_with_body(seconds: float) -> float:
-    """The same [s] of a wearer who reacts, each sample of whom has some hundred numbers more."""
-    return 5.0e-3 if seconds <= 61.0 else (1.0e-2 if seconds <= 601.0 else 5.0e-2)
-
-
-def interval_of(scenario: Scenario) -> Callable[[float], float]:
-    """What finds the time [s] between two samples of the record of a walk from its length [s]."""
-    return record_interval if walk_of(scenario).reacts is None else interval_with_body
-
-
 def with_duration(scenario: Scenario, seconds: float) -> Scenario:
     """A walk of another length [s], recorded as often as that allows."""
-    return replace(scenario, duration=seconds, output_interval=interval_of(scenario)(seconds))
+    return replace(scenario, duration=seconds, output_interval=walk_of(scenario).who.interval(seconds))
 
 
 def duration_problems(scenario: Scenario, seconds: Any) -> tuple[Problem, ...]:
@@ -192,6 +194,8 @@ def clock_with(scenario: Scenario, times: Mapping[str, Any]) -> tuple[Clock, tup
     period = times.get("controller.period", scenario.control.period)
     if "controller.rate" in times:
         period = 1.0 / times["controller.rate"]
-    output = over_runs(interval_of(scenario), duration) if "run.duration" in times else scenario.output_interval
+    output = (
+        over_runs(walk_of(scenario).who.interval, duration) if "run.duration" in times else scenario.output_interval
+    )
     problems = duration_problems(scenario, duration) if "run.duration" in times else ()
     return Clock(duration, times.get("run.step", scenario.time_step), output, period), problems

@@ -7,18 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.constants import STANDARD_GRAVITY
 from ppafo.control.controllers import switching
 from ppafo.control.kind import ControllerKind
 from ppafo.control.walking.catalog import TIMINGS, walking_controllers, with_timing
 from ppafo.engine.lanes import Batch
 from ppafo.engine.rows import leaf_paths, leaves, rebuilt
-from ppafo.engine.run import ReactingWalk, Run, Walk, batches_of
+from ppafo.engine.run import Run, Walk, batches_of
 from ppafo.engine.scheme.walking import WalkState
 from ppafo.errors import ScenarioError
 from ppafo.gait import Gait
 from ppafo.model.catalog import VALVES
-from ppafo.model.columns import Problem, at, first, over_runs, smaller, truncated, whole
+from ppafo.model.columns import Problem, first, over_runs, smaller, truncated, whole
 from ppafo.model.gait import Course, GaitSeries, GaitTiming, gait_at
 from ppafo.model.leg import LegParameters
 from ppafo.model.orifice import area_conductance
@@ -47,9 +46,7 @@ from ppafo.walking.preparation import (
     walk_from_strike,
     walk_step_counts,
     with_leg,
-    without_leg,
 )
-from ppafo.walking.reacting_wearer import LONGEST_STEP, start_of_body
 from ppafo.walking.wearer import Build, leg_parameters
 
 NO_REFERENCE = ProfileChoice("constant", {"level": 0.0})
@@ -61,7 +58,8 @@ def plan_walk(scenario: Scenario) -> Run:
 
     ScenarioError where it cannot be.
     """
-    run, problems = plan_walks(scenario)
+    planned: tuple[Run, tuple[Problem, ...]] = walk_of(scenario).kind.plan(scenario)
+    run, problems = planned
     for is_bad, line in problems:
         if is_bad:
             raise ScenarioError(f"{scenario.origin.file or scenario.name}: {line(0)}")
@@ -73,9 +71,7 @@ def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
 
     All runs of an ensemble must ask for one program: the settings of ``switches`` are 0 for all of them or for none.
     """
-    if walk_of(scenario).reacts is not None:
-        return _plan_reacting(scenario)
-    motion, device, period = walk_of(scenario), fed_device(scenario), scenario.control.period
+    motion, device = walk_of(scenario), fed_device(scenario)
     person = person_of(motion.gait, motion.person)
     leg = leg_of_person(leg_parameters(motion.wearer, heel_rocker(motion.gait, motion.wearer)), person)
     bare = plant_parameters(device)
@@ -92,8 +88,7 @@ def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         course=course,
         failing=failing_of(scenario),
     )
-    controller, settings = controller_of(_fitted(scenario, person))
-    components = _components_of_walk(scenario, device, controller, settings, _of_each(longest_delay, sensors) * period)
+    components = components_of_walk(_fitted(scenario, person), device, sensors)
     run = compose_run(
         components,
         with_leg(bare, leg),
@@ -104,14 +99,13 @@ def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
     return run, (too_many_steps(scenario, run.step, run.step_count),)
 
 
-def _components_of_walk(
-    scenario: Scenario, device: Device, controller: ControllerKind | None, settings: Mapping[str, Any], delay: Any
-) -> Components:
-    """What the run of a walk is made of; ``delay`` [s] is the longest of its sensors."""
+def components_of_walk(scenario: Scenario, device: Device, sensors: GaitSensors) -> Components:
+    """What the run of a walk is made of, whoever walks."""
+    controller, settings = controller_of(scenario)
     return Components(
         device=device,
         valve=walking_valve(device.valve),
-        controller=None if scenario.control.kind == PYTHON_CONTROLLER else controller,
+        controller=controller,
         settings=settings,
         reference=NO_REFERENCE,
         path=None,
@@ -119,43 +113,8 @@ def _components_of_walk(
         has_ideal_sensors=has_ideal_sensors(scenario),
         thermal=scenario.thermal,
         supply_lines=scenario.supply_lines,
-        signal_delay=delay,
+        signal_delay=of_each(longest_delay, sensors) * scenario.control.period,
     )
-
-
-def _plan_reacting(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
-    """As ``plan_walks``, of a wearer who reacts: the body begins at its start speed, with vented chambers."""
-    device, wearer = fed_device(scenario), walk_of(scenario).reacts
-    assert wearer is not None, "a wearer who reacts comes here"
-    bare, sensors, start = plant_parameters(device), gait_sensors_of(scenario), start_of_body(wearer)
-    walk = ReactingWalk(
-        share=device_share(bare, STANDARD_GRAVITY),
-        body=wearer.row(),
-        sensors=sensors,
-        initial=start.walk,
-        walker=start.walker,
-        reflexes=start.reflexes,
-        nerves=start.nerves,
-        failing=failing_of(scenario),
-    )
-    controller, settings = controller_of(scenario)
-    delay = _of_each(longest_delay, sensors) * scenario.control.period
-    run = compose_run(
-        _components_of_walk(scenario, device, controller, settings, delay),
-        without_leg(bare),
-        lambda plant: walk_steps(scenario, plant),
-        lambda plant: vented_state(plant, start.ankle, 0.0),
-        walk,
-    )
-    return run, (too_many_steps(scenario, run.step, run.step_count), _too_long(scenario))
-
-
-def _too_long(scenario: Scenario) -> Problem:
-    """A step that is too long for a body."""
-    step = scenario.time_step
-    return np.asarray(
-        step > LONGEST_STEP
-    ), lambda run: f"run.step = {at(step, run):g} s: a wearer who reacts needs {LONGEST_STEP:g} s or less"
 
 
 def batch_of_many(scenario: Scenario, build: Build, gaits: VariedGaits, generator: np.random.Generator) -> Batch:
@@ -172,7 +131,7 @@ def unrecorded(run: Run, runs: int) -> Batch:
 
 def walk_steps(scenario: Scenario, plant: PlantParameters) -> Steps:
     """The steps of a walk: whole ones that follow the gas, as many to a sample of the controller as that asks for."""
-    lines, volume = scenario.supply_lines, _of_each(smallest_chamber, plant)
+    lines, volume = scenario.supply_lines, of_each(smallest_chamber, plant)
     volume = volume if lines is None else smaller(volume, smaller(lines.volume_1, lines.volume_2))
     # Adiabatic chambers fill faster than isothermal ones, by the ratio of heat capacities.
     stiffness = 1.0 if scenario.thermal is None else scenario.device.gas.heat_capacity_ratio
@@ -190,14 +149,14 @@ def walk_steps(scenario: Scenario, plant: PlantParameters) -> Steps:
 def _start(leg: LegParameters, series: GaitSeries, timing: GaitTiming, course: Course | None) -> WalkState:
     """Where a walk begins: at a heel strike, or standing where there is a course."""
     if course is None:
-        begun = _of_each(lambda *rows: walk_from_strike(gait_at(rows[1], rows[2], rows[0], 0.0)), leg, series, timing)
+        begun = of_each(lambda *rows: walk_from_strike(gait_at(rows[1], rows[2], rows[0], 0.0)), leg, series, timing)
     else:
-        begun = _of_each(lambda *rows: walk_from_standing(standing_gait(*rows)), leg, timing, course)
+        begun = of_each(lambda *rows: walk_from_standing(standing_gait(*rows)), leg, timing, course)
     start: WalkState = begun
     return start
 
 
-def _of_each(function: Any, *rows: Any) -> Any:
+def of_each(function: Any, *rows: Any) -> Any:
     """What a function makes of some NamedTuples of floats; where they have arrays (runs,), run by run."""
     kinds, counts = [type(row) for row in rows], np.cumsum([0, *(len(leaves(row)) for row in rows)]).tolist()
 

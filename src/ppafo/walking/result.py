@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.engine.lane_samples import FELL
 from ppafo.engine.lanes import BatchResult, Floats
 from ppafo.engine.program import LaneResult
-from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run
+from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, Walk
 from ppafo.metrics import METRICS, Metric, evaluate
 from ppafo.metrics.metric import LED, LED_SHANK, REACTS, REQUEST, STEADY, MetricKind, Metrics
 from ppafo.model.contact import SWING
 from ppafo.model.leg import centrifugal_torques, gravity_torques, mass_matrix, passive_torque
 from ppafo.signals import Channel, Recording
+from ppafo.simulation.motion_kind import REACT
 from ppafo.simulation.sampled import state_row_numbers
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario
 from ppafo.simulation.simulate import Status, gas_channels
@@ -30,7 +30,6 @@ from ppafo.walking.gait_series import AnklePath, ankle_path, truncate
 from ppafo.walking.motion import walk_of
 from ppafo.walking.person import as_drawn
 from ppafo.walking.planning import course_of_walk, law_of
-from ppafo.walking.reacting import reacting_metrics, recording_of_reacting
 from ppafo.walking.strides import (
     Curves,
     SegmentResult,
@@ -52,6 +51,12 @@ if TYPE_CHECKING:
 REMEDY = "the step may be too long, or a value unrealistic: try a smaller run.step, and check the wearer"
 
 
+def led_leg(run: Run) -> Walk:
+    """The leg of a run that a gait leads."""
+    assert isinstance(run.walk, Walk), "a gait leads it"
+    return run.walk
+
+
 def recording_of_walk(
     configuration: Scenario,
     run: Run,
@@ -60,10 +65,9 @@ def recording_of_walk(
     supply: SupplyCourse | None = None,
 ) -> Recording:
     """The recording of a walk [SI] from its rows (samples,) by path, at these times [s]; with its bottle's course."""
-    run = run if supply is None else _with_cold_gas(run, supply, time)
-    assert run.walk is not None, "a walk has a leg"
+    run, led = with_cold_gas(run, supply, time), led_leg(run)
     angle = record["state.angle"]
-    path = ankle_path(walk_of(configuration).gait, run.walk.timing, walk_of(configuration).wearer)
+    path = ankle_path(walk_of(configuration).gait, led.timing, walk_of(configuration).wearer)
     channels: Channels = {
         "angle": (angle, "rad"),
         "angular_velocity": (record["state.angular_velocity"], "rad/s"),
@@ -74,13 +78,13 @@ def recording_of_walk(
         "toe_height": (path.toe_height(record["walk.now.phase"], record["walk.now.shank"], angle), "m"),
         **valve_and_ground_channels(record),
     }
-    if run.walk.leg.keeps_gait >= 0.5:
+    if led.leg.keeps_gait >= 0.5:
         channels["dorsiflexor_moment"] = (dorsiflexor_moment(run, record), "N m")
     channels |= gas_channels(configuration.device.gas, run, record)
     if supply is not None:
         channels |= supply_channels(supply, time, record)
     channels |= controller_channels(record)
-    if run.walk.course is not None:
+    if led.course is not None:
         channels |= _course_channels(configuration, run, path, time, record)
     values = {name: Channel(np.asarray(series), unit) for name, (series, unit) in channels.items()}
     return Recording(f"walk, {configuration.name}", time, values, kind="simulated")
@@ -92,8 +96,10 @@ def supply_channels(supply: SupplyCourse, time: Floats, record: Mapping[str, Flo
     return found | {"bottle_mass": (supply.first.mass - record["line_state.regulated_mass"], "kg")}
 
 
-def _with_cold_gas(run: Run, supply: SupplyCourse, time: Floats) -> Run:
-    """The run with the gas of each time [s], as it was in force between two meetings of bottle and device."""
+def with_cold_gas(run: Run, supply: SupplyCourse | None, time: Floats) -> Run:
+    """The run with the gas of each time [s], as it was in force between two meetings of bottle and device, if any."""
+    if supply is None:
+        return run
     met = np.maximum(np.searchsorted(supply.times, time + 1.0e-9 * run.step, side="right") - 1, 0)
     warmth = supply.values["gas_temperature"] / supply.values["gas_temperature"][0]
     product: Any = run.plant.gas_product * warmth[np.minimum(met, supply.times.size - 2)]
@@ -107,9 +113,9 @@ def _course_channels(
 
     The healthy toes are as high as those of the gait, times the stride over the recorded one.
     """
-    assert run.walk is not None, "a walk has a leg"
-    assert run.walk.course is not None, "of a course"
-    gait, pace = walk_of(configuration).gait, pace_in_time(run.walk.course, time)
+    course = led_leg(run).course
+    assert course is not None, "of a course"
+    gait, pace = walk_of(configuration).gait, pace_in_time(course, time)
     phase, shank = record["walk.now.phase"], record["walk.now.shank"]
     healthy = path.toe_height(
         phase, truncate(gait.shank_angle).values_at(phase), truncate(gait.ankle_angle).values_at(phase)
@@ -130,10 +136,9 @@ def dorsiflexor_moment(run: Run, record: Mapping[str, Any]) -> Floats:
     What the healthy ankle needs, by its moment on the ground and by equation (11) in the swing, less tissue and T_ex.
     The literature shows the activity of the tibialis anterior in its place.
     """
-    assert run.walk is not None, "a walk has a leg"
     in_swing = record["walk.contact"] == SWING
     needed = np.where(in_swing, record["walk.now.healthy_torque"], record["walk.now.moment"])
-    tissue = passive_torque(run.walk.leg, record["walk.now.ankle"])
+    tissue = passive_torque(led_leg(run).leg, record["walk.now.ankle"])
     return np.asarray(np.maximum(tissue + record["walk.external_torque"] - needed, 0.0))
 
 
@@ -142,8 +147,7 @@ def swing_knee_torque(run: Run, time: Floats, record: Mapping[str, Any]) -> Floa
 
     There it would need the horizontal force of the ground, which a gait file does not have.
     """
-    assert run.walk is not None, "a walk has a leg"
-    leg = run.walk.leg
+    leg = led_leg(run).leg
     theta, phi = record["state.angle"], record["walk.now.shank"]
     alpha = phi - theta + 0.5 * np.pi
     rate = record["state.angular_velocity"]
@@ -228,7 +232,8 @@ def result_of_walk(scenario: Scenario, run: Run, outcome: BatchResult, supply: S
         kept = time < status.time
         kept[0] = True
         time, record = time[kept], {name: values[kept] for name, values in record.items()}
-    return _walk_result(scenario, run, time, record, status, supply)
+    found: WalkResult = walk_of(scenario).who.result(scenario, run, time, record, status, supply)
+    return found
 
 
 def measured(
@@ -236,7 +241,8 @@ def measured(
 ) -> tuple[Recording, Mapping[str, Metric], str]:
     """Recording and metrics of a walk from its rows (samples,) by path, at these times [s]; and how it ended."""
     check_no_bottle(scenario)
-    result = _walk_result(scenario, run, time, record, Status("completed", None, "completed"), None)
+    completed = Status("completed", None, "completed")
+    result: WalkResult = walk_of(scenario).who.result(scenario, run, time, record, completed, None)
     of_recording = evaluate(result.recording)
     offered = {name: metric for name, metric in of_recording.items() if not lacks(scenario, METRICS[name])}
     return result.recording, {**offered, **result.metrics}, result.status.message
@@ -247,7 +253,7 @@ def lacks(scenario: Scenario, kind: MetricKind) -> str:
     motion, control = walk_of(scenario), scenario.control.kind
     is_outside = control == PYTHON_CONTROLLER
     has_request = not is_outside and hasattr(law_of(scenario).initial, "request")
-    reacts, needs = motion.reacts is not None, kind.needs
+    subject, needs = motion.who.subject, kind.needs
     reasons = (
         (
             "reference" in kind.channels,
@@ -255,10 +261,10 @@ def lacks(scenario: Scenario, kind: MetricKind) -> str:
         ),
         (bool(kind.traced), "it needs the course of the whole run, which is not kept of a walk"),
         (LED_SHANK in needs, "it needs a leg without ground, whose shank is that of a gait"),
-        (REACTS in needs and not reacts, "it needs a wearer who reacts (wearer.reacts)"),
+        (REACTS in needs and subject != REACTS, f"it needs a neuromuscular gait model (motion.kind = '{REACT}')"),
         (
-            LED in needs and reacts,
-            "it is measured from the gait that leads a leg, and this wearer reacts: lowest_toes is over the ground",
+            LED in needs and subject != LED,
+            "it is measured from the gait that leads a leg, and none does here: lowest_toes is over the ground",
         ),
         (
             STEADY in needs and motion.course is not None,
@@ -278,7 +284,7 @@ def integral_of_a_stride(result: WalkResult, values: Floats) -> float:
     return float(np.diff(done[result.starts])[counted].mean())
 
 
-def _walk_result(
+def led_result(
     scenario: Scenario,
     run: Run,
     time: Floats,
@@ -286,8 +292,7 @@ def _walk_result(
     status: Status,
     supply: SupplyCourse | None,
 ) -> WalkResult:
-    if run.reacting is not None:
-        return _reacting_result(scenario, run, time, record, status, supply)
+    """The result of a leg that a gait leads, from its rows (samples,) by path up to where the run failed."""
     walked, motion = scenario, walk_of(scenario)
     # Whom it is healthy for is the person who walked; what was planned stays in the result.
     gait, wearer = as_drawn(motion.gait, motion.wearer, motion.person)
@@ -319,47 +324,6 @@ def _walk_result(
         vented_metrics=apart,
         events=events,
         segments=segments,
-        supply=supply,
-    )
-
-
-def _reacting_result(
-    scenario: Scenario,
-    run: Run,
-    time: Floats,
-    record: Mapping[str, Floats],
-    status: Status,
-    supply: SupplyCourse | None,
-) -> WalkResult:
-    """The result of a wearer who reacts, until the end or a fall."""
-    fall_time = float(record[FELL][-1])
-    stands = record[FELL] < 0.0
-    stands[0] = True
-    time, rows = time[stands], {path: values[stands] for path, values in record.items()}
-    recording = recording_of_reacting(
-        scenario,
-        run if supply is None else _with_cold_gas(run, supply, time),
-        time,
-        rows,
-        {} if supply is None else supply_channels(supply, time, rows),
-    )
-    starts = stride_starts(rows["walk.strides"])
-    strides = per_stride(rows, starts)
-    helped = helped_strides(rows.get(SAFE_ROW, np.zeros(time.size)), starts)
-    metrics = reacting_metrics(recording, rows, starts, strides, helped, fall_time)
-    if fall_time >= 0.0 and status.is_completed:
-        status = Status("completed", None, f"completed: the wearer fell at t = {fall_time:.4g} s")
-    return WalkResult(
-        scenario=scenario,
-        recording=recording,
-        strides=strides,
-        averages=mean_curves(recording, starts, settled(helped)),
-        metrics=Metrics(metrics),
-        status=status,
-        starts=starts,
-        helped=helped,
-        vented_metrics={},
-        events=safety_events(scenario, recording.time, rows),
         supply=supply,
     )
 

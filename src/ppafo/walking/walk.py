@@ -142,7 +142,7 @@ def _run_in_parts(batch: Batch, step: float, progress: Progress) -> BatchResult:
 class Comparison:
     """A walk with the device, the same without it, and numbers of the healthy gait by name.
 
-    Without is without a device; of a wearer who reacts it is with the device off.
+    Without is without a device; of a body that walks by itself it is with the device off.
     """
 
     with_device: WalkResult
@@ -156,7 +156,7 @@ class Comparison:
 
 
 def compare_walks(configuration: Scenario, minutes: float | None = None, progress: Progress = silent) -> Comparison:
-    """Walk ``minutes`` [min], or a whole course, with the device and without; of a wearer who reacts with it off.
+    """Walk ``minutes`` [min], or a whole course, with the device and without, as its kind of motion says.
 
     ScenarioError for bad input, SimulationError where its bottle ends the walk before there is anything to compare.
     """
@@ -171,11 +171,9 @@ def compare_walks(configuration: Scenario, minutes: float | None = None, progres
         )
     # As long as the bottle lasted, where one ended the walk.
     as_long = minutes if ending is None else float(worn.recording.time[-1]) / 60.0
-    reacts = walk_of(configuration).reacts is not None
-    other = with_device_off(configuration) if reacts else without_device(configuration)
-    bare = walk(other, as_long, progress=progress)
-    healthy = {} if reacts else healthy_metrics(configuration)
-    return Comparison(worn, bare, healthy)
+    who = walk_of(configuration).who
+    bare = walk(who.without(configuration), as_long, progress=progress)
+    return Comparison(worn, bare, who.healthy(configuration))
 
 
 def with_device_off(configuration: Scenario) -> Scenario:

@@ -16,14 +16,11 @@ from ppafo.cli.main import main
 from ppafo.engine.lanes import BatchResult, run_batch, write_source
 from ppafo.engine.rows import leaf_paths, numbers, rebuild, row_numbers
 from ppafo.engine.run import Run, batch_of
-from ppafo.engine.scheme import reacting
 from ppafo.engine.scheme.pneumatics import HeldChambers, held_chambers
 from ppafo.errors import DataError, PpafoError, ScenarioError
 from ppafo.metrics import METRICS
 from ppafo.metrics.metric import REACTS
 from ppafo.model.plant import PlantState
-from ppafo.model.wearer.nerves import Nerves
-from ppafo.model.wearer.walker import Walker
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.scenario import Scenario
@@ -34,8 +31,11 @@ from ppafo.validation.replay import Replay, replay_recording, start_of
 from ppafo.walking import load_walk, walk, walk_population
 from ppafo.walking.motion import walk_of, with_duration
 from ppafo.walking.planning import plan_walk
-from ppafo.walking.reacting import toe_heights
 from ppafo.walking.walk import with_device_off
+from ppafo.wearer import scheme as reacting
+from ppafo.wearer.model.nerves import Nerves
+from ppafo.wearer.model.walker import Walker
+from ppafo.wearer.recording import toe_heights
 
 WALK, STEP = "reacting", 1.0e-4
 WEAK = "wearer.tibialis_strength=0.1"

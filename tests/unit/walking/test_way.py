@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from ppafo.errors import ScenarioError
-from ppafo.model.wearer.way import LEVEL, NOT_PUSHED, PIECES, Push, footing, next_push, push_now
 from ppafo.walking import load_walk
-from ppafo.walking.way import EDGE, Stretch, met_by, way_of
+from ppafo.wearer.model.way import LEVEL, NOT_PUSHED, PIECES, Push, footing, next_push, push_now
+from ppafo.wearer.way import EDGE, Stretch, met_by, way_of
 
 START = Stretch("walk", 0.0, {"distance": 4.0, "slope": 0.0})
 UP = Stretch("walk", 4.0, {"distance": 2.0, "slope": 0.08})

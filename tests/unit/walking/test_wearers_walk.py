@@ -11,8 +11,8 @@ from ppafo.gait.document import load_gait
 from ppafo.signals.recording import Recording
 from ppafo.walking import load_walk, walk
 from ppafo.walking.walk import with_device_off
-from ppafo.wearers.loading import list_wearers
-from ppafo.wearers.published import WEIGHT
+from ppafo.wearer.loading import list_wearers
+from ppafo.wearer.published import WEIGHT
 
 pytestmark = pytest.mark.long
 
@@ -63,9 +63,9 @@ def mean_curve(recording: Recording, values: NDArray[np.float64]) -> NDArray[np.
 @pytest.mark.parametrize("name", SPEEDS)
 def test_a_healthy_wearer_walks_at_the_speed_of_its_file(name: str) -> None:
     """With the valves off: the push of the device makes one of them 3 % faster."""
-    speed, _, _ = mean_stride(walked(f"wearer.reacts={name}", "controller.kind=off"))
+    speed, _, _ = mean_stride(walked(f"wearer.name={name}", "controller.kind=off"))
     assert speed == pytest.approx(SPEEDS[name], rel=0.03)
-    _, time, stance = mean_stride(walked(f"wearer.reacts={name}"))
+    _, time, stance = mean_stride(walked(f"wearer.name={name}"))
     assert 0.9 < time < 1.5
     assert 0.55 < stance < 0.65
 
@@ -75,13 +75,13 @@ def test_at_half_the_step_the_mean_stride_is_within_half_a_percent_and_with_the_
     controller: str, room: float
 ) -> None:
     """Paths diverge from 1e-12 on: strides are compared, not samples."""
-    given = ("wearer.reacts=healthy-128", f"controller.kind={controller}")
+    given = ("wearer.name=healthy-128", f"controller.kind={controller}")
     whole, half = (mean_stride(walked(*given, f"run.step={step} ms")) for step in (0.1, 0.05))
     assert half == pytest.approx(whole, rel=room)
 
 
 def test_curves_of_a_stride_are_as_close_to_a_measured_gait_as_those_of_the_publication() -> None:
-    recording, gait = walked("wearer.reacts=healthy-128"), load_gait()
+    recording, gait = walked("wearer.name=healthy-128"), load_gait()
     place = np.linspace(0.0, 1.0, 101)
     # The wearer's impacts last for 2 ms: what a force plate shows after its filter.
     force = np.convolve(channel(recording, "ground_force") / WEIGHT, np.ones(20) / 20.0, "same")
@@ -104,5 +104,5 @@ def test_curves_of_a_stride_are_as_close_to_a_measured_gait_as_those_of_the_publ
 @pytest.mark.parametrize(("strength", "stays"), [(0.5, 1.0), (0.25, 1.0), (0.1, 0.0)])
 def test_a_weak_tibialis_makes_a_wearer_fall_whose_device_is_off(strength: float, stays: float) -> None:
     """The trial of this model fell at 20 % and below."""
-    overrides = ["wearer.reacts=healthy-128", f"wearer.tibialis_strength={strength}", "run.duration=20 s"]
+    overrides = ["wearer.name=healthy-128", f"wearer.tibialis_strength={strength}", "run.duration=20 s"]
     assert walk(with_device_off(load_walk("reacting", overrides))).metrics["stays_up"].value == stays

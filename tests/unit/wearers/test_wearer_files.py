@@ -7,9 +7,9 @@ import pytest
 
 from ppafo.engine.rows import numbers
 from ppafo.errors import DataError
-from ppafo.model.wearer.walker import Assist, next_walker
-from ppafo.wearers.loading import find_wearer, list_wearers, wearer_of
-from ppafo.wearers.published import felt_at, first_answer, start_of, start_with_size, with_size
+from ppafo.wearer.loading import find_wearer, list_wearers, wearer_of
+from ppafo.wearer.model.walker import Assist, next_walker
+from ppafo.wearer.published import felt_at, first_answer, start_of, start_with_size, with_size
 
 HEALTHY = tuple(name for name in list_wearers() if name.startswith("healthy-"))
 

@@ -106,7 +106,7 @@ def _walked_to_its_end(carried: Scenario, at_set_pressure: Draw, schedule: Sched
     assert supply is not None, "a walk on a bottle"
     check_schedule(schedule)
     life = bottle_life(carried, schedule)
-    if walk_of(carried).reacts is not None:  # whose strides no gait sets
+    if not walk_of(carried).is_led:  # whose strides no gait sets
         life = replace(life, repeats=life.walked / at_set_pressure.stride_time)
     strides = max(life.repeats, 1.0e-9)
     stride_time = life.walked / strides

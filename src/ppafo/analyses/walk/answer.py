@@ -20,8 +20,8 @@ from ppafo.analyses.walk.course import (
     trust_remark,
 )
 from ppafo.analyses.walk.document import versions, walk_data, walk_document
-from ppafo.analyses.walk.reacting import reacting_answer
 from ppafo.analyses.walk.safety import over_time_sections, safety_remarks
+from ppafo.kinds import kind_at
 from ppafo.metrics import Metric
 from ppafo.metrics.strides import PER_STRIDE
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE
@@ -214,20 +214,20 @@ _LIMITS = (
 
 def answer_of(solved: WalkPair | Wearers) -> Answer:
     """Return the answer of one wearer's walks, or of many wearers."""
-    if isinstance(solved, WalkPair) and walk_of(solved.comparison.with_device.scenario).reacts is not None:
-        return reacting_answer(solved.comparison)
-    return wearers_answer(solved.population) if isinstance(solved, Wearers) else _pair_answer(solved)
+    if isinstance(solved, Wearers):
+        return wearers_answer(solved.population)
+    made: Answer = kind_at(walk_of(solved.comparison.with_device.scenario).who.answer)(solved.comparison)
+    return made
 
 
-def _pair_answer(pair: WalkPair) -> Answer:
+def pair_answer(comparison: Comparison) -> Answer:
     """Return the answer of a walk; one that diverged has numbers and no pictures, and has not passed."""
-    comparison = pair.comparison
     worn, bare = comparison.with_device, comparison.without_device
     configuration, walked = worn.scenario, walk_of(worn.scenario)
     strides = f"{worn.metrics['strides'].value:.0f} strides" if "strides" in worn.metrics else "no strides"
     remarks = [
         *person_remarks(configuration),
-        _bottle(pair),
+        _bottle(comparison),
         *safety_remarks(worn),
         trust_remark(configuration),
     ]
@@ -335,9 +335,9 @@ def _assumptions_section(assumed: Mapping[str, str]) -> tuple[Section, ...]:
     return (Section("What is assumed", table=table, is_detail=True),)
 
 
-def _bottle(pair: WalkPair) -> str:
+def _bottle(comparison: Comparison) -> str:
     """Return how long the bottle of the walk lasts and what ended it, or how to see that; empty without gas."""
-    worn = pair.comparison.with_device
+    worn = comparison.with_device
     if worn.supply is not None:
         return bottle_remark(worn)
     gas = worn.metrics.get("gas")

@@ -59,7 +59,7 @@ def bottle_remark(worn: WalkResult) -> str:
 def _walked(worn: WalkResult, seconds: float) -> str:
     """Return how many strides were walked in a time [s], as ``ppafo bottle`` counts; of a course the whole ones."""
     motion = walk_of(worn.scenario)
-    if motion.course is not None or motion.reacts is not None:
+    if motion.course is not None or not motion.is_led:
         return f"after {worn.helped.size} whole strides"
     return (
         f"{strides_text(seconds / motion.gait.stride_time)} strides, {worn.helped.size} of them whole between strikes"

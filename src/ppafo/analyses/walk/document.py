@@ -7,7 +7,7 @@ import numpy as np
 
 from ppafo.simulation.scenario import UNITS, Scenario, plain
 from ppafo.version import __version__
-from ppafo.walking.motion import WalkMotion, walk_of
+from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import sensor_settings
 from ppafo.walking.walk import Comparison
 
@@ -42,7 +42,7 @@ def walk_document(scenario: Scenario) -> dict[str, Any]:
         "name": scenario.name,
         "description": scenario.description,
         "device": plain(scenario.device),
-        **_who_walks(motion),
+        **motion.who.document(motion),
         "controller": control.kind,
         "timing": motion.timing,
         "settings": plain(control.settings),
@@ -56,18 +56,4 @@ def walk_document(scenario: Scenario) -> dict[str, Any]:
         "file": origin.file,
         "overrides": list(origin.overrides),
         "content": origin.content,
-    }
-
-
-def _who_walks(motion: WalkMotion) -> dict[str, Any]:
-    """Return the prescribed gait and body, or the name and numbers of a wearer who reacts, and the course of either."""
-    reacts = motion.reacts
-    if reacts is not None:
-        who = {"name": reacts.name, "numbers": plain(dict(reacts.settings))}
-        return {"wearer": who, "course": plain(reacts.course)}
-    return {
-        "gait": plain(motion.gait),
-        "wearer": plain(motion.wearer),
-        "wearer_origin": motion.wearer_origin,
-        "course": plain(motion.course),
     }

@@ -16,6 +16,7 @@ from ppafo.engine.source_text import Collector
 from ppafo.exports import filled, in_comment, in_markdown, licence, template
 from ppafo.exports.c_library.boundary import Boundary
 from ppafo.exports.c_library.program import ExportedProgram, Further, c_text_of_run
+from ppafo.kinds import kind_at
 from ppafo.metrics import METRICS
 from ppafo.model.catalog import VALVES
 from ppafo.model.declaration import Quantity
@@ -410,20 +411,7 @@ def words_of_walk(configuration: Scenario, links: Graph, failing: "Mapping[str, 
     from ppafo.walking.planning import has_ideal_sensors
 
     motion = walk_of(configuration)
-    if motion.reacts is None:
-        gait, course = motion.gait, motion.course
-        way = "stride after equal stride" if course is None else f"the course `{course.name}`, which stays as it is"
-        led = [
-            f"the gait, `{gait.name}`: its series, its events and its stride of "
-            f"{gait.stride_time:.4g} s are numbers in the source",
-            f"how it is walked: {way}",
-        ]
-        precomputed = "the gait alone" if course is None else "the gait and its course alone"
-    else:
-        led = [
-            f"the wearer, `{motion.reacts.name}`: its body and muscles are numbers in the source, its gains settings"
-        ]
-        precomputed = "the body alone"
+    led, precomputed = kind_at(motion.who.exported).words(motion)
     fixed = [
         *led,
         f"the valve, `{configuration.device.valve.kind}`, and the controller, `{configuration.control.kind}`",

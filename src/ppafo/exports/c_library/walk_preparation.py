@@ -1,20 +1,19 @@
 """From the settings of a walk to the numbers of a run: one composed function, which calls those of the planning.
 
-What a gait comes to (series, events, how its heel rolls) and a course in time are numbers written out, and so are the
-body of a wearer who reacts and the pose in which it begins.
+What a gait comes to (series, events, how its heel rolls) and a course in time are numbers written out.
 """
 
-from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
 
-from ppafo.constants import STANDARD_GRAVITY
 from ppafo.control.walking.catalog import walking_controllers
 from ppafo.engine.program import Program
 from ppafo.engine.source_text import Collector
 from ppafo.errors import ScenarioError
 from ppafo.exports.c_library.boundary import Boundary
 from ppafo.exports.c_library.files import Relation, Setting, c_identifier
-from ppafo.exports.c_library.preparation import SAID, Writing, Written, declared_settings
+from ppafo.exports.c_library.preparation import SAID, Writing, declared_settings
+from ppafo.kinds import kind_at
 from ppafo.model.declaration import Quantity
 from ppafo.model.gait import gait_at
 from ppafo.model.plant_faults import POWERED
@@ -26,9 +25,9 @@ from ppafo.simulation.numbers import device_numbers, number_at
 from ppafo.simulation.plan import profile_parameters
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.course import flat_foot
-from ppafo.walking.declaration import PERSON, STEP, fault_numbers
+from ppafo.walking.declaration import PERSON, fault_numbers
 from ppafo.walking.gait_series import fit_rocker, gait_series, gait_timing
-from ppafo.walking.motion import interval_of, walk_of
+from ppafo.walking.motion import WalkMotion, walk_of
 from ppafo.walking.planning import NO_REFERENCE, course_of_walk, failing_of, law_of, sensor_settings
 from ppafo.walking.preparation import (
     DISTORTED,
@@ -48,9 +47,7 @@ from ppafo.walking.preparation import (
     walk_from_strike,
     walk_step_counts,
     with_leg,
-    without_leg,
 )
-from ppafo.walking.reacting_wearer import REACTIONS, STEP_OF_BODY, ReactingWearer, start_of_body
 from ppafo.walking.wearer import WEARER, leg_parameters
 
 _FORCES = ("force_bandwidth", "force_noise", "force_resolution", "lost_share")
@@ -76,6 +73,19 @@ _RELATIONS = (
     ("controller.peak_time", "at least", "controller.push_off_start"),
 )
 """Contradictions of a walk file between two numbers; those with a third, or with the gait, are left to the caller."""
+
+
+@dataclass(frozen=True, slots=True)
+class ExportedWalk:
+    """What an exported library has for a kind of walk.
+
+    ``leg`` are lines that make the leg and the plant with it, ``start`` those of the states at the start; ``words``
+    say of the motion what is fixed in the source, and of what a library has precomputed numbers.
+    """
+
+    leg: Callable[[Scenario, Writing], Iterator[str]]
+    start: Callable[[Scenario, Writing], Iterator[str]]
+    words: Callable[[WalkMotion], tuple[tuple[str, ...], str]]
 
 
 def check_can_leave(configuration: Scenario) -> None:
@@ -106,16 +116,15 @@ def _numbers(configuration: Scenario) -> dict[str, tuple[Quantity, float]]:
     of_run = {
         "run.duration": duration,
         "run.step": configuration.time_step,
-        "run.output_interval": interval_of(configuration)(duration),
+        "run.output_interval": walk_of(configuration).who.interval(duration),
     }
     times, control = of_run | {"controller.period": configuration.control.period}, _control(configuration)
-    reacts = walk_of(configuration).reacts is not None
-    step = STEP_OF_BODY if reacts else STEP
-    declared = declared_settings(configuration) | control | {f"run.{item.name}": item for item in (*RUN, step)}
+    who = walk_of(configuration).who
+    declared = declared_settings(configuration) | control | {f"run.{item.name}": item for item in (*RUN, who.step)}
     # What fails of the plant, with its shut-off valve, is written out in the source; persons are drawn in Python.
     fixed = ("shut_off.", *(f"faults.{part}." for part in walk_of(configuration).broken), f"wearer.{PERSON.name}")
     # The structures of libraries have the times behind the device.
-    wearer = (f"wearer.{item.name}" for item in (REACTIONS if reacts else WEARER))
+    wearer = (f"wearer.{item.name}" for item in who.numbers)
     paths = dict.fromkeys((*device_numbers(configuration.device), *of_run, *wearer, *times, *control, *declared))
     return {
         path: (declared[path], times[path] if path in times else number_at(configuration, path))
@@ -140,7 +149,7 @@ def _control(configuration: Scenario) -> dict[str, Quantity]:
 def links_of_walk(configuration: Scenario) -> Graph:
     """What follows other settings of a walk as long as nobody changes it."""
     known = _numbers(configuration)
-    recorded = {"run.output_interval": (Follows((Term(("run.duration",), interval_of(configuration)),)),)}
+    recorded = {"run.output_interval": (Follows((Term(("run.duration",), walk_of(configuration).who.interval),)),)}
     # A plant alone has no settings of the controller that its walk had.
     links = {path: links for path, links in {**configuration.graph, **recorded}.items() if path in known}
     return holding(links, lambda path: known[path][1])
@@ -166,16 +175,16 @@ def relations_of_walk(configuration: Scenario) -> tuple[Relation, ...]:
 def preparation_of_walk(configuration: Scenario, program: Program, collector: Collector, boundary: Boundary) -> str:
     """The composed function ``prepare`` of a walk, once everything it calls is gathered."""
     writing = Writing(configuration.device, configuration.supply_lines, program, collector)
-    reacts = walk_of(configuration).reacts
+    form: ExportedWalk = kind_at(walk_of(configuration).who.exported)
     lines = [
         *writing.plant("bare", "0.0"),
-        *(_leg(configuration, writing) if reacts is None else _body(reacts, writing)),
+        *form.leg(configuration, writing),
         *_gait_sensors(configuration, writing),
         *_plant_faults(configuration, writing),
         *_steps(configuration, writing),
         *writing.timing("signal_delay"),
         *_pieces(configuration, writing),
-        *(_start(configuration, writing) if reacts is None else _body_at_start(reacts, writing)),
+        *form.start(configuration, writing),
         *writing.start(),
     ]
     return writing.text(settings_of_walk(configuration), lines, boundary)
@@ -265,24 +274,16 @@ def _start(configuration: Scenario, writing: Writing) -> Iterator[str]:
     yield f"state = {add(vented_state)}(plant, walk.now.ankle, walk.now.ankle_rate)"
 
 
-def _body(reacts: ReactingWearer, writing: Writing) -> Iterator[str]:
-    """Lines that make the body of a wearer who reacts, its share of the device and the plant without a leg."""
-    add = writing.add
-    yield f"share = {add(device_share)}(bare, {STANDARD_GRAVITY!r})"
-    yield f"plant = {add(without_leg)}(bare)"
-    yield f"wearer = {writing.constant(_as_settings(reacts).row(), 'wearer')}"
+def _words(motion: WalkMotion) -> tuple[tuple[str, ...], str]:
+    gait, course = motion.gait, motion.course
+    way = "stride after equal stride" if course is None else f"the course `{course.name}`, which stays as it is"
+    led = (
+        f"the gait, `{gait.name}`: its series, its events and its stride of "
+        f"{gait.stride_time:.4g} s are numbers in the source",
+        f"how it is walked: {way}",
+    )
+    return led, "the gait alone" if course is None else "the gait and its course alone"
 
 
-def _as_settings(reacts: ReactingWearer) -> ReactingWearer:
-    """The wearer whose numbers are those that the settings of a library have."""
-    return replace(reacts, settings={name: Written(c_identifier(f"wearer.{name}")) for name in reacts.settings})
-
-
-def _body_at_start(reacts: ReactingWearer, writing: Writing) -> Iterator[str]:
-    """Lines that make the states at the start of a wearer who reacts."""
-    add, start = writing.add, start_of_body(_as_settings(reacts))
-    rows = {"walk": start.walk, "walker": start.walker, "reflexes": start.reflexes, "nerves": start.nerves}
-    for name, row in rows.items():
-        yield f"{name} = {writing.constant(row, name)}"
-    yield f"gait_seen = {writing.constant(NOTHING_SEEN, 'gait_seen')}"
-    yield f"state = {add(vented_state)}(plant, {start.ankle!r}, 0.0)"
+LED_WALK = ExportedWalk(_leg, _start, _words)
+"""The walk along a prescribed gait."""

@@ -21,6 +21,7 @@ from ppafo.simulation.accuracy import unchanged
 from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, Clock
 from ppafo.simulation.declaration import limits, quantity_text
 from ppafo.simulation.motion import TOLERANCE, profile_problem
+from ppafo.simulation.motion_kind import MotionKind
 from ppafo.simulation.numbers import (
     LOCKED_ANGLE,
     TIMES,
@@ -33,7 +34,7 @@ from ppafo.simulation.numbers import (
     varied_scenario,
 )
 from ppafo.simulation.plan import plan_runs, profile_bounds
-from ppafo.simulation.scenario import FreeMotion, MotionKind, ProfileChoice, Scenario, vane_motion, worn_kind
+from ppafo.simulation.scenario import FreeMotion, ProfileChoice, Scenario, vane_motion, worn_kind
 
 _WHOLE = ("sensors.seed", "wearer.person")
 

@@ -6,13 +6,13 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from ppafo.analyses.walk.reacting import likeness
 from ppafo.gait.document import load_gait
 from ppafo.model.contact import FLAT
 from ppafo.walking import load_walk, walk
 from ppafo.walking.motion import with_duration
 from ppafo.walking.result import WalkResult
 from ppafo.walking.strides import PHASES, Curves
+from ppafo.wearer.answer import likeness
 
 
 class Planted:
@@ -42,7 +42,7 @@ def test_a_planted_delay_and_a_planted_difference_are_found() -> None:
 @pytest.mark.long
 def test_the_moment_on_the_ankle_is_that_of_the_ground_under_a_flat_foot() -> None:
     """The foot is light: what muscles and device give together, the ground takes at heel and ball."""
-    scenario = with_duration(load_walk("reacting", ["wearer.reacts=healthy-128"]), 6.0)
+    scenario = with_duration(load_walk("reacting", ["wearer.name=healthy-128"]), 6.0)
     record = walk(replace(scenario, output_interval=1e-3)).recording
     foot = 0.16 * record["toe_force"] - 0.04 * record["heel_force"]
     given = record["wearer_ankle_moment"] + record["external_torque"]

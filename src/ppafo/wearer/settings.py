@@ -9,20 +9,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from ppafo.engine.scheme.reacting import STANDING, ReactingState, Reflexes, WalkNow
 from ppafo.engine.scheme.walking import NO_CLEARANCE
 from ppafo.errors import DataError, ScenarioError, refused_as
 from ppafo.model.contact import FLAT
 from ppafo.model.declaration import Quantity
-from ppafo.model.wearer.nerves import Nerves, settled_nerves
-from ppafo.model.wearer.reflexes import Gains
-from ppafo.model.wearer.segments import Limb, Pose
-from ppafo.model.wearer.walker import Fibres, Walker, Wearer, joints
-from ppafo.model.wearer.way import NOT_PUSHED
 from ppafo.simulation.declaration import Reading, value_at
+from ppafo.simulation.motion_kind import REACT
 from ppafo.walking.course import WalkingCourse
-from ppafo.walking.way import OF_THE_WAY, Stretch, stretches_of_course, stretches_of_settings, way_of
-from ppafo.wearers.loading import (
+from ppafo.walking.motion import WalkMotion
+from ppafo.wearer.loading import (
     FASTEST_START,
     IN_RADIANS,
     LARGEST_GAINS,
@@ -32,10 +27,19 @@ from ppafo.wearers.loading import (
     wearer_of,
     with_strengths,
 )
-from ppafo.wearers.published import felt_at, first_answer, start_of, start_with_size, with_size
+from ppafo.wearer.model.nerves import Nerves, settled_nerves
+from ppafo.wearer.model.reflexes import Gains
+from ppafo.wearer.model.segments import Limb, Pose
+from ppafo.wearer.model.walker import Fibres, Walker, Wearer, joints
+from ppafo.wearer.model.way import NOT_PUSHED
+from ppafo.wearer.published import felt_at, first_answer, start_of, start_with_size, with_size
+from ppafo.wearer.scheme import STANDING, ReactingState, Reflexes, WalkNow
+from ppafo.wearer.way import OF_THE_WAY, Stretch, stretches_of_course, stretches_of_settings, way_of
 
-REACTS = "wearer.reacts"
-"""Where the file of a walk names a wearer who reacts."""
+NAME = "wearer.name"
+"""Where the file of a walk names the wearer."""
+DEFAULT_NAME = "healthy-128"
+NAME_SUMMARY = f"name of a wearer of the package, or the path of its file; {DEFAULT_NAME} unless given"
 
 STRENGTHS = tuple(
     Quantity(
@@ -127,6 +131,12 @@ class ReactingWearer:
         return with_size(body, own[LENGTH_RATIO.name], own[MASS_RATIO.name])
 
 
+def wearer_of_walk(motion: WalkMotion) -> ReactingWearer:
+    """Return the body that walks."""
+    assert isinstance(motion.body, ReactingWearer), "the walk of a neuromuscular gait model"
+    return motion.body
+
+
 @dataclass(frozen=True, slots=True)
 class BodyStart:
     """Where a wearer begins: body, reflexes, nerves, and of the left leg ankle [rad] and what counts the strides."""
@@ -193,34 +203,24 @@ def _check_way(reading: Reading, given: Mapping[str, Any], course: WalkingCourse
 
 def read_reacting(
     reading: Reading, folder: Path, instead: Mapping[str, str], course: WalkingCourse | None
-) -> ReactingWearer | None:
-    """Return the wearer who reacts of the file of a walk, None where its gait is prescribed.
+) -> ReactingWearer:
+    """Return the wearer who reacts of the file of a walk.
 
     A relative path begins in ``folder``; ``instead`` has the files that options name in place of those of the
-    document. ScenarioError for what does not go with a wearer who reacts, or needs one;
+    document. ScenarioError for what does not go with a wearer who reacts;
     DataError for a file that cannot be used.
     """
-    name = value_at(reading.document, REACTS)
+    name = value_at(reading.document, NAME) or DEFAULT_NAME
     given = reading.document.get("wearer", {})
-    if name is None:
-        for item in REACTIONS:
-            if item.name in given:
-                raise reading.refusal(f"wearer.{item.name}", f'needs a wearer who reacts: give {REACTS} = "NAME"')
-        return None
     if "gait" in instead:
-        raise ScenarioError(f"{reading.file}: gait '{instead['gait']}' does not go with {REACTS} yet: leave it out")
+        raise ScenarioError(
+            f"{reading.file}: gait '{instead['gait']}' does not go with motion.kind = '{REACT}' yet: leave it out"
+        )
     if "gait" in reading.document:
-        raise reading.refusal("gait", f"does not go with {REACTS} yet: leave one of both out")
+        raise reading.refusal("gait", f"does not go with motion.kind = '{REACT}' yet: leave it out")
     if course is not None:
         _check_way(reading, given, course)
-    known = {item.name for item in REACTIONS} | {"reacts"}
-    for name_given in given:
-        if name_given not in known:
-            words = f"{', '.join(item.name for item in (*STRENGTHS, START_SPEED))} and gains such as {GAINS[0].name}"
-            raise reading.refusal(
-                f"wearer.{name_given}", f"is of a leg that a gait leads; a wearer who reacts has {words}"
-            )
-    with refused_as(DataError, reading.quote(REACTS), DataError):
+    with refused_as(DataError, reading.quote(NAME), DataError):
         file = find_wearer(folder / name if Path(name).suffix == ".toml" else name)
     own = {f"left_{name}": value for name, value in file.left_gains._asdict().items()}
     own |= {f"right_{name}": value for name, value in file.right_gains._asdict().items()}

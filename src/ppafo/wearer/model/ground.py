@@ -7,7 +7,7 @@ slope forces are normal to the ground and along it; a point that passes to anoth
 
 from typing import NamedTuple
 
-from ppafo.model.wearer.way import Footing
+from ppafo.wearer.model.way import Footing
 
 
 class Ground(NamedTuple):

@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from ppafo.model.wearer.metabolic import (
+from ppafo.wearer.model.metabolic import (
     Work,
     bhargava_2004,
     mass_of,
@@ -14,7 +14,7 @@ from ppafo.model.wearer.metabolic import (
     umberger_2010,
     work_of,
 )
-from ppafo.model.wearer.muscle import Fibre, Muscle, force_at, lengthening, next_fibre
+from ppafo.wearer.model.muscle import Fibre, Muscle, force_at, lengthening, next_fibre
 
 SLOW = Muscle(force=4000.0, optimum=0.04, velocity=6.0, slack=0.26, slow=1.0)
 FAST = SLOW._replace(slow=0.0, velocity=12.0)

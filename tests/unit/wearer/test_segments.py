@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ppafo.model.wearer.segments import (
+from ppafo.wearer.model.segments import (
     Body,
     Damping,
     Limb,

@@ -11,24 +11,36 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.engine.lane_samples import WEARER_ROWS
+from ppafo.engine.lane_samples import FELL, WEARER_ROWS
 from ppafo.engine.lanes import Floats
 from ppafo.engine.run import Run
 from ppafo.metrics import Metric
-from ppafo.metrics.metric import Readings
+from ppafo.metrics.metric import Metrics, Readings
 from ppafo.metrics.strides import PER_STRIDE, SETTLING
 from ppafo.metrics.wearer import METER, WearerTotals
 from ppafo.metrics.wearer import METRICS as OF_WEARER
-from ppafo.model.wearer.muscle import Fibre
-from ppafo.model.wearer.segments import Limb
-from ppafo.model.wearer.walker import Fibres, Joints, Wearer, end_of_joint, joints, pull
-from ppafo.model.wearer.way import footing
 from ppafo.signals import Channel, Recording
 from ppafo.signals.meter import WearerSample
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.simulate import gas_channels
+from ppafo.simulation.simulate import Status, gas_channels
+from ppafo.walking.bottle import SupplyCourse
 from ppafo.walking.channels import Channels, actuator_channels, controller_channels, valve_and_ground_channels
-from ppafo.walking.strides import counts_of_strides, first_less_help
+from ppafo.walking.events import SAFE_ROW, safety_events
+from ppafo.walking.result import WalkResult, supply_channels, with_cold_gas
+from ppafo.walking.strides import (
+    counts_of_strides,
+    first_less_help,
+    helped_strides,
+    mean_curves,
+    per_stride,
+    settled,
+    stride_starts,
+)
+from ppafo.wearer.model.muscle import Fibre
+from ppafo.wearer.model.segments import Limb
+from ppafo.wearer.model.walker import Fibres, Joints, Wearer, end_of_joint, joints, pull
+from ppafo.wearer.model.way import footing
+from ppafo.wearer.scheme import ReactingWalk
 
 
 def recording_of_reacting(
@@ -39,8 +51,8 @@ def recording_of_reacting(
     of_bottle: Mapping[str, tuple[Floats, str]],
 ) -> Recording:
     """The recording of a wearer who reacts [SI] from rows (samples,) by path, with the channels of a bottle."""
-    assert run.reacting is not None, "of a wearer who reacts"
-    weight = run.reacting.body.weight
+    assert isinstance(run.walk, ReactingWalk), "the walk of a neuromuscular gait model"
+    body = run.walk.body
     left, right = (angles_of(record, side) for side in ("left", "right"))
     channels: Channels = {
         "angle": (record["state.angle"], "rad"),
@@ -54,12 +66,12 @@ def recording_of_reacting(
         "trunk_lean": (record["walker.pose.lean"], "rad"),
         "hip_height": (record["walker.pose.y"], "m"),
         "hip_position": (record["walker.pose.x"], "m"),
-        "ground_force": (weight * record["walk.load"], "N"),
-        "other_ground_force": (weight * record["walk.other_load"], "N"),
+        "ground_force": (body.weight * record["walk.load"], "N"),
+        "other_ground_force": (body.weight * record["walk.other_load"], "N"),
         **actuator_channels(run, record),
-        "toe_height": (toe_heights(run.reacting.body, record), "m"),
+        "toe_height": (toe_heights(body, record), "m"),
         **valve_and_ground_channels(record),
-        "wearer_ankle_moment": (ankle_moments(run.reacting.body, record, left), "N m"),
+        "wearer_ankle_moment": (ankle_moments(body, record, left), "N m"),
         "muscle_work": (record["walk.muscle_work"], "J"),
     }
     for name in Fibres._fields:
@@ -150,3 +162,44 @@ def reacting_metrics(
             found[name] = Metric(float(own.mean()), item.unit, f"{item.summary}, mean")
     found["counted_strides"] = Metric(float((counted & helped).sum()), "-", "strides over which the means are taken")
     return found | counts_of_strides(recording, helped) | first_less_help(recording)
+
+
+def reacting_result(
+    scenario: Scenario,
+    run: Run,
+    time: Floats,
+    record: Mapping[str, Floats],
+    status: Status,
+    supply: SupplyCourse | None,
+) -> WalkResult:
+    """The result of a wearer who reacts, until the end or a fall."""
+    fall_time = float(record[FELL][-1])
+    stands = record[FELL] < 0.0
+    stands[0] = True
+    time, rows = time[stands], {path: values[stands] for path, values in record.items()}
+    recording = recording_of_reacting(
+        scenario,
+        with_cold_gas(run, supply, time),
+        time,
+        rows,
+        {} if supply is None else supply_channels(supply, time, rows),
+    )
+    starts = stride_starts(rows["walk.strides"])
+    strides = per_stride(rows, starts)
+    helped = helped_strides(rows.get(SAFE_ROW, np.zeros(time.size)), starts)
+    metrics = reacting_metrics(recording, rows, starts, strides, helped, fall_time)
+    if fall_time >= 0.0 and status.is_completed:
+        status = Status("completed", None, f"completed: the wearer fell at t = {fall_time:.4g} s")
+    return WalkResult(
+        scenario=scenario,
+        recording=recording,
+        strides=strides,
+        averages=mean_curves(recording, starts, settled(helped)),
+        metrics=Metrics(metrics),
+        status=status,
+        starts=starts,
+        helped=helped,
+        vented_metrics={},
+        events=safety_events(scenario, recording.time, rows),
+        supply=supply,
+    )

@@ -6,7 +6,7 @@ sixty numbers a leg, but they move along one place in ten steps only.
 
 from typing import Annotated, NamedTuple
 
-from ppafo.model.wearer.reflexes import Balance, Felt
+from ppafo.wearer.model.reflexes import Balance, Felt
 
 SAMPLE = 1.0e-3
 """Time [s] between two samples of the nerves."""

@@ -6,10 +6,10 @@ H. Geyer and H. Herr, IEEE Trans. Neural Syst. Rehabil. Eng. 18 (2010) 263.
 from typing import NamedTuple
 
 from ppafo.model.elementary import QUARTER_TURN
-from ppafo.model.wearer.ground import Ground, Point, contact
-from ppafo.model.wearer.muscle import Fibre, Lever, Muscle, arm_and_way, next_fibre, tendon_force
-from ppafo.model.wearer.reflexes import Balance, Felt, Gains, Gait, Stimulation, next_gait, stimulation
-from ppafo.model.wearer.segments import (
+from ppafo.wearer.model.ground import Ground, Point, contact
+from ppafo.wearer.model.muscle import Fibre, Lever, Muscle, arm_and_way, next_fibre, tendon_force
+from ppafo.wearer.model.reflexes import Balance, Felt, Gains, Gait, Stimulation, next_gait, stimulation
+from ppafo.wearer.model.segments import (
     Body,
     Damping,
     LegMatrix,
@@ -20,7 +20,7 @@ from ppafo.model.wearer.segments import (
     freed,
     leg_matrix,
 )
-from ppafo.model.wearer.way import Way, footing
+from ppafo.wearer.model.way import Way, footing
 
 HALF_TURN = 3.141592653589793
 

@@ -7,9 +7,9 @@ Biomed. Eng. 6 (2003) 99; L. J. Bhargava, M. G. Pandy and F. C. Anderson, J. Bio
 from typing import NamedTuple
 
 from ppafo.model.elementary import sine_and_cosine_of_turns
-from ppafo.model.wearer.muscle import Fibre, Muscle, bell, force_at
-from ppafo.model.wearer.reflexes import Stimulation
-from ppafo.model.wearer.walker import Fibres, Muscles
+from ppafo.wearer.model.muscle import Fibre, Muscle, bell, force_at
+from ppafo.wearer.model.reflexes import Stimulation
+from ppafo.wearer.model.walker import Fibres, Muscles
 
 DENSITY, TENSION = 1059.7, 0.25e6
 """Of muscle [kg/m^3], and its largest stress [Pa]: Umberger 2003."""

@@ -8,11 +8,11 @@ import math
 from typing import Any
 
 from ppafo.model.elementary import QUARTER_TURN
-from ppafo.model.wearer.ground import Ground, Point
-from ppafo.model.wearer.muscle import Fibre, Lever, Muscle
-from ppafo.model.wearer.reflexes import Balance, Felt, Gains, Gait, Stimulation
-from ppafo.model.wearer.segments import Body, Limb, Pose, Segment
-from ppafo.model.wearer.walker import (
+from ppafo.wearer.model.ground import Ground, Point
+from ppafo.wearer.model.muscle import Fibre, Lever, Muscle
+from ppafo.wearer.model.reflexes import Balance, Felt, Gains, Gait, Stimulation
+from ppafo.wearer.model.segments import Body, Limb, Pose, Segment
+from ppafo.wearer.model.walker import (
     HALF_TURN,
     Answer,
     Assist,
@@ -27,7 +27,7 @@ from ppafo.model.wearer.walker import (
     leg_now,
     pull,
 )
-from ppafo.model.wearer.way import LEVEL
+from ppafo.wearer.model.way import LEVEL
 
 GRAVITY = 9.81
 """m/s^2, as the publication takes it."""

@@ -12,10 +12,10 @@ from pydantic import BaseModel, Field
 from ppafo.documents.models import NAME, QUANTITY, make_schema, optional, quote, read_model, table
 from ppafo.documents.toml_text import TomlKind, beside
 from ppafo.errors import DataError, UnitError, refused_as
-from ppafo.model.wearer.reflexes import Gains
-from ppafo.model.wearer.walker import Fibres, Muscles, Wearer
 from ppafo.units import parse_quantity
-from ppafo.wearers.published import published_wearer
+from ppafo.wearer.model.reflexes import Gains
+from ppafo.wearer.model.walker import Fibres, Muscles, Wearer
+from ppafo.wearer.published import published_wearer
 
 NOT_PUBLISHED = ("soleus_stretch", "gastrocnemius_stretch")
 """Gains that a file may leave out: they are 0 but in a spastic leg."""
@@ -30,7 +30,7 @@ SLOWEST_START, FASTEST_START = 0.5, 2.0
 PUBLISHED = "geyer-herr"
 """The wearer that is taken where none is named."""
 
-_FILE = TomlKind("wearer", "wearer", resources.files("ppafo") / "wearers" / "files", DataError)
+_FILE = TomlKind("wearer", "wearer", resources.files("ppafo.wearer") / "files", DataError)
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ pressures at its begin, and the ankle that the gas sees is the body's. Device an
 step, which is 0.1 ms long. What sensors, faults, controllers and metrics read of a walk has the same names in both.
 """
 
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from ppafo.engine.components import LegScheme, Phases, RarePhase
@@ -13,15 +14,15 @@ from ppafo.engine.scheme.pneumatics import HeldChambers, held_chambers, held_pre
 from ppafo.engine.scheme.walking import NO_CLEARANCE, DeviceShare
 from ppafo.model.contact import FLAT, HEEL, SWING, TOE
 from ppafo.model.plant import PlantParameters, PlantState, actuator_torque
-from ppafo.model.plant_faults import PlantFaults, ShutOff, Unpowered
+from ppafo.model.plant_faults import POWERED, PlantFaults, ShutOff, Unpowered
 from ppafo.model.ports import friction_in_motion
-from ppafo.model.sensors import GaitSeen, GaitSensors
-from ppafo.model.wearer.metabolic import rates_of_leg
-from ppafo.model.wearer.muscle import Fibre, Muscle, tendon_force
-from ppafo.model.wearer.nerves import SAMPLE, LegNerves, Nerves, arrived, balance_arrived, next_nerves
-from ppafo.model.wearer.reflexes import Balance, Felt
-from ppafo.model.wearer.segments import Limb
-from ppafo.model.wearer.walker import (
+from ppafo.model.sensors import NOTHING_SEEN, GaitSeen, GaitSensors
+from ppafo.wearer.model.metabolic import rates_of_leg
+from ppafo.wearer.model.muscle import Fibre, Muscle, tendon_force
+from ppafo.wearer.model.nerves import SAMPLE, LegNerves, Nerves, arrived, balance_arrived, next_nerves
+from ppafo.wearer.model.reflexes import Balance, Felt
+from ppafo.wearer.model.segments import Limb
+from ppafo.wearer.model.walker import (
     Answer,
     Assist,
     Fibres,
@@ -35,7 +36,7 @@ from ppafo.model.wearer.walker import (
     next_walker,
     rates_of_joints,
 )
-from ppafo.model.wearer.way import Pushed, footing, next_push, push_now
+from ppafo.wearer.model.way import Pushed, footing, next_push, push_now
 
 CREEP = 0.02
 """Rate [rad/s] below which friction of the vane grows with it, so that a step can take it implicitly."""
@@ -425,3 +426,33 @@ def _scheme(fails: bool) -> LegScheme:
 
 REACTING, FAILING_REACTING = _scheme(fails=False), _scheme(fails=True)
 """A leg of a wearer who reacts, and the same with a plant that may fail, or whose line has a shut-off valve."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReactingWalk:
+    """A body with the device on its left leg, and where all of it begins."""
+
+    share: DeviceShare
+    body: Wearer
+    sensors: GaitSensors
+    initial: ReactingState
+    walker: Walker
+    reflexes: Reflexes
+    nerves: Nerves
+    failing: tuple[PlantFaults, ShutOff] | None = None
+
+    @property
+    def scheme(self) -> LegScheme:
+        """How it goes through a step."""
+        return REACTING if self.failing is None else FAILING_REACTING
+
+    @property
+    def parameters(self) -> list[Any]:
+        """Its groups of parameters."""
+        return [self.share, self.body, self.sensors, *(self.failing or ())]
+
+    @property
+    def states(self) -> list[Any]:
+        """Its groups of states at the start."""
+        own = [self.initial, NOTHING_SEEN, self.walker, self.reflexes, self.nerves]
+        return [*own, *([] if self.failing is None else [POWERED])]

@@ -13,15 +13,15 @@ from ppafo.metrics.strides import SETTLING
 from ppafo.report import Answer, Column, Figure, Section, Table
 from ppafo.report.display_units import display_values, rounded_text, title_with_unit
 from ppafo.report.style import BLUE, GREY, VERMILION, house_style, mark_kind
-from ppafo.simulation.scenario import Scenario, plain
+from ppafo.simulation.scenario import plain
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.walking.motion import person_remarks, walk_of
-from ppafo.walking.reacting_wearer import ReactingWearer
 from ppafo.walking.result import REACTING_WALK_FORMAT, WalkResult
 from ppafo.walking.strides import PHASES
 from ppafo.walking.walk import Comparison
-from ppafo.walking.way import EDGE, met_by
+from ppafo.wearer.settings import ReactingWearer, wearer_of_walk
+from ppafo.wearer.way import EDGE, met_by
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawn
@@ -95,7 +95,7 @@ def reacting_answer(comparison: Comparison) -> Answer:
     """Return the answer; one of a wearer who falls with the device has not passed."""
     worn, bare = comparison.with_device, comparison.without_device
     scenario = worn.scenario
-    wearer = wearer_of_walk(scenario)
+    wearer = wearer_of_walk(walk_of(scenario))
     remarks = [*person_remarks(scenario), *weak_remarks(wearer), *fall_remarks(comparison)]
     remarks += [] if worn.supply is None else [bottle_remark(worn)]
     remarks += safety_remarks(worn)
@@ -153,7 +153,7 @@ class Likeness:
 
 def likeness(walked: WalkResult) -> dict[str, Likeness]:
     """Return how alike the mean stride is to the measured gait that is shipped, by curve; {} without strides."""
-    gait, wearer = load_gait(), wearer_of_walk(walked.scenario)
+    gait, wearer = load_gait(), wearer_of_walk(walk_of(walked.scenario))
     over = {"ground_force": wearer.weight, "wearer_ankle_moment": wearer.mass}
     found = {}
     for channel, curve, _ in _COMPARED:
@@ -196,13 +196,6 @@ def _likeness_section(comparison: Comparison) -> tuple[Section, ...]:
     return (Section("Compared with a measured gait", (_LIKENESS,), Table(tuple(head), tuple(rows)), is_detail=True),)
 
 
-def wearer_of_walk(scenario: Scenario) -> ReactingWearer:
-    """Return the wearer who reacts."""
-    wearer = walk_of(scenario).reacts
-    assert wearer is not None, "of a wearer who reacts"
-    return wearer
-
-
 def weak_remarks(wearer: ReactingWearer) -> list[str]:
     """Return a line on the muscles that are weaker or stronger than those of the wearer's file."""
     changed = [
@@ -225,7 +218,9 @@ def fall_remarks(comparison: Comparison) -> list[str]:
             f", and the means are of {strides:.0f} stride{'s' if strides > 1 else ''} before that" if strides else ""
         )
         if fall is not None:
-            place = met_by(wearer_of_walk(walked.scenario).stretches, float(walked.recording["hip_position"][-1]))
+            place = met_by(
+                wearer_of_walk(walk_of(walked.scenario)).stretches, float(walked.recording["hip_position"][-1])
+            )
             found.append(f"{words}: the wearer falls {place}{' ' if place else ''}at {fall.value:.1f} s{means}")
     return found
 
@@ -245,8 +240,10 @@ def reacting_table(comparison: Comparison) -> Table:
 
 def _way_section(comparison: Comparison) -> tuple[Section, ...]:
     """Return what was walked on each stretch of the way, with the device and without; nothing on level ground."""
-    stretches = [item for item in wearer_of_walk(comparison.with_device.scenario).stretches if item.kind == "walk"]
-    met = [item for item in wearer_of_walk(comparison.with_device.scenario).stretches if not item.is_plain]
+    stretches = [
+        item for item in wearer_of_walk(walk_of(comparison.with_device.scenario)).stretches if item.kind == "walk"
+    ]
+    met = [item for item in wearer_of_walk(walk_of(comparison.with_device.scenario)).stretches if not item.is_plain]
     if not met:
         return ()
     head = [Column("On the way"), Column("from (m)")]
@@ -304,7 +301,7 @@ def stride_figure(comparison: Comparison) -> "Drawn":
         handles, labels = figure.axes[4].get_legend_handles_labels()
         figure.legend(handles, labels, loc="upper center", bbox_to_anchor=(0.53, 0.955), ncols=3)
         scenario = comparison.with_device.scenario
-        title = f"{scenario.name}: {wearer_of_walk(scenario).name}, who reacts"
+        title = f"{scenario.name}: {wearer_of_walk(walk_of(scenario)).name}, who reacts"
         figure.text(0.012, 0.985, title, ha="left", va="top", fontweight="bold")
         mark_kind(figure, "simulated")
         return figure

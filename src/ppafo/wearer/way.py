@@ -12,8 +12,13 @@ import numpy as np
 
 from ppafo.errors import ScenarioError
 from ppafo.model.declaration import Quantity
-from ppafo.model.wearer.way import LEVEL, PIECES, PUSHES, UNUSED, UNUSED_PUSH, Piece, Push, Way
 from ppafo.walking.course import FORCE, HEIGHT, PUSHED_FOR, WalkingCourse
+from ppafo.wearer.model.way import LEVEL, PIECES, PUSHES, UNUSED, UNUSED_PUSH, Piece, Push, Way
+
+_REFLEXES = ("walk", "step", "push")
+"""What reflexes can do, or what can be done to them."""
+_LEVEL_START = 1.0
+"""Way [m] on level ground with which a course begins."""
 
 EDGE = 0.01
 """Length [m] of the steep piece that a step is: its edges are not sharp."""
@@ -78,6 +83,25 @@ def stretches_of_settings(settings: Mapping[str, Any]) -> tuple[Stretch, ...]:
         Stretch("walk", start + EDGE, {"distance": math.inf, "slope": settings[SLOPE.name]}),
         Stretch("push", settings[PUSH_FROM.name], push),
     )
+
+
+def check_reacting_course(course: WalkingCourse) -> None:
+    """Raise ScenarioError for what a wearer who reacts cannot do."""
+    for index, segment in enumerate(course.segments):
+        if segment.kind not in _REFLEXES:
+            raise course.refusal(
+                index,
+                "a wearer who reacts walks on, for the reflexes know nothing else; such a course has walk (with "
+                "distance and slope), step and push",
+            )
+        others = [name for name in segment.values if segment.kind == "walk" and name not in ("distance", "slope")]
+        if others:
+            raise course.refusal(
+                index, f"{others[0]}: the reflexes set the pace of a wearer who reacts: give distance, and slope"
+            )
+    first = course.segments[0]
+    if first.kind != "walk" or first.values["distance"] < _LEVEL_START or first.values.get("slope"):
+        raise course.refusal(0, f"a wearer who reacts begins with a level walk of {_LEVEL_START:g} m or more")
 
 
 def stretches_of_course(course: WalkingCourse) -> tuple[Stretch, ...]:

@@ -1,0 +1,155 @@
+"""The walk of a neuromuscular gait model as a kind of motion: reflexes move a body, with the device on its left leg."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ppafo.constants import STANDARD_GRAVITY
+from ppafo.engine.run import Run
+from ppafo.gait import Gait
+from ppafo.metrics.metric import REACTS
+from ppafo.model.columns import Problem, at
+from ppafo.parameters.graph import Graph
+from ppafo.parameters.plant import plant_parameters
+from ppafo.simulation.declaration import Reading
+from ppafo.simulation.loading import ScenarioRequest
+from ppafo.simulation.motion_kind import REACT
+from ppafo.simulation.plan import compose_run, too_many_steps
+from ppafo.simulation.scenario import Scenario, plain
+from ppafo.walking.course import WalkingCourse
+from ppafo.walking.kind import WalkKind
+from ppafo.walking.led import WALK_KIND
+from ppafo.walking.motion import WalkMotion, walk_of
+from ppafo.walking.planning import components_of_walk, failing_of, fed_device, gait_sensors_of, walk_steps
+from ppafo.walking.preparation import device_share, vented_state, without_leg
+from ppafo.walking.walk import with_device_off
+from ppafo.walking.wearer import paper_subject
+from ppafo.wearer.recording import reacting_result
+from ppafo.wearer.scheme import ReactingWalk
+from ppafo.wearer.settings import (
+    LONGEST_STEP,
+    NAME,
+    NAME_SUMMARY,
+    REACTIONS,
+    START_SPEED,
+    STEP_OF_BODY,
+    read_reacting,
+    start_of_body,
+    wearer_of_walk,
+)
+from ppafo.wearer.way import check_reacting_course, length_of
+
+SHORTEST_WAY = 6.0
+"""Shortest walk [s] on a course, unless given."""
+
+
+def plan_reacting(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
+    """As ``plan_walks``: the body begins at its start speed, with vented chambers."""
+    device, wearer = fed_device(scenario), wearer_of_walk(walk_of(scenario))
+    bare, sensors, start = plant_parameters(device), gait_sensors_of(scenario), start_of_body(wearer)
+    walk = ReactingWalk(
+        share=device_share(bare, STANDARD_GRAVITY),
+        body=wearer.row(),
+        sensors=sensors,
+        initial=start.walk,
+        walker=start.walker,
+        reflexes=start.reflexes,
+        nerves=start.nerves,
+        failing=failing_of(scenario),
+    )
+    run = compose_run(
+        components_of_walk(scenario, device, sensors),
+        without_leg(bare),
+        lambda plant: walk_steps(scenario, plant),
+        lambda plant: vented_state(plant, start.ankle, 0.0),
+        walk,
+    )
+    return run, (too_many_steps(scenario, run.step, run.step_count), _too_long(scenario))
+
+
+def _too_long(scenario: Scenario) -> Problem:
+    """A step that is too long for a body."""
+    step = scenario.time_step
+    return np.asarray(
+        step > LONGEST_STEP
+    ), lambda run: f"run.step = {at(step, run):g} s: a wearer who reacts needs {LONGEST_STEP:g} s or less"
+
+
+def _label(motion: WalkMotion) -> str:
+    wearer = wearer_of_walk(motion)
+    return f"a walk of a wearer who reacts, {wearer.name}" + (
+        "" if wearer.course is None else f", course {wearer.course.name}"
+    )
+
+
+def _read(
+    reading: Reading, request: ScenarioRequest, _gait: Gait, _is_named: bool, course: WalkingCourse | None
+) -> Mapping[str, Any]:
+    return {"wearer": paper_subject(), "body": read_reacting(reading, request.folder, request.instead, course)}
+
+
+def _links(_document: Mapping[str, Any]) -> Graph:
+    return {}
+
+
+def _interval(seconds: float) -> float:
+    # Each sample has some hundred numbers more than that of a leg along a gait.
+    return 5.0e-3 if seconds <= 61.0 else (1.0e-2 if seconds <= 601.0 else 5.0e-2)
+
+
+def _duration(motion: WalkMotion) -> float | None:
+    wearer = wearer_of_walk(motion)
+    if wearer.course is None:
+        return None
+    # The reflexes set the pace: at the speed of the start, to the next whole second.
+    return max(SHORTEST_WAY, float(math.ceil(length_of(wearer.course) / wearer.settings[START_SPEED.name])))
+
+
+def _remarks(motion: WalkMotion) -> list[str]:
+    wearer = wearer_of_walk(motion)
+    return [f"wearer: {wearer.name}, who reacts, {wearer.mass:.4g} kg; the device is on the left leg"]
+
+
+def _document(motion: WalkMotion) -> dict[str, Any]:
+    wearer = wearer_of_walk(motion)
+    return {"wearer": {"name": wearer.name, "numbers": plain(dict(wearer.settings))}, "course": plain(wearer.course)}
+
+
+def _nothing_healthy(_scenario: Scenario) -> dict[str, Any]:
+    return {}
+
+
+_PLACES = {f"wearer.{item.name}": ("motion", "body", "settings", item.name) for item in REACTIONS}
+
+REACT_KIND = replace(
+    WALK_KIND,
+    name=REACT,
+    plan=plan_reacting,
+    places=dict(WALK_KIND.places)
+    | {f"wearer.{item.name}": ("motion", "body", "settings", item.name) for item in REACTIONS},
+    walk=WalkKind(
+        name=REACT,
+        summary="the device on the left leg of a neuromuscular gait model, whose reflexes answer it",
+        label=_label,
+        numbers=REACTIONS,
+        texts={NAME: NAME_SUMMARY},
+        step=STEP_OF_BODY,
+        interval=_interval,
+        check_course=check_reacting_course,
+        read=_read,
+        links=_links,
+        duration=_duration,
+        subject=REACTS,
+        result=reacting_result,
+        remarks=_remarks,
+        document=_document,
+        without=with_device_off,
+        healthy=_nothing_healthy,
+        answer="ppafo.wearer.answer:reacting_answer",
+        exported="ppafo.wearer.export:REACTING_WALK",
+    ),
+)
+"""The motion of a scenario in which a neuromuscular gait model walks."""
