@@ -106,7 +106,7 @@ def test_the_scenario_of_the_page_loads_and_says_what_the_page_says() -> None:
     scenario = parse_scenario(blocks("write-a-scenario.md", "toml")[0].encode(), "stairs.toml")
     assert scenario.name == "stairs"
     assert isinstance(scenario.motion, PrescribedMotion)
-    assert (scenario.time_step, scenario.output_interval, scenario.control.period) == (0.001, 0.002, 0.002)
+    assert (scenario.time_step, scenario.output_interval, scenario.controller.period) == (0.001, 0.002, 0.002)
     assert [item.path for item in scenario.assumptions] == ["motion.profile.level"]
 
 
@@ -244,10 +244,10 @@ def test_the_controller_of_the_page_is_compiled_and_named_in_a_scenario(hysteres
     assert hysteresis.KIND.name not in set(CONTROLLERS)
     wide = ppafo.simulate(scenario_from_dict(content, ["controller.band=1 N m"]))
     narrow = ppafo.simulate(scenario_from_dict(content))
-    assert hysteresis.KIND.name == narrow.scenario.control.kind
+    assert hysteresis.KIND.name == narrow.scenario.controller.kind
     content["controller"] = tomllib.loads(extension("[controller]"))["controller"]
     by_module = ppafo.simulate(scenario_from_dict(content))
-    assert by_module.scenario.control.kind == "my_laws.hysteresis:KIND"
+    assert by_module.scenario.controller.kind == "my_laws.hysteresis:KIND"
     assert by_module.metrics == narrow.metrics
     assert 1 <= wide.metrics["switchings"].value < narrow.metrics["switchings"].value
 

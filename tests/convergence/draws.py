@@ -113,5 +113,5 @@ def random_scenario(seed: int) -> Scenario:
             "ramp_hold", {"start_level": 0.0, "level": level, "ramp_start": 0.0, "ramp_time": ramp_time}
         ),
         sensors=dataclasses.replace(Sensors(), delay=chance.choice([0.0, 0.0, chance.uniform(0.0, 0.005)])),
-        control=dataclasses.replace(base.control, period=chance.choice(PERIODS[experiment])),
+        controller=dataclasses.replace(base.controller, period=chance.choice(PERIODS[experiment])),
     )

@@ -39,9 +39,9 @@ def supplied_gas(run: Run) -> np.ndarray:
 def swung(name: str, is_relieving: bool, command: float, overrides: tuple[str, ...] = ()) -> Scenario:
     """A vane swung against an open valve: the chamber that is fed is squeezed above its supply twice a second."""
     scenario = load_scenario(name, (f"supply.relieving={str(is_relieving).lower()}", *overrides))
-    open_loop = dataclasses.replace(scenario.control, kind="constant", settings={"command": command})
+    open_loop = dataclasses.replace(scenario.controller, kind="constant", settings={"command": command})
     return dataclasses.replace(
-        scenario, motion=PrescribedMotion(ProfileChoice("sine", SWING)), control=open_loop, duration=1.0
+        scenario, motion=PrescribedMotion(ProfileChoice("sine", SWING)), controller=open_loop, duration=1.0
     )
 
 

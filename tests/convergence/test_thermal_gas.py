@@ -41,8 +41,8 @@ def held_and_open(command: float, pressure: float) -> Scenario:
     scenario = load_scenario(
         "torque-task-proportional", (NO_LEAK, f"initial.pressure_1={start}", f"initial.pressure_2={start}")
     )
-    control = dataclasses.replace(scenario.control, kind="constant", settings={"command": command})
-    return with_walls(dataclasses.replace(scenario, control=control, duration=0.2), 0.0)
+    control = dataclasses.replace(scenario.controller, kind="constant", settings={"command": command})
+    return with_walls(dataclasses.replace(scenario, controller=control, duration=0.2), 0.0)
 
 
 def test_adiabatic_filling_adds_the_enthalpy_of_the_source() -> None:
@@ -66,8 +66,8 @@ def compressed(step: float) -> float:
     """Largest relative departure from the isentrope of a closed chamber while the vane is swung, in steps [s]."""
     scenario = load_scenario("torque-task-proportional", (NO_LEAK,))
     swing = ProfileChoice("sine", {"level": 1.3, "amplitude": 0.6, "frequency": 2.0, "phase": 0.0})
-    shut = dataclasses.replace(scenario.control, kind="constant", settings={"command": 0.0}, period=step)
-    planned = plan_run(with_walls(dataclasses.replace(scenario, motion=PrescribedMotion(swing), control=shut), 0.0))
+    shut = dataclasses.replace(scenario.controller, kind="constant", settings={"command": 0.0}, period=step)
+    planned = plan_run(with_walls(dataclasses.replace(scenario, motion=PrescribedMotion(swing), controller=shut), 0.0))
     counts = {"steps_per_sample": 1, "step_count": round(1.0 / step), "record_every": 1}
     run = dataclasses.replace(planned, step=step, tolerance=1e9, **counts)
     states = plant_states(run, run_batch(batch_of(run)))

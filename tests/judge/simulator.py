@@ -682,13 +682,13 @@ def valve_of(scenario: Scenario) -> Valve:
 
 def law_of(scenario: Scenario, bias: float) -> Law:
     """Controller and sensors as numbers; their noise must be off."""
-    s, sensors = scenario.control.settings, scenario.sensors
+    s, sensors = scenario.controller.settings, scenario.sensors
     if sensors.angle_noise or sensors.pressure_noise:
         raise ValueError("the judge knows no noise")
     names = ("proportional_gain", "integral_gain", "derivative_gain", "derivative_filter", "anti_windup")
     gains = (s.get(name, 0.0) for name in names)
     seen = (sensors.delay, sensors.pressure_resolution, bias)
-    return Law(CONTROLLERS[scenario.control.kind], scenario.control.period, s.get("command", 0.0), *gains, *seen)
+    return Law(CONTROLLERS[scenario.controller.kind], scenario.controller.period, s.get("command", 0.0), *gains, *seen)
 
 
 def rig_of(scenario: Scenario, bias: float = 0.0, relieving: bool | None = None) -> Rig:

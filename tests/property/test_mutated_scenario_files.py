@@ -121,10 +121,10 @@ def outcome_of(content: bytes) -> Scenario | None:
 
 def assert_can_be_run(scenario: Scenario) -> None:
     """What got through keeps the promises that the engine relies on."""
-    numbers = [scenario.duration, scenario.time_step, scenario.output_interval, scenario.control.period]
+    numbers = [scenario.duration, scenario.time_step, scenario.output_interval, scenario.controller.period]
     numbers += [scenario.initial_pressure_1, scenario.initial_pressure_2]
     assert all(math.isfinite(number) and number > 0.0 for number in numbers)
-    for whole in (scenario.duration, scenario.output_interval, scenario.control.period):
+    for whole in (scenario.duration, scenario.output_interval, scenario.controller.period):
         count = whole / scenario.time_step
         assert round(count) >= 1
         assert abs(count - round(count)) < 1e-5

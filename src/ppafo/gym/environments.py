@@ -263,7 +263,7 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
         self._drawn = drawn[:, 0]
         self._trail = []
         if self.render_mode is not None:
-            self._period = self.episode().control.period * self.world.frame_skip
+            self._period = self.episode().controller.period * self.world.frame_skip
             self._remember(float(seen.errors[0]))
         return seen.observations[0], {}
 

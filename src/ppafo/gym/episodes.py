@@ -535,9 +535,9 @@ def walk_episodes(configuration: Scenario, randomise: bool, seconds: float) -> W
             raise ScenarioError(
                 f"{configuration.origin.file}: {name}: an environment does not support it; leave it out"
             )
-    settings = configuration.control.settings
+    settings = configuration.controller.settings
     if not set(TorqueProfile._fields) <= set(settings):
-        kind = configuration.control.kind
+        kind = configuration.controller.kind
         raise ScenarioError(
             f"{configuration.origin.file}: controller.kind = '{kind}' has no torque profile; event_pid has one"
         )

@@ -456,7 +456,7 @@ def _task(scenario: Scenario) -> str:
         return _WALK
     motion = vane_motion(scenario)
     if isinstance(motion, FreeMotion):
-        return _STEP if scenario.control.kind == "constant" else _TASKS["free"]
+        return _STEP if scenario.controller.kind == "constant" else _TASKS["free"]
     return _TASKS["held" if motion.profile.kind == "constant" else "prescribed"]
 
 

@@ -283,7 +283,7 @@ def rig_run(scenario: Scenario, request: Request, rate: float) -> RigRun:
     run = replace(run, plant=rig_plant(run.plant, preset))
     physics = rig_physics(device, preset)
     times = np.arange(int(scenario.duration * rate + _WHOLE) + 1, dtype=np.float64) / rate
-    is_open_loop = scenario.control.kind == _OPEN_LOOP
+    is_open_loop = scenario.controller.kind == _OPEN_LOOP
     return RigRun(
         device=device,
         run=run,

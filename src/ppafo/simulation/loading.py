@@ -116,7 +116,7 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
         motion=read_motion(reading, device, clock.duration, clock.step, request.folder),
         initial_pressure_1=_initial_pressure(reading, 0, device.supply),
         initial_pressure_2=_initial_pressure(reading, 1, device.supply),
-        control=_control(reading, clock.period),
+        controller=_control(reading, clock.period),
         reference=_reference(reading),
         sensors=_sensors(reading, clock),
         assumptions=(*read_assumptions(before, reading, hardware, request.overrides), *assumed_lines(reading)),
@@ -130,7 +130,7 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
     try:
         if scenario.thermal is not None:
             scenario.device.check_vane("gas with an energy balance")
-        if CONTROLLERS[scenario.control.kind].plan is not None:
+        if CONTROLLERS[scenario.controller.kind].plan is not None:
             scenario.device.check_vane("a controller on whole numbers")
     except ParameterError as error:
         raise _of_device(reading, error) from error

@@ -244,7 +244,7 @@ def plan_runs(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
     if worn is not None:
         planned: tuple[Run, tuple[Problem, ...]] = worn.plan(scenario)
         return planned
-    device, motion, control = scenario.device, vane_motion(scenario), scenario.control
+    device, motion, control = scenario.device, vane_motion(scenario), scenario.controller
     plant = plant_parameters(device, outside_torque(motion))
     law = None if control.kind == PYTHON_CONTROLLER else CONTROLLERS[control.kind]
     numbers, problems = _numbers_of_law(law, scenario, plant.torque_constant)
@@ -273,7 +273,7 @@ def _numbers_of_law(
     law: ControllerKind | None, scenario: Scenario, torque_constant: Any
 ) -> tuple[Mapping[str, Any], tuple[Problem, ...]]:
     """Return the numbers of a law by name, which are its settings unless it has a plan, and what may be wrong."""
-    control = scenario.control
+    control = scenario.controller
     if law is None or law.plan is None:
         return control.settings, ()
     return law.plan(control.settings, control.period, torque_constant, profile_bounds(scenario.reference))
@@ -281,7 +281,7 @@ def _numbers_of_law(
 
 def scenario_steps(scenario: Scenario, plant: PlantParameters) -> Steps:
     """The steps of a scenario: the largest that divides a sample of its controller, in parts where the error asks."""
-    counts = step_counts(scenario.duration, scenario.time_step, scenario.output_interval, scenario.control.period)
+    counts = step_counts(scenario.duration, scenario.time_step, scenario.output_interval, scenario.controller.period)
     tolerance = relative_tolerance(scenario.tolerance)
     return Steps(
         step=counts.step,

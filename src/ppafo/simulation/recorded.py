@@ -284,7 +284,7 @@ def replay_scenario(
         motion=motion or FreeMotion(start.angle, start.angular_velocity),
         initial_pressure_1=start.pressure_1,
         initial_pressure_2=start.pressure_2,
-        control=replay_control(recording),
+        controller=replay_control(recording),
         reference=ProfileChoice("constant", {"level": 0.0}),
         sensors=Sensors(),
         assumptions=(),

@@ -221,7 +221,7 @@ class Scenario:
     """A device in one experiment.
 
     Times [s]: ``time_step`` is the largest step (the engine divides it where a chamber is faster) and divides
-    ``duration``, ``output_interval`` and the sample period of ``control``. Initial pressures [Pa absolute]; the
+    ``duration``, ``output_interval`` and the sample period of ``controller``. Initial pressures [Pa absolute]; the
     reference is a torque [N m]. Without ``thermal`` the gas keeps its temperature, without ``supply_lines`` the supply
     pressures are constant, both as in the paper. ``tolerance`` is the error of a pressure over the pressure range [-]
     that the step size control keeps to. ``links`` say which numbers follow others that are varied, beside those of the
@@ -237,7 +237,7 @@ class Scenario:
     motion: VaneMotion | WornMotion
     initial_pressure_1: float
     initial_pressure_2: float
-    control: Control
+    controller: Control
     reference: ProfileChoice
     sensors: Sensors
     assumptions: tuple[Assumption, ...]
@@ -253,7 +253,7 @@ class Scenario:
             f"Scenario '{self.name}'\n"
             f"  device      {self.device.name}, valve {self.device.valve_name}\n"
             f"  motion      {self.motion.label}\n"
-            f"  controller  {self.control.label}\n"
+            f"  controller  {self.controller.label}\n"
             f"  duration    {self.duration:g} s, in steps of at most {self.time_step:g} s"
         )
 
@@ -286,7 +286,7 @@ class Scenario:
                 )
         own = ("controller.", "timing.")
         links = {path: link for path, link in self.links.items() if not path.startswith(own)}
-        return replace(self, control=Control(PYTHON_CONTROLLER, {}, self.control.period, controller), links=links)
+        return replace(self, controller=Control(PYTHON_CONTROLLER, {}, self.controller.period, controller), links=links)
 
 
 def vane_motion(scenario: Scenario) -> VaneMotion:

@@ -152,7 +152,7 @@ def on_bottle(scenario: Scenario, bottle: str | Path | None, overrides: Iterable
 
 def _walked_with(scenario: Scenario) -> tuple[Any, ...]:
     """Return what a walk on another bottle shares with a walk: all but how long it is and what it hangs on."""
-    hardware = scenario.device, scenario.supply_lines, scenario.thermal, scenario.sensors, scenario.control
+    hardware = scenario.device, scenario.supply_lines, scenario.thermal, scenario.sensors, scenario.controller
     return *hardware, scenario.time_step, replace(walk_of(scenario), bottle=None)
 
 
@@ -215,7 +215,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
         motion=motion,
         initial_pressure_1=supply.atmospheric_pressure,
         initial_pressure_2=supply.atmospheric_pressure,
-        control=_control(reading, law, device, lines, settings, links),
+        controller=_control(reading, law, device, lines, settings, links),
         reference=NO_REFERENCE,
         sensors=_sensors(reading, settings),
         assumptions=_assumed(reading, carried),

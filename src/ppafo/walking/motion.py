@@ -107,7 +107,11 @@ LONGEST_MINUTES = 60.0
 
 PLACES: Mapping[str, tuple[str, ...]] = {
     **{f"wearer.{item.name}": ("motion", "wearer", item.name) for item in WEARER},
-    **{f"timing.{item.name}": ("control", "settings", item.name) for kind in TIMINGS for item in timing_settings(kind)},
+    **{
+        f"timing.{item.name}": ("controller", "settings", item.name)
+        for kind in TIMINGS
+        for item in timing_settings(kind)
+    },
     f"wearer.{PERSON.name}": ("motion", PERSON.name),
     **{f"wearer.{item.name}": ("motion", "reacts", "settings", item.name) for item in REACTIONS},
     **{f"sensors.{name}": ("motion", "forces", name) for name in FORCES},
@@ -130,7 +134,7 @@ PLACES: Mapping[str, tuple[str, ...]] = {
 
 def numbers_of_scenario(scenario: Scenario) -> dict[str, Quantity]:
     """The declaration of every number of a walk beside those of its device, by path."""
-    motion, control = walk_of(scenario), scenario.control
+    motion, control = walk_of(scenario), scenario.controller
     own = controller_settings(control.kind)
     known = quantities(control.kind, motion.timing)
     kept = {f"controller.{item.name}" for item in own} | {"controller.rate", "controller.period"}
@@ -189,7 +193,7 @@ def duration_problems(scenario: Scenario, seconds: Any) -> tuple[Problem, ...]:
 def clock_with(scenario: Scenario, times: Mapping[str, Any]) -> tuple[Clock, tuple[Problem, ...]]:
     """The clock of a walk with other times [s] by path, which may be arrays (runs,), and what is wrong with it."""
     duration = times.get("run.duration", scenario.duration)
-    period = times.get("controller.period", scenario.control.period)
+    period = times.get("controller.period", scenario.controller.period)
     if "controller.rate" in times:
         period = 1.0 / times["controller.rate"]
     output = over_runs(interval_of(scenario), duration) if "run.duration" in times else scenario.output_interval

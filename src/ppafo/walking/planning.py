@@ -75,7 +75,7 @@ def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
     """
     if walk_of(scenario).reacts is not None:
         return _plan_reacting(scenario)
-    motion, device, period = walk_of(scenario), fed_device(scenario), scenario.control.period
+    motion, device, period = walk_of(scenario), fed_device(scenario), scenario.controller.period
     person = person_of(motion.gait, motion.person)
     leg = leg_of_person(leg_parameters(motion.wearer, heel_rocker(motion.gait, motion.wearer)), person)
     bare = plant_parameters(device)
@@ -111,7 +111,7 @@ def _components_of_walk(
     return Components(
         device=device,
         valve=walking_valve(device.valve),
-        controller=None if scenario.control.kind == PYTHON_CONTROLLER else controller,
+        controller=None if scenario.controller.kind == PYTHON_CONTROLLER else controller,
         settings=settings,
         reference=NO_REFERENCE,
         path=None,
@@ -139,7 +139,7 @@ def _plan_reacting(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         failing=failing_of(scenario),
     )
     controller, settings = controller_of(scenario)
-    delay = _of_each(longest_delay, sensors) * scenario.control.period
+    delay = _of_each(longest_delay, sensors) * scenario.controller.period
     run = compose_run(
         _components_of_walk(scenario, device, controller, settings, delay),
         without_leg(bare),
@@ -176,7 +176,7 @@ def walk_steps(scenario: Scenario, plant: PlantParameters) -> Steps:
     volume = volume if lines is None else smaller(volume, smaller(lines.volume_1, lines.volume_2))
     # Adiabatic chambers fill faster than isothermal ones, by the ratio of heat capacities.
     stiffness = 1.0 if scenario.thermal is None else scenario.device.gas.heat_capacity_ratio
-    times = scenario.duration, scenario.time_step, scenario.output_interval, scenario.control.period
+    times = scenario.duration, scenario.time_step, scenario.output_interval, scenario.controller.period
     counts = walk_step_counts(*times, plant, volume, stiffness)
     return Steps(
         step=counts.step,
@@ -221,7 +221,7 @@ def gait_sensors_of(scenario: Scenario) -> GaitSensors:
         own = {sensor: FaultSettings(kind, {name: next(left) for name in known}) for sensor, kind, known in faults}
         return sensors_of(SensorSettings(numbers, own), period)
 
-    return over_runs(made, scenario.control.period, *values)
+    return over_runs(made, scenario.controller.period, *values)
 
 
 def failing_of(scenario: Scenario) -> tuple[PlantFaults, ShutOff] | None:
@@ -277,7 +277,7 @@ def has_ideal_sensors(scenario: Scenario) -> bool:
 def switches(scenario: Scenario) -> tuple[Any, ...]:
     """Settings that are 0 for all runs of a program or for none: flaws of sensors, samples by which one is late."""
     delays = (fault.numbers.get("delay", 0.0) for fault in walk_of(scenario).faults.values())
-    return *flaws(scenario), *(truncated(delay / scenario.control.period + 0.5) for delay in delays)
+    return *flaws(scenario), *(truncated(delay / scenario.controller.period + 0.5) for delay in delays)
 
 
 def noise(scenario: Scenario) -> Any:
@@ -291,8 +291,8 @@ def noise(scenario: Scenario) -> Any:
 
 def _fitted(scenario: Scenario, person: Person) -> Scenario:
     """The walk with the settings of its controller as they were fitted to the person."""
-    settings = settings_of_person(dict(scenario.control.settings), person)
-    return replace(scenario, control=replace(scenario.control, settings=settings))
+    settings = settings_of_person(dict(scenario.controller.settings), person)
+    return replace(scenario, controller=replace(scenario.controller, settings=settings))
 
 
 def law_of(scenario: Scenario) -> ControllerKind:
@@ -300,14 +300,14 @@ def law_of(scenario: Scenario) -> ControllerKind:
 
     A constant command is no controller of a walk in a file: an exported plant has it, whose command is handed in.
     """
-    if scenario.control.kind == switching.CONSTANT.name:
+    if scenario.controller.kind == switching.CONSTANT.name:
         return switching.CONSTANT
-    return with_timing(walking_controllers()[scenario.control.kind], TIMINGS[walk_of(scenario).timing])
+    return with_timing(walking_controllers()[scenario.controller.kind], TIMINGS[walk_of(scenario).timing])
 
 
 def controller_of(scenario: Scenario) -> tuple[ControllerKind | None, Mapping[str, Any]]:
     """The controller of a walk for the lanes, and its settings in SI units."""
-    control = scenario.control
+    control = scenario.controller
     return (None, {}) if control.kind == PYTHON_CONTROLLER else (law_of(scenario), control.settings)
 
 

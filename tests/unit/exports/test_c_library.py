@@ -384,7 +384,7 @@ def drawn(scenario: Scenario) -> tuple[dict[str, Any], Scenario]:
         duration=columns["run.duration"],
         time_step=columns["run.step"],
         output_interval=columns["run.output_interval"],
-        control=replace(varied.control, period=columns["controller.period"]),
+        controller=replace(varied.controller, period=columns["controller.period"]),
     )
 
 

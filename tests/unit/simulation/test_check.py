@@ -165,7 +165,7 @@ def test_a_decision_by_a_hair_of_the_start_is_found(torque_task: Callable[[str],
     atmosphere = torque_task("proportional").device.supply.atmospheric_pressure
     controller = Threshold(lambda seen: seen.pressure_1, atmosphere * (1.0 + 0.5e-7))
     once = dataclasses.replace(torque_task("proportional"), duration=0.05)
-    slow = dataclasses.replace(once, control=dataclasses.replace(once.control, period=0.05))
+    slow = dataclasses.replace(once, controller=dataclasses.replace(once.controller, period=0.05))
     check = simulate(slow.controlled_by(controller)).check()
     lost = next(row for row in check.metrics if row.name == "rms_error")
     assert lost.changed_by == {MOVED_START}

@@ -58,7 +58,7 @@ def test_every_scenario_of_the_package_loads_under_its_own_name(name: str) -> No
 def test_the_content_of_a_scenario_gives_the_same_scenario_again(name: str) -> None:
     scenario = load_scenario(name, ["run.duration=0.25 s"])
     again = scenario_from_dict(scenario.origin.content, scenario.origin.overrides)
-    for field in ("device", "duration", "time_step", "motion", "control", "reference", "sensors", "assumptions"):
+    for field in ("device", "duration", "time_step", "motion", "controller", "reference", "sensors", "assumptions"):
         assert getattr(again, field) == getattr(scenario, field)
 
 
@@ -66,7 +66,7 @@ def test_a_file_and_the_same_plain_values_give_the_same_scenario(tmp_path: Path)
     file = tmp_path / "small.toml"
     file.write_text(SMALL_TEXT)
     from_file, from_values = load_scenario(file), scenario_from_dict(SMALL)
-    assert from_file.control == from_values.control
+    assert from_file.controller == from_values.controller
     assert from_file.motion == from_values.motion
     assert from_file.origin.content == from_values.origin.content
     assert (from_file.origin.file, from_values.origin.file) == (str(file), None)
@@ -91,7 +91,7 @@ def test_every_value_arrives_in_si_units() -> None:
 def test_what_is_left_out_has_its_declared_value() -> None:
     scenario = small()
     assert scenario.device == load_device("ppafo2011")
-    assert scenario.control.settings["proportional_gain"] == 0.095
+    assert scenario.controller.settings["proportional_gain"] == 0.095
     assert scenario.sensors == Sensors()
     assert scenario.reference == ProfileChoice("constant", {"level": 0.0})
     assert (scenario.time_step, scenario.output_interval) == (0.001, 0.001)
@@ -124,14 +124,14 @@ def test_gauge_pressure_counts_from_the_atmosphere_of_the_device() -> None:
 def test_a_rate_and_its_period_are_the_same_sampling() -> None:
     by_rate = small(controller={"kind": "on_off", "rate": "20 Hz"})
     by_period = small(controller={"kind": "on_off", "period": "50 ms"})
-    assert by_rate.control.period == by_period.control.period == 0.05
+    assert by_rate.controller.period == by_period.controller.period == 0.05
 
 
 def test_any_controller_goes_with_any_valve() -> None:
     on_off = small(controller={"kind": "on_off", "rate": "20 Hz"})
     pid = small(device={"set": "ppafo2011", "valve": "solenoid"})
-    assert (on_off.control.kind, on_off.device.valve.kind) == ("on_off", "proportional")
-    assert (pid.control.kind, pid.device.valve.kind) == ("pid", "solenoid")
+    assert (on_off.controller.kind, on_off.device.valve.kind) == ("on_off", "proportional")
+    assert (pid.controller.kind, pid.device.valve.kind) == ("pid", "solenoid")
 
 
 def test_a_set_file_is_found_beside_the_scenario(tmp_path: Path) -> None:
@@ -165,7 +165,7 @@ class Relay:
 
 def test_a_python_object_takes_the_place_of_the_controller() -> None:
     relay = Relay()
-    control = small().controlled_by(relay).control
+    control = small().controlled_by(relay).controller
     assert (control.kind, control.custom, control.period, control.settings) == ("python", relay, 0.001, {})
 
 
@@ -212,9 +212,9 @@ def test_an_assumption_about_nothing_is_refused_with_the_nearest_path() -> None:
 
 def test_the_paper_s_gains_and_times_are_in_its_scenarios() -> None:
     proportional, solenoid = load_scenario("torque-task-proportional"), load_scenario("torque-task-solenoid")
-    gains = [proportional.control.settings[f"{name}_gain"] for name in ("proportional", "integral", "derivative")]
+    gains = [proportional.controller.settings[f"{name}_gain"] for name in ("proportional", "integral", "derivative")]
     assert gains == [0.095, 0.25, 0.006]
-    assert (proportional.control.period, solenoid.control.period) == (0.001, 0.05)
+    assert (proportional.controller.period, solenoid.controller.period) == (0.001, 0.05)
     for field in ("reference", "motion", "duration", "initial_pressure_1", "initial_pressure_2"):
         assert getattr(proportional, field) == getattr(solenoid, field)
     assert (proportional.device.valve.kind, solenoid.device.valve.kind) == ("proportional", "solenoid")
@@ -228,7 +228,7 @@ def test_the_step_response_starts_as_the_paper_says() -> None:
     assert scenario.initial_pressure_2 == supply.pressure
     assert isinstance(scenario.motion, FreeMotion)
     assert scenario.motion.angle == scenario.device.actuator.angle_min == math.radians(20.0)
-    assert scenario.control.settings == {"command": 1.0}
+    assert scenario.controller.settings == {"command": 1.0}
 
 
 def test_bytes_are_read_as_a_file_is() -> None:

@@ -93,8 +93,8 @@ def test_python_controller_gives_what_the_same_law_in_the_catalogue_gives(
     torque_task: Callable[[str], Scenario],
 ) -> None:
     base = torque_task("proportional")
-    settings = dict.fromkeys(base.control.settings, 0.0) | {"proportional_gain": 0.2}
-    compiled = simulate(dataclasses.replace(base, control=dataclasses.replace(base.control, settings=settings)))
+    settings = dict.fromkeys(base.controller.settings, 0.0) | {"proportional_gain": 0.2}
+    compiled = simulate(dataclasses.replace(base, controller=dataclasses.replace(base.controller, settings=settings)))
     python = simulate(base.controlled_by(Proportional(0.2)))
     assert python.recording["torque"] == pytest.approx(compiled.recording["torque"], abs=1e-9)
     assert np.array_equal(python.recording.time, compiled.recording.time)
@@ -113,8 +113,8 @@ def test_python_controller_is_reset_and_then_asked_once_for_every_sample(
 
 def test_python_controller_sees_the_same_late_and_noisy_signals_as_a_compiled_one() -> None:
     base = dataclasses.replace(load_scenario("torque-task-slow-valve"), duration=0.3)
-    settings = dict.fromkeys(base.control.settings, 0.0) | {"proportional_gain": 0.2}
-    compiled = simulate(dataclasses.replace(base, control=dataclasses.replace(base.control, settings=settings)))
+    settings = dict.fromkeys(base.controller.settings, 0.0) | {"proportional_gain": 0.2}
+    compiled = simulate(dataclasses.replace(base, controller=dataclasses.replace(base.controller, settings=settings)))
     python = simulate(base.controlled_by(Proportional(0.2)))
     assert base.sensors.delay > 0.0
     assert python.recording["command"] == pytest.approx(compiled.recording["command"], abs=1e-9)

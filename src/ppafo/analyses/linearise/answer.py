@@ -210,7 +210,7 @@ def _torque(model: LinearModel, command: float) -> Floats:
     """Torque [N m] on the runs, from the steady state on, with another command."""
     scenario = replace(
         model.scenario,
-        control=Control(PYTHON_CONTROLLER, {}, INTERVAL),
+        controller=Control(PYTHON_CONTROLLER, {}, INTERVAL),
         duration=DURATION,
         time_step=INTERVAL,
         output_interval=INTERVAL,

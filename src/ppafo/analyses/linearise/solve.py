@@ -209,7 +209,7 @@ def point_at(scenario: Scenario, time: float) -> Point:
 def _after(scenario: Scenario, run: Run, steps: int) -> tuple[dict[str, float], float | None]:
     """Values after some steps of a run, and the way of its vane."""
     batch = batch_of(replace(run, step_count=steps))
-    custom = scenario.control.custom
+    custom = scenario.controller.custom
     outcome = run_batch(batch) if custom is None else run_sampled(batch, custom)
     rows = {name: float(outcome.states[row, 0]) for name, row in state_row_numbers(run).items()}
     if rows["result.failure_time"] < NEVER_FAILED or not all(map(np.isfinite, rows.values())):
@@ -262,7 +262,7 @@ def equilibrium(scenario: Scenario) -> Point:
         raise ScenarioError(f"{scenario.name}: no equilibrium while the shank of the leg moves; take --at with a time")
     values, _ = _after(scenario, whole, whole.step_count)
     values["angular_velocity"] = 0.0
-    is_open_loop = scenario.control.kind == OPEN_LOOP
+    is_open_loop = scenario.controller.kind == OPEN_LOOP
     end = np.array([scenario.duration])
     wanted = None if is_open_loop else float(profile_values(scenario.reference, end)[0][0])
     run = without_slew_limit(whole)

@@ -61,9 +61,9 @@ def phased_runs(solenoid: Result) -> PhasedRuns:
 
 
 def _has_phase(scenario: Scenario) -> bool:
-    reference, period = scenario.reference, scenario.control.period
+    reference, period = scenario.reference, scenario.controller.period
     return (
-        scenario.control.kind == "on_off"
+        scenario.controller.kind == "on_off"
         and isinstance(scenario.motion, PrescribedMotion)
         and scenario.motion.kind == "held"
         and scenario.thermal is None
@@ -78,7 +78,7 @@ def _has_phase(scenario: Scenario) -> bool:
 
 def _with_first_valve(scenario: Scenario, tie: float) -> Iterator[tuple[float, float]]:
     """Yield RMS error [N m] and gas [g] for each phase, with the valve that a tie calls held on until the first."""
-    period, whole = scenario.control.period, scenario.duration
+    period, whole = scenario.controller.period, scenario.duration
     ramp = scenario.reference.settings
     slope = ramp["level"] / ramp["ramp_time"]
     same = {**ramp, "start_level": tie, "level": tie}
@@ -164,12 +164,12 @@ class InterpretationOfU:
 def readings_of_u(solenoid: Result, proportional: Result) -> tuple[InterpretationOfU, ...]:
     """Return what each meaning of U makes of the comparison; none where another law or reference runs."""
     pair, spool = solenoid.scenario, proportional.scenario
-    if spool.control.kind != "pid" or {pair.reference.kind, spool.reference.kind} != {"ramp_hold"}:
+    if spool.controller.kind != "pid" or {pair.reference.kind, spool.reference.kind} != {"ramp_hold"}:
         return ()
 
     def better(full: float, level: float | None) -> tuple[float, float]:
-        gains = {**spool.control.settings, **{name: spool.control.settings[name] / full for name in _GAINS}}
-        both = [pair, replace(spool, control=replace(spool.control, settings=gains))]
+        gains = {**spool.controller.settings, **{name: spool.controller.settings[name] / full for name in _GAINS}}
+        both = [pair, replace(spool, controller=replace(spool.controller, settings=gains))]
         if level is not None:
             both = [
                 replace(item, reference=replace(item.reference, settings={**item.reference.settings, "level": level}))

@@ -372,9 +372,9 @@ def _without_restriction(uncertainty: Uncertainty, only: Mapping[str, Sequence[s
 def present_value(path: str, scenario: Scenario) -> float:
     """Return the value [SI] of a scenario at a path as in overrides; ScenarioError where it has none there."""
     if path == "controller.rate":
-        return 1.0 / scenario.control.period
+        return 1.0 / scenario.controller.period
     of_clock = {
-        "controller.period": scenario.control.period,
+        "controller.period": scenario.controller.period,
         "run.duration": scenario.duration,
         "run.step": scenario.time_step,
         "run.output_interval": scenario.output_interval,

@@ -36,7 +36,7 @@ def versions() -> dict[str, str]:
 
 def walk_document(scenario: Scenario) -> dict[str, Any]:
     """Return a walk as data in SI units; its bottle by its values, not by the tables of its gas."""
-    motion, control, origin = walk_of(scenario), scenario.control, scenario.origin
+    motion, control, origin = walk_of(scenario), scenario.controller, scenario.origin
     lines = scenario.supply_lines
     return {
         "name": scenario.name,

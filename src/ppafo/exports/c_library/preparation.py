@@ -311,7 +311,7 @@ def settings_of(scenario: Scenario) -> tuple[Setting, ...]:
     """Every number of a scenario in SI units, under the path that overrides know it by."""
     # The step is that of the file, of which the engine takes one that divides a sample.
     texts = time_texts(scenario)
-    duration, period = scenario.duration, scenario.control.period
+    duration, period = scenario.duration, scenario.controller.period
     step, output = (value_at(texts, f"run.{name}") for name in ("step", "output_interval"))
     if step is not None:
         longest = parse_quantity(str(step), "s")
@@ -421,7 +421,7 @@ def _pieces(scenario: Scenario, writing: Writing) -> Iterator[str]:
     """Lines that make the parameters of controller, profiles, sensors, gas and lines."""
     program = writing.program
     if program.controller is not None:
-        yield f"controller = {_kind(writing, 'controller', CONTROLLERS[scenario.control.kind])}"
+        yield f"controller = {_kind(writing, 'controller', CONTROLLERS[scenario.controller.kind])}"
     yield f"reference = {_reference(scenario, writing)}"
     if program.angle is RECORDED_ANGLE:
         yield f"path = {writing.add(Segment)}(0.0, motion_angle, 0.0)"

@@ -108,7 +108,7 @@ def _numbers(configuration: Scenario) -> dict[str, tuple[Quantity, float]]:
         "run.step": configuration.time_step,
         "run.output_interval": interval_of(configuration)(duration),
     }
-    times, control = of_run | {"controller.period": configuration.control.period}, _control(configuration)
+    times, control = of_run | {"controller.period": configuration.controller.period}, _control(configuration)
     reacts = walk_of(configuration).reacts is not None
     step = STEP_OF_BODY if reacts else STEP
     declared = declared_settings(configuration) | control | {f"run.{item.name}": item for item in (*RUN, step)}
@@ -151,7 +151,7 @@ def relations_of_walk(configuration: Scenario) -> tuple[Relation, ...]:
     rules = [(path, relation, other) for path, relation, other, _ in consistency(configuration.device)]
     if configuration.supply_lines is not None:
         rules.append(("supply.dorsiflexion_pressure", "at most", "supply.pressure"))
-    if "load_threshold" in configuration.control.settings:
+    if "load_threshold" in configuration.controller.settings:
         rules += _RELATIONS
     else:
         rules += _RELATIONS[:2]

@@ -69,7 +69,7 @@ def plant_of(scenario: Scenario, rate: int = wire.RATE) -> Plant:
     chosen = replace(
         scenario,
         time_step=min(scenario.time_step, period),
-        control=Control(PYTHON_CONTROLLER, {}, period),
+        controller=Control(PYTHON_CONTROLLER, {}, period),
     )
     run = plan_run(chosen)
     valve = chosen.device.valve
@@ -320,7 +320,7 @@ def run_at(
     try:
         if port.is_stream:
             check_baud(baud, rate)
-        plant, period = plant_of(scenario, rate), scenario.control.period
+        plant, period = plant_of(scenario, rate), scenario.controller.period
         if plant.period > period * (1.0 + _SAME):
             apart, wanted = plant.period * _PER_THOUSAND, period * _PER_THOUSAND
             say(
@@ -387,10 +387,10 @@ def example_controller(scenario: Scenario) -> dict[str, bytes]:
     """Files of a controller at the wire, by name. ScenarioError where it has no form on whole numbers."""
     chip = chip_controller(scenario)
     written = firmware(scenario)
-    period = round(scenario.control.period * MICROSECONDS)
-    if abs(period / MICROSECONDS - scenario.control.period) > 1.0e-9 * scenario.control.period:
+    period = round(scenario.controller.period * MICROSECONDS)
+    if abs(period / MICROSECONDS - scenario.controller.period) > 1.0e-9 * scenario.controller.period:
         raise ScenarioError(
-            f"{scenario.name}: controller.period = {scenario.control.period:.9g} s: must be a whole number of us"
+            f"{scenario.name}: controller.period = {scenario.controller.period:.9g} s: must be a whole number of us"
         )
     words = {
         "title": scenario.name,

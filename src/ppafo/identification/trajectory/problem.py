@@ -90,7 +90,7 @@ def check_experiment(experiment: Experiment) -> None:
         raise IdentificationError(
             f"{said}: the angle of the vane is prescribed, so it carries no information; add a pressure"
         )
-    if experiment.scenario.control.kind == PYTHON_CONTROLLER and COMMAND not in experiment.inputs:
+    if experiment.scenario.controller.kind == PYTHON_CONTROLLER and COMMAND not in experiment.inputs:
         raise IdentificationError(f"{said}: a Python controller cannot run in lanes; use one of the catalogue")
     _check_inputs(experiment, said)
 
@@ -139,7 +139,7 @@ def scenario_of(experiment: Experiment) -> Scenario:
         scenario = replace(scenario, device=with_highest_supply(scenario.device, recording, experiment.inputs))
     if COMMAND in experiment.inputs:
         # Nobody measures for a controller that nobody asks.
-        scenario = replace(scenario, control=replay_control(recording), sensors=Sensors())
+        scenario = replace(scenario, controller=replay_control(recording), sensors=Sensors())
     said = f"experiment '{experiment.label}'"
     if ANGLE in experiment.inputs:
         # From here the recorded angle prescribes that of the vane.

@@ -270,7 +270,7 @@ def lacking(scenario: Scenario, kind: MetricKind) -> str:
     motion = scenario.motion
     if LED_SHANK in kind.needs and not (isinstance(motion, FreeMotion) and motion.leg is not None and motion.leg.gait):
         return "it needs a leg whose shank is that of a gait"
-    is_open = scenario.control.kind == OPEN_LOOP
+    is_open = scenario.controller.kind == OPEN_LOOP
     return "its controller follows no reference" if is_open and REFERENCE in kind.channels else ""
 
 
