@@ -106,7 +106,7 @@ def test_the_scenario_of_the_page_loads_and_says_what_the_page_says() -> None:
     scenario = parse_scenario(blocks("write-a-scenario.md", "toml")[0].encode(), "stairs.toml")
     assert scenario.name == "stairs"
     assert isinstance(scenario.motion, PrescribedMotion)
-    assert (scenario.time_step, scenario.output_interval, scenario.controller.period) == (0.001, 0.002, 0.002)
+    assert (scenario.run.step, scenario.run.output_interval, scenario.controller.period) == (0.001, 0.002, 0.002)
     assert [item.path for item in scenario.assumptions] == ["motion.profile.level"]
 
 
@@ -139,8 +139,8 @@ def test_the_section_that_a_command_of_the_scenario_page_adds_is_taken() -> None
     scenario = ppafo.load_scenario(words[2], [word for word in words[3:] if word != "--set"])
     assert scenario.supply_lines is not None
     assert scenario.supply_lines.droop_1 == 3.0e6
-    assert scenario.thermal is not None
-    assert scenario.thermal.heat_transfer_coefficient == 50.0
+    assert scenario.gas_model is not None
+    assert scenario.gas_model.heat_transfer_coefficient == 50.0
 
 
 def test_the_check_of_the_scenario_page_finds_what_the_page_shows(

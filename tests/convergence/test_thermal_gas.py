@@ -11,7 +11,7 @@ from ppafo.engine.run import batch_of
 from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.scenario import PrescribedMotion, ProfileChoice, Scenario, Thermal
+from ppafo.simulation.scenario import GasModel, PrescribedMotion, ProfileChoice, Scenario
 from tests.judge.reference_solver import chamber_pressures_of, compare_with_reference, plant_states
 
 LARGEST_ANGLE = 2.0e-4
@@ -25,7 +25,7 @@ ENERGIES = ("supplied_enthalpy", "wall_heat")
 
 
 def with_walls(scenario: Scenario, coefficient: float) -> Scenario:
-    return dataclasses.replace(scenario, thermal=Thermal(coefficient, WALLS_PER_VOLUME))
+    return dataclasses.replace(scenario, gas_model=GasModel(coefficient, WALLS_PER_VOLUME))
 
 
 def assert_within_limits(scenario: Scenario, what: str) -> None:
@@ -42,7 +42,9 @@ def held_and_open(command: float, pressure: float) -> Scenario:
         "torque-task-proportional", (NO_LEAK, f"initial.pressure_1={start}", f"initial.pressure_2={start}")
     )
     control = dataclasses.replace(scenario.controller, kind="constant", settings={"command": command})
-    return with_walls(dataclasses.replace(scenario, controller=control, duration=0.2), 0.0)
+    return with_walls(
+        dataclasses.replace(scenario, controller=control, run=dataclasses.replace(scenario.run, duration=0.2)), 0.0
+    )
 
 
 def test_adiabatic_filling_adds_the_enthalpy_of_the_source() -> None:
@@ -84,7 +86,8 @@ def test_adiabatic_compression_follows_the_isentrope_with_order_two() -> None:
 
 @pytest.mark.parametrize("name", ["step-response", "torque-task-proportional", "torque-task-solenoid"])
 def test_warm_walls_make_the_gas_isothermal(name: str) -> None:
-    scenario = dataclasses.replace(load_scenario(name), duration=0.5)
+    loaded = load_scenario(name)
+    scenario = dataclasses.replace(loaded, run=dataclasses.replace(loaded.run, duration=0.5))
     isothermal = simulate(scenario).recording
 
     def difference(coefficient: float) -> float:

@@ -115,7 +115,7 @@ class World:
             if varied:
                 raise ScenarioError(f"vary: {', '.join(varied)}: a walk draws wearers and gaits, and no numbers")
             walk = load_walk(file, words)
-            seconds = lasting(walk, (WALKING_TIME if duration is None else duration) / 60.0).duration
+            seconds = lasting(walk, (WALKING_TIME if duration is None else duration) / 60.0).run.duration
             self.episodes = walk_episodes(walk, randomise, seconds)
         else:
             own = () if duration is None else (f"run.duration={float(duration)!r} s",)

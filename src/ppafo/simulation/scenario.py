@@ -142,7 +142,29 @@ VaneMotion = FreeMotion | PrescribedMotion
 
 
 @dataclass(frozen=True, slots=True)
-class Thermal:
+class RunSettings:
+    """Times of a run [s], and the error of a pressure over the pressure range [-] that the step size control keeps to.
+
+    ``step`` is the largest step (the engine divides it where a chamber is faster) and divides ``duration``,
+    ``output_interval`` and the sample period of the controller.
+    """
+
+    duration: float
+    step: float
+    output_interval: float
+    tolerance: float = KEPT_OF_PRESSURE
+
+
+@dataclass(frozen=True, slots=True)
+class Initial:
+    """Pressures [Pa absolute] of both chambers at the start."""
+
+    pressure_1: float
+    pressure_2: float
+
+
+@dataclass(frozen=True, slots=True)
+class GasModel:
     """Gas with an energy balance: heat transfer coefficient [W/(m^2 K)], area of the walls over the volume [1/m].
 
     The walls, the source and the room have the temperature of the device's gas. A coefficient of 0 is adiabatic; a
@@ -150,7 +172,7 @@ class Thermal:
     """
 
     heat_transfer_coefficient: float
-    area_per_volume: float
+    wall_area_per_volume: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -220,31 +242,24 @@ class Origin:
 class Scenario:
     """A device in one experiment.
 
-    Times [s]: ``time_step`` is the largest step (the engine divides it where a chamber is faster) and divides
-    ``duration``, ``output_interval`` and the sample period of ``controller``. Initial pressures [Pa absolute]; the
-    reference is a torque [N m]. Without ``thermal`` the gas keeps its temperature, without ``supply_lines`` the supply
-    pressures are constant, both as in the paper. ``tolerance`` is the error of a pressure over the pressure range [-]
-    that the step size control keeps to. ``links`` say which numbers follow others that are varied, beside those of the
-    device.
+    The reference is a torque [N m]. Without ``gas_model`` the gas keeps its temperature, without ``supply_lines`` the
+    supply pressures are constant, both as in the paper. ``links`` say which numbers follow others that are varied,
+    beside those of the device.
     """
 
     name: str
     description: str
     device: Device
-    duration: float
-    time_step: float
-    output_interval: float
+    run: RunSettings
     motion: VaneMotion | WornMotion
-    initial_pressure_1: float
-    initial_pressure_2: float
+    initial: Initial
     controller: Control
     reference: ProfileChoice
     sensors: Sensors
     assumptions: tuple[Assumption, ...]
     origin: Origin
-    thermal: Thermal | None = None
+    gas_model: GasModel | None = None
     supply_lines: SupplyLines | None = None
-    tolerance: float = KEPT_OF_PRESSURE
     links: Graph = field(default_factory=dict, compare=False)
 
     def __repr__(self) -> str:
@@ -254,7 +269,7 @@ class Scenario:
             f"  device      {self.device.name}, valve {self.device.valve_name}\n"
             f"  motion      {self.motion.label}\n"
             f"  controller  {self.controller.label}\n"
-            f"  duration    {self.duration:g} s, in steps of at most {self.time_step:g} s"
+            f"  duration    {self.run.duration:g} s, in steps of at most {self.run.step:g} s"
         )
 
     @property

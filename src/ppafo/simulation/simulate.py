@@ -118,7 +118,7 @@ class Result:
         width = max((len(name) for name in self.metrics), default=0)
         lines = [f"  {name:<{width}}  {item.value:.4g} {item.unit}" for name, item in self.metrics.items()]
         return "\n".join(
-            [f"Result of '{scenario.name}', {scenario.duration:g} s: {status.message or status.kind}", *lines]
+            [f"Result of '{scenario.name}', {scenario.run.duration:g} s: {status.message or status.kind}", *lines]
         )
 
     def __str__(self) -> str:
@@ -512,7 +512,7 @@ def _metric_range(result: Result, name: str, unit: str, pressures: float) -> flo
         "J": torques * angles,
         "kg": max(_value(result, "gas_supplied"), _largest_content(recording)),
         "m": float(np.ptp(recording["toe_height"])) if "toe_height" in recording else 0.0,
-        "s": scenario.duration,
+        "s": scenario.run.duration,
         "-": 1.0,
     }
     if unit in ranges:

@@ -85,7 +85,7 @@ def _interval(outputs: declared.Outputs, scenarios: Sequence[Scenario], refusal:
         every = parse_quantity(outputs.every, "s")
     if not (outputs.trajectories or outputs.bands):
         return every
-    shortest = min(scenario.duration for scenario in scenarios)
+    shortest = min(scenario.run.duration for scenario in scenarios)
     if not 0.0 < every <= shortest:
         raise refusal(
             f"outputs.every = {outputs.every!r} must be more than 0 s and at most run.duration, {shortest:g} s"

@@ -50,7 +50,7 @@ def chunk_size(study: Study) -> int:
 
 def samples_of(study: Study, configuration: Configuration) -> int:
     """Return how many samples a channel over time has in a configuration."""
-    return int(configuration.scenario.duration / study.outputs.every + 1.0e-9) + 1
+    return int(configuration.scenario.run.duration / study.outputs.every + 1.0e-9) + 1
 
 
 def maximum_samples(study: Study) -> int:

@@ -28,14 +28,14 @@ from ppafo.simulation.loading import (
     ScenarioRequest,
     assumed_lines,
     read_device,
+    read_gas_model,
     read_hardware,
     read_supply_lines,
-    read_thermal,
     scenario_of,
 )
 from ppafo.simulation.numbers import device_number_at
 from ppafo.simulation.overrides import OverriddenDocument, over_layer
-from ppafo.simulation.scenario import Assumption, Control, MotionKind, Origin, Scenario, Sensors
+from ppafo.simulation.scenario import Assumption, Control, Initial, MotionKind, Origin, RunSettings, Scenario, Sensors
 from ppafo.walking.bottle import BOTTLE, BOTTLE_NAME, BottleSupply, read_bottle
 from ppafo.walking.contradictions import check_walk, rules
 from ppafo.walking.course import check_led_course, check_reacting_course, load_course
@@ -152,8 +152,8 @@ def on_bottle(scenario: Scenario, bottle: str | Path | None, overrides: Iterable
 
 def _walked_with(scenario: Scenario) -> tuple[Any, ...]:
     """Return what a walk on another bottle shares with a walk: all but how long it is and what it hangs on."""
-    hardware = scenario.device, scenario.supply_lines, scenario.thermal, scenario.sensors, scenario.controller
-    return *hardware, scenario.time_step, replace(walk_of(scenario), bottle=None)
+    hardware = scenario.device, scenario.supply_lines, scenario.gas_model, scenario.sensors, scenario.controller
+    return *hardware, scenario.run.step, replace(walk_of(scenario), bottle=None)
 
 
 def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenario:
@@ -209,12 +209,9 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
         name=document["name"],
         description=document.get("description", ""),
         device=device,
-        duration=DEFAULT_DURATION,
-        time_step=step,
-        output_interval=record_interval(DEFAULT_DURATION),
+        run=RunSettings(DEFAULT_DURATION, step, record_interval(DEFAULT_DURATION)),
         motion=motion,
-        initial_pressure_1=supply.atmospheric_pressure,
-        initial_pressure_2=supply.atmospheric_pressure,
+        initial=Initial(supply.atmospheric_pressure, supply.atmospheric_pressure),
         controller=_control(reading, law, device, lines, settings, links),
         reference=NO_REFERENCE,
         sensors=_sensors(reading, settings),
@@ -222,7 +219,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
         origin=Origin(
             request.path, document["device"]["set"], hardware.valve, (*request.overrides, *more), request.content
         ),
-        thermal=read_thermal(reading),
+        gas_model=read_gas_model(reading),
         supply_lines=lines,
         links={**links, **of_wearer},
     )

@@ -139,7 +139,7 @@ def numbers_of_scenario(scenario: Scenario) -> dict[str, Quantity]:
     known = quantities(control.kind, motion.timing)
     kept = {f"controller.{item.name}" for item in own} | {"controller.rate", "controller.period"}
     kept |= {path for path in known if path.partition(".")[0] in ("wearer", "timing", "sensors", "run")}
-    kept |= {f"gas_model.{item.name}" for item in gas_settings("" if scenario.thermal is None else "thermal")}
+    kept |= {f"gas_model.{item.name}" for item in gas_settings("" if scenario.gas_model is None else "thermal")}
     kept |= set() if scenario.supply_lines is None else set(line_paths())
     for sensor, fault in motion.faults.items():
         kept |= {f"faults.{sensor}.{name}" for name in fault.numbers}
@@ -171,7 +171,9 @@ def interval_of(scenario: Scenario) -> Callable[[float], float]:
 
 def with_duration(scenario: Scenario, seconds: float) -> Scenario:
     """A walk of another length [s], recorded as often as that allows."""
-    return replace(scenario, duration=seconds, output_interval=interval_of(scenario)(seconds))
+    return replace(
+        scenario, run=replace(scenario.run, duration=seconds, output_interval=interval_of(scenario)(seconds))
+    )
 
 
 def duration_problems(scenario: Scenario, seconds: Any) -> tuple[Problem, ...]:
@@ -192,10 +194,10 @@ def duration_problems(scenario: Scenario, seconds: Any) -> tuple[Problem, ...]:
 
 def clock_with(scenario: Scenario, times: Mapping[str, Any]) -> tuple[Clock, tuple[Problem, ...]]:
     """The clock of a walk with other times [s] by path, which may be arrays (runs,), and what is wrong with it."""
-    duration = times.get("run.duration", scenario.duration)
+    duration = times.get("run.duration", scenario.run.duration)
     period = times.get("controller.period", scenario.controller.period)
     if "controller.rate" in times:
         period = 1.0 / times["controller.rate"]
-    output = over_runs(interval_of(scenario), duration) if "run.duration" in times else scenario.output_interval
+    output = over_runs(interval_of(scenario), duration) if "run.duration" in times else scenario.run.output_interval
     problems = duration_problems(scenario, duration) if "run.duration" in times else ()
-    return Clock(duration, times.get("run.step", scenario.time_step), output, period), problems
+    return Clock(duration, times.get("run.step", scenario.run.step), output, period), problems

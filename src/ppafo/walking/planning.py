@@ -117,7 +117,7 @@ def _components_of_walk(
         path=None,
         sensors=sensor_parameters(scenario),
         has_ideal_sensors=has_ideal_sensors(scenario),
-        thermal=scenario.thermal,
+        thermal=scenario.gas_model,
         supply_lines=scenario.supply_lines,
         signal_delay=delay,
     )
@@ -152,7 +152,7 @@ def _plan_reacting(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
 
 def _too_long(scenario: Scenario) -> Problem:
     """A step that is too long for a body."""
-    step = scenario.time_step
+    step = scenario.run.step
     return np.asarray(
         step > LONGEST_STEP
     ), lambda run: f"run.step = {at(step, run):g} s: a wearer who reacts needs {LONGEST_STEP:g} s or less"
@@ -175,8 +175,8 @@ def walk_steps(scenario: Scenario, plant: PlantParameters) -> Steps:
     lines, volume = scenario.supply_lines, _of_each(smallest_chamber, plant)
     volume = volume if lines is None else smaller(volume, smaller(lines.volume_1, lines.volume_2))
     # Adiabatic chambers fill faster than isothermal ones, by the ratio of heat capacities.
-    stiffness = 1.0 if scenario.thermal is None else scenario.device.gas.heat_capacity_ratio
-    times = scenario.duration, scenario.time_step, scenario.output_interval, scenario.controller.period
+    stiffness = 1.0 if scenario.gas_model is None else scenario.device.gas.heat_capacity_ratio
+    times = scenario.run.duration, scenario.run.step, scenario.run.output_interval, scenario.controller.period
     counts = walk_step_counts(*times, plant, volume, stiffness)
     return Steps(
         step=counts.step,

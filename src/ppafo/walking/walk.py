@@ -108,12 +108,13 @@ def bottle_life(scenario: Scenario, schedule: Schedule, progress: Progress = sil
     seconds = float(planned.duration) if planned is not None else strides * motion.gait.stride_time
     unrecorded = 60.0 if planned is None else 1.0
     if planned is None:  # no more steps than a run may take: what lasts longer begins again, as a course does
-        step = plan_walk(replace(with_duration(scenario, unrecorded), output_interval=unrecorded)).step
+        before = with_duration(scenario, unrecorded)
+        step = plan_walk(replace(before, run=replace(before.run, output_interval=unrecorded))).step
         seconds = min(seconds, unrecorded * (MAXIMUM_STEPS * step // unrecorded))
     count = max(1, round(seconds / unrecorded))
     whole = with_duration(scenario, seconds if planned is not None else count * unrecorded)
     if planned is None:
-        whole = replace(whole, output_interval=unrecorded)
+        whole = replace(whole, run=replace(whole.run, output_interval=unrecorded))
     run = plan_walk(whole)
     return life_on_bottle(run, fed_device(whole), motion.bottle, motion.gait.stride_time, schedule, progress)
 
@@ -345,7 +346,7 @@ def walk_population(
     planned = course_of_walk(crowd)
     if minutes is None and planned is not None:
         minutes = float(np.max(planned.duration)) / 60.0
-    seconds = lasting(configuration, minutes).duration
+    seconds = lasting(configuration, minutes).run.duration
     run, _ = plan_walks(with_duration(crowd, seconds))
     batch = unrecorded(run, wearers)
     states = _run_in_groups(batch, progress)

@@ -58,7 +58,7 @@ def test_every_scenario_of_the_package_loads_under_its_own_name(name: str) -> No
 def test_the_content_of_a_scenario_gives_the_same_scenario_again(name: str) -> None:
     scenario = load_scenario(name, ["run.duration=0.25 s"])
     again = scenario_from_dict(scenario.origin.content, scenario.origin.overrides)
-    for field in ("device", "duration", "time_step", "motion", "controller", "reference", "sensors", "assumptions"):
+    for field in ("device", "run", "motion", "initial", "controller", "reference", "sensors", "assumptions"):
         assert getattr(again, field) == getattr(scenario, field)
 
 
@@ -80,10 +80,10 @@ def test_every_value_arrives_in_si_units() -> None:
         sensors={"delay": "3 ms", "angle_noise": "0.5 deg", "pressure_noise": "1 psi_d", "seed": 7},
         reference={"kind": "sine", "level": "1 N m", "amplitude": "500 g m^2/s^2", "frequency": "2 Hz"},
     )
-    assert (scenario.duration, scenario.time_step, scenario.output_interval) == (60.0, 0.0005, 0.002)
+    assert (scenario.run.duration, scenario.run.step, scenario.run.output_interval) == (60.0, 0.0005, 0.002)
     assert scenario.motion == FreeMotion(math.radians(75.0), math.pi / 2.0, 500.0)
-    assert scenario.initial_pressure_1 == pytest.approx(STANDARD_ATMOSPHERE + 10.0 * PSI, rel=1e-15)
-    assert scenario.initial_pressure_2 == 2.0e5
+    assert scenario.initial.pressure_1 == pytest.approx(STANDARD_ATMOSPHERE + 10.0 * PSI, rel=1e-15)
+    assert scenario.initial.pressure_2 == 2.0e5
     assert scenario.sensors == Sensors(0.003, math.radians(0.5), PSI, 0.0, 0.0, 7)
     assert scenario.reference.settings == {"level": 1.0, "amplitude": 0.5, "frequency": 2.0, "phase": 0.0}
 
@@ -94,8 +94,8 @@ def test_what_is_left_out_has_its_declared_value() -> None:
     assert scenario.controller.settings["proportional_gain"] == 0.095
     assert scenario.sensors == Sensors()
     assert scenario.reference == ProfileChoice("constant", {"level": 0.0})
-    assert (scenario.time_step, scenario.output_interval) == (0.001, 0.001)
-    assert scenario.initial_pressure_1 == scenario.initial_pressure_2 == STANDARD_ATMOSPHERE
+    assert (scenario.run.step, scenario.run.output_interval) == (0.001, 0.001)
+    assert scenario.initial.pressure_1 == scenario.initial.pressure_2 == STANDARD_ATMOSPHERE
 
 
 def test_a_held_vane_is_led_along_a_constant_angle() -> None:
@@ -108,8 +108,8 @@ def test_words_stand_for_the_pressures_of_the_device() -> None:
         initial={"pressure_1": "supply", "pressure_2": "dorsiflexion_supply"},
     )
     supply = scenario.device.supply
-    assert scenario.initial_pressure_1 == supply.pressure
-    assert scenario.initial_pressure_2 == supply.dorsiflexion_pressure
+    assert scenario.initial.pressure_1 == supply.pressure
+    assert scenario.initial.pressure_2 == supply.dorsiflexion_pressure
     assert supply.pressure > supply.dorsiflexion_pressure
 
 
@@ -118,7 +118,7 @@ def test_gauge_pressure_counts_from_the_atmosphere_of_the_device() -> None:
         device={"set": "ppafo2011", "overrides": ["supply.atmospheric_pressure=90 kPa_a"]},
         initial={"pressure_1": "0 psi_g"},
     )
-    assert scenario.initial_pressure_1 == scenario.initial_pressure_2 == 9.0e4
+    assert scenario.initial.pressure_1 == scenario.initial.pressure_2 == 9.0e4
 
 
 def test_a_rate_and_its_period_are_the_same_sampling() -> None:
@@ -215,7 +215,8 @@ def test_the_paper_s_gains_and_times_are_in_its_scenarios() -> None:
     gains = [proportional.controller.settings[f"{name}_gain"] for name in ("proportional", "integral", "derivative")]
     assert gains == [0.095, 0.25, 0.006]
     assert (proportional.controller.period, solenoid.controller.period) == (0.001, 0.05)
-    for field in ("reference", "motion", "duration", "initial_pressure_1", "initial_pressure_2"):
+    assert proportional.run.duration == solenoid.run.duration
+    for field in ("reference", "motion", "initial"):
         assert getattr(proportional, field) == getattr(solenoid, field)
     assert (proportional.device.valve.kind, solenoid.device.valve.kind) == ("proportional", "solenoid")
 
@@ -224,8 +225,8 @@ def test_the_step_response_starts_as_the_paper_says() -> None:
     scenario = load_scenario("step-response")
     supply = scenario.device.supply
     assert supply.pressure == supply.dorsiflexion_pressure == pytest.approx(STANDARD_ATMOSPHERE + 55.0 * PSI)
-    assert scenario.initial_pressure_1 == STANDARD_ATMOSPHERE
-    assert scenario.initial_pressure_2 == supply.pressure
+    assert scenario.initial.pressure_1 == STANDARD_ATMOSPHERE
+    assert scenario.initial.pressure_2 == supply.pressure
     assert isinstance(scenario.motion, FreeMotion)
     assert scenario.motion.angle == scenario.device.actuator.angle_min == math.radians(20.0)
     assert scenario.controller.settings == {"command": 1.0}

@@ -375,9 +375,9 @@ def present_value(path: str, scenario: Scenario) -> float:
         return 1.0 / scenario.controller.period
     of_clock = {
         "controller.period": scenario.controller.period,
-        "run.duration": scenario.duration,
-        "run.step": scenario.time_step,
-        "run.output_interval": scenario.output_interval,
+        "run.duration": scenario.run.duration,
+        "run.step": scenario.run.step,
+        "run.output_interval": scenario.run.output_interval,
     }
     try:
         return float(of_clock[path]) if path in of_clock else number_at(scenario, path)

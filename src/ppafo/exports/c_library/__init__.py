@@ -90,13 +90,14 @@ def scenario_library(scenario: Scenario) -> Library:
 
 def commanded(scenario: Scenario) -> Scenario:
     """The plant of a scenario alone, under a command that is handed in at every step of its engine."""
-    step = step_counts(scenario.duration, scenario.time_step, scenario.output_interval, scenario.controller.period).step
+    step = step_counts(
+        scenario.run.duration, scenario.run.step, scenario.run.output_interval, scenario.controller.period
+    ).step
     return replace(
         scenario,
         name=f"{scenario.name}-plant",
         description=f"The plant alone of this scenario: {scenario.description}",
-        time_step=step,
-        output_interval=step,
+        run=replace(scenario.run, step=step, output_interval=step),
         controller=Control("constant", {"command": 0.0}, step),
         sensors=Sensors(),
     )

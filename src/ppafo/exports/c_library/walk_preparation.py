@@ -102,10 +102,10 @@ def settings_of_walk(configuration: Scenario) -> tuple[Setting, ...]:
 
 def _numbers(configuration: Scenario) -> dict[str, tuple[Quantity, float]]:
     """Declaration and value of every number of a walk, by path."""
-    duration = configuration.duration
+    duration = configuration.run.duration
     of_run = {
         "run.duration": duration,
-        "run.step": configuration.time_step,
+        "run.step": configuration.run.step,
         "run.output_interval": interval_of(configuration)(duration),
     }
     times, control = of_run | {"controller.period": configuration.controller.period}, _control(configuration)
@@ -233,7 +233,7 @@ def _steps(configuration: Scenario, writing: Writing) -> Iterator[str]:
     if configuration.supply_lines is not None:
         volumes = (c_identifier(f"supply_line.{line}.volume") for line in SUPPLY_LINES)
         yield f"volume = min(volume, {', '.join(volumes)})"
-    stiffness = "1.0" if configuration.thermal is None else "gas_heat_capacity_ratio"
+    stiffness = "1.0" if configuration.gas_model is None else "gas_heat_capacity_ratio"
     given = "run_duration, run_step, run_output_interval, controller_period"
     yield f"counts_of_steps = {writing.add(walk_step_counts)}({given}, plant, volume, {stiffness})"
     yield "needs_parts = False"

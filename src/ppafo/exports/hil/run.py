@@ -68,7 +68,7 @@ def plant_of(scenario: Scenario, rate: int = wire.RATE) -> Plant:
     period = 1.0 / rate
     chosen = replace(
         scenario,
-        time_step=min(scenario.time_step, period),
+        run=replace(scenario.run, step=min(scenario.run.step, period)),
         controller=Control(PYTHON_CONTROLLER, {}, period),
     )
     run = plan_run(chosen)

@@ -155,11 +155,8 @@ def scenario_of(experiment: Experiment) -> Scenario:
         )
     time = recording.time[before]
     rest = {name: value_at_rest(time, recording[name][before], at_end=True) for name in recording.names}
-    scenario = replace(
-        scenario,
-        initial_pressure_1=rest.get("pressure_1", scenario.initial_pressure_1),
-        initial_pressure_2=rest.get("pressure_2", scenario.initial_pressure_2),
-    )
+    recorded = {name: rest[name] for name in ("pressure_1", "pressure_2") if name in rest}
+    scenario = replace(scenario, initial=replace(scenario.initial, **recorded))
     if ANGLE in rest and ANGLE not in experiment.inputs and isinstance(scenario.motion, FreeMotion):
         start = float(between_stops(np.array([rest[ANGLE]]), scenario.device, said)[0])
         scenario = replace(scenario, motion=replace(scenario.motion, angle=start))

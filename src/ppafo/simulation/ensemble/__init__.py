@@ -72,7 +72,7 @@ def run_ensemble(
     metrics = {name: _metric(base, name) for name in meters}
     for name in bands:
         _check_channel(base, name)
-    interval = every or base.output_interval
+    interval = every or base.run.output_interval
     if not interval > 0.0:
         raise ScenarioError(f"{base.name}: traces need a time above 0 between two samples, not {interval:g} s")
     checked = check_columns(base, columns, gauge)
@@ -135,7 +135,7 @@ def _check_channel(base: Scenario, name: str) -> None:
         raise ScenarioError(f"{base.name}: the channel '{name}' cannot be traced{_hint(name, TRACED)}")
     if name == REFERENCE and base.controller.kind == OPEN_LOOP:
         raise ScenarioError(f"{base.name}: a constant command follows no reference, so there is none to trace")
-    if name.startswith("temperature_") and base.thermal is None:
+    if name.startswith("temperature_") and base.gas_model is None:
         raise ScenarioError(f"{base.name}: '{name}' needs gas with an energy balance ([gas_model] kind = \"thermal\")")
 
 

@@ -136,7 +136,7 @@ def sizing_figure(sizing: Sizing) -> "matplotlib.figure.Figure":
         grid = figure.add_gridspec(2, 2)
         axes = figure.add_subplot(grid[0, :])
         problem = sizing.problem
-        time = np.linspace(0.0, problem.scenario.duration, 3001)
+        time = np.linspace(0.0, problem.scenario.run.duration, 3001)
         axes.plot(
             time,
             problem.profile.at(time),

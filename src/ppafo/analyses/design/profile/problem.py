@@ -313,7 +313,7 @@ def _scenario(document: SizingFile, profile: TorqueProfile, folder: Path, file: 
     plain.device.check_vane("the size of a device")
     if plain.controller.kind == OPEN_LOOP:
         raise StudyError(f"{file}: scenario '{plain.name}' follows no reference (controller '{OPEN_LOOP}')")
-    grain = _common_multiple(plain.controller.period, plain.output_interval)
+    grain = _common_multiple(plain.controller.period, plain.run.output_interval)
     count = math.ceil(Fraction(document.simulated * profile.period).limit_denominator(_LARGEST_DENOMINATOR) / grain)
     duration = f"run.duration={float(count * grain)!r} s"
     return reloaded(plain, (*profile.overrides(), duration))
