@@ -263,8 +263,8 @@ def candidates_of(section: TrajectorySection, setting: Setting) -> tuple[Candida
         scenario = _scenario(item.scenario, item.overrides, setting)
         if not SHORTEST_STEP <= interval <= scenario.run.duration:
             raise IdentificationError(
-                f"{said}: interval = '{item.interval}': must be from {SHORTEST_STEP:g} s to {scenario.run.duration:g} s, the "
-                "duration of its run"
+                f"{said}: interval = '{item.interval}': must be from {SHORTEST_STEP:g} s to "
+                f"{scenario.run.duration:g} s, the duration of its run"
             )
         found.append(Candidate(item.label, scenario, noise_of_channels(item.noise, said), interval))
     return tuple(found)
