@@ -21,8 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.simulation.declaration import LARGEST_SEED
-from ppafo.simulation.scenario import Scenario, worn_kind
+from ppafo.simulation.scenario import LARGEST_SEED, Scenario, worn_kind
 from ppafo.simulation.simulate import OPEN_LOOP
 from ppafo.studies.distributions import Floats, WholeNumbersBetween
 from ppafo.studies.study import Drawn, Sample
