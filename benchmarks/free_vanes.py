@@ -39,7 +39,7 @@ def measure_free_vanes(runs: int, repetitions: int, say: Callable[[str], None]) 
     """Lines about ``runs`` step responses of each kind; nothing is recorded."""
     say(f"{runs} step responses of free vanes, four kinds")
     batches = free_vanes(runs)
-    simulated = runs * load_scenario(SCENARIO).duration
+    simulated = runs * load_scenario(SCENARIO).run.duration
     contenders = {name: partial(_run_all, group) for name, group in batches.items()}
     for contender in contenders.values():
         contender()

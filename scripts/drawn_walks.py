@@ -149,7 +149,9 @@ def drawn_device(base: Scenario, draws: np.random.Generator) -> dict[str, float]
     supply = device.supply.atmospheric_pressure + draws.uniform(0.95, 1.05) * (
         device.supply.pressure - device.supply.atmospheric_pressure
     )
-    believed = {f"controller.{name}": value for name, value in base.control.settings.items() if name[:8] == "nominal_"}
+    believed = {
+        f"controller.{name}": value for name, value in base.controller.settings.items() if name[:8] == "nominal_"
+    }
     return believed | {
         "supply.pressure": supply,
         "supply.dorsiflexion_pressure": supply,
@@ -266,7 +268,7 @@ _OF_LINES = ("droop", "largest_flow", "volume")
 def nominal_device(configuration: Scenario) -> NominalDevice:
     """The device that the controller of a walk believes in."""
     names = (path.rpartition(".")[2] for path in leaf_paths(NominalDevice, ""))
-    given = configuration.control.settings
+    given = configuration.controller.settings
     lines = {f"{name}_{line}": f"nominal_line_{name}_{line}" for name in _OF_LINES for line in (1, 2)}
     lines["relieving"] = "nominal_line_relieving"
     found: NominalDevice = rebuilt(NominalDevice, [given[lines.get(name, name)] for name in names])
@@ -279,7 +281,7 @@ def residual_peaks(result: WalkResult) -> tuple[np.ndarray, np.ndarray]:
     Above 0 is more gas than expected, for as many samples as make an alarm. The readings are the true ones.
     """
     nominal, data, time = nominal_device(result.scenario), result.recording, result.recording.time
-    period = result.scenario.control.period
+    period = result.scenario.controller.period
     every = round(period / float(time[1] - time[0]))
     seen = list(zip(*(data[name][::every].tolist() for name in ("angle", "pressure_1", "pressure_2")), strict=True))
     means = observer.volumes(nominal, 0.5 * (nominal.nominal_angle_min + nominal.nominal_angle_max))

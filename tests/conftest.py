@@ -72,7 +72,9 @@ def torque_task() -> Callable[[str], Scenario]:
 @pytest.fixture
 def shorter() -> Callable[[Scenario, float], Scenario]:
     """A scenario that ends earlier [s]."""
-    return lambda scenario, duration: dataclasses.replace(scenario, duration=duration)
+    return lambda scenario, duration: dataclasses.replace(
+        scenario, run=dataclasses.replace(scenario.run, duration=duration)
+    )
 
 
 @pytest.fixture(scope="session")

@@ -99,7 +99,7 @@ def reloaded(scenario: Scenario, more: Iterable[str]) -> Scenario:
 
     A Python object that controls it stays in charge.
     """
-    origin, custom = scenario.origin, scenario.control.custom
+    origin, custom = scenario.origin, scenario.controller.custom
     declared = _layout(origin.content).declared
     every = over_layer(
         origin.content, origin.overrides, tuple(more), scenario.name, declared, scenario.device.valve_name

@@ -106,7 +106,7 @@ def test_the_scenario_of_the_page_loads_and_says_what_the_page_says() -> None:
     scenario = parse_scenario(blocks("write-a-scenario.md", "toml")[0].encode(), "stairs.toml")
     assert scenario.name == "stairs"
     assert isinstance(scenario.motion, PrescribedMotion)
-    assert (scenario.time_step, scenario.output_interval, scenario.control.period) == (0.001, 0.002, 0.002)
+    assert (scenario.run.step, scenario.run.output_interval, scenario.controller.period) == (0.001, 0.002, 0.002)
     assert [item.path for item in scenario.assumptions] == ["motion.profile.level"]
 
 
@@ -139,8 +139,8 @@ def test_the_section_that_a_command_of_the_scenario_page_adds_is_taken() -> None
     scenario = ppafo.load_scenario(words[2], [word for word in words[3:] if word != "--set"])
     assert scenario.supply_lines is not None
     assert scenario.supply_lines.droop_1 == 3.0e6
-    assert scenario.thermal is not None
-    assert scenario.thermal.heat_transfer_coefficient == 50.0
+    assert scenario.gas_model is not None
+    assert scenario.gas_model.heat_transfer_coefficient == 50.0
 
 
 def test_the_check_of_the_scenario_page_finds_what_the_page_shows(
@@ -244,10 +244,10 @@ def test_the_controller_of_the_page_is_compiled_and_named_in_a_scenario(hysteres
     assert hysteresis.KIND.name not in set(CONTROLLERS)
     wide = ppafo.simulate(scenario_from_dict(content, ["controller.band=1 N m"]))
     narrow = ppafo.simulate(scenario_from_dict(content))
-    assert hysteresis.KIND.name == narrow.scenario.control.kind
+    assert hysteresis.KIND.name == narrow.scenario.controller.kind
     content["controller"] = tomllib.loads(extension("[controller]"))["controller"]
     by_module = ppafo.simulate(scenario_from_dict(content))
-    assert by_module.scenario.control.kind == "my_laws.hysteresis:KIND"
+    assert by_module.scenario.controller.kind == "my_laws.hysteresis:KIND"
     assert by_module.metrics == narrow.metrics
     assert 1 <= wide.metrics["switchings"].value < narrow.metrics["switchings"].value
 

@@ -188,9 +188,13 @@ def test_a_unit_has_its_settings_and_the_bits_of_python(tmp_path: Path) -> None:
     ((file, content),) = functional_unit(closed_loop(scenario), 2, ["linux64"]).items()
     (tmp_path / file).write_bytes(content)
     moved = simulate(load_scenario(NAME, (*SHORT, f"{AREA}=7e-06 m^2", REAL)))
-    given = {"stop_time": scenario.duration, "step_size": scenario.output_interval, "start_values": {AREA: 7e-6}}
+    given = {
+        "stop_time": scenario.run.duration,
+        "step_size": scenario.run.output_interval,
+        "start_values": {AREA: 7e-6},
+    }
     found = fmpy.simulate_fmu(
-        str(tmp_path / file), output=["torque", "mass_1"], output_interval=scenario.output_interval, **given
+        str(tmp_path / file), output=["torque", "mass_1"], output_interval=scenario.run.output_interval, **given
     )
     for name in ("torque", "mass_1"):
         np.testing.assert_array_equal(found[name], moved.recording[name])

@@ -93,12 +93,13 @@ def random_scenario(seed: int) -> Scenario:
     experiment = chance.choice(EXPERIMENTS)
     if experiment.startswith("step"):
         device = random_device(chance, "solenoid" if "solenoids" in experiment else "proportional")
+        loaded = load_scenario("step-response")
         return dataclasses.replace(
-            load_scenario("step-response"),
+            loaded,
             device=device,
-            duration=0.6,
+            run=dataclasses.replace(loaded.run, duration=0.6),
             motion=FreeMotion(device.actuator.angle_min, 0.0, 0.0),
-            initial_pressure_2=device.supply.dorsiflexion_pressure,
+            initial=dataclasses.replace(loaded.initial, pressure_2=device.supply.dorsiflexion_pressure),
         )
     device = random_device(chance, experiment)
     base = load_scenario(f"torque-task-{experiment}")
@@ -107,11 +108,11 @@ def random_scenario(seed: int) -> Scenario:
     return dataclasses.replace(
         base,
         device=device,
-        duration=1.0,
+        run=dataclasses.replace(base.run, duration=1.0),
         motion=PrescribedMotion(ProfileChoice("constant", {"level": angle})),
         reference=ProfileChoice(
             "ramp_hold", {"start_level": 0.0, "level": level, "ramp_start": 0.0, "ramp_time": ramp_time}
         ),
         sensors=dataclasses.replace(Sensors(), delay=chance.choice([0.0, 0.0, chance.uniform(0.0, 0.005)])),
-        control=dataclasses.replace(base.control, period=chance.choice(PERIODS[experiment])),
+        controller=dataclasses.replace(base.controller, period=chance.choice(PERIODS[experiment])),
     )

@@ -37,8 +37,10 @@ def test_torque_task_is_within_the_limits(torque_task: Callable[[str], Scenario]
 
 
 def test_valve_open_by_a_tenth_is_within_the_limits(step_response: Scenario) -> None:
-    control = dataclasses.replace(step_response.control, settings={"command": 0.1})
-    scenario = dataclasses.replace(step_response, control=control, duration=3.0)
+    control = dataclasses.replace(step_response.controller, settings={"command": 0.1})
+    scenario = dataclasses.replace(
+        step_response, controller=control, run=dataclasses.replace(step_response.run, duration=3.0)
+    )
     assert_within_limits(compare_with_reference(plan_run(scenario)), "10 % opening")
 
 

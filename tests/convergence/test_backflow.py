@@ -10,7 +10,7 @@ from ppafo.engine.lanes import run_batch
 from ppafo.engine.run import Run, batch_of
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, ProfileChoice, Scenario, Thermal
+from ppafo.simulation.scenario import FreeMotion, GasModel, PrescribedMotion, ProfileChoice, Scenario
 from tests.judge.reference_solver import measure_agreement, plant_states, solve_reference
 
 LARGEST_ANGLE = 2.0e-4
@@ -39,9 +39,12 @@ def supplied_gas(run: Run) -> np.ndarray:
 def swung(name: str, is_relieving: bool, command: float, overrides: tuple[str, ...] = ()) -> Scenario:
     """A vane swung against an open valve: the chamber that is fed is squeezed above its supply twice a second."""
     scenario = load_scenario(name, (f"supply.relieving={str(is_relieving).lower()}", *overrides))
-    open_loop = dataclasses.replace(scenario.control, kind="constant", settings={"command": command})
+    open_loop = dataclasses.replace(scenario.controller, kind="constant", settings={"command": command})
     return dataclasses.replace(
-        scenario, motion=PrescribedMotion(ProfileChoice("sine", SWING)), control=open_loop, duration=1.0
+        scenario,
+        motion=PrescribedMotion(ProfileChoice("sine", SWING)),
+        controller=open_loop,
+        run=dataclasses.replace(scenario.run, duration=1.0),
     )
 
 
@@ -61,8 +64,8 @@ def test_a_squeezed_chamber_gives_gas_back_to_a_relieving_supply_only(
     drawn = []
     for is_relieving in (False, True):
         scenario = swung(name, is_relieving, command, overrides)
-        thermal = None if walls is None else Thermal(walls, 300.0)
-        drawn.append(supplied_gas(plan_run(dataclasses.replace(scenario, thermal=thermal))))
+        thermal = None if walls is None else GasModel(walls, 300.0)
+        drawn.append(supplied_gas(plan_run(dataclasses.replace(scenario, gas_model=thermal))))
     one_way, relieved = (np.diff(gas) for gas in drawn)
     assert one_way.min() >= 0.0
     assert -np.minimum(relieved, 0.0).sum() > PUMPED
@@ -88,7 +91,9 @@ def pushed_about(scenario: Scenario, seed: int) -> Scenario:
     if isinstance(scenario.motion, FreeMotion):
         angle = chance.uniform(device.actuator.angle_min, device.actuator.angle_max)
         motion = FreeMotion(float(angle), float(chance.uniform(-8.0, 8.0)), float(chance.uniform(-25.0, 25.0)))
-        return dataclasses.replace(scenario, motion=motion, initial_pressure_1=device.supply.pressure)
+        return dataclasses.replace(
+            scenario, motion=motion, initial=dataclasses.replace(scenario.initial, pressure_1=device.supply.pressure)
+        )
     swing = SWING | {"frequency": float(chance.uniform(0.5, 4.0)), "phase": float(chance.uniform(-1.0, 1.0))}
     return dataclasses.replace(scenario, motion=PrescribedMotion(ProfileChoice("sine", swing)))
 
@@ -98,11 +103,11 @@ def test_drawn_gas_never_falls_with_random_devices_that_are_pushed_about(draws: 
     fallen = 0
     for seed in range(first, first + 10):
         scenario = pushed_about(draws.random_scenario(seed), seed)
-        thermal = Thermal(200.0, 300.0) if seed % 3 == 0 else None
+        thermal = GasModel(200.0, 300.0) if seed % 3 == 0 else None
         relieving = dataclasses.replace(scenario.device.supply, relieving=True)
         device = dataclasses.replace(scenario.device, supply=relieving)
         for given in (scenario, dataclasses.replace(scenario, device=device)):
-            run = plan_run(dataclasses.replace(given, thermal=thermal))
+            run = plan_run(dataclasses.replace(given, gas_model=thermal))
             falls = float(np.diff(plant_states(run, run_batch(batch_of(run)))[:, 4]).min()) < 0.0
             assert given is not scenario or not falls, f"seed {seed}"
             fallen += falls

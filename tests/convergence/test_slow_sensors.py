@@ -58,8 +58,8 @@ def test_a_slow_angle_sensor_shows_a_sine_smaller_and_later_and_the_others_show_
     )
     swing = ProfileChoice("sine", {"level": 1.3, "amplitude": 0.4, "frequency": frequency, "phase": 0.0})
     listener = Listener()
-    listening = Control(PYTHON_CONTROLLER, {}, scenario.control.period, listener)
-    result = ppafo.simulate(dataclasses.replace(scenario, motion=PrescribedMotion(swing), control=listening))
+    listening = Control(PYTHON_CONTROLLER, {}, scenario.controller.period, listener)
+    result = ppafo.simulate(dataclasses.replace(scenario, motion=PrescribedMotion(swing), controller=listening))
     times = result.recording.time[: len(listener.seen)]
     ratio = frequency / bandwidth
     expected = 1.3 + 0.4 / math.hypot(1.0, ratio) * np.sin(2.0 * math.pi * frequency * times - math.atan(ratio))

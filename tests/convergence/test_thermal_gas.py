@@ -11,7 +11,7 @@ from ppafo.engine.run import batch_of
 from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.scenario import PrescribedMotion, ProfileChoice, Scenario, Thermal
+from ppafo.simulation.scenario import GasModel, PrescribedMotion, ProfileChoice, Scenario
 from tests.judge.reference_solver import chamber_pressures_of, compare_with_reference, plant_states
 
 LARGEST_ANGLE = 2.0e-4
@@ -25,7 +25,7 @@ ENERGIES = ("supplied_enthalpy", "wall_heat")
 
 
 def with_walls(scenario: Scenario, coefficient: float) -> Scenario:
-    return dataclasses.replace(scenario, thermal=Thermal(coefficient, WALLS_PER_VOLUME))
+    return dataclasses.replace(scenario, gas_model=GasModel(coefficient, WALLS_PER_VOLUME))
 
 
 def assert_within_limits(scenario: Scenario, what: str) -> None:
@@ -41,8 +41,10 @@ def held_and_open(command: float, pressure: float) -> Scenario:
     scenario = load_scenario(
         "torque-task-proportional", (NO_LEAK, f"initial.pressure_1={start}", f"initial.pressure_2={start}")
     )
-    control = dataclasses.replace(scenario.control, kind="constant", settings={"command": command})
-    return with_walls(dataclasses.replace(scenario, control=control, duration=0.2), 0.0)
+    control = dataclasses.replace(scenario.controller, kind="constant", settings={"command": command})
+    return with_walls(
+        dataclasses.replace(scenario, controller=control, run=dataclasses.replace(scenario.run, duration=0.2)), 0.0
+    )
 
 
 def test_adiabatic_filling_adds_the_enthalpy_of_the_source() -> None:
@@ -66,8 +68,8 @@ def compressed(step: float) -> float:
     """Largest relative departure from the isentrope of a closed chamber while the vane is swung, in steps [s]."""
     scenario = load_scenario("torque-task-proportional", (NO_LEAK,))
     swing = ProfileChoice("sine", {"level": 1.3, "amplitude": 0.6, "frequency": 2.0, "phase": 0.0})
-    shut = dataclasses.replace(scenario.control, kind="constant", settings={"command": 0.0}, period=step)
-    planned = plan_run(with_walls(dataclasses.replace(scenario, motion=PrescribedMotion(swing), control=shut), 0.0))
+    shut = dataclasses.replace(scenario.controller, kind="constant", settings={"command": 0.0}, period=step)
+    planned = plan_run(with_walls(dataclasses.replace(scenario, motion=PrescribedMotion(swing), controller=shut), 0.0))
     counts = {"steps_per_sample": 1, "step_count": round(1.0 / step), "record_every": 1}
     run = dataclasses.replace(planned, step=step, tolerance=1e9, **counts)
     states = plant_states(run, run_batch(batch_of(run)))
@@ -84,7 +86,8 @@ def test_adiabatic_compression_follows_the_isentrope_with_order_two() -> None:
 
 @pytest.mark.parametrize("name", ["step-response", "torque-task-proportional", "torque-task-solenoid"])
 def test_warm_walls_make_the_gas_isothermal(name: str) -> None:
-    scenario = dataclasses.replace(load_scenario(name), duration=0.5)
+    loaded = load_scenario(name)
+    scenario = dataclasses.replace(loaded, run=dataclasses.replace(loaded.run, duration=0.5))
     isothermal = simulate(scenario).recording
 
     def difference(coefficient: float) -> float:

@@ -160,7 +160,7 @@ def bench(scenario: Scenario, commands: Sequence[tuple[float, float]], times: An
         rig.dead_1 + rig.volume_per_angle * (y[0] - rig.lowest),
         rig.dead_2 + rig.volume_per_angle * (rig.highest - y[0]),
     )
-    for n, pressure in enumerate((scenario.initial_pressure_1, scenario.initial_pressure_2)):
+    for n, pressure in enumerate((scenario.initial.pressure_1, scenario.initial.pressure_2)):
         ideal = pressure / (1.0 + extra.virial * pressure)
         y[2 + n] = ideal * volumes[n] / product
         y[4 + n] = pressure * volumes[n] / (rig.k - 1.0)

@@ -104,7 +104,7 @@ def verdict(scenario: Scenario) -> Verdict:
     answer = judge(scenario)
     span = pressure_range(scenario, answer)
     others = [judge(scenario, moved=MOVED), judge(scenario, tolerance=1.0e-11)]
-    if scenario.control.kind != "constant":
+    if scenario.controller.kind != "constant":
         others += [judge(scenario, bias=BIAS * span), judge(scenario, bias=-BIAS * span)]
     keep = away_from_impacts(answer.time, answer.impacts, *(other.impacts for other in others))
     gaps = [max(differences(scenario, answer, columns(other), keep)) for other in others]

@@ -201,7 +201,7 @@ class _Solution:
         self.way = self.rest_mode() if run.program.angle is None else 0.0
         if self.y[1] != 0.0 and run.program.angle is None:
             self.way = float(np.sign(self.y[1]))
-        self.control = SampledControl(run, self.present_signals())
+        self.controller = SampledControl(run, self.present_signals())
         count = samples_in(run.step_count, run.record_every)
         times = np.arange(count, dtype=np.float64) * (run.step * run.record_every)
         self.result = ReferenceResult(times, np.empty((count, PLANT_UNKNOWNS)), np.zeros(count))
@@ -274,7 +274,7 @@ class _Solution:
         if run.program.angle is None and self.is_thrown_at_its_stop():
             self.change_mode()
         while self.time < end - SAME_TIME:
-            self.control.decide(sample, self.time, self.present_signals())
+            self.controller.decide(sample, self.time, self.present_signals())
             sample += 1
             self.advance_to(min(sample * run.period, end), sample)
         self.record_until(end + 1.0, None)
@@ -310,19 +310,19 @@ class _Solution:
 
     def advance_to(self, end: float, next_sample: int) -> None:
         """Integrate to the next sample over all that happens on the way."""
-        looks = self.control.looks(next_sample)
+        looks = self.controller.looks(next_sample)
         while self.time < end - SAME_TIME:
             for moment, sample in looks.items():
                 if abs(moment - self.time) <= SAME_TIME:
-                    self.control.keep(sample, self.present_signals())
+                    self.controller.keep(sample, self.present_signals())
             self.take_command()
             self.settle_valve()
-            events = [*looks, *self.control.arrivals(), self.next_valve_event()]
+            events = [*looks, *self.controller.arrivals(), self.next_valve_event()]
             self.integrate(min([end, *(moment for moment in events if moment > self.time + SAME_TIME)]))
 
     def take_command(self) -> None:
         """Let the valve have the command that has arrived, and effects between them change with it."""
-        self.arrived = self.control.arriving(self.time, self.arrived)
+        self.arrived = self.controller.arriving(self.time, self.arrived)
         self.command = self.arrived
         if self.follows is None:
             return
@@ -376,7 +376,7 @@ class _Solution:
             moment = times[self.records]
             state = self.y if solution is None else solution.y[np.argmin(np.abs(solution.t - moment))]
             self.result.states[self.records] = self.with_prescribed_angle(state[:PLANT_UNKNOWNS], moment)
-            self.result.commands[self.records] = self.control.decided
+            self.result.commands[self.records] = self.controller.decided
             self.records += 1
 
     def with_prescribed_angle(self, state: Floats, time: float) -> Floats:

@@ -682,18 +682,18 @@ def valve_of(scenario: Scenario) -> Valve:
 
 def law_of(scenario: Scenario, bias: float) -> Law:
     """Controller and sensors as numbers; their noise must be off."""
-    s, sensors = scenario.control.settings, scenario.sensors
+    s, sensors = scenario.controller.settings, scenario.sensors
     if sensors.angle_noise or sensors.pressure_noise:
         raise ValueError("the judge knows no noise")
     names = ("proportional_gain", "integral_gain", "derivative_gain", "derivative_filter", "anti_windup")
     gains = (s.get(name, 0.0) for name in names)
     seen = (sensors.delay, sensors.pressure_resolution, bias)
-    return Law(CONTROLLERS[scenario.control.kind], scenario.control.period, s.get("command", 0.0), *gains, *seen)
+    return Law(CONTROLLERS[scenario.controller.kind], scenario.controller.period, s.get("command", 0.0), *gains, *seen)
 
 
 def rig_of(scenario: Scenario, bias: float = 0.0, relieving: bool | None = None) -> Rig:
     """The numbers of a scenario."""
-    device, motion, warm = scenario.device, scenario.motion, scenario.thermal
+    device, motion, warm = scenario.device, scenario.motion, scenario.gas_model
     actuator, friction, supply, gas = device.actuator, device.friction, device.supply, device.gas
     free = isinstance(motion, FreeMotion)
     leg = motion.leg if free else None
@@ -721,7 +721,7 @@ def rig_of(scenario: Scenario, bias: float = 0.0, relieving: bool | None = None)
         device.flow.linear_ratio,
         0.0 if warm is None else 1.0,
         0.0 if warm is None else warm.heat_transfer_coefficient,
-        0.0 if warm is None else warm.area_per_volume,
+        0.0 if warm is None else warm.wall_area_per_volume,
         0.0 if free else 1.0,
         restriction(device.valve.orifice, scenario),
         restriction(actuator.leak, scenario),
@@ -742,9 +742,9 @@ def start_of(scenario: Scenario, rig: Rig, moved: float) -> Any:
         y[ANGLE] = scenario.motion.angle + math.copysign(moved, middle - scenario.motion.angle)
         y[VELOCITY] = scenario.motion.angular_velocity * (1.0 + moved)
     product = rig.gas_constant * rig.temperature
-    content_1 = scenario.initial_pressure_1 * (1.0 + moved)
+    content_1 = scenario.initial.pressure_1 * (1.0 + moved)
     content_1 *= rig.dead_1 + rig.volume_per_angle * (y[ANGLE] - rig.lowest)
-    content_2 = scenario.initial_pressure_2 * (1.0 - moved)
+    content_2 = scenario.initial.pressure_2 * (1.0 - moved)
     content_2 *= rig.dead_2 + rig.volume_per_angle * (rig.highest - y[ANGLE])
     y[MASS_1], y[MASS_2] = content_1 / product, content_2 / product
     y[ENERGY_1], y[ENERGY_2] = content_1 / (rig.k - 1.0), content_2 / (rig.k - 1.0)
@@ -764,8 +764,8 @@ def judge(
     Supplies take gas back where ``relieving`` says so, or the device does; one that says nothing takes it back.
     """
     rig = rig_of(scenario, bias, relieving)
-    records = np.full((round(scenario.duration / scenario.output_interval) + 1, 6), np.nan)
+    records = np.full((round(scenario.run.duration / scenario.run.output_interval) + 1, 6), np.nan)
     impacts = np.zeros(10_000)
     start = start_of(scenario, rig, moved)
-    counts = solve(rig, start, scenario.output_interval, records, impacts, tolerance)
+    counts = solve(rig, start, scenario.run.output_interval, records, impacts, tolerance)
     return Answer(*records.T, impacts[: counts[1]], int(counts[0]))

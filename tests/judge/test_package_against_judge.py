@@ -79,6 +79,6 @@ def test_a_vane_thrown_at_the_stop_it_starts_on_rebounds_at_once(angle: str, spe
 
 
 def test_a_supply_that_does_not_relieve_lets_gas_in_only(step_response: Scenario) -> None:
-    high = dataclasses.replace(step_response, initial_pressure_1=900_000.0)
+    high = dataclasses.replace(step_response, initial=dataclasses.replace(step_response.initial, pressure_1=900_000.0))
     assert judge(high, relieving=False).drawn[5] == 0.0
     assert judge(high, relieving=True).drawn[5] < 0.0

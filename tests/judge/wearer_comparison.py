@@ -60,7 +60,8 @@ class Gap(NamedTuple):
 def light_walk(name: str, step: float, seconds: float = SECONDS, changes: Sequence[str] = ()) -> Scenario:
     """The walk of a wearer with the lightest device, at a step [ms], recorded with each sample of the reflexes."""
     given = [f"wearer.name={name}", *LIGHT, f"run.duration={seconds} s", f"run.step={step} ms", *changes]
-    return replace(load_walk("reacting", given), output_interval=SAMPLE)
+    loaded = load_walk("reacting", given)
+    return replace(loaded, run=replace(loaded.run, output_interval=SAMPLE))
 
 
 def by_package(name: str, step: float, seconds: float = SECONDS, changes: Sequence[str] = ()) -> Columns:

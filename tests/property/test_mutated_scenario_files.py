@@ -121,15 +121,15 @@ def outcome_of(content: bytes) -> Scenario | None:
 
 def assert_can_be_run(scenario: Scenario) -> None:
     """What got through keeps the promises that the engine relies on."""
-    numbers = [scenario.duration, scenario.time_step, scenario.output_interval, scenario.control.period]
-    numbers += [scenario.initial_pressure_1, scenario.initial_pressure_2]
+    numbers = [scenario.run.duration, scenario.run.step, scenario.run.output_interval, scenario.controller.period]
+    numbers += [scenario.initial.pressure_1, scenario.initial.pressure_2]
     assert all(math.isfinite(number) and number > 0.0 for number in numbers)
-    for whole in (scenario.duration, scenario.output_interval, scenario.control.period):
-        count = whole / scenario.time_step
+    for whole in (scenario.run.duration, scenario.run.output_interval, scenario.controller.period):
+        count = whole / scenario.run.step
         assert round(count) >= 1
         assert abs(count - round(count)) < 1e-5
-    assert scenario.duration / scenario.time_step <= 1.0001e8
-    assert 0.0 <= scenario.sensors.delay <= min(scenario.duration, 1.0001e5 * scenario.time_step)
+    assert scenario.run.duration / scenario.run.step <= 1.0001e8
+    assert 0.0 <= scenario.sensors.delay <= min(scenario.run.duration, 1.0001e5 * scenario.run.step)
     assert (
         scenario.device.actuator.angle_min - 1e-6 <= start_angle(scenario) <= scenario.device.actuator.angle_max + 1e-6
     )

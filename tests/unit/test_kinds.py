@@ -52,7 +52,7 @@ def test_a_law_of_another_package_is_found_by_its_name_and_only_then(install: In
     install("other_laws", LAW.format(name="on_off", call="mine"), controllers="mine")
     load_scenario("torque-task-proportional")
     assert "other_laws" not in sys.modules
-    assert load_scenario("torque-task-proportional", ["controller.kind=mine"]).control.kind == "mine"
+    assert load_scenario("torque-task-proportional", ["controller.kind=mine"]).controller.kind == "mine"
     assert "other_laws" in sys.modules
     assert CONTROLLERS["mine"].summary == "Of another package."
 
@@ -120,7 +120,7 @@ def test_a_law_is_named_by_module_and_object_from_the_working_folder(
     monkeypatch.chdir(tmp_path)
     path = list(sys.path)
     scenario = load_scenario("torque-task-proportional", ["controller.kind=beside:KIND"])
-    assert scenario.control.kind == "beside:KIND"
+    assert scenario.controller.kind == "beside:KIND"
     assert sys.path == path
     for name, problem in (
         ("nowhere:KIND", "No module named 'nowhere'"),

@@ -96,7 +96,7 @@ def _answer(result: "Result", check: "Check | None") -> "Answer":
     ]
     return Answer(
         name="run",
-        kicker=f"A run of {scenario.duration:g} s",
+        kicker=f"A run of {scenario.run.duration:g} s",
         title=scenario.name,
         lead=(" ".join(scenario.description.split()), f"{device}{changed if scenario.origin.overrides else ''}"),
         sections=(

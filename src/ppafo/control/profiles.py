@@ -4,14 +4,14 @@ import math
 from typing import Annotated, NamedTuple
 
 from ppafo.control.kind import ProfileKind
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Number, Quantity, quantities_of
 from ppafo.model.elementary import TURN, sine_and_cosine_of_turns
 
 
 class ConstantProfile(NamedTuple):
     """The level."""
 
-    level: float
+    level: Annotated[float, Number("", "the level")]
 
 
 def constant_value(profile: ConstantProfile, time: float) -> tuple[float, float, float]:
@@ -27,7 +27,7 @@ def constant_bounds(profile: ConstantProfile) -> tuple[float, float]:
 CONSTANT = ProfileKind(
     name="constant",
     summary="One level from beginning to end.",
-    quantities=(Quantity("level", "", "the level"),),
+    quantities=quantities_of(ConstantProfile),
     parameters=ConstantProfile,
     value=constant_value,
     bounds=constant_bounds,
@@ -39,10 +39,10 @@ CONSTANT = ProfileKind(
 class RampHold(NamedTuple):
     """Level before the ramp and after it, start of the ramp and its length [s]."""
 
-    start_level: float
-    level: float
-    ramp_start: float
-    ramp_time: float
+    start_level: Annotated[float, Number("", "level before the ramp", 0.0)]
+    level: Annotated[float, Number("", "level of the hold")]
+    ramp_start: Annotated[float, Number("s", "time at which the ramp starts", 0.0, 0.0, 1.0e6)]
+    ramp_time: Annotated[float, Number("s", "length of the ramp", 1.0, 1.0e-6, 1.0e6)]
 
 
 def ramp_hold_value(profile: RampHold, time: float) -> tuple[float, float, float]:
@@ -62,12 +62,7 @@ def ramp_hold_bounds(profile: RampHold) -> tuple[float, float]:
 RAMP_HOLD = ProfileKind(
     name="ramp_hold",
     summary="A level, a straight ramp to another level, and a hold.",
-    quantities=(
-        Quantity("start_level", "", "level before the ramp", 0.0),
-        Quantity("level", "", "level of the hold"),
-        Quantity("ramp_start", "s", "time at which the ramp starts", 0.0, 0.0, 1.0e6),
-        Quantity("ramp_time", "s", "length of the ramp", 1.0, 1.0e-6, 1.0e6),
-    ),
+    quantities=quantities_of(RampHold),
     parameters=RampHold,
     value=ramp_hold_value,
     bounds=ramp_hold_bounds,
@@ -78,10 +73,10 @@ RAMP_HOLD = ProfileKind(
 class Sine(NamedTuple):
     """Mean level, amplitude, frequency [Hz] and phase [turns]."""
 
-    level: float
-    amplitude: float
-    frequency: float
-    phase: float
+    level: Annotated[float, Number("", "mean level", 0.0)]
+    amplitude: Annotated[float, Number("", "amplitude")]
+    frequency: Annotated[float, Number("Hz", "frequency", 1.0, 0.0, 100.0)]
+    phase: Annotated[float, Number("1", "phase in turns; 0.25 starts at the crest", 0.0, -1.0, 1.0)]
 
 
 def sine_value(profile: Sine, time: float) -> tuple[float, float, float]:
@@ -101,12 +96,7 @@ def sine_bounds(profile: Sine) -> tuple[float, float]:
 SINE = ProfileKind(
     name="sine",
     summary="A sine about a mean level.",
-    quantities=(
-        Quantity("level", "", "mean level", 0.0),
-        Quantity("amplitude", "", "amplitude"),
-        Quantity("frequency", "Hz", "frequency", 1.0, 0.0, 100.0),
-        Quantity("phase", "1", "phase in turns; 0.25 starts at the crest", 0.0, -1.0, 1.0),
-    ),
+    quantities=quantities_of(Sine),
     parameters=Sine,
     value=sine_value,
     bounds=sine_bounds,

@@ -7,6 +7,7 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 import numpy as np
 
 from ppafo.engine.source_text import is_row
+from ppafo.model.declaration import number_of
 
 
 @cache
@@ -17,7 +18,8 @@ def members(row: Any) -> tuple[tuple[str, Any], ...]:
     """
     if is_row(row):
         hints = get_type_hints(row, include_extras=True)
-        return tuple((f".{name}", hints[name]) for name in row._fields)
+        # What is declared of a number is for files, and none of the engine's business.
+        return tuple((f".{name}", float if number_of(hints[name]) else hints[name]) for name in row._fields)
     if get_origin(row) is Annotated:
         items, length = get_args(row)
         return tuple((f"[{number}]", get_args(items)[0]) for number in range(length))

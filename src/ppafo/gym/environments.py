@@ -115,7 +115,7 @@ class World:
             if varied:
                 raise ScenarioError(f"vary: {', '.join(varied)}: a walk draws wearers and gaits, and no numbers")
             walk = load_walk(file, words)
-            seconds = lasting(walk, (WALKING_TIME if duration is None else duration) / 60.0).duration
+            seconds = lasting(walk, (WALKING_TIME if duration is None else duration) / 60.0).run.duration
             self.episodes = walk_episodes(walk, randomise, seconds)
         else:
             own = () if duration is None else (f"run.duration={float(duration)!r} s",)
@@ -263,7 +263,7 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
         self._drawn = drawn[:, 0]
         self._trail = []
         if self.render_mode is not None:
-            self._period = self.episode().control.period * self.world.frame_skip
+            self._period = self.episode().controller.period * self.world.frame_skip
             self._remember(float(seen.errors[0]))
         return seen.observations[0], {}
 

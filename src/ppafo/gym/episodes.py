@@ -44,12 +44,11 @@ from ppafo.parameters import load_parameter_set
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import ATMOSPHERE_PATH, gauge_link
 from ppafo.parameters.parameter_set import atmospheric_pressure, entry_in_si
-from ppafo.simulation.declaration import LARGEST_SEED
 from ppafo.simulation.ensemble.planning import plan_ensemble
 from ppafo.simulation.loading import set_name
 from ppafo.simulation.numbers import absolute, check_columns, chosen_path, declared_numbers, number_at, with_numbers
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.scenario import LARGEST_SEED, Scenario
 from ppafo.studies.varying import VariedPath, in_its_unit, varied_path
 from ppafo.units import parse_quantity
 from ppafo.walking.motion import check_led, walk_of, with_duration
@@ -535,9 +534,9 @@ def walk_episodes(configuration: Scenario, randomise: bool, seconds: float) -> W
             raise ScenarioError(
                 f"{configuration.origin.file}: {name}: an environment does not support it; leave it out"
             )
-    settings = configuration.control.settings
+    settings = configuration.controller.settings
     if not set(TorqueProfile._fields) <= set(settings):
-        kind = configuration.control.kind
+        kind = configuration.controller.kind
         raise ScenarioError(
             f"{configuration.origin.file}: controller.kind = '{kind}' has no torque profile; event_pid has one"
         )

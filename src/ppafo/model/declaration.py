@@ -1,7 +1,13 @@
-"""How a component declares its parameters: name, unit, range and meaning. Data only, no physics."""
+"""How a component declares its parameters: name, unit, range and meaning. Data only, no physics.
+
+A number is declared once, as a field of a frozen dataclass or of a NamedTuple:
+``area: Annotated[float, Number("m^2", "area of the opening")]``.
+"""
 
 import math
 from dataclasses import dataclass
+from functools import cache
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 VALVE_LAG, VALVE_DELAY = "lag of the valve", "dead time of the valve"
 PRESSURE_LAG, FORCE_LAG = "lag of the pressure sensors", "lag of the force sensors"
@@ -41,11 +47,24 @@ NOMINAL = {
 
 
 @dataclass(frozen=True, slots=True)
-class Quantity:
-    """One parameter of a component; every number is in SI units. ``default`` None means that it must be given.
+class Number:
+    """What is declared of a field: unit, meaning, default and range, in SI. ``default`` None: it must be given.
 
     What the default ``follows`` is added to it, in a walk: some of those above.
     """
+
+    unit: str
+    summary: str
+    default: float | None = None
+    minimum: float = -math.inf
+    maximum: float = math.inf
+    minimum_allowed: bool = True
+    follows: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """One parameter of a component by its name; otherwise as ``Number``."""
 
     name: str
     unit: str
@@ -55,6 +74,38 @@ class Quantity:
     maximum: float = math.inf
     minimum_allowed: bool = True
     follows: tuple[str, ...] = ()
+
+
+@cache
+def quantities_of(section: type) -> tuple[Quantity, ...]:
+    """Return the numbers that a dataclass or a NamedTuple declares, those of nested NamedTuples in their place.
+
+    They are in the order of its fields; a field without a ``Number`` is none.
+    """
+    found: list[Quantity] = []
+    for name, hint in get_type_hints(section, include_extras=True).items():
+        if isinstance(hint, type) and issubclass(hint, tuple):
+            found += quantities_of(hint)
+        elif (number := number_of(hint)) is not None:
+            found.append(
+                Quantity(
+                    name,
+                    number.unit,
+                    number.summary,
+                    number.default,
+                    number.minimum,
+                    number.maximum,
+                    number.minimum_allowed,
+                    number.follows,
+                )
+            )
+    return tuple(found)
+
+
+def number_of(hint: Any) -> Number | None:
+    """Return what the type of a field declares of a number, None where it declares none."""
+    declared = get_args(hint)[1:] if get_origin(hint) is Annotated else ()
+    return next((item for item in declared if isinstance(item, Number)), None)
 
 
 def range_rule(quantity: Quantity, limits: str) -> str:

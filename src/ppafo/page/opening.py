@@ -89,7 +89,7 @@ def computed_opening(
     def runs(columns: Mapping[str, Floats], bands: Sequence[str]) -> Any:
         count = max((len(column) for column in columns.values()), default=1)
         usual = {path: np.full(count, value) for path, value in given.items()}
-        some = {**usual, **columns} or {"run.duration": np.full(count, scenario.duration)}
+        some = {**usual, **columns} or {"run.duration": np.full(count, scenario.run.duration)}
         return run_ensemble(scenario, some, claims, bands)
 
     shown = [lead, *(("reference",) if lead == "torque" else ())]

@@ -366,11 +366,10 @@ def live_part(scenarios: "Sequence[str | Scenario]") -> LivePart | None:
 def _difference(scenario: Scenario) -> str:
     """A sentence where a configuration of a page begins shorter than the scenario is; empty where it does not."""
     shorter = usual_changes(scenario).get("run.duration", "")
-    if not shorter or scenario.duration <= float(shorter.removesuffix(" s")):
+    if not shorter or scenario.run.duration <= float(shorter.removesuffix(" s")):
         return ""
-    return (
-        f"It begins with {shorter} of the {scenario.duration:g} s above: lengthen run.duration to compare the numbers."
-    )
+    whole = f"{scenario.run.duration:g} s"
+    return f"It begins with {shorter} of the {whole} above: lengthen run.duration to compare the numbers."
 
 
 def _content(
@@ -456,7 +455,7 @@ def _task(scenario: Scenario) -> str:
         return _WALK
     motion = vane_motion(scenario)
     if isinstance(motion, FreeMotion):
-        return _STEP if scenario.control.kind == "constant" else _TASKS["free"]
+        return _STEP if scenario.controller.kind == "constant" else _TASKS["free"]
     return _TASKS["held" if motion.profile.kind == "constant" else "prescribed"]
 
 

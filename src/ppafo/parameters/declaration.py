@@ -10,61 +10,26 @@ from dataclasses import replace
 from types import MappingProxyType
 
 from ppafo.model.actuators.vane import KIND as VANE
-from ppafo.model.actuators.vane import SMALLEST_VOLUME
 from ppafo.model.catalog import ACTUATORS, VALVES, device_effects
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Quantity, quantities_of
 from ppafo.model.effects.kind import Effect
 from ppafo.model.effects.restitution import EFFECT as RESTITUTION
+from ppafo.parameters.device import Actuator, Flow, FootPlate, Friction, Gas, Orifice, SonicOrifice, Supply
 
 SPECIES_PATH = "gas.species"
 RELIEVING_PATH = "supply.relieving"
 RELIEVING = "true where the regulators take gas back from a chamber above their pressure; false unless given"
 
-GAS = (
-    Quantity("molar_mass", "kg/mol", "molar mass", minimum=1e-3, maximum=0.5),
-    Quantity("heat_capacity_ratio", "", "ratio of heat capacities k", minimum=1.01, maximum=1.67),
-    Quantity("temperature", "K", "gas temperature, constant", minimum=150.0, maximum=600.0),
-)
-AREA_FORM = (
-    Quantity("area", "m^2", "area of the opening", minimum=0.0, maximum=1e-2),
-    Quantity(
-        "discharge_coefficient",
-        "",
-        "discharge coefficient Cd, flow over A C1 P",
-        minimum=0.0,
-        maximum=2.0,
-        minimum_allowed=False,
-    ),
-)
-SONIC_FORM = (
-    Quantity("sonic_conductance", "m^3/(s Pa)", "sonic conductance C of ISO 6358", minimum=0.0, maximum=1e-4),
-    Quantity("critical_ratio", "", "critical pressure ratio b of ISO 6358", minimum=0.0, maximum=0.95),
-)
+GAS = quantities_of(Gas)
+AREA_FORM = quantities_of(Orifice)
+SONIC_FORM = quantities_of(SonicOrifice)
 ORIFICE = AREA_FORM + SONIC_FORM
-ACTUATOR = (
-    *VANE.quantities,
-    Quantity("angle_min", "rad", "lower stop, where chamber 1 is smallest", minimum=-10.0, maximum=10.0),
-    Quantity("angle_max", "rad", "upper stop, where chamber 2 is smallest", minimum=-10.0, maximum=10.0),
-    Quantity("dead_volume_1", "m^3", "line and clearance of chamber 1", minimum=SMALLEST_VOLUME),
-    Quantity("dead_volume_2", "m^3", "line and clearance of chamber 2", minimum=SMALLEST_VOLUME),
-    *RESTITUTION.quantities,
-)
+ACTUATOR = (*VANE.quantities, *quantities_of(Actuator), *RESTITUTION.quantities)
 _OF_A_VANE = frozenset(quantity.name for quantity in VANE.quantities)
-FRICTION = (
-    Quantity("static_torque", "N m", "maximum friction torque at rest", minimum=0.0, maximum=1e4),
-    Quantity("dynamic_torque", "N m", "friction torque in motion", minimum=0.0, maximum=1e4),
-    Quantity("viscous_damping", "N m s/rad", "friction torque per angular velocity", minimum=0.0, maximum=1e4),
-)
-FOOT_PLATE = (
-    Quantity("inertia", "kg m^2", "inertia about the ankle", minimum=0.0, maximum=1e3, minimum_allowed=False),
-    Quantity("gravity_torque", "N m", "maximum gravity torque about the ankle, m g l", minimum=0.0, maximum=1e4),
-)
-SUPPLY = (
-    Quantity("pressure", "Pa_a", "regulated pressure to chamber 1", minimum=1e3, maximum=1e8),
-    Quantity("dorsiflexion_pressure", "Pa_a", "regulated pressure to chamber 2", minimum=1e3, maximum=1e8),
-    Quantity("atmospheric_pressure", "Pa_a", "ambient pressure, the zero of gauge", minimum=1e3, maximum=1e6),
-)
-FLOW = (Quantity("linear_ratio", "", "pressure ratio above which flow is linear", minimum=0.99, maximum=0.9999),)
+FRICTION = quantities_of(Friction)
+FOOT_PLATE = quantities_of(FootPlate)
+SUPPLY = quantities_of(Supply)
+FLOW = quantities_of(Flow)
 
 REPORTED = (
     Quantity("choked_flow_constant", "s/m", "C1 of equation (6)"),

@@ -3,10 +3,13 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Annotated
 
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
 from ppafo.errors import ParameterError
 from ppafo.model.actuators.table import Table
+from ppafo.model.actuators.vane import SMALLEST_VOLUME
+from ppafo.model.declaration import Number
 from ppafo.model.gas import specific_gas_constant
 from ppafo.parameters.graph import SAME_PRESSURE, Graph
 
@@ -19,9 +22,9 @@ class Gas:
     """A gas at one temperature: molar mass [kg/mol], heat capacity ratio [-], temperature [K]."""
 
     species: str
-    molar_mass: float
-    heat_capacity_ratio: float
-    temperature: float
+    molar_mass: Annotated[float, Number("kg/mol", "molar mass", minimum=1e-3, maximum=0.5)]
+    heat_capacity_ratio: Annotated[float, Number("", "ratio of heat capacities k", minimum=1.01, maximum=1.67)]
+    temperature: Annotated[float, Number("K", "gas temperature, constant", minimum=150.0, maximum=600.0)]
 
     @property
     def specific_gas_constant(self) -> float:
@@ -33,16 +36,20 @@ class Gas:
 class Orifice:
     """A restriction in the paper's form: area [m^2], discharge coefficient [-]; equations (6) and (7)."""
 
-    area: float
-    discharge_coefficient: float
+    area: Annotated[float, Number("m^2", "area of the opening", minimum=0.0, maximum=1e-2)]
+    discharge_coefficient: Annotated[
+        float, Number("", "discharge coefficient Cd, flow over A C1 P", minimum=0.0, maximum=2.0, minimum_allowed=False)
+    ]
 
 
 @dataclass(frozen=True, slots=True)
 class SonicOrifice:
     """A restriction in the form of ISO 6358: sonic conductance [m^3/(s Pa)], critical pressure ratio [-]."""
 
-    sonic_conductance: float
-    critical_ratio: float
+    sonic_conductance: Annotated[
+        float, Number("m^3/(s Pa)", "sonic conductance C of ISO 6358", minimum=0.0, maximum=1e-4)
+    ]
+    critical_ratio: Annotated[float, Number("", "critical pressure ratio b of ISO 6358", minimum=0.0, maximum=0.95)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,10 +64,10 @@ class Actuator:
 
     torque_constant: float
     volume_per_angle: float
-    angle_min: float
-    angle_max: float
-    dead_volume_1: float
-    dead_volume_2: float
+    angle_min: Annotated[float, Number("rad", "lower stop, where chamber 1 is smallest", minimum=-10.0, maximum=10.0)]
+    angle_max: Annotated[float, Number("rad", "upper stop, where chamber 2 is smallest", minimum=-10.0, maximum=10.0)]
+    dead_volume_1: Annotated[float, Number("m^3", "line and clearance of chamber 1", minimum=SMALLEST_VOLUME)]
+    dead_volume_2: Annotated[float, Number("m^3", "line and clearance of chamber 2", minimum=SMALLEST_VOLUME)]
     restitution: float
     leak: Orifice | SonicOrifice
     kind: str = VANE
@@ -72,17 +79,23 @@ class Actuator:
 class Friction:
     """Friction of the vane: static limit and dynamic torque [N m], viscous damping [N m s/rad]; equations (1), (10)."""
 
-    static_torque: float
-    dynamic_torque: float
-    viscous_damping: float
+    static_torque: Annotated[float, Number("N m", "maximum friction torque at rest", minimum=0.0, maximum=1e4)]
+    dynamic_torque: Annotated[float, Number("N m", "friction torque in motion", minimum=0.0, maximum=1e4)]
+    viscous_damping: Annotated[
+        float, Number("N m s/rad", "friction torque per angular velocity", minimum=0.0, maximum=1e4)
+    ]
 
 
 @dataclass(frozen=True, slots=True)
 class FootPlate:
     """What the vane moves: inertia about the ankle [kg m^2], largest gravity torque m g l [N m]; equation (1)."""
 
-    inertia: float
-    gravity_torque: float
+    inertia: Annotated[
+        float, Number("kg m^2", "inertia about the ankle", minimum=0.0, maximum=1e3, minimum_allowed=False)
+    ]
+    gravity_torque: Annotated[
+        float, Number("N m", "maximum gravity torque about the ankle, m g l", minimum=0.0, maximum=1e4)
+    ]
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,9 +105,11 @@ class Supply:
     ``relieving`` is True where the regulators take gas back from a chamber above their pressure.
     """
 
-    pressure: float
-    dorsiflexion_pressure: float
-    atmospheric_pressure: float
+    pressure: Annotated[float, Number("Pa_a", "regulated pressure to chamber 1", minimum=1e3, maximum=1e8)]
+    dorsiflexion_pressure: Annotated[float, Number("Pa_a", "regulated pressure to chamber 2", minimum=1e3, maximum=1e8)]
+    atmospheric_pressure: Annotated[
+        float, Number("Pa_a", "ambient pressure, the zero of gauge", minimum=1e3, maximum=1e6)
+    ]
     relieving: bool = False
 
     @property
@@ -116,7 +131,9 @@ class Valve:
 class Flow:
     """How flow is computed: the pressure ratio [-] above which it is linear in the ratio, as in ISO 6358."""
 
-    linear_ratio: float
+    linear_ratio: Annotated[
+        float, Number("", "pressure ratio above which flow is linear", minimum=0.99, maximum=0.9999)
+    ]
 
 
 @dataclass(frozen=True, slots=True)

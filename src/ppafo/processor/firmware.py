@@ -174,7 +174,7 @@ def integer_form(scenario: Scenario) -> Scenario:
 
     ScenarioError where that controller has none.
     """
-    kind = scenario.control.kind
+    kind = scenario.controller.kind
     if kind in FIXED_LAWS:
         return scenario
     if f"{kind}{ON_CHIP}" not in FIXED_LAWS:
@@ -183,14 +183,14 @@ def integer_form(scenario: Scenario) -> Scenario:
             f"{', '.join(name.removesuffix(ON_CHIP) for name in FIXED_LAWS)}"
         )
     scenario.device.check_vane("a controller on whole numbers")
-    settings = {**scenario.control.settings, **{item.name: item.default or 0.0 for item in SETTINGS}}
-    return replace(scenario, control=replace(scenario.control, kind=f"{kind}{ON_CHIP}", settings=settings))
+    settings = {**scenario.controller.settings, **{item.name: item.default or 0.0 for item in SETTINGS}}
+    return replace(scenario, controller=replace(scenario.controller, kind=f"{kind}{ON_CHIP}", settings=settings))
 
 
 def chip_controller(scenario: Scenario) -> ChipController:
     """The integer controller of a scenario; ScenarioError where the timer of a chip cannot make its sample period."""
     scenario = integer_form(scenario)
-    control = scenario.control
+    control = scenario.controller
     ticks = ticks_of(scenario.name, control.period)
     law = FIXED_LAWS[control.kind]
     row = plan_run(scenario).controller
@@ -214,8 +214,8 @@ def firmware(scenario: Scenario, target: str = TARGETS[0]) -> dict[str, bytes]:
         "board": chosen.board,
         "own_bits": str(chosen.converter_bits),
         "version": __version__,
-        "period": quantity_text(scenario.control.period, "s"),
-        "range": f"{scenario.control.settings[SETTINGS[1].name] / 1.0e3:.6g} kPa",
+        "period": quantity_text(scenario.controller.period, "s"),
+        "range": f"{scenario.controller.settings[SETTINGS[1].name] / 1.0e3:.6g} kPa",
         "step": f"{converter.pressure_step:.4g} Pa",
         "torque_step": f"{converter.torque_step * 1.0e3:.4g} mN m",
         "lowest": f"{-converter.middle * converter.torque_step:.4g} N m",
@@ -232,7 +232,7 @@ def firmware(scenario: Scenario, target: str = TARGETS[0]) -> dict[str, bytes]:
         (", ".join(f"int16_t {name}" for name in Readings._fields), "readings", ", ".join(Readings._fields)),
         {"bool controller_is_sound": "state.sound == 1"},
     )
-    control = scenario.control
+    control = scenario.controller
     texts["parameters.h"] = parameters_header(
         f"the controller '{chip.law.name}' of {scenario.name}, made by ppafo {__version__}",
         _origins(scenario),
@@ -246,7 +246,7 @@ def firmware(scenario: Scenario, target: str = TARGETS[0]) -> dict[str, bytes]:
 
 def _origins(scenario: Scenario) -> Iterator[str]:
     """Settings that the numbers come from, each with unit and value in SI units."""
-    control = scenario.control
+    control = scenario.controller
     declared: dict[str, Quantity] = {item.name: item for item in CONTROLLERS[control.kind].quantities}
     source = scenario.origin.file or "a scenario without a file"
     yield f"period {control.period:.9g} s (controller.rate or controller.period of {source.rpartition('/')[2]})"

@@ -43,7 +43,7 @@ def tried(names: Sequence[str], target: str, samples: int | None, overrides: Seq
         return _runs(scenarios, target)
     found = compare_drawn(scenarios[0], samples, target=target)
     about = {"scenario": scenarios[0].name, "target": target}
-    return _drawn(found, scenarios[0].name, scenarios[0].control.period, about)
+    return _drawn(found, scenarios[0].name, scenarios[0].controller.period, about)
 
 
 def _runs(scenarios: Sequence[Scenario], target: str) -> Tried:
@@ -55,7 +55,7 @@ def _runs(scenarios: Sequence[Scenario], target: str) -> Tried:
         lines = [
             f"{one.scenario.name} with the controller on the chip's simulator, the lanes as the plant",
             "",
-            *_cost_lines(one.cost, one.scenario.control.period),
+            *_cost_lines(one.cost, one.scenario.controller.period),
             *_compared_lines(one),
             *(f"{name:<12} {value * _SHOWN[name][1]:.4f} {_SHOWN[name][0]}" for name, value in metrics.items()),
         ]

@@ -282,8 +282,8 @@ def rig_run(scenario: Scenario, request: Request, rate: float) -> RigRun:
         )
     run = replace(run, plant=rig_plant(run.plant, preset))
     physics = rig_physics(device, preset)
-    times = np.arange(int(scenario.duration * rate + _WHOLE) + 1, dtype=np.float64) / rate
-    is_open_loop = scenario.control.kind == _OPEN_LOOP
+    times = np.arange(int(scenario.run.duration * rate + _WHOLE) + 1, dtype=np.float64) / rate
+    is_open_loop = scenario.controller.kind == _OPEN_LOOP
     return RigRun(
         device=device,
         run=run,
@@ -294,7 +294,7 @@ def rig_run(scenario: Scenario, request: Request, rate: float) -> RigRun:
             name: sensor(preset, name, seed, times.size) for name in ("angle", "pressure_1", "pressure_2", *_SUPPLIES)
         },
         sample_times=times,
-        control_period=2.0 * scenario.duration if is_open_loop else run.period,
+        control_period=2.0 * scenario.run.duration if is_open_loop else run.period,
         command_delay=run.command_delay + preset.values["line.delay"],
         hysteresis=preset.values["valve.hysteresis"],
     )
@@ -304,7 +304,7 @@ def initial_state(scenario: Scenario, run: Run, physics: RigPhysics) -> RigState
     """Return vane and gas at the start [SI], everything at the temperature of the walls."""
     angle, rate = run.initial.angle, run.initial.angular_velocity
     warm = physics.wall_temperature
-    pressures = (scenario.initial_pressure_1, scenario.initial_pressure_2)
+    pressures = (scenario.initial.pressure_1, scenario.initial.pressure_2)
     densities = [real_density(pressure, warm, physics.gas_constant, physics.virial) for pressure in pressures]
     volumes = chamber_volumes(run.plant, angle)
     mass_1, mass_2 = (density * volume for density, volume in zip(densities, volumes, strict=True))
@@ -344,7 +344,7 @@ def _outcome(name: str, scenario: Scenario, bench_run: RigRun, names: tuple[str,
     recording = Recording(name, bench_run.sample_times, channels, kind="synthetic")
     offsets = {item: bench_run.sensors[item].offset for item in names if item in bench_run.sensors}
     settings = {
-        "duration": scenario.duration,
+        "duration": scenario.run.duration,
         "initial_angle": bench_run.initial.angle,
         "initial_angular_velocity": bench_run.initial.angular_velocity,
         "impacts": solution.impacts,

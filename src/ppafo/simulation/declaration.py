@@ -16,61 +16,28 @@ from typing import Any
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.control.catalog import CONTROLLERS, ON_CHIP, PROFILES
 from ppafo.documents.models import quote
-from ppafo.engine.scheme.pneumatics import KEPT_OF_PRESSURE
 from ppafo.errors import KindError, ScenarioError, UnitError, nearest_name, one_line, refused_as
 from ppafo.kinds import Kinds
-from ppafo.model.declaration import Quantity, range_rule
+from ppafo.model.declaration import Quantity, quantities_of, range_rule
 from ppafo.model.effects.bandwidth import EFFECT as BANDWIDTH
 from ppafo.parameters.declaration import is_within
 from ppafo.parameters.parameter_set import Entry
 from ppafo.simulation.motion_kind import WALKS
+from ppafo.simulation.scenario import FreeMotion, GasModel, Initial, Leg, RunSettings, Sensors
 from ppafo.units import format_quantity, from_si, parse_quantity, to_si
 
-LARGEST_SEED = 2**32 - 1
 PLAIN = ("", "1")
 """Units of a plain number."""
 
-RUN = (
-    Quantity("duration", "s", "length of the run", None, 0.0, 1.0e6, minimum_allowed=False),
-    Quantity("step", "s", "largest step; 1 ms unless given, less where a sample comes sooner", 1.0e-3, 1.0e-8, 1.0e3),
-    Quantity("output_interval", "s", "time between two recorded samples; the step unless given", 1.0e-3, 1.0e-8, 1.0e6),
-)
-ACCURACY = Quantity(
-    "tolerance", "1", "error of a pressure to keep to, over the pressure range", KEPT_OF_PRESSURE, 1.0e-6, 0.1
-)
-"""With the default a pressure keeps to 1e-3 of the pressure range and the angle to 2e-4 of its own."""
-ANGLE = Quantity("angle", "rad", "angle of the vane, 90 deg neutral, growing in plantarflexion", None, -10.0, 10.0)
-FREE = (
-    ANGLE,
-    Quantity("angular_velocity", "rad/s", "angular velocity at the start", 0.0, -1.0e4, 1.0e4),
-    Quantity("external_torque", "N m", "constant torque T_ex, above 0 against plantarflexion", 0.0, -1.0e4, 1.0e4),
-)
-FOOT = {
-    item.name: item
-    for item in (
-        Quantity("shank_length", "m", "knee to ankle", 0.46, 0.1, 1.0),
-        Quantity("foot_mass_centre", "m", "ankle to the mass centre of the foot", 0.09, 0.0, 0.5),
-        Quantity("foot_mass", "kg", "mass of the foot", 1.0, 0.05, 10.0),
-        Quantity("foot_inertia", "kg m^2", "inertia of the foot about its mass centre", 0.001, 1.0e-5, 1.0),
-        Quantity("toe_lever", "m", "ankle forward to the toes", 0.18, 0.0, 0.5),
-    )
-}
-"""The paper's subject (after equation (12)); the mass centre is half way along the foot of 0.18 m."""
-LEG = (
-    ANGLE,
-    Quantity("angular_velocity", "rad/s", "angular velocity at the start", 0.0, -1.0e4, 1.0e4),
-    *FOOT.values(),
-    Quantity(
-        "ankle_torque", "N m", "constant torque T_2 of the wearer's ankle, plantarflexion above 0", 0.0, -1.0e3, 1.0e3
-    ),
-)
+*RUN, ACCURACY = quantities_of(RunSettings)
+FREE = quantities_of(FreeMotion)
+ANGLE = FREE[0]
+LEG = (*FREE[:2], *quantities_of(Leg))
+FOOT = {item.name: item for item in quantities_of(Leg)}
 SHANK_LEVEL = Quantity("level", "rad", "", None, -10.0, 10.0)
 GAIT_SHANK = "gait"
 GAIT_START = Quantity("start", "1", "phase in strides at time 0, from heel strike", 0.0, 0.0, 1.0)
-INITIAL = (
-    Quantity("pressure_1", "Pa_a", "pressure in chamber 1 at the start", None, 1.0e3, 1.0e8),
-    Quantity("pressure_2", "Pa_a", "pressure in chamber 2 at the start", None, 1.0e3, 1.0e8),
-)
+INITIAL = quantities_of(Initial)
 PRESSURE_WORDS = {
     "supply": "pressure",
     "dorsiflexion_supply": "dorsiflexion_pressure",
@@ -79,22 +46,12 @@ PRESSURE_WORDS = {
 """Words that stand for a pressure of the device, and the name of that pressure in its supply."""
 AT_REST = "atmosphere"
 
-SENSORS = (
-    Quantity("delay", "s", "age of a measurement when the controller uses it", 0.0, 0.0, 1.0e6),
-    *BANDWIDTH.quantities,
-    Quantity("angle_noise", "rad", "standard deviation of the measured angle", 0.0, 0.0, 10.0),
-    Quantity("pressure_noise", "Pa_d", "standard deviation of the measured pressures", 0.0, 0.0, 1.0e8),
-    Quantity("angle_resolution", "rad", "step of the measured angle", 0.0, 0.0, 10.0),
-    Quantity("pressure_resolution", "Pa_d", "step of the measured pressures", 0.0, 0.0, 1.0e8),
-)
-SEED = Quantity("seed", "", "seed of the noise, a whole number", 1.0, 0.0, float(LARGEST_SEED))
+_DELAY, *_OF_SIGNALS, SEED = quantities_of(Sensors)
+SENSORS = (_DELAY, *BANDWIDTH.quantities, *_OF_SIGNALS)
 
 THERMAL = "thermal"
 ISOTHERMAL = "isothermal"
-THERMAL_GAS = (
-    Quantity("heat_transfer_coefficient", "W/(m^2 K)", "between gas and walls; 0 is adiabatic", None, 0.0, 1.0e9),
-    Quantity("wall_area_per_volume", "1/m", "area of a chamber's walls over its volume", None, 0.0, 1.0e6),
-)
+THERMAL_GAS = quantities_of(GasModel)
 
 RATE = Quantity("rate", "Hz", "samples per second; or give the period", None, 1.0e-6, 1.0e8)
 PERIOD = Quantity("period", "s", "time between two samples; or give the rate", None, 1.0e-8, 1.0e6)

@@ -55,11 +55,13 @@ from ppafo.simulation.overrides import OverriddenDocument, apply_overrides, devi
 from ppafo.simulation.scenario import (
     Assumption,
     Control,
+    GasModel,
+    Initial,
     Origin,
     ProfileChoice,
+    RunSettings,
     Scenario,
     Sensors,
-    Thermal,
 )
 from ppafo.simulation.schema import scenario_file, whole_scenario_file
 from ppafo.units import format_quantity, split_quantity
@@ -110,27 +112,25 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
         name=document["name"],
         description=document.get("description", ""),
         device=device,
-        duration=clock.duration,
-        time_step=clock.step,
-        output_interval=clock.output_interval,
+        run=RunSettings(
+            clock.duration, clock.step, clock.output_interval, tolerance=reading.number("run.tolerance", ACCURACY)
+        ),
         motion=read_motion(reading, device, clock.duration, clock.step, request.folder),
-        initial_pressure_1=_initial_pressure(reading, 0, device.supply),
-        initial_pressure_2=_initial_pressure(reading, 1, device.supply),
-        control=_control(reading, clock.period),
+        initial=Initial(*(_initial_pressure(reading, item, device.supply) for item in INITIAL)),
+        controller=_control(reading, clock.period),
         reference=_reference(reading),
         sensors=_sensors(reading, clock),
         assumptions=(*read_assumptions(before, reading, hardware, request.overrides), *assumed_lines(reading)),
         origin=Origin(request.path, document["device"]["set"], hardware.valve, request.overrides, request.content),
-        thermal=read_thermal(reading),
+        gas_model=read_gas_model(reading),
         supply_lines=read_supply_lines(reading, device),
-        tolerance=reading.number("run.tolerance", ACCURACY),
         links=_links_at_start(reading),
     )
     # Refuse what only a vane has.
     try:
-        if scenario.thermal is not None:
+        if scenario.gas_model is not None:
             scenario.device.check_vane("gas with an energy balance")
-        if CONTROLLERS[scenario.control.kind].plan is not None:
+        if CONTROLLERS[scenario.controller.kind].plan is not None:
             scenario.device.check_vane("a controller on whole numbers")
     except ParameterError as error:
         raise _of_device(reading, error) from error
@@ -180,9 +180,8 @@ def _of_device(reading: Reading, error: ParameterError) -> ParameterError:
     return ParameterError(f"{reading.file}: [device]: {one_line(error)}")
 
 
-def _initial_pressure(reading: Reading, chamber: int, supply: Supply) -> float:
+def _initial_pressure(reading: Reading, quantity: Quantity, supply: Supply) -> float:
     """Return the pressure [Pa absolute] of a chamber at the start, from a number or a word."""
-    quantity = INITIAL[chamber]
     path = f"initial.{quantity.name}"
     value = value_at(reading.document, path)
     word = AT_REST if value is None else value
@@ -307,14 +306,11 @@ def _unknown(reading: Reading, path: str) -> ScenarioError:
     )
 
 
-def read_thermal(reading: Reading) -> Thermal | None:
+def read_gas_model(reading: Reading) -> GasModel | None:
     """Return how the gas takes up heat in SI, None where it keeps its temperature."""
     if kind_at(reading.document, "gas_model") != THERMAL:
         return None
-    values = reading.section("gas_model", THERMAL_GAS)
-    return Thermal(
-        heat_transfer_coefficient=values["heat_transfer_coefficient"], area_per_volume=values["wall_area_per_volume"]
-    )
+    return GasModel(**reading.section("gas_model", THERMAL_GAS))
 
 
 def read_supply_lines(reading: Reading, device: Device) -> SupplyLines | None:

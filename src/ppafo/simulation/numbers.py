@@ -29,13 +29,6 @@ TIMES = ("run.duration", "run.step", "run.output_interval", "controller.rate", "
 """Paths that decide the clock of a run."""
 
 _DEVICE_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow")
-_OF_SENSORS = {"angle_resolution": "angle_resolution", "pressure_resolution": "pressure_resolution"}
-_OF_WALLS = {"wall_area_per_volume": "area_per_volume"}
-_OF_SCENARIO = {
-    "initial.pressure_1": "initial_pressure_1",
-    "initial.pressure_2": "initial_pressure_2",
-    "run.tolerance": "tolerance",
-}
 _ORIFICES = {"actuator.leak": ("device", "actuator", "leak"), "valve": ("device", "valve", "orifice")}
 
 _TEXTS = (
@@ -152,10 +145,10 @@ def _kinds(scenario: Scenario) -> dict[str, Any]:
     if isinstance(scenario.motion, PrescribedMotion):
         is_locked = scenario.motion.kind == "held"
         motion = {} if is_locked else {"kind": "prescribed", "profile": {"kind": scenario.motion.profile.kind}}
-    controller = {"kind": scenario.control.kind}
-    gas: dict[str, Any] = {} if scenario.thermal is None else {"gas_model": {"kind": declaration.THERMAL}}
+    controller = {"kind": scenario.controller.kind}
+    gas: dict[str, Any] = {} if scenario.gas_model is None else {"gas_model": {"kind": declaration.THERMAL}}
     gas |= {} if scenario.supply_lines is None else {SUPPLY_LINE: {}}
-    if scenario.control.kind == switching.CONSTANT.name:
+    if scenario.controller.kind == switching.CONSTANT.name:
         return {"motion": motion, "controller": controller, **gas}
     return {"motion": motion, "controller": controller, "reference": {"kind": scenario.reference.kind}, **gas}
 
@@ -178,8 +171,6 @@ def _place(path: str, scenario: Scenario) -> tuple[str, ...]:
     worn = worn_kind(scenario)
     if worn is not None and path in worn.places:
         return worn.places[path]
-    if path in _OF_SCENARIO:
-        return (_OF_SCENARIO[path],)
     if path == LOCKED_ANGLE and not isinstance(scenario.motion, FreeMotion):
         return ("motion", "profile", "settings", "level")
     if section.startswith(f"{SUPPLY_LINE}."):
@@ -188,10 +179,9 @@ def _place(path: str, scenario: Scenario) -> tuple[str, ...]:
         "motion": ("motion", "leg", name) if name in _OF_LEG else ("motion", name),
         "motion.shank": ("motion", "leg", "shank", "settings", name),
         "motion.profile": ("motion", "profile", "settings", name),
-        "controller": ("control", "settings", name),
+        "controller": ("controller", "settings", name),
         "reference": ("reference", "settings", name),
-        "sensors": ("sensors", _OF_SENSORS.get(name, name)),
-        "gas_model": ("thermal", _OF_WALLS.get(name, name)),
+        **{plain: (plain, name) for plain in ("run", "initial", "sensors", "gas_model")},
     }.get(section, ("device", *_place_in_device(path, scenario.device)))
 
 
@@ -245,7 +235,7 @@ def check_columns(base: Scenario, columns: Mapping[str, Any], gauge: Collection[
 
     Those of the paths in ``gauge`` count from the atmosphere of their run.
     """
-    if base.control.kind == PYTHON_CONTROLLER and base.control.custom is None:
+    if base.controller.kind == PYTHON_CONTROLLER and base.controller.custom is None:
         raise ScenarioError(f"{base.name}: nothing controls the valve; give a controller (controlled_by)")
     find_effects(columns)
     declared = declared_numbers(base)
@@ -277,7 +267,7 @@ def _check_path(base: Scenario, given: str, path: str, declared: Mapping[str, Qu
         return
     if path in _TEXTS:
         raise ScenarioError(f"{base.name}: '{given}' is a text and cannot vary; run an ensemble for each value")
-    if base.control.kind == PYTHON_CONTROLLER and path.startswith("controller."):
+    if base.controller.kind == PYTHON_CONTROLLER and path.startswith("controller."):
         raise ScenarioError(
             f"{base.name}: '{given}' cannot vary: a Python object has no declared settings; "
             "a module with a KIND has them (docs/how-to/extend.md)"
@@ -305,10 +295,8 @@ def varied_scenario(columns: Columns, clock: Clock) -> Scenario:
     scenario = with_numbers(columns.base, numbers)
     return replace(
         scenario,
-        duration=clock.duration,
-        time_step=clock.step,
-        output_interval=clock.output_interval,
-        control=replace(scenario.control, period=clock.period),
+        run=replace(scenario.run, duration=clock.duration, step=clock.step, output_interval=clock.output_interval),
+        controller=replace(scenario.controller, period=clock.period),
     )
 
 
@@ -339,13 +327,13 @@ def time_texts(base: Scenario) -> TimeTexts:
     }
     if read_clock(Reading(base.name, texts)) == clock_of(base):
         return texts
-    run = {"duration": base.duration, "step": base.time_step, "output_interval": base.output_interval}
+    run = {"duration": base.run.duration, "step": base.run.step, "output_interval": base.run.output_interval}
     return {
         "run": {name: f"{value!r} s" for name, value in run.items()},
-        "controller": {"period": f"{base.control.period!r} s"},
+        "controller": {"period": f"{base.controller.period!r} s"},
     }
 
 
 def clock_of(base: Scenario) -> Clock:
     """Return the clock that a scenario has."""
-    return Clock(base.duration, base.time_step, base.output_interval, base.control.period)
+    return Clock(base.run.duration, base.run.step, base.run.output_interval, base.controller.period)

@@ -53,11 +53,11 @@ from ppafo.parameters.plant import effect_rows, effects_of, orifice_conductance,
 from ppafo.simulation.scenario import (
     PYTHON_CONTROLLER,
     FreeMotion,
+    GasModel,
     Leg,
     PrescribedMotion,
     ProfileChoice,
     Scenario,
-    Thermal,
     VaneMotion,
     vane_motion,
     worn_kind,
@@ -100,7 +100,7 @@ class Components:
     path: ProfileChoice | None
     sensors: SensorParameters
     has_ideal_sensors: bool
-    thermal: Thermal | None
+    thermal: GasModel | None
     supply_lines: SupplyLines | None
     signal_delay: Any = 0.0
     sections: Mapping[str, Any] = field(default_factory=dict)
@@ -232,7 +232,7 @@ def plan_runs(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
     if worn is not None:
         planned: tuple[Run, tuple[Problem, ...]] = worn.plan(scenario)
         return planned
-    device, motion, control = scenario.device, vane_motion(scenario), scenario.control
+    device, motion, control = scenario.device, vane_motion(scenario), scenario.controller
     plant = plant_parameters(device, outside_torque(motion))
     law = None if control.kind == PYTHON_CONTROLLER else CONTROLLERS[control.kind]
     numbers, problems = _numbers_of_law(law, scenario, plant.torque_constant)
@@ -245,7 +245,7 @@ def plan_runs(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         path=None if isinstance(motion, FreeMotion) else motion.profile,
         sensors=sensor_parameters(scenario),
         has_ideal_sensors=has_ideal_sensors(scenario),
-        thermal=scenario.thermal,
+        thermal=scenario.gas_model,
         supply_lines=scenario.supply_lines,
         signal_delay=scenario.sensors.delay,
         sections=scenario.effect_sections,
@@ -261,7 +261,7 @@ def _numbers_of_law(
     law: ControllerKind | None, scenario: Scenario, torque_constant: Any
 ) -> tuple[Mapping[str, Any], tuple[Problem, ...]]:
     """Return the numbers of a law by name, which are its settings unless it has a plan, and what may be wrong."""
-    control = scenario.control
+    control = scenario.controller
     if law is None or law.plan is None:
         return control.settings, ()
     return law.plan(control.settings, control.period, torque_constant, profile_bounds(scenario.reference))
@@ -269,8 +269,10 @@ def _numbers_of_law(
 
 def scenario_steps(scenario: Scenario, plant: PlantParameters) -> Steps:
     """The steps of a scenario: the largest that divides a sample of its controller, in parts where the error asks."""
-    counts = step_counts(scenario.duration, scenario.time_step, scenario.output_interval, scenario.control.period)
-    tolerance = relative_tolerance(scenario.tolerance)
+    counts = step_counts(
+        scenario.run.duration, scenario.run.step, scenario.run.output_interval, scenario.controller.period
+    )
+    tolerance = relative_tolerance(scenario.run.tolerance)
     return Steps(
         step=counts.step,
         step_count=whole(counts.step_count),
@@ -350,7 +352,7 @@ def too_many_steps(scenario: Scenario, step: float, step_count: int) -> Problem:
     """Runs that take more steps [s] than can be waited for."""
 
     def line(run: int) -> str:
-        duration, length, count = (at(number, run) for number in (scenario.duration, step, step_count))
+        duration, length, count = (at(number, run) for number in (scenario.run.duration, step, step_count))
         return (
             f"run.duration = {duration:.6g} s takes {count:.3g} steps of {length:.3g} s, at most {MAXIMUM_STEPS:.0e} "
             "are allowed: shorten the run or take a larger run.step"
@@ -359,7 +361,7 @@ def too_many_steps(scenario: Scenario, step: float, step_count: int) -> Problem:
     return step_count > MAXIMUM_STEPS, line
 
 
-def thermal_parameters(walls: Thermal | None, device: Device) -> ThermalParameters | NoParameters:
+def thermal_parameters(walls: GasModel | None, device: Device) -> ThermalParameters | NoParameters:
     """How the gas takes up heat, where it has an energy balance."""
     if walls is None:
         return NoParameters()
@@ -428,7 +430,7 @@ def is_adaptive(scenario: Scenario, plant: PlantParameters, step: float) -> Any:
     motion = scenario.motion
     if not isinstance(motion, PrescribedMotion) or motion.profile.kind != "constant":
         return True
-    stiffness = 1.0 if scenario.thermal is None else scenario.device.gas.heat_capacity_ratio
+    stiffness = 1.0 if scenario.gas_model is None else scenario.device.gas.heat_capacity_ratio
     return np.logical_not(is_slow_locked(plant, step, motion.profile.settings["level"], stiffness))
 
 
@@ -449,7 +451,7 @@ def initial_state(scenario: Scenario, plant: PlantParameters) -> PlantState:
         path = PROFILES[motion.profile.kind]
         numbers = [motion.profile.settings[item.name] for item in path.quantities]
         angle, rate, _ = over_runs(lambda *values: path.value(rebuilt(path.parameters, values), 0.0), *numbers)
-    pressures = scenario.initial_pressure_1, scenario.initial_pressure_2
+    pressures = scenario.initial.pressure_1, scenario.initial.pressure_2
     kind = scenario.device.actuator.kind
     if kind == VANE.name:
         return state_at_start(plant, angle, rate, *pressures)
@@ -501,10 +503,10 @@ def is_slow_locked(plant: PlantParameters, step: float, angle: float, stiffness:
     return is_slow(plant, step, larger(angle, plant.angle_min), smaller(angle, plant.angle_max), stiffness)
 
 
-def thermal_gas(walls: Thermal, gas: Gas) -> ThermalParameters:
+def thermal_gas(walls: GasModel, gas: Gas) -> ThermalParameters:
     """How a gas with an energy balance takes up heat."""
     exchange = wall_exchange(
-        walls.heat_transfer_coefficient, walls.area_per_volume, gas.heat_capacity_ratio, gas.specific_gas_constant
+        walls.heat_transfer_coefficient, walls.wall_area_per_volume, gas.heat_capacity_ratio, gas.specific_gas_constant
     )
     return ThermalParameters(
         heat_capacity_ratio=gas.heat_capacity_ratio, wall_exchange=exchange, temperature=gas.temperature

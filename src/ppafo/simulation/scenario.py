@@ -9,11 +9,12 @@ import math
 import numbers
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Annotated, Any, Protocol
 
 from ppafo.control.kind import PythonController
 from ppafo.engine.scheme.pneumatics import KEPT_OF_PRESSURE
 from ppafo.errors import ScenarioError
+from ppafo.model.declaration import Number
 from ppafo.model.gait import ShankSeries
 from ppafo.model.regulator import SupplyLines
 from ppafo.parameters.device import Device
@@ -21,6 +22,7 @@ from ppafo.parameters.graph import Graph
 from ppafo.simulation.motion_kind import MotionKind
 
 PYTHON_CONTROLLER = "python"
+LARGEST_SEED = 2**32 - 1
 
 UNITS = "SI: kg, m, s, K, mol; angles in rad, pressures in Pa absolute, torques in N m"
 
@@ -41,14 +43,17 @@ class Leg:
     from the ankle to the toes [m], which nothing but the height of the toes asks for.
     ``ankle_torque`` [N m] is T_2, positive in plantarflexion. ``shank`` is its angle in time [rad], upright at 0; with
     the kind ``gait`` that of a ``gait`` by its ``curves``, whose knee moves too, from the phase ``start`` [strides] on.
+    Defaults are the paper's subject (after equation (12)), with the mass centre half way along a foot of 0.18 m.
     """
 
-    foot_mass: float
-    foot_mass_centre: float
-    foot_inertia: float
-    shank_length: float
-    toe_lever: float
-    ankle_torque: float
+    shank_length: Annotated[float, Number("m", "knee to ankle", 0.46, 0.1, 1.0)]
+    foot_mass_centre: Annotated[float, Number("m", "ankle to the mass centre of the foot", 0.09, 0.0, 0.5)]
+    foot_mass: Annotated[float, Number("kg", "mass of the foot", 1.0, 0.05, 10.0)]
+    foot_inertia: Annotated[float, Number("kg m^2", "inertia of the foot about its mass centre", 0.001, 1.0e-5, 1.0)]
+    toe_lever: Annotated[float, Number("m", "ankle forward to the toes", 0.18, 0.0, 0.5)]
+    ankle_torque: Annotated[
+        float, Number("N m", "constant torque T_2 of the wearer's ankle, plantarflexion above 0", 0.0, -1.0e3, 1.0e3)
+    ]
     shank: ProfileChoice
     gait: str = ""
     curves: ShankSeries | None = None
@@ -62,9 +67,13 @@ class FreeMotion:
     equation (1), positive where it works against plantarflexion. With a ``leg`` T_ex follows from equation (11).
     """
 
-    angle: float
-    angular_velocity: float = 0.0
-    external_torque: float = 0.0
+    angle: Annotated[
+        float, Number("rad", "angle of the vane, 90 deg neutral, growing in plantarflexion", None, -10.0, 10.0)
+    ]
+    angular_velocity: Annotated[float, Number("rad/s", "angular velocity at the start", 0.0, -1.0e4, 1.0e4)] = 0.0
+    external_torque: Annotated[
+        float, Number("N m", "constant torque T_ex, above 0 against plantarflexion", 0.0, -1.0e4, 1.0e4)
+    ] = 0.0
     leg: Leg | None = None
 
     @property
@@ -117,15 +126,46 @@ VaneMotion = FreeMotion | PrescribedMotion
 
 
 @dataclass(frozen=True, slots=True)
-class Thermal:
+class RunSettings:
+    """Times of a run [s], and the error of a pressure over the pressure range [-] that the step size control keeps to.
+
+    ``step`` is the largest step (the engine divides it where a chamber is faster) and divides ``duration``,
+    ``output_interval`` and the sample period of the controller. With the default tolerance a pressure keeps to 1e-3 of
+    the pressure range and the angle to 2e-4 of its own.
+    """
+
+    duration: Annotated[float, Number("s", "length of the run", None, 0.0, 1.0e6, minimum_allowed=False)]
+    step: Annotated[
+        float, Number("s", "largest step; 1 ms unless given, less where a sample comes sooner", 1.0e-3, 1.0e-8, 1.0e3)
+    ]
+    output_interval: Annotated[
+        float, Number("s", "time between two recorded samples; the step unless given", 1.0e-3, 1.0e-8, 1.0e6)
+    ]
+    tolerance: Annotated[
+        float, Number("1", "error of a pressure to keep to, over the pressure range", KEPT_OF_PRESSURE, 1.0e-6, 0.1)
+    ] = KEPT_OF_PRESSURE
+
+
+@dataclass(frozen=True, slots=True)
+class Initial:
+    """Pressures [Pa absolute] of both chambers at the start."""
+
+    pressure_1: Annotated[float, Number("Pa_a", "pressure in chamber 1 at the start", None, 1.0e3, 1.0e8)]
+    pressure_2: Annotated[float, Number("Pa_a", "pressure in chamber 2 at the start", None, 1.0e3, 1.0e8)]
+
+
+@dataclass(frozen=True, slots=True)
+class GasModel:
     """Gas with an energy balance: heat transfer coefficient [W/(m^2 K)], area of the walls over the volume [1/m].
 
     The walls, the source and the room have the temperature of the device's gas. A coefficient of 0 is adiabatic; a
     very large one gives the isothermal gas of the paper.
     """
 
-    heat_transfer_coefficient: float
-    area_per_volume: float
+    heat_transfer_coefficient: Annotated[
+        float, Number("W/(m^2 K)", "between gas and walls; 0 is adiabatic", None, 0.0, 1.0e9)
+    ]
+    wall_area_per_volume: Annotated[float, Number("1/m", "area of a chamber's walls over its volume", None, 0.0, 1.0e6)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,12 +176,14 @@ class Sensors:
     seed of the noise, and first-order bandwidths of the angle sensor and the pressure sensors [Hz], 0 for none.
     """
 
-    delay: float = 0.0
-    angle_noise: float = 0.0
-    pressure_noise: float = 0.0
-    angle_resolution: float = 0.0
-    pressure_resolution: float = 0.0
-    seed: int = 1
+    delay: Annotated[float, Number("s", "age of a measurement when the controller uses it", 0.0, 0.0, 1.0e6)] = 0.0
+    angle_noise: Annotated[float, Number("rad", "standard deviation of the measured angle", 0.0, 0.0, 10.0)] = 0.0
+    pressure_noise: Annotated[
+        float, Number("Pa_d", "standard deviation of the measured pressures", 0.0, 0.0, 1.0e8)
+    ] = 0.0
+    angle_resolution: Annotated[float, Number("rad", "step of the measured angle", 0.0, 0.0, 10.0)] = 0.0
+    pressure_resolution: Annotated[float, Number("Pa_d", "step of the measured pressures", 0.0, 0.0, 1.0e8)] = 0.0
+    seed: Annotated[int, Number("", "seed of the noise, a whole number", 1.0, 0.0, float(LARGEST_SEED))] = 1
     angle_bandwidth: float = 0.0
     pressure_bandwidth: float = 0.0
 
@@ -195,31 +237,24 @@ class Origin:
 class Scenario:
     """A device in one experiment.
 
-    Times [s]: ``time_step`` is the largest step (the engine divides it where a chamber is faster) and divides
-    ``duration``, ``output_interval`` and the sample period of ``control``. Initial pressures [Pa absolute]; the
-    reference is a torque [N m]. Without ``thermal`` the gas keeps its temperature, without ``supply_lines`` the supply
-    pressures are constant, both as in the paper. ``tolerance`` is the error of a pressure over the pressure range [-]
-    that the step size control keeps to. ``links`` say which numbers follow others that are varied, beside those of the
-    device.
+    The reference is a torque [N m]. Without ``gas_model`` the gas keeps its temperature, without ``supply_lines`` the
+    supply pressures are constant, both as in the paper. ``links`` say which numbers follow others that are varied,
+    beside those of the device.
     """
 
     name: str
     description: str
     device: Device
-    duration: float
-    time_step: float
-    output_interval: float
+    run: RunSettings
     motion: VaneMotion | WornMotion
-    initial_pressure_1: float
-    initial_pressure_2: float
-    control: Control
+    initial: Initial
+    controller: Control
     reference: ProfileChoice
     sensors: Sensors
     assumptions: tuple[Assumption, ...]
     origin: Origin
-    thermal: Thermal | None = None
+    gas_model: GasModel | None = None
     supply_lines: SupplyLines | None = None
-    tolerance: float = KEPT_OF_PRESSURE
     links: Graph = field(default_factory=dict, compare=False)
 
     def __repr__(self) -> str:
@@ -228,8 +263,8 @@ class Scenario:
             f"Scenario '{self.name}'\n"
             f"  device      {self.device.name}, valve {self.device.valve_name}\n"
             f"  motion      {self.motion.label}\n"
-            f"  controller  {self.control.label}\n"
-            f"  duration    {self.duration:g} s, in steps of at most {self.time_step:g} s"
+            f"  controller  {self.controller.label}\n"
+            f"  duration    {self.run.duration:g} s, in steps of at most {self.run.step:g} s"
         )
 
     @property
@@ -261,7 +296,7 @@ class Scenario:
                 )
         own = ("controller.", "timing.")
         links = {path: link for path, link in self.links.items() if not path.startswith(own)}
-        return replace(self, control=Control(PYTHON_CONTROLLER, {}, self.control.period, controller), links=links)
+        return replace(self, controller=Control(PYTHON_CONTROLLER, {}, self.controller.period, controller), links=links)
 
 
 def vane_motion(scenario: Scenario) -> VaneMotion:

@@ -16,6 +16,7 @@ from ppafo.control.kind import ControllerKind
 from ppafo.documents.models import NAME, make_schema, one_of, optional, table
 from ppafo.model.declaration import Quantity
 from ppafo.simulation import declaration
+from ppafo.simulation.scenario import LARGEST_SEED
 
 _LONGEST_NAME = 100
 _STARTS_WITH_NUMBER = r"^\s*[+-]?(\d|\.\d)"
@@ -162,7 +163,7 @@ def device_fields() -> dict[str, Any]:
 
 
 def _sensors() -> dict[str, Any]:
-    seed = Annotated[int, Field(ge=0, le=declaration.LARGEST_SEED)]
+    seed = Annotated[int, Field(ge=0, le=LARGEST_SEED)]
     return quantity_fields(declaration.SENSORS) | {"seed": (seed, Field(1, description=declaration.SEED.summary))}
 
 

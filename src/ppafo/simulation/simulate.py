@@ -118,7 +118,7 @@ class Result:
         width = max((len(name) for name in self.metrics), default=0)
         lines = [f"  {name:<{width}}  {item.value:.4g} {item.unit}" for name, item in self.metrics.items()]
         return "\n".join(
-            [f"Result of '{scenario.name}', {scenario.duration:g} s: {status.message or status.kind}", *lines]
+            [f"Result of '{scenario.name}', {scenario.run.duration:g} s: {status.message or status.kind}", *lines]
         )
 
     def __str__(self) -> str:
@@ -205,7 +205,7 @@ def simulate(scenario: Scenario) -> Result:
 
 def results_of(scenario: Scenario, runs: Sequence[Run]) -> list[Result]:
     """Results of runs of one scenario, as planned or with other numbers; a Python controller has them in turn."""
-    custom = scenario.control.custom
+    custom = scenario.controller.custom
     outcomes = run_together(runs) if custom is None else [run_sampled(batch_of(run), custom) for run in runs]
     return [result_of(scenario, run, outcome) for run, outcome in zip(runs, outcomes, strict=True)]
 
@@ -213,7 +213,7 @@ def results_of(scenario: Scenario, runs: Sequence[Run]) -> list[Result]:
 def simulate_many(scenarios: Sequence[Scenario], threads: int | None = None) -> list[Result]:
     """Run many scenarios side by side, each exactly as if it ran alone."""
     runs = [plan_run(scenario) for scenario in scenarios]
-    inside = [index for index, scenario in enumerate(scenarios) if scenario.control.custom is None]
+    inside = [index for index, scenario in enumerate(scenarios) if scenario.controller.custom is None]
     outcomes = dict(zip(inside, run_together([runs[index] for index in inside], threads), strict=True))
     return [
         result_of(scenario, run, outcomes[index]) if index in outcomes else simulate(scenario)
@@ -288,7 +288,7 @@ def _recording(scenario: Scenario, run: Run, times: Floats, rows: Mapping[str, F
         "mass_1": (rows["state.mass_1"], "kg"),
         "mass_2": (rows["state.mass_2"], "kg"),
     }
-    if scenario.control.kind != OPEN_LOOP:
+    if scenario.controller.kind != OPEN_LOOP:
         # Times of the first samples [s], shape (count,), rounded as the engine does, so that a reference has its bits.
         steps = np.arange(times.size, dtype=np.float64) * run.record_every
         whole = np.round(steps)
@@ -409,7 +409,7 @@ def _error(result: Result, fine: Result) -> ErrorEstimate:
 
 def _check_repeatable(result: Result, run: Run) -> None:
     """Refuse a Python controller that gives a different run each time: every change would be its own."""
-    controller = result.scenario.control.custom
+    controller = result.scenario.controller.custom
     if controller is None:
         return
     again = results_of(result.scenario, [run])[0].recording
@@ -512,7 +512,7 @@ def _metric_range(result: Result, name: str, unit: str, pressures: float) -> flo
         "J": torques * angles,
         "kg": max(_value(result, "gas_supplied"), _largest_content(recording)),
         "m": float(np.ptp(recording["toe_height"])) if "toe_height" in recording else 0.0,
-        "s": scenario.duration,
+        "s": scenario.run.duration,
         "-": 1.0,
     }
     if unit in ranges:

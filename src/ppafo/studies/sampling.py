@@ -21,8 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.simulation.declaration import LARGEST_SEED
-from ppafo.simulation.scenario import Scenario, worn_kind
+from ppafo.simulation.scenario import LARGEST_SEED, Scenario, worn_kind
 from ppafo.simulation.simulate import OPEN_LOOP
 from ppafo.studies.distributions import Floats, WholeNumbersBetween
 from ppafo.studies.study import Drawn, Sample
@@ -171,7 +170,7 @@ _KEY = 1
 
 def is_noisy(scenarios: Iterable[Scenario], paths: Sequence[str] = ()) -> bool:
     """Tell whether a controller receives noise in any of some scenarios, or where some paths vary."""
-    closed = [item for item in scenarios if item.control.kind != OPEN_LOOP]
+    closed = [item for item in scenarios if item.controller.kind != OPEN_LOOP]
     heard = any(np.any(np.asarray(_noise_of(item)) > 0.0) for item in closed)
     return heard or (bool(closed) and any(path in _NOISE_LEVELS for path in paths))
 

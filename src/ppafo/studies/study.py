@@ -49,7 +49,7 @@ def valid_outputs(outputs: declared.Outputs, scenarios: Sequence[Scenario], refu
     _check_names("trajectories", outputs.trajectories, tuple(TRACED), refusal)
     _check_names("bands", outputs.bands, tuple(TRACED), refusal)
     channels = (*outputs.trajectories, *outputs.bands)
-    if "reference" in channels and all(scenario.control.kind == OPEN_LOOP for scenario in scenarios):
+    if "reference" in channels and all(scenario.controller.kind == OPEN_LOOP for scenario in scenarios):
         raise refusal("outputs: 'reference' needs a reference, and the controllers here follow none")
     has = {name: [lacking(scenario, METRICS[name]) for scenario in scenarios] for name in metrics}
     missing = {name: reasons[0] for name, reasons in has.items() if all(reasons)}
@@ -85,7 +85,7 @@ def _interval(outputs: declared.Outputs, scenarios: Sequence[Scenario], refusal:
         every = parse_quantity(outputs.every, "s")
     if not (outputs.trajectories or outputs.bands):
         return every
-    shortest = min(scenario.duration for scenario in scenarios)
+    shortest = min(scenario.run.duration for scenario in scenarios)
     if not 0.0 < every <= shortest:
         raise refusal(
             f"outputs.every = {outputs.every!r} must be more than 0 s and at most run.duration, {shortest:g} s"
@@ -250,7 +250,7 @@ def with_overrides(scenario: Scenario, overrides: Sequence[str]) -> Scenario:
     """
     if not overrides:
         return scenario
-    of_object = [text for text in overrides if scenario.control.custom is not None and _SETTING.match(text)]
+    of_object = [text for text in overrides if scenario.controller.custom is not None and _SETTING.match(text)]
     if of_object:
         raise StudyError(f"override '{of_object[0]}': scenario '{scenario.name}' is controlled by a Python object")
     # Overrides load the file anew, so what was replaced in Python would silently come back.

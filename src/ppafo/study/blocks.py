@@ -37,7 +37,7 @@ def chunk_size(study: Study) -> int:
     """Return the runs of a full chunk: fewer where channels over time are kept, so that memory stays small."""
     if study.runs_of_chunk is not None:
         return study.runs_of_chunk
-    if any(item.scenario.control.custom is not None for item in study.configurations):
+    if any(item.scenario.controller.custom is not None for item in study.configurations):
         return _SLOW_RUNS_OF_CHUNK
     if any(reacts(item.scenario) for item in study.configurations):
         return _REACTING_RUNS_OF_CHUNK
@@ -50,7 +50,7 @@ def chunk_size(study: Study) -> int:
 
 def samples_of(study: Study, configuration: Configuration) -> int:
     """Return how many samples a channel over time has in a configuration."""
-    return int(configuration.scenario.duration / study.outputs.every + 1.0e-9) + 1
+    return int(configuration.scenario.run.duration / study.outputs.every + 1.0e-9) + 1
 
 
 def maximum_samples(study: Study) -> int:

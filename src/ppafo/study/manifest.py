@@ -224,9 +224,9 @@ def _without_origin(scenario: Scenario) -> dict[str, Any]:
     """Return a base scenario in SI units without the file it came from, which may lie elsewhere the next time."""
     document: dict[str, Any] = _plain(scenario_document(scenario))
     del document["origin"]
-    custom = scenario.control.custom
+    custom = scenario.controller.custom
     if custom is not None:
-        document["control"]["custom"] = controller_document(custom)
+        document["controller"]["custom"] = controller_document(custom)
     return document
 
 

@@ -68,7 +68,7 @@ class Runs:
         """
         check_metrics(metrics, scenario)
         at_once = _REACTING_AT_ONCE if reacts(scenario) else _AT_ONCE
-        self._at_once = at_once if scenario.control.custom is None else _SLOW_AT_ONCE
+        self._at_once = at_once if scenario.controller.custom is None else _SLOW_AT_ONCE
         self._tally = tally
         self._begin(metrics, lambda columns: _ensemble(scenario, columns, metrics, threads, gauge))
 

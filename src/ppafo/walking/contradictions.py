@@ -73,9 +73,9 @@ def _text(number: Any, run: int, unit: str) -> str:
 
 
 def _contradictions(scenario: Scenario) -> Iterator[Contradiction]:
-    settings = scenario.control.settings
+    settings = scenario.controller.settings
     yield from _segments(scenario)
-    if scenario.control.kind == PYTHON_CONTROLLER:
+    if scenario.controller.kind == PYTHON_CONTROLLER:
         return
     yield from _valve(scenario, law_of(scenario))
     if "load_threshold" in settings:
@@ -133,7 +133,11 @@ def _thresholds(settings: Mapping[str, Any]) -> Iterator[Contradiction]:
 
 
 def _times(scenario: Scenario) -> Iterator[Contradiction]:
-    settings, stride, period = scenario.control.settings, walk_of(scenario).gait.stride_time, scenario.control.period
+    settings, stride, period = (
+        scenario.controller.settings,
+        walk_of(scenario).gait.stride_time,
+        scenario.controller.period,
+    )
     first = settings["first_stride_time"]
     yield Contradiction(
         "controller.first_stride_time",
@@ -162,7 +166,7 @@ def _times(scenario: Scenario) -> Iterator[Contradiction]:
 
 
 def _angles(scenario: Scenario) -> Iterator[Contradiction]:
-    settings, actuator = scenario.control.settings, scenario.device.actuator
+    settings, actuator = scenario.controller.settings, scenario.device.actuator
     low, high = settings["lowest_angle"], settings["highest_angle"]
     yield Contradiction(
         "controller.lowest_angle",
@@ -193,7 +197,7 @@ def _gait(scenario: Scenario) -> Iterator[Contradiction]:
 
 
 def _pressures(scenario: Scenario) -> Iterator[Contradiction]:
-    settings, supply = scenario.control.settings, scenario.device.supply
+    settings, supply = scenario.controller.settings, scenario.device.supply
     room = supply.atmospheric_pressure
     lowest = smaller(supply.pressure, supply.dorsiflexion_pressure)
     compressed = larger(supply.pressure, supply.dorsiflexion_pressure) * COMPRESSION

@@ -212,7 +212,7 @@ def _venting(
         level=level,
         fault_flag=flag,
         readings={name: float(record[f"{FINDING_ROW}.{name}"][place]) for name in flag.readings},
-        settings={name: configuration.control.settings[name] for name in flag.settings},
+        settings={name: configuration.controller.settings[name] for name in flag.settings},
         units={name: quantities[name].unit for name in flag.settings},
         atmosphere=configuration.device.supply.atmospheric_pressure,
     )

@@ -28,15 +28,15 @@ from ppafo.simulation.loading import (
     ScenarioRequest,
     assumed_lines,
     read_device,
+    read_gas_model,
     read_hardware,
     read_supply_lines,
-    read_thermal,
     scenario_of,
 )
 from ppafo.simulation.motion_kind import WALK, WALKS
 from ppafo.simulation.numbers import device_number_at
 from ppafo.simulation.overrides import OverriddenDocument, over_layer
-from ppafo.simulation.scenario import Assumption, Control, Origin, Scenario, Sensors
+from ppafo.simulation.scenario import Assumption, Control, Initial, Origin, RunSettings, Scenario, Sensors
 from ppafo.walking.bottle import BOTTLE, BOTTLE_NAME, BottleSupply, read_bottle
 from ppafo.walking.contradictions import check_walk
 from ppafo.walking.course import load_course
@@ -142,8 +142,8 @@ def on_bottle(scenario: Scenario, bottle: str | Path | None, overrides: Iterable
 
 def _walked_with(scenario: Scenario) -> tuple[Any, ...]:
     """Return what a walk on another bottle shares with a walk: all but how long it is and what it hangs on."""
-    hardware = scenario.device, scenario.supply_lines, scenario.thermal, scenario.sensors, scenario.control
-    return *hardware, scenario.time_step, replace(walk_of(scenario), bottle=None)
+    hardware = scenario.device, scenario.supply_lines, scenario.gas_model, scenario.sensors, scenario.controller
+    return *hardware, scenario.run.step, replace(walk_of(scenario), bottle=None)
 
 
 def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenario:
@@ -194,20 +194,17 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
         name=document["name"],
         description=document.get("description", ""),
         device=device,
-        duration=DEFAULT_DURATION,
-        time_step=step,
-        output_interval=who.interval(DEFAULT_DURATION),
+        run=RunSettings(DEFAULT_DURATION, step, who.interval(DEFAULT_DURATION)),
         motion=motion,
-        initial_pressure_1=supply.atmospheric_pressure,
-        initial_pressure_2=supply.atmospheric_pressure,
-        control=_control(reading, law, device, lines, settings, links),
+        initial=Initial(supply.atmospheric_pressure, supply.atmospheric_pressure),
+        controller=_control(reading, law, device, lines, settings, links),
         reference=NO_REFERENCE,
         sensors=_sensors(reading, settings),
         assumptions=_assumed(reading, carried),
         origin=Origin(
             request.path, document["device"]["set"], hardware.valve, (*request.overrides, *more), request.content
         ),
-        thermal=read_thermal(reading),
+        gas_model=read_gas_model(reading),
         supply_lines=lines,
         links={**links, **who.links(reading.document)},
     )

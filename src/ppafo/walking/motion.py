@@ -121,7 +121,11 @@ LONGEST_MINUTES = 60.0
 
 PLACES: Mapping[str, tuple[str, ...]] = {
     **{f"wearer.{item.name}": ("motion", "wearer", item.name) for item in WEARER},
-    **{f"timing.{item.name}": ("control", "settings", item.name) for kind in TIMINGS for item in timing_settings(kind)},
+    **{
+        f"timing.{item.name}": ("controller", "settings", item.name)
+        for kind in TIMINGS
+        for item in timing_settings(kind)
+    },
     f"wearer.{PERSON.name}": ("motion", PERSON.name),
     **{f"sensors.{name}": ("motion", "forces", name) for name in FORCES},
     **{
@@ -143,12 +147,12 @@ PLACES: Mapping[str, tuple[str, ...]] = {
 
 def numbers_of_scenario(scenario: Scenario) -> dict[str, Quantity]:
     """The declaration of every number of a walk beside those of its device, by path."""
-    motion, control = walk_of(scenario), scenario.control
+    motion, control = walk_of(scenario), scenario.controller
     own = controller_settings(control.kind)
     known = quantities(motion.who, control.kind, motion.timing)
     kept = {f"controller.{item.name}" for item in own} | {"controller.rate", "controller.period"}
     kept |= {path for path in known if path.partition(".")[0] in ("wearer", "timing", "sensors", "run")}
-    kept |= {f"gas_model.{item.name}" for item in gas_settings("" if scenario.thermal is None else "thermal")}
+    kept |= {f"gas_model.{item.name}" for item in gas_settings("" if scenario.gas_model is None else "thermal")}
     kept |= set() if scenario.supply_lines is None else set(line_paths())
     for sensor, fault in motion.faults.items():
         kept |= {f"faults.{sensor}.{name}" for name in fault.numbers}
@@ -169,7 +173,8 @@ def record_interval(seconds: float) -> float:
 
 def with_duration(scenario: Scenario, seconds: float) -> Scenario:
     """A walk of another length [s], recorded as often as that allows."""
-    return replace(scenario, duration=seconds, output_interval=walk_of(scenario).who.interval(seconds))
+    interval = walk_of(scenario).who.interval(seconds)
+    return replace(scenario, run=replace(scenario.run, duration=seconds, output_interval=interval))
 
 
 def duration_problems(scenario: Scenario, seconds: Any) -> tuple[Problem, ...]:
@@ -190,12 +195,12 @@ def duration_problems(scenario: Scenario, seconds: Any) -> tuple[Problem, ...]:
 
 def clock_with(scenario: Scenario, times: Mapping[str, Any]) -> tuple[Clock, tuple[Problem, ...]]:
     """The clock of a walk with other times [s] by path, which may be arrays (runs,), and what is wrong with it."""
-    duration = times.get("run.duration", scenario.duration)
-    period = times.get("controller.period", scenario.control.period)
+    duration = times.get("run.duration", scenario.run.duration)
+    period = times.get("controller.period", scenario.controller.period)
     if "controller.rate" in times:
         period = 1.0 / times["controller.rate"]
     output = (
-        over_runs(walk_of(scenario).who.interval, duration) if "run.duration" in times else scenario.output_interval
+        over_runs(walk_of(scenario).who.interval, duration) if "run.duration" in times else scenario.run.output_interval
     )
     problems = duration_problems(scenario, duration) if "run.duration" in times else ()
-    return Clock(duration, times.get("run.step", scenario.time_step), output, period), problems
+    return Clock(duration, times.get("run.step", scenario.run.step), output, period), problems

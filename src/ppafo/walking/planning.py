@@ -111,9 +111,9 @@ def components_of_walk(scenario: Scenario, device: Device, sensors: GaitSensors)
         path=None,
         sensors=sensor_parameters(scenario),
         has_ideal_sensors=has_ideal_sensors(scenario),
-        thermal=scenario.thermal,
+        thermal=scenario.gas_model,
         supply_lines=scenario.supply_lines,
-        signal_delay=of_each(longest_delay, sensors) * scenario.control.period,
+        signal_delay=of_each(longest_delay, sensors) * scenario.controller.period,
     )
 
 
@@ -134,8 +134,8 @@ def walk_steps(scenario: Scenario, plant: PlantParameters) -> Steps:
     lines, volume = scenario.supply_lines, of_each(smallest_chamber, plant)
     volume = volume if lines is None else smaller(volume, smaller(lines.volume_1, lines.volume_2))
     # Adiabatic chambers fill faster than isothermal ones, by the ratio of heat capacities.
-    stiffness = 1.0 if scenario.thermal is None else scenario.device.gas.heat_capacity_ratio
-    times = scenario.duration, scenario.time_step, scenario.output_interval, scenario.control.period
+    stiffness = 1.0 if scenario.gas_model is None else scenario.device.gas.heat_capacity_ratio
+    times = scenario.run.duration, scenario.run.step, scenario.run.output_interval, scenario.controller.period
     counts = walk_step_counts(*times, plant, volume, stiffness)
     return Steps(
         step=counts.step,
@@ -180,7 +180,7 @@ def gait_sensors_of(scenario: Scenario) -> GaitSensors:
         own = {sensor: FaultSettings(kind, {name: next(left) for name in known}) for sensor, kind, known in faults}
         return sensors_of(SensorSettings(numbers, own), period)
 
-    return over_runs(made, scenario.control.period, *values)
+    return over_runs(made, scenario.controller.period, *values)
 
 
 def failing_of(scenario: Scenario) -> tuple[PlantFaults, ShutOff] | None:
@@ -236,7 +236,7 @@ def has_ideal_sensors(scenario: Scenario) -> bool:
 def switches(scenario: Scenario) -> tuple[Any, ...]:
     """Settings that are 0 for all runs of a program or for none: flaws of sensors, samples by which one is late."""
     delays = (fault.numbers.get("delay", 0.0) for fault in walk_of(scenario).faults.values())
-    return *flaws(scenario), *(truncated(delay / scenario.control.period + 0.5) for delay in delays)
+    return *flaws(scenario), *(truncated(delay / scenario.controller.period + 0.5) for delay in delays)
 
 
 def noise(scenario: Scenario) -> Any:
@@ -250,8 +250,8 @@ def noise(scenario: Scenario) -> Any:
 
 def _fitted(scenario: Scenario, person: Person) -> Scenario:
     """The walk with the settings of its controller as they were fitted to the person."""
-    settings = settings_of_person(dict(scenario.control.settings), person)
-    return replace(scenario, control=replace(scenario.control, settings=settings))
+    settings = settings_of_person(dict(scenario.controller.settings), person)
+    return replace(scenario, controller=replace(scenario.controller, settings=settings))
 
 
 def law_of(scenario: Scenario) -> ControllerKind:
@@ -259,14 +259,14 @@ def law_of(scenario: Scenario) -> ControllerKind:
 
     A constant command is no controller of a walk in a file: an exported plant has it, whose command is handed in.
     """
-    if scenario.control.kind == switching.CONSTANT.name:
+    if scenario.controller.kind == switching.CONSTANT.name:
         return switching.CONSTANT
-    return with_timing(walking_controllers()[scenario.control.kind], TIMINGS[walk_of(scenario).timing])
+    return with_timing(walking_controllers()[scenario.controller.kind], TIMINGS[walk_of(scenario).timing])
 
 
 def controller_of(scenario: Scenario) -> tuple[ControllerKind | None, Mapping[str, Any]]:
     """The controller of a walk for the lanes, and its settings in SI units."""
-    control = scenario.control
+    control = scenario.controller
     return (None, {}) if control.kind == PYTHON_CONTROLLER else (law_of(scenario), control.settings)
 
 

@@ -250,7 +250,7 @@ def measured(
 
 def lacks(scenario: Scenario, kind: MetricKind) -> str:
     """Why a walk has not what a metric needs, an empty text where it has."""
-    motion, control = walk_of(scenario), scenario.control.kind
+    motion, control = walk_of(scenario), scenario.controller.kind
     is_outside = control == PYTHON_CONTROLLER
     has_request = not is_outside and hasattr(law_of(scenario).initial, "request")
     subject, needs = motion.who.subject, kind.needs

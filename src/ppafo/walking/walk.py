@@ -81,7 +81,7 @@ def walk(
         chosen = load_walk(scenario, overrides, gait, course, bottle)
     chosen = lasting(chosen, minutes)
     run, carried = plan_walk(chosen), walk_of(chosen).bottle
-    custom = chosen.control.custom
+    custom = chosen.controller.custom
     if custom is not None:
         check_no_bottle(chosen)
         return result_of_walk(chosen, run, run_sampled(batch_of(run), custom), None)
@@ -102,18 +102,19 @@ def bottle_life(scenario: Scenario, schedule: Schedule, progress: Progress = sil
     motion, planned = walk_of(scenario), course_of_walk(scenario)
     if motion.bottle is None:
         raise ScenarioError(f"{scenario.name}: hangs on no bottle")
-    if scenario.control.custom is not None:
+    if scenario.controller.custom is not None:
         check_no_bottle(scenario)
     strides = math.ceil(schedule.longest / motion.gait.stride_time)
     seconds = float(planned.duration) if planned is not None else strides * motion.gait.stride_time
     unrecorded = 60.0 if planned is None else 1.0
     if planned is None:  # no more steps than a run may take: what lasts longer begins again, as a course does
-        step = plan_walk(replace(with_duration(scenario, unrecorded), output_interval=unrecorded)).step
+        before = with_duration(scenario, unrecorded)
+        step = plan_walk(replace(before, run=replace(before.run, output_interval=unrecorded))).step
         seconds = min(seconds, unrecorded * (MAXIMUM_STEPS * step // unrecorded))
     count = max(1, round(seconds / unrecorded))
     whole = with_duration(scenario, seconds if planned is not None else count * unrecorded)
     if planned is None:
-        whole = replace(whole, output_interval=unrecorded)
+        whole = replace(whole, run=replace(whole.run, output_interval=unrecorded))
     run = plan_walk(whole)
     return life_on_bottle(run, fed_device(whole), motion.bottle, motion.gait.stride_time, schedule, progress)
 
@@ -179,11 +180,11 @@ def compare_walks(configuration: Scenario, minutes: float | None = None, progres
 def with_device_off(configuration: Scenario) -> Scenario:
     """The same wearer and device with both chambers vented; no gas flows, so no bottle and no lines are needed."""
     name = f"{configuration.name}-off"
-    control = Control(event_on_off.OFF.name, {}, configuration.control.period)
+    control = Control(event_on_off.OFF.name, {}, configuration.controller.period)
     motion = replace(walk_of(configuration), bottle=None, timing=THRESHOLDS)
     gone = ("controller.", "timing.", "supply_lines.")  # what follows others and is no longer there
     links = {path: own for path, own in configuration.links.items() if not path.startswith(gone)}
-    return replace(configuration, name=name, control=control, motion=motion, supply_lines=None, links=links)
+    return replace(configuration, name=name, controller=control, motion=motion, supply_lines=None, links=links)
 
 
 ANKLE_RANGE = math.radians(45.0), math.radians(140.0)
@@ -343,7 +344,7 @@ def walk_population(
     planned = course_of_walk(crowd)
     if minutes is None and planned is not None:
         minutes = float(np.max(planned.duration)) / 60.0
-    seconds = lasting(configuration, minutes).duration
+    seconds = lasting(configuration, minutes).run.duration
     run, _ = plan_walks(with_duration(crowd, seconds))
     batch = unrecorded(run, wearers)
     states = _run_in_groups(batch, progress)

@@ -104,7 +104,7 @@ def reacting_answer(comparison: Comparison) -> Answer:
     ended = "walks to the end" if stays else f"falls after {worn.metrics['fall_time'].value:.1f} s"
     return Answer(
         name="walk",
-        kicker=f"A walk of a wearer who reacts, {scenario.duration / 60.0:.3g} min",
+        kicker=f"A walk of a wearer who reacts, {scenario.run.duration / 60.0:.3g} min",
         title=f"Walking with {scenario.name}",
         lead=(f"{scenario.name}: {wearer.name} {ended}, {strides}",),
         sections=(

@@ -72,7 +72,7 @@ def plan_reacting(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
 
 def _too_long(scenario: Scenario) -> Problem:
     """A step that is too long for a body."""
-    step = scenario.time_step
+    step = scenario.run.step
     return np.asarray(
         step > LONGEST_STEP
     ), lambda run: f"run.step = {at(step, run):g} s: a wearer who reacts needs {LONGEST_STEP:g} s or less"

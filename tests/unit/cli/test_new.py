@@ -105,7 +105,7 @@ def test_a_copy_has_the_values_of_its_source() -> None:
         main(["new", *words])
     main(["new", "study", "c", "--from", "pressure-and-area"])
     assert load_scenario("a.toml").device == load_scenario("step-response").device
-    assert load_walk("b.toml").control.settings == load_walk("solenoid").control.settings
+    assert load_walk("b.toml").controller.settings == load_walk("solenoid").controller.settings
     assert load_study("c.toml").paths == load_study("pressure-and-area").paths
 
 

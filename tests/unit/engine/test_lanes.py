@@ -23,7 +23,8 @@ SAMPLED_INSIDE = (
 
 def different_runs(name: str, count: int) -> list[Run]:
     """Runs of one scenario with different supply pressures and inertias."""
-    run = plan_run(dataclasses.replace(load_scenario(name), duration=0.25))
+    loaded = load_scenario(name)
+    run = plan_run(dataclasses.replace(loaded, run=dataclasses.replace(loaded.run, duration=0.25)))
     return [
         dataclasses.replace(
             run,
@@ -155,7 +156,9 @@ def test_a_block_takes_no_more_runs_than_its_program_has_lanes() -> None:
 
 def test_noise_depends_on_the_seed_and_not_on_the_place() -> None:
     scenario = load_scenario("torque-task-slow-valve")
-    runs = [plan_run(dataclasses.replace(scenario, duration=0.1)) for _ in range(40)]
+    runs = [
+        plan_run(dataclasses.replace(scenario, run=dataclasses.replace(scenario.run, duration=0.1))) for _ in range(40)
+    ]
     results = run_together(runs)
     assert np.array_equal(results[0].record, results[39].record)
     other = dataclasses.replace(runs[0], sensors=runs[0].sensors._replace(seed=99.0))

@@ -381,10 +381,13 @@ def drawn(scenario: Scenario) -> tuple[dict[str, Any], Scenario]:
     varied = with_numbers(scenario, {path: column for path, column in columns.items() if path not in TIMES})
     return columns, replace(
         varied,
-        duration=columns["run.duration"],
-        time_step=columns["run.step"],
-        output_interval=columns["run.output_interval"],
-        control=replace(varied.control, period=columns["controller.period"]),
+        run=replace(
+            varied.run,
+            duration=columns["run.duration"],
+            step=columns["run.step"],
+            output_interval=columns["run.output_interval"],
+        ),
+        controller=replace(varied.controller, period=columns["controller.period"]),
     )
 
 

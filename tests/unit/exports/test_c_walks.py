@@ -139,7 +139,10 @@ def batches(name: str, overrides: tuple[str, ...], settings: tuple[Setting, ...]
         except ScenarioError:
             pass  # settings that contradict each other
         else:
-            plan = replace(walked, duration=values["run.duration"], output_interval=values["run.output_interval"])
+            plan = replace(
+                walked,
+                run=replace(walked.run, duration=values["run.duration"], output_interval=values["run.output_interval"]),
+            )
             yield values, batch_of(plan_walk(plan))
         values = drawn(settings, draw)
 

@@ -137,7 +137,7 @@ def test_the_chip_decides_as_python_does_within_its_memory_and_time(law: str, ta
     assert cost.sizes.data + cost.stack + target.interrupt_stack <= (128 if target is MSP430 else 160)
     # Instructions of a Cortex-M take up to four cycles where no block of registers is moved.
     longest = 1.0 if target.counted == "cycles" else 4.0
-    assert 0 < cost.mean <= cost.worst <= 0.5 * target.clock * scenario.control.period / longest
+    assert 0 < cost.mean <= cost.worst <= 0.5 * target.clock * scenario.controller.period / longest
 
 
 @every_target

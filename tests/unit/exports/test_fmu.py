@@ -61,9 +61,9 @@ def largest_difference(unit: str, name: str, overrides: tuple[str, ...]) -> dict
     """Largest difference of each output in FMPy from the lanes, at all samples."""
     scenario = load_scenario(name, overrides)
     recording = simulate(scenario).recording
-    given = {"stop_time": scenario.duration, "step_size": scenario.output_interval}
+    given = {"stop_time": scenario.run.duration, "step_size": scenario.run.output_interval}
     names = outputs_of(unit)
-    found = fmpy.simulate_fmu(unit, output=names, output_interval=scenario.output_interval, **given)
+    found = fmpy.simulate_fmu(unit, output=names, output_interval=scenario.run.output_interval, **given)
     assert len(found) == len(recording)
     assert np.ptp(found["torque"]) > 1.0
     return {item: float(np.abs(found[item] - recording[item]).max()) for item in names}

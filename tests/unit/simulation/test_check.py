@@ -164,8 +164,9 @@ def test_a_check_prints_numbers_in_the_units_of_the_field(chaotic: Check) -> Non
 def test_a_decision_by_a_hair_of_the_start_is_found(torque_task: Callable[[str], Scenario]) -> None:
     atmosphere = torque_task("proportional").device.supply.atmospheric_pressure
     controller = Threshold(lambda seen: seen.pressure_1, atmosphere * (1.0 + 0.5e-7))
-    once = dataclasses.replace(torque_task("proportional"), duration=0.05)
-    slow = dataclasses.replace(once, control=dataclasses.replace(once.control, period=0.05))
+    before = torque_task("proportional")
+    once = dataclasses.replace(before, run=dataclasses.replace(before.run, duration=0.05))
+    slow = dataclasses.replace(once, controller=dataclasses.replace(once.controller, period=0.05))
     check = simulate(slow.controlled_by(controller)).check()
     lost = next(row for row in check.metrics if row.name == "rms_error")
     assert lost.changed_by == {MOVED_START}
@@ -185,7 +186,8 @@ def test_a_decision_by_a_hair_of_a_reading_is_found_where_the_start_does_not_mat
 
 
 def test_a_controller_that_gives_another_run_each_time_is_refused(torque_task: Callable[[str], Scenario]) -> None:
-    scenario = dataclasses.replace(torque_task("proportional"), duration=0.05)
+    before = torque_task("proportional")
+    scenario = dataclasses.replace(before, run=dataclasses.replace(before.run, duration=0.05))
     result = simulate(scenario.controlled_by(Unforgetting(0.0)))
     with pytest.raises(SimulationError, match=r"Unforgetting gives a different run each time.* reset\(\) must forget"):
         result.check()

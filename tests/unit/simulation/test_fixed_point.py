@@ -101,7 +101,7 @@ def test_a_file_with_the_old_arithmetic_is_told_the_kind_to_write(name: str, giv
 def test_a_chip_takes_the_integer_form_of_a_controller_with_its_gains() -> None:
     scenario = load_scenario("torque-task-proportional", ("controller.proportional_gain=0.1 1/(N m)",))
     named = load_scenario("torque-task-proportional", (FIXED, "controller.proportional_gain=0.1 1/(N m)"))
-    assert integer_form(scenario).control == named.control
+    assert integer_form(scenario).controller == named.controller
     assert chip_controller(scenario).numbers == chip_controller(named).numbers
 
 

@@ -40,16 +40,17 @@ def test_what_follows_a_number_moves_with_it_and_what_is_given_does_not() -> Non
     thin = with_numbers(scenario, {"supply.atmospheric_pressure": 8.0e4})
     gauge = scenario.device.supply.pressure - scenario.device.supply.atmospheric_pressure
     assert thin.device.supply.pressure == pytest.approx(8.0e4 + gauge, rel=1e-12)
-    assert (thin.initial_pressure_1, thin.initial_pressure_2) == (8.0e4, thin.device.supply.dorsiflexion_pressure)
+    assert (thin.initial.pressure_1, thin.initial.pressure_2) == (8.0e4, thin.device.supply.dorsiflexion_pressure)
     apart = with_numbers(thin, {"supply.dorsiflexion_pressure": 3.0e5})
-    assert (apart.initial_pressure_2, apart.device.supply.pressure) == (3.0e5, thin.device.supply.pressure)
+    assert (apart.initial.pressure_2, apart.device.supply.pressure) == (3.0e5, thin.device.supply.pressure)
     higher = with_numbers(apart, {"supply.pressure": 5.0e5})
     assert (higher.device.supply.pressure, higher.device.supply.dorsiflexion_pressure) == (5.0e5, 3.0e5)
 
 
 def test_a_number_that_was_changed_since_the_scenario_was_loaded_follows_nothing_any_more() -> None:
-    scenario = replace(load_scenario("torque-task-solenoid"), initial_pressure_1=2.0e5)
-    assert with_numbers(scenario, {"supply.atmospheric_pressure": 8.0e4}).initial_pressure_1 == 2.0e5
+    loaded = load_scenario("torque-task-solenoid")
+    scenario = replace(loaded, initial=replace(loaded.initial, pressure_1=2.0e5))
+    assert with_numbers(scenario, {"supply.atmospheric_pressure": 8.0e4}).initial.pressure_1 == 2.0e5
 
 
 def test_an_orifice_in_the_other_form_takes_that_form() -> None:

@@ -76,9 +76,9 @@ def test_a_controller_written_in_python_is_named_in_the_document(step_response: 
         def update(self, *seen: object) -> float:
             return float(len(seen))
 
-    control = dataclasses.replace(step_response.control, custom=Law())
-    document = scenario_document(dataclasses.replace(step_response, control=control))
-    assert document["control"]["custom"].endswith("Law")
+    control = dataclasses.replace(step_response.controller, custom=Law())
+    document = scenario_document(dataclasses.replace(step_response, controller=control))
+    assert document["controller"]["custom"].endswith("Law")
 
 
 def test_a_saved_result_is_read_back(result: Result, tmp_path: Path) -> None:

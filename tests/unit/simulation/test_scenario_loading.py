@@ -58,7 +58,7 @@ def test_every_scenario_of_the_package_loads_under_its_own_name(name: str) -> No
 def test_the_content_of_a_scenario_gives_the_same_scenario_again(name: str) -> None:
     scenario = load_scenario(name, ["run.duration=0.25 s"])
     again = scenario_from_dict(scenario.origin.content, scenario.origin.overrides)
-    for field in ("device", "duration", "time_step", "motion", "control", "reference", "sensors", "assumptions"):
+    for field in ("device", "run", "motion", "initial", "controller", "reference", "sensors", "assumptions"):
         assert getattr(again, field) == getattr(scenario, field)
 
 
@@ -66,7 +66,7 @@ def test_a_file_and_the_same_plain_values_give_the_same_scenario(tmp_path: Path)
     file = tmp_path / "small.toml"
     file.write_text(SMALL_TEXT)
     from_file, from_values = load_scenario(file), scenario_from_dict(SMALL)
-    assert from_file.control == from_values.control
+    assert from_file.controller == from_values.controller
     assert from_file.motion == from_values.motion
     assert from_file.origin.content == from_values.origin.content
     assert (from_file.origin.file, from_values.origin.file) == (str(file), None)
@@ -80,10 +80,10 @@ def test_every_value_arrives_in_si_units() -> None:
         sensors={"delay": "3 ms", "angle_noise": "0.5 deg", "pressure_noise": "1 psi_d", "seed": 7},
         reference={"kind": "sine", "level": "1 N m", "amplitude": "500 g m^2/s^2", "frequency": "2 Hz"},
     )
-    assert (scenario.duration, scenario.time_step, scenario.output_interval) == (60.0, 0.0005, 0.002)
+    assert (scenario.run.duration, scenario.run.step, scenario.run.output_interval) == (60.0, 0.0005, 0.002)
     assert scenario.motion == FreeMotion(math.radians(75.0), math.pi / 2.0, 500.0)
-    assert scenario.initial_pressure_1 == pytest.approx(STANDARD_ATMOSPHERE + 10.0 * PSI, rel=1e-15)
-    assert scenario.initial_pressure_2 == 2.0e5
+    assert scenario.initial.pressure_1 == pytest.approx(STANDARD_ATMOSPHERE + 10.0 * PSI, rel=1e-15)
+    assert scenario.initial.pressure_2 == 2.0e5
     assert scenario.sensors == Sensors(0.003, math.radians(0.5), PSI, 0.0, 0.0, 7)
     assert scenario.reference.settings == {"level": 1.0, "amplitude": 0.5, "frequency": 2.0, "phase": 0.0}
 
@@ -91,11 +91,11 @@ def test_every_value_arrives_in_si_units() -> None:
 def test_what_is_left_out_has_its_declared_value() -> None:
     scenario = small()
     assert scenario.device == load_device("ppafo2011")
-    assert scenario.control.settings["proportional_gain"] == 0.095
+    assert scenario.controller.settings["proportional_gain"] == 0.095
     assert scenario.sensors == Sensors()
     assert scenario.reference == ProfileChoice("constant", {"level": 0.0})
-    assert (scenario.time_step, scenario.output_interval) == (0.001, 0.001)
-    assert scenario.initial_pressure_1 == scenario.initial_pressure_2 == STANDARD_ATMOSPHERE
+    assert (scenario.run.step, scenario.run.output_interval) == (0.001, 0.001)
+    assert scenario.initial.pressure_1 == scenario.initial.pressure_2 == STANDARD_ATMOSPHERE
 
 
 def test_a_held_vane_is_led_along_a_constant_angle() -> None:
@@ -108,8 +108,8 @@ def test_words_stand_for_the_pressures_of_the_device() -> None:
         initial={"pressure_1": "supply", "pressure_2": "dorsiflexion_supply"},
     )
     supply = scenario.device.supply
-    assert scenario.initial_pressure_1 == supply.pressure
-    assert scenario.initial_pressure_2 == supply.dorsiflexion_pressure
+    assert scenario.initial.pressure_1 == supply.pressure
+    assert scenario.initial.pressure_2 == supply.dorsiflexion_pressure
     assert supply.pressure > supply.dorsiflexion_pressure
 
 
@@ -118,20 +118,20 @@ def test_gauge_pressure_counts_from_the_atmosphere_of_the_device() -> None:
         device={"set": "ppafo2011", "overrides": ["supply.atmospheric_pressure=90 kPa_a"]},
         initial={"pressure_1": "0 psi_g"},
     )
-    assert scenario.initial_pressure_1 == scenario.initial_pressure_2 == 9.0e4
+    assert scenario.initial.pressure_1 == scenario.initial.pressure_2 == 9.0e4
 
 
 def test_a_rate_and_its_period_are_the_same_sampling() -> None:
     by_rate = small(controller={"kind": "on_off", "rate": "20 Hz"})
     by_period = small(controller={"kind": "on_off", "period": "50 ms"})
-    assert by_rate.control.period == by_period.control.period == 0.05
+    assert by_rate.controller.period == by_period.controller.period == 0.05
 
 
 def test_any_controller_goes_with_any_valve() -> None:
     on_off = small(controller={"kind": "on_off", "rate": "20 Hz"})
     pid = small(device={"set": "ppafo2011", "valve": "solenoid"})
-    assert (on_off.control.kind, on_off.device.valve.kind) == ("on_off", "proportional")
-    assert (pid.control.kind, pid.device.valve.kind) == ("pid", "solenoid")
+    assert (on_off.controller.kind, on_off.device.valve.kind) == ("on_off", "proportional")
+    assert (pid.controller.kind, pid.device.valve.kind) == ("pid", "solenoid")
 
 
 def test_a_set_file_is_found_beside_the_scenario(tmp_path: Path) -> None:
@@ -165,7 +165,7 @@ class Relay:
 
 def test_a_python_object_takes_the_place_of_the_controller() -> None:
     relay = Relay()
-    control = small().controlled_by(relay).control
+    control = small().controlled_by(relay).controller
     assert (control.kind, control.custom, control.period, control.settings) == ("python", relay, 0.001, {})
 
 
@@ -212,10 +212,11 @@ def test_an_assumption_about_nothing_is_refused_with_the_nearest_path() -> None:
 
 def test_the_paper_s_gains_and_times_are_in_its_scenarios() -> None:
     proportional, solenoid = load_scenario("torque-task-proportional"), load_scenario("torque-task-solenoid")
-    gains = [proportional.control.settings[f"{name}_gain"] for name in ("proportional", "integral", "derivative")]
+    gains = [proportional.controller.settings[f"{name}_gain"] for name in ("proportional", "integral", "derivative")]
     assert gains == [0.095, 0.25, 0.006]
-    assert (proportional.control.period, solenoid.control.period) == (0.001, 0.05)
-    for field in ("reference", "motion", "duration", "initial_pressure_1", "initial_pressure_2"):
+    assert (proportional.controller.period, solenoid.controller.period) == (0.001, 0.05)
+    assert proportional.run.duration == solenoid.run.duration
+    for field in ("reference", "motion", "initial"):
         assert getattr(proportional, field) == getattr(solenoid, field)
     assert (proportional.device.valve.kind, solenoid.device.valve.kind) == ("proportional", "solenoid")
 
@@ -224,11 +225,11 @@ def test_the_step_response_starts_as_the_paper_says() -> None:
     scenario = load_scenario("step-response")
     supply = scenario.device.supply
     assert supply.pressure == supply.dorsiflexion_pressure == pytest.approx(STANDARD_ATMOSPHERE + 55.0 * PSI)
-    assert scenario.initial_pressure_1 == STANDARD_ATMOSPHERE
-    assert scenario.initial_pressure_2 == supply.pressure
+    assert scenario.initial.pressure_1 == STANDARD_ATMOSPHERE
+    assert scenario.initial.pressure_2 == supply.pressure
     assert isinstance(scenario.motion, FreeMotion)
     assert scenario.motion.angle == scenario.device.actuator.angle_min == math.radians(20.0)
-    assert scenario.control.settings == {"command": 1.0}
+    assert scenario.controller.settings == {"command": 1.0}
 
 
 def test_bytes_are_read_as_a_file_is() -> None:

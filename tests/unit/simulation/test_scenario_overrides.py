@@ -58,7 +58,7 @@ def test_a_section_that_the_file_leaves_out_can_be_set() -> None:
 
 def test_another_kind_of_controller_drops_the_settings_of_the_old_one() -> None:
     scenario = load_scenario(TASK, ["controller.kind=on_off"])
-    assert (scenario.control.kind, scenario.control.settings, scenario.control.period) == ("on_off", {}, 0.001)
+    assert (scenario.controller.kind, scenario.controller.settings, scenario.controller.period) == ("on_off", {}, 0.001)
     assert not [item for item in scenario.assumptions if item.path.endswith("_gain")]
 
 
@@ -75,13 +75,13 @@ def test_a_profile_can_be_built_from_nothing() -> None:
 
 def test_a_period_takes_the_place_of_the_rate() -> None:
     scenario = load_scenario(TASK, ["controller.period=2 ms"])
-    assert scenario.control.period == 0.002
+    assert scenario.controller.period == 0.002
     assert "controller.rate" not in [item.path for item in scenario.assumptions]
 
 
 def test_a_gain_may_leave_out_its_unit_as_the_paper_does() -> None:
-    bare = load_scenario(TASK, ["controller.proportional_gain=0.1"]).control
-    assert bare == load_scenario(TASK, ["controller.proportional_gain=0.1 1/(N m)"]).control
+    bare = load_scenario(TASK, ["controller.proportional_gain=0.1"]).controller
+    assert bare == load_scenario(TASK, ["controller.proportional_gain=0.1 1/(N m)"]).controller
     assert bare.settings["proportional_gain"] == 0.1
 
 
@@ -185,7 +185,7 @@ def test_a_setting_may_come_before_its_kind(words: list[str]) -> None:
 def test_a_value_comes_before_or_behind_the_kind_that_has_it() -> None:
     words = ["controller.integral_gain=2", "controller.kind=pid", "reference.kind=constant", "reference.level=2 N m"]
     for order in itertools.permutations(words):
-        assert load_scenario("step-response", order).control.settings["integral_gain"] == 2.0
+        assert load_scenario("step-response", order).controller.settings["integral_gain"] == 2.0
 
 
 def test_a_value_of_a_valve_beside_the_choice_of_another_is_refused_with_both_in_any_order() -> None:

@@ -93,8 +93,8 @@ def test_python_controller_gives_what_the_same_law_in_the_catalogue_gives(
     torque_task: Callable[[str], Scenario],
 ) -> None:
     base = torque_task("proportional")
-    settings = dict.fromkeys(base.control.settings, 0.0) | {"proportional_gain": 0.2}
-    compiled = simulate(dataclasses.replace(base, control=dataclasses.replace(base.control, settings=settings)))
+    settings = dict.fromkeys(base.controller.settings, 0.0) | {"proportional_gain": 0.2}
+    compiled = simulate(dataclasses.replace(base, controller=dataclasses.replace(base.controller, settings=settings)))
     python = simulate(base.controlled_by(Proportional(0.2)))
     assert python.recording["torque"] == pytest.approx(compiled.recording["torque"], abs=1e-9)
     assert np.array_equal(python.recording.time, compiled.recording.time)
@@ -112,9 +112,10 @@ def test_python_controller_is_reset_and_then_asked_once_for_every_sample(
 
 
 def test_python_controller_sees_the_same_late_and_noisy_signals_as_a_compiled_one() -> None:
-    base = dataclasses.replace(load_scenario("torque-task-slow-valve"), duration=0.3)
-    settings = dict.fromkeys(base.control.settings, 0.0) | {"proportional_gain": 0.2}
-    compiled = simulate(dataclasses.replace(base, control=dataclasses.replace(base.control, settings=settings)))
+    loaded = load_scenario("torque-task-slow-valve")
+    base = dataclasses.replace(loaded, run=dataclasses.replace(loaded.run, duration=0.3))
+    settings = dict.fromkeys(base.controller.settings, 0.0) | {"proportional_gain": 0.2}
+    compiled = simulate(dataclasses.replace(base, controller=dataclasses.replace(base.controller, settings=settings)))
     python = simulate(base.controlled_by(Proportional(0.2)))
     assert base.sensors.delay > 0.0
     assert python.recording["command"] == pytest.approx(compiled.recording["command"], abs=1e-9)
@@ -138,7 +139,9 @@ def test_commands_of_a_python_controller_are_clipped(torque_task: Callable[[str]
 
 
 def test_diverging_run_is_a_status_with_time_state_and_remedy(step_response: Scenario) -> None:
-    impossible = dataclasses.replace(step_response, initial_pressure_1=-2.0e5)
+    impossible = dataclasses.replace(
+        step_response, initial=dataclasses.replace(step_response.initial, pressure_1=-2.0e5)
+    )
     result = simulate(impossible)
     assert result.status.kind == "diverged"
     assert result.status.time is not None
@@ -227,7 +230,7 @@ def test_a_vane_led_close_to_its_stops_fifty_times_a_second_is_followed_at_steps
 
 def test_run_with_too_many_steps_is_refused_before_it_starts(step_response: Scenario) -> None:
     with pytest.raises(ScenarioError, match=r"steps of 0\.001 s.*run\.step"):
-        simulate(dataclasses.replace(step_response, duration=2.0e6))
+        simulate(dataclasses.replace(step_response, run=dataclasses.replace(step_response.run, duration=2.0e6)))
 
 
 def test_interrupt_is_seen_in_the_middle_of_a_long_run() -> None:

@@ -58,7 +58,7 @@ def columns_of(scenario: Scenario, seed: int) -> tuple[dict[str, np.ndarray], di
     from ppafo.simulation.numbers import declared_numbers, number_at
 
     known, draw = declared_numbers(scenario), np.random.default_rng(seed)
-    clock = {"run.duration": scenario.duration, "run.step": 1.0e-3, "controller.period": scenario.control.period}
+    clock = {"run.duration": scenario.run.duration, "run.step": 1.0e-3, "controller.period": scenario.controller.period}
     usual = {path: clock[path] if path in clock else number_at(scenario, path) for path in VARIED if path in known}
     paths = [path for path in VARIED if usual.get(path, 0.0) > 0.0]
     chosen = sorted(draw.choice(len(paths), 5, replace=False).tolist())

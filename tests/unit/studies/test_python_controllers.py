@@ -129,4 +129,4 @@ def test_a_command_that_is_no_number_names_the_object_and_a_valve_that_nothing_c
     with pytest.raises(SimulationError, match=r"Proportional.update returned nan at t = 0 s"):
         run_ensemble(base.controlled_by(Proportional(float("nan"))), columns, METRIC)
     with pytest.raises(ScenarioError, match="nothing controls the valve"):
-        run_ensemble(replace(base, control=Control(PYTHON_CONTROLLER, {}, base.control.period)), columns, METRIC)
+        run_ensemble(replace(base, controller=Control(PYTHON_CONTROLLER, {}, base.controller.period)), columns, METRIC)

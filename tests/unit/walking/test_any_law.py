@@ -21,8 +21,8 @@ NEW = sorted(name for name in LAWS if walking_controllers()[name] not in WALKING
 def test_every_torque_law_is_named_in_a_walk_file_by_its_own_name(law: str) -> None:
     configuration = load_walk("proportional", [f"controller.kind={law}"])
     for item in CONTROLLERS[law].quantities:
-        assert item.name in configuration.control.settings
-    assert configuration.control.settings["peak_torque"] == 5.0
+        assert item.name in configuration.controller.settings
+    assert configuration.controller.settings["peak_torque"] == 5.0
 
 
 @pytest.mark.parametrize("name", ["event_pid", "event_feedback_linearisation", "event_on_off_dead_zone"])
@@ -30,14 +30,14 @@ def test_a_law_with_gains_for_walking_has_them_under_both_names(name: str) -> No
     old = load_walk("proportional", [f"controller.kind={name}"])
     new = load_walk("proportional", [f"controller.kind={name.removeprefix('event_')}"])
     assert law_of(new) is law_of(old)
-    assert new.control.settings == old.control.settings
+    assert new.controller.settings == old.controller.settings
 
 
 def test_a_law_without_gains_for_walking_keeps_its_own() -> None:
     assert NEW == ["damped_proportional", "on_off"]
     walked = load_walk("proportional", ["controller.kind=damped_proportional"])
     own = {item.name: item.default for item in CONTROLLERS["damped_proportional"].quantities}
-    assert {name: walked.control.settings[name] for name in own} == own
+    assert {name: walked.controller.settings[name] for name in own} == own
 
 
 def test_a_constant_command_does_not_walk_and_the_answer_names_what_does() -> None:
@@ -47,7 +47,7 @@ def test_a_constant_command_does_not_walk_and_the_answer_names_what_does() -> No
 
 
 def test_the_law_of_the_paper_switches_solenoid_valves_and_a_pid_does_not() -> None:
-    assert load_walk("solenoid", ["controller.kind=on_off"]).control.kind == "on_off"
+    assert load_walk("solenoid", ["controller.kind=on_off"]).controller.kind == "on_off"
     with pytest.raises(
         ScenarioError, match="gradually, which in a walk only a proportional valve does, not a solenoid one"
     ):
@@ -61,7 +61,7 @@ def test_a_law_whose_setting_has_a_name_of_walking_is_refused_by_that_name(monke
         law_that_walks(named)
     monkeypatch.setitem(CONTROLLERS, "own", named)
     assert "own" not in walking_controllers(), "and the other laws walk as before"
-    assert load_walk("proportional").control.kind == "event_proportional"
+    assert load_walk("proportional").controller.kind == "event_proportional"
 
 
 def test_the_law_of_the_paper_walks_and_follows_the_torque_of_its_phases() -> None:

@@ -93,7 +93,7 @@ def test_a_mistake_with_a_proportional_valve_is_named(overrides: str) -> None:
 
 
 def test_an_on_off_controller_works_a_proportional_valve() -> None:
-    assert load_walk("proportional", ["controller.kind=event_on_off"]).control.kind == "event_on_off"
+    assert load_walk("proportional", ["controller.kind=event_on_off"]).controller.kind == "event_on_off"
 
 
 def test_bandwidths_are_what_is_left_after_a_sample() -> None:
@@ -106,7 +106,7 @@ def test_bandwidths_are_what_is_left_after_a_sample() -> None:
 
 def test_bandwidth_of_0_is_a_sensor_that_follows_at_once_as_in_a_scenario() -> None:
     given = load_walk("solenoid", ["sensors.angle_bandwidth=0 Hz", "sensors.pressure_bandwidth=0 Hz"])
-    assert (given.sensors, given.control) == (load_walk("solenoid").sensors, load_walk("solenoid").control)
+    assert (given.sensors, given.controller) == (load_walk("solenoid").sensors, load_walk("solenoid").controller)
     assert has_ideal_sensors(given)
 
 
@@ -134,7 +134,7 @@ def test_the_published_schema_accepts_the_shipped_walks_and_no_unknown_key() -> 
 
 
 def test_a_period_given_takes_the_place_of_the_rate_of_the_file() -> None:
-    assert load_walk("solenoid", ["controller.period=2 ms"]).control.period == pytest.approx(2.0e-3)
+    assert load_walk("solenoid", ["controller.period=2 ms"]).controller.period == pytest.approx(2.0e-3)
 
 
 def test_unknown_names_have_a_hint() -> None:

@@ -68,7 +68,7 @@ def test_any_wearer_walks_as_it_would_alone() -> None:
     gaits = draw_gaits(walk_of(configuration).gait, build.stature, generator)
     scale = 1.0 + THRESHOLD_VARIATION * draw_bounded_normal(generator, (count,))[index]
     start = START_VARIATION * draw_bounded_normal(generator, (count,))[index]
-    settings = dict(configuration.control.settings)
+    settings = dict(configuration.controller.settings)
     settings |= {name: settings[name] * scale for name in ("load_threshold", "unload_threshold")}
     settings["push_off_start"] += start
     segments = segment_values(walk_of(configuration).wearer, build)
@@ -86,7 +86,7 @@ def test_any_wearer_walks_as_it_would_alone() -> None:
         assert float(values[index]) == pytest.approx(getattr(timing, name), rel=1e-9), name
     wearer = replace(walk_of(configuration).wearer, **{name: float(values[index]) for name, values in segments.items()})
     motion = replace(walk_of(configuration), wearer=wearer, gait=gait)
-    alone = replace(configuration, motion=motion, control=replace(configuration.control, settings=settings))
+    alone = replace(configuration, motion=motion, controller=replace(configuration.controller, settings=settings))
     shared = plan_walk(with_duration(configuration, 60.0 * MINUTES))
     run = with_heel_of(plan_walk(with_duration(alone, 60.0 * MINUTES)), shared, float(build.stature[index]))
     many = with_duration(configuration, 60.0 * MINUTES)

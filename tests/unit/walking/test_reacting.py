@@ -54,7 +54,8 @@ class Alternating:
 
 def every_step(scenario: Scenario, seconds: float) -> tuple[Run, BatchResult]:
     """A run that records every step."""
-    run = plan_walk(replace(with_duration(scenario, seconds), output_interval=STEP))
+    before = with_duration(scenario, seconds)
+    run = plan_walk(replace(before, run=replace(before.run, output_interval=STEP)))
     return run, run_batch(batch_of(run))
 
 
@@ -92,7 +93,8 @@ def test_each_step_of_the_lanes_is_the_step_of_plain_python_to_the_bit() -> None
 
 def test_the_gas_is_that_of_a_vane_which_is_led_along_the_same_ankle() -> None:
     scenario = load_walk(WALK, ["wearer.start_speed=1.2 m/s"])
-    played = walk(replace(with_duration(scenario.controlled_by(Alternating()), 1.0), output_interval=STEP))
+    before = with_duration(scenario.controlled_by(Alternating()), 1.0)
+    played = walk(replace(before, run=replace(before.run, output_interval=STEP)))
     recording = played.recording
     assert recording["angle"].max() - recording["angle"].min() > 0.3, "the foot moves"
     measured = check_recording(recording, scenario.device, "walk")
@@ -219,7 +221,10 @@ def test_a_healthy_wearer_walks_at_the_published_speed_with_the_device_off() -> 
 @pytest.mark.long
 def test_half_the_step_gives_the_same_mean_stride() -> None:
     off = with_duration(load_walk(WALK, ["controller.kind=off"]), 20.0)
-    speeds = [walk(replace(off, time_step=step)).metrics["walking_speed"].value for step in (STEP, 0.5 * STEP)]
+    speeds = [
+        walk(replace(off, run=replace(off.run, step=step))).metrics["walking_speed"].value
+        for step in (STEP, 0.5 * STEP)
+    ]
     assert speeds[0] == pytest.approx(speeds[1], rel=0.01)
 
 

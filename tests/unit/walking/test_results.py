@@ -75,7 +75,7 @@ def test_the_comparison_is_the_same_wearer_without_a_device() -> None:
     pair = compared("solenoid")
     worn, bare = pair.with_device, pair.without_device
     assert walk_of(bare.scenario).wearer == walk_of(worn.scenario).wearer
-    assert bare.scenario.control.kind == "off"
+    assert bare.scenario.controller.kind == "off"
     assert (bare.recording["command"] == 2.0).all()
     assert bare.metrics["gas"].value == 0.0
     assert worn.metrics["toe_clearance"].value > bare.metrics["toe_clearance"].value + 0.05

@@ -84,7 +84,11 @@ def test_a_tenfold_droop_costs_work_and_a_smaller_step_changes_little() -> None:
     drooping = replace(base, supply_lines=base.supply_lines._replace(droop_1=10.0 * base.supply_lines.droop_1))
     found = {
         name: walk(configuration, 0.1).metrics["net_push_off_work"].value
-        for name, configuration in {"base": base, "fine": replace(base, time_step=1.0e-4), "drooping": drooping}.items()
+        for name, configuration in {
+            "base": base,
+            "fine": replace(base, run=replace(base.run, step=1.0e-4)),
+            "drooping": drooping,
+        }.items()
     }
     assert found["drooping"] < 0.95 * found["base"]
     assert found["fine"] == pytest.approx(found["base"], rel=0.01)

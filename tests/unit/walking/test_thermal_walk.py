@@ -9,7 +9,7 @@ import pytest
 from ppafo.engine.scheme.thermal_gas import ENERGY_BALANCE
 from ppafo.errors import ScenarioError
 from ppafo.metrics.gas import energy_imbalance, gas_imbalance
-from ppafo.simulation.scenario import Thermal
+from ppafo.simulation.scenario import GasModel
 from ppafo.walking import load_walk, walk, walk_population
 from ppafo.walking.motion import with_duration
 from ppafo.walking.planning import plan_walk
@@ -25,9 +25,9 @@ def test_a_walk_file_takes_the_gas_model_of_a_scenario(tmp_path: Path) -> None:
     head = 'schema_version = 1\nname = "warm"\n[device]\nset = "ppafo2011"\nvalve = "solenoid"\n'
     gas = 'kind = "thermal"\nheat_transfer_coefficient = "50 W/(m^2 K)"\nwall_area_per_volume = "100 1/m"\n'
     path.write_text(f'{head}[controller]\nkind = "off"\n[gas_model]\n{gas}')
-    assert load_walk(path).thermal == Thermal(50.0, 100.0)
-    assert load_walk(path, ["gas_model.kind=isothermal"]).thermal is None
-    assert load_walk("solenoid").thermal is None
+    assert load_walk(path).gas_model == GasModel(50.0, 100.0)
+    assert load_walk(path, ["gas_model.kind=isothermal"]).gas_model is None
+    assert load_walk("solenoid").gas_model is None
     with pytest.raises(ScenarioError, match="heat_transfer_coefficient"):
         load_walk("solenoid", WALLS)
 

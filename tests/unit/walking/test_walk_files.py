@@ -66,7 +66,7 @@ def test_gait_and_course_may_stand_in_the_motion_or_above_and_not_in_both(tmp_pa
     above = load_scenario(written(tmp_path, course + text_of(NAME)))
     assert walk_of(inside).course == walk_of(above).course
     assert walk_of(inside).course is not None
-    assert inside.duration == above.duration
+    assert inside.run.duration == above.run.duration
     with pytest.raises(ScenarioError, match=r"mine\.toml: give either motion\.course or course, not both"):
         load_scenario(written(tmp_path, course + text_of(NAME) + MOTION + course))
 
@@ -123,7 +123,7 @@ def test_a_misspelt_motion_is_told_of_walks_too(tmp_path: Path) -> None:
 
 
 def test_a_walk_takes_its_own_motion_and_names_the_kinds_that_exist(tmp_path: Path) -> None:
-    assert load_walk(NAME, ["motion.kind=walk"]).control == load_walk(NAME).control
+    assert load_walk(NAME, ["motion.kind=walk"]).controller == load_walk(NAME).controller
     with pytest.raises(ScenarioError, match=r"override 'motion\.kind=free': this is the file of a walk"):
         load_walk(NAME, ["motion.kind=free"])
     misspelt = written(tmp_path, (text_of(NAME) + MOTION).replace('"walk"', '"wlak"'))
@@ -165,11 +165,11 @@ def test_the_schema_of_scenarios_takes_every_shipped_one_and_a_motion_that_is_a_
 
 def test_another_kind_drops_the_settings_of_the_old_one_as_in_every_scenario() -> None:
     on_off = load_scenario(NAME, ["controller.kind=event_on_off"])
-    assert "peak_torque" not in on_off.control.settings
+    assert "peak_torque" not in on_off.controller.settings
     warm = ("kind=thermal", "heat_transfer_coefficient=50 W/(m^2 K)", "wall_area_per_volume=100 1/m")
     thermal = load_scenario(NAME, [f"gas_model.{text}" for text in warm])
-    assert thermal.thermal is not None
-    assert reloaded(thermal, ["gas_model.kind=isothermal"]).thermal is None
+    assert thermal.gas_model is not None
+    assert reloaded(thermal, ["gas_model.kind=isothermal"]).gas_model is None
     with pytest.raises(ScenarioError, match=r"'controller.peak_torque=5 N m' and 'controller.kind=event_on_off'"):
         load_scenario(NAME, ["controller.peak_torque=5 N m", "controller.kind=event_on_off"])
 

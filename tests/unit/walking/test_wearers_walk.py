@@ -25,7 +25,7 @@ SETTLED = 5.0
 def walked(*overrides: str, seconds: float = 30.0) -> Recording:
     """A walk with the device on the left leg, each millisecond."""
     configuration = load_walk("reacting", [f"run.duration={seconds} s", *overrides])
-    return walk(replace(configuration, output_interval=1e-3)).recording
+    return walk(replace(configuration, run=replace(configuration.run, output_interval=1e-3))).recording
 
 
 def channel(recording: Recording, name: str) -> NDArray[np.float64]:

@@ -269,7 +269,7 @@ def _failures(case: Case, task: str, draws: int) -> list[str]:
 
 
 def _other_tasks(baseline: str, task: OnTask) -> list[str]:
-    asked = {case.configuration: (case.scenario.reference, case.scenario.duration) for case in task.cases}
+    asked = {case.configuration: (case.scenario.reference, case.scenario.run.duration) for case in task.cases}
     others = [name for name, what in asked.items() if what != asked[baseline]]
     return [
         f"task '{task.task}': {', '.join(others)} follow a different reference, or run for a different time, than "

@@ -28,7 +28,7 @@ from ppafo.report.style import (
 )
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.sampled import state_row_numbers
-from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, PrescribedMotion, Scenario
+from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, Initial, PrescribedMotion, Scenario
 from ppafo.version import __version__
 
 if TYPE_CHECKING:
@@ -210,12 +210,9 @@ def _torque(model: LinearModel, command: float) -> Floats:
     """Torque [N m] on the runs, from the steady state on, with another command."""
     scenario = replace(
         model.scenario,
-        control=Control(PYTHON_CONTROLLER, {}, INTERVAL),
-        duration=DURATION,
-        time_step=INTERVAL,
-        output_interval=INTERVAL,
-        initial_pressure_1=_value(model, "pressure_1"),
-        initial_pressure_2=_value(model, "pressure_2"),
+        controller=Control(PYTHON_CONTROLLER, {}, INTERVAL),
+        run=replace(model.scenario.run, duration=DURATION, step=INTERVAL, output_interval=INTERVAL),
+        initial=Initial(_value(model, "pressure_1"), _value(model, "pressure_2")),
     )
     run = plan_run(scenario)
     record = replay(batch_of(run), StepInputs(np.full(run.step_count, command), {})).record[:, :, 0]

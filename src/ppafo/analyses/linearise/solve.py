@@ -199,8 +199,10 @@ class Point:
 
 def point_at(scenario: Scenario, time: float) -> Point:
     """The point that the run of a scenario passes at a time [s], to the nearest step; ScenarioError outside the run."""
-    if not 0.0 <= time <= scenario.duration * (1.0 + 1.0e-12):
-        raise ScenarioError(f"{scenario.name}: --at {time:g} s is outside the run, which lasts {scenario.duration:g} s")
+    if not 0.0 <= time <= scenario.run.duration * (1.0 + 1.0e-12):
+        raise ScenarioError(
+            f"{scenario.name}: --at {time:g} s is outside the run, which lasts {scenario.run.duration:g} s"
+        )
     whole = plan_run(scenario)
     steps = min(round(time / whole.step), whole.step_count)
     return Point(steps * whole.step, *_after(scenario, whole, steps))
@@ -209,7 +211,7 @@ def point_at(scenario: Scenario, time: float) -> Point:
 def _after(scenario: Scenario, run: Run, steps: int) -> tuple[dict[str, float], float | None]:
     """Values after some steps of a run, and the way of its vane."""
     batch = batch_of(replace(run, step_count=steps))
-    custom = scenario.control.custom
+    custom = scenario.controller.custom
     outcome = run_batch(batch) if custom is None else run_sampled(batch, custom)
     rows = {name: float(outcome.states[row, 0]) for name, row in state_row_numbers(run).items()}
     if rows["result.failure_time"] < NEVER_FAILED or not all(map(np.isfinite, rows.values())):
@@ -262,15 +264,15 @@ def equilibrium(scenario: Scenario) -> Point:
         raise ScenarioError(f"{scenario.name}: no equilibrium while the shank of the leg moves; take --at with a time")
     values, _ = _after(scenario, whole, whole.step_count)
     values["angular_velocity"] = 0.0
-    is_open_loop = scenario.control.kind == OPEN_LOOP
-    end = np.array([scenario.duration])
+    is_open_loop = scenario.controller.kind == OPEN_LOOP
+    end = np.array([scenario.run.duration])
     wanted = None if is_open_loop else float(profile_values(scenario.reference, end)[0][0])
     run = without_slew_limit(whole)
     held = None if run.program.angle is not None else 0.0
     found = _steady(run, held, values, wanted)
     if found is None:
         raise ScenarioError(_no_equilibrium(scenario, run, held, values, wanted))
-    way = _way(run, found, scenario.duration)
+    way = _way(run, found, scenario.run.duration)
     if way:
         raise ScenarioError(
             f"{scenario.name}: no equilibrium: at {np.degrees(values['angle']):.4g} deg the torque moves the vane; "

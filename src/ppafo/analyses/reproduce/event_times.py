@@ -46,8 +46,12 @@ def uneven_course(cadence: float) -> WalkingCourse:
 def timed_events(configuration: Scenario, minutes: float) -> Mapping[str, EventErrors]:
     """Errors of the events of one walk of at most so many minutes; SimulationError where it diverges."""
     course = course_of_walk(configuration)
-    longest = lasting(configuration, minutes).duration if course is None else float(course.duration)
-    run = plan_walk(replace(configuration, duration=min(longest, 60.0 * minutes), output_interval=1.0e-3))
+    longest = lasting(configuration, minutes).run.duration if course is None else float(course.duration)
+    run = plan_walk(
+        replace(
+            configuration, run=replace(configuration.run, duration=min(longest, 60.0 * minutes), output_interval=1.0e-3)
+        )
+    )
     outcome = run_batch(batch_of(run))
     rows = row_numbers(run.program.state_rows())
     if outcome.states[rows["result.failure_time"], 0] < NEVER_FAILED or not np.isfinite(outcome.states).all():

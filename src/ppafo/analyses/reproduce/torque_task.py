@@ -16,7 +16,7 @@ from ppafo.errors import ParameterError, ScenarioError, SimulationError
 from ppafo.parameters.publications.publication import paper_entries
 from ppafo.signals.recording import Floats
 from ppafo.simulation.loading import load_scenario
-from ppafo.simulation.scenario import PrescribedMotion, Scenario
+from ppafo.simulation.scenario import Initial, PrescribedMotion, Scenario
 from ppafo.simulation.simulate import Result, simulate
 
 _PERCENT = 100.0
@@ -54,35 +54,39 @@ def phased_runs(solenoid: Result) -> PhasedRuns:
     if not _has_phase(scenario):
         gas = GRAMS_PER_KILOGRAM * solenoid.metrics["gas_supplied"].value
         return PhasedRuns(np.array([solenoid.metrics["rms_error"].value]), np.array([gas]))
-    fine = replace(scenario, time_step=_FINE, output_interval=_FINE)
+    fine = replace(scenario, run=replace(scenario.run, step=_FINE, output_interval=_FINE))
     found = [run for tie in (_TIE, -_TIE) for run in _with_first_valve(fine, tie)]
     errors, gas = np.array(found).T
     return PhasedRuns(errors, gas)
 
 
 def _has_phase(scenario: Scenario) -> bool:
-    reference, period = scenario.reference, scenario.control.period
+    reference, period = scenario.reference, scenario.controller.period
     return (
-        scenario.control.kind == "on_off"
+        scenario.controller.kind == "on_off"
         and isinstance(scenario.motion, PrescribedMotion)
         and scenario.motion.kind == "held"
-        and scenario.thermal is None
+        and scenario.gas_model is None
         and scenario.supply_lines is None
         and reference.kind == "ramp_hold"
         and reference.settings["ramp_start"] == 0.0
         and reference.settings["start_level"] == 0.0
         and reference.settings["ramp_time"] > period
-        and scenario.duration > period
+        and scenario.run.duration > period
     )
 
 
 def _with_first_valve(scenario: Scenario, tie: float) -> Iterator[tuple[float, float]]:
     """Yield RMS error [N m] and gas [g] for each phase, with the valve that a tie calls held on until the first."""
-    period, whole = scenario.control.period, scenario.duration
+    period, whole = scenario.controller.period, scenario.run.duration
     ramp = scenario.reference.settings
     slope = ramp["level"] / ramp["ramp_time"]
     same = {**ramp, "start_level": tie, "level": tie}
-    held = simulate(replace(scenario, duration=period, reference=replace(scenario.reference, settings=same))).recording
+    held = simulate(
+        replace(
+            scenario, run=replace(scenario.run, duration=period), reference=replace(scenario.reference, settings=same)
+        )
+    ).recording
     for number in range(1, PHASES + 1):
         phase = period * number / PHASES
         last = round(phase / _FINE)
@@ -91,10 +95,9 @@ def _with_first_valve(scenario: Scenario, tie: float) -> Iterator[tuple[float, f
         rest = simulate(
             replace(
                 scenario,
-                duration=whole - phase,
+                run=replace(scenario.run, duration=whole - phase),
                 reference=replace(scenario.reference, settings=later),
-                initial_pressure_1=float(held["pressure_1"][last]),
-                initial_pressure_2=float(held["pressure_2"][last]),
+                initial=Initial(float(held["pressure_1"][last]), float(held["pressure_2"][last])),
             )
         )
         before = slope * held.time[: last + 1] - held["torque"][: last + 1]
@@ -164,12 +167,12 @@ class InterpretationOfU:
 def readings_of_u(solenoid: Result, proportional: Result) -> tuple[InterpretationOfU, ...]:
     """Return what each meaning of U makes of the comparison; none where another law or reference runs."""
     pair, spool = solenoid.scenario, proportional.scenario
-    if spool.control.kind != "pid" or {pair.reference.kind, spool.reference.kind} != {"ramp_hold"}:
+    if spool.controller.kind != "pid" or {pair.reference.kind, spool.reference.kind} != {"ramp_hold"}:
         return ()
 
     def better(full: float, level: float | None) -> tuple[float, float]:
-        gains = {**spool.control.settings, **{name: spool.control.settings[name] / full for name in _GAINS}}
-        both = [pair, replace(spool, control=replace(spool.control, settings=gains))]
+        gains = {**spool.controller.settings, **{name: spool.controller.settings[name] / full for name in _GAINS}}
+        both = [pair, replace(spool, controller=replace(spool.controller, settings=gains))]
         if level is not None:
             both = [
                 replace(item, reference=replace(item.reference, settings={**item.reference.settings, "level": level}))

@@ -372,12 +372,12 @@ def _without_restriction(uncertainty: Uncertainty, only: Mapping[str, Sequence[s
 def present_value(path: str, scenario: Scenario) -> float:
     """Return the value [SI] of a scenario at a path as in overrides; ScenarioError where it has none there."""
     if path == "controller.rate":
-        return 1.0 / scenario.control.period
+        return 1.0 / scenario.controller.period
     of_clock = {
-        "controller.period": scenario.control.period,
-        "run.duration": scenario.duration,
-        "run.step": scenario.time_step,
-        "run.output_interval": scenario.output_interval,
+        "controller.period": scenario.controller.period,
+        "run.duration": scenario.run.duration,
+        "run.step": scenario.run.step,
+        "run.output_interval": scenario.run.output_interval,
     }
     try:
         return float(of_clock[path]) if path in of_clock else number_at(scenario, path)

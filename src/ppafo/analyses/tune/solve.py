@@ -315,7 +315,7 @@ def _ceiling(problem: Problem, gains: Gains, draws: Mapping[str, Floats], runs: 
     base = scenario_with(problem, gains)
     given = {path: column for path, column in absolute(base, draws, problem.gauge).items() if path not in TIMES}
     scenario = with_numbers(base, given)
-    if scenario.control.kind == OPEN_LOOP or worn_kind(scenario) is not None:
+    if scenario.controller.kind == OPEN_LOOP or worn_kind(scenario) is not None:
         return Ceiling(0.0, ())
     known = runs.metrics
     lacking = np.broadcast_to(shortfall(scenario), known[problem.metrics[0]][:1].shape)

@@ -36,7 +36,7 @@ def versions() -> dict[str, str]:
 
 def walk_document(scenario: Scenario) -> dict[str, Any]:
     """Return a walk as data in SI units; its bottle by its values, not by the tables of its gas."""
-    motion, control, origin = walk_of(scenario), scenario.control, scenario.origin
+    motion, control, origin = walk_of(scenario), scenario.controller, scenario.origin
     lines = scenario.supply_lines
     return {
         "name": scenario.name,
@@ -47,10 +47,10 @@ def walk_document(scenario: Scenario) -> dict[str, Any]:
         "timing": motion.timing,
         "settings": plain(control.settings),
         "period": control.period,
-        "step": scenario.time_step,
+        "step": scenario.run.step,
         "sensors": plain(sensor_settings(scenario)) | {"seed": scenario.sensors.seed},
         "supply_lines": None if lines is None else plain(lines._asdict()),
-        "thermal": plain(scenario.thermal),
+        "gas_model": plain(scenario.gas_model),
         "bottle": None if motion.bottle is None else motion.bottle.to_dict(),
         "assumed": {item.path: item.note for item in scenario.assumptions},
         "file": origin.file,

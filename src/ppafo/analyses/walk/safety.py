@@ -42,7 +42,7 @@ def _shut_off_line(scenario: Scenario) -> list[str]:
 
 def _limit_line(scenario: Scenario) -> list[str]:
     """Return which peaks of the desired torque are above the limit of the controller, which requests no more."""
-    settings = scenario.control.settings
+    settings = scenario.controller.settings
     limit = settings.get("largest_torque", math.inf)
     cut = [
         f"controller.{name} = {quantity_text(settings[name], 'torque')}"

@@ -3,18 +3,22 @@
 from typing import Annotated, NamedTuple
 
 from ppafo.control.kind import ControllerKind
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Number, Quantity, quantities_of
 from ppafo.model.sensors import Measurement
 
 
 class PidParameters(NamedTuple):
     """Gains [1/(N m)], [1/(N m s)], [s/(N m)]; time constant of the derivative filter [s]; back-calculation [1/s]."""
 
-    proportional_gain: float
-    integral_gain: float
-    derivative_gain: float
-    derivative_filter: float
-    anti_windup: float
+    proportional_gain: Annotated[float, Number("1/(N m)", "k_p", 0.095, 0.0, 1.0e3)]
+    integral_gain: Annotated[float, Number("1/(N m s)", "k_i", 0.25, 0.0, 1.0e4)]
+    derivative_gain: Annotated[float, Number("s/(N m)", "k_d", 0.006, 0.0, 1.0e3)]
+    derivative_filter: Annotated[
+        float, Number("s", "time constant of the derivative filter, 0 for none", 0.0, 0.0, 1.0)
+    ]
+    anti_windup: Annotated[
+        float, Number("1/s", "rate of back-calculation while the command is clipped, 0 for none", 0.0, 0.0, 1.0e3)
+    ]
 
 
 class PidState(NamedTuple):
@@ -64,15 +68,7 @@ PID = ControllerKind(
     name="pid",
     summary="Proportional, integral and derivative action on the torque error.",
     source="the paper, equation (13); gains k_p 0.095, k_i 0.25, k_d 0.006",
-    quantities=(
-        Quantity("proportional_gain", "1/(N m)", "k_p", 0.095, 0.0, 1.0e3),
-        Quantity("integral_gain", "1/(N m s)", "k_i", 0.25, 0.0, 1.0e4),
-        Quantity("derivative_gain", "s/(N m)", "k_d", 0.006, 0.0, 1.0e3),
-        Quantity("derivative_filter", "s", "time constant of the derivative filter, 0 for none", 0.0, 0.0, 1.0),
-        Quantity(
-            "anti_windup", "1/s", "rate of back-calculation while the command is clipped, 0 for none", 0.0, 0.0, 1.0e3
-        ),
-    ),
+    quantities=quantities_of(PidParameters),
     parameters=PidParameters,
     initial=PidState(integral=0.0, error=0.0, slope=0.0, started=0.0),
     update=pid_update,
@@ -83,9 +79,9 @@ PID = ControllerKind(
 class SlidingModeParameters(NamedTuple):
     """Slope of the surface [1/s], half width of the boundary layer [N m], command outside of it [-]."""
 
-    surface_slope: float
-    boundary_layer: float
-    reaching_command: float
+    surface_slope: Annotated[float, Number("1/s", "weight of the error's integral in the surface", 14.0, 0.0, 1.0e3)]
+    boundary_layer: Annotated[float, Number("N m", "half width of the layer without switching", 0.13, 1.0e-6, 100.0)]
+    reaching_command: Annotated[float, Number("", "command outside the layer", 0.14, 0.0, 1.0)]
 
 
 class SlidingModeState(NamedTuple):
@@ -124,11 +120,7 @@ SLIDING_MODE = ControllerKind(
     name="sliding_mode",
     summary="Sliding mode on the torque error and its integral, with a boundary layer.",
     source="Slotine and Li 1991, Applied Nonlinear Control, chapter 7; on pneumatic actuators Bone and Ning 2007",
-    quantities=(
-        Quantity("surface_slope", "1/s", "weight of the error's integral in the surface", 14.0, 0.0, 1.0e3),
-        Quantity("boundary_layer", "N m", "half width of the layer without switching", 0.13, 1.0e-6, 100.0),
-        Quantity("reaching_command", "", "command outside the layer", 0.14, 0.0, 1.0),
-    ),
+    quantities=quantities_of(SlidingModeParameters),
     parameters=SlidingModeParameters,
     initial=SlidingModeState(0.0),
     update=sliding_update,
@@ -152,9 +144,9 @@ class DampedProportionalParameters(NamedTuple):
 class DampedGains(NamedTuple):
     """Gain [1/(N m)], damping [s/(N m)], time constant of its filter [s]."""
 
-    proportional_gain: float
-    damping: float
-    damping_filter: float
+    proportional_gain: Annotated[float, Number("1/(N m)", "command per torque error", 1.7, 0.0, 1.0e3)]
+    damping: Annotated[float, Number("s/(N m)", "command per rate of the torque, against it", 0.0067, 0.0, 1.0e3)]
+    damping_filter: Annotated[float, Number("s", "time constant of the filter on the torque's rate", 0.0011, 0.0, 10.0)]
 
 
 class TorqueSlope(NamedTuple):
@@ -211,11 +203,7 @@ def damped_update(
     return command, DampedProportionalState(state.elapsed + period, course)
 
 
-GAIN_QUANTITIES = (
-    Quantity("proportional_gain", "1/(N m)", "command per torque error", 1.7, 0.0, 1.0e3),
-    Quantity("damping", "s/(N m)", "command per rate of the torque, against it", 0.0067, 0.0, 1.0e3),
-    Quantity("damping_filter", "s", "time constant of the filter on the torque's rate", 0.0011, 0.0, 10.0),
-)
+GAIN_QUANTITIES = quantities_of(DampedGains)
 """Fields of ``DampedGains`` in order."""
 
 DAMPED_PROPORTIONAL = ControllerKind(

@@ -5,11 +5,11 @@ number is the controller's own, so that it can be wrong about the device as a re
 """
 
 import math
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from ppafo.control.controllers.feedback import PidParameters, PidState, pid_command, pid_restart
 from ppafo.control.kind import ControllerKind
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Number, Quantity, quantities_of
 from ppafo.model.plant import chamber_1_volume, chamber_2_volume
 from ppafo.model.sensors import Measurement
 
@@ -20,19 +20,27 @@ SMALLEST_GAIN = 1.0e-3
 class NominalChambers(NamedTuple):
     """The believed device, SI units; conductances are Cd A C1 [kg/(s Pa)], ``gas_product`` is R T / M [J/kg]."""
 
-    torque_constant: float
-    volume_per_angle: float
-    angle_min: float
-    angle_max: float
-    dead_volume_1: float
-    dead_volume_2: float
-    gas_product: float
-    valve_conductance: float
-    leak_conductance: float
-    critical_ratio: float
-    supply_pressure: float
-    dorsiflexion_pressure: float
-    atmospheric_pressure: float
+    torque_constant: Annotated[float, Number("m^3", "believed K_actuator", 1.451e-5, 1.0e-9, 1.0)]
+    volume_per_angle: Annotated[float, Number("m^3/rad", "believed B_vane", 2.35e-5, 1.0e-9, 1.0)]
+    angle_min: Annotated[float, Number("rad", "believed lower stop", math.radians(20.0), -10.0, 10.0)]
+    angle_max: Annotated[float, Number("rad", "believed upper stop", math.radians(130.0), -10.0, 10.0)]
+    dead_volume_1: Annotated[float, Number("m^3", "believed dead volume of chamber 1", 2.65e-5, 1.0e-9, 1.0)]
+    dead_volume_2: Annotated[float, Number("m^3", "believed dead volume of chamber 2", 2.65e-5, 1.0e-9, 1.0)]
+    gas_product: Annotated[
+        float, Number("J/kg", "believed R T / M, that of CO2 at 298 K", 5.6308454545e4, 1.0e3, 1.0e7)
+    ]
+    valve_conductance: Annotated[
+        float, Number("kg/(s Pa)", "believed Cd A C1 of the valve", 1.0040962467e-8, 1.0e-15, 1.0)
+    ]
+    leak_conductance: Annotated[float, Number("kg/(s Pa)", "believed Cd A C1 of the leak", 9.532559304e-11, 0.0, 1.0)]
+    critical_ratio: Annotated[
+        float, Number("", "believed critical pressure ratio, ISO 6358", 0.545727733814, 0.01, 0.95)
+    ]
+    supply_pressure: Annotated[float, Number("Pa_a", "believed pressure to chamber 1", 446062.864658, 1.0e3, 1.0e8)]
+    dorsiflexion_pressure: Annotated[
+        float, Number("Pa_a", "believed pressure to chamber 2", 446062.864658, 1.0e3, 1.0e8)
+    ]
+    atmospheric_pressure: Annotated[float, Number("Pa_a", "believed atmosphere", 101325.0, 1.0e3, 1.0e8)]
 
 
 class TorqueRates(NamedTuple):
@@ -43,21 +51,7 @@ class TorqueRates(NamedTuple):
     falling: float
 
 
-NOMINAL_QUANTITIES = (
-    Quantity("torque_constant", "m^3", "believed K_actuator", 1.451e-5, 1.0e-9, 1.0),
-    Quantity("volume_per_angle", "m^3/rad", "believed B_vane", 2.35e-5, 1.0e-9, 1.0),
-    Quantity("angle_min", "rad", "believed lower stop", math.radians(20.0), -10.0, 10.0),
-    Quantity("angle_max", "rad", "believed upper stop", math.radians(130.0), -10.0, 10.0),
-    Quantity("dead_volume_1", "m^3", "believed dead volume of chamber 1", 2.65e-5, 1.0e-9, 1.0),
-    Quantity("dead_volume_2", "m^3", "believed dead volume of chamber 2", 2.65e-5, 1.0e-9, 1.0),
-    Quantity("gas_product", "J/kg", "believed R T / M, that of CO2 at 298 K", 5.6308454545e4, 1.0e3, 1.0e7),
-    Quantity("valve_conductance", "kg/(s Pa)", "believed Cd A C1 of the valve", 1.0040962467e-8, 1.0e-15, 1.0),
-    Quantity("leak_conductance", "kg/(s Pa)", "believed Cd A C1 of the leak", 9.532559304e-11, 0.0, 1.0),
-    Quantity("critical_ratio", "", "believed critical pressure ratio, ISO 6358", 0.545727733814, 0.01, 0.95),
-    Quantity("supply_pressure", "Pa_a", "believed pressure to chamber 1", 446062.864658, 1.0e3, 1.0e8),
-    Quantity("dorsiflexion_pressure", "Pa_a", "believed pressure to chamber 2", 446062.864658, 1.0e3, 1.0e8),
-    Quantity("atmospheric_pressure", "Pa_a", "believed atmosphere", 101325.0, 1.0e3, 1.0e8),
-)
+NOMINAL_QUANTITIES = quantities_of(NominalChambers)
 """Fields of ``NominalChambers`` in order; the defaults are those of the set ppafo2011 with its proportional valve."""
 
 
@@ -183,8 +177,8 @@ PID_FEEDFORWARD = ControllerKind(
 class FeedbackLinearisationParameters(NamedTuple):
     """Decay rate of the error [1/s], filter of the angle's rate [s], and the believed device."""
 
-    convergence_rate: float
-    rate_filter: float
+    convergence_rate: Annotated[float, Number("1/s", "rate at which the torque error decays", 93.0, 0.0, 1.0e5)]
+    rate_filter: Annotated[float, Number("s", "time constant of the filter on the angle's rate", 0.0054, 0.0, 10.0)]
     nominal: NominalChambers
 
 
@@ -229,11 +223,7 @@ FEEDBACK_LINEARISATION = ControllerKind(
     name="feedback_linearisation",
     summary="Chamber dynamics inverted at the measured pressures and angle: the torque error decays at a chosen rate.",
     source="Slotine and Li 1991, Applied Nonlinear Control, chapter 6; on pneumatic actuators Richer and Hurmuzlu 2000",
-    quantities=(
-        Quantity("convergence_rate", "1/s", "rate at which the torque error decays", 93.0, 0.0, 1.0e5),
-        Quantity("rate_filter", "s", "time constant of the filter on the angle's rate", 0.0054, 0.0, 10.0),
-        *NOMINAL_QUANTITIES,
-    ),
+    quantities=quantities_of(FeedbackLinearisationParameters),
     parameters=FeedbackLinearisationParameters,
     initial=FeedbackLinearisationState(reference=0.0, angle=0.0, angular_velocity=0.0, started=0.0),
     update=linearising_update,

@@ -1,16 +1,16 @@
 """Laws that open the valve by a fixed amount: always, by the sign of the error (equation 14), or beyond a dead zone."""
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from ppafo.control.kind import ControllerKind
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Number, quantities_of
 from ppafo.model.sensors import Measurement
 
 
 class ConstantParameters(NamedTuple):
     """The command [-], -1 to 1."""
 
-    command: float
+    command: Annotated[float, Number("", "command, above 0 feeds chamber 1", 1.0, -1.0, 1.0)]
 
 
 class ConstantState(NamedTuple):
@@ -28,7 +28,7 @@ CONSTANT = ControllerKind(
     name="constant",
     summary="The same command from beginning to end.",
     source="the paper, section on model validation: valve fully open",
-    quantities=(Quantity("command", "", "command, above 0 feeds chamber 1", 1.0, -1.0, 1.0),),
+    quantities=quantities_of(ConstantParameters),
     parameters=ConstantParameters,
     initial=ConstantState(),
     update=constant_update,
@@ -71,9 +71,9 @@ ON_OFF = ControllerKind(
 class OnOffDeadZoneParameters(NamedTuple):
     """Errors at which the valve opens and at which it closes again [N m]; command while it is open [-]."""
 
-    dead_zone: float
-    release: float
-    opening: float
+    dead_zone: Annotated[float, Number("N m", "error at which the valve opens", 0.038, 0.0, 100.0)]
+    release: Annotated[float, Number("N m", "error at which it closes again; the dead zone at most", 0.038, 0.0, 100.0)]
+    opening: Annotated[float, Number("", "command while it is open", 0.12, 0.0, 1.0)]
 
 
 class OnOffDeadZoneState(NamedTuple):
@@ -111,11 +111,7 @@ ON_OFF_DEAD_ZONE = ControllerKind(
     name="on_off_dead_zone",
     summary="On/off with a dead zone and hysteresis: the valve opens for a large error and closes for a small one.",
     source="relay with dead zone and hysteresis: Gelb and Vander Velde 1968, Multiple-Input Describing Functions",
-    quantities=(
-        Quantity("dead_zone", "N m", "error at which the valve opens", 0.038, 0.0, 100.0),
-        Quantity("release", "N m", "error at which it closes again; the dead zone at most", 0.038, 0.0, 100.0),
-        Quantity("opening", "", "command while it is open", 0.12, 0.0, 1.0),
-    ),
+    quantities=quantities_of(OnOffDeadZoneParameters),
     parameters=OnOffDeadZoneParameters,
     initial=OnOffDeadZoneState(0.0),
     update=dead_zone_update,

@@ -51,7 +51,7 @@ def library_of(item: Scenario) -> Library:
 
 def scenario_library(scenario: Scenario) -> Library:
     """A library whose settings are all numbers of a scenario. ProgramError for a controller on whole numbers."""
-    if CONTROLLERS[scenario.control.kind].plan is not None:
+    if CONTROLLERS[scenario.controller.kind].plan is not None:
         raise ProgramError(
             f"{scenario.name}: a controller on whole numbers has no library yet; 'ppafo export firmware' writes it"
         )
@@ -90,14 +90,15 @@ def scenario_library(scenario: Scenario) -> Library:
 
 def commanded(scenario: Scenario) -> Scenario:
     """The plant of a scenario alone, under a command that is handed in at every step of its engine."""
-    step = step_counts(scenario.duration, scenario.time_step, scenario.output_interval, scenario.control.period).step
+    step = step_counts(
+        scenario.run.duration, scenario.run.step, scenario.run.output_interval, scenario.controller.period
+    ).step
     return replace(
         scenario,
         name=f"{scenario.name}-plant",
         description=f"The plant alone of this scenario: {scenario.description}",
-        time_step=step,
-        output_interval=step,
-        control=Control("constant", {"command": 0.0}, step),
+        run=replace(scenario.run, step=step, output_interval=step),
+        controller=Control("constant", {"command": 0.0}, step),
         sensors=Sensors(),
     )
 

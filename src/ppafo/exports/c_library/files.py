@@ -379,9 +379,9 @@ def words_of(scenario: Scenario, links: Graph) -> dict[str, str]:
     if isinstance(motion, FreeMotion) and motion.leg is not None:
         moves = f"free with the foot of a leg, whose shank is led, `{motion.leg.shank.kind}`"
     fixed = [
-        f"the valve, `{scenario.device.valve.kind}`, and the controller, `{scenario.control.kind}`",
+        f"the valve, `{scenario.device.valve.kind}`, and the controller, `{scenario.controller.kind}`",
         f"the reference, `{scenario.reference.kind}`, and the motion, {moves}",
-        *_fixed_of_device(scenario.device, scenario.thermal is not None, scenario.supply_lines is not None),
+        *_fixed_of_device(scenario.device, scenario.gas_model is not None, scenario.supply_lines is not None),
         _at_zero(scenario.device, scenario.sensors.flaws),
         "whether `run_output_interval` is a whole number of steps of the engine",
     ]
@@ -414,9 +414,9 @@ def words_of_walk(configuration: Scenario, links: Graph, failing: "Mapping[str, 
     led, precomputed = kind_at(motion.who.exported).words(motion)
     fixed = [
         *led,
-        f"the valve, `{configuration.device.valve.kind}`, and the controller, `{configuration.control.kind}`",
+        f"the valve, `{configuration.device.valve.kind}`, and the controller, `{configuration.controller.kind}`",
         *_fixed_of_device(
-            configuration.device, configuration.thermal is not None, configuration.supply_lines is not None
+            configuration.device, configuration.gas_model is not None, configuration.supply_lines is not None
         ),
         f"which sensors fail, and how: {', '.join(faults) or 'none'}; and whether one is late",
         _at_zero(configuration.device, () if has_ideal_sensors(configuration) else (1.0,)),

@@ -139,7 +139,7 @@ def plant_of(item: Scenario) -> PlantAlone:
         lead=lead,
         highest=highest,
         hidden=frozenset(hidden | {item.path for item in library.settings if item.path.startswith(unused)}),
-        step=chosen.time_step,
+        step=chosen.run.step,
     )
 
 
@@ -211,7 +211,7 @@ def _led_vane(scenario: Scenario) -> Scenario:
 def _commanded_walk(walk: Scenario) -> Scenario:
     """The walk with a command that is handed in at every step, and sensors that nothing reads."""
     check_can_leave(walk)
-    step = step_counts(1.0, walk.time_step, 1.0, walk.control.period).step
+    step = step_counts(1.0, walk.run.step, 1.0, walk.controller.period).step
     motion = walk_of(walk)
     # The forces under the foot are among the outputs.
     forces = dict.fromkeys(FORCES, 0.0) | {"force_bandwidth": motion.forces["force_bandwidth"]}
@@ -219,8 +219,8 @@ def _commanded_walk(walk: Scenario) -> Scenario:
         walk,
         name=f"{walk.name}-plant",
         description=f"The plant alone of this walk, on its leg: {walk.description}",
-        control=Control(switching.CONSTANT.name, {"command": 0.0}, step),
-        time_step=step,
+        controller=Control(switching.CONSTANT.name, {"command": 0.0}, step),
+        run=replace(walk.run, step=step),
         sensors=Sensors(),
         motion=replace(motion, forces=forces, faults={sensor: FaultSettings() for sensor in motion.faults}),
     )

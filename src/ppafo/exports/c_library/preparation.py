@@ -311,18 +311,18 @@ def settings_of(scenario: Scenario) -> tuple[Setting, ...]:
     """Every number of a scenario in SI units, under the path that overrides know it by."""
     # The step is that of the file, of which the engine takes one that divides a sample.
     texts = time_texts(scenario)
-    duration, period = scenario.duration, scenario.control.period
+    duration, period = scenario.run.duration, scenario.controller.period
     step, output = (value_at(texts, f"run.{name}") for name in ("step", "output_interval"))
     if step is not None:
         longest = parse_quantity(str(step), "s")
     elif output is None:
         longest = step_unless_given(duration, period)
     else:
-        longest = step_with_output(duration, period, scenario.output_interval)
+        longest = step_with_output(duration, period, scenario.run.output_interval)
     times = {
         "run.duration": duration,
         "run.step": longest,
-        "run.output_interval": scenario.output_interval,
+        "run.output_interval": scenario.run.output_interval,
         "controller.period": period,
     }
     return tuple(
@@ -411,7 +411,7 @@ def _steps(scenario: Scenario, writing: Writing) -> Iterator[str]:
     if scenario.supply_lines is not None or not writing.program.is_locked or writing.program.has_shape:
         yield "needs_parts = True"
         return
-    stiffness = "1.0" if scenario.thermal is None else "gas_heat_capacity_ratio"
+    stiffness = "1.0" if scenario.gas_model is None else "gas_heat_capacity_ratio"
     angle = c_identifier(path_of_locked_angle(scenario) or LOCKED_ANGLE)
     shortened = f"step / {writing.add(smaller)}(1.0, tolerance)"
     yield f"needs_parts = not {writing.add(is_slow_locked)}(plant, {shortened}, {angle}, {stiffness})"
@@ -421,7 +421,7 @@ def _pieces(scenario: Scenario, writing: Writing) -> Iterator[str]:
     """Lines that make the parameters of controller, profiles, sensors, gas and lines."""
     program = writing.program
     if program.controller is not None:
-        yield f"controller = {_kind(writing, 'controller', CONTROLLERS[scenario.control.kind])}"
+        yield f"controller = {_kind(writing, 'controller', CONTROLLERS[scenario.controller.kind])}"
     yield f"reference = {_reference(scenario, writing)}"
     if program.angle is RECORDED_ANGLE:
         yield f"path = {writing.add(Segment)}(0.0, motion_angle, 0.0)"

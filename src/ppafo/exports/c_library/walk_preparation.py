@@ -112,13 +112,13 @@ def settings_of_walk(configuration: Scenario) -> tuple[Setting, ...]:
 
 def _numbers(configuration: Scenario) -> dict[str, tuple[Quantity, float]]:
     """Declaration and value of every number of a walk, by path."""
-    duration = configuration.duration
+    duration = configuration.run.duration
     of_run = {
         "run.duration": duration,
-        "run.step": configuration.time_step,
+        "run.step": configuration.run.step,
         "run.output_interval": walk_of(configuration).who.interval(duration),
     }
-    times, control = of_run | {"controller.period": configuration.control.period}, _control(configuration)
+    times, control = of_run | {"controller.period": configuration.controller.period}, _control(configuration)
     who = walk_of(configuration).who
     declared = declared_settings(configuration) | control | {f"run.{item.name}": item for item in (*RUN, who.step)}
     # What fails of the plant, with its shut-off valve, is written out in the source; persons are drawn in Python.
@@ -160,7 +160,7 @@ def relations_of_walk(configuration: Scenario) -> tuple[Relation, ...]:
     rules = [(path, relation, other) for path, relation, other, _ in consistency(configuration.device)]
     if configuration.supply_lines is not None:
         rules.append(("supply.dorsiflexion_pressure", "at most", "supply.pressure"))
-    if "load_threshold" in configuration.control.settings:
+    if "load_threshold" in configuration.controller.settings:
         rules += _RELATIONS
     else:
         rules += _RELATIONS[:2]
@@ -242,7 +242,7 @@ def _steps(configuration: Scenario, writing: Writing) -> Iterator[str]:
     if configuration.supply_lines is not None:
         volumes = (c_identifier(f"supply_line.{line}.volume") for line in SUPPLY_LINES)
         yield f"volume = min(volume, {', '.join(volumes)})"
-    stiffness = "1.0" if configuration.thermal is None else "gas_heat_capacity_ratio"
+    stiffness = "1.0" if configuration.gas_model is None else "gas_heat_capacity_ratio"
     given = "run_duration, run_step, run_output_interval, controller_period"
     yield f"counts_of_steps = {writing.add(walk_step_counts)}({given}, plant, volume, {stiffness})"
     yield "needs_parts = False"

@@ -270,7 +270,7 @@ def plant_alone(item: Scenario) -> Interface:
         time=PLANT_TIME.format(motion=alone.motion),
         tuning=PLANT_TUNING,
         step=alone.step,
-        duration=item.duration,
+        duration=item.run.duration,
         outputs=library.program.outputs,
         shows_metrics=False,
         is_step_fixed=True,

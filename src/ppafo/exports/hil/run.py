@@ -64,8 +64,8 @@ def plant_of(scenario: Scenario, rate: int = wire.RATE) -> Plant:
     period = 1.0 / rate
     chosen = replace(
         scenario,
-        time_step=min(scenario.time_step, period),
-        control=Control(PYTHON_CONTROLLER, {}, period),
+        run=replace(scenario.run, step=min(scenario.run.step, period)),
+        controller=Control(PYTHON_CONTROLLER, {}, period),
     )
     run = plan_run(chosen)
     valve = chosen.device.valve
@@ -316,7 +316,7 @@ def run_at(
     try:
         if port.is_stream:
             check_baud(baud, rate)
-        plant, period = plant_of(scenario, rate), scenario.control.period
+        plant, period = plant_of(scenario, rate), scenario.controller.period
         if plant.period > period * (1.0 + _SAME):
             apart, wanted = plant.period * _PER_THOUSAND, period * _PER_THOUSAND
             say(

@@ -63,7 +63,7 @@ def _expect(fit: TrajectoryFit, candidate: Candidate) -> Expected:
     place = [index for index, item in enumerate(fit.numbers) if not item.recordings]
     acting = [fit.numbers[index] for index in place]
     point, scale = fit.fit.values[place], np.array([item.free.scale for item in acting])
-    count = math.floor(candidate.scenario.duration / candidate.interval + 1.0e-6)
+    count = math.floor(candidate.scenario.run.duration / candidate.interval + 1.0e-6)
     times = candidate.interval * np.arange(count + 1, dtype=np.float64)
     samples = Samples(times, tuple(Measured(name, np.zeros(times.size)) for name in noise), reach_of(acting))
     given = {path: float(row[0]) for path, row in columns_in("", acting, point[:, None]).items()}

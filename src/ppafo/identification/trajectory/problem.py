@@ -90,7 +90,7 @@ def check_experiment(experiment: Experiment) -> None:
         raise IdentificationError(
             f"{said}: the angle of the vane is prescribed, so it carries no information; add a pressure"
         )
-    if experiment.scenario.control.kind == PYTHON_CONTROLLER and COMMAND not in experiment.inputs:
+    if experiment.scenario.controller.kind == PYTHON_CONTROLLER and COMMAND not in experiment.inputs:
         raise IdentificationError(f"{said}: a Python controller cannot run in lanes; use one of the catalogue")
     _check_inputs(experiment, said)
 
@@ -139,7 +139,7 @@ def scenario_of(experiment: Experiment) -> Scenario:
         scenario = replace(scenario, device=with_highest_supply(scenario.device, recording, experiment.inputs))
     if COMMAND in experiment.inputs:
         # Nobody measures for a controller that nobody asks.
-        scenario = replace(scenario, control=replay_control(recording), sensors=Sensors())
+        scenario = replace(scenario, controller=replay_control(recording), sensors=Sensors())
     said = f"experiment '{experiment.label}'"
     if ANGLE in experiment.inputs:
         # From here the recorded angle prescribes that of the vane.
@@ -155,11 +155,8 @@ def scenario_of(experiment: Experiment) -> Scenario:
         )
     time = recording.time[before]
     rest = {name: value_at_rest(time, recording[name][before], at_end=True) for name in recording.names}
-    scenario = replace(
-        scenario,
-        initial_pressure_1=rest.get("pressure_1", scenario.initial_pressure_1),
-        initial_pressure_2=rest.get("pressure_2", scenario.initial_pressure_2),
-    )
+    recorded = {name: rest[name] for name in ("pressure_1", "pressure_2") if name in rest}
+    scenario = replace(scenario, initial=replace(scenario.initial, **recorded))
     if ANGLE in rest and ANGLE not in experiment.inputs and isinstance(scenario.motion, FreeMotion):
         start = float(between_stops(np.array([rest[ANGLE]]), scenario.device, said)[0])
         scenario = replace(scenario, motion=replace(scenario.motion, angle=start))

@@ -138,7 +138,8 @@ def prepare(experiment: Experiment, numbers: Mapping[str, float], reach: float =
                 f"{channel.values.size} samples: its sensor is at its limit; end the recording before it, or give the "
                 "standard deviation of the sensor in noise"
             )
-    scenario = replace(scenario_of(experiment), duration=float(time[-1]) + reach)
+    before = scenario_of(experiment)
+    scenario = replace(before, run=replace(before.run, duration=float(time[-1]) + reach))
     recorded = RecordedInputs(recording, experiment.inputs, experiment.start) if experiment.inputs else None
     return prepare_samples(experiment.label, scenario, Samples(time, tuple(channels), reach), numbers, recorded)
 
@@ -247,7 +248,7 @@ def blocks_of(experiments: Sequence[PreparedExperiment], numbers: Sequence[Numbe
 
 
 def _with_half_steps(prepared: PreparedExperiment, numbers: Sequence[Number], point: Floats) -> PreparedExperiment:
-    scenario = replace(prepared.scenario, time_step=0.5 * prepared.run.step)
+    scenario = replace(prepared.scenario, run=replace(prepared.scenario.run, step=0.5 * prepared.run.step))
     given = {path: float(row[0]) for path, row in columns_in(prepared.label, numbers, point[:, None]).items()}
     run = plan_run(with_numbers(scenario, given))
     return _place_samples(prepared, replace(run, tolerance=_FINER * prepared.run.tolerance))

@@ -261,10 +261,10 @@ def candidates_of(section: TrajectorySection, setting: Setting) -> tuple[Candida
         said = f"{setting.file}: candidate '{item.label}'"
         interval = quantity_of(f"{said}: interval", item.interval, "s")
         scenario = _scenario(item.scenario, item.overrides, setting)
-        if not SHORTEST_STEP <= interval <= scenario.duration:
+        if not SHORTEST_STEP <= interval <= scenario.run.duration:
             raise IdentificationError(
-                f"{said}: interval = '{item.interval}': must be from {SHORTEST_STEP:g} s to {scenario.duration:g} s, "
-                "the duration of its run"
+                f"{said}: interval = '{item.interval}': must be from {SHORTEST_STEP:g} s to "
+                f"{scenario.run.duration:g} s, the duration of its run"
             )
         found.append(Candidate(item.label, scenario, noise_of_channels(item.noise, said), interval))
     return tuple(found)
@@ -290,7 +290,7 @@ def _experiment(item: ExperimentSection, setting: Setting) -> Experiment:
             raise IdentificationError(
                 f"{said}: step = '{item.step}': must be from {SHORTEST_STEP:g} s to {LONGEST_STEP:g} s"
             )
-        scenario = replace(scenario, time_step=step)
+        scenario = replace(scenario, run=replace(scenario.run, step=step))
     return Experiment(
         label=item.label,
         scenario=scenario,

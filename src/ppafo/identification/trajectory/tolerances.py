@@ -97,7 +97,7 @@ def _of_run(tolerances: Tolerances, experiment: Experiment) -> dict[str, tuple[f
         found["supply.pressure"] = deviation_of_limit(tolerances.supply)
         if DORSIFLEXION_SUPPLY not in inputs:
             found["supply.dorsiflexion_pressure"] = deviation_of_limit(tolerances.supply)
-    is_read = experiment.initial_state == "recording" or experiment.scenario.control.kind == PYTHON_CONTROLLER
+    is_read = experiment.initial_state == "recording" or experiment.scenario.controller.kind == PYTHON_CONTROLLER
     stops = scenario.device.actuator.angle_min, scenario.device.actuator.angle_max
     # Where the vane lies at a stop, the stop says where it starts.
     if free is not None and ANGLE not in inputs and not any(math.isclose(free.angle, stop) for stop in stops):

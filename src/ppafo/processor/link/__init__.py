@@ -15,10 +15,10 @@ def example_controller(scenario: Scenario) -> dict[str, bytes]:
     """Files of a controller at the wire, by name. ScenarioError where it has no form on whole numbers."""
     chip = chip_controller(scenario)
     written = firmware(scenario)
-    period = round(scenario.control.period * MICROSECONDS)
-    if abs(period / MICROSECONDS - scenario.control.period) > 1.0e-9 * scenario.control.period:
+    period = round(scenario.controller.period * MICROSECONDS)
+    if abs(period / MICROSECONDS - scenario.controller.period) > 1.0e-9 * scenario.controller.period:
         raise ScenarioError(
-            f"{scenario.name}: controller.period = {scenario.control.period:.9g} s: must be a whole number of us"
+            f"{scenario.name}: controller.period = {scenario.controller.period:.9g} s: must be a whole number of us"
         )
     words = {
         "title": scenario.name,

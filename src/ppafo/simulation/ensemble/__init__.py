@@ -72,17 +72,17 @@ def run_ensemble(
     metrics = {name: _metric(base, name) for name in meters}
     for name in bands:
         _check_channel(base, name)
-    interval = every or base.output_interval
+    interval = every or base.run.output_interval
     if not interval > 0.0:
         raise ScenarioError(f"{base.name}: traces need a time above 0 between two samples, not {interval:g} s")
     checked = check_columns(base, columns, gauge)
     plan = plan_ensemble(checked)
     times = _times(plan, interval if bands else 0.0)
-    request = Request(metrics, tuple(dict.fromkeys(bands)), interval, times, base.control.custom)
+    request = Request(metrics, tuple(dict.fromkeys(bands)), interval, times, base.controller.custom)
     outcome = _run(plan, Outcome(checked.runs, request), threads)
     if not errors:
         return _result(plan, outcome, {})
-    alone = Request(metrics, (), interval, np.empty(0), base.control.custom)
+    alone = Request(metrics, (), interval, np.empty(0), base.controller.custom)
     fine = _run(plan_ensemble(checked, finer), Outcome(checked.runs, alone), threads)
     return _result(plan, outcome, _errors(outcome, fine))
 
@@ -133,9 +133,9 @@ def _metric(base: Scenario, name: str) -> MetricKind:
 def _check_channel(base: Scenario, name: str) -> None:
     if name not in TRACED:
         raise ScenarioError(f"{base.name}: the channel '{name}' cannot be traced{_hint(name, TRACED)}")
-    if name == REFERENCE and base.control.kind == OPEN_LOOP:
+    if name == REFERENCE and base.controller.kind == OPEN_LOOP:
         raise ScenarioError(f"{base.name}: a constant command follows no reference, so there is none to trace")
-    if name.startswith("temperature_") and base.thermal is None:
+    if name.startswith("temperature_") and base.gas_model is None:
         raise ScenarioError(f"{base.name}: '{name}' needs gas with an energy balance ([gas_model] kind = \"thermal\")")
 
 

@@ -284,12 +284,12 @@ def _stop_violation(scenario: Scenario, profile: ProfileChoice, run: int) -> str
     settings = {name: at(value, run) for name, value in profile.settings.items()}
     stops = (at(actuator.angle_min, run), at(actuator.angle_max, run))
     one = ProfileChoice(profile.kind, settings)
-    return profile_problem(scenario.device.name, stops, one, at(scenario.duration, run), at(scenario.time_step, run))
+    return profile_problem(scenario.device.name, stops, one, at(scenario.run.duration, run), at(scenario.run.step, run))
 
 
 def _too_late(scenario: Scenario) -> tuple[Problem, ...]:
     """Sensors whose delay is longer than the run, or than can be stored."""
-    delay, step = scenario.sensors.delay, scenario.time_step
+    delay, step = scenario.sensors.delay, scenario.run.step
 
     def long_line(run: int) -> str:
         longest = quantity_text(MAXIMUM_STEPS_OF_DELAY * at(step, run), "s")
@@ -297,7 +297,7 @@ def _too_late(scenario: Scenario) -> tuple[Problem, ...]:
 
     return (
         (
-            delay > scenario.duration,
+            delay > scenario.run.duration,
             lambda run: f"sensors.delay = {at(delay, run):.9g} s: must not be longer than run.duration",
         ),
         (delay / step > MAXIMUM_STEPS_OF_DELAY, long_line),

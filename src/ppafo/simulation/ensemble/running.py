@@ -270,7 +270,7 @@ def lacking(scenario: Scenario, kind: MetricKind) -> str:
     motion = scenario.motion
     if LED_SHANK in kind.needs and not (isinstance(motion, FreeMotion) and motion.leg is not None and motion.leg.gait):
         return "it needs a leg whose shank is that of a gait"
-    is_open = scenario.control.kind == OPEN_LOOP
+    is_open = scenario.controller.kind == OPEN_LOOP
     return "its controller follows no reference" if is_open and REFERENCE in kind.channels else ""
 
 
@@ -281,7 +281,7 @@ def reacts(scenario: Scenario) -> bool:
 
 def offered(scenario: Scenario) -> dict[str, MetricKind]:
     """The metrics that runs of a scenario have, for messages: those of walks are not for a vane, nor the reverse."""
-    missing = frozenset() if scenario.thermal is not None else _WITH_ENERGY_BALANCE
+    missing = frozenset() if scenario.gas_model is not None else _WITH_ENERGY_BALANCE
     return {
         name: kind
         for name, kind in METRICS.items()

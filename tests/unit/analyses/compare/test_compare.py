@@ -159,7 +159,7 @@ def test_mistakes_are_one_line() -> None:
 
 def test_a_scenario_that_was_changed_in_python_is_not_changed_back_in_silence() -> None:
     scenario = ppafo.load_scenario("torque-task-proportional")
-    other = replace(scenario, name="longer", duration=4.0)
+    other = replace(scenario, name="longer", run=replace(scenario.run, duration=4.0))
     with pytest.raises(StudyError, match="'longer' was changed in Python"):
         compare([scenario, other], tasks={"slow": ["reference.ramp_time=2 s"]})
 

@@ -142,7 +142,9 @@ def test_a_steady_state_is_one_on_the_lanes(steady: LinearModel) -> None:
     still = {item.name: item.value for item in (*steady.states, *steady.inputs)}
     scenario = ppafo.load_scenario(TASK, ["controller.kind=constant", f"controller.command={still['command']!r}"])
     run = replace(
-        scenario, initial_pressure_1=still["pressure_1"], initial_pressure_2=still["pressure_2"], duration=1.0
+        scenario,
+        initial=replace(scenario.initial, pressure_1=still["pressure_1"], pressure_2=still["pressure_2"]),
+        run=replace(scenario.run, duration=1.0),
     )
     recording = ppafo.simulate(run).recording
     assert recording["torque"] == pytest.approx(3.0, rel=1e-9)

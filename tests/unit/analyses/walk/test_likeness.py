@@ -43,7 +43,7 @@ def test_a_planted_delay_and_a_planted_difference_are_found() -> None:
 def test_the_moment_on_the_ankle_is_that_of_the_ground_under_a_flat_foot() -> None:
     """The foot is light: what muscles and device give together, the ground takes at heel and ball."""
     scenario = with_duration(load_walk("reacting", ["wearer.name=healthy-128"]), 6.0)
-    record = walk(replace(scenario, output_interval=1e-3)).recording
+    record = walk(replace(scenario, run=replace(scenario.run, output_interval=1e-3))).recording
     foot = 0.16 * record["toe_force"] - 0.04 * record["heel_force"]
     given = record["wearer_ankle_moment"] + record["external_torque"]
     flat = (record["contact"] == FLAT) & (record.time > 1.0)

@@ -48,7 +48,7 @@ def test_the_same_experiment_again_narrows_everything_by_the_square_root_of_two(
 
 def test_more_noise_and_a_shorter_run_bring_less(found: TrajectoryFit, experiment: Experiment) -> None:
     loud = {name: 3.0 * noise for name, noise in NOISE.items()}
-    short = dataclasses.replace(experiment.scenario, duration=0.1)
+    short = dataclasses.replace(experiment.scenario, run=dataclasses.replace(experiment.scenario.run, duration=0.1))
     candidates = [
         Candidate("noisy", experiment.scenario, loud),
         Candidate("short", short, NOISE),

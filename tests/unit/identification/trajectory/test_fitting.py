@@ -97,7 +97,7 @@ def test_area_and_discharge_coefficient_are_not_identifiable_together(experiment
 
 def test_a_number_that_does_nothing_is_not_identifiable_and_says_so(experiment: Experiment) -> None:
     # Chamber 2 would start at the pressure of its regulator; with a start of its own, it never meets that regulator.
-    start = {"initial.pressure_2": experiment.scenario.initial_pressure_2}
+    start = {"initial.pressure_2": experiment.scenario.initial.pressure_2}
     apart = dataclasses.replace(experiment, scenario=with_numbers(experiment.scenario, start))
     found = fitted(apart, INERTIA, FreeParameter("supply.dorsiflexion_pressure"))
     assert found.estimate("supply.dorsiflexion_pressure").verdict == "not identifiable"
@@ -137,14 +137,14 @@ def test_an_initial_pressure_of_one_recording_is_found(experiment: Experiment) -
     start = FreeParameter("initial.pressure_2", start=4.4e5, low=4.0e5, high=5.2e5, recordings=("step",))
     (estimate,) = fitted(experiment, start).estimates
     assert (estimate.path, estimate.unit) == ("initial.pressure_2 of step", "Pa")
-    assert abs(estimate.value - experiment.scenario.initial_pressure_2) < 3.0 / 1.96 * estimate.half_width
+    assert abs(estimate.value - experiment.scenario.initial.pressure_2) < 3.0 / 1.96 * estimate.half_width
     assert estimate.verdict == "identified"
 
 
 def test_a_number_limited_to_one_recording_leaves_the_other_alone(
     experiment: Experiment, step: Scenario, recorded: Callable[..., Recording]
 ) -> None:
-    start = f"initial.pressure_2={step.initial_pressure_2} Pa_a"
+    start = f"initial.pressure_2={step.initial.pressure_2} Pa_a"
     low = load_scenario(
         "step-response", ["motion.kind=free", "run.duration=0.35 s", "supply.pressure=45 psi_g", start, "name=low"]
     )

@@ -124,8 +124,8 @@ def test_the_initial_state_is_that_in_which_the_samples_up_to_the_start_end(expe
     prepared = prepare(dataclasses.replace(experiment, recording=shifted, initial_state="recording"), {})
     before = shifted.time <= 1e-9
     assert before.sum() == 11
-    assert prepared.scenario.initial_pressure_1 == pytest.approx(float(clean["pressure_1"][before][-1]), rel=1e-3)
-    assert prepared.scenario.initial_pressure_2 == pytest.approx(float(clean["pressure_2"][before][-1]), rel=1e-3)
+    assert prepared.scenario.initial.pressure_1 == pytest.approx(float(clean["pressure_1"][before][-1]), rel=1e-3)
+    assert prepared.scenario.initial.pressure_2 == pytest.approx(float(clean["pressure_2"][before][-1]), rel=1e-3)
 
 
 _SECOND = ("supply.dorsiflexion_pressure", "initial.pressure_2")

@@ -76,7 +76,7 @@ def test_a_recorded_supply_takes_the_place_of_both_regulators(
         ],
     )
     recording = recorded(low)
-    start = dataclasses.replace(step, initial_pressure_2=low.initial_pressure_2)
+    start = dataclasses.replace(step, initial=dataclasses.replace(step.initial, pressure_2=low.initial.pressure_2))
     other = dataclasses.replace(experiment, recording=recording, scenario=start)
     followed = with_input(other, "supply_pressure", np.full(len(recording), low.device.supply.pressure), "Pa")
     found = fit(TrajectoryProblem((FLOW,), (followed,)))
@@ -196,7 +196,7 @@ def test_the_zero_of_the_sensor_of_a_followed_supply_moves_what_the_run_follows(
 
 
 def test_the_error_of_coarse_steps_is_the_floor_of_the_noise(experiment: Experiment, step: Scenario) -> None:
-    clean = simulate(dataclasses.replace(step, time_step=2e-5)).recording
+    clean = simulate(dataclasses.replace(step, run=dataclasses.replace(step.run, step=2e-5))).recording
     random = np.random.default_rng(1)
     channels = {
         name: Channel(clean[name] + 1.0e-6 * np.ptp(clean[name]) * random.standard_normal(len(clean)), clean.unit(name))

@@ -196,7 +196,12 @@ def test_metrics_and_traces_in_another_order_are_the_same_program_and_numbers(mo
 
 
 def test_a_scenario_that_was_changed_in_python_runs_as_it_is() -> None:
-    base = dataclasses.replace(load_scenario(TASK), duration=0.1005, initial_pressure_1=2e5)
+    loaded = load_scenario(TASK)
+    base = dataclasses.replace(
+        loaded,
+        run=dataclasses.replace(loaded.run, duration=0.1005),
+        initial=dataclasses.replace(loaded.initial, pressure_1=2e5),
+    )
     result = run_ensemble(base, {"valve.area": np.array([base.device.valve.orifice.area])}, METERS)  # type: ignore[union-attr]
     assert result.metrics["rms_error"][0] == pytest.approx(simulate(base).metrics["rms_error"].value, rel=1e-12)
 
@@ -248,7 +253,8 @@ def test_an_ensemble_of_which_no_run_can_be_is_a_result_all_the_same(path: str, 
 
 
 def test_a_run_that_diverges_says_when_and_has_neither_metrics_nor_traces() -> None:
-    impossible = dataclasses.replace(load_scenario("step-response"), initial_pressure_1=-2.0e5)
+    loaded = load_scenario("step-response")
+    impossible = dataclasses.replace(loaded, initial=dataclasses.replace(loaded.initial, pressure_1=-2.0e5))
     result = run_ensemble(impossible, {"valve.area": np.array([1e-5, 2e-5])}, METERS, BANDS, 0.01)
     assert result.status.tolist() == [DIVERGED, DIVERGED]
     assert np.isnan(np.array(list(result.metrics.values()))).all()

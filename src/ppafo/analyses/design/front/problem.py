@@ -337,7 +337,7 @@ def _task(table: TaskTable, kinds: Sequence[str], folder: Path, file: str, whole
             )
     scenarios = {kind: load_scenario(placed(table.scenarios[kind], folder), table.overrides) for kind in kinds}
     for kind, scenario in scenarios.items():
-        if scenario.control.kind == OPEN_LOOP:
+        if scenario.controller.kind == OPEN_LOOP:
             raise StudyError(
                 f"{file}: task '{table.name}': scenario '{scenario.name}' follows no reference (controller "
                 f"'{OPEN_LOOP}'), so it has no tracking error"

@@ -136,7 +136,7 @@ def sizing_figure(sizing: Sizing) -> "matplotlib.figure.Figure":
         grid = figure.add_gridspec(2, 2)
         axes = figure.add_subplot(grid[0, :])
         problem = sizing.problem
-        time = np.linspace(0.0, problem.scenario.duration, 3001)
+        time = np.linspace(0.0, problem.scenario.run.duration, 3001)
         axes.plot(
             time,
             problem.profile.at(time),
@@ -313,7 +313,7 @@ def _row(item: SizedValve) -> tuple[str | float | None, ...]:
 
 def _margin_row(problem: SizingProblem, item: SizedValve) -> tuple[str | float | None, ...]:
     margins = [None if item.margins is None else getattr(item.margins, name) for name in _MARGINS]
-    control = problem.scenario.control
+    control = problem.scenario.controller
     units = {f"controller.{quantity.name}": quantity.unit for quantity in CONTROLLERS[control.kind].quantities}
     gains = [
         f"{path.rpartition('.')[2].replace('_', ' ')} {value:.3g} {units[path]}" for path, value in item.gains.items()

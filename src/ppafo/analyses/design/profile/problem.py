@@ -282,7 +282,7 @@ def sizing_problem(document: SizingFile, file: str, folder: Path) -> SizingProbl
                 f"controller are for a {kind} one"
             )
     # The settings that multiply a torque error.
-    quantities = CONTROLLERS[scenario.control.kind].quantities
+    quantities = CONTROLLERS[scenario.controller.kind].quantities
     gains = tuple(f"controller.{item.name}" for item in quantities if "(N m" in item.unit)
     lowest, highest = _pressures(document, scenario, file)
     return SizingProblem(
@@ -311,9 +311,9 @@ def _scenario(document: SizingFile, profile: TorqueProfile, folder: Path, file: 
     name = beside(document.scenario, folder)
     plain = load_scenario(name, document.overrides)
     plain.device.check_vane("the size of a device")
-    if plain.control.kind == OPEN_LOOP:
+    if plain.controller.kind == OPEN_LOOP:
         raise StudyError(f"{file}: scenario '{plain.name}' follows no reference (controller '{OPEN_LOOP}')")
-    grain = _common_multiple(plain.control.period, plain.output_interval)
+    grain = _common_multiple(plain.controller.period, plain.run.output_interval)
     count = math.ceil(Fraction(document.simulated * profile.period).limit_denominator(_LARGEST_DENOMINATOR) / grain)
     duration = f"run.duration={float(count * grain)!r} s"
     return reloaded(plain, (*profile.overrides(), duration))

@@ -137,7 +137,7 @@ class Trials:
 
     def gain_numbers(self, number: int) -> dict[str, float]:
         """Return the gains of a set in SI, by path."""
-        settings = self.problem.scenario.control.settings
+        settings = self.problem.scenario.controller.settings
         pairs = zip(self.problem.gains, self.gain_sets[number], strict=True)
         return {path: float(factor * settings[path.rpartition(".")[2]]) for path, factor in pairs}
 
@@ -162,7 +162,7 @@ class Trials:
             for name in ("torque_constant", "volume_per_angle"):
                 columns[f"actuator.{name}"] = np.full(count, problem.actuator.values[name])
         columns |= {"supply.pressure": pressure, "supply.dorsiflexion_pressure": pressure}
-        settings = problem.scenario.control.settings
+        settings = problem.scenario.controller.settings
         for index, path in enumerate(problem.gains):
             columns[path] = self.gain_sets[gains, index] * settings[path.rpartition(".")[2]]
         return columns

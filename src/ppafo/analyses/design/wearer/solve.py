@@ -438,7 +438,7 @@ def _sections(wish: Wish, device: Device) -> tuple[Section, ...]:
     peaks = peak_torques(walked)
     low, high = (share * walk_of(walked.scenario).gait.body_mass for share in SCALED_MASS)
     facts = (
-        ("controller", f"{walked.scenario.control.kind}, walk '{WALKS[device.tried.valve.kind]}'"),
+        ("controller", f"{walked.scenario.controller.kind}, walk '{WALKS[device.tried.valve.kind]}'"),
         ("lasts", f"{minutes_text(device.life.discharge.walking_time)}, of {wish.seconds / 60.0:.4g} min"),
         ("then", device.life.discharge.ending.message),
         ("peak torque", f"{quantity_text(device.torque, 'torque')} in the mean stride{_short(wish, device)}, "
@@ -483,7 +483,7 @@ def _data(sizing: WearerSizing, doubtful: list[tuple[Part, str]]) -> dict[str, A
             "valve": device.tried.valve.name,
             "actuator": device.tried.actuator.name,
             "bottle": device.bottle.name,
-            "controller": device.walked.scenario.control.kind,
+            "controller": device.walked.scenario.controller.kind,
             "walk": WALKS[device.tried.valve.kind],
             "overrides": list(device.tried.overrides),
             "lasts": device.life.discharge.walking_time,

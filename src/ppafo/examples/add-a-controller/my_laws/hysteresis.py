@@ -1,16 +1,16 @@
 """On/off control that keeps its last command while the error is small."""
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from ppafo.control.kind import ControllerKind
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Number, quantities_of
 from ppafo.model.sensors import Measurement
 
 
 class HysteresisParameters(NamedTuple):
     """Half width of the band [N m] in which nothing changes."""
 
-    band: float
+    band: Annotated[float, Number("N m", "half width of the band", 0.2, 0.0, 100.0)]
 
 
 class HysteresisState(NamedTuple):
@@ -37,7 +37,7 @@ KIND = ControllerKind(
     name="hysteresis",
     summary="On/off with a band in which the last command stays.",
     source="the rule of equation (14) with a dead zone that remembers",
-    quantities=(Quantity("band", "N m", "half width of the band", 0.2, 0.0, 100.0),),
+    quantities=quantities_of(HysteresisParameters),
     parameters=HysteresisParameters,
     initial=HysteresisState(0.0),
     update=update,

@@ -186,7 +186,7 @@ def test_a_profile_that_ends_elsewhere_than_it_begins_jumps_at_its_end(tmp_path:
 def test_simulated_repetitions_are_covered_to_a_whole_sample(folder: Path) -> None:
     (folder / "odd.toml").write_text(FILE.replace('"1 s"]', '"1.0007 s"]').replace("simulated = 1", "simulated = 3"))
     problem = load_design(folder / "odd.toml")
-    assert problem.scenario.duration == pytest.approx(3.003)
+    assert problem.scenario.run.duration == pytest.approx(3.003)
     assert dataclasses.asdict(problem.scenario.reference)["kind"] == "tabulated"
 
 
