@@ -43,7 +43,7 @@ def run_in(bare: Path, home: Path, *arguments: str) -> subprocess.CompletedProce
         ["simulate", "torque-task-proportional", "--set", "run.duration=0.2s"],
         ["walk", "off", "--set", "run.duration=6s"],
         ["walk", "--list"],
-        ["doctor", "schema"],
+        ["doctor", "--schema", "scenario"],
         ["export", "c", "torque-task-proportional", "--out", "c"],
     ],
     ids=" ".join,
