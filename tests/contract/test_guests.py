@@ -70,7 +70,7 @@ def called(bare: Path, folder: Path, *arguments: str) -> subprocess.CompletedPro
         ["simulate", "torque-task-proportional", "--set", "run.duration=0.2s"],
         ["walk", "off", "--set", "run.duration=6s"],
         ["walk", "--list"],
-        ["doctor", "schema"],
+        ["doctor", "--schema", "scenario"],
         ["design", "BARE/profile.toml"],
         ["export", "c", "torque-task-proportional", "--out", "c"],
         ["export", "fmu", "torque-task-proportional", "--out", "fmu"],

@@ -11,6 +11,7 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.walking import load_walk, walk
 from ppafo.walking.planning import plan_walk
 from ppafo.wearer.published import WEIGHT
+from ppafo.wearer.scheme import ReactingWalk
 from tests.judge.wearer import COLUMNS, SAMPLE, Device, walk_of_judge
 
 Floats = NDArray[np.float64]
@@ -74,8 +75,8 @@ def by_package(name: str, step: float, seconds: float = SECONDS, changes: Sequen
 def device_of(name: str) -> Device:
     """What the device of these walks is for the judge."""
     run = plan_walk(light_walk(name, STEPS[0]))
-    assert run.reacting is not None
-    share = run.reacting.share
+    assert isinstance(run.walk, ReactingWalk)
+    share = run.walk.share
     return Device(inertia=share.inertia, damping=share.viscous_damping, friction=run.plant.dynamic_torque)
 
 

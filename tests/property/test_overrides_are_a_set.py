@@ -75,7 +75,8 @@ OF_A_WALK = (
     "motion.gait=normal-adult",
     "gait=normal-adult",
     "wearer.body_mass=70 kg",
-    "wearer.name=published",
+    "motion.kind=react",
+    "wearer.name=geyer-herr",
     "faults.heel.kind=frozen",
     "faults.heel.time=1 s",
     "faults.heel.gain=0.5",
@@ -133,7 +134,7 @@ def test_a_parameter_set_is_the_same_for_all_orders(words: list[str], seed: int)
         ("torque-task-proportional", ["valve.area=3 mm^2", "valves.proportional.area=4 mm^2"]),
         ("torque-task-moving-ankle", ["motion.profile.kind=sine", "motion.kind=held"]),
         ("torque-task-moving-ankle", ["motion.angle=75 deg", "motion.kind=prescribed"]),
-        ("proportional", ["wearer.body_mass=70 kg", "wearer.name=published"]),
+        ("proportional", ["wearer.body_mass=70 kg", "motion.kind=react"]),
         ("proportional", ["motion.gait=normal-adult", "gait=normal-adult"]),
     ],
 )

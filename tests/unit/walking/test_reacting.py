@@ -36,6 +36,7 @@ from ppafo.wearer import scheme as reacting
 from ppafo.wearer.model.nerves import Nerves
 from ppafo.wearer.model.walker import Walker
 from ppafo.wearer.recording import toe_heights
+from ppafo.wearer.settings import wearer_of_walk
 
 WALK, STEP = "reacting", 1.0e-4
 WEAK = "wearer.tibialis_strength=0.1"
@@ -61,8 +62,8 @@ def every_step(scenario: Scenario, seconds: float) -> tuple[Run, BatchResult]:
 
 def test_each_step_of_the_lanes_is_the_step_of_plain_python_to_the_bit() -> None:
     run, result = every_step(load_walk(WALK, [WEAK, "wearer.push=60 N", "wearer.push_from=1 cm"]), 0.05)
-    walk = run.reacting
-    assert walk is not None
+    walk = run.walk
+    assert isinstance(walk, reacting.ReactingWalk)
     rows = row_numbers(run.program.state_rows())
 
     def group(kind: Any, name: str, sample: int) -> Any:
@@ -254,10 +255,10 @@ def test_the_answer_says_on_which_slope_a_wearer_falls_and_what_was_walked_befor
 def test_toes_are_over_the_ground_below_them() -> None:
     """As the lanes find it: the lowest of a swing is what the recording has."""
     _, result = every_step(load_walk(WALK, ["controller.kind=off"]), 0.01)
-    level = plan_walk(load_walk(WALK)).reacting
-    sloped = plan_walk(load_walk(WALK, ["wearer.slope=0.1", "wearer.ground_from=1 m"])).reacting
-    assert level is not None
-    assert sloped is not None
+    level = plan_walk(load_walk(WALK)).walk
+    sloped = plan_walk(load_walk(WALK, ["wearer.slope=0.1", "wearer.ground_from=1 m"])).walk
+    assert isinstance(level, reacting.ReactingWalk)
+    assert isinstance(sloped, reacting.ReactingWalk)
     rows = row_numbers(plan_walk(load_walk(WALK)).program.state_rows())
     record = {path: result.record[:3, row, 0] for path, row in rows.items() if path.startswith("walker.pose")}
     record["walker.pose.x"] = np.array([0.0, 3.0, 5.0])
@@ -267,8 +268,7 @@ def test_toes_are_over_the_ground_below_them() -> None:
 
 
 def test_a_ratio_changes_a_gain_of_both_legs() -> None:
-    wearer = walk_of(load_walk(WALK, ["wearer.soleus_force_ratio=1.1", "wearer.left_soleus_force=1.0"])).reacts
-    assert wearer is not None
+    wearer = wearer_of_walk(walk_of(load_walk(WALK, ["wearer.soleus_force_ratio=1.1", "wearer.left_soleus_force=1.0"])))
     row, plain = wearer.row(), wearer.body
     assert row.left_gains == plain.left_gains._replace(soleus_force=1.1)
     assert row.right_gains == plain.right_gains._replace(soleus_force=1.1 * plain.right_gains.soleus_force)
@@ -277,17 +277,24 @@ def test_a_ratio_changes_a_gain_of_both_legs() -> None:
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"wearer": {"tibialis_strength": 0.3}}, 'needs a wearer who reacts: give wearer.reacts = "NAME"'),
+        ({"motion": {"kind": "walk"}, "wearer": {"tibialis_strength": 0.3}}, "unknown key 'wearer.tibialis_strength'"),
+        (
+            {"wearer": {"reacts": "geyer-herr"}},
+            'wearer.reacts = \'geyer-herr\': is now motion.kind = "react" and wearer.name = "geyer-herr"',
+        ),
         ({"course": "stairs"}, "segment 1 (stand): a wearer who reacts walks on"),
         (
-            {"course": "ramp-and-kerb", "wearer": {"reacts": "geyer-herr", "slope": 0.01}},
+            {"course": "ramp-and-kerb", "wearer": {"name": "geyer-herr", "slope": 0.01}},
             "wearer.slope = 0.01: does not go with course 'ramp-and-kerb'",
         ),
-        ({"course": "ramp-and-kerb", "wearer": {}}, "segment 1 (walk): distance is for a wearer who reacts"),
-        ({"gait": "normal"}, "does not go with wearer.reacts yet"),
-        ({"wearer": {"reacts": "geyer-herr", "body_mass": "70 kg"}}, "is of a leg that a gait leads"),
-        ({"wearer": {"reacts": "geyer-her"}}, "did you mean 'geyer-herr'"),
-        ({"wearer": {"reacts": "geyer-herr", "device_on": "both"}}, "unknown key 'wearer.device_on'; allowed here: "),
+        (
+            {"course": "ramp-and-kerb", "motion": {"kind": "walk"}, "wearer": {}},
+            "segment 1 (walk): distance is for a wearer who reacts",
+        ),
+        ({"gait": "falisse2019-subject1"}, "does not go with motion.kind = 'react' yet"),
+        ({"wearer": {"name": "geyer-herr", "body_mass": "70 kg"}}, "unknown key 'wearer.body_mass'"),
+        ({"wearer": {"name": "geyer-her"}}, "did you mean 'geyer-herr'"),
+        ({"wearer": {"name": "geyer-herr", "device_on": "both"}}, "unknown key 'wearer.device_on'; allowed here: "),
         ({"run": {"step": "0.2 ms"}}, "at most 0.0001 s (largest step; 0.1 ms unless given)"),
     ],
 )
@@ -295,8 +302,8 @@ def test_what_a_file_cannot_say_is_one_line(changes: dict[str, Any], words: str)
     content: dict[str, Any] = {
         "schema_version": 1,
         "name": "mine",
-        "motion": {"kind": "walk"},
-        "wearer": {"reacts": "geyer-herr"},
+        "motion": {"kind": "react"},
+        "wearer": {"name": "geyer-herr"},
         "device": {"set": "ppafo2011", "valve": "solenoid"},
         "controller": {"kind": "event_on_off"},
         **changes,
@@ -308,23 +315,25 @@ def test_what_a_file_cannot_say_is_one_line(changes: dict[str, Any], words: str)
 
 
 def test_a_gait_of_an_option_is_refused_as_one_of_the_file_is() -> None:
-    with pytest.raises(ScenarioError, match=r"gait 'normal' does not go with wearer\.reacts yet"):
-        load_walk(WALK, gait="normal")
+    with pytest.raises(ScenarioError, match=r"gait 'falisse2019-subject1' does not go with motion.kind = 'react' yet"):
+        load_walk(WALK, gait="falisse2019-subject1")
 
 
 def test_what_needs_a_prescribed_gait_refuses_in_one_line() -> None:
-    scenario, line = load_walk(WALK), "needs a prescribed gait, and its wearer reacts"
+    scenario, line = load_walk(WALK), "needs a prescribed gait, and motion.kind = 'react' has none"
     with pytest.raises(ScenarioError, match=line):
         walk_population(scenario, 0.1, 8)
     assert "lowest_toes is over the ground" in lacking(scenario, METRICS["toe_clearance"])
-    assert "it needs a wearer who reacts (wearer.reacts)" in lacking(load_walk("solenoid"), METRICS["fall_time"])
+    assert "it needs a neuromuscular gait model (motion.kind = 'react')" in lacking(
+        load_walk("solenoid"), METRICS["fall_time"]
+    )
     with pytest.raises(DataError, match="a wearer who reacts walks on two legs"):
         opensim_recording(walk(load_walk(WALK, ["run.duration=6 s"])).recording)
 
 
 def test_a_wearer_file_beside_the_walk_is_found(tmp_path: Path) -> None:
     shipped = Path(ppafo.__file__).parent
-    text = (shipped / "wearers" / "files" / "geyer-herr.toml").read_text()
+    text = (shipped / "wearer" / "files" / "geyer-herr.toml").read_text()
     (tmp_path / "me.toml").write_text(text.replace('"geyer-herr"', '"me"', 1))
     walked = (shipped / "walking" / "configurations" / "reacting.toml").read_text()
     (tmp_path / "mine.toml").write_text(walked.replace('"healthy-128"', '"me.toml"'))
