@@ -14,7 +14,7 @@ from typing import Annotated, Any, Protocol
 from ppafo.control.kind import PythonController
 from ppafo.engine.scheme.pneumatics import KEPT_OF_PRESSURE
 from ppafo.errors import ScenarioError
-from ppafo.model.declaration import Number
+from ppafo.model.declaration import Number, attribute_among
 from ppafo.model.gait import ShankSeries
 from ppafo.model.regulator import SupplyLines
 from ppafo.parameters.device import Device
@@ -28,10 +28,14 @@ UNITS = "SI: kg, m, s, K, mol; angles in rad, pressures in Pa absolute, torques 
 
 @dataclass(frozen=True, slots=True)
 class ProfileChoice:
-    """A function of time: its kind in ``control.catalog.PROFILES`` and all its settings in SI units."""
+    """A function of time: its kind in ``control.catalog.PROFILES`` and all its settings in SI units, as attributes."""
 
     kind: str
     settings: Mapping[str, float]
+
+    def __getattr__(self, name: str) -> Any:
+        """Return a setting by its name."""
+        return attribute_among(self, name, "settings")
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,13 +227,17 @@ class Sensors:
 class Control:
     """A sampled controller: kind in ``control.catalog.CONTROLLERS``, settings in SI units, sample period [s].
 
-    With kind ``python`` there are no settings and ``custom`` is asked sample by sample.
+    Its settings are attributes: ``controller.proportional_gain``. With kind ``python`` there are no settings and ``custom`` is asked sample by sample.
     """
 
     kind: str
     settings: Mapping[str, float]
     period: float
     custom: PythonController | None = None
+
+    def __getattr__(self, name: str) -> Any:
+        """Return a setting by its name."""
+        return attribute_among(self, name, "settings")
 
     @property
     def label(self) -> str:
@@ -349,7 +357,11 @@ def plain(value: Any) -> Any:
     """Return dicts, lists, texts and finite numbers; an infinite number becomes None, a controller its type's name."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         # Links are no part of what is run: what is not compared is not shown.
-        return {field.name: plain(getattr(value, field.name)) for field in dataclasses.fields(value) if field.compare}
+        shown = {field.name: plain(getattr(value, field.name)) for field in dataclasses.fields(value) if field.compare}
+        if hasattr(type(value), "__getattr__"):  # then their numbers are its own attributes
+            for inner in ("orifice", "settings"):
+                shown |= shown.pop(inner, {})
+        return shown
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, tuple | list):
