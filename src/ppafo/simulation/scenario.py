@@ -17,7 +17,7 @@ from ppafo.errors import ScenarioError
 from ppafo.model.declaration import Number, attribute_among
 from ppafo.model.gait import ShankSeries
 from ppafo.model.regulator import SupplyLines
-from ppafo.parameters.device import Device
+from ppafo.parameters.device import Device, Supply
 from ppafo.parameters.graph import Graph
 
 PYTHON_CONTROLLER = "python"
@@ -198,6 +198,36 @@ class GasModel:
 
 
 @dataclass(frozen=True, slots=True)
+class RegulatedLine:
+    """A regulator with the line behind it: droop [Pa s/kg], largest mass flow [kg/s], volume [m^3]."""
+
+    droop: Annotated[float, Number("Pa s/kg", "fall of the line pressure per mass flow", None, 1.0, 1.0e10)]
+    largest_flow: Annotated[float, Number("kg/s", "what the regulator passes at most", None, 1.0e-6, 1.0)]
+    volume: Annotated[float, Number("m^3", "room for gas between regulator and valve", None, 1.0e-6, 1.0e-2)]
+
+
+@dataclass(frozen=True, slots=True)
+class SupplyLine:
+    """Both lines: behind the bottle's regulator, and behind the second regulator, which the first line feeds."""
+
+    plantarflexion: RegulatedLine
+    dorsiflexion: RegulatedLine
+
+    def row(self, supply: Supply) -> SupplyLines:
+        """Return the lines as the engine has them, with regulators that relieve where those of a supply do."""
+        first, second = self.plantarflexion, self.dorsiflexion
+        return SupplyLines(
+            droop_1=first.droop,
+            largest_flow_1=first.largest_flow,
+            volume_1=first.volume,
+            droop_2=second.droop,
+            largest_flow_2=second.largest_flow,
+            volume_2=second.volume,
+            relieving=float(supply.relieving),
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class Sensors:
     """What the controller sees, ideal by default.
 
@@ -227,7 +257,8 @@ class Sensors:
 class Control:
     """A sampled controller: kind in ``control.catalog.CONTROLLERS``, settings in SI units, sample period [s].
 
-    Its settings are attributes: ``controller.proportional_gain``. With kind ``python`` there are no settings and ``custom`` is asked sample by sample.
+    Its settings are attributes: ``controller.proportional_gain``. With kind ``python`` there are none, and ``custom``
+    is asked sample by sample.
     """
 
     kind: str
@@ -270,7 +301,7 @@ class Origin:
 class Scenario:
     """A device in one experiment.
 
-    The reference is a torque [N m]. Without ``gas_model`` the gas keeps its temperature, without ``supply_lines`` the
+    The reference is a torque [N m]. Without ``gas_model`` the gas keeps its temperature, without ``supply_line`` the
     supply pressures are constant, both as in the paper. ``links`` say which numbers follow others that are varied,
     beside those of the device.
     """
@@ -287,7 +318,7 @@ class Scenario:
     assumptions: tuple[Assumption, ...]
     origin: Origin
     gas_model: GasModel | None = None
-    supply_lines: SupplyLines | None = None
+    supply_line: SupplyLine | None = None
     links: Graph = field(default_factory=dict, compare=False)
 
     def __repr__(self) -> str:
@@ -299,6 +330,11 @@ class Scenario:
             f"  controller  {self.controller.label}\n"
             f"  duration    {self.run.duration:g} s, in steps of at most {self.run.step:g} s"
         )
+
+    @property
+    def supply_lines(self) -> SupplyLines | None:
+        """Regulators and lines as the engine has them, None where supply pressures are constant."""
+        return None if self.supply_line is None else self.supply_line.row(self.device.supply)
 
     @property
     def effect_sections(self) -> dict[str, Any]:
@@ -347,10 +383,7 @@ def worn_kind(scenario: Scenario) -> MotionKind | None:
 
 def scenario_document(scenario: Scenario) -> dict[str, Any]:
     """Return the whole scenario with every number of the device, in SI units, as data that JSON can hold."""
-    document: dict[str, Any] = plain(scenario)
-    lines = scenario.supply_lines
-    document["supply_lines"] = None if lines is None else plain(lines._asdict())
-    return {"units": UNITS, **document}
+    return {"units": UNITS, **plain(scenario)}
 
 
 def plain(value: Any) -> Any:
