@@ -130,7 +130,7 @@ def test_the_overrides_of_the_scenario_page_are_taken() -> None:
     overrides = re.findall(r"--set (.+?)(?= --set|$)", command.strip())
     scenario = parse_scenario(blocks("write-a-scenario.md", "toml")[0].encode(), "stairs.toml", overrides)
     assert len(overrides) == 3
-    assert scenario.reference.settings["level"] == 5.0
+    assert scenario.reference.level == 5.0
     assert scenario.device.valve_name == "solenoid"
 
 
@@ -321,7 +321,7 @@ def test_the_actuator_of_the_page_pulls_as_its_catalogue_prints_by_entry_point_a
         text = shipped.replace('kind = "muscle_pair"', f'kind = "{kind}"')
         actuator = build_device(parse_parameter_set(text.encode(), "mine.toml")).actuator
         assert actuator.kind == kind
-        thread, turns = actuator.settings["thread_length"], actuator.settings["turns"]
+        thread, turns = actuator.thread_length, actuator.turns
         # Chou and Hannaford, F = p b^2 (3 cos^2 - 1)/(4 pi n^2), at the nominal length; 40 mm has four times the area.
         cosine = 0.2 / thread
         force = 6.0e5 * thread**2 * (3.0 * cosine**2 - 1.0) / (4.0 * math.pi * turns**2)

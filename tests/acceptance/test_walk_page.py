@@ -59,7 +59,7 @@ def test_the_walk_file_of_the_page_loads(tmp_path: Path) -> None:
     path = tmp_path / "stiff-ankle.toml"
     path.write_text(blocks("toml")[0])
     configuration = load_walk(path)
-    assert configuration.controller.settings["push_off_start"] == pytest.approx(0.42)
+    assert configuration.controller.push_off_start == pytest.approx(0.42)
     assert gait_sensors_of(configuration).heel_fault.time == pytest.approx(3.0)
     assert not has_ideal_sensors(configuration)
 

@@ -5,6 +5,7 @@ A number is declared once, as a field of a frozen dataclass or of a NamedTuple:
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
@@ -106,6 +107,21 @@ def number_of(hint: Any) -> Number | None:
     """Return what the type of a field declares of a number, None where it declares none."""
     declared = get_args(hint)[1:] if get_origin(hint) is Annotated else ()
     return next((item for item in declared if isinstance(item, Number)), None)
+
+
+def attribute_among(section: object, name: str, *fields: str) -> Any:
+    """Return what a section has by ``name`` in one of its ``fields``, a mapping or an object, for its ``__getattr__``.
+
+    AttributeError where none has it.
+    """
+    if not name.startswith("_") and name not in fields:  # a copy asks for these before there are any fields
+        for field in fields:
+            inner = getattr(section, field)
+            if isinstance(inner, Mapping) and name in inner:
+                return inner[name]
+            if hasattr(inner, name) and not isinstance(inner, Mapping):
+                return getattr(inner, name)
+    raise AttributeError(f"{type(section).__name__} has no '{name}'")
 
 
 def range_rule(quantity: Quantity, limits: str) -> str:

@@ -3,13 +3,13 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import Annotated, Any
 
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
 from ppafo.errors import ParameterError
 from ppafo.model.actuators.table import Table
 from ppafo.model.actuators.vane import SMALLEST_VOLUME
-from ppafo.model.declaration import Number
+from ppafo.model.declaration import Number, attribute_among
 from ppafo.model.gas import specific_gas_constant
 from ppafo.parameters.graph import SAME_PRESSURE, Graph
 
@@ -74,6 +74,10 @@ class Actuator:
     settings: Mapping[str, float] = field(default_factory=dict)
     table: Table | None = None
 
+    def __getattr__(self, name: str) -> Any:
+        """Return a setting by its name."""
+        return attribute_among(self, name, "settings")
+
 
 @dataclass(frozen=True, slots=True)
 class Friction:
@@ -120,11 +124,18 @@ class Supply:
 
 @dataclass(frozen=True, slots=True)
 class Valve:
-    """A valve: its kind in the catalogue, its orifice fully open, and its settings in SI, all of them present."""
+    """A valve: its kind in the catalogue, its orifice fully open, and its settings in SI, all of them present.
+
+    Their numbers are attributes: ``valve.area``, ``valve.dead_band``.
+    """
 
     kind: str
     orifice: Orifice | SonicOrifice
     settings: Mapping[str, float]
+
+    def __getattr__(self, name: str) -> Any:
+        """Return a setting, or a number of the orifice, by its name."""
+        return attribute_among(self, name, "settings", "orifice")
 
 
 @dataclass(frozen=True, slots=True)

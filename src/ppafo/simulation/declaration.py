@@ -9,7 +9,7 @@ import functools
 import math
 import tomllib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from importlib import resources
 from typing import Any
 
@@ -23,7 +23,16 @@ from ppafo.model.effects.bandwidth import EFFECT as BANDWIDTH
 from ppafo.parameters.declaration import is_within
 from ppafo.parameters.parameter_set import Entry
 from ppafo.simulation.motion_kind import WALKS
-from ppafo.simulation.scenario import FreeMotion, GasModel, Initial, Leg, RunSettings, Sensors
+from ppafo.simulation.scenario import (
+    FreeMotion,
+    GasModel,
+    Initial,
+    Leg,
+    RegulatedLine,
+    RunSettings,
+    Sensors,
+    SupplyLine,
+)
 from ppafo.units import format_quantity, from_si, parse_quantity, to_si
 
 PLAIN = ("", "1")
@@ -63,14 +72,9 @@ TORQUE_LEVEL = Quantity("level", "N m", "", None, -1.0e4, 1.0e4)
 ANGLE_LEVEL = Quantity("level", "rad", "", None, -10.0, 10.0)
 
 SUPPLY_LINE = "supply_line"
-SUPPLY_LINES = ("plantarflexion", "dorsiflexion")
-"""Behind the bottle's regulator, and behind the second one on the device, which the first line feeds."""
+SUPPLY_LINES = tuple(item.name for item in fields(SupplyLine))
 
-_REGULATED = (
-    Quantity("droop", "Pa s/kg", "fall of the line pressure per mass flow", None, 1.0, 1.0e10),
-    Quantity("largest_flow", "kg/s", "what the regulator passes at most", None, 1.0e-6, 1.0),
-    Quantity("volume", "m^3", "room for gas between regulator and valve", None, 1.0e-6, 1.0e-2),
-)
+_REGULATED = quantities_of(RegulatedLine)
 
 MOTIONS = ("free", "held", "prescribed", "leg")
 OLD_PRESCRIBED = "led"

@@ -18,7 +18,6 @@ from ppafo.documents.models import all_problems, is_gap
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, ScenarioError, nearest_name, one_line
 from ppafo.model.declaration import Quantity
-from ppafo.model.regulator import SupplyLines
 from ppafo.parameters import ParameterSet, build_device, list_sets, load_parameter_set
 from ppafo.parameters import apply_overrides as apply_device_overrides
 from ppafo.parameters.declaration import RELIEVING_PATH
@@ -59,9 +58,11 @@ from ppafo.simulation.scenario import (
     Initial,
     Origin,
     ProfileChoice,
+    RegulatedLine,
     RunSettings,
     Scenario,
     Sensors,
+    SupplyLine,
 )
 from ppafo.simulation.schema import scenario_file, whole_scenario_file
 from ppafo.units import format_quantity, split_quantity
@@ -123,7 +124,7 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
         assumptions=(*read_assumptions(before, reading, hardware, request.overrides), *assumed_lines(reading)),
         origin=Origin(request.path, document["device"]["set"], hardware.valve, request.overrides, request.content),
         gas_model=read_gas_model(reading),
-        supply_lines=read_supply_lines(reading, device),
+        supply_line=read_supply_line(reading, device),
         links=_links_at_start(reading),
     )
     # Refuse what only a vane has.
@@ -313,7 +314,7 @@ def read_gas_model(reading: Reading) -> GasModel | None:
     return GasModel(**reading.section("gas_model", THERMAL_GAS))
 
 
-def read_supply_lines(reading: Reading, device: Device) -> SupplyLines | None:
+def read_supply_line(reading: Reading, device: Device) -> SupplyLine | None:
     """Return the lines of a file in SI, None where it has no such section: then supply pressures are constant.
 
     ScenarioError where dorsiflexion is set to more than the line has that feeds its regulator.
@@ -330,16 +331,8 @@ def read_supply_lines(reading: Reading, device: Device) -> SupplyLines | None:
             f"{reading.file}: [{SUPPLY_LINE}]: its second regulator is fed by the first, so "
             f"supply.dorsiflexion_pressure, {second}, cannot be above supply.pressure, {first}"
         )
-    first_line, second_line = (reading.section(f"{SUPPLY_LINE}.{line}", line_quantities(line)) for line in SUPPLY_LINES)
-    return SupplyLines(
-        droop_1=first_line["droop"],
-        largest_flow_1=first_line["largest_flow"],
-        volume_1=first_line["volume"],
-        droop_2=second_line["droop"],
-        largest_flow_2=second_line["largest_flow"],
-        volume_2=second_line["volume"],
-        relieving=float(supply.relieving),
-    )
+    read = {line: reading.section(f"{SUPPLY_LINE}.{line}", line_quantities(line)) for line in SUPPLY_LINES}
+    return SupplyLine(**{line: RegulatedLine(**numbers) for line, numbers in read.items()})
 
 
 def assumed_lines(reading: Reading) -> tuple[Assumption, ...]:

@@ -79,7 +79,7 @@ def _read_leg(reading: Reading, numbers: dict[str, Any], folder: Path) -> Leg:
         raise reading.refusal(f"{section}.gait", one_line(error)) from error
     series = ShankSeries(
         frequency=1.0 / gait.stride_time,
-        start=shank.settings["start"],
+        start=shank.start,
         toe_lever=numbers["toe_lever"],
         shank=series_of(gait, "shank_angle"),
         ankle=series_of(gait, "ankle_angle"),

@@ -1,7 +1,7 @@
 """The numbers of a scenario by dotted path: which there are, and columns of them in their place for many runs."""
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,6 @@ from ppafo.errors import ScenarioError, nearest_name
 from ppafo.model.catalog import VALVES, device_effects, find_effects
 from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import SECTION as EFFECT_SETTINGS
-from ppafo.model.regulator import SupplyLines
 from ppafo.parameters.declaration import AREA_FORM, ORIFICE, SONIC_FORM, members
 from ppafo.parameters.device import Device, Orifice, SonicOrifice
 from ppafo.parameters.graph import ATMOSPHERE_PATH, Graph, holding, left, resolved
@@ -20,7 +19,7 @@ from ppafo.parameters.overrides import either, in_two_forms, one_path
 from ppafo.parameters.plant import all_settings
 from ppafo.simulation import declaration
 from ppafo.simulation.clock import Clock, read_clock
-from ppafo.simulation.declaration import SUPPLY_LINE, SUPPLY_LINES, Reading
+from ppafo.simulation.declaration import SUPPLY_LINE, Reading
 from ppafo.simulation.overrides import apply_overrides
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, FreeMotion, PrescribedMotion, Scenario, worn_kind
 
@@ -29,6 +28,7 @@ TIMES = ("run.duration", "run.step", "run.output_interval", "controller.rate", "
 """Paths that decide the clock of a run."""
 
 _DEVICE_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow")
+_OF_DEVICE = (*_DEVICE_SECTIONS, "valve", EFFECT_SETTINGS)
 _ORIFICES = {"actuator.leak": ("device", "actuator", "leak"), "valve": ("device", "valve", "orifice")}
 
 _TEXTS = (
@@ -76,7 +76,7 @@ def device_numbers(device: Device) -> dict[str, Quantity]:
 
 def device_number_at(device: Device, path: str) -> float:
     """Return the number at a path of ``device_numbers``, in SI units; not of the form in which an orifice is not."""
-    return float(_number(device, _place_in_device(path, device)))
+    return float(_number(device, tuple(path.split("."))))
 
 
 def with_numbers(scenario: Scenario, numbers: Mapping[str, Any]) -> Scenario:
@@ -147,7 +147,7 @@ def _kinds(scenario: Scenario) -> dict[str, Any]:
         motion = {} if is_locked else {"kind": "prescribed", "profile": {"kind": scenario.motion.profile.kind}}
     controller = {"kind": scenario.controller.kind}
     gas: dict[str, Any] = {} if scenario.gas_model is None else {"gas_model": {"kind": declaration.THERMAL}}
-    gas |= {} if scenario.supply_lines is None else {SUPPLY_LINE: {}}
+    gas |= {} if scenario.supply_line is None else {SUPPLY_LINE: {}}
     if scenario.controller.kind == switching.CONSTANT.name:
         return {"motion": motion, "controller": controller, **gas}
     return {"motion": motion, "controller": controller, "reference": {"kind": scenario.reference.kind}, **gas}
@@ -166,46 +166,33 @@ def path_of_locked_angle(scenario: Scenario) -> str | None:
 
 
 def _place(path: str, scenario: Scenario) -> tuple[str, ...]:
-    """Return the attributes (or keys) that lead from the scenario to a number."""
+    """Return the attributes that lead from the scenario to a number: its path, but for a few of a motion."""
     section, _, name = path.rpartition(".")
     worn = worn_kind(scenario)
     if worn is not None and path in worn.places:
         return worn.places[path]
     if path == LOCKED_ANGLE and not isinstance(scenario.motion, FreeMotion):
-        return ("motion", "profile", "settings", "level")
-    if section.startswith(f"{SUPPLY_LINE}."):
-        return ("supply_lines", f"{name}_{1 + SUPPLY_LINES.index(section.removeprefix(f'{SUPPLY_LINE}.'))}")
-    return {
-        "motion": ("motion", "leg", name) if name in _OF_LEG else ("motion", name),
-        "motion.shank": ("motion", "leg", "shank", "settings", name),
-        "motion.profile": ("motion", "profile", "settings", name),
-        "controller": ("controller", "settings", name),
-        "reference": ("reference", "settings", name),
-        **{plain: (plain, name) for plain in ("run", "initial", "sensors", "gas_model")},
-    }.get(section, ("device", *_place_in_device(path, scenario.device)))
-
-
-def _place_in_device(path: str, device: Device) -> tuple[str, ...]:
-    section, _, name = path.rpartition(".")
-    if section == "valve":
-        return ("valve", "orifice" if name in _names(device.valve.orifice) else "settings", name)
-    if section == "actuator" and name in device.actuator.settings:
-        return (section, "settings", name)
-    return tuple(path.split("."))
-
-
-def _names(node: object) -> frozenset[str]:
-    return frozenset(item.name for item in fields(node)) if is_dataclass(node) else frozenset()
+        return ("motion", "profile", "level")
+    if section == "motion.shank" or (section == "motion" and name in _OF_LEG):
+        return ("motion", "leg", *path.split(".")[1:])
+    parts = tuple(path.split("."))
+    return ("device", *parts) if parts[0] in _OF_DEVICE else parts
 
 
 def _replace_number(node: Any, parts: tuple[str, ...], number: Any) -> Any:
-    inside = parts[1:]
+    name, inside = parts[0], parts[1:]
+    inner = _replace_number(_inner(node, name), inside, number) if inside else number
     if isinstance(node, Mapping):
-        return {**node, parts[0]: _replace_number(node[parts[0]], inside, number) if inside else number}
-    inner = _replace_number(_inner(node, parts[0]), inside, number) if inside else number
-    if isinstance(node, SupplyLines):
-        return node._replace(**{parts[0]: inner})
-    return replace(node, **{parts[0]: inner})
+        return {**node, name: inner}
+    if name in _names(node):
+        return replace(node, **{name: inner})
+    # Among its settings, or in its orifice: there it is an attribute all the same.
+    field = "settings" if name in node.settings else "orifice"
+    return replace(node, **{field: _replace_number(getattr(node, field), parts, number)})
+
+
+def _names(node: Any) -> frozenset[str]:
+    return frozenset(item.name for item in fields(node))
 
 
 @dataclass(frozen=True, slots=True)

@@ -304,7 +304,7 @@ def shank_parameters(leg: Leg) -> Any:
     """Parameters of what leads the shank of a leg; its settings may be arrays (runs,)."""
     if leg.curves is None:
         return profile_parameters(leg.shank)
-    return leg.curves._replace(start=leg.shank.settings["start"], toe_lever=leg.toe_lever)
+    return leg.curves._replace(start=leg.shank.start, toe_lever=leg.toe_lever)
 
 
 def led_leg(plant: PlantParameters, leg: Leg) -> LedLeg:
@@ -431,7 +431,7 @@ def is_adaptive(scenario: Scenario, plant: PlantParameters, step: float) -> Any:
     if not isinstance(motion, PrescribedMotion) or motion.profile.kind != "constant":
         return True
     stiffness = 1.0 if scenario.gas_model is None else scenario.device.gas.heat_capacity_ratio
-    return np.logical_not(is_slow_locked(plant, step, motion.profile.settings["level"], stiffness))
+    return np.logical_not(is_slow_locked(plant, step, motion.profile.level, stiffness))
 
 
 def profile_bounds(choice: ProfileChoice) -> tuple[float, float]:

@@ -14,10 +14,10 @@ from typing import Annotated, Any, Protocol
 from ppafo.control.kind import PythonController
 from ppafo.engine.scheme.pneumatics import KEPT_OF_PRESSURE
 from ppafo.errors import ScenarioError
-from ppafo.model.declaration import Number
+from ppafo.model.declaration import Number, attribute_among
 from ppafo.model.gait import ShankSeries
 from ppafo.model.regulator import SupplyLines
-from ppafo.parameters.device import Device
+from ppafo.parameters.device import Device, Supply
 from ppafo.parameters.graph import Graph
 from ppafo.simulation.motion_kind import MotionKind
 
@@ -29,10 +29,14 @@ UNITS = "SI: kg, m, s, K, mol; angles in rad, pressures in Pa absolute, torques 
 
 @dataclass(frozen=True, slots=True)
 class ProfileChoice:
-    """A function of time: its kind in ``control.catalog.PROFILES`` and all its settings in SI units."""
+    """A function of time: its kind in ``control.catalog.PROFILES`` and all its settings in SI units, as attributes."""
 
     kind: str
     settings: Mapping[str, float]
+
+    def __getattr__(self, name: str) -> Any:
+        """Return a setting by its name."""
+        return attribute_among(self, name, "settings")
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,6 +173,36 @@ class GasModel:
 
 
 @dataclass(frozen=True, slots=True)
+class RegulatedLine:
+    """A regulator with the line behind it: droop [Pa s/kg], largest mass flow [kg/s], volume [m^3]."""
+
+    droop: Annotated[float, Number("Pa s/kg", "fall of the line pressure per mass flow", None, 1.0, 1.0e10)]
+    largest_flow: Annotated[float, Number("kg/s", "what the regulator passes at most", None, 1.0e-6, 1.0)]
+    volume: Annotated[float, Number("m^3", "room for gas between regulator and valve", None, 1.0e-6, 1.0e-2)]
+
+
+@dataclass(frozen=True, slots=True)
+class SupplyLine:
+    """Both lines: behind the bottle's regulator, and behind the second regulator, which the first line feeds."""
+
+    plantarflexion: RegulatedLine
+    dorsiflexion: RegulatedLine
+
+    def row(self, supply: Supply) -> SupplyLines:
+        """Return the lines as the engine has them, with regulators that relieve where those of a supply do."""
+        first, second = self.plantarflexion, self.dorsiflexion
+        return SupplyLines(
+            droop_1=first.droop,
+            largest_flow_1=first.largest_flow,
+            volume_1=first.volume,
+            droop_2=second.droop,
+            largest_flow_2=second.largest_flow,
+            volume_2=second.volume,
+            relieving=float(supply.relieving),
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class Sensors:
     """What the controller sees, ideal by default.
 
@@ -198,13 +232,18 @@ class Sensors:
 class Control:
     """A sampled controller: kind in ``control.catalog.CONTROLLERS``, settings in SI units, sample period [s].
 
-    With kind ``python`` there are no settings and ``custom`` is asked sample by sample.
+    Its settings are attributes: ``controller.proportional_gain``. With kind ``python`` there are none, and ``custom``
+    is asked sample by sample.
     """
 
     kind: str
     settings: Mapping[str, float]
     period: float
     custom: PythonController | None = None
+
+    def __getattr__(self, name: str) -> Any:
+        """Return a setting by its name."""
+        return attribute_among(self, name, "settings")
 
     @property
     def label(self) -> str:
@@ -237,7 +276,7 @@ class Origin:
 class Scenario:
     """A device in one experiment.
 
-    The reference is a torque [N m]. Without ``gas_model`` the gas keeps its temperature, without ``supply_lines`` the
+    The reference is a torque [N m]. Without ``gas_model`` the gas keeps its temperature, without ``supply_line`` the
     supply pressures are constant, both as in the paper. ``links`` say which numbers follow others that are varied,
     beside those of the device.
     """
@@ -254,7 +293,7 @@ class Scenario:
     assumptions: tuple[Assumption, ...]
     origin: Origin
     gas_model: GasModel | None = None
-    supply_lines: SupplyLines | None = None
+    supply_line: SupplyLine | None = None
     links: Graph = field(default_factory=dict, compare=False)
 
     def __repr__(self) -> str:
@@ -266,6 +305,11 @@ class Scenario:
             f"  controller  {self.controller.label}\n"
             f"  duration    {self.run.duration:g} s, in steps of at most {self.run.step:g} s"
         )
+
+    @property
+    def supply_lines(self) -> SupplyLines | None:
+        """Regulators and lines as the engine has them, None where supply pressures are constant."""
+        return None if self.supply_line is None else self.supply_line.row(self.device.supply)
 
     @property
     def effect_sections(self) -> dict[str, Any]:
@@ -314,17 +358,18 @@ def worn_kind(scenario: Scenario) -> MotionKind | None:
 
 def scenario_document(scenario: Scenario) -> dict[str, Any]:
     """Return the whole scenario with every number of the device, in SI units, as data that JSON can hold."""
-    document: dict[str, Any] = plain(scenario)
-    lines = scenario.supply_lines
-    document["supply_lines"] = None if lines is None else plain(lines._asdict())
-    return {"units": UNITS, **document}
+    return {"units": UNITS, **plain(scenario)}
 
 
 def plain(value: Any) -> Any:
     """Return dicts, lists, texts and finite numbers; an infinite number becomes None, a controller its type's name."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         # Links are no part of what is run: what is not compared is not shown.
-        return {field.name: plain(getattr(value, field.name)) for field in dataclasses.fields(value) if field.compare}
+        shown = {field.name: plain(getattr(value, field.name)) for field in dataclasses.fields(value) if field.compare}
+        if hasattr(type(value), "__getattr__"):  # then their numbers are its own attributes
+            for inner in ("orifice", "settings"):
+                shown |= shown.pop(inner, {})
+        return shown
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, tuple | list):

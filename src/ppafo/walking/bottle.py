@@ -34,7 +34,6 @@ from ppafo.model.cold_gas import (
 from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import Effect
 from ppafo.model.plant import PlantParameters
-from ppafo.model.regulator import SupplyLines
 from ppafo.model.source import bottle_content, content_energy, densest_gas, has_liquid, liquid_density
 from ppafo.parameters.bottles.bottle import PATHS, Bottle, load_bottle
 from ppafo.parameters.device import Device
@@ -44,6 +43,7 @@ from ppafo.report.display_units import display_value
 from ppafo.report.display_units import quantity_text as shown_text
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.declaration import SUPPLY_LINE, THERMAL, Reading, kind_at, quantity_text, value_at
+from ppafo.simulation.scenario import SupplyLine
 from ppafo.units import format_quantity
 
 BOTTLE = "bottle"
@@ -160,10 +160,10 @@ class BottleSupply:
         """Return the device with gas of the temperature that the supply has at the start."""
         return replace(device, gas=replace(device.gas, temperature=self.offers_first().gas_temperature))
 
-    def lines(self, lines: SupplyLines) -> SupplyLines:
+    def fed(self, line: SupplyLine) -> SupplyLine:
         """Return the lines with the droop of the bottle's regulator, and with what it passes at the start."""
-        most = self.offers_first().largest_flow
-        return lines._replace(droop_1=self.bottle.regulator.droop, largest_flow_1=most)
+        droop, most = self.bottle.regulator.droop, self.offers_first().largest_flow
+        return replace(line, plantarflexion=replace(line.plantarflexion, droop=droop, largest_flow=most))
 
     @property
     def assumed(self) -> dict[str, str]:

@@ -30,13 +30,22 @@ from ppafo.simulation.loading import (
     read_device,
     read_gas_model,
     read_hardware,
-    read_supply_lines,
+    read_supply_line,
     scenario_of,
 )
 from ppafo.simulation.motion_kind import WALK, WALKS
 from ppafo.simulation.numbers import device_number_at
 from ppafo.simulation.overrides import OverriddenDocument, over_layer
-from ppafo.simulation.scenario import Assumption, Control, Initial, Origin, RunSettings, Scenario, Sensors
+from ppafo.simulation.scenario import (
+    Assumption,
+    Control,
+    Initial,
+    Origin,
+    RunSettings,
+    Scenario,
+    Sensors,
+    SupplyLine,
+)
 from ppafo.walking.bottle import BOTTLE, BOTTLE_NAME, BottleSupply, read_bottle
 from ppafo.walking.contradictions import check_walk
 from ppafo.walking.course import load_course
@@ -169,7 +178,8 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
         walked = load_gait(_named_file("gait", request, document) or NORMATIVE)
     is_named = "gait" in instead or "gait" in document
     carried = read_bottle(reading, device, Path() if BOTTLE_NAME in instead else request.folder)
-    lines = _lines(reading, document, device, carried)
+    line = _line(reading, document, device, carried)
+    lines = None if line is None else line.row(device.supply)
     settings = _sensor_settings(reading)
     # Which settings of controller and timing follow others because the file does not give them.
     timing = timing_settings(timing_of(reading.document))
@@ -205,7 +215,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
             request.path, document["device"]["set"], hardware.valve, (*request.overrides, *more), request.content
         ),
         gas_model=read_gas_model(reading),
-        supply_lines=lines,
+        supply_line=line,
         links={**links, **who.links(reading.document)},
     )
     check_walk(scenario, reading)
@@ -322,14 +332,14 @@ def _device(reading: Reading, hardware: Hardware) -> Device:
     return device
 
 
-def _lines(
+def _line(
     reading: Reading, document: dict[str, Any], device: Device, carried: BottleSupply | None
-) -> SupplyLines | None:
+) -> SupplyLine | None:
     """Return the lines of a walk; a bottle always feeds some, with the defaults of what the file does not say."""
     if carried is not None:
         document.setdefault(SUPPLY_LINE, {})
-    lines = read_supply_lines(reading, device)
-    return lines if lines is None or carried is None else carried.lines(lines)
+    line = read_supply_line(reading, device)
+    return line if line is None or carried is None else carried.fed(line)
 
 
 def _sensors(reading: Reading, settings: SensorSettings) -> Sensors:

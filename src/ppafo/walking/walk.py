@@ -182,9 +182,9 @@ def with_device_off(configuration: Scenario) -> Scenario:
     name = f"{configuration.name}-off"
     control = Control(event_on_off.OFF.name, {}, configuration.controller.period)
     motion = replace(walk_of(configuration), bottle=None, timing=THRESHOLDS)
-    gone = ("controller.", "timing.", "supply_lines.")  # what follows others and is no longer there
+    gone = ("controller.", "timing.", "supply_line.")  # what follows others and is no longer there
     links = {path: own for path, own in configuration.links.items() if not path.startswith(gone)}
-    return replace(configuration, name=name, controller=control, motion=motion, supply_lines=None, links=links)
+    return replace(configuration, name=name, controller=control, motion=motion, supply_line=None, links=links)
 
 
 ANKLE_RANGE = math.radians(45.0), math.radians(140.0)

@@ -182,7 +182,7 @@ def test_an_override_of_the_device_reaches_all_experiments_and_is_listed() -> No
 
 def test_an_override_of_a_scenario_reaches_those_that_have_the_value() -> None:
     changed = reproduce(["controller.proportional_gain=0.2 1/(N m)"])
-    assert changed.proportional.scenario.controller.settings["proportional_gain"] == pytest.approx(0.2)
+    assert changed.proportional.scenario.controller.proportional_gain == pytest.approx(0.2)
     assert changed.step.scenario.origin.overrides == changed.solenoid.scenario.origin.overrides == ()
 
 

@@ -113,7 +113,7 @@ def test_every_setting_is_a_parameter_with_its_unit_and_metrics_can_be_read(unit
     found = {item.name: item for item in described.modelVariables}
     area = found["valve.area"]
     assert (area.causality, area.variability, area.unit) == ("parameter", "tunable", "m^2")
-    assert float(area.start) == load_scenario("torque-task-proportional").device.valve.orifice.area
+    assert float(area.start) == load_scenario("torque-task-proportional").device.valve.area
     assert {found[name].variability for name in ("gas.temperature", "run.step", "motion.angle")} == {"fixed"}
     assert all(found[name].variability == "fixed" for name in found if name.split(".")[-1] in FIXED_NAMES)
     units = {item.name: item.baseUnit for item in described.unitDefinitions}

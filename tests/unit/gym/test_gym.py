@@ -130,7 +130,7 @@ def test_another_seed_draws_another_episode_and_the_same_the_same() -> None:
     scenario = env.episode()
     half = 3.7e-6
     assert abs(scenario.device.actuator.dead_volume_1 - 26.5e-6) <= half
-    assert 1.0 <= scenario.reference.settings["level"] <= 4.5
+    assert 1.0 <= scenario.reference.level <= 4.5
 
 
 def vector(name: str, mode: AutoresetMode, count: int = 3, **settings: Any) -> PneumaticVectorEnv:

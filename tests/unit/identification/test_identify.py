@@ -97,7 +97,7 @@ def test_the_new_set_reads_back_and_makes_a_device(solved: Solve, bench: Path) -
     assert outcome.new_set.parameter_set.parent == "ppafo2011"
     (bench / "twin.toml").write_text(text)
     device = load_device(bench / "twin.toml")
-    assert device.valve.settings["dead_band"] == pytest.approx(0.12, abs=0.01)
+    assert device.valve.dead_band == pytest.approx(0.12, abs=0.01)
     assert outcome.is_good
 
 

@@ -34,7 +34,7 @@ def test_the_valve_can_be_chosen_by_name() -> None:
     device = load_device("ppafo2011", valve="solenoid")
     assert device.valve.kind == "solenoid"
     assert device.valve.orifice == Orifice(12.6e-6, 0.113)
-    assert device.valve.settings["switching_interval"] == 0.05
+    assert device.valve.switching_interval == 0.05
 
 
 def test_settings_that_the_set_leaves_out_take_their_declared_defaults() -> None:

@@ -40,8 +40,8 @@ def test_a_scenario_takes_the_section_of_a_walk_file_and_lists_what_it_leaves_to
     assert "supply_line.plantarflexion.droop" not in assumed
     assert assumed["supply_line.dorsiflexion.volume"].note.startswith("assumed: ")
     assert load_scenario("torque-task-proportional").supply_lines is None
-    assert scenario_document(scenario)["supply_lines"]["droop_1"] == 3.0e6
-    assert scenario_document(load_scenario("torque-task-proportional"))["supply_lines"] is None
+    assert scenario_document(scenario)["supply_line"]["plantarflexion"]["droop"] == 3.0e6
+    assert scenario_document(load_scenario("torque-task-proportional"))["supply_line"] is None
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,7 @@ def test_every_torque_law_is_named_in_a_walk_file_by_its_own_name(law: str) -> N
     configuration = load_walk("proportional", [f"controller.kind={law}"])
     for item in CONTROLLERS[law].quantities:
         assert item.name in configuration.controller.settings
-    assert configuration.controller.settings["peak_torque"] == 5.0
+    assert configuration.controller.peak_torque == 5.0
 
 
 @pytest.mark.parametrize("name", ["event_pid", "event_feedback_linearisation", "event_on_off_dead_zone"])

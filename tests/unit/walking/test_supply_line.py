@@ -9,6 +9,7 @@ import pytest
 from ppafo.errors import ParameterError, ScenarioError
 from ppafo.model.regulator import SupplyLines
 from ppafo.simulation.declaration import line_entries
+from ppafo.simulation.numbers import number_at, with_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking import load_walk, walk, walk_population
 from ppafo.walking.walk import with_device_off
@@ -80,8 +81,8 @@ def test_a_walk_without_the_device_needs_no_lines() -> None:
 
 def test_a_tenfold_droop_costs_work_and_a_smaller_step_changes_little() -> None:
     base = load_walk("solenoid-regulators")
-    assert base.supply_lines is not None
-    drooping = replace(base, supply_lines=base.supply_lines._replace(droop_1=10.0 * base.supply_lines.droop_1))
+    droop = "supply_line.plantarflexion.droop"
+    drooping = with_numbers(base, {droop: 10.0 * number_at(base, droop)})
     found = {
         name: walk(configuration, 0.1).metrics["net_push_off_work"].value
         for name, configuration in {

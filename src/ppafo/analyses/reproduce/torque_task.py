@@ -69,9 +69,9 @@ def _has_phase(scenario: Scenario) -> bool:
         and scenario.gas_model is None
         and scenario.supply_lines is None
         and reference.kind == "ramp_hold"
-        and reference.settings["ramp_start"] == 0.0
-        and reference.settings["start_level"] == 0.0
-        and reference.settings["ramp_time"] > period
+        and reference.ramp_start == 0.0
+        and reference.start_level == 0.0
+        and reference.ramp_time > period
         and scenario.run.duration > period
     )
 

@@ -37,7 +37,6 @@ def versions() -> dict[str, str]:
 def walk_document(scenario: Scenario) -> dict[str, Any]:
     """Return a walk as data in SI units; its bottle by its values, not by the tables of its gas."""
     motion, control, origin = walk_of(scenario), scenario.controller, scenario.origin
-    lines = scenario.supply_lines
     return {
         "name": scenario.name,
         "description": scenario.description,
@@ -49,7 +48,7 @@ def walk_document(scenario: Scenario) -> dict[str, Any]:
         "period": control.period,
         "step": scenario.run.step,
         "sensors": plain(sensor_settings(scenario)) | {"seed": scenario.sensors.seed},
-        "supply_lines": None if lines is None else plain(lines._asdict()),
+        "supply_line": plain(scenario.supply_line),
         "gas_model": plain(scenario.gas_model),
         "bottle": None if motion.bottle is None else motion.bottle.to_dict(),
         "assumed": {item.path: item.note for item in scenario.assumptions},

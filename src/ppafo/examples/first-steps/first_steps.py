@@ -16,7 +16,7 @@ folder.mkdir(parents=True, exist_ok=True)
 
 scenario = ppafo.load_scenario("torque-task-proportional")
 print(scenario.description)
-print(f"valve area {scenario.device.valve.orifice.area * 1e6:.1f} mm^2, duration {scenario.run.duration} s")
+print(f"valve area {scenario.device.valve.area * 1e6:.1f} mm^2, duration {scenario.run.duration} s")
 
 # What the paper does not say is marked as assumed, with the reason.
 print(f"{len(scenario.assumptions)} assumed values, for example:")

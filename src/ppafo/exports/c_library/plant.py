@@ -100,7 +100,7 @@ def plant_of(item: Scenario) -> PlantAlone:
     lead: tuple[tuple[str, str], ...] = ()
     if isinstance(motion, PrescribedMotion):
         said, first, lead = LED, _FIRST_ANGLE, _LEAD_ANGLE
-        angle = motion.profile.settings["start_level"]
+        angle = motion.profile.start_level
         settings = {one.path: one for one in library.settings}
         stops = [settings[f"actuator.angle_{end}"].value for end in ("min", "max")]
         fastest = (settings["motion.profile.level"].quantity.maximum - max(map(abs, stops))) / _SHORT

@@ -31,7 +31,7 @@ from ppafo.parameters.device import Device, SonicOrifice
 from ppafo.parameters.graph import Graph, Term
 from ppafo.parameters.plant import SEEN_BY_EFFECTS, area_restriction, effects_of, plant_with, sonic_restriction
 from ppafo.simulation.clock import links_of_times, step_unless_given, step_with_output
-from ppafo.simulation.declaration import SUPPLY_LINE, SUPPLY_LINES, value_at
+from ppafo.simulation.declaration import SUPPLY_LINE, SUPPLY_LINES, THERMAL, gas_settings, value_at
 from ppafo.simulation.motion import TOLERANCE
 from ppafo.simulation.numbers import (
     LOCKED_ANGLE,
@@ -268,10 +268,7 @@ class Writing:
         flaws = self.section("sensors", FLAWS)
         yield f"sensors = {add(SensorParameters)}({', '.join(flaws.values())}, sensors_seed)"
         if self.program.is_thermal:
-            walls = {
-                "heat_transfer_coefficient": "gas_model_heat_transfer_coefficient",
-                "area_per_volume": "gas_model_wall_area_per_volume",
-            }
+            walls = self.section("gas_model", [item.name for item in gas_settings(THERMAL)])
             yield f"thermal = {add(thermal_gas)}({self.row('Walls', walls)}, gas)"
         if self.lines is not None:
             of_lines = [

@@ -264,7 +264,7 @@ def _beyond_the_stops(scenario: Scenario) -> tuple[Problem, ...]:
     lower, upper = actuator.angle_min - TOLERANCE, actuator.angle_max + TOLERANCE
     outside = np.atleast_1d(np.logical_or(lowest < lower, highest > upper))
     if profile.kind == "constant":
-        level = profile.settings["level"]
+        level = profile.level
 
         def angle_line(run: int) -> str:
             low, high = (quantity_text(at(stop, run), "rad") for stop in (actuator.angle_min, actuator.angle_max))

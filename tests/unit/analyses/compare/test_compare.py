@@ -130,8 +130,8 @@ def test_tasks_change_every_configuration() -> None:
         ("low", "torque-task-proportional"),
     ]
     slow, low = (task.cases for task in comparison.tasks)
-    assert {case.scenario.reference.settings["ramp_time"] for case in slow} == {2.0}
-    assert {case.scenario.reference.settings["level"] for case in low} == {3.0}
+    assert {case.scenario.reference.ramp_time for case in slow} == {2.0}
+    assert {case.scenario.reference.level for case in low} == {3.0}
     alone = ppafo.simulate("torque-task-solenoid", ["reference.level=3 N m"])
     assert low[0].metrics["rms_error"].value == alone.metrics["rms_error"].value
 

@@ -18,10 +18,10 @@ from ppafo.engine.lanes import Floats
 from ppafo.engine.run import Run
 from ppafo.errors import ScenarioError
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState
-from ppafo.model.regulator import SupplyLines
 from ppafo.model.valves.proportional import openings_of, spool_acceleration
 from ppafo.report.writing import text_of
 from ppafo.simulation.plan import plan_run
+from ppafo.simulation.scenario import RegulatedLine, SupplyLine
 from ppafo.translation.plant_rates import gas_flows, thermal_gas_flows
 
 pytest.importorskip("casadi", reason="linear models need the extra 'control'")
@@ -258,7 +258,8 @@ def test_what_has_no_linear_model_is_refused_in_one_line() -> None:
         with pytest.raises(ppafo.PpafoError, match=line) as refused:
             linearise(scenario, at, overrides)
         assert "\n" not in str(refused.value)
-    fed = replace(ppafo.load_scenario(TASK), supply_lines=SupplyLines(1e9, 1e-2, 1e-5, 1e9, 1e-2, 1e-5, 0.0))
+    line = RegulatedLine(1e9, 1e-2, 1e-5)
+    fed = replace(ppafo.load_scenario(TASK), supply_line=SupplyLine(line, line))
     with pytest.raises(ScenarioError, match="constant supplies; omit"):
         linearise(fed, 1.0)
 

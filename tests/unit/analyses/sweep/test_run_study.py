@@ -266,7 +266,7 @@ def copied(results: StudyResults, tmp_path: Path) -> Path:
         (lambda study: study.update(runs_of_chunk=6), "runs_of_chunk was 5 and is now 6"),
         (
             lambda study: study["configurations"][0].update(overrides=["run.duration=0.2 s", "valve.area=9 mm^2"]),
-            r"scenarios.proportional.device.valve.orifice.area was .* and is now 9e-06",
+            r"scenarios.proportional.device.valve.area was .* and is now 9e-06",
         ),
     ],
 )

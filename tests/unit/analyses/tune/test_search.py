@@ -153,6 +153,4 @@ def test_the_gains_that_are_run_are_those_that_are_written() -> None:
     trial = problem(searched=(Searched("controller.proportional_gain", 0.01, 1.0, True, 0.095, place),))
     gains = trial.gains([0.123456789])
     line = trial.lines(gains)[0]
-    assert (
-        load_scenario("torque-task-proportional", [line]).controller.settings["proportional_gain"] == gains[place.path]
-    )
+    assert load_scenario("torque-task-proportional", [line]).controller.proportional_gain == gains[place.path]

@@ -47,10 +47,10 @@ def test_every_number_of_the_nominal_device_is_that_of_the_device_unless_given()
     assert (settings["nominal_pair"], settings["nominal_switching_interval"]) == (1.0, 0.05)
     assert settings["nominal_flow"] == pytest.approx(2.256e-4, rel=1.0e-3)
     changed = load_walk("proportional", ["valve.area=20 mm^2", "valve.delay=5 ms", "supply.pressure=60 psi_g"])
-    assert changed.controller.settings["nominal_supply_pressure"] == changed.device.supply.pressure
-    assert changed.controller.settings["nominal_lag"] == pytest.approx(0.005)
+    assert changed.controller.nominal_supply_pressure == changed.device.supply.pressure
+    assert changed.controller.nominal_lag == pytest.approx(0.005)
     given = load_walk("solenoid", ["supply.pressure=60 psi_g", "controller.nominal_supply_pressure=50 psi_g"])
-    assert given.controller.settings["nominal_supply_pressure"] == pytest.approx(SUPPLY)
+    assert given.controller.nominal_supply_pressure == pytest.approx(SUPPLY)
 
 
 def test_a_valve_that_is_not_known_leaves_the_observer_off() -> None:
