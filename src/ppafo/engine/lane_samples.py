@@ -15,7 +15,6 @@ from ppafo.engine.scheme.pneumatics import held_pressures
 from ppafo.model.gait import foot_in_gait
 from ppafo.model.helping import STOPPED
 from ppafo.model.plant import actuator_torque, chamber_pressures
-from ppafo.model.plant_faults import is_due, is_in_brown_out, is_silenced, next_unpowered, runs_at
 from ppafo.model.ports import shown_signals
 from ppafo.model.sensors import GaitMeasurement, Measurement, late_measurement, measure, measure_gait, samples_late
 from ppafo.model.valves.kind import VENT
@@ -72,6 +71,9 @@ def sampled(rows: Rows) -> list[str]:
 
 def sampled_with_faults(rows: Rows, lines: list[str]) -> list[str]:
     """The lines of a sample where the controller may miss it or have no power, and where a valve may take it late."""
+    # Most plants have no faults.
+    from ppafo.model.plant_faults import is_due, is_in_brown_out, is_silenced, next_unpowered, runs_at
+
     add, before = rows.add, rows.program.controller
     assert before is not None, "a controller takes samples"
     stored = dict(zip(leaf_paths(type(before.initial), "controller_state"), leaves(before.initial), strict=True))

@@ -20,13 +20,13 @@ from ppafo.model.gait import Course, GaitSeries, GaitTiming
 from ppafo.model.leg import LegParameters
 from ppafo.model.orifice import ExactOrifice
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, chamber_pressures
-from ppafo.model.plant_faults import POWERED, PlantFaults, ShutOff
 from ppafo.model.regulator import LineState, SupplyLines
 from ppafo.model.sensors import NOTHING_SEEN, GaitSensors, SensorParameters
 
-if TYPE_CHECKING:  # for most runs know no walk
+if TYPE_CHECKING:  # for most runs know no walk and no fault
     from ppafo.engine.scheme.reacting import ReactingState, Reflexes
     from ppafo.engine.scheme.walking import DeviceShare, WalkState
+    from ppafo.model.plant_faults import PlantFaults, ShutOff
     from ppafo.model.wearer.nerves import Nerves
     from ppafo.model.wearer.walker import Walker
     from ppafo.model.wearer.walker import Wearer as Body
@@ -59,7 +59,7 @@ class Walk:
     sensors: GaitSensors
     initial: "WalkState"
     course: Course | None = None
-    failing: tuple[PlantFaults, ShutOff] | None = None
+    failing: "tuple[PlantFaults, ShutOff] | None" = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +73,7 @@ class ReactingWalk:
     walker: "Walker"
     reflexes: "Reflexes"
     nerves: "Nerves"
-    failing: tuple[PlantFaults, ShutOff] | None = None
+    failing: "tuple[PlantFaults, ShutOff] | None" = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -268,14 +268,23 @@ def _walk_groups(walk: Walk | None) -> tuple[list[Any], list[Any]]:
     parameters = [walk.leg, walk.share, walk.gait, walk.timing, walk.sensors]
     parameters += [] if walk.course is None else [walk.course]
     parameters += [] if walk.failing is None else [*walk.failing]
-    return parameters, [walk.initial, NOTHING_SEEN, *([] if walk.failing is None else [POWERED])]
+    return parameters, [walk.initial, NOTHING_SEEN, *_powered(walk.failing)]
 
 
 def _reacting_groups(walk: ReactingWalk) -> tuple[list[Any], list[Any]]:
     """The same of a wearer who reacts."""
     failing = [] if walk.failing is None else [*walk.failing]
     states = [walk.initial, NOTHING_SEEN, walk.walker, walk.reflexes, walk.nerves]
-    return [walk.share, walk.body, walk.sensors, *failing], [*states, *([POWERED] if failing else [])]
+    return [walk.share, walk.body, walk.sensors, *failing], [*states, *_powered(walk.failing)]
+
+
+def _powered(failing: "tuple[PlantFaults, ShutOff] | None") -> list[Any]:
+    """The state of the shut-off valve before the first step, of a plant that has faults or one."""
+    if failing is None:
+        return []
+    from ppafo.model.plant_faults import POWERED
+
+    return [POWERED]
 
 
 def _device_at_start(run: Run) -> list[Any]:

@@ -3,12 +3,15 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
 from ppafo.errors import ParameterError
-from ppafo.model.actuators.table import Table
 from ppafo.model.gas import specific_gas_constant
 from ppafo.parameters.graph import SAME_PRESSURE, Graph
+
+if TYPE_CHECKING:  # few devices have a measured actuator
+    from ppafo.model.actuators.table import Table
 
 VANE = "vane"
 """The kind of actuator that is the paper's; see the catalogue of actuators."""
@@ -65,7 +68,7 @@ class Actuator:
     leak: Orifice | SonicOrifice
     kind: str = VANE
     settings: Mapping[str, float] = field(default_factory=dict)
-    table: Table | None = None
+    table: "Table | None" = None
 
 
 @dataclass(frozen=True, slots=True)
