@@ -4,11 +4,10 @@ Meters and traces stand where nothing is recorded. Their samples are the ones th
 get the course of the reference too, which is looked at once before the first sample and followed from there.
 """
 
-from ppafo.engine.lane_rows import LaneRows, Rows, indent
+from ppafo.engine.lane_rows import LaneRows, Rows, RunRows, indent
 from ppafo.engine.led_leg import GAIT_SHANK
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, leaves
-from ppafo.engine.run_rows import RunRows
 from ppafo.engine.scheme.actuators import seen_with_torque, torque_at
 from ppafo.engine.scheme.motion import SAME_INSTANT
 from ppafo.engine.scheme.pneumatics import held_pressures

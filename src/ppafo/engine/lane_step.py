@@ -14,11 +14,10 @@ import re
 from typing import get_type_hints
 
 from ppafo.engine.components import Phases, RarePhase
-from ppafo.engine.lane_rows import HANDED, LaneRows, Rows, count_lanes, indent
+from ppafo.engine.lane_rows import HANDED, LaneRows, Rows, RunRows, count_lanes, indent
 from ppafo.engine.lane_samples import present_pressures, pressures_of, sense_end
 from ppafo.engine.led_leg import torque_lines
 from ppafo.engine.rows import leaf_paths
-from ppafo.engine.run_rows import RunRows
 from ppafo.engine.scheme import motion, pneumatics
 from ppafo.engine.source_text import composed_lines
 from ppafo.model.effects.kind import Moment, State
