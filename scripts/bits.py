@@ -29,13 +29,14 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from ppafo.engine.compilers import FLAGS
 from ppafo.engine.lane_source import INLINE, write_lanes
 from ppafo.engine.lanes import Batch, run_batch
 from ppafo.engine.loading import BACKEND_VARIABLE, NUMBA
 from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import SimulationError
 from ppafo.golden_bits import GOLDEN, Hashes, digest, golden_hashes, names, plain_batch
-from ppafo.translation.c99 import FLAGS, program_source, translated
+from ppafo.translation.c99 import program_source, translated
 from ppafo.translation.native import build, compiler, run_native
 from scripts.golden_bits import Runner, drawn_batch, failures, hashes_of, new_golden_hashes
 from scripts.other_machines import MACHINES, on_other_machine

@@ -16,9 +16,10 @@ from typing import Any
 
 import numpy as np
 
+from ppafo.engine.compilers import FLAGS
 from ppafo.engine.lanes import Batch, BatchResult
 from ppafo.errors import SimulationError
-from ppafo.translation.c99 import FLAGS, program_source
+from ppafo.translation.c99 import program_source
 from ppafo.translation.native import compiler, run_native
 
 DRIVER = r"""

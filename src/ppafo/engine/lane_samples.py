@@ -4,18 +4,16 @@ Meters and traces stand where nothing is recorded. Their samples are the ones th
 get the course of the reference too, which is looked at once before the first sample and followed from there.
 """
 
-from ppafo.engine.lane_rows import LaneRows, Rows, indent
+from ppafo.engine.lane_rows import LaneRows, Rows, RunRows, indent
 from ppafo.engine.led_leg import GAIT_SHANK
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, leaves
-from ppafo.engine.run_rows import RunRows
 from ppafo.engine.scheme.actuators import seen_with_torque, torque_at
 from ppafo.engine.scheme.motion import SAME_INSTANT
 from ppafo.engine.scheme.pneumatics import held_pressures
 from ppafo.model.gait import foot_in_gait
 from ppafo.model.helping import STOPPED
 from ppafo.model.plant import actuator_torque, chamber_pressures
-from ppafo.model.plant_faults import is_due, is_in_brown_out, is_silenced, next_unpowered, runs_at
 from ppafo.model.ports import shown_signals
 from ppafo.model.sensors import GaitMeasurement, Measurement, late_measurement, measure, measure_gait, samples_late
 from ppafo.model.valves.kind import VENT
@@ -72,6 +70,9 @@ def sampled(rows: Rows) -> list[str]:
 
 def sampled_with_faults(rows: Rows, lines: list[str]) -> list[str]:
     """The lines of a sample where the controller may miss it or have no power, and where a valve may take it late."""
+    # Most plants have no faults.
+    from ppafo.model.plant_faults import is_due, is_in_brown_out, is_silenced, next_unpowered, runs_at
+
     add, before = rows.add, rows.program.controller
     assert before is not None, "a controller takes samples"
     stored = dict(zip(leaf_paths(type(before.initial), "controller_state"), leaves(before.initial), strict=True))

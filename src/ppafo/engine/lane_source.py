@@ -1,10 +1,9 @@
 """Writes the source of the lane loop of one program: loads, calls and stores, with the rows as literals."""
 
-from ppafo.engine.lane_rows import VECTOR, LaneRows, Rows, indent
+from ppafo.engine.lane_rows import VECTOR, LaneRows, Rows, RunRows, indent
 from ppafo.engine.lane_samples import control_loop, measure_sample, remember_commands, signals_before_start
 from ppafo.engine.lane_step import find_begin, over_rows, plant_loop
 from ppafo.engine.program import Program, link_program
-from ppafo.engine.run_rows import RunRows
 from ppafo.engine.source_text import Collector, SourceCollector
 
 HEADER = '''"""Generated from the functions of ppafo; their hash is in the file name. Not to be edited."""

@@ -14,14 +14,12 @@ import re
 from typing import get_type_hints
 
 from ppafo.engine.components import Phases, RarePhase
-from ppafo.engine.lane_rows import HANDED, LaneRows, Rows, count_lanes, indent
+from ppafo.engine.lane_rows import HANDED, LaneRows, Rows, RunRows, count_lanes, indent
 from ppafo.engine.lane_samples import present_pressures, pressures_of, sense_end
 from ppafo.engine.led_leg import torque_lines
 from ppafo.engine.rows import leaf_paths
-from ppafo.engine.run_rows import RunRows
 from ppafo.engine.scheme import motion, pneumatics
 from ppafo.engine.source_text import composed_lines
-from ppafo.model import plant_faults
 from ppafo.model.effects.kind import Moment, State
 from ppafo.model.plant import SinglePort
 from ppafo.model.ports import at_valve, leakage_path
@@ -57,7 +55,11 @@ def opening(rows: Rows) -> list[str]:
     names += ["load", "shank"] if rows.program.shank is not None else []
     names += ["held"] if rows.program.hands_chambers_on else []
     names += ["start"] if rows.program.starts_apart else []
-    leaks = [f"plant = {rows.add(plant_faults.failed_plant)}(plant, plant_faults, time)"] if rows.program.fails else []
+    leaks = []
+    if rows.program.fails:
+        from ppafo.model.plant_faults import failed_plant
+
+        leaks = [f"plant = {rows.add(failed_plant)}(plant, plant_faults, time)"]
     return [*[rows.load(name) for name in names], time_of_step(rows), *leaks, "command = result.command"]
 
 
@@ -113,8 +115,10 @@ def connect(rows: Rows, *fed_from: str) -> list[str]:
     lines = [f"port_1, port_2 = {rows.add(rows.program.valve.connect)}({source}, shown)"]
     if not rows.program.fails:
         return lines
+    from ppafo.model.plant_faults import failed_blended_ports, failed_single_ports
+
     is_single = get_type_hints(rows.program.valve.connect)["return"] == tuple[SinglePort, SinglePort]
-    failed = rows.add(plant_faults.failed_single_ports if is_single else plant_faults.failed_blended_ports)
+    failed = rows.add(failed_single_ports if is_single else failed_blended_ports)
     return [*lines, f"port_1, port_2 = {failed}(plant, plant_faults, shut_off, unpowered, port_1, port_2, time)"]
 
 

@@ -22,12 +22,12 @@ from ppafo.model.gait import Course, GaitSeries, GaitTiming
 from ppafo.model.leg import LegParameters
 from ppafo.model.orifice import ExactOrifice
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, chamber_pressures
-from ppafo.model.plant_faults import POWERED, PlantFaults, ShutOff
 from ppafo.model.regulator import LineState, SupplyLines
 from ppafo.model.sensors import NOTHING_SEEN, GaitSensors, SensorParameters
 
-if TYPE_CHECKING:  # for most runs know no walk
+if TYPE_CHECKING:  # for most runs know no walk and no fault
     from ppafo.engine.scheme.walking import DeviceShare, WalkState
+    from ppafo.model.plant_faults import PlantFaults, ShutOff
 
 Members = NDArray[np.intp]
 Floats = NDArray[np.float64]
@@ -73,7 +73,7 @@ class Walk:
     sensors: GaitSensors
     initial: "WalkState"
     course: Course | None = None
-    failing: tuple[PlantFaults, ShutOff] | None = None
+    failing: "tuple[PlantFaults, ShutOff] | None" = None
 
     @property
     def scheme(self) -> LegScheme:
@@ -91,7 +91,11 @@ class Walk:
     @property
     def states(self) -> list[Any]:
         """Its groups of states at the start."""
-        return [self.initial, NOTHING_SEEN, *([] if self.failing is None else [POWERED])]
+        if self.failing is None:
+            return [self.initial, NOTHING_SEEN]
+        from ppafo.model.plant_faults import POWERED  # most runs have no fault
+
+        return [self.initial, NOTHING_SEEN, POWERED]
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,13 +6,12 @@ back at the end; between them stands what happens in a step, in the order in whi
 
 import re
 
-from ppafo.engine.lane_rows import indent
+from ppafo.engine.lane_rows import KEPT, RunRows, indent
 from ppafo.engine.lane_samples import control_loop, remember_commands, signals_before_start
 from ppafo.engine.lane_source import at_sample, between_samples
 from ppafo.engine.lane_step import find_begin, plant_loop
 from ppafo.engine.program import Program, link_program
 from ppafo.engine.rows import leaf_paths
-from ppafo.engine.run_rows import KEPT, RunRows
 from ppafo.engine.source_text import Collector
 
 LOOP_ARRAYS = {"signal_history": 3, "command_history": 2}

@@ -3,20 +3,18 @@
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ppafo.errors import ParameterError, UnitError, nearest_name, one_line, refused_as
 from ppafo.model.actuators.kind import Range
-from ppafo.model.actuators.table import Table
 from ppafo.model.catalog import ACTUATORS, EFFECTS, VALVES
 from ppafo.model.columns import Problem, at, larger
 from ppafo.model.declaration import Quantity, range_rule
 from ppafo.model.effects.kind import SECTION
 from ppafo.model.gas import SPECIES
 from ppafo.parameters import declaration
-from ppafo.parameters.actuator_table import highest_pressure
 from ppafo.parameters.device import (
     VANE,
     Actuator,
@@ -42,6 +40,9 @@ from ppafo.parameters.parameter_set import (
     with_second_pressure,
 )
 from ppafo.parameters.plant import shape_and_growth
+
+if TYPE_CHECKING:  # few devices have a measured actuator
+    from ppafo.model.actuators.table import Table
 
 _SAME = 1.0e-9
 """Angles [rad] this near are one, written in two ways."""
@@ -129,7 +130,7 @@ def actuator_problem(actuator: Actuator) -> str:
     return ACTUATORS[actuator.kind].problem(actuator.settings, stops) or _outside(actuator.table, stops)
 
 
-def _outside(table: Table | None, stops: Range) -> str:
+def _outside(table: "Table | None", stops: Range) -> str:
     """Return what is wrong where the stops are beyond the angles that were measured."""
     if table is None or (table.first_angle <= stops.angle_min + _SAME and stops.angle_max <= table.last_angle + _SAME):
         return ""
@@ -143,7 +144,12 @@ def _outside(table: Table | None, stops: Range) -> str:
 def beyond_pressures(device: Device) -> Problem:
     """Return where the supply is above the pressures at which a table was measured, in columns too."""
     table, supply = device.actuator.table, device.supply
-    highest = math.inf if table is None else highest_pressure(table)
+    if table is None:
+        highest = math.inf
+    else:
+        from ppafo.parameters.actuator_table import highest_pressure
+
+        highest = highest_pressure(table)
     gauge = larger(supply.pressure, supply.dorsiflexion_pressure) - supply.atmospheric_pressure
 
     def line(run: int) -> str:

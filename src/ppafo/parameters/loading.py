@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from importlib import resources
 from pathlib import Path
 from types import GenericAlias
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BaseModel, Field
 
@@ -15,12 +15,10 @@ from ppafo.documents.models import NAME, make_schema, one_of, optional, table, v
 from ppafo.documents.toml_text import TomlKind, beside, label
 from ppafo.errors import ParameterError, UnitError, nearest_name, refused_as
 from ppafo.kinds import Kinds
-from ppafo.model.actuators.table import Table
 from ppafo.model.catalog import ACTUATORS, EFFECTS, VALVES, device_effects, find_effects
 from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import SECTION
 from ppafo.parameters import declaration
-from ppafo.parameters.actuator_table import read_actuator_table
 from ppafo.parameters.building import build_device
 from ppafo.parameters.device import VANE, Device
 from ppafo.parameters.overrides import check_valve
@@ -35,6 +33,9 @@ from ppafo.parameters.parameter_set import (
     chosen_valve,
 )
 from ppafo.units import check_unit
+
+if TYPE_CHECKING:  # few devices have a measured actuator
+    from ppafo.model.actuators.table import Table
 
 # A dotted path names a valve: a dot or a blank in its name would make it another path.
 _VALVE_NAME = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$")]
@@ -220,10 +221,16 @@ def _find_actuator(document: dict[str, Any]) -> None:
         ACTUATORS.get(kind)
 
 
-def _read_table(actuator: Any, folder: Path) -> Table | None:
+def _read_table(actuator: Any, folder: Path) -> "Table | None":
     """Return what the file of an actuator holds; None for a kind without one."""
-    has_file = actuator is not None and ACTUATORS[actuator.kind].model.table is Table
-    return read_actuator_table(folder / actuator.file) if has_file else None
+    declared = None if actuator is None else ACTUATORS[actuator.kind].model.table
+    if declared is None:
+        return None
+    # Few devices have a measured actuator.
+    from ppafo.model.actuators.table import Table
+    from ppafo.parameters.actuator_table import read_actuator_table
+
+    return read_actuator_table(folder / actuator.file) if declared is Table else None
 
 
 def _flatten(parsed: Any, file: str, folder: Path) -> ParameterSet:

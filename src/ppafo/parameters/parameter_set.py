@@ -3,14 +3,13 @@
 import math
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.models import StrictTable, Text, Texts
 from ppafo.errors import ParameterError, UnitError, nearest_name
-from ppafo.model.actuators.table import Table
 from ppafo.model.catalog import EFFECTS, find_effects
 from ppafo.model.declaration import Quantity
 from ppafo.model.gas import SPECIES
@@ -27,6 +26,9 @@ from ppafo.parameters.graph import (
 )
 from ppafo.parameters.overrides import CHOSEN_VALVE, NAMED_VALVE, Given, one_path, other_forms, override_set
 from ppafo.units import base_value, format_quantity, split_quantity, to_si
+
+if TYPE_CHECKING:  # few devices have a measured actuator
+    from ppafo.model.actuators.table import Table
 
 Origin = Literal["published", "datasheet", "derived", "identified", "fitted", "assumed"]
 """How a value came to be known; ``fitted`` is one that recordings do not fix, or whose recordings no model explains."""
@@ -110,7 +112,7 @@ class ParameterSet:
     valve_kinds: Mapping[str, str]
     actuator_kind: str
     actuator_file: str
-    actuator_table: Table | None
+    actuator_table: "Table | None"
     numbers: Mapping[str, Entry]
     texts: Mapping[str, TextEntry]
     flags: Mapping[str, FlagEntry]

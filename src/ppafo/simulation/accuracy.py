@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from ppafo.engine.run import Run
-from ppafo.report.display_units import metric_change
 
 SHORTER = 4
 """How many times shorter the steps of a finer run are; its allowed error is smaller by the square."""
@@ -31,6 +30,8 @@ class ErrorEstimate:
     @property
     def sentence(self) -> str:
         """The errors of angle and pressures in the units that people are shown."""
+        from ppafo.report.display_units import metric_change
+
         shown = (metric_change(self.angle, "rad"), metric_change(self.pressure, "Pa"))
         angle, pressure = (f"{value:.1e} {unit}" for value, unit in shown)
         return f"Estimated error of the steps: at most {angle} and {pressure}."

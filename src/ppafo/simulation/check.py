@@ -10,8 +10,6 @@ from functools import partial
 from typing import Any
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.report.display_units import metric_change, metric_level
-from ppafo.report.writing import align_columns
 from ppafo.simulation.accuracy import ErrorEstimate
 from ppafo.simulation.scenario import plain
 
@@ -21,6 +19,8 @@ ALLOWED_CHANGE = 1.0e-3
 """Largest change of a metric that counts as none, as a fraction of its value or of the range of its quantity."""
 
 FINER, MOVED_START, MOVED_MEASUREMENT = "finer steps", "start moved", "measurement moved"
+Shown = Callable[[float, str], tuple[float, str]]
+"""A value in SI units and its unit, as people are shown them."""
 _MOVES = frozenset({MOVED_START, MOVED_MEASUREMENT})
 
 
@@ -107,9 +107,13 @@ class Check:
 
     def __repr__(self) -> str:
         """Return the table of all changes in the units that people are shown, and the sentence."""
+        from ppafo.report.display_units import metric_change, metric_level
+        from ppafo.report.writing import align_columns
+
         names = list(self.metrics[0].changes) if self.metrics else []
-        rows = [_cells(row, names, partial(metric_level, atmosphere=self.atmosphere)) for row in self.metrics]
-        rows += [_cells(row, names, metric_change) for row in self.courses]
+        above = partial(metric_level, atmosphere=self.atmosphere)
+        rows = [_cells(row, names, above, metric_change) for row in self.metrics]
+        rows += [_cells(row, names, metric_change, metric_change) for row in self.courses]
         head = f"Check of '{self.scenario}': what changes in runs that should be the same"
         return "\n".join([head, *align_columns([["", "value", *names, ""], *rows]), "", self.sentence])
 
@@ -124,7 +128,8 @@ class Check:
         return {"is_determined": self.is_determined, "sentence": self.sentence, **document, **judged}
 
 
-def _cells(row: NumberCheck, names: list[str], level: Callable[[float, str], tuple[float, str]]) -> list[str]:
+def _cells(row: NumberCheck, names: list[str], level: Shown, change: Shown) -> list[str]:
+    """The row of a number: its ``level``, each ``change`` of it, and what they come to."""
     value, unit = level(row.value, row.unit)
-    changes = [f"{metric_change(row.changes[name], row.unit)[0]:+.1e}" if row.changes[name] else "0" for name in names]
+    changes = [f"{change(row.changes[name], row.unit)[0]:+.1e}" if row.changes[name] else "0" for name in names]
     return [row.name, f"{value:.4g} {unit}".rstrip(), *changes, "" if row.is_determined else "sensitive"]

@@ -16,12 +16,10 @@ from ppafo.engine.lanes import BatchResult, Floats, load_program, load_programs
 from ppafo.engine.led_leg import GAIT_SHANK, shank_over_samples
 from ppafo.engine.over_samples import over_samples
 from ppafo.engine.program import place_over_samples
-from ppafo.engine.rows import leaf_paths, rebuilt
+from ppafo.engine.rows import leaf_paths, rebuilt, row_numbers
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, batch_of, run_together
 from ppafo.engine.scheme.actuators import pressures_of, torque_of, volumes_of
 from ppafo.errors import SimulationError
-from ppafo.metrics import evaluate
-from ppafo.metrics.metric import Metric, Metrics
 from ppafo.model.gait import foot_in_gait
 from ppafo.model.gas import energy_per_content
 from ppafo.model.leg import torque_on_foot
@@ -33,7 +31,6 @@ from ppafo.signals.recording import Channel, Recording
 from ppafo.simulation.accuracy import LARGEST_OF_ANGLE, LARGEST_OF_PRESSURE, MARGIN, ErrorEstimate, finer
 from ppafo.simulation.check import ALLOWED_CHANGE, FINER, MOVE, MOVED_MEASUREMENT, MOVED_START, Check, NumberCheck
 from ppafo.simulation.plan import foot_load, plan_run, profile_values, shank_kind
-from ppafo.simulation.sampled import run_sampled, state_row_numbers
 from ppafo.simulation.scenario import (
     FreeMotion,
     Leg,
@@ -43,12 +40,13 @@ from ppafo.simulation.scenario import (
     scenario_document,
     worn_kind,
 )
-from ppafo.storage import dataset_of, write_result
 from ppafo.version import __version__
 
 if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
+
+    from ppafo.metrics.metric import Metric
 
 OPEN_LOOP = "constant"
 """The controller that follows no reference: its recordings have none, so that no tracking error is made of it."""
@@ -82,7 +80,7 @@ class Status:
         return self.kind == "completed"
 
 
-Measured = tuple[Recording, Mapping[str, Metric]]
+Measured = tuple[Recording, "Mapping[str, Metric]"]
 """The channels of a run, and its metrics."""
 
 
@@ -92,7 +90,7 @@ class Result:
 
     scenario: Scenario
     recording: Recording
-    metrics: Mapping[str, Metric]
+    metrics: "Mapping[str, Metric]"
     status: Status
     versions: Mapping[str, str]
     engine: Mapping[str, float | int | str]
@@ -188,6 +186,8 @@ class Result:
 
     def dataset(self) -> "xarray.Dataset":
         """Return the recording as an xarray Dataset; attributes hold units, long names and the scenario as JSON."""
+        from ppafo.storage import dataset_of
+
         return dataset_of(self.recording, scenario_document(self.scenario))
 
     def save(self, folder: str | Path, attachments: Mapping[str, bytes] | None = None) -> Path:
@@ -195,6 +195,8 @@ class Result:
 
         The folder is complete or not there; an earlier result in it is replaced. Returns the folder.
         """
+        from ppafo.storage import write_result
+
         return write_result(folder, self.recording, self.to_dict(), attachments or {})
 
 
@@ -206,7 +208,12 @@ def simulate(scenario: Scenario) -> Result:
 def results_of(scenario: Scenario, runs: Sequence[Run]) -> list[Result]:
     """Results of runs of one scenario, as planned or with other numbers; a Python controller has them in turn."""
     custom = scenario.controller.custom
-    outcomes = run_together(runs) if custom is None else [run_sampled(batch_of(run), custom) for run in runs]
+    if custom is None:
+        outcomes = run_together(runs)
+    else:
+        from ppafo.simulation.sampled import run_sampled
+
+        outcomes = [run_sampled(batch_of(run), custom) for run in runs]
     return [result_of(scenario, run, outcome) for run, outcome in zip(runs, outcomes, strict=True)]
 
 
@@ -223,7 +230,7 @@ def simulate_many(scenarios: Sequence[Scenario], threads: int | None = None) -> 
 
 def result_of(scenario: Scenario, run: Run, outcome: BatchResult) -> Result:
     """The result of what a run came to; one that was stopped has the records up to there."""
-    rows = state_row_numbers(run)
+    rows = row_numbers(run.program.state_rows())
     times: Floats = np.arange(outcome.record.shape[0], dtype=np.float64) * (run.step * run.record_every)
     record = outcome.record[:, :, 0]
     status = _status(outcome, record, rows, times)
@@ -232,6 +239,8 @@ def result_of(scenario: Scenario, run: Run, outcome: BatchResult) -> Result:
     engine = {"step": run.step, "steps": run.step_count, "steps_per_sample": run.steps_per_sample}
     worn = worn_kind(scenario)
     if worn is not None:
+        from ppafo.metrics.metric import Metrics
+
         recording, metrics, ended = worn.measured(scenario, run, times[:kept], _by_path(record[:kept], rows))
         status = replace(status, message=ended) if status.is_completed else status
         return Result(scenario, recording, Metrics(metrics), status, versions, engine)
@@ -250,6 +259,9 @@ def _by_path(record: Floats, rows: Mapping[str, int]) -> dict[str, Floats]:
 
 
 def _measure(scenario: Scenario, run: Run, times: Floats, record: Floats, rows: Mapping[str, int]) -> Measured:
+    from ppafo.metrics import evaluate
+    from ppafo.metrics.metric import Metrics
+
     recording = _recording(scenario, run, times, _by_path(record, rows))
     return recording, Metrics(evaluate(recording))
 

@@ -2,7 +2,8 @@
 
 One C function for each of Python's, with its docstring and its names; rows become structs that are handed over by
 value. There is no heap, no global that changes, no recursion, and no library function but ``sqrt`` and ``fabs``, which
-are exact, unless the walk was told to take others. Built as ``FLAGS`` say, it gives the bits of the lanes.
+are exact, unless the walk was told to take others. Built as the flags of ``engine.compilers`` say, it gives the bits of
+the lanes.
 """
 
 import inspect
@@ -257,9 +258,6 @@ class CTerms:
     def _of_not(self, item: Term) -> tuple[str, int]:
         return f"!{self.term(item.parts[0], _ATOM)}", _SIGN
 
-
-FLAGS = ("-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-fwrapv")
-"""Flags of gcc and clang: strict arithmetic; without the third last gcc is up to 20 times slower."""
 
 WIDTH = 118
 TIED = "\N{NO-BREAK SPACE}"

@@ -28,15 +28,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo import interrupts
-from ppafo.engine.compilers import CompilerError
+from ppafo.engine.compilers import FLAGS, CompilerError
 from ppafo.engine.lane_rows import lanes_of
 from ppafo.engine.lane_source import COMPILED
 from ppafo.engine.lanes import Batch, BatchResult, LaneBlock, join_results
 from ppafo.engine.loading import HOW_TO_INSTALL, WITHOUT_C
 from ppafo.errors import SimulationError, one_line, reason
-from ppafo.translation.c99 import FLAGS, c_source
-from ppafo.translation.typed import FLOAT, INT, LIBRARY, Array, Scalar, Type
-from ppafo.translation.walk import entries_of, walk_module
+from ppafo.translation.typed import FLOAT, INT, LIBRARY, Array, Scalar, Type, entries_of
 
 LONGEST_COMPILING = 300.0
 """Seconds after which a compiler is ended that has not ended by itself; the longest program takes a tenth of it."""
@@ -354,6 +352,10 @@ def translator_hash() -> str:
 
 def translated_text(source: str) -> str:
     """The C of a composed text; ProgramError for what has none."""
+    # A model that is kept from earlier is loaded without the translator.
+    from ppafo.translation.c99 import c_source
+    from ppafo.translation.walk import walk_module
+
     return with_packed_entries(c_source(walk_module(source, library=LIBRARY), {}, _TITLE), entries_of(source))
 
 

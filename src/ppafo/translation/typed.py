@@ -3,6 +3,8 @@
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
+from ppafo.engine.loading import entry_types
+
 
 @dataclass(frozen=True, slots=True)
 class Scalar:
@@ -60,6 +62,15 @@ class Shared:
 
 
 Type: TypeAlias = Scalar | Row | Items | Array | Handed | Shared
+
+
+def entries_of(source: str) -> dict[str, tuple[Type, ...]]:
+    """Functions of a composed module that are called from outside, with the types of their parameters."""
+    plain: dict[str, Type] = {"int64": INT, "float64": FLOAT}
+    return {
+        name: tuple(plain.get(word) or Array(word.count(":") - 1) for word in words)
+        for name, words in entry_types(source).items()
+    }
 
 
 _NONE: frozenset[str] = frozenset()

@@ -11,7 +11,6 @@ from copy import copy
 from dataclasses import dataclass, field
 from typing import Any
 
-from ppafo.engine.loading import entry_types
 from ppafo.engine.plain_python import parse_module, place_in, refusal
 from ppafo.errors import ProgramError
 from ppafo.translation import typed
@@ -35,6 +34,7 @@ from ppafo.translation.typed import (
     Type,
     converted,
     count_of,
+    entries_of,
     is_empty,
     joined,
 )
@@ -411,15 +411,6 @@ def walk_module(
         if name in walk.entries:
             walk.function(name, walk.entries[name])
     return walk.module
-
-
-def entries_of(source: str) -> dict[str, tuple[Type, ...]]:
-    """Functions of a composed module that are called from outside, with the types of their parameters."""
-    plain: dict[str, Type] = {"int64": INT, "float64": FLOAT}
-    return {
-        name: tuple(plain.get(word) or Array(word.count(":") - 1) for word in words)
-        for name, words in entry_types(source).items()
-    }
 
 
 @dataclass(slots=True)

@@ -17,7 +17,8 @@ from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import ProgramError
 from ppafo.translation.c99 import c_source, program_source
 from ppafo.translation.native import build, run_native
-from ppafo.translation.walk import entries_of, walk_module
+from ppafo.translation.typed import entries_of
+from ppafo.translation.walk import walk_module
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import with_duration
 from ppafo.walking.planning import plan_walk
