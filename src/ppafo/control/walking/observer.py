@@ -39,7 +39,7 @@ class NominalDevice(NamedTuple):
 
     ``nominal_flow`` is R T times the valve's conductance [m^3/s]: content that a choked flow moves in a second, over
     the pressure before it. ``nominal_pair`` is 1 for on/off valves that vent where they do not feed, else 0: a spool
-    with a dump valve, which follows its command with ``nominal_lag`` beyond ``nominal_dead_band``.
+    with a vent valve, which follows its command with ``nominal_lag`` beyond ``nominal_dead_band``.
     ``nominal_joining_time`` is how long both chambers are joined after chamber 1 was fed. ``nominal_lines`` count gas
     as its content p V [J]; a volume of 0 stands for a supply that needs none.
     """
@@ -94,7 +94,7 @@ NOMINAL_QUANTITIES = (
     _nominal("dead_volume_2", "m^3", "dead volume of chamber 2", 1.0),
     _nominal("angle_min", "rad", "lower stop", 10.0, -10.0),
     _nominal("angle_max", "rad", "upper stop", 10.0, -10.0),
-    _nominal("pair", "", "1 for a pair of on/off valves, 0 for a spool with a dump valve", 1.0),
+    _nominal("pair", "", "1 for a pair of on/off valves, 0 for a spool with a vent valve", 1.0),
     _nominal("opening_delay", "s", "time from energising a coil to flow", 1.0),
     _nominal("closing_delay", "s", "time from de-energising it to venting", 1.0),
     _nominal("switching_interval", "s", "shortest time between two switchings of a coil", 1.0),

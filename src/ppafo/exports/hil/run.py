@@ -28,7 +28,7 @@ from ppafo.exports.firmware import chip_controller, firmware
 from ppafo.exports.hil import wire
 from ppafo.exports.hil.loop import Bench, Exchange, LockStep, Pace, RealTime, Row, without_collections
 from ppafo.exports.hil.wire import MICROSECONDS
-from ppafo.model.valves import dump
+from ppafo.model.valves import vent_valve
 from ppafo.report.recording_figure import recording_figure
 from ppafo.report.style import ACTUAL, VERMILION, Margins, figure_of_free_panels, house_style, render_figure
 from ppafo.simulation.plan import plan_run
@@ -62,7 +62,7 @@ class Plant:
 
 
 def plant_of(scenario: Scenario, rate: int = wire.RATE) -> Plant:
-    """The plant of a scenario, whose command is given ``rate`` times a second; a proportional valve can be dumped."""
+    """The plant of a scenario with ``rate`` commands a second; a proportional valve gets a vent valve."""
     if not wire.LOWEST_RATE <= rate <= wire.HIGHEST_RATE:
         raise ScenarioError(f"--rate {rate}: must be {wire.LOWEST_RATE} to {wire.HIGHEST_RATE} samples per second")
     period = 1.0 / rate
@@ -74,7 +74,7 @@ def plant_of(scenario: Scenario, rate: int = wire.RATE) -> Plant:
     run = plan_run(chosen)
     valve = chosen.device.valve
     if valve.kind == "proportional":
-        run = replace(run, program=replace(run.program, valve=dump.choose(valve.settings)))
+        run = replace(run, program=replace(run.program, valve=vent_valve.choose(valve.settings)))
     module = load_program(batch_of(run).program)
     return Plant(chosen, run, module, chosen_compiler().described(), period)
 
