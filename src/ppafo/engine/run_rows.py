@@ -1,6 +1,6 @@
 """The rows of one program where a single run goes through it: each group is a local name, and there are no lanes.
 
-What writes the lanes' steps writes those of one run too: it loads groups, makes new ones, and stores them. For lanes
+What writes the lanes' steps writes a single run's too: it loads groups, makes new ones, and stores them. For lanes
 that is a copy from and to the rows of ``x``; for one run a group is a NamedTuple under its own name, so that a load is
 nothing and a store an assignment. Lines that change a group for themselves alone get a name of their own for it.
 """
@@ -79,6 +79,7 @@ class RunRows:
     def renamed(self, lines: list[str], names: dict[str, str], before: list[str]) -> tuple[list[str], dict[str, str]]:
         """Lines in which a group that is changed, and not stored, has another name; and these names in the end."""
         tree = ast.parse("\n".join(lines))
+        # A group that is stored keeps its name: later parts read it.
         stored = {found[1] for line in lines if (found := _STORED.fullmatch(line.strip()))}
         used = {word for line in (*lines, *before) for word in re.findall(r"\w+", line)}
         writer = _Renaming(set(self.groups) - stored, dict(names), used)

@@ -17,7 +17,7 @@ FLAT = 2.0
 TOE = 3.0
 
 FADING_TIME = 0.02
-"""Time [s] in which a difference of angle at a hand-over falls to a third: about that of a foot that falls flat."""
+"""Time [s] in which a difference of angle at a hand-over falls to a third: about the time of a foot slap."""
 
 NEARLY_FLAT = 0.05235987755982989
 """The measured foot stands on heel and toes while within this angle [rad], 3 deg, of flat; beyond it the heel is up.

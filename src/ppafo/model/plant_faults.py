@@ -165,7 +165,7 @@ _CATALOGUE = [
     PlantFault(
         "bottle",
         "empty",
-        "its pressure falls to that of the atmosphere",
+        "its pressure falls to atmospheric",
         (TIME, Quantity("lag", "s", "time in which most of it is gone", 0.2, 1.0e-3, 1.0e3)),
         {"time": "empty_time", "lag": "empty_lag"},
     ),

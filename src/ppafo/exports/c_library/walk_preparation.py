@@ -125,7 +125,7 @@ def _numbers(configuration: Scenario) -> dict[str, tuple[Quantity, float]]:
 
 
 def sensors_that_fail(configuration: Scenario) -> dict[str, FaultSettings]:
-    """Faults of a walk by the name of the sensor, without those that have none."""
+    """Faults of a walk by the name of the sensor, only where there is one."""
     return {sensor: item for sensor, item in sensor_settings(configuration).faults.items() if item.kind}
 
 
@@ -138,7 +138,7 @@ def _control(configuration: Scenario) -> dict[str, Quantity]:
 
 
 def links_of_walk(configuration: Scenario) -> Graph:
-    """What follows other settings of a walk as long as nobody changes it."""
+    """Settings of a walk that follow others as long as nobody changes them."""
     known = _numbers(configuration)
     recorded = {"run.output_interval": (Follows((Term(("run.duration",), interval_of(configuration)),)),)}
     # A plant alone has no settings of the controller that its walk had.
@@ -169,12 +169,13 @@ def preparation_of_walk(configuration: Scenario, program: Program, collector: Co
     reacts = walk_of(configuration).reacts
     lines = [
         *writing.plant("bare", "0.0"),
+        # Each line needs names that lines before it have made, so this order is fixed.
         *(_leg(configuration, writing) if reacts is None else _body(reacts, writing)),
         *_gait_sensors(configuration, writing),
         *_plant_faults(configuration, writing),
         *_steps(configuration, writing),
         *writing.timing("signal_delay"),
-        *_pieces(configuration, writing),
+        *_components(configuration, writing),
         *(_start(configuration, writing) if reacts is None else _body_at_start(reacts, writing)),
         *writing.start(),
     ]
@@ -239,7 +240,7 @@ def _steps(configuration: Scenario, writing: Writing) -> Iterator[str]:
     yield "needs_parts = False"
 
 
-def _pieces(configuration: Scenario, writing: Writing) -> Iterator[str]:
+def _components(configuration: Scenario, writing: Writing) -> Iterator[str]:
     """Lines that make the parameters of the controller, its noise, gas, lines and course."""
     control = law_of(configuration)
     given = [c_identifier(path) for path in _control(configuration)]
@@ -266,7 +267,7 @@ def _start(configuration: Scenario, writing: Writing) -> Iterator[str]:
 
 
 def _body(reacts: ReactingWearer, writing: Writing) -> Iterator[str]:
-    """Lines that make the body of a wearer who reacts, its share of the device and the plant without a leg."""
+    """Lines that make the body of a neuromuscular gait model, its share of the device and the plant without a leg."""
     add = writing.add
     yield f"share = {add(device_share)}(bare, {STANDARD_GRAVITY!r})"
     yield f"plant = {add(without_leg)}(bare)"
@@ -274,12 +275,12 @@ def _body(reacts: ReactingWearer, writing: Writing) -> Iterator[str]:
 
 
 def _as_settings(reacts: ReactingWearer) -> ReactingWearer:
-    """The wearer whose numbers are those that the settings of a library have."""
+    """The wearer with the settings of a library in place of numbers."""
     return replace(reacts, settings={name: Written(c_identifier(f"wearer.{name}")) for name in reacts.settings})
 
 
 def _body_at_start(reacts: ReactingWearer, writing: Writing) -> Iterator[str]:
-    """Lines that make the states at the start of a wearer who reacts."""
+    """Lines that make the states at the start of a neuromuscular gait model."""
     add, start = writing.add, start_of_body(_as_settings(reacts))
     rows = {"walk": start.walk, "walker": start.walker, "reflexes": start.reflexes, "nerves": start.nerves}
     for name, row in rows.items():

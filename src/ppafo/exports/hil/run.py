@@ -1,7 +1,7 @@
-"""A scenario at the wire, from its settings to a folder: plant, run, result, log, how the link did; a controller.
+"""Hardware in the loop from the settings of a scenario to a folder: plant, run, result, log, link; a controller.
 
-The plant is the lanes of one run, whose command comes from outside. Why in this process and not in one of its own:
-docs/decisions/0022-processor-and-hardware-in-the-loop.md.
+The plant is the compiled module with one run, whose command comes from outside. Why in this process and not in one of
+its own: docs/decisions/0022-processor-and-hardware-in-the-loop.md.
 """
 
 import csv
@@ -68,6 +68,7 @@ def plant_of(scenario: Scenario, rate: int = wire.RATE) -> Plant:
     period = 1.0 / rate
     chosen = replace(
         scenario,
+        # No step may be longer than a sample: a command acts from its sample on.
         time_step=min(scenario.time_step, period),
         control=Control(PYTHON_CONTROLLER, {}, period),
     )
@@ -155,12 +156,12 @@ class HardwareRun:
 
     @property
     def _in_time(self) -> Sequence[Row]:
-        """The samples that were sent: not those with which a stopped run was vented."""
+        """The samples that were sent, without the samples with which a stopped run was vented."""
         count = next((place for place, row in enumerate(self.exchange.rows) if row.sent_late is None), None)
         return self.exchange.rows[:count]
 
     def document(self) -> dict[str, Any]:
-        """What ``link.json`` says, in SI units."""
+        """The content of ``link.json``, in SI units."""
         exchange = self.exchange
         return {
             "rate": round(1.0 / self.plant.period),
@@ -249,7 +250,7 @@ class HardwareRun:
         return found
 
     def plot_signals(self) -> "Figure":
-        """The signals of the run; what vented it stands below."""
+        """Figure of the signals of the run; the reason of venting stands below."""
         exchange, status = self.exchange, self.result.status
         vented = (
             ""
@@ -294,6 +295,7 @@ def run_plant(
     ``patience`` [s] is how long the controller is called; ``run`` its number, drawn where none is given.
     ScenarioError where nobody answers.
     """
+    # Not from a seed: packets of an earlier run that are still under way must have another number.
     number = random.SystemRandom().randint(0, _LARGEST_RUN) if run is None else run
     before = load_now()
     begun = plant.begin()
@@ -347,7 +349,7 @@ def spread(values: Sequence[float]) -> dict[str, float] | None:
 
 
 def described_spread(values: Sequence[float]) -> str:
-    """The same in words."""
+    """Median, 99th percentile and largest of some times, in words."""
     found = spread(values)
     if found is None:
         return "none"

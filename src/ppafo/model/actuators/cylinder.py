@@ -1,6 +1,6 @@
 """A double-acting cylinder between two pins that drives a lever: the law of cosines between joint, base and rod end.
 
-Chamber 1 is on the side of the piston, chamber 2 on that of the rod. The cylinder grows longer with the angle.
+Chamber 1 is on the side of the piston, chamber 2 on the rod's. The cylinder grows longer with the angle.
 """
 
 import math

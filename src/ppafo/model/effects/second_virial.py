@@ -1,6 +1,6 @@
 """Gas that is not ideal: the virial equation of state cut after its second term, ``P = rho R T (1 + b rho)``.
 
-With a constant ``b`` the internal energy is that of the ideal gas, so that energy and state agree with each other; with
+With a constant ``b`` the internal energy is the ideal gas's, so that energy and state agree with each other; with
 ``b = 0`` all of it is the ideal gas. The engine, the reference solver and the simulated test bench share these
 functions.
 """

@@ -206,7 +206,7 @@ def settle_moving(valve: MovingProportional, state: SpoolState, command: float, 
 def spool_step(angular: float, damping_ratio: float, step: float) -> SpoolStep:
     """Exact step [s] of a free spool with an undamped angular frequency [rad/s], to rounding.
 
-    Series of exp and of its mean at a small fraction of the step, doubled until they are those of the whole. A function
+    Series of exp and of its mean at a small fraction of the step, doubled until they hold for the whole. A function
     of the matrix A of x and x'/w is ``p + q A``, so all of it is on pairs of numbers, without a library function.
     Where a spool has long arrived the series would not converge; the step ends there, and only the mean goes on.
     """
