@@ -15,16 +15,16 @@ from ppafo.engine.scheme.walking import COURSE, STRIDES
 from ppafo.metrics import METRICS
 from ppafo.metrics.metric import MetricKind
 from ppafo.model.catalog import EFFECTS, VALVES
-from ppafo.model.valves import dump
+from ppafo.model.valves import vent_valve
 from ppafo.model.valves.kind import ValveModel
 from ppafo.signals.meter import MeterKind
 
 
 def valve_models(walks: bool) -> list[ValveModel]:
-    """Every model that the valves of the catalogue choose; a proportional one in a walk has a dump valve."""
+    """Every model that the valves of the catalogue choose; a proportional one in a walk has a vent valve."""
     found: dict[int, ValveModel] = {}
     for kind in VALVES.values():
-        choose = dump.choose if walks and kind.name == "proportional" else kind.choose
+        choose = vent_valve.choose if walks and kind.name == "proportional" else kind.choose
         names = [item.name for item in kind.quantities]
         settings = [dict.fromkeys(names, 0.0), *({**dict.fromkeys(names, 0.0), name: 0.01} for name in names)]
         for model in map(choose, settings):

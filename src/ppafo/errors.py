@@ -9,14 +9,14 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 class PpafoError(Exception):
     """Something a user can put right; the message is one line that says what and how.
 
-    ``parts`` are what it says, one by one, where it says several things.
+    ``parts`` are its statements one by one, where there are several.
     """
 
     parts: tuple[str, ...] = ()
 
 
 class UnitError(PpafoError):
-    """A text is not a quantity, or its unit does not fit; whoever reads a file adds the file and the key."""
+    """A text is not a quantity, or its unit does not fit; the reader of a file adds the file and the key."""
 
 
 class ParameterError(PpafoError):
@@ -86,6 +86,7 @@ def raise_noted(found: Sequence[PpafoError]) -> None:
     """Raise one PpafoError, of the class of the first, that says everything that was noted, each thing once."""
     parts = tuple(dict.fromkeys(part for error in found for part in error.parts or (str(error),)))
     if len(parts) == 1:
+        # One alone keeps its traceback and its class.
         raise found[0]
     if parts:
         listed = "; ".join(f"({number}) {part}" for number, part in enumerate(parts, 1))
@@ -95,7 +96,7 @@ def raise_noted(found: Sequence[PpafoError]) -> None:
 
 
 def said_missing(names: Sequence[str]) -> str:
-    """Return what says that all of these are missing: ``'a', 'b' and 'c' are missing``."""
+    """Return a statement that all of these are missing: ``'a', 'b' and 'c' are missing``."""
     quoted = [f"'{name}'" for name in names]
     listed = " and ".join(filter(None, (", ".join(quoted[:-1]), quoted[-1])))
     return f"{listed} {'is' if len(quoted) == 1 else 'are'} missing"
@@ -107,6 +108,7 @@ def nearest_name(name: str, allowed: Iterable[str]) -> str:
     A name that is far from all in letters may be short for one: its first word, or another.
     """
     known = list(allowed)
+    # 0.6 finds a transposed or forgotten letter, and is difflib's own default.
     near = difflib.get_close_matches(str(name), known, n=1, cutoff=0.6) or _first_with_word(str(name), known)
     return f", did you mean '{near[0]}'?" if near else ""
 

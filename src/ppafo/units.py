@@ -8,7 +8,7 @@ Three rules go beyond arithmetic:
 - An angle is a dimension: ``75`` is no angle, ``75 deg`` is, and ``rad/s`` is not ``Hz``.
 - Only the units listed here exist. A short list makes a misspelling an error and the start quick.
 
-pint reads units. What it says of those in the files of the package is kept in ``known_units.json``, so that most
+pint reads units. Its answers for units in the files of the package are kept in ``known_units.json``, so that most
 processes start without it; ``scripts/known_units.py`` writes that file.
 """
 
@@ -74,7 +74,7 @@ _SPELLINGS = str.maketrans({"²": "^2", "³": "^3", "·": " ", "*": " ", "°": "
 
 
 class ParsedUnit(NamedTuple):
-    """What a unit is: a value in base units (m, kg, s, K, mol, rad) is ``scale`` times the one in it plus ``offset``.
+    """A unit as data: a value in base units (m, kg, s, K, mol, rad) is ``scale`` times the one in it plus ``offset``.
 
     ``dimensions`` are the powers of the base dimensions, such as ``[mass]`` and ``[angle]``.
     """
@@ -93,6 +93,7 @@ def split_quantity(text: str) -> tuple[float, str]:
     unit = stripped[match.end() :].strip()
     check_unit(unit)
     value = _finite(float(match.group()), text)
+    # float() rounds 1e-400 to 0 without a word, and 0 often means "none" in a file.
     if value == 0.0 and _NOT_ZERO.match(match.group()):
         raise UnitError(f"{_quote(text)} is too small for a number of 64 bits, and would be 0; write 0 or a larger one")
     return value, unit
@@ -114,6 +115,7 @@ def parse_quantity(text: str, si_unit: str, atmosphere: float = STANDARD_ATMOSPH
 def to_si(value: float, unit: str, si_unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
     """Return ``value`` in ``si_unit``: ``Pa_a`` for a pressure level, ``Pa_d`` for a pressure difference."""
     scale, offset, counts_from_atmosphere = conversion(unit, si_unit)
+    # In decimals: 8.4 g is the float nearest to 0.0084 kg, not one beside it.
     exact = Decimal(repr(_finite(value, value))) * scale + offset
     return _finite(float(exact) + (atmosphere if counts_from_atmosphere else 0.0), f"{value:g} {unit}")
 
@@ -195,8 +197,9 @@ def _quote_unit(unit: str) -> str:
 
 @functools.lru_cache(maxsize=512)
 def _parse_unit(unit: str) -> tuple[ParsedUnit, str]:
-    """Return what a unit is, and ``g``, ``a`` or ``d`` for a pressure that says so; else an empty text."""
+    """Return a unit as data, and ``g``, ``a`` or ``d`` for a pressure that says so; else an empty text."""
     bare, kind = split_pressure_kind(unit)
+    # The kept file first: pint's import takes longer than a run.
     parsed = known_units().get(bare) or unit_by_pint(unit)
     if kind and parsed.dimensions != known_units()["Pa"].dimensions:
         raise UnitError(f"'{unit}': {_KIND_BELONGS}")
@@ -205,13 +208,13 @@ def _parse_unit(unit: str) -> tuple[ParsedUnit, str]:
 
 @functools.cache
 def known_units() -> dict[str, ParsedUnit]:
-    """Return what is kept of units, by their normal spelling."""
+    """Return the kept units by their normal spelling."""
     told = json.loads((files("ppafo") / "known_units.json").read_text(encoding="utf-8"))
     return {unit: ParsedUnit(Decimal(scale), Decimal(offset), powers) for unit, (scale, offset, powers) in told.items()}
 
 
 def unit_by_pint(unit: str) -> ParsedUnit:
-    """Return what pint makes of a unit, be it gauge, absolute or a difference; UnitError where it does not exist."""
+    """Return a unit as pint reads it, be it gauge, absolute or a difference; UnitError where it does not exist."""
     import pint
 
     bare, _ = split_pressure_kind(unit)
@@ -224,6 +227,7 @@ def unit_by_pint(unit: str) -> ParsedUnit:
         raise _unknown_unit(bare) from error
     except pint.OffsetUnitCalculusError as error:  # milli of a temperature that has another zero
         raise UnitError(f"'{unit}': degC takes no prefix; give degC or K") from error
+    # Units are affine: their values at 0 and 1 give scale and offset.
     zero, one = (_registry().Quantity(Decimal(number), parsed).to_base_units().magnitude for number in (0, 1))
     powers = {name: round(float(str(power))) for name, power in parsed.dimensionality.items()}
     return ParsedUnit(one - zero, zero, powers)

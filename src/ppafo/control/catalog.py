@@ -5,7 +5,7 @@ from ppafo.control.kind import ControllerKind, ProfileKind
 from ppafo.kinds import Kinds
 
 ON_CHIP = "_on_chip"
-"""Behind the name of a controller it is that of its form on whole numbers."""
+"""Ending of the name of a controller in its fixed-point form."""
 
 CONTROLLERS: Kinds[ControllerKind] = Kinds(
     "ppafo.controllers",

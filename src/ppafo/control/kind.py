@@ -15,10 +15,10 @@ Plan = Callable[[Mapping[str, Any], Any, Any, tuple[Any, Any]], tuple[dict[str, 
 class ControllerKind:
     """A controller in the catalogue.
 
-    ``parameters`` is a NamedTuple class whose numbers, those of nested ones in their place, are the quantities in
+    ``parameters`` is a NamedTuple class whose numbers, nested ones in their place, are the quantities in
     order; ``initial`` is the start of the state, a NamedTuple of floats or of further ones. ``update(parameters, state,
     reference, measurement, period)`` returns the command from -1 to 1 and the next state, once every ``period`` [s].
-    At a command of 0 a proportional valve is closed and both chambers hold their gas; a solenoid pair vents both.
+    At a command of 0 a proportional valve is closed and both chambers keep their gas; a solenoid pair vents both.
 
     ``restart(state, requested, continues)`` is the state of a torque law while a task of a gait goes on (1) and where
     another one begins (0), at a requested torque [N m]; without it the law begins anew there. A law that

@@ -9,7 +9,7 @@ from ppafo.model.elementary import TURN, sine_and_cosine_of_turns
 
 
 class ConstantProfile(NamedTuple):
-    """The level."""
+    """One level, in the unit of what is prescribed."""
 
     level: Annotated[float, Number("", "the level")]
 
@@ -20,7 +20,7 @@ def constant_value(profile: ConstantProfile, time: float) -> tuple[float, float,
 
 
 def constant_bounds(profile: ConstantProfile) -> tuple[float, float]:
-    """The level [N m or rad], twice."""
+    """Lowest and highest value [N m or rad]: the level, twice."""
     return profile.level, profile.level
 
 
@@ -49,6 +49,7 @@ def ramp_hold_value(profile: RampHold, time: float) -> tuple[float, float, float
     """Value, rate and second derivative (0 also at the corners) at a time [s]."""
     gain = profile.level - profile.start_level
     progress = (time - profile.ramp_start) / profile.ramp_time
+    # Half-open, so that the rate is the ramp's at its start and 0 once its end is reached.
     inside = progress >= 0.0 and progress < 1.0
     fraction = max(0.0, min(1.0, progress))
     return profile.start_level + gain * fraction, (gain / profile.ramp_time if inside else 0.0), 0.0
@@ -151,6 +152,7 @@ def next_segment(segment: Segment, place: float, time: float, value: float) -> S
 
 def segment_at(profile: Tabulated, place: float) -> Segment:
     """The segment in which a place [s] of a repetition lies; its end is later than the place."""
+    # Every knot is looked at: a search would branch, and 32 selects cost little in vector code.
     segment = Segment(start=0.0, first=profile.value_01, end=profile.knots[0].time, last=profile.knots[0].value)
     for knot in profile.knots[1:]:
         segment = next_segment(segment, place, knot.time, knot.value)
@@ -208,7 +210,7 @@ def next_stretch(stretch: Stretch, place: float, knot: Knot) -> Stretch:
 
 
 def repeated_knot(profile: Tabulated, before: Knot, knot: Knot) -> Knot:
-    """A knot; the first one or the second one of the next repetition where those of this one are used up before it."""
+    """A knot; the first or second knot of the next repetition where this one has no more."""
     is_used = knot.time < profile.period
     is_first = before.time < profile.period
     second_is_used = profile.knots[0].time < profile.period
@@ -254,6 +256,7 @@ def smooth_value(profile: Tabulated, time: float) -> tuple[float, float, float]:
     at = stretch_at(profile, place)
     length = at.end.time - at.start.time
     chord = (at.end.value - at.start.value) / length
+    # Slope of the parabola through three knots: both chords, each weighted with the other's length.
     before = (at.start.value - at.earlier.value) / (at.start.time - at.earlier.time)
     after = (at.later.value - at.end.value) / (at.later.time - at.end.time)
     slope_start = (before * length + chord * (at.start.time - at.earlier.time)) / (at.end.time - at.earlier.time)
@@ -274,6 +277,7 @@ def smooth_bounds(profile: Tabulated) -> tuple[float, float]:
         length = end - start
         value, rate, bend = smooth_value(profile, start)
         twist = (profile.level + last - value - length * (rate + 0.5 * length * bend)) / length**3
+        # Extremes lie at knots or where the rate of a cubic is 0.
         for place in turning_places(rate, bend, 3.0 * twist):
             if 0.0 < place < length:
                 turned = value + place * (rate + place * (0.5 * bend + place * twist))

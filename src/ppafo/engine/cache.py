@@ -49,6 +49,7 @@ WRITTEN_BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 
 LONGEST_WAIT = 300.0
 """Seconds after which a process compiles for itself, whoever holds the lock; one that has died holds none."""
+# Between two tries to get the lock [s]: short beside the seconds of a compilation.
 _PAUSE = 0.05
 LOCK = ".lock-"
 """Beginning of the name of a lock file; the rest is the program's."""
@@ -56,11 +57,12 @@ QUIET = 2.0
 """Seconds of compiling that nobody has to hear of."""
 SECONDS_FILE = "seconds.txt"
 """The file of a kept program that says how long it took to compile [s]."""
+# Programs whose times are read for an estimate: a median of more says no more, and each costs two files.
 _MAXIMUM_ASKED = 20
 _models: ContextVar[int] = ContextVar("models that are compiled together", default=0)
 
 _PROGRAM = re.compile(r"ppafo_[a-z]+_[0-9a-f]{24}(-[0-9a-f]{12}|\..+)?")
-"""What the name of a program looks like; beside it, one of an earlier release, which lay in several files."""
+"""Names of programs; also of an earlier release, whose programs lay in several files."""
 
 NOTE = "not-working-"
 _ASIDE = re.compile(rf"\.writing-[0-9a-f]{{16}}|{re.escape(LOCK)}{_PROGRAM.pattern}|{NOTE}[a-z]+-[0-9a-f]{{12}}")
@@ -139,6 +141,7 @@ def load_generated(source: str, compiler: Compiler) -> ModuleType:
 def load_all(sources: Iterable[str], compiler: Compiler, load: Callable[[str], ModuleType]) -> None:
     """Import the modules with these sources by ``load``; several that ``compiler`` must make are made side by side."""
     missing = [source for source in dict.fromkeys(sources) if not is_kept(source, compiler)]
+    # One alone is compiled where it is needed, with its own message.
     if len(missing) < 2:
         return
     folder = cache_folder()
@@ -178,7 +181,7 @@ def list_programs(folder: Path) -> list[CachedProgram]:
 
 
 def clear(folder: Path) -> int:
-    """Remove all programs, and the folder where nothing else is in it; returns how many bytes that made free."""
+    """Remove all programs, and the folder where nothing else is in it; return how many bytes that freed."""
     freed = 0
     for program in [*list_programs(folder), *map(_measure_program, _entries_named(folder, _ASIDE))]:
         _remove(program.place)
@@ -192,11 +195,13 @@ def clear(folder: Path) -> int:
 def evict(folder: Path) -> None:
     """Remove programs unused for ``LONGEST_UNUSED``, those beyond ``MAXIMUM_BYTES``, and what a killed process left."""
     now, total = time.time(), 0
+    # The list begins with what was used last, so that the total passes the limit at what is dropped.
     for program in list_programs(folder):
         total += program.size
         if now - program.used > LONGEST_UNUSED or total > MAXIMUM_BYTES:
             _remove(program.place)
     for place in _entries_named(folder, _ASIDE):
+        # A day is longer than any compilation: what is older was left by a process that was killed.
         if now - _measure_program(place).used > _LONGEST_ASIDE:
             _remove(place)
 
@@ -213,6 +218,7 @@ def _import_program(wanted: _Wanted) -> ModuleType:
         return module
     try:
         with one_process(kept):
+            # Another process may have compiled it while this one waited for the lock.
             return _load_kept_module(kept, wanted) or _compile_and_keep(kept, wanted)
     except OSError as error:
         logger.warning("ppafo: the compiled model is not kept in %s: %s", folder, reason(error))
@@ -237,6 +243,7 @@ def _load_kept_module(kept: Path, wanted: _Wanted) -> ModuleType | None:
 
 def _compile_and_keep(kept: Path, wanted: _Wanted) -> ModuleType:
     """Compile a program in a folder aside, which takes its place when it is whole."""
+    # Written aside and renamed: to other processes a program is whole, or not there.
     aside = kept.with_name(f".writing-{secrets.token_hex(8)}")
     try:
         aside.mkdir(mode=0o700)
@@ -272,6 +279,7 @@ def _execute(name: str, source: str, path: Path, execute: Callable[[str, str, Mo
     sys.modules[name] = module
     try:
         execute(source, str(path), module)
+    # A module that was interrupted half-way must not be found by the next import.
     except BaseException:
         del sys.modules[name]
         raise
@@ -283,7 +291,7 @@ def _short_hash(described: str) -> str:
 
 
 def _is_whole(kept: Path) -> bool:
-    """Tell whether a program's folder is as it was written, file by file."""
+    """Return whether a program's folder is as it was written, file by file."""
     try:
         stated = json.loads(read_regular_file(kept / _CHECKSUMS))
         # What else lies there is no part of it: Numba tries, for an instant, whether it could write a file of its own.
@@ -296,7 +304,7 @@ def _is_whole(kept: Path) -> bool:
 
 
 def _is_own(kept: Path, files: Collection[str]) -> bool:
-    """Tell whether a program and all in it is this user's, and nobody else can write into its ``files`` and folders.
+    """Return whether a program and all in it is this user's, and nobody else can write into its ``files`` and folders.
 
     What came while others could write stays theirs. Nobody else can then change a file between this look and its use.
     """
@@ -324,7 +332,7 @@ def _checksum(path: Path) -> str:
 
 
 def _entries_named(folder: Path, pattern: re.Pattern[str]) -> list[Path]:
-    """Return what in a folder has such a name; what others put beside it is left alone."""
+    """Return the entries of a folder with such a name; what others put beside them is left alone."""
     try:
         return [place for place in folder.iterdir() if pattern.fullmatch(place.name)]
     except OSError:
@@ -366,6 +374,7 @@ def refusal(folder: Path | None) -> str:
         with contextlib.suppress(FileExistsError):
             folder.mkdir(mode=0o700)
         found = folder.lstat()
+        # Whoever can write in any folder above can rename this one and put his own in its place.
         above = [place.stat() for place in Path(os.path.realpath(folder)).parents]
     except (OSError, ValueError) as error:
         return f"{folder} cannot be made: {reason(error)}"
@@ -389,16 +398,17 @@ def _why_not_private(folder: Path, found: os.stat_result, above: list[os.stat_re
 
 
 def _can_be_exchanged(place: os.stat_result) -> bool:
-    """Tell whether another user can rename what lies in a folder."""
+    """Return whether another user can rename what lies in a folder."""
     if place.st_uid not in (0, os.geteuid()):
         return True
+    # A sticky folder such as /tmp lets each user rename only what is his own.
     writers = stat.S_IWOTH if _is_own_group(place.st_gid) else WRITTEN_BY_OTHERS
     return bool(place.st_mode & writers and not place.st_mode & stat.S_ISVTX)
 
 
 @cache
 def _is_own_group(number: int) -> bool:
-    """Tell whether a group is this user's alone: many systems give each user one, which may write where they may."""
+    """Return whether a group is this user's alone: many systems give each user one, which may write where they may."""
     import grp
     import pwd
 
@@ -424,7 +434,7 @@ def one_process(kept: Path) -> Iterator[None]:
 
 
 def _lock(place: Path) -> int | None:
-    """Open and lock a file, waiting for who has it; None where that cannot be done."""
+    """Open and lock a file, waiting for its present owner; None where that cannot be done."""
     if fcntl is None:
         return None
     end = time.monotonic() + LONGEST_WAIT
@@ -455,6 +465,7 @@ def compile_side_by_side(tasks: Sequence[Callable[[], object]], expected: float,
 
     workers = min(len(tasks), os.cpu_count() or 1)
     with announce(expected / workers, where, len(tasks)), ThreadPoolExecutor(workers) as pool:
+        # A context variable, not a global: two threads may compile different sets at once.
         known = _models.set(len(tasks))
         try:
             started = [pool.submit(copy_context().run, task) for task in tasks]
@@ -470,12 +481,14 @@ def announce(expected: float, where: str, models: int = 1) -> Iterator[None]:
 
     Nothing is said of what is quick, and of one of several models that are announced together.
     """
+    # One of several: their message counts them together.
     if _models.get():
         yield
         return
     what = "a model" if models == 1 else f"{models} models"
     text = f"ppafo: compiling {what} for this computer, about {time_text(max(expected, QUIET))} ..."
     timer = threading.Timer(QUIET, logger.warning, (text,))
+    # A program that ends while it compiles does not wait for the message.
     timer.daemon = True
     start = time.perf_counter()
     timer.start()
@@ -504,7 +517,7 @@ def estimate_seconds(source: str, kept: Iterable[Path], usual: float) -> float:
 
 
 FOLDER = "made"
-"""Folder of these files in that of the programs."""
+"""Folder of these files inside the folder of the programs."""
 
 MAXIMUM_MADE_BYTES = 50_000_000
 """Size of all files above which those that were not used for longest are removed."""
@@ -539,7 +552,7 @@ def kept_sizes(folder: Path) -> list[int]:
 
 
 def clear_kept(folder: Path) -> int:
-    """Remove all of it from the folder of the programs; returns how many bytes that made free."""
+    """Remove all of it from the folder of the programs; return how many bytes that freed."""
     sizes = [_remove_file(place) for place in _files(folder / FOLDER)]
     with contextlib.suppress(OSError):
         (folder / FOLDER).rmdir()
@@ -555,12 +568,13 @@ def _read(place: Path) -> bytes | None:
         os.utime(place)
     except OSError:
         return None
+    # A file that was cut by a full disk, or changed, counts as not there.
     stated, rest = content[:_HASH_BYTES], content[_HASH_BYTES:]
     return rest if hashlib.sha256(rest).digest() == stated else None
 
 
 def _is_own_file(found: os.stat_result, above: os.stat_result) -> bool:
-    """Tell whether a file is this user's, and so its folder, where nobody else can write: what is in it may be run."""
+    """Return whether a file and its folder are this user's, and nobody else can write there: it may be run."""
     if not hasattr(os, "geteuid"):
         return True
     is_written = (found.st_mode | above.st_mode) & WRITTEN_BY_OTHERS
@@ -568,6 +582,7 @@ def _is_own_file(found: os.stat_result, above: os.stat_result) -> bool:
 
 
 def _write(place: Path, content: bytes) -> None:
+    # Through a link the file would land in a folder that nobody has checked.
     if place.parent.is_symlink():
         return
     place.parent.mkdir(mode=0o700, exist_ok=True)
@@ -598,7 +613,7 @@ def _last_used(place: Path) -> float:
 
 
 def _files(folder: Path) -> list[Path]:
-    """The files of this module in a folder that is no link; what others put beside them is left alone."""
+    """Return this module's files in a folder that is no link; what others put beside them is left alone."""
     try:
         return [] if folder.is_symlink() else [item for item in folder.iterdir() if _OWN_NAME.fullmatch(item.name)]
     except OSError:
@@ -606,7 +621,7 @@ def _files(folder: Path) -> list[Path]:
 
 
 def _remove_file(place: Path) -> int:
-    """Remove a file; returns its size, 0 where it stays."""
+    """Remove a file; return its size, 0 where it stays."""
     try:
         size = place.lstat().st_size
         place.unlink()

@@ -24,7 +24,7 @@ Phases = list[list[str] | RarePhase]
 class Second(NamedTuple):
     """Expressions of the second stage of the gas, and of what a step changes, once ``second`` is known.
 
-    Then those of its error, and of the error of a valve that moves by ``shift``, over what is allowed [-].
+    Then of its error, and of the error of a valve that moves by ``shift``, over what is allowed [-].
     """
 
     stage: str
@@ -39,10 +39,10 @@ class GasScheme:
 
     ``loads`` are the groups that a step asks for from its begin on, ``stored`` has for groups of ``states`` what they
     are called at its end; ``start(plant, initial)`` makes the only group of states, None where there is none.
-    ``begun(program)`` is the row of the first stage, which the line ``begin(rows)`` makes as ``gas``; ``first`` are its
-    rates, and the flows of the second stage belong to the pressures ``ends``. ``add`` makes ``fed``, the state with the
-    gas of the step; ``move(rows, state, from, to)`` follows a vane that ends elsewhere than assumed, ``work`` counts
-    what the gas did on it.
+    ``begun(program)`` is the struct of the first stage, which the line ``begin(rows)`` makes as ``gas``; ``first`` are
+    its rates, and the flows of the second stage belong to the pressures ``ends``. ``add`` makes ``fed``, the state with
+    the gas of the step; ``move(rows, state, from, to)`` follows a vane that ends elsewhere than assumed, ``work``
+    counts what the gas did on it.
     """
 
     parameters: Mapping[str, type]
@@ -66,8 +66,8 @@ class Feed:
     """What stands between constant pressures and the valve, with a state that the stages solve together with the gas.
 
     ``source(rows, state)`` is the plant at the pressures of a state. ``begin`` makes the first stage, in which
-    ``chambers`` are those of the gas and ``after_first`` is the state after it; ``end(rows)`` brings the state to the
-    end of the step, ``error`` is what that misses. ``loads`` and ``stored`` are as in ``GasScheme``.
+    ``chambers`` are the chambers of the gas and ``after_first`` is the state after it; ``end(rows)`` brings the state
+    to the end of the step, ``error`` is what that misses. ``loads`` and ``stored`` are as in ``GasScheme``.
     """
 
     parameters: Mapping[str, type]

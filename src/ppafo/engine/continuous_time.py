@@ -1,4 +1,4 @@
-"""The plant in continuous time, as solvers and linear models share it: gas that is not ideal, a free vane, its modes.
+"""The plant in continuous time, as solvers and linear models share it: real gas, an unconstrained vane, its modes.
 
 A vane that sticks, slides or stands at a stop is in modes, which root functions end.
 """
@@ -36,6 +36,7 @@ def real_gas_rates(
 ) -> tuple[float, float]:
     """Rates of both contents [kg/s] of gas that is not ideal, from the flows into its chambers. Equation (3)."""
     volume_1, volume_2 = chamber_volumes(plant, angle)
+    # The chambers are opposite: what one gains in volume the other loses.
     growth = plant.volume_per_angle * angular_velocity
     return (
         content_rate(content_1, volume_1, growth, flow_1),
@@ -52,9 +53,9 @@ def free_motion(
     added_torque: float,
     way: float,
 ) -> tuple[float, float]:
-    """Slopes of angle [rad/s] and angular velocity [rad/s^2] of a vane that slides towards ``way`` (0: it is held).
+    """Slopes of angle [rad/s] and angular velocity [rad/s^2] of a vane that slides towards ``way`` (0: it sticks).
 
-    Equations (1), (2), (10). ``added_torque`` [N m] drives the vane beside what the plant has: that of a leg.
+    Equations (1), (2), (10). ``added_torque`` [N m] is the leg's, beside the plant's own.
     """
     if way == 0.0:
         return 0.0, 0.0
@@ -77,7 +78,7 @@ def torque_on_vane(plant: PlantParameters, angle: float, mass_1: float, mass_2: 
 
 
 def mode_at_rest(plant: PlantParameters, angle: float, torque: float) -> float:
-    """Direction in which a vane at ``angle`` [rad] sets off under ``torque`` [N m]: 1, -1, or 0 where it is held."""
+    """Direction in which a vane at ``angle`` [rad] sets off under ``torque`` [N m]: 1, -1, or 0 where it sticks."""
     if holds_still(torque, plant.static_torque, angle <= plant.angle_min, angle >= plant.angle_max):
         return 0.0
     return 1.0 if torque > 0.0 else -1.0
@@ -85,6 +86,7 @@ def mode_at_rest(plant: PlantParameters, angle: float, torque: float) -> float:
 
 def roots_at_rest(plant: PlantParameters, angle: float, torque: float) -> Roots:
     """Distance of the torque from breakaway in both directions [N m]; a stop holds against any torque."""
+    # A constant has no zero: the solver never leaves the mode through a stop that holds.
     towards_upper = 1.0 if angle >= plant.angle_max else plant.static_torque - torque
     towards_lower = 1.0 if angle <= plant.angle_min else plant.static_torque + torque
     return Roots(towards_upper, towards_lower)
@@ -100,4 +102,5 @@ def after_stop(run: Run, states: Mapping[str, Any], angular_velocity: float) -> 
     """Angular velocity [rad/s] after an impact on a stop; 0 where the rebound is not worth following."""
     law = python_place(rebound, run.program.effects, run.effects)
     thrown_back = 0.0 if law is None else float(law(states, angular_velocity))
+    # Rebounds follow in ever shorter times: without a lowest speed the solver would restart without end.
     return thrown_back if abs(thrown_back) > SLOWEST_REBOUND else 0.0

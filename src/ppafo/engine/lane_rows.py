@@ -40,6 +40,7 @@ _LOAD = re.compile(r"(?P<group>\w+) = (\(\)|\w+\([\w(), \[\]]*\))")
 def lanes_of(program: Program) -> int:
     """Runs of one block of a program."""
     groups = (program.state_rows(), program.parameter_rows(), program.step_rows())
+    # Fewer lanes rather than a block that spills: a miss of the first cache costs more than half-used loops.
     rows = sum(len(leaf_paths(row, name)) for group in groups for name, row in group.items())
     return next((lanes for lanes in (LANES, LANES // 2) if 8 * lanes * rows <= FIRST_CACHE), VECTOR)
 
@@ -261,6 +262,7 @@ def over_lanes(lines: list[str]) -> list[str]:
     """A loop over all lanes of the block, without loads that nothing in it asks for: they take time to compile."""
     kept: list[str] = []
     loaded_groups: set[str] = set()
+    # From the end, so that what later lines ask for is known.
     for line in reversed(lines):
         load = _LOAD.fullmatch(line)
         words = re.findall(r"\w+", line)

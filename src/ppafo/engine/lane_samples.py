@@ -1,7 +1,7 @@
-"""What the lanes do at a sample: sense, control, keep what sensors and valve get late; and meters, and traces.
+"""What the lanes do at a sample: sense, control, keep what reaches sensors and valve late; and meters, and traces.
 
 Meters and traces stand where nothing is recorded. Their samples are the ones that a recording would have. Meters
-get the course of the reference too, which is looked at once before the first sample and followed from there.
+get the whole reference too, which is looked at once before the first sample and followed from there.
 """
 
 from ppafo.engine.lane_rows import LaneRows, Rows, RunRows, indent
@@ -76,22 +76,24 @@ def sampled_with_faults(rows: Rows, lines: list[str]) -> list[str]:
     add, before = rows.add, rows.program.controller
     assert before is not None, "a controller takes samples"
     stored = dict(zip(leaf_paths(type(before.initial), "controller_state"), leaves(before.initial), strict=True))
+    # The state is stored by the lines below, under the condition that the controller has run.
     kept = [line for line in lines if not any(line.startswith(f"{rows.cells[path]} = ") for path in stored)]
     called = [line.replace("command, controller_state =", "ordered, after_state =") for line in kept[:-1]]
     level = "after_state.safety.level" if f"controller_state.{LEVEL}" in stored else "0.0"
     return [
         *[rows.load(group) for group in ("result", "plant_faults", "shut_off", "unpowered", "sensors")],
         "now = step_index * timing.step",
-        f"dark = {add(is_in_brown_out)}(plant_faults, now)",
+        f"brown_out = {add(is_in_brown_out)}(plant_faults, now)",
         f"runs = {add(runs_at)}(plant_faults, now, timing.period, int(sensors.seed), step_index // steps_per_sample)",
         *called,
         f"takes = {add(is_due)}(plant_faults.slow_time, plant_faults.slow_delay, now, timing.period)",
-        f"unpowered = {add(next_unpowered)}(shut_off, unpowered, runs, {level} >= {STOPPED!r}, dark, timing.period)",
+        f"stopped = {level} >= {STOPPED!r}",
+        f"unpowered = {add(next_unpowered)}(shut_off, unpowered, runs, stopped, brown_out, timing.period)",
         *rows.store("unpowered"),
-        f"vents = dark | {add(is_silenced)}(shut_off, unpowered)",
+        f"vents = brown_out | {add(is_silenced)}(shut_off, unpowered)",
         f"{rows.cells['result.command']} = {VENT!r} if vents else (ordered if runs & takes else result.command)",
         *[
-            f"{rows.cells[path]} = {float(first)!r} if dark else "
+            f"{rows.cells[path]} = {float(first)!r} if brown_out else "
             f"({path.replace('controller_state', 'after_state', 1)} if runs else {path})"
             for path, first in stored.items()
         ],
@@ -131,7 +133,7 @@ def torque_line(rows: Rows, angle: str) -> str:
 
 
 def current_readings(rows: Rows) -> list[str]:
-    """Lines that make what the sensors show at the present."""
+    """Lines that make the sensors' present readings."""
     return ["angle = state.angle", *present_pressures(rows), *as_shown(rows)]
 
 
@@ -178,7 +180,7 @@ def sense_gait(rows: Rows) -> list[str]:
 
 
 def late_readings(rows: Rows) -> list[str]:
-    """Lines that keep the readings of a walk, and hand the controller those of a sensor as late as its fault says."""
+    """Lines that keep the readings of a walk, and hand the controller each sensor's as late as its fault says."""
     lines = ["slots = signal_history.shape[1]"]
     for row, (sensor, reading) in enumerate(READINGS.items()):
         age = f"{rows.add(samples_late)}(gait_sensors.{sensor}_fault, step_index * timing.step, sample_index)"
@@ -189,7 +191,7 @@ def late_readings(rows: Rows) -> list[str]:
 
 
 def signals_before_start(rows: Rows) -> list[str]:
-    """Fills the late signals with those at the start, which sensors show until the first have come."""
+    """Lines that fill the late signals with their values at the start, which sensors show until the first have come."""
     if not rows.program.late_signals:
         return []
     lines = [rows.load("plant"), rows.load("state"), *current_readings(rows)]
@@ -225,7 +227,7 @@ def look() -> list[str]:
 
 
 def remember_commands(rows: Rows) -> list[str]:
-    """Keeps the command of every step, where the valve gets it late."""
+    """Lines that keep the command of every step, where the valve gets it late."""
     if not rows.program.late_commands:
         return []
     kept = f"command_history[command_place, lane] = {rows.cells['result.command']}"
@@ -256,7 +258,7 @@ TRACED_IN_WALKS: dict[str, str] = {
 REQUEST = "controller_state.request.torque"
 """Where a controller of walking keeps the torque that it wants, if it wants one."""
 TRUE_MASSES = {name: f"masses.{name}" for name in ("mass_1", "mass_2")}
-"""Where it has those that a recording has otherwise of gas with an energy balance, or that is not ideal."""
+"""Paths of the true masses, which a recording shows for gas with an energy balance or that is not ideal."""
 
 
 def measure_sample(rows: Rows, moment: str) -> list[str]:
@@ -284,6 +286,7 @@ def _meter_updates(rows: Rows) -> tuple[list[str], list[str]]:
     """Lines that begin the meters with the first sample, and those that take a further one."""
     program, add = rows.program, rows.add
     groups = program.meter_groups
+    # A locked vane never moves: its meters of motion keep what the first sample gave them.
     moving = {group: kind for group, kind in groups.items() if not (program.is_locked and kind.of_motion)}
     begin = [f"{group} = {add(kind.start)}(course, {_sample_for(kind)})" for group, kind in groups.items()]
     begin += [line for group in groups for line in rows.store(group)]
@@ -358,7 +361,7 @@ def sample_lines(rows: Rows, moment: str) -> list[str]:
 
 
 FELL = "walk.fall_time"
-"""Row of the time of a fall [s], below 0 before one."""
+"""Path of the time of a fall [s], below 0 before one."""
 
 WEARER_ROWS = {
     "strides": "walk.strides",
@@ -369,27 +372,27 @@ WEARER_ROWS = {
     "bhargava": "reflexes.bhargava",
     "fall_time": FELL,
 }
-"""The rows that the sample of a wearer who reacts is made of, beside its time."""
+"""Numbers from which the sample of a neuromuscular gait model is made, beside its time."""
 
 
 def wearer_sample(rows: Rows) -> list[str]:
-    """Lines that make the sample of a wearer who reacts."""
+    """Lines that make the sample of a neuromuscular gait model."""
     values = {**WEARER_ROWS, "time": "next_record * (timing.step * interval)"}
     return [rows.load("walker"), rows.load("reflexes"), f"of_wearer = {_row(rows.add(WearerSample), values)}"]
 
 
 def _zeros(row: type[FootSample] | type[StrideSample]) -> dict[str, str]:
-    """A row of what a run does not have."""
+    """Zeros for what a run does not have."""
     return dict.fromkeys(row._fields, "0.0")
 
 
 def _row(name: str, values: dict[str, str]) -> str:
-    """Expression that makes a row."""
+    """Expression that makes a NamedTuple."""
     return f"{name}({', '.join(f'{field}={value}' for field, value in values.items())})"
 
 
 def _stride_values(rows: Rows) -> dict[str, str]:
-    """Where a walk is in its stride."""
+    """Gait phase of a walk, and totals of its strides."""
     totals = ("strides", "positive_push_off_work", "net_push_off_work", "clearances", "toe_landings")
     return {
         "supplied_mass": "state.supplied_mass",
@@ -436,7 +439,7 @@ def _trace_lines(rows: LaneRows, moment: str) -> list[str]:
 
 
 def course_lines(rows: Rows) -> list[str]:
-    """Lines that write the course of the reference into its rows, before the first sample.
+    """Lines that look at the whole reference before the first sample: its last value, its largest, and where it holds.
 
     A monotone reference is largest at one of its ends, and where its hold starts shows on the way. Any other one is
     looked at sample by sample, over all lanes at once; its hold is looked for from the end.
@@ -463,6 +466,7 @@ def course_lines(rows: Rows) -> list[str]:
         *tolerance,
         "for index in range(last_record - 1, -1, -1):",
         *indent(rows.over_lanes([*given, f"{cell['hold_start']} = {found}"])),
+        # The search ends as soon as every lane has found its hold.
         "    earliest = 1.0",
         *indent(rows.over_lanes([f"earliest = min(earliest, {cell['hold_start']})"])),
         "    if earliest > 0.0:",

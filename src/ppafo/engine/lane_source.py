@@ -70,7 +70,7 @@ def write_lanes(program: Program, collector: Collector, lanes: int = 0) -> str:
 def lane_loop(program: Program, collector: Collector, name: str, lanes: int = 0) -> str:
     """The function that runs one block of a program, of some lanes, 0 for as many as fit.
 
-    That of one lane takes the first column of its arrays, however many there are.
+    The function of one lane takes the first column of its arrays, however many there are.
     """
     link_program(program, collector)
     rows = LaneRows(program, collector, lanes)
@@ -80,6 +80,7 @@ def lane_loop(program: Program, collector: Collector, name: str, lanes: int = 0)
         *indent(
             [
                 f"x = empty_rows({rows.count}, {rows.lanes})",
+                # A literal width lets the compiler unroll the loops of a small block.
                 f"width = {rows.lanes if rows.lanes <= VECTOR else 'states.shape[1]'}",
                 *over_rows(len(rows.state_at), "x[row, lane] = states[row, lane]"),
                 *over_rows(len(rows.parameter_at), f"x[{len(rows.state_at)} + row, lane] = parameters[row, lane]"),
@@ -113,7 +114,7 @@ def all_steps(rows: Rows) -> list[str]:
 
 
 def between_samples(rows: Rows) -> list[str]:
-    """A step in which samples are due anywhere."""
+    """A step in which samples may be due at any time."""
     return [
         "reached = 0.0",
         "while reached < 1.0:",

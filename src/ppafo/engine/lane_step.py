@@ -1,6 +1,6 @@
 """What the lanes do between two samples: the way of one step, from the valve to the state that is stored.
 
-A step is whole where nothing changes abruptly inside it and its error is known to be small: the gas of a held vane
+A step is whole where nothing changes abruptly inside it and its error is known to be small: the gas of a locked vane
 behind a valve that follows at once. Otherwise each lane goes through it in parts of its own. A part ends where a coil
 switches, a late command arrives, the vane meets a stop, a sample is due, or its error would become too large. Lanes
 that are through wait, masked, and no lane sees another.
@@ -24,6 +24,7 @@ from ppafo.model.effects.kind import Moment, State
 from ppafo.model.plant import SinglePort
 from ppafo.model.ports import at_valve, leakage_path
 
+# Beyond 1e6 rad/s or 1 t of gas a run is lost; 100,000 parts of one step are minutes without progress.
 IMPOSSIBLE_RATE = 1.0e6
 IMPOSSIBLE_MASS = 1.0e3
 MAXIMUM_PARTS = 100_000
@@ -32,7 +33,7 @@ LARGEST = 1.0e300
 
 
 def find_begin(rows: Rows) -> list[str]:
-    """Finds what a step is handed by the one before, where there was none; of a held vane it lasts for all steps."""
+    """Finds what a step is handed by the one before, where there was none; for a locked vane it lasts for all steps."""
     if not rows.program.hands_chambers_on:
         return []
     held = f"held = {rows.add(pneumatics.held_chambers)}(plant, state.angle)"
@@ -95,6 +96,7 @@ def phases(rows: Rows) -> Phases:
 def open_valve(rows: Rows) -> list[str]:
     """The valve, and the flows with which the step begins."""
     valve, feed, add = rows.program.valve, rows.program.feed, rows.add
+    # A part may be refused: its valve becomes the state only once it is taken.
     after = "next_valve" if rows.program.is_parted else "valve_state"
     return [
         f"shown, {after} = {add(valve.advance)}(valve, valve_state, command, time, length)",
@@ -171,7 +173,7 @@ def pass_gas(rows: Rows) -> list[str]:
 
 
 def states_ahead(rows: Rows, lines: list[str]) -> list[str]:
-    """Lines that predict, for the end of the first stage, the states that laws called in some lines ask for.
+    """Lines that predict, for the end of the first stage, the states that the laws in some lines take.
 
     Without them the flows of the second stage would have the states of the begin, and the order would fall to one.
     """
@@ -197,6 +199,7 @@ def feed(rows: Rows) -> list[str]:
     if not program.is_adaptive:
         return lines
     if program.feed is not None:
+        # The larger of both errors, not their sum: each has its own limit.
         error = f"max({error}, {program.feed.error(rows)})"
     moves = program.valve.shift
     if moves is not None:
@@ -231,7 +234,9 @@ def finish(rows: Rows) -> list[str]:
         *lines,
         f"missed = max({', '.join(['error', 'gas_error', *state_errors(rows)])})",
         "error = missed / timing.tolerance",
+        # A part with a mass below 0 or NaN counts as the worst error, and is done again, shorter.
         f"error = error if {positive(rows)} else {motion.MAXIMUM_ERROR!r}",
+        # A run that has failed is carried to its end without more parts, so that its lane holds nobody up.
         f"refused = {add(motion.is_refused)}(error, length) and not result.failure_time <= time",
         f"next_length = {add(motion.next_pace)}(pace, error, length, refused, timing.step).length",
         f"active = {rows.remaining} > 0.0",
@@ -313,7 +318,7 @@ def positive(rows: Rows) -> str:
 
 
 def masses_after(rows: Rows, *others: str) -> list[str]:
-    """Masses at the end of a step that must be above 0: of the gas, and of some other rows."""
+    """Masses at the end of a step that must be above 0: of the gas, and of some other structs."""
     groups = ("after", *rows.program.gas.stored.values(), *others)
     return [f"{group}.mass_{number}" for group in groups for number in (1, 2)]
 
@@ -334,7 +339,7 @@ def store_all(rows: Rows, flag: str) -> list[str]:
 
 
 def judge(rows: Rows, flag: str = "", followed: str = "") -> list[str]:
-    """The first time at which a run left what is possible, or where ``followed`` says so what its parts can follow."""
+    """Lines that keep the first time at which a run became unphysical, or its parts could not follow (``followed``)."""
     gas = ", ".join(masses_after(rows))
     waits = f"not {flag} or " if flag else ""
     return [
@@ -397,6 +402,7 @@ def step_in_parts(rows: Rows) -> list[str]:
         *indent([] if isinstance(rows, RunRows) else put_aside(rows)),
         *indent(part),
         *indent(none_left(rows)),
+        # The else of the loop is what a run without end in sight gets.
         "        break",
         "else:",
         *indent(rows.over_lanes(give_up(rows))),
@@ -426,7 +432,7 @@ def part_opening(rows: Rows) -> list[str]:
 
 
 def measure(rows: Rows) -> list[str]:
-    """Lines that find the length of a part; where the vane is free, until it meets a stop."""
+    """Lines that find the length of a part; where the vane is unconstrained, until it meets a stop."""
     program, add = rows.program, rows.add
     lines = ["remaining = max(goal * timing.step - before, 0.0)", "until = remaining"]
     if program.late_commands:
@@ -484,6 +490,7 @@ def handed_aside(rows: LaneRows) -> dict[str, str]:
 def add_up(rows: Rows) -> list[str]:
     """Lines that count the time of a part that is taken; the end of the last one is the goal to the last bit."""
     return [
+        # Sums of part lengths miss the goal by rounding: the last part sets it.
         f"arrives = length >= {rows.remaining} and taken or {rows.remaining} == 0.0",
         f"{rows.before} = goal * timing.step if arrives else before + (length if taken else 0.0)",
         f"{rows.remaining} = 0.0 if arrives else {rows.remaining}",

@@ -141,6 +141,7 @@ def run_blocks(batch: Batch, take: Callable[[slice, BatchResult], None], threads
     starts = range(0, runs, lanes)
     workers = 1 if len(starts) == 1 else min(len(starts), threads or os.cpu_count() or 1)
 
+    # One iterator for all threads: a range iterator hands each start to one of them.
     waiting = iter(starts)
     stop = threading.Event()
 
@@ -197,6 +198,7 @@ class LaneBlock:
         self._record = np.empty((records, states.shape[0], self._width))
         traces = (clock.samples - 1) // clock.trace_every + 1 if clock.trace_every else 0
         self._trace = np.empty((traces, len(program.traced), self.states.shape[1]))
+        # Two slots more than the delay: the present step, and the one that is being written.
         self._signals = np.zeros((SIGNAL_ROWS, clock.signal_delay + 2, self.states.shape[1]))
         self._commands = np.zeros((clock.command_delay + 2, self.states.shape[1]))
 
@@ -204,6 +206,7 @@ class LaneBlock:
         """Go ``step_count`` steps on."""
         clock = self._clock
         interval = float(clock.record_every or clock.measure_every)
+        # Samples before this step are taken; one that lies on it to rounding is still to come.
         taken = math.ceil((self._next_step - SAME_MOMENT) / interval) if interval else 0
         self._module.advance(
             self.states,
@@ -252,6 +255,7 @@ def _pad_columns(columns: Floats) -> Floats:
     rows, width = columns.shape
     padded = np.empty((rows, width + -width % VECTOR))
     padded[:, :width] = columns
+    # Lanes that nobody asked for repeat the last run: zeros could fail, and be slow, in the physics.
     padded[:, width:] = columns[:, -1:]
     return padded
 
@@ -262,6 +266,7 @@ def add_meters(batch: Batch, meters: Sequence[MeterKind], traced: Sequence[str] 
     clock, interval = batch.clock, batch.clock.record_every
     clock = replace(clock, record_every=0, measure_every=interval, trace_every=trace_every)
     rows = sum(len(leaf_paths(row, name)) for name, row in program.state_rows().items())
+    # Meters begin with zeros; their first sample fills them.
     states = np.zeros((rows, batch.states.shape[1]))
     states[: batch.states.shape[0]] = batch.states
     return Batch(program, clock, batch.parameters, states)
@@ -340,22 +345,21 @@ def replay(batch: Batch, inputs: StepInputs) -> BatchResult:
     runs = batch.states.shape[1]
     lanes = lanes_of(batch.program)
     blocks = [slice(first, min(first + lanes, runs)) for first in range(0, runs, lanes)]
-    return join_results([_replay_block(batch, inputs, block) for block in blocks])
-
-
-def _replay_block(batch: Batch, inputs: StepInputs, runs: slice) -> BatchResult:
     program, parameters, command = batch.program, inputs.parameters, inputs.command
-    block = begin_block(replace(batch, parameters=batch.parameters[:, runs], states=batch.states[:, runs]))
     command_row = row_numbers(program.state_rows())[COMMAND]
     numbered = row_numbers(program.parameter_rows())
     rows = [numbered[path] for path in parameters]
     table = np.array([*parameters.values(), *(() if command is None else (command,))])
     # Steps at which any input differs from the step before, the first step among them.
     starts = [0, *(np.flatnonzero((np.diff(table, axis=1) != 0.0).any(axis=0)) + 1).tolist()]
-    for start, end in zip(starts, [*starts[1:], batch.clock.step_count], strict=True):
-        if command is not None:
-            block.states[command_row] = command[start]
-        if rows:
-            block.set_parameters(rows, table[: len(rows), start])
-        block.advance(end - start)
-    return block.result()
+    results = []
+    for of_block in blocks:
+        block = begin_block(replace(batch, parameters=batch.parameters[:, of_block], states=batch.states[:, of_block]))
+        for start, end in zip(starts, [*starts[1:], batch.clock.step_count], strict=True):
+            if command is not None:
+                block.states[command_row] = command[start]
+            if rows:
+                block.set_parameters(rows, table[: len(rows), start])
+            block.advance(end - start)
+        results.append(block.result())
+    return join_results(results)

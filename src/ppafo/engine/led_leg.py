@@ -1,4 +1,4 @@
-"""A foot on a shank that is led, without ground: the torque that it adds to a free vane, in the lanes and in Python.
+"""A foot on a prescribed shank, without ground: the torque that it adds to an unconstrained vane.
 
 Foot, foot plate and vane turn as one body, whose inertia the plant has; what shank, knee and weight do to it stands
 here. A walk's free foot has the same physics with more around it (``scheme/walking.py``).
@@ -64,6 +64,7 @@ def torque_lines(program: Program, add: Callable[..., str], time: str, angle: st
     if kind is None:
         return ["added = 0.0"]
     if kind is CONSTANT:
+        # A shank that rests needs one sine instead of two in each part of a step.
         return [f"added = {add(torque_on_resting_foot)}(load, shank.level, {angle})"]
     if kind is GAIT_SHANK:
         lines = [f"shank_now = {add(kind.value)}(shank, {time})"]

@@ -138,6 +138,7 @@ def _compilers(name: str, folder: Path | None) -> tuple[Compiler, ...]:
     if not found:
         where = f"{BACKEND_VARIABLE}={name}: " if name else ""
         raise SimulationError(f"{where}there is no compiler on this computer: {HOW_TO_INSTALL}")
+    # The last one is kept even if it failed, so that its own error is what the user reads.
     return tuple(compiler for compiler in found if not _has_failed(compiler, folder)) or (found[-1],)
 
 
@@ -165,6 +166,7 @@ def _load_by(source: str, compilers: tuple[Compiler, ...]) -> ModuleType:
     try:
         return load_generated(source, compiler)
     except CompilerError as failure:
+        # One reason, such as missing headers, often stops several compilers.
         failed = [item for item in compilers if item is compiler or item.name in failure.names]
         left = tuple(item for item in others if item not in failed)
         if not left:
@@ -181,16 +183,13 @@ def _load_by(source: str, compilers: tuple[Compiler, ...]) -> ModuleType:
             raise
         if compilers[-1].name != NUMBA:
             raise ProgramError(f"{refused}; {BACKEND_VARIABLE}={NUMBA} may compile it") from refused
-        return _load_by_numba(source, compilers[-1], refused)
-
-
-def _load_by_numba(source: str, numba: Compiler, refused: ProgramError) -> ModuleType:
-    """A model that has no C, for instance because a law calls ``math.sin``."""
-    was_kept = is_kept(source, numba)
-    module = load_generated(source, numba)
-    if not was_kept:
-        logger.warning("ppafo: %s; Numba compiles this model", refused)
-    return module
+        # A model that has no C, for instance because a law calls ``math.sin``.
+        numba = compilers[-1]
+        was_kept = is_kept(source, numba)
+        module = load_generated(source, numba)
+        if not was_kept:
+            logger.warning("ppafo: %s; Numba compiles this model", refused)
+        return module
 
 
 def _leave_out(failed: Iterable[Compiler], failure: CompilerError) -> None:

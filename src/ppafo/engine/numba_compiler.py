@@ -1,6 +1,6 @@
 """Numba as a compiler of programs; their functions are compiled once in a process, however many programs call them.
 
-Most of a program's functions are those of other programs too. Each is known by a hash of its text and of all that it
+Most of a program's functions occur in other programs too. Each is known by a hash of its text and of all that it
 calls, so that what is shared is the same to the last bit; the hash is in its symbol, so that nothing else has its name.
 """
 
@@ -26,7 +26,7 @@ from ppafo.errors import SimulationError, one_line
 _LENGTH = 24
 _SHARED: dict[str, Any] = {}
 _ONE_AT_A_TIME = threading.RLock()
-"""What is shared, and the settings of Numba, are those of the process."""
+"""What is shared, and Numba's settings, belong to the whole process."""
 
 _KEPT, _NOT_KEPT = "cache=True", "cache=False"
 
@@ -47,7 +47,7 @@ class NumbaCompiler:
         return _identity()
 
     def described(self) -> str:
-        """Its version, and that of LLVM."""
+        """Its version, and LLVM's."""
         numba = _imported()
         import llvmlite.binding
 
@@ -56,6 +56,7 @@ class NumbaCompiler:
 
     def compile_text(self, source: str, path: str, module: ModuleType) -> None:
         """Run the text of a module that is to be compiled."""
+        # A text that is not on disk has no folder in which Numba could keep its files.
         text = source if Path(path).is_absolute() else source.replace(_KEPT, _NOT_KEPT)
         _run_by_numba(text, path, module, _compile_text)
 
@@ -85,7 +86,7 @@ def _imported() -> ModuleType:
 
 
 def _errors_of_settings() -> tuple[type[Exception], ...]:
-    """What Numba raises at its import: its own error, and that of PyYAML, with which it reads its file if it can."""
+    """What Numba raises at its import: its own error, and PyYAML's, with which it reads its file if it can."""
     yaml = sys.modules.get("yaml")
     return (ValueError,) if yaml is None else (ValueError, yaml.YAMLError)
 
@@ -107,7 +108,11 @@ def _run_by_numba(source: str, path: str, module: ModuleType, run: Callable[[str
     try:
         with _ONE_AT_A_TIME, _numba_files_beside_source():
             if Path(path).is_absolute():
-                _check_numba_can_write(Path(path).parent / "__pycache__")
+                # Where Numba cannot write it takes another folder, of which nobody knows what is in it: OSError
+                # instead.
+                folder = Path(path).parent / "__pycache__"
+                folder.mkdir(mode=0o700, exist_ok=True)
+                tempfile.TemporaryFile(dir=folder).close()
             run(source, path, module)
     except NumbaError as error:
         raise mistake(str(error), source) from None
@@ -159,7 +164,12 @@ def _run_with_shared(source: str, path: str, module: ModuleType) -> None:
         described = "\n".join([text, *(f"{item} {keys.get(item, '')}" for item in sorted(used))])
         key = hashlib.sha256(described.encode()).hexdigest()[:_LENGTH]
         if key not in _SHARED:
-            _SHARED[key] = _define(node, path, name, key, used)
+            scope = {"__name__": __name__, **used}
+            exec(compile(ast.Module([node], []), path, "exec"), scope)
+            made = scope[name]
+            if isinstance(node, ast.FunctionDef):
+                made.py_func.__qualname__ = f"{name}_{key}"
+            _SHARED[key] = made
         names[name], keys[name] = _SHARED[key], key
 
 
@@ -176,22 +186,9 @@ def _shared_name(node: ast.stmt) -> str:
     return node.name if is_called and not has_types else ""
 
 
-def _define(node: ast.stmt, path: str, name: str, key: str, used: dict[str, Any]) -> Any:
-    """The function or row, with what it uses as its globals.
-
-    Their module is one that every process can import: a kept program names it, and is loaded without the others.
-    """
-    scope = {"__name__": __name__, **used}
-    exec(compile(ast.Module([node], []), path, "exec"), scope)
-    made = scope[name]
-    if isinstance(node, ast.FunctionDef):
-        made.py_func.__qualname__ = f"{name}_{key}"
-    return made
-
-
 @contextlib.contextmanager
 def _numba_files_beside_source() -> Iterator[None]:
-    """Let Numba keep its files in the program's folder: those of ``NUMBA_CACHE_DIR`` are checked by nobody."""
+    """Let Numba keep its files in the program's folder: nobody checks the files of ``NUMBA_CACHE_DIR``."""
     from numba.core import config
 
     others = {name: getattr(config, name) for name in ("CACHE_DIR", "CACHE_LOCATOR_CLASSES") if hasattr(config, name)}
@@ -202,9 +199,3 @@ def _numba_files_beside_source() -> Iterator[None]:
     finally:
         for name, value in others.items():
             setattr(config, name, value)
-
-
-def _check_numba_can_write(folder: Path) -> None:
-    """Raise OSError where Numba would take another folder, of which nobody knows what is in it."""
-    folder.mkdir(mode=0o700, exist_ok=True)
-    tempfile.TemporaryFile(dir=folder).close()

@@ -56,9 +56,11 @@ class Outline:
     def text(self) -> str:
         """The hash of everything that was added, as a line of the module."""
         made = hashlib.sha256()
+        # A change in how functions are written changes the text, too.
         composers = [file_hash(module.__file__ or "") for module in _WRITTEN_BY]
         adapted = f"{emitted_name(self.adapt)} {file_hash(self.adapt.__code__.co_filename)}"
         for part in (sys.version, *composers, adapted, self.decorator, *self.parts):
+            # Each part with its length, or two lists of parts could run into one another.
             made.update(f"{len(part)} {part}".encode("utf-8", "surrogatepass"))
         return f"# made from {made.hexdigest()}"
 
@@ -108,7 +110,19 @@ class Outline:
             f"{name} = {self._described(value, function)}"
             for name, value in self._read(function.__globals__, names, ())
         ]
-        shapes = [(inner.co_code.hex(), inner.co_names, inner.co_varnames, _constants(inner)) for inner in codes]
+        shapes = [
+            (
+                inner.co_code.hex(),
+                inner.co_names,
+                inner.co_varnames,
+                [
+                    (type(item).__name__, repr(item))
+                    for item in inner.co_consts
+                    if not isinstance(item, CodeType | frozenset)
+                ],
+            )
+            for inner in codes
+        ]
         place = code.co_filename, code.co_firstlineno, file_hash(code.co_filename)
         counts = code.co_argcount, code.co_kwonlyargcount
         further = self._declared(function), self.effects.get(function, ())
@@ -135,10 +149,6 @@ def _codes(code: CodeType) -> Iterator[CodeType]:
     for item in code.co_consts:
         if isinstance(item, CodeType):
             yield from _codes(item)
-
-
-def _constants(code: CodeType) -> list[tuple[str, str]]:
-    return [(type(item).__name__, repr(item)) for item in code.co_consts if not isinstance(item, CodeType | frozenset)]
 
 
 def file_hash(file: str) -> str:

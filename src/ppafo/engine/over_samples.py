@@ -24,7 +24,12 @@ def over_samples(function: Callable[..., Any], *given: Any) -> Any:
 
     What is the same for all samples may stay one number.
     """
-    return called_over_samples(function, _columns_of(function), *given)
+    # A form that was made from a function that has changed since is made anew.
+    found = _composed(function)
+    if found is not None and not found[0].is_current():
+        _composed.cache_clear()
+        found = _composed(function)
+    return called_over_samples(function, (None if found is None else found[1]), *given)
 
 
 def called_over_samples(function: Callable[..., Any], of_columns: Callable[..., Any] | None, *given: Any) -> Any:
@@ -34,14 +39,6 @@ def called_over_samples(function: Callable[..., Any], of_columns: Callable[..., 
     # A choice works out what no sample takes, too.
     with np.errstate(all="ignore"):
         return of_columns(*given)
-
-
-def _columns_of(function: Callable[..., Any]) -> Callable[..., Any] | None:
-    found = _composed(function)
-    if found is not None and not found[0].is_current():
-        _composed.cache_clear()
-        found = _composed(function)
-    return None if found is None else found[1]
 
 
 @lru_cache(maxsize=64)
@@ -105,8 +102,9 @@ def _where(test: Any, yes: Any, no: Any) -> Any:
 
 
 def _largest(first: Any, *others: Any) -> Any:
-    """As Python has it: of equal numbers the first, also of 0 and -0."""
+    """The largest as Python has it: of equal numbers the first, also of 0 and -0."""
     for other in others:
+        # A strict comparison, as Python's max has it; np.maximum would take 0.0 over -0.0, and spread NaN.
         first = _either(other > first, other, first)
     return first
 
@@ -154,7 +152,7 @@ def _is_elementwise(node: ast.AST) -> bool:
         return all(isinstance(item, ast.Constant) for item in node.iter.args)
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
         return node.func.id not in COMPILED_BUILTINS - _SAME_IN_COLUMNS
-    # The last bits of NumPy's other functions are not those of ``math``.
+    # NumPy's other functions differ from ``math`` in the last bits.
     return not isinstance(node, ast.Call) or ast.unparse(node.func) == "math.sqrt"
 
 

@@ -149,6 +149,7 @@ class _Flow:
         if isinstance(statement, ast.If):
             self.read(statement.test, bound)
             ends = [self.end_of(branch, bound) for branch in (statement.body, statement.orelse)]
+            # Only branches that go on decide: a name that one of them lacks may have no value.
             going_on = [end for end in ends if end is not None]
             return set.intersection(*going_on) if going_on else None
         if isinstance(statement, ast.For | ast.While):
@@ -176,6 +177,7 @@ class _Flow:
         self.read(statement.test, bound)
         self.end_of(statement.body, bound)
         is_endless = isinstance(statement.test, ast.Constant) and bool(statement.test.value)
+        # A break of an inner loop counts too: the name is then checked once too often, never too seldom.
         breaks = any(isinstance(node, ast.Break) for node in ast.walk(statement))
         return None if is_endless and not breaks else self.end_of(statement.orelse, bound)
 

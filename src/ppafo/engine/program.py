@@ -66,18 +66,18 @@ class NoParameters(NamedTuple):
 class Program:
     """One combination of components; each combination is compiled once.
 
-    ``angle`` None leaves the vane free, otherwise that profile prescribes it. ``controller`` None leaves the command
-    to the caller, sample by sample. ``ideal_sensors`` False adds noise and quantisation of the signals,
+    ``angle`` None leaves the vane unconstrained, otherwise that profile prescribes it. ``controller`` None leaves the
+    command to the caller, sample by sample. ``ideal_sensors`` False adds noise and quantisation of the signals,
     ``late_signals`` True a delay. ``late_readings`` True lets sensors of a walk be whole samples late.
-    ``late_commands`` True adds a dead time before the valve. ``gas`` is what the gas keeps or exchanges, ``feed``
-    what feeds it, None for constant pressures. ``leg`` is a walking one that the device is on, whose foot is free or
-    where the ground and a gait lead it (``angle`` is None then; its sensors are its own). ``is_adaptive`` True
-    divides each step as its error asks, ``samples_inside`` True where recorded samples lie between the steps.
-    ``meters`` are updated at every sample that a recording would have, ``traced`` names channels, or paths of the
-    state, that are kept at some of them. ``starts_apart`` True lets the run of each lane begin at a step of its own,
-    while others of the block are under way. ``actuator`` is what stands between the chambers and the joint.
-    ``effects`` act in this order at the places of their laws. ``shank`` None leaves a free vane to itself; otherwise
-    it carries a foot on a shank that moves so (``engine/led_leg.py``).
+    ``late_commands`` True adds a dead time before the valve. ``gas`` is what the gas keeps or exchanges, ``feed`` what
+    feeds it, None for constant pressures. ``leg`` is a walking one that the device is on, whose foot is free or where
+    the ground and a gait lead it (``angle`` is None then; its sensors are its own). ``is_adaptive`` True divides each
+    step as its error asks, ``samples_inside`` True where recorded samples lie between the steps. ``meters`` are updated
+    at every sample that a recording would have, ``traced`` names channels, or paths of the state, that are kept at some
+    of them. ``starts_apart`` True lets the run of each lane begin at a step of its own, while others of the block are
+    under way. ``actuator`` is what stands between the chambers and the joint. ``effects`` act in this order at the
+    ports of their laws. ``shank`` None leaves an unconstrained vane to itself; otherwise it carries a foot on a shank
+    that moves so (``engine/led_leg.py``).
     """
 
     valve: ValveModel
@@ -166,12 +166,12 @@ class Program:
 
     @property
     def takes_course(self) -> bool:
-        """True where that leg stands, starts, changes its speed and stops."""
+        """True where that leg walks a task sequence: it stands, starts, changes its speed and stops."""
         return self.leg is not None and self.leg.takes_course
 
     @property
     def reacts(self) -> bool:
-        """True where the wearer of that leg reacts."""
+        """True where a neuromuscular gait model moves that leg."""
         return self.leg is not None and self.leg.reacts
 
     @property
@@ -206,7 +206,7 @@ class Program:
 
     @property
     def follows_reference(self) -> bool:
-        """True where a meter needs to know the course of the reference."""
+        """True where a meter needs to know the reference over the whole run."""
         return any(kind.needs_course for kind in self.meters)
 
     @property
@@ -227,12 +227,12 @@ class Program:
 
     @property
     def has_shape(self) -> bool:
-        """True where the actuator is no vane, so that chambers and torque are those of its kind."""
+        """True where the actuator is no vane, so that its kind gives chambers and torque."""
         return self.actuator is not VANE
 
     @property
     def keeps_volumes(self) -> bool:
-        """True where the chamber volumes of a held vane are computed once; all other chambers are treated as moving."""
+        """True where the chamber volumes of a locked vane are computed once; all others are treated as moving."""
         return self.is_locked and not (self.has_true_masses or self.has_lines or self.has_shape)
 
     @property
@@ -277,12 +277,13 @@ def _shown_by(connect: Any) -> Any:
 def link_program(program: Program, collector: Collector) -> None:
     """Let a collector call what the components of a program have in the place of functions of the model.
 
-    ProgramError for an effect that cannot act, or whose name is that of other rows of the program.
+    ProgramError for an effect that cannot act, or whose name other rows of the program have.
     """
     own = links_of(program.actuator)
     collector.links.update(own)
     if not program.effects:
         return
+    # Names of rows without any effect: two effects that share a name are refused by the catalogue.
     bare = replace(program, effects=())
     taken = {*bare.parameter_rows(), *bare.state_rows(), *bare.step_rows()}
     for effect in program.effects:
@@ -292,7 +293,7 @@ def link_program(program: Program, collector: Collector) -> None:
 
 
 def link_effects(effects: Sequence[Effect], collector: Collector, own: Mapping[Any, Any] | None = None) -> None:
-    """Let a collector call the laws of effects at their places, of which an actuator may have its ``own``.
+    """Let a collector call the laws of effects at their ports, of which an actuator may have its ``own``.
 
     ProgramError for an effect that cannot act.
     """
@@ -341,6 +342,7 @@ def _composed_with(
         return collector, None
     scope: dict[str, Any] = {"math": math, "namedtuple": namedtuple}
     text = collector.text()
+    # The composed text runs as plain Python: solvers and recordings call single functions, not programs.
     exec(text, scope)
     return collector, Composed(scope[name], tuple(collector.needs[name]), in_columns(text, name))
 
@@ -348,7 +350,7 @@ def _composed_with(
 def python_place(
     place: Callable[..., Any], effects: Sequence[Effect], rows: Sequence[Any]
 ) -> Callable[..., Any] | None:
-    """Return a place as Python calls it with effects and their rows; None where no effect acts there.
+    """Return a port as Python calls it with effects and their parameters; None where no effect acts there.
 
     Before its own arguments it takes the states of effects by name. Any other function of the model will do too.
     """
@@ -366,7 +368,7 @@ def python_place(
 def place_over_samples(
     place: Callable[..., Any], effects: Sequence[Effect], rows: Sequence[Any]
 ) -> Callable[..., Any] | None:
-    """As ``python_place``, for states and arguments whose numbers are columns (samples,)."""
+    """Return what ``python_place`` does, for states and arguments whose numbers are columns (samples,)."""
     composed = composed_with(place, effects)
     if composed is None:
         return None

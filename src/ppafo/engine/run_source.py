@@ -1,4 +1,4 @@
-"""Writes the source of the loop of a single run, for exports: as that of the lanes, with the bits of the lanes.
+"""Writes the source of the loop of a single run, for exports: the lanes' loop for one, with the same bits.
 
 Groups are NamedTuples under their own names. They are taken from what a run is made of once, and its state is written
 back at the end; between them stands what happens in a step, in the order in which it happens.
@@ -46,15 +46,17 @@ def run_loop(program: Program, collector: Collector, outputs: str, in_parts: Pro
         *[f"states.{group} = {group}" for group in states],
     ]
     text = "\n".join(body)
+    # C wants a struct to exist before one of its members is set.
     first = [item.empty(group) for item in (rows, *others) for group in _stored_by_number(item, text)]
     given = ["states", "parameters", "samples", *LOOP_ARRAYS, *LOOP_NUMBERS, *([NEEDS_PARTS] if others else [])]
     row = f"{outputs} = namedtuple({outputs!r}, {['time', *program.traced]!r})"
     whole = "\n".join([row, f"def advance({', '.join(given)}):", *indent([*dict.fromkeys(first), *body])])
+    # A single run is lane 0 of the histories, and its groups are local names.
     return re.sub(r"\blane\b", "0", re.sub(rf"\b{KEPT}\.", "", whole))
 
 
 def _all_steps(rows: RunRows, others: list[RunRows]) -> list[str]:
-    """The loop over steps, with the sample at the end of the run as a turn without a step."""
+    """The loop over steps, with the sample at the end of the run as an iteration without a step."""
     program = rows.program
     control = [repr("Sense and decide."), *control_loop(rows)] if control_loop(rows) else []
     begin = [*signals_before_start(rows), *control, *remember_commands(rows)]

@@ -86,12 +86,13 @@ class Composer(ast.NodeTransformer):
         return ast.copy_location(ast.Assign([node.target], self.visit(node.value)), node)
 
     def visit_Assign(self, node: ast.Assign) -> ast.stmt:
-        """Remember which row each name stands for, so that ``name._replace`` can be written out."""
+        """Remember which NamedTuple each name stands for, so that ``name._replace`` can be written out."""
         kind, target = self.kind_of(node.value), node.targets[0]
         parts = getattr(kind, "__args__", ())
         named = zip(target.elts, parts, strict=False) if isinstance(target, ast.Tuple) else ((target, kind),)
         for item, found in named:
             if isinstance(item, ast.Name):
+                # A name that stands for two kinds stands for none: nothing may then be written out for it.
                 self.kinds[item.id] = found if self.kinds.get(item.id, found) is found else None
         return ast.copy_location(ast.Assign(node.targets, self.visit(node.value)), node)
 
@@ -146,7 +147,7 @@ class Composer(ast.NodeTransformer):
         rows = self.rows_of(function.id) if isinstance(function, ast.Name) else ()
         for row in rows:
             if row in self.local - self.given:
-                raise self.refuse(node, f"the local name '{row}' hides the row of the effect '{row}'; rename it")
+                raise self.refuse(node, f"the local name '{row}' hides the parameters of the effect '{row}'; rename it")
         self.needed.update(row for row in rows if row not in self.given)
         return [ast.Name(row, ast.Load()) for row in rows]
 
@@ -302,6 +303,7 @@ class Composer(ast.NodeTransformer):
     def literal(self, value: Any, where: ast.AST, name: str) -> ast.expr:
         """A constant, to the last bit: a number, or a tuple or NamedTuple of them. ProgramError for anything else."""
         if type(value) in (float, np.float64):
+            # A minus sign of its own: -0.0 and the sign of NaN survive, which repr would lose in some languages.
             size: ast.expr = ast.Constant(abs(float(value)))
             return ast.UnaryOp(ast.USub(), size) if math.copysign(1.0, value) < 0.0 else size
         if type(value) is int and value < 0:
@@ -352,7 +354,7 @@ def emitted_name(item: Any) -> str:
 
 
 def without_origins(source: str) -> str:
-    """The text without the lines that say where its functions stand: what decides the machine code."""
+    """Return the text without the lines that say where its functions stand: what decides the machine code."""
     return "\n".join(line for line in source.split("\n") if not line.startswith(ORIGIN))
 
 
@@ -395,7 +397,7 @@ class Collector(Protocol):
 
     @property
     def effects(self) -> dict[Any, tuple[str, ...]]:
-        """Laws of effects, each with the rows that it asks for by the names of its parameters."""
+        """Laws of effects, each with the effect's structs that it takes, by the names of its parameters."""
 
     @property
     def needs(self) -> dict[str, tuple[str, ...]]:
@@ -438,11 +440,16 @@ class SourceCollector:
         owner = self.owners.setdefault(name, item)
         if owner is item and name in self.definitions:
             return name
-        if owner is not item:
-            self._check_is_the_same(item, owner, name)
-            return name
         text = _row_text(item, name) if isinstance(item, type) else self._function_text(item, name)
-        self.definitions[name] = text
+        if owner is item:
+            self.definitions[name] = text
+        # A second thing of the same name is refused unless it is the same text, as after a module was loaded anew.
+        elif without_origins(text) != without_origins(self.definitions.get(name, "")):
+            raise ProgramError(
+                f"{place_of(item)}: '{item.__module__}.{item.__qualname__}' and "
+                f"'{owner.__module__}.{owner.__qualname__}' at {place_of(owner)} both get the name '{name}' in the "
+                f"compiled model; give one of them another name"
+            )
         return name
 
     def text(self) -> str:
@@ -453,16 +460,6 @@ class SourceCollector:
         """True while every name and function that was composed is what it was then."""
         return is_unchanged(self.reads, self.functions)
 
-    def _check_is_the_same(self, item: Any, owner: Any, name: str) -> None:
-        """Refuse a second thing of the same name, unless it is the same text, as after a module was loaded anew."""
-        text = _row_text(item, name) if isinstance(item, type) else self._function_text(item, name)
-        if without_origins(text) != without_origins(self.definitions.get(name, "")):
-            raise ProgramError(
-                f"{place_of(item)}: '{item.__module__}.{item.__qualname__}' and "
-                f"'{owner.__module__}.{owner.__qualname__}' at {place_of(owner)} both get the name '{name}' in the "
-                f"compiled model; give one of them another name"
-            )
-
     def _function_text(self, function: Any, name: str) -> str:
         tree = parse_definition(function, self.adapt)
         file = function.__code__.co_filename
@@ -472,15 +469,22 @@ class SourceCollector:
             defaults=function.__defaults__,
             named_defaults=dict(function.__kwdefaults__ or {}),
         )
+        # A function is noted before its body is read, so that one met again inside it calls itself.
         if any(known.function is function for known in self.functions):
             raise refusal(file, tree, f"'{function.__name__}' calls itself, which cannot be compiled")
         self.functions.append(made)
         composer = Composer(
-            function, lambda item: self._add_inside(function, item), self._note, self._rows_of, self._stands_for
+            function,
+            lambda item: self._add_inside(function, item),
+            lambda scope, read, value: self.reads.append(Read(scope, read, value)),
+            lambda callee: self.needs.get(callee, ()),
+            lambda row: self.links.get((row, "_replace"), row),
         )
         arguments = tree.args
         asked = self.effects.get(function, ())
         if asked:
+            # Structs of effects come first, in every function: callers can then hand them over without knowing the
+            # rest.
             arguments.args = sorted(arguments.args, key=lambda item: item.arg not in asked)
         for argument in (*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs):
             argument.annotation = None
@@ -505,23 +509,14 @@ class SourceCollector:
         return f"{ORIGIN} {one_line(file)}: {lines}\n{self.decorator}\n{text}"
 
     def _add_inside(self, function: Any, item: Any) -> str:
-        """Add what a function calls; a law of an effect that calls its own place gets what was there before it."""
+        """Add what a function calls; a law of an effect that calls its own port gets what was there before it."""
         if (function, item) in self.links:
             return self._add(self.links[function, item])
         if item in self.effects and isinstance(item, FunctionType):
             raise ProgramError(
-                f"{place_of(function)}: '{item.__name__}' is the law of an effect: call its place instead"
+                f"{place_of(function)}: '{item.__name__}' is the law of an effect: call its port instead"
             )
         return self.add(item)
-
-    def _stands_for(self, row: Any) -> Any:
-        return self.links.get((row, "_replace"), row)
-
-    def _rows_of(self, name: str) -> tuple[str, ...]:
-        return self.needs.get(name, ())
-
-    def _note(self, scope: Mapping[str, Any], name: str, value: Any) -> None:
-        self.reads.append(Read(scope, name, value))
 
 
 def check_is_plain(function: Any) -> None:
@@ -585,6 +580,7 @@ def _code_of(tree: ast.FunctionDef, function: FunctionType) -> Iterator[CodeType
     names = function.__code__.co_names
     modules = [name for name in names if isinstance(function.__globals__.get(name), ModuleType)]
     imports = [parse_module(f"import {name}").body[0] for name in modules]
+    # Python compiles a call through a module name otherwise where it has seen the import.
     for before in (imports, []):
         module = compile(ast.Module([*before, tree], []), "<source>", "exec", dont_inherit=True)
         yield next(item for item in module.co_consts if isinstance(item, CodeType) and item.co_name == tree.name)
@@ -592,6 +588,7 @@ def _code_of(tree: ast.FunctionDef, function: FunctionType) -> Iterator[CodeType
 
 def _shape(code: CodeType) -> tuple[Any, ...]:
     """What a code object computes, without the places of its lines and its docstring."""
+    # Texts are left out: a docstring may have changed without a change of what runs.
     constants = [(type(item), repr(item)) for item in code.co_consts if not isinstance(item, str)]
     return code.co_code, code.co_names, code.co_varnames, code.co_argcount, code.co_kwonlyargcount, constants
 

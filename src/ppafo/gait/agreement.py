@@ -18,14 +18,14 @@ from ppafo.gait.plausible import MIDSTANCE, STANCE_FRACTION, MeanStride, force_r
 from ppafo.signals.recording import Floats
 
 LARGEST_DELAY = 0.03
-"""Seconds by which a curve may be away from its usual place (0.016 at most)."""
+"""Seconds by which a curve may be away from its usual place (0.016 at most in the recorded strides)."""
 
 _USUALLY = {"shank_angle": 0.052, "ankle_angle": 0.041, "ankle_moment": -0.002}
 """Strides from toe-off to the shank furthest back and to the peak of plantarflexion; of the moment, from the force."""
 _ABOUT_TOE_OFF = (-0.16, 0.22)
 """Strides from toe-off within which both are looked for."""
 _PUSH_OFF_FROM = 0.35
-"""Of the stride; the largest load from there on is the one of the push-off."""
+"""Fraction of the stride; the largest load from there on is the push-off's."""
 _FORCE_ENDS = -0.06
 """Strides from toe-off to half the largest force of the push-off (-0.060): for a moment without a force."""
 
@@ -47,7 +47,7 @@ USUAL_ANKLE = (18.0, 45.0)
 USUAL_FOLLOWING = (0.65, 1.4)
 """Turn of the ankle over the turn of the shank while the foot stands (0.78 to 1.07)."""
 _RESTS = 0.2
-"""The same of an ankle that hardly turns there, which says nothing of its size."""
+"""Turn of the ankle over the shank's below which it hardly turns there and says nothing of its size."""
 
 _FINE = np.linspace(0.0, 1.0, 1000, endpoint=False)
 
@@ -69,10 +69,12 @@ def check_side(walk: MeanStride, usual: Gait) -> None:
 
 def _lag(walk: MeanStride, usual: Gait, name: str) -> tuple[float, float, float]:
     """Return by how many strides a curve is behind the usual one, and the correlations there and without a shift."""
+    # Stance on stance and swing on swing: a toe-off that comes early or late is no delay.
     at = np.interp(_FINE, (0.0, walk.stance_share, 1.0), (0.0, usual.stance_share, 1.0))
     found, expected = (
         values - np.mean(values) for values in (_smooth(walk.curves[name], name), usual.curve(name).values_at(at))
     )
+    # Correlation at all 1000 shifts at once.
     spectrum = np.fft.rfft(found) * np.conj(np.fft.rfft(expected))
     scale = float(np.sqrt(np.sum(found**2) * np.sum(expected**2)))
     alike = np.fft.irfft(spectrum, _FINE.size) / scale

@@ -99,13 +99,14 @@ def _curve_table(name: str, unit: str) -> type[BaseModel]:
 
 
 def gait_of(document: dict[str, Any], file: str) -> Gait:
-    """Return the gait in the document of a gait file; ``file`` is what messages call it.
+    """Return the gait in the document of a gait file; ``file`` is its name in messages.
 
     DataError where it is not a gait.
     """
     validate(gait_file(), document, file, DataError)
     numbers = {path: _number(document, path, file) for path in _LIMITS}
     curves = {name: _curve(document[name], name, file) for name in CURVES if name in document}
+    # Required by the schema already: this tells the type checker.
     if numbers["stride.time"] is None or numbers["stride.stance_share"] is None or numbers["subject.body_mass"] is None:
         raise DataError(f"{file}: [subject] and [stride] are not complete")
     return Gait(
@@ -189,7 +190,7 @@ def load_gait(name_or_path: str | Path = NORMATIVE) -> Gait:
 
 
 def parse_gait(content: bytes, file: str) -> Gait:
-    """Return the gait in the bytes of a gait file; ``file`` is what messages call it. DataError where it cannot be."""
+    """Return the gait in the bytes of a gait file; ``file`` is its name in messages. DataError where unreadable."""
     gait = gait_of(_FILE.parse(content, label(file)), label(file))
     check_gait(gait, label(file))
     return gait
@@ -199,7 +200,7 @@ WRITTEN_UNITS: dict[str, str] = {"rad": "deg"}
 """Angles are written in degrees; every other curve in its own unit."""
 
 _DIGITS = 12
-"""Written of a coefficient; degrees made of radians carry noise behind these."""
+"""Digits written of a coefficient; degrees made of radians carry noise behind these."""
 
 
 def gait_toml(gait: Gait) -> str:

@@ -38,7 +38,7 @@ CURVES: dict[str, str] = {
     "knee_forward": "m/s^2",
     "knee_up": "m/s^2",
 }
-"""The curves of a gait and the unit in which each is kept; the first two are always there."""
+"""The curves of a gait and the unit of each; the first two are always there."""
 
 REQUIRED = ("shank_angle", "ankle_angle")
 
@@ -109,6 +109,7 @@ class Curve:
         values = self.mean + 0.0 * first_cosine
         for of_cosine, of_sine in zip(self.cosines, self.sines, strict=True):
             values = values + (of_cosine * cosine + of_sine * sine)
+            # Angle sums instead of a cosine for each harmonic: the same bits on every computer.
             cosine, sine = cosine * first_cosine - sine * first_sine, sine * first_cosine + cosine * first_sine
         return np.asarray(values, dtype=np.float64)
 
@@ -186,7 +187,7 @@ HARMONICS: dict[str, int] = {
     "knee_forward": 6,
     "knee_up": 6,
 }
-"""As many as bring the fit well below the spread between strides, and not more: each one roughens the acceleration."""
+"""Harmonics of each curve: enough for a fit well below the spread between strides; more roughen the acceleration."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,17 +237,20 @@ def speed_range(gait: Gait) -> tuple[float, float]:
 def at_speed(gait: Gait, speed: float) -> Gait:
     """Return the gait at a walking speed [m/s]: stride time goes with speed to the power of -1/2.
 
-    That is a constant walk ratio, step length over cadence (Sekiya and Nagasaki 1998, Gait Posture 7:225). Amplitudes,
+    This is a constant walk ratio, step length over cadence (Sekiya and Nagasaki 1998, Gait Posture 7:225). Amplitudes,
     moments per mass, force in body weights and stance fraction stay as recorded, so only a small change is allowed. So
-    does the way of the knee about its mean speed; its acceleration goes with 1/T^2. DataError for a speed out of range.
+    does the motion of the knee about its mean speed; its acceleration goes with 1/T^2. DataError for a speed out of
+    range.
     """
     recorded = _recorded_speed(gait)
     low, high = speed_range(gait)
+    # A speed that was rounded to the printed limit is still within it.
     if not (math.isfinite(speed) and low * (1.0 - 1e-9) <= speed <= high * (1.0 + 1e-9)):
         raise DataError(
             f"gait '{gait.name}' was recorded at {recorded:g} m/s and can be scaled from {low:.3g} to {high:.3g} m/s, "
             f"not to {speed:g} m/s; import a gait that was recorded near that speed"
         )
+    # A gait that was scaled before is scaled from where it is, and judged by where it was recorded.
     current = gait.walking_speed or recorded
     return replace(
         gait,
@@ -277,6 +281,7 @@ def walk_recording(gait: Gait, strides: int, rate: float = _RATE) -> Recording:
     """
     if not 1 <= strides <= _MAXIMUM_STRIDES:
         raise DataError(f"the number of strides must be from 1 to {_MAXIMUM_STRIDES}, not {strides}")
+    # A whole number of samples a stride: all strides are then equal to the last bit.
     per_stride = max(10, round(rate * gait.stride_time))
     phase = np.arange(strides * per_stride + 1) / per_stride
     one = np.arange(per_stride) / per_stride

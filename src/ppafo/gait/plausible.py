@@ -1,4 +1,4 @@
-"""Whether a stride can be true: limits wide enough for impaired walking, that exclude what no leg does.
+"""Whether a stride is plausible: limits wide enough for impaired walking, which exclude what no leg does.
 
 Each refusal names file, curve, number and limits, and the remedy for what is wrong with units, signs and sides. A sign
 is refused only where the other one fits clearly better: impaired walking breaks every rule of healthy walking a little.
@@ -57,6 +57,7 @@ def check_gait(gait: Gait, file: str) -> None:
 
 def check_plausible(walk: MeanStride) -> None:
     """Raise DataError for a mean stride that is not plausible; names file, curve, number, limits and remedy of all."""
+    # A check in a chain is made only where those before it pass: a wrong unit would be refused again as a wrong sign.
     chains = (
         (check_stride_time,),
         (check_stance, check_moment_time),
@@ -105,9 +106,9 @@ MIDSTANCE = slice(15, 41)
 _TURNS = 2.0
 """Degrees, RMS, by which a standing foot has to turn for a sign to show; recorded feet turn by 0.5 to 1.5."""
 _TURNED_BACK = 0.1
-"""Of its range, by which a shank has to rotate backwards over the standing foot for its sign to be reversed.
+"""Fraction of its range by which a shank has to rotate backwards over the standing foot for its sign to be reversed.
 
-Recorded ones rotate forward by 0.15 to 0.25 of it.
+Recorded shanks rotate forward by 0.15 to 0.25 of it.
 """
 _CLEARLY_BETTER = 2.0
 """Times that a curve has to fit better, or be larger, with the other sign for its sign to be reversed."""
@@ -131,6 +132,7 @@ def check_shank(walk: MeanStride) -> None:
             f"{place} covers a range of {travel:.3g} deg in a stride, plausible is {low:g} to {high:g} deg; "
             f"{_unit_hint(travel, low, high)}"
         )
+    # Means of five samples at both ends: a single one may lie on a tremor.
     growth = float(np.mean(phi[MIDSTANCE][-5:]) - np.mean(phi[MIDSTANCE][:5]))
     if growth > _TURNED_BACK * travel:
         raise DataError(
@@ -194,7 +196,7 @@ def standing_turns(shank: Floats, ankle: Floats) -> tuple[float, float]:
 
 
 def sign_remarks(shank: Floats, ankle: Floats) -> list[str]:
-    """Return what there is to say of an ankle whose sign the standing foot does not show."""
+    """Return a remark on an ankle whose sign the standing foot does not show."""
     turned, reversed_turned = standing_turns(shank, ankle)
     if _CLEARLY_BETTER * turned <= reversed_turned:
         return []
@@ -205,7 +207,7 @@ def sign_remarks(shank: Floats, ankle: Floats) -> list[str]:
 
 
 def zero_remarks(tilt: float, correction: str) -> list[str]:
-    """Return what there is to say of the zero of an ankle whose standing foot is tilted [deg]."""
+    """Return a remark on the zero of an ankle whose standing foot is tilted [deg]."""
     if abs(tilt) <= REMARKED_TILT:
         return []
     way = "toes down" if tilt > 0.0 else "toes up"
@@ -217,7 +219,7 @@ def zero_remarks(tilt: float, correction: str) -> list[str]:
 
 
 def gait_file_remarks(gait: Gait) -> list[str]:
-    """Return what there is to say of the ankle's zero in a finished gait, with the new mean of its series."""
+    """Return a remark on the ankle's zero in a finished gait, with the new mean of its series."""
     percent = np.linspace(0.0, 1.0, 101)
     tilt = standing_tilt(gait.shank_angle.values_at(percent), gait.ankle_angle.values_at(percent))
     mean = float(np.degrees(gait.ankle_angle.mean)) - tilt
@@ -257,9 +259,9 @@ USUAL_FORCE_MEAN = (0.42, 0.58)
 _ON_GROUND = 0.05
 """Body weights, either way; a plate with no foot on it shows less."""
 _AFTER_TOE_OFF = 0.03
-"""Of the stride; a toe-off found in the shank is no nearer than this."""
+"""Fraction of the stride; a toe-off found in the shank is no nearer than this."""
 _LEFT_IN_SWING = 0.25
-"""Of the peak; the swinging foot needs a few hundredths."""
+"""Fraction of the peak; the swinging foot needs a few hundredths."""
 _FOOT_ALONE = 0.05
 """N m/kg that a swinging foot may need, however weak the push-off."""
 
@@ -306,7 +308,7 @@ _UNCLEAR_MOMENT = 0.5
 
 
 def moment_remarks(moment: Floats) -> list[str]:
-    """Return what there is to say of an ankle moment [N m/kg] whose sign its curve hardly shows."""
+    """Return a remark on an ankle moment [N m/kg] whose sign its curve hardly shows."""
     down, up = float(np.max(moment)), float(-np.min(moment))
     if up <= _UNCLEAR_MOMENT * down:
         return []
@@ -383,7 +385,7 @@ Factors = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class _Mistake:
-    """What may have happened, the way back in words, and the mended curves as fractions of the given (forward, up)."""
+    """A possible mistake, its remedy in words, and the corrected curves as fractions of the given (forward, up)."""
 
     words: str
     remedy: str
@@ -467,10 +469,11 @@ def turning_about_ankle(shank: Floats, stride_time: float) -> Floats:
 
 
 def _misfit(given: Floats, expected: Floats) -> float:
-    """Return what the best shank leaves, as a fraction of what its turning asks for; infinite for a shank at rest."""
+    """Return the misfit of the best shank as a fraction of its turning; infinite for a shank at rest."""
     square = float(np.sum(expected**2))
     if square == 0.0:
         return float("inf")
+    # Least squares for the one unknown, the length of the shank.
     length = float(np.clip(np.sum(given * expected) / square, *SHANK_LENGTHS))
     return float(np.sqrt(np.sum((given - length * expected) ** 2) / square)) / length
 
@@ -478,7 +481,7 @@ def _misfit(given: Floats, expected: Floats) -> float:
 KNEE_TRAVEL = (0.5, 80.0)
 KNEE_MEAN = 1.5
 _HELD_BACK = 0.2
-"""Of its range, by which a knee has to be held back where others are driven for its sign to be reversed.
+"""Fraction of its range by which a knee has to decelerate where others are driven for its sign to be reversed.
 
 A measured knee is driven by 0.8 to 0.9 of it.
 """
@@ -521,6 +524,7 @@ def _check_knee_curve(walk: MeanStride, name: str) -> None:
             f"{place} covers a range of {travel:.3g} m/s^2 in a stride, plausible is {low:g} to {high:g} m/s^2; "
             "is the unit right (m/s^2, or m for a position)?"
         )
+    # Gait phase of the swing, below 0 before toe-off.
     swung = (np.linspace(0.0, 1.0, values.size) - walk.stance_share) / (1.0 - walk.stance_share)
     driven, held = (float(np.mean(values[(swung >= start) & (swung <= end)])) for start, end in _PARTS[name])
     if held - driven > _HELD_BACK * travel:

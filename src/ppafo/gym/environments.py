@@ -201,7 +201,7 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
 
     ``task`` is 'torque', 'angle' or 'walk'; ``scenario`` the name or file of a scenario, or of a walk, and
     ``overrides`` change it: of the task's own, with late, noisy sensors with steps, unless one is given. ``actions``
-    are 'continuous', a command from -1 to 1 (and on a leg that walks one above 0 for the dump valve), or 'on_off', 0
+    are 'continuous', a command from -1 to 1 (and on a leg that walks one above 0 for the vent valve), or 'on_off', 0
     to 2 for commands of -1, 0 and 1. ``randomise`` draws each episode: what the parameter set has an interval for,
     what ``vary`` gives lowest and highest values for, by path, the seed of the noise, an angle in ``targets``; or the
     wearer and the gait of a walk. ``duration`` of an episode [s]. The reward of a sample is

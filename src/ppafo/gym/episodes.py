@@ -35,7 +35,7 @@ from ppafo.gym.tasks import (
     finite,
     reward_of,
     valve_command,
-    valve_or_dump,
+    valve_or_vent,
     within,
 )
 from ppafo.model.plant import actuator_torque
@@ -94,7 +94,7 @@ def _step(rows: LaneRows, task: Task) -> list[str]:
     rows.cells.update({path: f"own[{row}, lane]" for row, path in enumerate(OWN_PATHS)})
     if rows.program.hands_chambers_on:
         rows.cells.update({path: f"chambers{path.removeprefix('held')}" for path in leaf_paths(HeldChambers, "held")})
-    command = rows.add(valve_or_dump if task.walks else valve_command)
+    command = rows.add(valve_or_vent if task.walks else valve_command)
     given = f"{command}(actions[place, 0], actions[place, actions.shape[1] - 1])"
     call = (
         "advance(states, parameters, signal_history, command_history, record, trace, "

@@ -158,7 +158,7 @@ def valve_command(action: float, other: float) -> float:
     return within(action, -1.0, 1.0)
 
 
-def valve_or_dump(action: float, other: float) -> float:
+def valve_or_vent(action: float, other: float) -> float:
     """Command from -1 to 1, or ``VENT`` where the other action is above 0."""
     return VENT if other > 0.0 else within(action, -1.0, 1.0)
 

@@ -1,6 +1,6 @@
 """The valves, actuators and effects that a device can have. To add one: a module in their folder and one line here.
 
-Those of other packages are found by an entry point.
+Kinds of other packages are found by their entry points.
 """
 
 from collections.abc import Iterable
@@ -54,13 +54,13 @@ EFFECTS: Kinds[Effect] = Kinds(
         "bandwidth": bandwidth.EFFECT,
     },
 )
-"""Those whose settings have another section than their own are named by no path: they are there from the beginning."""
+"""Effects whose settings stand in another part's section are named by no path: they are loaded from the beginning."""
 
 
 def find_effects(paths: Iterable[str]) -> None:
-    """Load the effects that some paths name, those of other packages too.
+    """Load the effects that some paths name, also from other packages.
 
-    KindError for one that is there and cannot be used.
+    KindError for an effect that exists and cannot be used.
     """
     for path in paths:
         section, _, rest = path.partition(".")
@@ -68,14 +68,16 @@ def find_effects(paths: Iterable[str]) -> None:
         if section == SECTION and name and name not in EFFECTS.loaded():
             effect = EFFECTS.get(name)
             problem = "" if effect is None else effect_problem(effect)
+            # An effect that cannot be used leaves the catalogue, or the next look-up would find it without this check.
             if problem:
                 del EFFECTS[name]
                 raise KindError(f"effect '{one_line(name)}': {problem}")
 
 
 def ordered_effects() -> tuple[Effect, ...]:
-    """Return all effects that are loaded, in the order in which they act: those of the package, then by name."""
+    """Return all effects that are loaded, in the order in which they act: the package's own first, then by name."""
     loaded = EFFECTS.loaded()
+    # Entry points come in no order: sorted, a composed program has the same bits on every computer.
     others = sorted((effect for name, effect in loaded.items() if not EFFECTS.is_own(name)), key=lambda item: item.name)
     return (*(effect for name, effect in loaded.items() if EFFECTS.is_own(name)), *others)
 

@@ -42,6 +42,7 @@ LARGEST_CHANGE = 0.2
 _LEAST_HEAT_CAPACITY = 2.5
 """Heat capacity of air, nitrogen or CO2 at constant volume over the gas constant [-], at least."""
 
+# First difference [K] of the secants, difference [K] that is none, and how many are tried before bisection.
 _FIRST_SECANT, _SAME_TEMPERATURE, _MAXIMUM_SECANTS = 1.0e-3, 1.0e-9, 12
 
 
@@ -68,7 +69,7 @@ class Isobar(NamedTuple):
 class ColdSupply(NamedTuple):
     """A bottle with what stands behind it: volume [m^3], wall, regulator with the room for ice in its seat [kg], hose.
 
-    ``room_temperature`` [K]; ``heat_capacity_ratio`` [-] is that of the gas.
+    ``room_temperature`` [K]; ``heat_capacity_ratio`` [-] of the gas.
     """
 
     volume: float
@@ -113,6 +114,7 @@ class SupplyNow(NamedTuple):
 
 def isobar(table: FluidTable, pressure: float) -> Isobar:
     """Enthalpies of a gas at a pressure [Pa], at the temperatures of its table from where it is dry gas."""
+    # At a lower node the gas would condense before it reached the pressure.
     dry = [node for node in table.temperatures if fluid_pressure(table, node, densest_gas(table, node)) >= pressure]
     enthalpies = tuple(gas_enthalpy(table, node, pressure) for node in dry)
     lowest = table.temperatures[0]
@@ -166,6 +168,7 @@ def ice_rate(line: Isobar, enthalpy: float, flow: float, ice: float, step: float
     if line.freezes < 0.5:
         return 0.0
     lacking = (line.enthalpies[0] - enthalpy) / DRY_ICE
+    # The ice grows at the expense of flow plus growth, hence the divisor.
     return max(flow * lacking / (1.0 - lacking), -ice / step)
 
 
@@ -191,6 +194,7 @@ def supply_now(
     """
     content = _content(table, supply, state, near)
     regulator = supply.regulator
+    # A bottle near its end gives what it has above the margin of its regulator.
     highest = min(regulator.set_pressure, max(content.pressure - regulator.pressure_margin, 0.0))
     limit = regulator_flow_limit(
         regulator._replace(set_pressure=highest),
@@ -222,8 +226,8 @@ def advance_supply(
 ) -> SupplyState:
     """The state after a step [s] in which a mass [kg] went on behind the seat evenly, by Heun's rule.
 
-    ``content`` is that of the bottle before it. The step is cut where little gas, or a part of little heat capacity,
-    follows faster than that rule does. SimulationError where the bottle has no more than that: nobody can have drawn
+    ``content`` of the bottle before it. The step is cut where little gas, or a part of little heat capacity,
+    follows faster than that rule does. SimulationError where the bottle holds no more than that: nobody can have drawn
     it.
     """
     if mass >= state.mass:
@@ -232,12 +236,20 @@ def advance_supply(
             f"{state.mass * GRAMS_PER_KILOGRAM:.3g} g: set bottle.coupling shorter, or bottle.least_torque higher, "
             f"so that the walk ends before the bottle is bare"
         )
-    parts = parts_of(table, line, supply, state.mass - mass, mass / step, step)
+    flow = mass / step
+    parts = parts_of(table, line, supply, state.mass - mass, flow, step)
+    length = step / parts
     after = state
     for part in range(parts):
-        near = content if part == 0 else _content(table, supply, after, content.temperature)
-        after = _heun(table, line, supply, after, near, mass / step, step / parts)
-        content = near
+        if part > 0:
+            content = _content(table, supply, after, content.temperature)
+        # Heun's rule; the content is found anew at the end of the first guess, or it would lag behind the energy.
+        first = supply_rates(line, supply, after, content, flow, length)
+        guess = SupplyState._make(value + length * rate for value, rate in zip(after, first, strict=True))
+        then = _content(table, supply, guess, content.temperature)
+        second = supply_rates(line, supply, guess, then, flow, length)
+        rates = zip(after, first, second, strict=True)
+        after = SupplyState._make(value + 0.5 * length * (one + other) for value, one, other in rates)
     # The mass itself, so that what left the bottle came through the regulator or is ice, to the last digit.
     return after._replace(mass=state.mass - mass - (after.ice - state.ice))
 
@@ -250,8 +262,9 @@ def parts_of(table: FluidTable, line: Isobar, supply: ColdSupply, mass: float, f
 def following_rates(table: FluidTable, line: Isobar, supply: ColdSupply, mass: float, flow: float) -> dict[str, float]:
     """The rates [1/s], by name, at which content, wall, regulator and hose follow what is around them, at most.
 
-    ``mass`` [kg] is the gas in the bottle, ``flow`` [kg/s] that through the regulator.
+    ``mass`` [kg] of gas in the bottle, ``flow`` [kg/s] through the regulator.
     """
+    # Mean specific heat over the isobar: which one does not matter for a bound that is cut by a safety factor of ten.
     wall, temperatures = supply.wall, line.temperatures
     capacity = (line.enthalpies[-1] - line.enthalpies[0]) / (temperatures[-1] - temperatures[0])
     parts = {"regulator": supply.body, "hose": supply.hose}
@@ -264,24 +277,6 @@ def following_rates(table: FluidTable, line: Isobar, supply: ColdSupply, mass: f
         "wall": (wall.content_heat_transfer + wall.room_heat_transfer) / wall.wall_heat_capacity,
         **passages,
     }
-
-
-def _heun(
-    table: FluidTable,
-    line: Isobar,
-    supply: ColdSupply,
-    state: SupplyState,
-    content: BottleContent,
-    flow: float,
-    step: float,
-) -> SupplyState:
-    """The state a step [s] later under a flow [kg/s], from its ``content``."""
-    first = supply_rates(line, supply, state, content, flow, step)
-    guess = SupplyState._make(value + step * rate for value, rate in zip(state, first, strict=True))
-    then = _content(table, supply, guess, content.temperature)
-    second = supply_rates(line, supply, guess, then, flow, step)
-    rates = zip(state, first, second, strict=True)
-    return SupplyState._make(value + 0.5 * step * (one + other) for value, one, other in rates)
 
 
 def supply_rates(

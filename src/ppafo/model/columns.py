@@ -26,13 +26,15 @@ def over_runs(function: Callable[..., Result], *arguments: Any) -> Result:
     varied = [argument for argument in arguments if isinstance(argument, np.ndarray)]
     if not varied:
         return function(*arguments)
+    # A function that branches takes no arrays; one call for each distinct combination gives each run the bits that it
+    # has alone.
     distinct, places = _distinct(varied)
     gathered: Result = _gather([function(*_fill(arguments, values)) for values in distinct], places)
     return gathered
 
 
 def root(number: Number) -> Number:
-    """Square root of a number or of each in a column."""
+    """Square root of a number; element by element for a column."""
     return np.sqrt(number) if isinstance(number, np.ndarray) else math.sqrt(number)
 
 
@@ -56,12 +58,13 @@ def choose(test: Any, yes: Any, no: Any) -> Any:
 
 
 def truncated(number: Number) -> Number:
-    """A number from -2^63 to 2^63 without its fraction, as a float; of each in a column."""
+    """A number from -2^63 to 2^63 without its fraction, as a float; element by element for a column."""
     return np.trunc(number) if isinstance(number, np.ndarray) else float(int(number))
 
 
 def rounded_up(number: Number) -> Number:
-    """The next whole number from a number on, as a float; of each in a column."""
+    """The next whole number from a number on, as a float; element by element for a column."""
+    # One expression for floats and columns, where math.ceil would give an int.
     part = truncated(number)
     found: Number = choose(part < number, part + 1.0, part)
     return found

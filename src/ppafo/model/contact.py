@@ -17,7 +17,7 @@ FLAT = 2.0
 TOE = 3.0
 
 FADING_TIME = 0.02
-"""Time [s] in which a difference of angle at a hand-over falls to a third: about that of a foot that falls flat."""
+"""Time [s] in which a difference of angle at a hand-over falls to a third: about the time of a foot slap."""
 
 NEARLY_FLAT = 0.05235987755982989
 """The measured foot stands on heel and toes while within this angle [rad], 3 deg, of flat; beyond it the heel is up.
@@ -44,7 +44,7 @@ class Landing(NamedTuple):
 
 
 def is_free(contact: float, keeps_gait: float) -> bool:
-    """True where the foot moves by its own dynamics; that of a wearer who keeps the gait (1) never does."""
+    """True where the foot moves by its own dynamics; never for a wearer who keeps the gait (1)."""
     return contact < 1.5 and keeps_gait < 0.5
 
 
@@ -56,8 +56,9 @@ def foot_angle(shank: float, ankle: float) -> float:
 def prescribed_ankle(contact: float, now: GaitNow, ground_angle: float, keeps_gait: float) -> Ankle:
     """Ankle [rad] that the ground prescribes: a flat foot leaves it to the shank, else it is as measured.
 
-    Of a wearer who keeps the gait (1) it is as measured all the time.
+    For a wearer who keeps the gait (1) it is as measured all the time.
     """
+    # Contacts are whole numbers kept as floats: 1.5 and 2.5 tell FLAT from HEEL and TOE.
     flat = contact > 1.5 and contact < 2.5 and keeps_gait < 0.5
     return Ankle(
         now.shank + QUARTER_TURN - ground_angle if flat else now.ankle,
@@ -69,7 +70,7 @@ def prescribed_ankle(contact: float, now: GaitNow, ground_angle: float, keeps_ga
 def landing(
     contact: float, timing: GaitTiming, now: GaitNow, angle: float, offset: float, keeps_gait: float
 ) -> Landing:
-    """Contact at the end of a step from that of the step, the gait then, and the ankle angle [rad] then.
+    """Contact at the end of a step from the contact before, and the gait and the ankle angle [rad] then.
 
     The foot of a wearer who keeps the gait (1) rolls its last degrees slowly, while its toes carry already.
     """
@@ -80,10 +81,13 @@ def landing(
     falls_flat = contact == HEEL and angle >= touches_angle and now.phase < timing.heel_off
     rises = contact > 0.5 and contact < 2.5 and now.phase >= timing.heel_off
     leaves = contact != SWING and not stance
+    # Later lines win: a foot that falls flat and lifts its heel in one step ends on the toes, and toe-off ends them
+    # all.
     after = HEEL if strikes else contact
     after = FLAT if falls_flat else after
     after = TOE if rises else after
     after = SWING if leaves else after
+    # What the angle has over what the new contact prescribes fades from there, so that the ankle does not jump.
     difference = angle - (now.ankle if keeps_gait > 0.5 else flat_angle) if falls_flat else offset
     difference = angle - now.ankle if rises else difference
     return Landing(
@@ -95,7 +99,7 @@ def landing(
 
 
 SETTLES = 3.0
-"""A foot that came down with its toes stands on its heel after one part in so many of the time to the heel's rise."""
+"""A foot that landed on its toes stands on its heel after one part in so many of the time to heel-off."""
 
 
 def heel_fraction(contact: float, timing: GaitTiming, phase: float, toes_first: float) -> float:
@@ -106,12 +110,14 @@ def heel_fraction(contact: float, timing: GaitTiming, phase: float, toes_first: 
     passed = max(0.0, min(1.0, phase / timing.heel_off))
     flat = 1.0 - passed
     rolling = 1.0 if contact == HEEL else flat
+    # The heel takes its load over the first third of that time; it is not there at once.
     fraction = flat * min(1.0, SETTLES * passed) if toes_first > 0.5 else rolling
     return fraction if contact > 0.5 and contact < 2.5 else 0.0
 
 
 def ground_lever(leg: LegParameters, tilt: float) -> float:
     """Lever [m] of the ground force behind the ankle, for a foot tilted up [rad]: it shrinks as the heel rolls down."""
+    # The tilt where it is above 0, else 0, and a fraction that saturates: smooth enough for the step's error estimate.
     raised = 0.5 * (tilt + abs(tilt))
     return leg.flat_heel_lever + (leg.heel_lever - leg.flat_heel_lever) * raised / (raised + leg.heel_roll_angle)
 
@@ -121,7 +127,7 @@ def heel_torque(contact: float, now: GaitNow, leg: LegParameters, ground_angle: 
 
     What the measured moment leaves to the ground of the torque that moves the healthy foot or, once that is flat, the
     force on the lever of a heel that is nearly so; and the same force on a longer lever where this foot, at an ankle
-    angle [rad], is tilted up further: the ground force has rolled less far forward, and a loaded foot comes down.
+    angle [rad], is tilted up further: the ground force has rolled less far forward, which turns a loaded foot down.
     """
     lever = ground_lever(leg, foot_angle(now.shank, angle) - ground_angle)
     healthy = ground_lever(leg, foot_angle(now.shank, now.ankle) - ground_angle)

@@ -1,7 +1,7 @@
 """Exponential, logarithm, power, sine and cosine from plain arithmetic alone: the same bits on every machine.
 
 A library's own differ between platforms, processors and browsers in the last bits. Most are for the constants that a
-run begins with; ``sine_and_cosine_of_turns`` is a short series that runs in many lanes at once, for what steps time.
+run begins with; ``sine_and_cosine_of_turns`` is a short series for vector code, for what steps time.
 """
 
 import math
@@ -23,13 +23,15 @@ _TERMS_OF_SINE = 9
 
 
 def exponential(exponent: float) -> float:
-    """Exponential function [-] of a number [-], within 2e-16; beyond -709 and 709 that of these, NaN of NaN.
+    """Exponential function [-] of a number [-], within 2e-16; constant beyond -709 and 709, NaN for NaN.
 
     Below -708.39 the result is subnormal, and has fewer digits: it is within 5e-324, not within a share of itself.
     """
+    # The negated comparison is true for NaN, for which every direct one is false.
     if not abs(exponent) >= 0.0:
         return exponent
     inside = max(-_LARGEST_EXPONENT, min(exponent, _LARGEST_EXPONENT))
+    # Cody and Waite: whole doublings times the upper part of ln 2 are exact, and the lower part mends the rest.
     doublings = int(inside / LOGARITHM_OF_2 + (0.5 if inside >= 0.0 else -0.5))
     rest = inside - doublings * _UPPER_PART
     rest = rest - doublings * _LOWER_PART
@@ -37,6 +39,7 @@ def exponential(exponent: float) -> float:
     for term in range(_TERMS_OF_EXPONENTIAL):
         series = (series + 1.0) * rest / float(_TERMS_OF_EXPONENTIAL - term)
     value = 1.0 + series
+    # Products with 2 and 0.5 are exact, and every language has them.
     factor = 2.0 if doublings > 0 else 0.5
     for _ in range(abs(doublings)):
         value = value * factor
@@ -53,11 +56,13 @@ def logarithm(number: float) -> float:
     while mantissa < _ROOT_OF_HALF and doublings > -_MAXIMUM_DOUBLINGS:
         mantissa = mantissa * 2.0
         doublings = doublings - 1
+    # ln m = 2 artanh((m - 1) / (m + 1)): within a factor of root 2 about 1 the argument is below 0.18.
     share = (mantissa - 1.0) / (mantissa + 1.0)
     square = share * share
     series = 0.0
     for term in range(_TERMS_OF_LOGARITHM):
         series = (series + 1.0 / float(2 * (_TERMS_OF_LOGARITHM - term) + 1)) * square
+    # Small terms first, so that the large upper part is rounded once.
     small = 2.0 * share + (2.0 * share * series + doublings * _LOWER_PART)
     return doublings * _UPPER_PART + small
 
@@ -102,10 +107,11 @@ TERMS = 9
 def sine_and_cosine_of_turns(turns: float) -> tuple[float, float]:
     """Sine and cosine [-] of a number of turns to 1e-9: power series within a quarter turn of the nearest half turn.
 
-    A library sine cannot run in many lanes at once.
+    A library sine is a call for each run, which keeps a loop over runs from vector code.
     """
     half_turns = float(int(2.0 * turns + (0.5 if turns >= 0.0 else -0.5)))
     odd = half_turns - 2.0 * float(int(0.5 * half_turns))
+    # A negative odd number of half turns leaves -1 here, hence the square.
     sign = 1.0 - 2.0 * odd * odd
     angle = TURN * (turns - 0.5 * half_turns)
     square = angle * angle

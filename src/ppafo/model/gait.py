@@ -1,6 +1,6 @@
-"""How a wearer leads the leg: a measured gait as Fourier series, stride after stride, or on a course.
+"""How a wearer leads the leg: a measured gait as Fourier series, stride after stride, or in a task sequence.
 
-First the series, then where a stride stands and what was measured there, then a course: standing, starting, changing
+First the series, then the gait phase and what was measured there, then a task sequence: standing, starting, changing
 the speed, stairs, stopping.
 """
 
@@ -10,7 +10,7 @@ from ppafo.model.elementary import QUARTER_TURN, TURN, TURNS_OF_RADIAN, sine_and
 from ppafo.model.leg import LegParameters, ShankNow, foot_inertia_about_ankle, torque_of_shank
 
 HARMONICS = 8
-"""Harmonics that the engine follows; those of the built-in gait above are below 0.04 deg and 0.4 % of body weight."""
+"""Harmonics that the engine follows; higher ones of the built-in gait are below 0.04 deg and 0.4 % of body weight."""
 
 
 class Harmonic(NamedTuple):
@@ -28,8 +28,9 @@ class Series(NamedTuple):
 
 
 def harmonics(turns: float) -> tuple[Harmonic, ...]:
-    """Cosines and sines of 1 to 8 times an angle."""
+    """Cosines and sines of 1 to 8 times an angle [turns]."""
     s1, c1 = sine_and_cosine_of_turns(turns)
+    # One sine and cosine, and sums of angles: no result waits for more than three products in a row.
     c2, s2 = c1 * c1 - s1 * s1, 2.0 * s1 * c1
     c3, s3 = c2 * c1 - s2 * s1, s2 * c1 + c2 * s1
     c4, s4 = c2 * c2 - s2 * s2, 2.0 * s2 * c2
@@ -100,7 +101,7 @@ def term_value(one: Harmonic, at: Harmonic) -> float:
 
 
 def term_rate(one: Harmonic, at: Harmonic) -> float:
-    """As ``term_value``, a quarter of a turn later: the derivative with respect to the angle."""
+    """Derivative of ``term_value`` with respect to the angle: its value a quarter of a turn later."""
     return one.sine * at.cosine - one.cosine * at.sine
 
 
@@ -159,7 +160,7 @@ class GaitPlace(NamedTuple):
 
 
 class GaitMeasured(NamedTuple):
-    """What was measured of a gait at an instant: the numbers with which ``GaitNow`` begins, as it has them."""
+    """What was measured of a gait at an instant: the first numbers of ``GaitNow``, in its order."""
 
     phase: float
     shank: float
@@ -177,8 +178,8 @@ class GaitMeasured(NamedTuple):
 class GaitNow(NamedTuple):
     """The gait at an instant: phase in turns, angles [rad] with their derivatives, moment [N m], force [N].
 
-    Accelerations of the knee forward and up [m/s^2]; sine and cosine of the shank angle, and sine of the angle of the
-    measured foot over the horizontal; torque [N m] that moves the measured foot, by equation (11).
+    Accelerations of the knee forward and up [m/s^2]; sine and cosine of the shank angle, and sine of the measured
+    foot's angle over the horizontal; torque [N m] that moves the measured foot, by equation (11).
     """
 
     phase: float
@@ -200,6 +201,7 @@ class GaitNow(NamedTuple):
 
 def phase_at(timing: GaitTiming, time: float) -> float:
     """Phase in turns since the last heel strike, 0 to 1, at a time [s] of 0 or more."""
+    # Times are 0 or more, so int() is the floor; math.floor is a call in vector code.
     turns = timing.start + timing.frequency * time
     return turns - float(int(turns))
 
@@ -268,7 +270,7 @@ def foot_in_gait(gait: ShankSeries, time: float, angle: float) -> FootInGait:
 
 
 def gait_of(leg: LegParameters, now: GaitMeasured) -> GaitNow:
-    """What was measured, with what follows of it for this leg."""
+    """The measured gait with what follows from it for this leg."""
     sine_shank, cosine_shank = sine_and_cosine_of_turns(now.shank * TURNS_OF_RADIAN)
     sine_foot, cosine_foot = sine_and_cosine_of_turns((now.shank - now.ankle) * TURNS_OF_RADIAN + 0.25)
     carried = torque_of_shank(
@@ -307,7 +309,7 @@ NEVER = 1.0e6
 """Time [s] of a part that is not used, and length of one that does not end."""
 
 STANDS_AT = 0.5
-"""Phase of standing as a fraction of that at which the heel rises: half of the weight is under the heel there."""
+"""Gait phase of standing over the phase of heel-off: half of the weight is under the heel there."""
 
 SCUFF_AT = 0.5
 """Place of a scuff as a fraction of the swing."""
@@ -344,7 +346,7 @@ class CoursePart(NamedTuple):
 
 
 class Course(NamedTuple):
-    """Parts in the order of their starts; those that are not used start at ``NEVER``."""
+    """Parts in the order of their starts; unused ones start at ``NEVER``."""
 
     parts: Annotated[tuple[CoursePart, ...], PARTS]
 
@@ -391,7 +393,7 @@ class Blend(NamedTuple):
 
 
 def blend(fraction: float) -> Blend:
-    """From 0 to 1 over a fraction from 0 to 1, with both derivatives 0 at both ends."""
+    """Rise from 0 to 1 over a fraction from 0 to 1, with both derivatives 0 at both ends."""
     rest = 1.0 - fraction
     square = fraction * fraction
     return Blend(
@@ -405,6 +407,7 @@ def part_at(course: Course, time: float) -> CoursePart:
     """The part in force at a time [s] from 0 on."""
     found = course.parts[0]
     for part in course.parts[1:]:
+        # A select for each field: choosing a whole struct would be a branch, which vector code cannot have.
         begun = time >= part.start
         found = CoursePart(
             start=part.start if begun else found.start,
@@ -430,6 +433,7 @@ def pace_in(part: CoursePart, time: float) -> Pace:
     fraction = min(passed / part.length, 1.0)
     shape = blend(fraction)
     square = fraction * fraction
+    # Integral of the blend, x^4 (2.5 - 3 x + x^2): the phase is the integral of the cadence.
     integral = square * square * (2.5 + fraction * (fraction - 3.0))
     return Pace(
         turns=part.turns + part.frequency * passed + part.frequency_gain * part.length * integral,
@@ -450,9 +454,10 @@ def pace_in(part: CoursePart, time: float) -> Pace:
 
 
 def blended_angle(series: Series, at: tuple[Harmonic, ...], pace: Pace, standing: float) -> Motion:
-    """An angle between that of standing [rad] and that of the gait."""
+    """An angle between its value in standing [rad] and the gait's."""
     away = value_at(series, at) - standing
     rate = rate_at(series, at, pace.frequency)
+    # A changing cadence adds its own term to the second derivative, with the shape of the rate.
     turning = acceleration_at(series, at, pace.frequency) + rate_at(series, at, pace.frequency_rate)
     return Motion(
         angle=standing + pace.stride * away,
@@ -464,6 +469,7 @@ def blended_angle(series: Series, at: tuple[Harmonic, ...], pace: Pace, standing
 def tilt_of_shank(timing: GaitTiming, phase: float, pace: Pace) -> Motion:
     """How far the shank leans forward for a strike with the toes: most at the strike, none at toe-off and standing."""
     standing = STANDS_AT * timing.heel_off
+    # Counted from standing, the lean rises from toe-off to the strike and falls to standing without a wrap in between.
     since = phase - standing if phase >= standing else phase - standing + 1.0
     strike, lifted = 1.0 - standing, timing.toe_off - standing
     rises = since < strike
@@ -481,6 +487,7 @@ def tilt_of_shank(timing: GaitTiming, phase: float, pace: Pace) -> Motion:
 def marks_at(timing: GaitTiming, leg: LegParameters, phase: float, pace: Pace) -> Marks:
     """The marks at a phase; none in a part without a scuff and a tilt."""
     since = phase - timing.toe_off - SCUFF_AT * (1.0 - timing.toe_off)
+    # The scuff lasts for a time, while the phase counts turns: the cadence is between them.
     weight = SCUFF_FORCE * leg.body_mass * leg.gravity
     scuffs = since >= 0.0 and since < pace.scuff * pace.frequency
     return Marks(scuff_force=weight if scuffs else 0.0, forefoot=1.0 if pace.tilt > 0.0 else 0.0)
@@ -489,15 +496,15 @@ def marks_at(timing: GaitTiming, leg: LegParameters, phase: float, pace: Pace) -
 def gait_on_course(
     gait: GaitSeries, course: Course, timing: GaitTiming, leg: LegParameters, time: float
 ) -> tuple[GaitNow, Marks]:
-    """The gait of a person with this leg at a time [s] of a course, and what marks the stride.
+    """The gait of a person with this leg at a time [s] of a task sequence, and what marks the stride.
 
-    The ground force is that of the gait at any speed, and passes to the load of standing below ``WALKS_ABOVE``. The
-    acceleration of the knee goes with stride and strides per second squared; that of the way of the body as its speed
-    changes is left out: at most 1 m/s^2 beside 10 to 20.
+    The ground force keeps the gait's curve at any speed, and passes to the load of standing below ``WALKS_ABOVE``. The
+    acceleration of the knee goes with stride and cadence squared; the body's own acceleration as its speed
+    changes is neglected: at most 1 m/s^2 beside 10 to 20.
 
-    On a slope all angles are those over the ground: the shank keeps its angle to the vertical, and the ankle takes the
+    On a slope all angles count from the ground: the shank keeps its angle to the vertical, and the ankle takes the
     slope up, in stance and in the swing (the invariance of A. H. Hansen, D. S. Childress, S. C. Miff, Hum. Mov. Sci. 23
-    (2004) 807). Moment and force are those of level walking, and so is the direction of gravity on the free foot.
+    (2004) 807). Moment, force and the direction of gravity on the unloaded foot are taken from level walking.
     """
     pace = pace_in(part_at(course, time), time)
     phase = pace.turns - float(int(pace.turns))
@@ -548,5 +555,5 @@ def shown_toe_force(toe_force: float, marks: Marks, follow_rate: float, step: fl
 
 
 def stands_on_toes(toes_first: float, marks: Marks) -> float:
-    """1 where the stride began with the toes, or where only the forefoot is on the ground: on the edge of a stair."""
+    """1 where the stride began with the toes, or where only the forefoot meets the ground: on the edge of a stair."""
     return max(toes_first, marks.forefoot)

@@ -50,7 +50,8 @@ def _critical_ratio(k: float) -> float:
 
 
 def choked_flow_constant(heat_capacity_ratio: float, gas_constant: float, temperature: float) -> float:
-    """C1 [s/m] of equation (6), with the exponent (k + 1)/(k - 1); ``gas_constant`` is the specific one."""
+    """C1 [s/m] of equation (6), with the exponent (k + 1)/(k - 1); ``gas_constant`` is R/M."""
+    # With this exponent the paper's own value, 0.00281 s/m, comes out.
     choked = over_runs(_choked_power, heat_capacity_ratio)
     return root(heat_capacity_ratio / (gas_constant * temperature) * choked)
 
@@ -98,7 +99,7 @@ def wall_exchange(
 
 
 def mass_flow_ratio(root: float) -> float:
-    """Mass flow [-] over that of gas at the reference temperature; ``root`` is sqrt(T_up/T_ref) [-], equation (6)."""
+    """Mass flow [-] relative to gas at the reference temperature; ``root`` is sqrt(T_up/T_ref) [-], equation (6)."""
     return 1.0 / root
 
 
@@ -111,9 +112,9 @@ def enthalpy_flow_ratio(root: float, heat_capacity_ratio: float) -> float:
 
 
 def energy_per_content(gas_product: float, heat_capacity_ratio: float) -> float:
-    """Internal energy over content [J/kg], ``R T_ref / (M (k - 1))``, from ``R T_ref / M`` [J/kg].
+    """Internal energy over gas content [J/kg], ``R T_ref / (M (k - 1))``, from ``R T_ref / M`` [J/kg].
 
-    The content of a chamber is the mass that would give its pressure at the reference temperature.
+    The gas content of a chamber is the mass that would give its pressure at the reference temperature.
     """
     return gas_product / (heat_capacity_ratio - 1.0)
 

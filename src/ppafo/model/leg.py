@@ -118,7 +118,7 @@ def gravity_torques(
 ) -> LegTorques:
     """The vector G [N m], with the acceleration of the knee forward and up [m/s^2] in it. Equations (11), (12).
 
-    phi is the shank angle and alpha that of the foot over the horizontal.
+    phi is the shank angle, alpha the foot's angle over the horizontal.
     """
     up = leg.gravity + knee_up
     shank = leg.shank_mass * leg.shank_mass_centre + leg.foot_mass * leg.shank_length
@@ -137,7 +137,7 @@ def torque_of_shank(
     knee_forward: float,
     knee_up: float,
 ) -> float:
-    """Torque [N m] that shank, knee and weight ask of the ankle, beside the foot's own acceleration.
+    """Torque [N m] of shank, knee and weight about the ankle, beside the foot's own acceleration.
 
     The ankle's row of equation (11) without the term in theta''; angles as in ``gravity_torques``, rates [rad/s],
     accelerations [rad/s^2], [m/s^2].
@@ -174,7 +174,7 @@ def torque_of_shank_on(
 ) -> float:
     """The same [N m] for any body that turns with the foot. The ankle's row of equation (11).
 
-    ``mass_moment`` [kg m] is its mass times the distance along the foot, ``inertia`` [kg m^2] that about the ankle.
+    ``mass_moment`` [kg m] is its mass times the distance along the foot, ``inertia`` [kg m^2] about the ankle.
     """
     # theta is phi less alpha, plus 90 deg.
     sine_theta = cosine_phi * cosine_alpha + sine_phi * sine_alpha
@@ -188,9 +188,10 @@ def torque_of_shank_on(
 def torque_on_foot(load: FootLoad, now: ShankNow, angle: float) -> float:
     """Torque [N m] that shank, knee and weight put on what turns about the ankle, positive in plantarflexion.
 
-    T_shank of docs/equations.md: equation (11), its ankle's row without the term in theta''. ``angle`` [rad] is that of
-    the ankle. It is what ``torque_of_shank_on`` asks of the ankle, with the sign of a torque that drives.
+    T_shank of docs/equations.md: equation (11), its ankle's row without the term in theta''. ``angle`` [rad] of
+    the ankle. It is the torque of ``torque_of_shank_on`` about the ankle, with the sign of a torque that drives.
     """
+    # alpha = phi - theta + a quarter turn: the foot is level at an ankle angle of 90 deg below an upright shank.
     sine_phi, cosine_phi = sine_and_cosine_of_turns(now.angle * TURNS_OF_RADIAN)
     sine_alpha, cosine_alpha = sine_and_cosine_of_turns((now.angle - angle) * TURNS_OF_RADIAN + 0.25)
     return -torque_of_shank_on(
@@ -212,6 +213,7 @@ def torque_on_foot(load: FootLoad, now: ShankNow, angle: float) -> float:
 def torque_on_resting_foot(load: FootLoad, shank: float, angle: float) -> float:
     """As ``torque_on_foot`` [N m], to the bit, of a shank that rests at an angle [rad]: the weight alone is left."""
     _, cosine_alpha = sine_and_cosine_of_turns((shank - angle) * TURNS_OF_RADIAN + 0.25)
+    # Grouped as torque_of_shank_on groups it, or the last bits would differ.
     return load.mass_moment * (cosine_alpha * load.gravity)
 
 

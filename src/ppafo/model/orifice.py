@@ -78,6 +78,8 @@ def exact_flow_function(pressure_ratio: float, orifice: ExactOrifice) -> float:
         value = iso6358_flow_function(inside, orifice.number)
     else:
         value = isentropic_flow_function(inside, orifice.number)
+    # The slope of both functions is infinite at equal pressures: ISO 6358 has a straight line there, and so the gas no
+    # infinite stiffness.
     return value * min((1.0 - pressure_ratio) / (1.0 - orifice.linear_ratio), 1.0)
 
 
@@ -111,7 +113,7 @@ def fitted_flow_function(pressure_ratio: float, curve: FlowCurve) -> float:
 def fitted_flow_slope(pressure_ratio: float, curve: FlowCurve) -> tuple[float, float]:
     """Flow function [-] and a slope with respect to the pressure ratio [-], at most 0, from a fitted curve.
 
-    The slope is the derivative, and within twice the linear region that of the chord to equal pressures.
+    The slope is the derivative; within twice the linear region it is the slope of the chord to equal pressures.
     """
     gap = 1.0 - pressure_ratio
     linear_gap = 1.0 - curve.linear_ratio
@@ -163,12 +165,13 @@ def orifice_flow_slopes(
 def check_valve_flow_slopes(
     pressure_a: float, pressure_b: float, conductance: float, is_relieving: float, curve: FlowCurve
 ) -> tuple[float, float, float]:
-    """As ``check_valve_flow``, with its derivatives with respect to both pressures [kg/(s Pa)]."""
+    """Return ``check_valve_flow`` with its derivatives with respect to both pressures [kg/(s Pa)]."""
     forward = pressure_a >= pressure_b
     upstream = max(pressure_a, pressure_b)
     ratio = min(pressure_a, pressure_b) / upstream
     value, slope = fitted_flow_slope(ratio, curve)
     flow = conductance * upstream * value
+    # d(C p_up psi(p_dn / p_up)) by p_up: the ratio falls as the upstream pressure grows.
     by_upstream = conductance * (value - ratio * slope)
     by_downstream = conductance * slope
     signed = flow if forward else -is_relieving * flow
@@ -179,15 +182,15 @@ def check_valve_flow_slopes(
 
 Terms = tuple[float, float, float, float, float, float, float]
 """One number for each coefficient; there are ``TERMS``."""
-PLACES: Terms = (0.01371, 0.117149, 0.300253, 0.522087, 0.735768, 0.900391, 0.988845)
-"""Where a curve meets the exact function: 1 - r over that of the critical ratio.
+NODES: Terms = (0.01371, 0.117149, 0.300253, 0.522087, 0.735768, 0.900391, 0.988845)
+"""Nodes at which a curve meets the exact function: 1 - r over its value at the critical ratio.
 
 A curve that is best by relative least squares crosses the exact function of helium here, and of other gases nearby.
 """
 
 
 def isentropic_curve(heat_capacity_ratio: float, linear_ratio: float) -> FlowCurve:
-    """Fitted curve [-] of equations (6), (7) for a gas; within 3e-7 of the exact function below ``linear_ratio``."""
+    """Fitted curve [-] of equations (6), (7) for a gas, within 3e-7 of the exact function below ``linear_ratio``."""
     coefficients = over_runs(_remembered_coefficients, heat_capacity_ratio)
     return _curve(critical_pressure_ratio(heat_capacity_ratio), linear_ratio, coefficients)
 
@@ -197,6 +200,7 @@ def iso6358_curve(critical_ratio: float, linear_ratio: float) -> FlowCurve:
 
     The exact function depends on (1 - r) / (1 - b) alone, so one fit, scaled, serves every b.
     """
+    # A factor on 1 - r scales the n-th coefficient by its n-th power, and the root in front by its own root.
     scale = 1.0 / (1.0 - critical_ratio)
     factor = root(scale)
     unscaled = _remembered_iso6358_coefficients()
@@ -208,27 +212,30 @@ def iso6358_curve(critical_ratio: float, linear_ratio: float) -> FlowCurve:
 
 
 def _isentropic_coefficients(heat_capacity_ratio: float) -> Terms:
-    """Coefficients of a gas, through the exact function of equation (7) at places below the critical pressure ratio."""
+    """Coefficients of a gas, through the exact function of equation (7) at nodes in the subsonic region."""
     k = heat_capacity_ratio
     critical_gap = 1.0 - critical_pressure_ratio(k)
     choked = math.sqrt(0.5 * (k - 1.0) * power(2.0 / (k + 1.0), (k + 1.0) / (k - 1.0)))
-    gaps, values = PLACES, PLACES
+    gaps, values = NODES, NODES
     for place in range(TERMS):
-        gap = critical_gap * PLACES[place]
+        gap = critical_gap * NODES[place]
+        # Divided by the root of the gap, which the curve has as a factor: what is left to fit is smooth at equal
+        # pressures.
         value = power(1.0 - gap, 1.0 / k) * math.sqrt((1.0 - power(1.0 - gap, (k - 1.0) / k)) / gap)
         gaps, values = _with_item(gaps, place, gap), _with_item(values, place, value / choked)
     return _polynomial_through(gaps, values)
 
 
+# A study asks for the few gases of its runs again and again.
 _remembered_coefficients = lru_cache(maxsize=4096)(_isentropic_coefficients)
 
 
 def _iso6358_coefficients() -> Terms:
     """Coefficients for a critical ratio of 0, where the function is the root of (1 - r)(1 + r)."""
-    values = PLACES
+    values = NODES
     for place in range(TERMS):
-        values = _with_item(values, place, math.sqrt(2.0 - PLACES[place]))
-    return _polynomial_through(PLACES, values)
+        values = _with_item(values, place, math.sqrt(2.0 - NODES[place]))
+    return _polynomial_through(NODES, values)
 
 
 _remembered_iso6358_coefficients = lru_cache(maxsize=1)(_iso6358_coefficients)
@@ -246,6 +253,7 @@ def sonic_conductance_mass(sonic_conductance: float, gas_constant: float, temper
 
     ISO 6358 gives C rho_0 sqrt(T_0 / T) for air; another gas passes sqrt(R_air / R) times as much.
     """
+    # Specific gas constant of air from its density in the reference atmosphere of 1 bar (ISO 8778).
     air_constant = 1.0e5 / (STANDARD_REFERENCE_DENSITY_AIR * STANDARD_REFERENCE_TEMPERATURE)
     warmth = root(STANDARD_REFERENCE_TEMPERATURE / temperature)
     same_gas = sonic_conductance * STANDARD_REFERENCE_DENSITY_AIR * warmth
@@ -270,6 +278,7 @@ def _polynomial_through(places: Terms, values: Terms) -> Terms:
             index = TERMS - 1 + order - number
             rise = differences[index] - differences[index - 1]
             differences = _with_item(differences, index, rise / (places[index] - places[index - order]))
+    # Tuples of fixed length, no lists: an exported library fits its curves itself, from this text in C.
     coefficients = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for number in range(TERMS):
         place = places[TERMS - 1 - number]

@@ -1,13 +1,14 @@
 """The plant: vane, chambers and the ports of a valve, put together as floats.
 
-First the rows of numbers of a device and of its state. Then the vane with its foot plate, equations (1), (2) and (10):
-torques, stick-slip friction, acceleration. Then the two chambers, equations (3) to (5): volume, pressure and mass.
+First the structs of a device's parameters and of its state. Then the vane with its foot plate, equations (1), (2) and
+(10): torques, stick-slip friction, acceleration. Then the two chambers, equations (3) to (5): volume, pressure and
+mass.
 
 Last what a chamber is connected to during one step, equation (8), for a steady or a changing valve. A ``SinglePort``
 joins a chamber to one node, source or atmosphere. A ``BlendedPort`` joins it to both, each with the mean opening over
 the step: that is how a valve that moves or switches inside a step is seen by the chamber. Flows are positive into the
 chamber. Both kinds offer the same two functions; the engine is composed with one pair. A source lets gas in only,
-unless its regulator is a relieving one: a flow back into a node is multiplied by what that node takes back, 1 for the
+unless its regulator is a relieving one: a flow back into a node is multiplied by ``is_relieving``, 1 for the
 atmosphere and for a relieving supply, 0 for a supply with a check valve.
 """
 
@@ -22,7 +23,7 @@ from ppafo.model.ports import exhaust_path, supply_path
 class PlantParameters(NamedTuple):
     """Everything fixed about a device and the bench it stands on, SI units; conductances are Cd A C1 [kg/(s Pa)].
 
-    ``relieving`` is 1 where the supplies take gas back, 0 where they let it in only.
+    ``relieving`` is 1 where the supplies are relieving, 0 where they let gas in only.
     """
 
     gas_product: float
@@ -67,7 +68,7 @@ class ThermalParameters(NamedTuple):
     """Gas with an energy balance: heat capacity ratio [-], and what the walls give, h a (k - 1)/R [kg/(s m^3)].
 
     ``h`` is the heat transfer coefficient, ``a`` the wall's area over the volume, ``R`` the specific gas constant.
-    ``temperature`` is that of the walls and the source [K], at which ``PlantState`` counts the gas.
+    ``temperature`` [K] of the walls and the source is the one at which ``PlantState`` counts the gas.
     """
 
     heat_capacity_ratio: float
@@ -116,7 +117,7 @@ def gravity_torque(angle: Number, largest_torque: float) -> Number:
 
     The foot plate is level at 90 deg, where gravity pulls the toes down with ``largest_torque`` = m g l, that is in
     plantarflexion, so the value is negative. The cosine of the slope is a power series, good to 1e-8 within 0 to
-    180 deg, because a library cosine cannot run in many lanes at once.
+    180 deg, because a call of a library cosine would keep the loop over runs from vector code.
     """
     slope = angle - QUARTER_TURN
     square = slope * slope
@@ -144,13 +145,14 @@ def vane_acceleration(
 def sliding_friction(angular_velocity: float, dynamic_torque: float) -> float:
     """Friction torque [N m] of a moving vane, along the angular velocity [rad/s]: it is subtracted. Equation (10).
 
-    The paper prints the opposite sign beside a friction that is subtracted too, which would drive the motion.
+    The paper reports the opposite sign beside a friction that is subtracted too, which would drive the motion.
     """
     return dynamic_torque if angular_velocity > 0.0 else (-dynamic_torque if angular_velocity < 0.0 else 0.0)
 
 
 def holds_still(net_torque: float, static_torque: float, at_lower_stop: bool, at_upper_stop: bool) -> bool:
     """True where a vane at rest stays at rest: static friction or a stop balances the net torque [N m]."""
+    # Equal torques hold: without friction and torque a resting vane rests.
     within = abs(net_torque) <= static_torque
     against_stop = (at_lower_stop and net_torque < 0.0) or (at_upper_stop and net_torque > 0.0)
     return within or against_stop
@@ -232,6 +234,7 @@ def single_ports(plant: PlantParameters, opening: float) -> tuple[SinglePort, Si
     """Ports of both chambers for a steady opening [-], -1 to 1: above 0 feeds chamber 1 and vents 2. Equation (8)."""
     conductance = abs(opening) * plant.valve_conductance
     fed, vented = supply_path(conductance), exhaust_path(conductance)
+    # An opening of exactly 0 has no conductance: which chamber it takes to be fed does not matter.
     feeds_1 = opening >= 0.0
     node_1 = plant.supply_pressure if feeds_1 else plant.atmospheric_pressure
     node_2 = plant.atmospheric_pressure if feeds_1 else plant.dorsiflexion_pressure
@@ -277,7 +280,7 @@ class PortFlow(NamedTuple):
 
 
 class PortFlowSlopes(NamedTuple):
-    """As ``PortFlow``, with the derivatives with respect to the chamber's pressure [kg/(s Pa)]."""
+    """``PortFlow`` with the derivatives with respect to the chamber's pressure [kg/(s Pa)]."""
 
     total: float
     total_slope: float
@@ -286,7 +289,7 @@ class PortFlowSlopes(NamedTuple):
 
 
 def admitted_flow(flow: float, is_relieving: float) -> float:
-    """Flow out of a node [kg/s], positive out of it: none back into one that takes nothing back. Equation (8)."""
+    """Flow out of a node [kg/s], positive out of it: none back into one that is not relieving. Equation (8)."""
     return max(flow, flow * is_relieving)
 
 
@@ -297,7 +300,7 @@ def single_port_flow(pressure: float, port: SinglePort, curve: FlowCurve) -> Por
 
 
 def single_port_flow_slopes(pressure: float, port: SinglePort, curve: FlowCurve) -> PortFlowSlopes:
-    """As ``single_port_flow``, with derivatives."""
+    """Flow of ``single_port_flow`` with its derivatives [kg/(s Pa)]."""
     flow, _, slope = check_valve_flow_slopes(port.node_pressure, pressure, port.conductance, port.is_relieving, curve)
     return PortFlowSlopes(
         total=flow,
@@ -310,12 +313,13 @@ def single_port_flow_slopes(pressure: float, port: SinglePort, curve: FlowCurve)
 def blended_port_flow(pressure: float, port: BlendedPort, curve: FlowCurve) -> PortFlow:
     """Flow [kg/s] into a chamber at ``pressure`` [Pa absolute] through two open paths. Equations (6) to (8)."""
     source = check_valve_flow(port.source_pressure, pressure, port.source_conductance, port.is_relieving, curve)
+    # The atmosphere gives gas as it takes it: no check valve on this path.
     vent = orifice_flow(port.vent_pressure, pressure, port.vent_conductance, curve)
     return PortFlow(source + vent, source)
 
 
 def blended_port_flow_slopes(pressure: float, port: BlendedPort, curve: FlowCurve) -> PortFlowSlopes:
-    """As ``blended_port_flow``, with derivatives."""
+    """Flow of ``blended_port_flow`` with its derivatives [kg/(s Pa)]."""
     source, _, source_slope = check_valve_flow_slopes(
         port.source_pressure, pressure, port.source_conductance, port.is_relieving, curve
     )

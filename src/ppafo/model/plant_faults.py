@@ -1,6 +1,6 @@
 """Faults of the plant in a walk, and the shut-off valve of the safe state: what they do to the ports of both chambers.
 
-A fault is one entry of ``PLANT_FAULTS``: the part, the kind, its numbers, and which fields of ``PlantFaults`` they are.
+A fault is one entry of ``PLANT_FAULTS``: the part, the kind, its numbers, and the fields of ``PlantFaults`` they fill.
 All act at the ports between valve and chamber, at the command, or at the controller's sample, from a time on; without
 one the numbers of ``SOUND`` change nothing, and a walk that has neither fault nor shut-off is composed without them.
 """
@@ -19,7 +19,7 @@ NEVER = 1.0e9
 
 
 class ChamberFaults(NamedTuple):
-    """Of one chamber: when each fault begins [s], and how large it is: absolute pressures [Pa], shares, openings."""
+    """Faults of one chamber: when each begins [s], and how large it is: absolute pressures [Pa], shares, openings."""
 
     stuck_time: float = NEVER
     opening: float = 0.0
@@ -35,7 +35,7 @@ class ChamberFaults(NamedTuple):
 
 
 class PlantFaults(NamedTuple):
-    """Those of both chambers and of what both share: when each begins [s], and how large it is."""
+    """Faults of both chambers and of their common parts: when each begins [s], and how large it is."""
 
     chamber_1: ChamberFaults
     chamber_2: ChamberFaults
@@ -60,7 +60,7 @@ SOUND = PlantFaults(ChamberFaults(), ChamberFaults())
 class ShutOff(NamedTuple):
     """Shut-off valve, normally closed 3/2: conductance [kg/(s Pa)], 0 where none is fitted, and delay [s].
 
-    Its watchdog takes its power away, and all that of the other valves, where the controller is silent for longer than
+    Its watchdog cuts the power of all valves where the controller is silent for longer than
     ``silence`` [s]; ``NEVER`` where there is none.
     """
 
@@ -75,7 +75,7 @@ NOT_FITTED = ShutOff(0.0, 0.0, NEVER)
 class Unpowered(NamedTuple):
     """For how long [s] the shut-off valve has had no power, and for how long the controller has been silent.
 
-    It has none since the controller has stopped, is dark, or was silent for longer than the watchdog allows, for good.
+    It has none since the controller stopped, was in a brown-out, or was silent for longer than the watchdog allows.
     """
 
     since: float
@@ -165,7 +165,7 @@ _CATALOGUE = [
     PlantFault(
         "bottle",
         "empty",
-        "its pressure falls to that of the atmosphere",
+        "its pressure falls to atmospheric",
         (TIME, Quantity("lag", "s", "time in which most of it is gone", 0.2, 1.0e-3, 1.0e3)),
         {"time": "empty_time", "lag": "empty_lag"},
     ),
@@ -222,14 +222,15 @@ SHUT_OFF = (
 
 
 def gone_share(faults: PlantFaults, time: float) -> float:
-    """What is left of the pressure [-] of a bottle that ends, at a time [s]."""
+    """Fraction of its pressure [-] that a bottle at its end still has at a time [s]."""
     gone = max(time - faults.empty_time, 0.0) / faults.empty_lag
-    # 1 / (1 + x + x^2/2) stands for exp(-x), and the lanes keep it in vector code.
+    # 1 / (1 + x + x^2/2) stands for exp(-x), without a call, so in vector code.
     return 1.0 / (1.0 + gone + 0.5 * gone * gone)
 
 
 def set_pressure(faults: PlantFaults, own: ChamberFaults, pressure: float, room: float, time: float) -> float:
-    """What a regulator gives at a time [s] in place of its pressure; never below the atmosphere ``room``; all [Pa]."""
+    """Pressure of a faulty regulator at a time [s], never below the atmosphere ``room``; all [Pa]."""
+    # First the regulator's own faults, then the bottle before it: an empty one takes any of them down with it.
     given = (own.pressure if time >= own.high_time else pressure) + own.rate * max(time - own.creep_time, 0.0)
     return max(room + (given - room) * gone_share(faults, time), room)
 
@@ -238,13 +239,14 @@ def feed_conductance(shut_off: ShutOff, own: ChamberFaults, conductance: float, 
     """Conductance [kg/(s Pa)] from a supply to a chamber at a time [s], through regulator, shut-off, valve and hose."""
     share = (own.frozen_share if time >= own.frozen_time else 1.0) * hose_share(own, time)
     fitted = shut_off.conductance > 0.0
+    # Both sides of a select are computed in vector code: without the valve the divisor is 1.
     second = shut_off.conductance if fitted else 1.0
     passed = conductance_in_series(conductance, 1.0 / (second * second)) if fitted else conductance
     return share * passed
 
 
 def hose_share(own: ChamberFaults, time: float) -> float:
-    """What is left of the conductance of a hose [-] at a time [s]."""
+    """Fraction of its conductance [-] that a hose still has at a time [s]."""
     return own.kinked_share if time >= own.kinked_time else 1.0
 
 
@@ -258,7 +260,7 @@ def failed_single_port(
     supply: float,
     time: float,
 ) -> SinglePort:
-    """A port with one open path as faults leave it at a time [s]; ``supply`` [Pa] is that of a stuck valve."""
+    """A port with one open path as faults leave it at a time [s]; ``supply`` [Pa] feeds a stuck valve."""
     room, stuck = plant.atmospheric_pressure, time >= own.stuck_time
     fed = (own.opening > 0.0) if stuck else (port.source_fraction > 0.5)
     conductance = abs(own.opening) * plant.valve_conductance if stuck else port.conductance
@@ -372,6 +374,8 @@ def is_in_brown_out(faults: PlantFaults, time: float) -> bool:
 def is_due(began: float, delay: float, time: float, period: float) -> bool:
     """True where something that happens once in each ``delay`` since it began does so in this sample; all [s]."""
     length = max(delay, period)
+    # A sample within half a period of its time is due, and one that misses it by rounding (1e-9 of a delay) is not
+    # early.
     place = max(time - began, 0.0) / length
     return (time < began) | ((place - float(int(place + 1.0e-9))) * length < 0.5 * period)
 
@@ -388,13 +392,14 @@ def is_silenced(shut_off: ShutOff, closed: Unpowered) -> bool:
 
 
 def next_unpowered(
-    shut_off: ShutOff, closed: Unpowered, runs: bool, stopped: bool, dark: bool, period: float
+    shut_off: ShutOff, closed: Unpowered, runs: bool, stopped: bool, brown_out: bool, period: float
 ) -> Unpowered:
     """The shut-off valve after a sample [s] at which the controller runs or not; without power it shuts at once.
 
     A watchdog that has acted stays: what the controller would do when it comes back is not known.
     """
     silenced = is_silenced(shut_off, closed)
-    silent = closed.silent if silenced else (0.0 if runs | dark else closed.silent + period)
+    silent = closed.silent if silenced else (0.0 if runs | brown_out else closed.silent + period)
+    # The same test with the new silence: the sample that exceeds the limit already takes the power.
     since = closed.since + period if stopped | (silent > shut_off.silence) else 0.0
-    return Unpowered(NEVER if dark else since, silent)
+    return Unpowered(NEVER if brown_out else since, silent)

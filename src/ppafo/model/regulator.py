@@ -6,7 +6,7 @@ takes its gas from that line and fills the dorsiflexion line. Each lets through
     mass flow = clip((set pressure - line pressure) / droop, 0, largest flow),
 
 where the second one cannot regulate to more than its inlet has. A line is a volume of isothermal gas, equation (3);
-gas that a chamber pushes back stays in its line, as no gas flows back through a regulator, unless it is a relieving
+gas that a chamber pushes back stays in its line, as no gas flows back through a regulator unless it is a relieving
 one: that lets as much back as through. The lines are stepped with the outflow of the step spread evenly over it: the
 regulator's linear part is solved in closed form, so that a small droop asks for no small step.
 """
@@ -53,13 +53,13 @@ def line_pressures(lines: SupplyLines, gas_product: float, state: LineState) -> 
 def regulated_mass(
     lacking: float, loss: float, stiffness: float, droop: float, largest_flow: float, relieving: float, step: float
 ) -> float:
-    """Mass [kg] that a regulator lets through in a step [s]; below 0 what a relieving one (1, else 0) takes back.
+    """Mass [kg] through a regulator in a step [s]; below 0 back through a relieving one (1, else 0).
 
     ``lacking`` [Pa] is the set pressure less the line's at the beginning; it would grow by ``loss`` [Pa], evenly over
     the step, if nothing came through, and shrinks by ``stiffness`` [Pa/kg] for what does.
     """
     steps = step * stiffness / droop
-    # 1 / (1 + x + x^2/2) stands for exp(-x): of second order, between 0 and 1, and the lanes keep it in vector code.
+    # 1 / (1 + x + x^2/2) stands for exp(-x): of second order, between 0 and 1, and without a call, so in vector code.
     scale = 1.0 / (1.0 + steps + 0.5 * steps * steps)
     regained = lacking * steps * (1.0 + 0.5 * steps) + loss * 0.5 * steps * (1.0 + steps)
     largest = largest_flow * step
@@ -85,6 +85,7 @@ def step_lines(
     per_mass_1, per_mass_2 = gas_product / lines.volume_1, gas_product / lines.volume_2
     pressure_1, pressure_2 = line_pressures(lines, gas_product, state)
     stands_open = pressure_1 < set_2
+    # Where the second regulator stands open its outlet follows its inlet, which sinks by what it draws.
     passed_2 = regulated_mass(
         min(set_2, pressure_1) - pressure_2,
         taken_2 * per_mass_2 + (inlet_rise if stands_open else 0.0),

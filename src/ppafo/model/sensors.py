@@ -36,6 +36,7 @@ class SensorParameters(NamedTuple):
 
 def decay_factors(rate: float, step: float) -> tuple[float, float]:
     """exp(-rate step) and its mean over the step [-], by series at a small fraction of it, doubled up to the whole."""
+    # Beyond ARRIVAL exp is 0 to rounding and its mean falls as one over the step: the last line scales it.
     whole = rate * step
     small = -min(whole, ARRIVAL) * SMALLEST_FRACTION
     term, kept, mean = 1.0, 1.0, 1.0
@@ -44,6 +45,7 @@ def decay_factors(rate: float, step: float) -> tuple[float, float]:
         kept += term
         mean += term / (order + 1)
     for _ in range(DOUBLINGS):
+        # The mean over twice the step is (1 + exp)/2 times the mean over the step, and exp is squared.
         mean *= 0.5 * (1.0 + kept)
         kept *= kept
     return kept, mean * ARRIVAL / max(whole, ARRIVAL)
@@ -83,13 +85,14 @@ def standard_noise(seed: int, sample: int, channel: int) -> float:
 
     The sum is within 6 and has an excess kurtosis of -0.1, near enough to normal for a sensor.
     """
-    # Six words of two uniforms each, written out: a loop inside would keep the lanes from running side by side.
+    # Six words of two uniforms each, written out: a loop inside would keep the runs from running side by side.
     first = mix_bits(mix_bits(mix_bits(seed & MASK) ^ (sample & MASK)) ^ (channel & MASK))
     second = next_word(first)
     third = next_word(second)
     fourth = next_word(third)
     fifth = next_word(fourth)
     total = halves(first) + halves(second) + halves(third) + halves(fourth) + halves(fifth) + halves(next_word(fifth))
+    # Each half stands for the middle of its 1/65536, twelve halves make the 6: the mean is exactly 0.
     return (total + 6.0) / 65536.0 - 6.0
 
 
@@ -100,6 +103,8 @@ def unit_noise(seed: int, sample: int, channel: int) -> float:
 
 def quantise(value: float, resolution: float) -> float:
     """``value`` rounded to a whole number of ``resolution`` of the same unit (half up); unchanged where that is 0."""
+    # Both sides of a select are computed in vector code: one must not divide by 0. int() cuts towards 0, so each sign
+    # has its own half.
     safe = resolution if resolution > 0.0 else 1.0
     rounded = (
         resolution * float(int(value / safe + 0.5)) if value >= 0.0 else -resolution * float(int(0.5 - value / safe))
@@ -157,7 +162,7 @@ class Fault(NamedTuple):
 class GaitSensors(NamedTuple):
     """How sensors follow, noise and step of the forces [N], fractions of samples that are lost, and faults.
 
-    ``follow_rate`` [1/s] is that of the force sensors; ``angle_memory`` and ``pressure_memory`` are what is left of a
+    ``follow_rate`` [1/s] of the force sensors; ``angle_memory`` and ``pressure_memory`` are what is left of a
     first-order sensor's last value after one sample, 0 for one that follows at once.
     """
 
@@ -223,9 +228,9 @@ def distorted(fault: Fault, reading: float, other: float, last: float, time: flo
 
 
 def faulty(fault: Fault, reading: float, other: float, last: float, time: float, draw: float) -> float:
-    """A reading at ``time`` [s] as a sensor with a fault gives it, in its unit; ``other`` is that of the other sensor.
+    """A reading at ``time`` [s] as a faulty sensor gives it, in its unit; ``other`` is the other sensor's.
 
-    ``draw`` from 0 to 1 tells whether the sample is lost.
+    ``draw`` from 0 to 1 decides whether the sample is lost.
     """
     wrong = distorted(fault, reading, other, last, time)
     wrong = last if draw < fault.lost_fraction else wrong
@@ -271,6 +276,8 @@ def measure_gait(
     smooth_angle = angle + (last.smooth_angle - angle) * angle_memory
     smooth_1 = pressure_1 + (last.smooth_pressure_1 - pressure_1) * pressure_memory
     smooth_2 = pressure_2 + (last.smooth_pressure_2 - pressure_2) * pressure_memory
+    # Channels of the noise: 0 to 4 values, 5 to 9 lost samples, 10 faults; 11 is the controller's own
+    # (plant_faults.py).
     seen = measure(sensors, smooth_angle, smooth_1, smooth_2, torque_constant, sample)
     heel = force_reading(gait_sensors, heel_force, seed, sample, 3)
     toe = force_reading(gait_sensors, toe_force, seed, sample, 4)
@@ -324,7 +331,7 @@ def late_measurement(
 
 
 def measurement_of(shown: GaitSeen, torque_constant: float) -> GaitMeasurement:
-    """What a controller gets of what the sensors show; its torque is that of the readings, true or not."""
+    """What a controller gets of what the sensors show; its torque follows from the readings, right or wrong."""
     return late_measurement(
         shown.heel_force, shown.toe_force, shown.angle, shown.pressure_1, shown.pressure_2, torque_constant
     )

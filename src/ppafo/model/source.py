@@ -3,7 +3,7 @@
 First the properties of a real fluid, read from a table: its gas, and where it has one its liquid at the same pressure.
 The table is over temperature and, for the gas, over the fraction of the densest gas that it holds at that temperature:
 saturated vapour where there is a liquid, else a fixed density. Between the nodes all columns run straight, so nothing
-overshoots. Whoever makes the table says where its numbers come from.
+overshoots. The maker of the table says where its numbers come from.
 
 A bottle has a fixed volume. What it holds has one temperature; liquid and vapour are in equilibrium, so that drawing
 vapour boils liquid, cools it and lowers the pressure. Heat comes from the wall of the bottle, and to the wall from the
@@ -21,6 +21,7 @@ Column = tuple[float, ...]
 Nodes = tuple[int, float]
 """Number of the node below a place, and the fraction of the way to the next."""
 
+# More halvings than a float has bits, so that the result does not depend on where they began.
 _HALVINGS = 80
 
 
@@ -42,7 +43,7 @@ class FluidTable(NamedTuple):
 
 
 def has_liquid(table: FluidTable) -> bool:
-    """Tell whether the densest gas of the table is vapour over liquid."""
+    """True where the densest gas of the table is vapour over liquid."""
     return bool(table.liquid_densities)
 
 
@@ -59,6 +60,7 @@ def liquid_density(table: FluidTable, temperature: float) -> float:
 def fluid_pressure(table: FluidTable, temperature: float, density: float) -> float:
     """Absolute pressure [Pa] of gas at a density [kg/m^3]; above the densest gas there is, that gas's pressure."""
     nodes = nodes_around(table, temperature)
+    # Beyond saturated vapour more gas is more liquid, at the same pressure.
     held = min(density, between(table.densest, nodes))
     factor = across(table.factors, table, nodes, density)
     return factor * held * table.gas_constant * temperature
@@ -77,12 +79,12 @@ def gas_density(table: FluidTable, temperature: float, pressure: float) -> float
 
 
 def gas_specific_energy(table: FluidTable, temperature: float, density: float) -> float:
-    """Specific internal energy [J/kg] of gas at a density [kg/m^3], at most that of the densest gas there is."""
+    """Specific internal energy [J/kg] of gas at a density [kg/m^3]; beyond the densest gas there is, that gas's."""
     return across(table.energies, table, nodes_around(table, temperature), density)
 
 
 def nodes_around(table: FluidTable, temperature: float) -> Nodes:
-    """Place of a temperature [K] among those of the table; the ends of the table hold outside it."""
+    """Place of a temperature [K] among the table's; the ends of the table hold outside it."""
     return _place(table.temperatures, temperature)
 
 
@@ -162,7 +164,7 @@ class Regulator(NamedTuple):
 
 
 def bottle_content(table: FluidTable, mass: float, volume: float, temperature: float) -> BottleContent:
-    """Return what a bottle of a volume [m^3] with ``mass`` [kg] at a temperature [K] holds."""
+    """Content of a bottle of a volume [m^3] with ``mass`` [kg] at a temperature [K]."""
     density = mass / volume
     vapour = min(density, densest_gas(table, temperature))
     pressure = fluid_pressure(table, temperature, density)
@@ -184,6 +186,7 @@ def _liquid_beside(table: FluidTable, mass: float, volume: float, nodes: Nodes) 
     vapour = between(table.densest, nodes)
     if mass <= volume * vapour or not has_liquid(table):
         return 0.0
+    # Both phases fill the volume: m = m_l + rho_v (V - m_l / rho_l), solved for the liquid.
     liquid = between(table.liquid_densities, nodes)
     return min((mass - volume * vapour) / (1.0 - vapour / liquid), mass)
 
@@ -217,38 +220,25 @@ def content_temperature(table: FluidTable, mass: float, volume: float, energy: f
             below, miss_below = middle, miss
         else:
             above, miss_above = middle, miss
-    return _between_nodes(table, mass, volume, energy, (nodes[below], miss_below), (nodes[above], miss_above))
-
-
-def _between_nodes(
-    table: FluidTable,
-    mass: float,
-    volume: float,
-    energy: float,
-    below: tuple[float, float],
-    above: tuple[float, float],
-) -> float:
-    """Return the root between two nodes, each with how far its energy is off, by the Illinois form of false position.
-
-    The energy grows with temperature.
-    """
-    (low, miss_low), (high, miss_high) = below, above
+    # False position between two nodes, where the energy is smooth and grows with temperature. An end that stays counts
+    # half the next time (the Illinois form), or the root would be approached from one side alone, slowly.
+    low, high, miss_low, miss_high = nodes[below], nodes[above], miss_below, miss_above
     for _ in range(_MAXIMUM_HALVINGS):
-        middle = (low * miss_high - high * miss_low) / (miss_high - miss_low)
-        miss = content_energy(table, mass, volume, middle) - energy
+        found = (low * miss_high - high * miss_low) / (miss_high - miss_low)
+        miss = content_energy(table, mass, volume, found) - energy
         if abs(miss) <= _NARROW_ENOUGH * abs(miss_high - miss_low) or high - low <= _NARROW_ENOUGH:
-            return middle
+            return found
         if miss > 0.0:
-            high, miss_high, miss_low = middle, miss, 0.5 * miss_low
+            high, miss_high, miss_low = found, miss, 0.5 * miss_low
         else:
-            low, miss_low, miss_high = middle, miss, 0.5 * miss_high
+            low, miss_low, miss_high = found, miss, 0.5 * miss_high
     return 0.5 * (low + high)
 
 
 def bottle_rates(
     content: BottleContent, state: BottleState, draw: float, wall: BottleWall, room_temperature: float
 ) -> BottleRates:
-    """Return how a bottle changes under a draw of vapour [kg/s]: balances of mass and of energy of content and wall."""
+    """Rates of a bottle under a draw of vapour [kg/s]: balances of mass, and of energy of content and wall."""
     to_content = wall.content_heat_transfer * (state.wall_temperature - content.temperature)
     from_room = wall.room_heat_transfer * (room_temperature - state.wall_temperature)
     outflow = draw * content.outflow_enthalpy

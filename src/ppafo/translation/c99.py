@@ -74,7 +74,8 @@ _MACRO = re.compile(
 _WORDS = {"and": "&&", "or": "||"}
 _LEVELS = {"or": 2, "and": 3, **dict.fromkeys(("<", "<=", ">", ">=", "==", "!="), 5), "+": 8, "-": 8, "*": 9, "/": 9}
 PART = "ppafo_part"
-"""A part of an array along its first places."""
+"""Name in C of the function for a part of an array along its first index."""
+# How strongly a text holds together: C's levels of precedence, as far as terms have them.
 _CHOICE, _SIGN, _ATOM = 1, 10, 11
 _WORKED_OUT = frozenset({"+", "-", "*", "&", "|", "^", ">>", "min", "max", "choice", "negative"})
 _HELPERS = {
@@ -90,6 +91,7 @@ _OF_C = {"sqrt": "sqrt", "abs": "fabs", **{name: name for name in LIBRARY}}
 def c_name(name: str, others: Collection[str] = (), outer: Collection[str] = ()) -> str:
     """A name of Python as C can have it: not one of C's, of the ``others`` beside it, or of the file around it."""
     found = name
+    # Python allows a final underscore on any name, so one more always ends at a free name.
     while found in _RESERVED or _MACRO.match(found) or found in outer or (found != name and found in others):
         found = f"v{found}" if _MACRO.match(found) else f"{found}_"
     return found
@@ -107,7 +109,7 @@ def member_name(kind: Row, name: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class CTerms:
-    """Writes terms; ``type_name`` gives the name of a type in C, ``name`` that of a local name.
+    """Writes terms; ``type_name`` gives the name of a type in C, ``name`` a local name.
 
     ``places`` has names for the first places of some arrays, ``functions`` other names of functions; ``made`` is told
     of every row that is made where no name is declared.
@@ -127,7 +129,7 @@ class CTerms:
     def written(self, item: Term) -> tuple[str, int]:
         """A term as text, and how strongly it holds together."""
         if item.type == INT16 and item.kind in _WORKED_OUT:
-            # What is worked out from 16 bits has those of an int in C, which are 16 or 32.
+            # Arithmetic on 16 bits gives an int in C, which has 16 or 32.
             return f"(int16_t)({self.worked_out(item)[0]})", _SIGN
         return self.worked_out(item)
 
@@ -141,8 +143,10 @@ class CTerms:
         if item.kind in _OF_C:
             return f"{_OF_C[item.kind]}({', '.join(map(self.term, item.parts))})", _ATOM
         if item.kind == "*" and item.type == INT:
+            # Signed overflow is undefined in C: the product is made of unsigned numbers, and wraps as Python's text
+            # says.
             return f"ppafo_wrapped_product({self.term(item.parts[0])}, {self.term(item.parts[1])})", _ATOM
-        # Signs that many misread get brackets around what they join, those of sums and products as they need them.
+        # Operators that many misread get brackets around their operands, sums and products only where they need them.
         level = _LEVELS.get(item.kind, 0)
         inner = level if level >= _LEVELS["+"] else _LEVELS["+"] if level else _SIGN
         if item.kind in _WORDS:
@@ -229,7 +233,7 @@ class CTerms:
         return f"{name}({', '.join(self.term(part) for part in item.parts)})", _ATOM
 
     def listed(self, item: Term) -> str:
-        """A row or tuple as what a declaration begins with: its numbers in braces, those of rows in it likewise."""
+        """A struct or tuple as an initialiser: its numbers in braces, and inner structs likewise."""
         if item.kind != "build":
             return self.term(item)
         text = ", ".join(self.listed(part) for part in item.parts if not is_empty(part.type))
@@ -246,6 +250,7 @@ class CTerms:
             text = f"({self.term(given, _CHOICE + 1)} ? 1 : 0)" if given.type == BOOL else self.term(given, _SIGN)
             return f"({'int16_t' if item.type == INT16 else 'int32_t'}){text}", _SIGN
         if given.type == FLOAT:
+            # A conversion of NaN or a large float is undefined in C: the prelude says what it gives.
             return f"ppafo_whole_part({self.term(given)})", _ATOM
         if given.type == BOOL:
             one, none = ("1.0", "0.0") if item.type == FLOAT else ("INT64_C(1)", "INT64_C(0)")
@@ -274,11 +279,11 @@ PPAFO_INLINE ppafo_array {PART}(ppafo_array whole, int64_t first, int64_t beyond
 }}
 """
 LANE = "lane"
-"""Loops over this name see no other turn of themselves, which the compiler is told."""
+"""Iterations of loops over this name are independent, which the compiler is told."""
 
 
 def program_source(program: Program) -> str:
-    """A translation unit whose ``advance`` takes one block of a program through its steps, as that of the lanes does.
+    """A translation unit whose ``advance`` takes one block of a program through its steps, as the compiled module does.
 
     ProgramError for what is outside the subset, with file and line.
     """
@@ -287,7 +292,7 @@ def program_source(program: Program) -> str:
 
 
 def translated(composed: str, collector: SourceCollector) -> str:
-    """The same of a composed module that ``collector`` gathered."""
+    """The translation unit of a composed module that ``collector`` gathered."""
     return c_source(
         walk_module(composed), documents_of(collector), "Generated from the functions of ppafo. Not to be edited."
     )
@@ -302,7 +307,7 @@ def documents_of(collector: SourceCollector) -> dict[str, str]:
 class Reading:
     """What makes a translation unit one for people: short names, and nothing that is not used.
 
-    ``names`` are the short ones by those of the module, where no two are the same; ``declared`` are structs that the
+    ``names`` are the short names by the module's own, where no two are the same; ``declared`` are structs that the
     file around it declares, by their rows; ``around`` is that file. Functions are plain static ones.
     """
 
@@ -322,7 +327,7 @@ def c_source(
     """A translation unit with all functions of a module; one for ``reading`` is shorter.
 
     ``documents`` has the docstrings of rows and functions; ``places`` has names for the first places of some arrays,
-    which the file around it defines, ``x`` for those of all functions, ``advance.x`` for that of one. ``prelude`` is
+    which the file around it defines, ``x`` in all functions, ``advance.x`` in one. ``prelude`` is
     the file with what stands before all of them.
     """
     # What returns nothing but empty rows is never called: an empty value is not written.
@@ -361,6 +366,7 @@ _DEFINES = re.compile(r"(?:^|\s|\*)(ppafo_\w+)\(|\} (ppafo_\w+);|#define (PPAFO_
 def _prelude_for(prelude: str, used: str) -> str:
     """The parts of a prelude that something after them uses."""
     kept: list[str] = []
+    # From the end, so that a part which only a later part uses is kept with it.
     for part in reversed(prelude.split("\n\n")):
         head = part.split("{")[0] if "PPAFO_INLINE" in part else part
         defined = {name for found in _DEFINES.finditer(head) for name in found.groups() if name}
@@ -614,7 +620,7 @@ class _Body:
 
 
 def _together(members: Iterable[str]) -> list[str]:
-    """Members of a struct, those of one type that follow each other in one declaration."""
+    """Members of a struct; neighbours of one type share a declaration."""
     lines: list[str] = []
     for kind, group in itertools.groupby((text.split(TIED) for text in members), key=lambda pair: pair[0]):
         lines += _wrapped(f"    {kind} {', '.join(pair[1] for pair in group)};", " " * 8)

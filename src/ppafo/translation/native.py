@@ -1,4 +1,4 @@
-"""A program built from its C by a compiler of this machine; it does what the compiled module of the lanes does.
+"""A program built from its C by a compiler of this machine; it does what the module compiled by Numba does.
 
 Handing an array to C costs Python about a microsecond, a number a twentieth of that. So the arrays of an entry are
 packed into one block of memory, once where they stay the same.
@@ -40,6 +40,7 @@ LONGEST_COMPILING = 300.0
 """Seconds after which a compiler is ended that has not ended by itself; the longest program takes a tenth of it."""
 _LONGEST_ANSWER = 10.0
 """Seconds that it has to say its version."""
+# Between two looks at an interrupt while a compiler runs [s].
 _PAUSE = 0.25
 
 
@@ -67,6 +68,7 @@ def asked(
             stderr=subprocess.PIPE,
             encoding="utf-8",
             errors="replace",
+            # A group of its own, so that cc1 and the linker end with the driver.
             process_group=0 if os.name == "posix" else None,
         )
     except OSError as error:
@@ -82,8 +84,13 @@ def asked(
                 if time.monotonic() > end:
                     raise CompilerError(f"{Path(line[0]).name} did not end within {seconds:g} s and was stopped")
         finally:
+            # Ended by an interrupt or its time, the driver's children would go on.
             if process.poll() is None or process.returncode < 0:
-                _end_all(process)
+                with contextlib.suppress(OSError):
+                    if os.name == "posix":
+                        os.killpg(process.pid, signal.SIGKILL)
+                    else:
+                        process.kill()
 
 
 def _home() -> dict[str, str]:
@@ -94,15 +101,6 @@ def _home() -> dict[str, str]:
         return {"HOME": str(Path("~").expanduser())}
     except RuntimeError:
         return {}
-
-
-def _end_all(process: "subprocess.Popen[str]") -> None:
-    """End a process and those that it has started, which would go on without it."""
-    with contextlib.suppress(OSError):
-        if os.name == "posix":
-            os.killpg(process.pid, signal.SIGKILL)
-        else:
-            process.kill()
 
 
 def complaint(done: "subprocess.CompletedProcess[str]") -> str:
@@ -137,7 +135,7 @@ _NUMBERS: dict[Scalar, Any] = {FLOAT: ctypes.c_double, INT: ctypes.c_int64}
 
 @dataclass(frozen=True, slots=True)
 class NativeEntry:
-    """An entry of a library, called as that of a module by Numba: arrays, then numbers.
+    """An entry of a library, called as an entry compiled by Numba: arrays, then numbers.
 
     ``function`` takes its arrays, of these dimensions, one after another as ``layout`` writes each ``ppafo_array``.
     """
@@ -195,14 +193,15 @@ def load_entries(library: Path, entries: Entries) -> dict[str, NativeEntry]:
     """Return the entries of a library by name.
 
     OSError where it cannot be loaded, AttributeError where it lacks one, CompilerError where its arithmetic is not
-    that of IEEE 754, to which an environment variable or a wrapper can set any compiler.
+    IEEE 754's; an environment variable or a wrapper can make any compiler leave it.
     """
     loaded = ctypes.CDLL(str(library))
+    # (1 + 2^-30)(1 - 2^-30) - 1 rounds to 0 where the product is rounded by itself, and to -2^-60 where it is fused.
     small = 2.0**-30
     numbers = map(ctypes.c_double, (1.0 + small, 1.0 - small, -1.0, small * small))
     if not loaded.ppafo_rounds_as_written(*numbers):
         raise CompilerError(
-            "the compiler joins or reorders sums and products, so that results would differ from those of others "
+            "the compiler joins or reorders sums and products, so that results would differ from other compilers' "
             "(look for -ffp-contract or -ffast-math in its wrapper or in the environment)"
         )
     return {name: _entry(loaded[f"{name}{_PACKED}"], types) for name, types in entries.items()}
@@ -220,7 +219,7 @@ def _entry(function: Any, types: Sequence[Type]) -> NativeEntry:
 FOR_GCC = ("-fno-thread-jumps", "-fno-ssa-phiopt", "-fno-tree-pre", "--param", "sra-max-scalarization-size-Ospeed=4096")
 """What lets gcc take lanes side by side: without them it makes jumps of choices first. The bits stay as they are."""
 _LIBRARY_AS_IT_RUNS = tuple(f"-fno-builtin-{name}" for name in sorted(LIBRARY))
-"""Else a compiler works out what it can by itself, to other last bits than those of the library, which Numba calls."""
+"""Else a compiler works out what it can by itself, to other last bits than the library's, which Numba calls."""
 _THIS_PROCESSOR = "-march=native" if platform.machine().lower() in ("x86_64", "amd64", "i686") else "-mcpu=native"
 _WIDEST_VECTORS = ("-mprefer-vector-width=512",) if _THIS_PROCESSOR.startswith("-march") else ()
 _LIBRARY_FILE = {"win32": "program.dll", "darwin": "program.dylib"}.get(sys.platform, "program.so")
@@ -255,7 +254,7 @@ class CCompiler:
 
     @property
     def flags(self) -> tuple[str, ...]:
-        """Those for the bits, and those for this processor."""
+        """Flags for the bits, and for this processor."""
         return (
             *FLAGS,
             *_LIBRARY_AS_IT_RUNS,
@@ -336,6 +335,7 @@ def described_processor() -> str:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:
         return f"{platform.machine()} {platform.processor()}"
+    # Lines that say what the processor can do; its clock and its load change from run to run.
     wanted = ("model name", "flags", "Features", "CPU implementer", "CPU part", "isa")
     return "\n".join(sorted({line for line in lines if line.startswith(wanted)}))
 
@@ -378,7 +378,7 @@ def build(
 
 def _compiled(source: str, folder: Path, command: Sequence[str], flags: Sequence[str]) -> Path:
     """The library that a compiler makes of C, in a folder."""
-    if _is_mounted_without_execution(folder):
+    if hasattr(os, "ST_NOEXEC") and bool(os.statvfs(folder).f_flag & os.ST_NOEXEC):
         raise CompilerError(f"libraries in {folder.parent} cannot be loaded (it is mounted noexec)", *COMPILERS)
     written, library = folder / "program.c", folder / _LIBRARY_FILE
     written.write_text(source, encoding="utf-8")
@@ -394,10 +394,6 @@ def _compiled(source: str, folder: Path, command: Sequence[str], flags: Sequence
     if not library.is_file():
         raise CompilerError(f"{name} ended without an error, but made no library")
     return library
-
-
-def _is_mounted_without_execution(folder: Path) -> bool:
-    return hasattr(os, "ST_NOEXEC") and bool(os.statvfs(folder).f_flag & os.ST_NOEXEC)
 
 
 def _fill(module: ModuleType, library: Path, entries: Entries) -> None:

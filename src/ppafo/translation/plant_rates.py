@@ -1,6 +1,6 @@
-"""The plant in continuous time with the flow curves of the lanes, as CasADi expressions of its own text.
+"""The plant in continuous time with the engine's flow curves, as CasADi expressions of its own text.
 
-What the lanes step and what is differentiated here are the same functions: ports, flow curves, chambers, gas with an
+What the engine steps and what is differentiated here are the same functions: ports, flow curves, chambers, gas with an
 energy balance, vane. Only the sums of equation (9) and the state of the vane, which stands or slides, are said here.
 """
 
@@ -100,7 +100,7 @@ def gas_rates(
 ) -> PlantRates:
     """Rates at an angle [rad] that is a symbol, its rate [rad/s] and absolute pressures [Pa]; gas of one temperature.
 
-    Equation (3) is differentiated, (6) to (9) are as the lanes have them. ``acting`` as in ``symbolic``.
+    Equation (3) is differentiated, (6) to (9) are the engine's. ``acting`` as in ``symbolic``.
     """
     flows = symbolic(gas_flows, PlantParameters, Openings, float, float, compare=compare, acting=acting)
     found = flows(plant, openings, *pressures)
@@ -132,7 +132,7 @@ def thermal_gas_rates(
     compare: Compare = both_sides,
     acting: Acting | None = None,
 ) -> PlantRates:
-    """As ``gas_rates`` for gas with an energy balance at temperatures [K]."""
+    """Rates of ``gas_rates`` for gas with an energy balance at temperatures [K]."""
     content_1, content_2 = _contents(plant, angle, pressures, acting)
     mass_1, mass_2 = (
         content * thermal.temperature / warm for content, warm in zip((content_1, content_2), temperatures, strict=True)
@@ -154,7 +154,7 @@ def thermal_gas_rates(
     found = flows(plant, thermal, openings, state, masses, *pressures)
     # The contents hold the work of the moving wall already: only the volumes are left of equation (3).
     slopes = _pressure_rates(plant, angle, rate, pressures, (found.content_1, found.content_2), acting)
-    # A temperature is that of the walls times content over mass.
+    # A temperature is the walls' times gas content over mass.
     return PlantRates(
         pressure_1=slopes[0],
         pressure_2=slopes[1],
@@ -179,11 +179,12 @@ def _pressure_rates(
     mass_rates: tuple[Any, Any],
     acting: Acting | None,
 ) -> tuple[Any, Any]:
-    """Rates of both pressures [Pa/s] from those of the gas [kg/s] and of the angle [rad/s]: equation (3) in time."""
+    """Rates of both pressures [Pa/s] from the rates of the gas [kg/s] and the angle [rad/s]: equation (3) in time."""
     import casadi
 
     per_mass = symbolic(pressures_per_mass, PlantParameters, float, acting=acting)(plant, angle)
     first, second = (
+        # p = m f(angle), so dp/dt = f dm/dt + p / f df/dt: no division by a mass, and any actuator.
         factor * gained + pressure / factor * casadi.jtimes(factor, angle, rate)
         for factor, pressure, gained in zip(per_mass, pressures, mass_rates, strict=True)
     )
@@ -200,7 +201,7 @@ def vane_acceleration(
     acting: Acting | None = None,
     added_torque: Any = 0.0,
 ) -> Any:
-    """Angular acceleration [rad/s^2] of a vane that slides one ``way`` (1 or -1), 0 where it is held (0)."""
+    """Angular acceleration [rad/s^2] of a vane that slides one ``way`` (1 or -1), 0 where it sticks (0)."""
     types = (PlantParameters, float, float, float, float, float, float)
     motion = symbolic(free_motion, *types, compare=compare, acting=acting)
     return motion(plant, angle, rate, *pressures, added_torque, way)[1]

@@ -65,7 +65,9 @@ class Scopes:
         if isinstance(mentions[0], typed.Reserve):
             return
         if _begins(mentions[0], name):
+            # A name that changes once is const: a reader of exported C need not look for more.
             self.first[id(mentions[0])] = "const " if self.changes[id(body)][name] == 1 else "let "
+        # As far in as it goes: each block with a value of its own declares it for itself.
         elif not self.is_divided(name, mentions):
             self.before.setdefault(id(body), []).append(name)
         else:
@@ -107,10 +109,11 @@ class Scopes:
 def needed(body: Block, after: frozenset[str], leaving: frozenset[str] = frozenset()) -> tuple[Block, frozenset[str]]:
     """A block without assignments that nothing reads, and the names that it reads.
 
-    ``after`` are the names that are read later, ``leaving`` those after ``break`` and ``continue``.
+    ``after`` are the names that are read later, ``leaving`` the names read after ``break`` and ``continue``.
     """
     kept: list[Statement] = []
     live = after
+    # Backwards, so that what is read later is known.
     for statement in reversed(body):
         if isinstance(statement, typed.Assign) and statement.name not in live:
             continue
@@ -119,7 +122,12 @@ def needed(body: Block, after: frozenset[str], leaving: frozenset[str] = frozens
             kept.append(replace(statement, body=yes, otherwise=no))
             live = read | others | _names_of(statement)
         elif isinstance(statement, typed.Count | typed.While):
-            turn, live = _needed_in_loop(statement, live)
+            # What one iteration leaves may be read by the next: again until no further name is found to be read.
+            live |= _names_of(statement)
+            turn, read = needed(statement.body, live, live)
+            while not live >= read:
+                live |= read
+                turn, read = needed(statement.body, live, live)
             kept.append(replace(statement, body=turn))
         else:
             made = _made(statement)
@@ -127,16 +135,6 @@ def needed(body: Block, after: frozenset[str], leaving: frozenset[str] = frozens
             live = (live - {made[0]} if made else live) | _names_of(statement)
             kept.append(statement)
     return tuple(kept[::-1]), live
-
-
-def _needed_in_loop(loop: typed.Count | typed.While, after: frozenset[str]) -> tuple[Block, frozenset[str]]:
-    """The same of a loop: what one turn leaves may be read by the next."""
-    live = after | _names_of(loop)
-    while True:
-        turn, read = needed(loop.body, live, live)
-        if live >= read:
-            return turn, live
-        live |= read
 
 
 def _names_of(statement: Statement) -> frozenset[str]:
@@ -148,7 +146,7 @@ def scopes_of(function: Function) -> Scopes:
     """Where each local name of a function is declared."""
     found = Scopes()
     found.look(function.body)
-    # In order of names: that of a set is another one in each process, and an export is to have the same text in all.
+    # In order of names: the order of a set changes from process to process, and an export has one text.
     for name in sorted(found.types.keys() - {name for name, _ in function.parameters}):
         found.place(name, function.body)
     return found
@@ -182,7 +180,7 @@ def _blocks(statement: Statement) -> list[Block]:
 
 
 def _terms(statement: Statement) -> list[Term]:
-    """Terms of a statement itself, without those of its blocks."""
+    """Terms of a statement itself, not of its blocks."""
     if isinstance(statement, typed.Assign | typed.Return):
         return [statement.value]
     if isinstance(statement, typed.Store):

@@ -26,11 +26,11 @@ Compare = Callable[[str, Any, Any, str], Any]
 """From a sign, two values and where they are compared: the expression of it, or a truth value where it is decided."""
 Around = Mapping[str, Callable[..., Any]]
 Acting = Mapping[Effect, Any]
-"""Effects in the order in which they act, with their rows."""
+"""Effects in the order in which they act, with their parameters."""
 
 
 def _quotient(left: Any, right: Any) -> Any:
-    """A quotient as the lanes have it: infinite, or no number, over 0."""
+    """A quotient as compiled code has it: infinite, or no number, over 0."""
     if isinstance(left, int | float) and isinstance(right, int | float) and right == 0:
         return math.nan if left == 0 or math.isnan(left) else math.copysign(math.inf, left) * math.copysign(1.0, right)
     return left / right
@@ -57,8 +57,8 @@ def both_sides(sign: str, left: Any, right: Any, _where: str) -> Any:
 class Symbolic:
     """A function of the model that takes CasADi symbols in the place of floats; call it as the function itself.
 
-    ``around`` has functions by the name of those of the model that they stand before: each is called with the function
-    of the model and with its arguments. ``compare`` says what becomes of a comparison. ``rows`` are those of the
+    ``around`` has functions by the name of the model's function that they stand before: each is called with that
+    function and with its arguments. ``compare`` says what becomes of a comparison. ``rows`` are the parameters of the
     effects that act inside it.
     """
 
@@ -95,12 +95,13 @@ def symbolic(
     """A function of the model for CasADi, from its text; ``given`` are the types of its parameters.
 
     These are ``float``, classes of NamedTuples, or functions that are handed over. ``acting`` are the effects that act
-    in it, with their rows. ProgramError, with file and line,
+    in it, with their parameters. ProgramError, with file and line,
     for what is outside the subset.
     """
     before = {emitted_name(item): wrapper for item, wrapper in (around or {}).items()}
     rows = {effect.name: row for effect, row in (acting or {}).items()}
     effects = tuple(acting or ())
+    # A function of the model that has changed since, as in a notebook, is walked again.
     if not _walked(function, given, effects).collector.is_current():
         _walked.cache_clear()
     walked = _walked(function, given, effects)
@@ -188,6 +189,7 @@ class _Call:
                     if found is not None:
                         return found
                 elif _returns(item):
+                    # A branch that may return takes what follows with it, on both ways: an expression has one value.
                     rest = body[place + 1 :]
                     yes, no = (self.block((*way, *rest), dict(names)) for way in (item.body, item.otherwise))
                     return self.chosen(test, yes, no)

@@ -92,6 +92,7 @@ class Term:
     """Local names whose values it takes."""
 
     def __post_init__(self) -> None:
+        # Gathered once: asked again and again while scopes are found.
         names = frozenset((self.detail,)) if self.kind == "name" else _NONE
         object.__setattr__(self, "reads", names.union(*(part.reads for part in self.parts)) if self.parts else names)
 

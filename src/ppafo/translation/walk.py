@@ -238,6 +238,7 @@ class Expressions:
         is_whole = left.type == right.type == INT
         if not sign or (not is_whole and sign in WHOLE_ONLY | {"//", "%"}):
             raise self.refused(node, f"'{ast.unparse(node)}' needs a library function")
+        # A shift by 64 or more, or by less than 0, is undefined in C.
         if sign == ">>" and _literal(right) not in range(64):
             raise self.refused(node, f"'{ast.unparse(node)}' shifts by what is not written out as 0 to 63")
         kind = INT if is_whole and sign != "/" else FLOAT
@@ -246,6 +247,7 @@ class Expressions:
     def power(self, node: ast.BinOp) -> Term:
         """A power of floats; compilers make something else of one whose base or exponent they see."""
         parts = tuple(self.scalar(item, FLOAT) for item in (node.left, node.right))
+        # Compilers replace powers of literals by products or roots, whose last bits differ from the library's.
         if any((part.parts[0] if part.kind == "negative" else part).kind == "number" for part in parts):
             raise self.refused(node, f"'{ast.unparse(node)}', a power of a number or by a number that is written out")
         return Term("pow", FLOAT, parts)
@@ -263,6 +265,7 @@ class Expressions:
             kind = joined(left.type, right.type)
             if type(sign) not in SIGN_OF or kind is None:
                 raise self.refused(node, f"'{ast.unparse(node)}'")
+            # A large integer that becomes a float may round, and Python compares the exact numbers.
             if kind == FLOAT and not all(map(self.is_exact, (left, right))):
                 raise self.refused(node, f"'{ast.unparse(node)}' compares a whole number with a float")
             one = Term(SIGN_OF[type(sign)], BOOL, (converted(left, kind), converted(right, kind)))
@@ -284,12 +287,13 @@ class Expressions:
         kind = joined(yes.type, no.type)
         if kind is None:
             raise self.refused(node, "a choice between values of different forms")
+        # In C both sides get one type: an int that becomes a float loses digits, and -0 differs from 0.
         if typed.mixes(yes.type, no.type):
             raise self.refused(node, f"'{ast.unparse(node)}', a choice between a whole number and a float")
         return Term("choice", kind, (test, converted(yes, kind), converted(no, kind)))
 
     def name_called(self, node: ast.Call) -> str:
-        """The name of what is called; that of the function itself where it was handed over."""
+        """The name of what is called; the function's own where it was handed over."""
         name = node.func.id if isinstance(node.func, ast.Name) else ast.unparse(node.func)
         if any(isinstance(item, ast.Starred) for item in node.args):
             raise self.refused(node, f"'{ast.unparse(node)}' hands over a tuple as arguments")
@@ -330,6 +334,7 @@ class Expressions:
         if set(given) != set(names):
             raise self.refused(node, f"'{ast.unparse(node)}' does not give every argument")
         types = tuple(given[item].type for item in names)
+        # An array of known shape is a local one, which C hands over as a pointer of another type.
         if any(isinstance(kind, Array) and kind.shape for kind in types):
             raise self.refused(node, f"'{ast.unparse(node)}' hands over an array of its own")
         return self.made(name, types), tuple(given[item] for item in names if not is_empty(given[item].type))
@@ -398,8 +403,8 @@ def walk_module(
 ) -> Module:
     """All functions of a composed module that its entries need. ProgramError for what is outside the subset.
 
-    Entries are functions with types of their parameters, by name; without any those that state them in a decorator.
-    ``library`` has those of ``LIBRARY`` that may be called.
+    Entries are functions with types of their parameters, by name; by default the functions that state them in a
+    decorator. ``library`` has the functions of ``LIBRARY`` that may be called.
     """
     walk = _ModuleWalk(source.split("\n"), entries_of(source) if entries is None else entries, library)
     for node in parse_module(source).body:
@@ -434,6 +439,7 @@ class _ModuleWalk:
             if key in self.open:
                 raise self.refused(definition, f"'{name}' calls itself")
             self.open.add(key)
+            # Each choice of types is a function of its own, since C has no overloading.
             number, own = 1, name
             while own in self.names or (number > 1 and (own in self.definitions or own in self.rows)):
                 number += 1

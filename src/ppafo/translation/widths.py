@@ -1,4 +1,4 @@
-"""Whole numbers in 16 and 32 bits where their ranges allow it, which interval arithmetic over declared inputs proves.
+"""Fixed-point numbers in 16 and 32 bits where interval arithmetic over declared inputs proves that they fit.
 
 Every function of a module is gone through with the ranges of what it is called with. What a name, a field or an item of
 a tuple ever holds decides its width; a value beyond 32 bits is refused, so that what is left cannot overflow.
@@ -12,6 +12,7 @@ from ppafo.errors import ProgramError
 from ppafo.translation import typed
 from ppafo.translation.typed import BOOL, INT, INT16, INT32, Function, Items, Module, Row, Statement, Term, Type
 
+# Loops are gone through turn by turn: more would take long, and no fixed-point law has them.
 MOST_TURNS = 64
 
 
@@ -23,7 +24,7 @@ class Interval(NamedTuple):
 
 
 Range: TypeAlias = "Interval | tuple[Range, ...]"
-"""That of a number, or those of the fields of a row or the items of a tuple."""
+"""Interval of a number, or ranges of the fields of a struct or the items of a tuple."""
 Names: TypeAlias = "dict[str, Range]"
 
 TRUTH = Interval(0, 1)
@@ -56,11 +57,6 @@ def hull(one: Range, other: Range) -> Range:
     assert not isinstance(one, Interval)
     assert not isinstance(other, Interval)
     return tuple(hull(*pair) for pair in zip(one, other, strict=True))
-
-
-def _corners(sign: Callable[[int, int], int], one: Interval, other: Interval) -> Interval:
-    found = [sign(left, right) for left in one for right in other]
-    return Interval(min(found), max(found))
 
 
 _SIGNS: dict[str, Callable[[int, int], int]] = {
@@ -148,7 +144,7 @@ class _Ranges:
         names.update(after or {})
 
     def value(self, item: Function, term: Term, names: Names) -> Range:
-        """The range of a term, which is kept as that of all times that it is worked out."""
+        """The range of a term; kept is the range over all times that it is worked out."""
         found = self.found(item, term, names)
         self.note(term.type, found)
         if isinstance(found, Interval):
@@ -186,7 +182,7 @@ class _Ranges:
 
 
 def _calculated(item: Function, term: Term, parts: list[Interval]) -> Interval:
-    """That of a sum, a product with a power of two, a shift, a choice of the smaller or larger."""
+    """Range of a sum, a product with a power of two, a shift, a choice of the smaller or larger."""
     if term.kind == "number":
         return Interval(int(term.detail), int(term.detail))
     if term.kind in _COMPARISONS:
@@ -201,11 +197,14 @@ def _calculated(item: Function, term: Term, parts: list[Interval]) -> Interval:
         raise _refused(item, "a product that is not with a power of two, for which there may be no multiplier")
     if term.kind not in _SIGNS:
         raise _refused(item, f"'{term.kind}'")
-    return _corners(_SIGNS[term.kind], *parts)
+    # Sums, products, shifts, min and max have their extremes at the ends of both ranges.
+    one, other = parts
+    ends = [_SIGNS[term.kind](left, right) for left in one for right in other]
+    return Interval(min(ends), max(ends))
 
 
 def _join(names: Names, other: Names) -> None:
-    """What names hold where two ways meet; one that only one way has is not read after it."""
+    """Join what names hold where two branches meet; a name that only one branch has is not read after it."""
     for name, value in other.items():
         names[name] = hull(names.get(name, value), value)
 
@@ -298,6 +297,7 @@ class _Narrowing:
         if term.kind == "number" or (term.kind == "convert" and parts[0].type == BOOL):
             return replace(term, type=own, parts=parts)
         if term.kind == ">>":
+            # An arithmetic shift to the right never leaves the width of what is shifted.
             own = parts[0].type
             return replace(term, type=own, parts=parts)
         whole = parts[1:] if term.kind == "choice" else parts

@@ -24,7 +24,7 @@ from ppafo.model.orifice import area_conductance
 from ppafo.model.plant import PlantParameters
 from ppafo.model.plant_faults import NOT_FITTED, PLANT_FAULTS, SOUND, PlantFaults, ShutOff
 from ppafo.model.sensors import GaitSensors
-from ppafo.model.valves import dump
+from ppafo.model.valves import vent_valve
 from ppafo.model.valves.kind import ValveModel
 from ppafo.parameters.device import Device, Valve
 from ppafo.parameters.plant import plant_parameters
@@ -289,6 +289,6 @@ def planned_course(course: WalkingCourse, gait: Gait, number: Any = 0.0) -> Plan
 
 
 def walking_valve(valve: Valve) -> ValveModel:
-    """The valve of a walking device; a proportional one has a dump valve for free motion."""
+    """The valve of a walking device; a proportional one has a vent valve for free motion."""
     settings = {name: first(value) for name, value in valve.settings.items()}
-    return dump.choose(settings) if valve.kind == "proportional" else VALVES[valve.kind].choose(settings)
+    return vent_valve.choose(settings) if valve.kind == "proportional" else VALVES[valve.kind].choose(settings)

@@ -25,7 +25,7 @@ from ppafo.model.plant import (
     gravity_torque,
     pressures_per_mass,
 )
-from ppafo.model.valves import dump, proportional, solenoid
+from ppafo.model.valves import proportional, solenoid, vent_valve
 from ppafo.parameters.plant import plant_parameters
 from ppafo.translation.plant_rates import gas_flows
 from ppafo.translation.symbolic import symbolic
@@ -95,8 +95,8 @@ CASES: dict[str, tuple[Callable[..., Any], tuple[Any, ...], Callable[[random.Ran
             draw.uniform(-1.2, 1.2),
         ),
     ),
-    "dump valve": (
-        dump.instant_ideal,
+    "vent valve": (
+        vent_valve.instant_ideal,
         (proportional.IdealProportional, proportional.NoValveState, float),
         lambda draw: (
             proportional.IdealProportional(0.05, 1.0 / 0.95),

@@ -41,11 +41,13 @@ def pid_command(
     time constant ``derivative_filter``. What a clipped command lacks is taken off the integral, by ``anti_windup`` a
     second (back-calculation).
     """
+    # The first sample has none before it: no kick of the derivative.
     change = (error - state.error) * state.started
     slope = state.slope + (change - period * state.slope) / (period + parameters.derivative_filter)
     integral = state.integral + parameters.integral_gain * error * period
     unlimited = ahead + parameters.proportional_gain * error + integral + parameters.derivative_gain * slope
     command = max(-1.0, min(1.0, unlimited))
+    # Back-calculation: it acts only while the command is clipped, since both are equal otherwise.
     integral = integral + parameters.anti_windup * period * (command - unlimited)
     return command, PidState(integral=integral, error=error, slope=slope, started=1.0)
 

@@ -1,4 +1,4 @@
-"""Laws with a model of the device: what they believe of it, its inverse, and two controllers that use it.
+"""Laws with a model of the device: the believed numbers, the model's inverse, and two controllers that use it.
 
 The model is equations (2) to (9) for a proportional valve, with the ellipse of ISO 6358 for the flow function. Every
 number is the controller's own, so that it can be wrong about the device as a real controller is.
@@ -52,7 +52,7 @@ class TorqueRates(NamedTuple):
 
 
 NOMINAL_QUANTITIES = quantities_of(NominalChambers)
-"""Fields of ``NominalChambers`` in order; the defaults are those of the set ppafo2011 with its proportional valve."""
+"""Fields of ``NominalChambers`` in order; the defaults come from the set ppafo2011 with its proportional valve."""
 
 
 def ellipse_flow(pressure_a: float, pressure_b: float, conductance: float, critical_ratio: float) -> float:
@@ -79,6 +79,7 @@ def torque_rates(
     Opening the valve raises or lowers the torque as it should where both pressures are above the
     atmosphere: the believed supplies let gas in only.
     """
+    # A measured angle beyond a stop must not make a believed volume 0 or less.
     least = min(nominal.dead_volume_1, nominal.dead_volume_2)
     volume_1 = chamber_1_volume(angle, nominal.angle_min, nominal.volume_per_angle, nominal.dead_volume_1)
     volume_2 = chamber_2_volume(angle, nominal.angle_max, nominal.volume_per_angle, nominal.dead_volume_2)
@@ -102,6 +103,7 @@ def opening_for_rate(rates: TorqueRates, requested: float) -> float:
     """Opening from -1 to 1 that gives a torque rate [N m/s], the inverse of ``torque_rates``; clipped to full."""
     needed = requested - rates.closed
     gain = rates.rising if needed >= 0.0 else rates.falling
+    # Where full opening moves the torque hardly at all, the quotient is limited, not the command's sign.
     return max(-1.0, min(1.0, needed / max(gain, SMALLEST_GAIN)))
 
 

@@ -95,6 +95,7 @@ def dead_zone_update(
     chambers of a solenoid pair.
     """
     error = reference - measurement.torque
+    # A release beyond the dead zone would open and close the valve in turn, sample by sample.
     release = min(parameters.release, parameters.dead_zone)
     limit_up = release if state.direction > 0.0 else parameters.dead_zone
     limit_down = release if state.direction < 0.0 else parameters.dead_zone

@@ -1,6 +1,6 @@
-"""What torque a walking device requests in each phase of the gait, whatever law then tracks it.
+"""Torque that a walking device requests in each phase of the gait, whatever law then tracks it.
 
-Landing: a profile in dorsiflexion that lets the foot down, about a spring and damper that hold it. Mid-stance: free.
+Landing: a profile in dorsiflexion that lets the foot down, about a spring and damper that hold it. Mid-stance: vented.
 Push-off: a profile in plantarflexion. Swing: a profile in dorsiflexion about the same spring and damper.
 
 The profile has the four parameters that the exoskeleton literature uses, of J. Zhang et al., Science 356 (2017) 1280:
@@ -87,7 +87,7 @@ PEAKS = ("peak_torque", "landing_peak_torque", "swing_peak_torque")
 """Settings that ``largest_torque`` limits."""
 
 ASSISTING_QUANTITIES = (*ASSISTANCE_QUANTITIES, *PHASE_QUANTITIES, *SAFETY_QUANTITIES)
-"""What every law declares after its own settings that follows ``assistance``."""
+"""Settings that every law with ``assistance`` declares after its own."""
 
 
 def with_defaults(quantities: tuple[Quantity, ...], defaults: Mapping[str, float]) -> tuple[Quantity, ...]:
@@ -124,7 +124,7 @@ class TorqueRequest(NamedTuple):
 
 
 class Assessment(NamedTuple):
-    """One sample: phase, clock and time in the stride, safety, request; 1 where the task goes on; 1 where it acts."""
+    """One sample: phase, clock and gait phase as a time, safety, request; 1 where the task goes on; 1 where it acts."""
 
     phase: PhaseState
     clock: Any
@@ -152,7 +152,7 @@ class AssistingParameters(Protocol):
 
     @property
     def timing(self) -> Any:
-        """How the time in the stride is known."""
+        """How the gait phase is known."""
 
 
 class AssistingState(Protocol):
@@ -213,9 +213,9 @@ def same_task(before: float, after: float) -> bool:
 def timed_phase(
     parameters: Any, phase: PhaseState, clock: Any, measurement: GaitMeasurement, period: float
 ) -> tuple[PhaseState, Any, GaitTime]:
-    """Phase, clock and time in the stride after a sample, taken every ``period`` [s].
+    """Phase, clock and gait phase as a time after a sample, taken every ``period`` [s].
 
-    A way to know the time puts its own functions in the place of ``follow_thresholds`` and ``threshold_time``.
+    A timing replaces ``follow_thresholds`` and ``threshold_time`` by its own functions.
     """
     passed = threshold_time(parameters.timing, clock, phase).since_strike + period
     heel, toe = measurement.heel_force, measurement.toe_force
@@ -231,10 +231,11 @@ def assess(
     phase, clock, time = timed_phase(parameters, state.phase, state.clock, measurement, period)
     watch = safety.monitor(parameters.safety, state.safety, state.phase, phase, measurement, period)
     last = state.request
+    # An angle of exactly 0 marks that there was no sample before.
     turned = measurement.angle - last.angle if last.angle > 0.0 else 0.0
     rate = last.rate + (turned - period * last.rate) / (period + parameters.assistance.hold.rate_filter)
     torque = requested_torque(parameters.assistance, phase, time, measurement.angle, rate)
-    # A foot that comes down on its toes turns far, and what is left in the chamber would then push on a loaded heel.
+    # A foot that lands on its toes turns far, and gas left in the chamber would then push on a loaded heel.
     on_toes = phase.phase == MID_STANCE and phase.in_phase >= phase.since_strike
     bends = on_toes and phase.since_strike < EASING_TIME and measurement.torque > EASED
     works = phases.lifts(phase.phase) or phase.phase == PUSH_OFF or bends

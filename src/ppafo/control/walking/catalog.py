@@ -89,13 +89,13 @@ def law_that_walks_update(
     )
 
 
-def bind(frame: Callable[..., Any], name: str, pieces: Mapping[str, Any]) -> Callable[..., Any]:
-    """Return the function of a frame with other pieces in the place of some names of this module.
+def bind(frame: Callable[..., Any], name: str, components: Mapping[str, Any]) -> Callable[..., Any]:
+    """Return the function of a frame in which some names of this module stand for other components.
 
-    It is the same code: only what those names stand for differs, so that the engine compiles it as any other function.
+    The code is the same and only those names differ, so that the engine compiles it as any other function.
     """
     assert isinstance(frame, types.FunctionType), "a frame is a plain function"
-    made = types.FunctionType(frame.__code__, {**frame.__globals__, **pieces}, name)
+    made = types.FunctionType(frame.__code__, {**frame.__globals__, **components}, name)
     made.__qualname__ = name
     made.__module__ = frame.__module__
     made.__annotations__ = frame.__annotations__
@@ -103,7 +103,7 @@ def bind(frame: Callable[..., Any], name: str, pieces: Mapping[str, Any]) -> Cal
 
 
 def row_with(name: str, row: Any, **classes: type) -> Any:
-    """Return a NamedTuple class as ``row`` is one, whose named fields are of the given classes."""
+    """Return a NamedTuple class like ``row``, whose named fields have the given classes."""
     namedtuple: Any = collections.namedtuple
     made = namedtuple(name, row._fields, module=__name__)
     made.__annotations__ = {**row.__annotations__, **classes}
@@ -111,7 +111,7 @@ def row_with(name: str, row: Any, **classes: type) -> Any:
 
 
 def shared_settings(law: ControllerKind) -> set[str]:
-    """Return the settings of a torque law that have the name of one that every controller of walking has."""
+    """Return the settings of a torque law whose names every controller of walking has, too."""
     return {item.name for item in law.quantities} & {item.name for item in ASSISTING_QUANTITIES}
 
 
@@ -127,11 +127,13 @@ def walking_law(law: ControllerKind, name: str, summary: str, gains: tuple[tuple
             f"controller '{law.name}' cannot walk: its setting '{min(taken)}' has the name of one that every "
             f"controller of walking has"
         )
+    # One class for each law, named after it: exported C has structs of these names.
     title = "".join(part.capitalize() for part in name.split("_"))
     parameters = row_with(f"{title}Parameters", LawParameters, law=law.parameters, timing=ThresholdRules)
     state = row_with(f"{title}State", LawState, law=type(law.initial), clock=ThresholdClock)
+    # A law without a state has nothing to begin anew, and its empty NamedTuple no literal in C.
     anew = bind(restart_anew, f"restart_{name}", {"LAW_START": law.initial}) if len(law.initial) else keep_state
-    pieces = {"law_update": law.update, "law_restart": law.restart or anew, "LawState": state}
+    components = {"law_update": law.update, "law_restart": law.restart or anew, "LawState": state}
     return replace(
         law,
         name=name,
@@ -146,7 +148,7 @@ def walking_law(law: ControllerKind, name: str, summary: str, gains: tuple[tuple
             request=assistance.START,
             law=law.initial,
         ),
-        update=bind(law_that_walks_update, f"update_{name}", pieces),
+        update=bind(law_that_walks_update, f"update_{name}", components),
         restart=None,
     )
 
@@ -252,12 +254,15 @@ LAWS = (
 """Gains found by search, one law at a time."""
 
 
-def _event_based(item: Walking) -> ControllerKind:
-    summary = f"Event-based torque profiles for each phase, tracked by {item.following}."
-    return walking_law(item.law, f"event_{item.law.name}", summary, item.gains)
-
-
-_EVENT_BASED = {item.law.name: _event_based(item) for item in LAWS}
+_EVENT_BASED = {
+    item.law.name: walking_law(
+        item.law,
+        f"event_{item.law.name}",
+        f"Event-based torque profiles for each phase, tracked by {item.following}.",
+        item.gains,
+    )
+    for item in LAWS
+}
 _ORDER = (
     event_on_off.EVENT_ON_OFF,
     *(_EVENT_BASED[name] for name in ("on_off_dead_zone", "proportional", "pid", "pid_feedforward", "sliding_mode")),
@@ -269,14 +274,14 @@ _ORDER = (
 WALKING_CONTROLLERS: Kinds[ControllerKind] = Kinds(
     "ppafo.walking_controllers", "controller of walking", ControllerKind, {kind.name: kind for kind in _ORDER}
 )
-"""Those with gains for walking, which compete with each other."""
+"""Controllers with gains for walking, which compete with each other."""
 
 
 def walking_controllers() -> dict[str, ControllerKind]:
-    """Return all that a walk file can name: those with gains for walking, and every torque law by its own name.
+    """Return all controllers that a walk file can name: with gains for walking, and every torque law by its own name.
 
     A law that has gains for walking has them under its own name too: ``pid`` is ``event_pid``. A constant command
-    follows no torque and does not walk, nor does a law on whole numbers or one whose settings have names that walking
+    follows no torque and does not walk, nor does a fixed-point law or one whose settings have names that walking
     has taken.
     """
     laws = {
@@ -295,6 +300,7 @@ def load_walking_controller(name: str) -> None:
 
 def law_that_walks(law: ControllerKind) -> ControllerKind:
     """Return any torque law as a controller of walking, with its gains for walking where the catalogue has some."""
+    # A law of another package may have the name of one of ours, and must not get its gains.
     if law.name in _EVENT_BASED and CONTROLLERS.get(law.name) is law:
         return _EVENT_BASED[law.name]
     summary = f"Torque profiles for each phase, tracked by the law {law.name} with its own gains."
@@ -307,33 +313,34 @@ TIMINGS: Kinds[TimingKind] = Kinds(
     TimingKind,
     {kind.name: kind for kind in (THRESHOLDS, FRACTIONAL, ESTIMATED)},
 )
-"""The ways to know the time in the stride. The first one is that of every controller unless another is chosen."""
+"""The ways to know the gait phase. Every controller has the first one unless another is chosen."""
 
 
 def keeps_time(kind: ControllerKind) -> bool:
-    """Tell whether a controller of walking goes by a time in the stride that can be known in several ways."""
+    """Return whether a controller of walking goes by a gait phase that can be known in several ways."""
     return "clock" in getattr(kind.initial, "_fields", ())
 
 
 @functools.cache
 def with_timing(kind: ControllerKind, timing: TimingKind) -> ControllerKind:
-    """Return a controller of walking that knows the time in the stride in another way; ScenarioError if it has none."""
+    """Return a controller of walking that knows the gait phase in another way; ScenarioError if it has none."""
     if timing is THRESHOLDS:
         return kind
     if not keeps_time(kind):
-        raise ScenarioError(f"controller '{kind.name}' goes by no time in the stride: timing.kind cannot be given")
+        raise ScenarioError(f"controller '{kind.name}' goes by no gait phase: timing.kind cannot be given")
     name, before = f"{kind.name}_{timing.name}", type(kind.initial)
     title = timing.name.capitalize()
     state = row_with(f"{before.__name__}{title}", before, clock=type(timing.initial))
     parameters = row_with(f"{kind.parameters.__name__}{title}", kind.parameters, timing=timing.parameters)
     own = {"follow_thresholds": timing.follow, "threshold_time": timing.gait_time}
     timed = {"timed_phase": bind(assistance.timed_phase, f"timed_phase_{timing.name}", own)}
-    pieces = timed | {"assess": bind(assistance.assess, f"assess_{timing.name}", timed)}
+    components = timed | {"assess": bind(assistance.assess, f"assess_{timing.name}", timed)}
+    # Where the frame makes its state, it must make the class with the other clock.
     made = {word: state for word, value in kind.update.__globals__.items() if value is before}
     return replace(
         kind,
         quantities=(*kind.quantities, *timing.quantities),
         parameters=parameters,
         initial=state(**kind.initial._asdict() | {"clock": timing.initial}),
-        update=bind(kind.update, f"update_{name}", pieces | made),
+        update=bind(kind.update, f"update_{name}", components | made),
     )

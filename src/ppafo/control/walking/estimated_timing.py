@@ -4,7 +4,7 @@ The stride is learnt at equal fractions of it ("knots") from the first good stri
 after knot, the last readings are compared with the learnt stride at the fractions where the clock has taken them, and
 with the learnt stride shifted by some knots either way: the shift with the least sum of squares is the error of the
 clock, to a part of a knot by one Gauss-Newton step. The clock is moved by a part of it. Where even the best shift fits
-badly nothing is moved: the wearer does something else than walk. Li et al. (2011) correlate a window in the same way.
+badly nothing is moved: the wearer does not walk then. Li et al. (2011) correlate a window in the same way.
 
 The learnt stride is kept as a ring: its first knot is the next to come, its last one the one just passed.
 """
@@ -122,7 +122,8 @@ def misfit(stride: LearntStride, window: Window, rules: EstimationRules, shift: 
 
 
 def finer_shift(stride: LearntStride, window: Window, rules: EstimationRules, shift: int) -> float:
-    """What is left of the shift [knots] after a whole number of them: one Gauss-Newton step, at most a knot."""
+    """Rest of the shift [knots] beyond a whole number of them: one Gauss-Newton step, at most a knot."""
+    # The cost of a shift is one more residual, and 1e-12 keeps a flat stride without trust from dividing by 0.
     along, square = -rules.clock_trust * shift, 1.0e-12 + rules.clock_trust
     for back in range(WINDOW):
         place, knot = WINDOW - 1 - back, (KNOTS - 1 - back + shift) % KNOTS
@@ -139,9 +140,10 @@ def finer_shift(stride: LearntStride, window: Window, rules: EstimationRules, sh
 
 
 def estimated_shift(stride: LearntStride, window: Window, rules: EstimationRules) -> float:
-    """By how much of a stride [turns] the wearer is ahead of the clock; 0 where no shift fits well."""
+    """Fraction of a stride [turns] by which the wearer is ahead of the clock; 0 where no shift fits well."""
     least, best = misfit(stride, window, rules, 0), 0
     for distance in range(1, FURTHEST + 1):
+        # Small shifts first, and only a better one replaces the best: ties stay near the clock.
         for side in range(2):
             shift = distance if side == 0 else -distance
             found = misfit(stride, window, rules, shift) + rules.clock_trust * shift * shift / (3.0 * WINDOW)
@@ -152,9 +154,9 @@ def estimated_shift(stride: LearntStride, window: Window, rules: EstimationRules
 
 
 def moved_since(window: Window) -> float:
-    """By how much the clock was moved since the readings of the window were taken, on average [turns].
+    """Mean movement of the clock [turns] since the readings of the window were taken.
 
-    So much of the shift that they show is mended.
+    That much of the shift that they show is already corrected.
     """
     total = 0.0
     for place in range(WINDOW):

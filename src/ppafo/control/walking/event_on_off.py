@@ -1,6 +1,6 @@
 """Event-based control of a pair of solenoid valves: each phase of the gait has its valve configuration.
 
-Landing: the dorsiflexion side, which lets the foot down. Swing: the same side holds it up, at an angle within a band.
+Landing: the dorsiflexion side, which lets the foot down. Swing: the same side keeps it up, at an angle within a band.
 Mid-stance: both chambers vented, free motion. Push-off: the plantarflexion side, vented again before the toes leave
 the ground, so that its gas does not hold the foot down in the swing. The functional tasks of figure 1A of the paper.
 """
@@ -52,6 +52,7 @@ def update(
     watch = safety.monitor(parameters.safety, state.safety, state.phase, phase, measurement, period)
     above = measurement.angle > parameters.swing_angle + parameters.band
     below = measurement.angle < parameters.swing_angle - parameters.band
+    # Hysteresis: between both limits the valve stays as it is.
     lifting = 0.0 if below else (1.0 if above else state.lifting)
     held = phases.lifts(phase.phase)
     command = -1.0 if lifting > 0.5 or time.lands > 0.5 else VENT

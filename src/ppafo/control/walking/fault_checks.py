@@ -4,7 +4,7 @@ A reading raises a flag where it is out of range, lost, frozen while others chan
 seen at the ankle: a foot on its heel turns down until it is flat, and up from then on. A foot that has turned up before
 the heel is detected, and goes on until the toes are, was on the ground long before.
 
-Flags are joined by ``&`` and ``|``: ``and`` and ``or`` are branches, which keep the lanes from running side by side.
+Flags are joined by ``&`` and ``|``: ``and`` and ``or`` are branches, which keep runs from running side by side.
 """
 
 from typing import NamedTuple
@@ -33,7 +33,7 @@ class SafetyRules(NamedTuple):
     """What readings can be, and how long a contradiction may last; ``declaration.SAFETY_QUANTITIES`` says it of each.
 
     Force [N], angles [rad], times in stride times (``longest_phase``, ``flat_from``, ``flat_to``, ``shortest_swing``)
-    or [s], strides, and absolute pressures [Pa]. ``fill_time`` is that of a valve fully open; half open it takes twice
+    or [s], strides, and absolute pressures [Pa]. ``fill_time`` holds for a valve fully open; half open it takes twice
     as long. ``nominal`` is what the observer of the chambers believes of the device.
     """
 
@@ -165,7 +165,7 @@ SLOW_TIME = 0.08
 """Time constant [s] of the slow readings: a step has faded from them when a sensor counts as frozen."""
 
 MOVES, TURNS = 40.0, 0.04
-"""A force [N] and an angle [rad] move that are further than this from their slow reading: not those of who stands."""
+"""A force [N] and an angle [rad] move that are further than this from their slow reading: more than in standing."""
 
 IN_TIME = 0.06
 """Angle [rad] below ``highest_toe_off_angle``, 3.4 deg, up to which toes that are seen to leave the ground do so in
@@ -222,7 +222,7 @@ DWELLS, TURNS_BACK = 0.235, 0.35
 stride the first one is ``frozen_time``, and slow strides turn back slowly."""
 
 LANDS = 0.3
-"""Fraction of the stride in which who comes down on the heel is stepping, and may then stand on it."""
+"""Fraction of the stride after heel strike that counts as stepping; later the wearer may stand on the heel."""
 
 MOST = 0.75
 """Fraction of a stride after which an angle has been the same for all of it, less where nothing else moved."""
@@ -248,10 +248,11 @@ def next_readings(
 ) -> LastReadings:
     """The last readings after a sample, taken every ``period`` [s]; ``before`` and ``phase`` are its phases.
 
-    Who stands with heel and toes on the ground has no moving sensor, and the steps of a converter then hold a reading
+    In standing with heel and toes on the ground no sensor moves, and the steps of a converter then keep a reading
     for long: a sensor is still only while another one moves. On the toes alone nobody stands still, and nobody lands
     for long; on the heel alone somebody stands whose toes the device holds up.
     """
+    # An ankle at exactly 0 rad does not occur: 0 marks that nothing was read yet.
     is_first = last.angle == 0.0
     same_angle = min(last.angle_unchanged, before.since_strike)
     slow_heel = slow_reading(last.slow_heel, measurement.heel_force, is_first, period)
@@ -316,9 +317,9 @@ def gone_flag(rules: SafetyRules, last: LastReadings, measurement: GaitMeasureme
 
 
 def still_flag(rules: SafetyRules, readings: LastReadings, before: PhaseState, phase: PhaseState) -> float:
-    """The fault flag of a reading that does not change while another sensor moves, a fault where that one shows a step.
+    """The fault flag of a reading that does not change while another sensor moves; frozen where that shows a step.
 
-    An unloaded force sensor shows the same for long, and so does the angle of a foot that is held up.
+    An unloaded force sensor shows the same for long, and so does the angle of a lifted foot.
     """
     longest = max(rules.frozen_time, DWELLS * phase.stride_time)
     heel = (readings.heel_unchanged > longest) & (phase.heel.loaded > 0.5)
@@ -364,6 +365,7 @@ def next_landing(
     lower = (swings != (before.phase == SWING)) | (angle < last.lowest)
     highest = max(last.highest - FADES * period, angle) if swings else last.highest
     strikes = (before.phase == SWING) & (phase.phase == LANDING)
+    # The slow angle remembers where the foot was a moment ago, even where the swing's highest has faded.
     turned_up = max(last.highest, readings.slow_angle) - angle > TURNED_UP
     in_doubt = (angle if turned_up & (steady > 0.5) else 0.0) if strikes else last.in_doubt
     lands = (angle > in_doubt + TURNS_DOWN) | ((phase.phase == LANDING) & (not lower) & (angle > last.lowest + IS_FLAT))

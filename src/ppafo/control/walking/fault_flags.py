@@ -1,10 +1,10 @@
-"""Fault flags of a controller of walking: one table of what each is called, asks for, says and goes by.
+"""Fault flags of a controller of walking: one table of their names, levels of help, causes, readings and settings.
 
 A flag reduces help to lifting, pauses it or stops it. Where the heel is missed the foot is still lifted in the swing,
 but not pushed. A pause vents both chambers and is for readings that walking can cause too: help comes back after some
 good strides. A stop is permanent, for what only a fault causes.
 
-A flag is a number in the rows of a run, in the order of what comes first: those that stop, that pause, that lift.
+A flag is a number in the state of a run, in order of urgency: first the flags that stop, then pause, then lift.
 """
 
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ SEEN = ("nominal_flow", "nominal_supply_pressure")
 
 @dataclass(frozen=True, slots=True)
 class FaultFlag:
-    """Name of a fault flag, level of help that it asks for, what is seen, and the readings and settings it goes by."""
+    """Name of a fault flag, level of help that it asks for, its cause, and the readings and settings it goes by."""
 
     name: str
     level: float
@@ -34,7 +34,7 @@ FAULT_FLAGS = {
         "force_range", STOPPED, "implausible foot force", FORCES, ("lowest_force", "largest_force")
     ),
     (ANGLE_RANGE := 2.0): FaultFlag(
-        "angle_range", STOPPED, "an angle that no ankle has", ("angle",), ("lowest_angle", "highest_angle")
+        "angle_range", STOPPED, "implausible ankle angle", ("angle",), ("lowest_angle", "highest_angle")
     ),
     (PRESSURE_RANGE := 3.0): FaultFlag(
         "pressure_range", STOPPED, "implausible chamber pressure", PRESSURES, ("lowest_pressure", "highest_pressure")
@@ -42,14 +42,14 @@ FAULT_FLAGS = {
     (NO_RISE := 4.0): FaultFlag(
         "no_rise",
         STOPPED,
-        "a chamber that the open valve has filled and that shows no pressure",
+        "no pressure in a chamber that the open valve has filled",
         PRESSURES,
         ("filled_pressure", "fill_time"),
     ),
     (NO_FALL := 5.0): FaultFlag(
         "no_fall",
         STOPPED,
-        "a vented chamber that shows a pressure which does not fall",
+        "pressure that does not fall in a vented chamber",
         PRESSURES,
         ("filled_pressure", "vent_time", "follow_time"),
     ),
@@ -70,14 +70,14 @@ FAULT_FLAGS = {
     (SUPPLY_LOST := 8.0): FaultFlag(
         "supply_lost",
         STOPPED,
-        "no gas comes to a chamber: supply lost, hose off, or a valve that never opens",
+        "no gas reaches a chamber: supply lost, hose off, or a valve that never opens",
         PRESSURES,
         SEEN,
     ),
     (VALVE_OPEN := 9.0): FaultFlag(
         "valve_open",
         STOPPED,
-        "gas comes to a chamber that is given none: a valve stuck open, or a leak across the vane",
+        "gas enters a chamber that is not fed: a valve stuck open, or a leak across the vane",
         PRESSURES,
         SEEN,
     ),
@@ -88,40 +88,38 @@ FAULT_FLAGS = {
     (PRESSURE_SENSOR := 12.0): FaultFlag(
         "pressure_sensor",
         STOPPED,
-        "a vented chamber that shows a pressure which does not fall and which its gas does not have",
+        "reading of a vented chamber that does not fall and does not match its gas",
         PRESSURES,
         ("filled_pressure", "vent_time"),
     ),
     (FROZEN_HEEL := 13.0): FaultFlag(
-        "frozen_heel", STOPPED, "a heel force that stays the same while the toes move", FORCES, ("frozen_time",)
+        "frozen_heel", STOPPED, "heel force frozen while the toe force changes", FORCES, ("frozen_time",)
     ),
     (FROZEN_TOE := 14.0): FaultFlag(
-        "frozen_toe", STOPPED, "a toe force that stays the same while the heel moves", FORCES, ("frozen_time",)
+        "frozen_toe", STOPPED, "toe force frozen while the heel force changes", FORCES, ("frozen_time",)
     ),
-    (FROZEN_ANGLE := 15.0): FaultFlag(
-        "frozen_angle", STOPPED, "an angle that stays the same for a whole stride", ("angle",), ()
-    ),
+    (FROZEN_ANGLE := 15.0): FaultFlag("frozen_angle", STOPPED, "angle frozen for a whole stride", ("angle",), ()),
     (FORCE_GONE := 16.0): FaultFlag(
-        "force_gone", STOPPED, "a large force that is gone within a sample", FORCES, ("largest_drop",)
+        "force_gone", STOPPED, "large force lost within one sample", FORCES, ("largest_drop",)
     ),
     (STILL_HEEL := 17.0): FaultFlag(
         "still_heel",
         PAUSED,
-        "a loaded heel whose force stays the same while something else moves",
+        "force of a loaded heel unchanged while other readings move",
         FORCES,
         ("frozen_time",),
     ),
     (STILL_TOE := 18.0): FaultFlag(
         "still_toe",
         PAUSED,
-        "loaded toes whose force stays the same while something else moves",
+        "force of loaded toes unchanged while other readings move",
         FORCES,
         ("frozen_time",),
     ),
     (STILL_ANGLE := 19.0): FaultFlag(
         "still_angle",
         PAUSED,
-        "an angle in stance that stays the same while something else moves",
+        "angle unchanged in stance while other readings move",
         ("angle",),
         ("frozen_time",),
     ),
@@ -129,47 +127,46 @@ FAULT_FLAGS = {
         "endless_phase", PAUSED, "swing, heel-only or toe-only contact lasting too long", FORCES, ("longest_phase",)
     ),
     (RESTLESS := 21.0): FaultFlag(
-        "restless", PAUSED, "a stance without end in which heel or toes come and go", FORCES, ("longest_phase",)
+        "restless", PAUSED, "endless stance in which heel or toe contact comes and goes", FORCES, ("longest_phase",)
     ),
-    (NO_TOES := 22.0): FaultFlag(
-        "no_toes", PAUSED, "a swing right after the heel strike, without the toes", FORCES, ()
-    ),
+    (NO_TOES := 22.0): FaultFlag("no_toes", PAUSED, "swing right after heel strike, without toe contact", FORCES, ()),
     (NOT_FLAT := 23.0): FaultFlag(
-        "not_flat", PAUSED, "a foot that must stand flat and does not load the toes", FORCES, ("flat_from", "flat_to")
+        "not_flat", PAUSED, "no toe load in flat-foot stance", FORCES, ("flat_from", "flat_to")
     ),
     (FLAT_ANGLE := 24.0): FaultFlag(
         "flat_angle",
         PAUSED,
-        "an angle that no ankle has while the foot must stand flat",
+        "implausible ankle angle in flat-foot stance",
         ("angle",),
         ("lowest_flat_angle", "highest_flat_angle"),
     ),
     (SHORT_SWING := 25.0): FaultFlag(
-        "short_swing", PAUSED, "a swing that is too short for its stride", FORCES, ("shortest_swing",)
+        "short_swing", PAUSED, "swing too short for its stride", FORCES, ("shortest_swing",)
     ),
     (NO_TOE_OFF := 26.0): FaultFlag(
         "no_toe_off",
         PAUSED,
-        "a step that does not end on the toes: heel and toe sensors show the same, or are swapped",
+        "stance without toe-off: heel and toe sensors show the same, or are swapped",
         FORCES,
         (),
     ),
     (NO_HEEL := 27.0): FaultFlag(
-        "no_heel", LIFTS, "a foot that must stand flat and does not load the heel", FORCES, ("flat_from", "flat_to")
+        "no_heel", LIFTS, "no heel load in flat-foot stance", FORCES, ("flat_from", "flat_to")
     ),
     (TOE_STRIDES := 28.0): FaultFlag(
-        "toe_strides", LIFTS, "strides on the toes alone, one after the other", FORCES, ("most_toe_strides",)
+        "toe_strides", LIFTS, "consecutive strides on the toes alone", FORCES, ("most_toe_strides",)
     ),
     (LATE_FORCES := 29.0): FaultFlag(
         "late_forces",
         LIFTS,
-        "two strides in which the ankle shows the foot flat, or in the air, before the forces do",
+        "two strides in which the ankle angle shows foot flat or toe-off before the forces do",
         (*FORCES, "angle"),
         ("highest_toe_off_angle",),
     ),
 }
 """Every fault flag by its number, which has a name of its own for the functions that set it."""
 
+# Levels from the order of the numbers: a comparison in vector code instead of a table.
 _LAST_STOP = max(number for number, flag in FAULT_FLAGS.items() if flag.level == STOPPED)
 _FIRST_LIFT = min(number for number, flag in FAULT_FLAGS.items() if flag.level == LIFTS)
 

@@ -7,7 +7,7 @@ The law of Zhang, Cheah and Collins (2015) for a knot of the table, from one str
 Here e_n is the mean torque error over the time of the knot, which takes the place of their filter over strides, and
 the table is read a lead earlier than it was learnt, because the torque follows a command late. The knots learn while
 the stride passes over them, so no stride has to be kept; they are written out one by one, which in the lanes is one
-straight line of arithmetic for all wearers at once.
+straight line of arithmetic for all runs at once.
 """
 
 from typing import Annotated, NamedTuple
@@ -103,6 +103,7 @@ def learn(
 
     While a stride passes over a knot, the weights of its samples add up to 1.
     """
+    # A sample counts by its share of the time that the stride spends on a knot.
     knot_time = (profile.rise_time + profile.fall_time) * stride_time / (KNOTS - 1.0)
     place = place_in_table(profile, since_strike - rules.lead, stride_time)
     return next_table(table, place, duration / knot_time, rules.learning_gain * error, rules.forgetting)

@@ -1,11 +1,11 @@
 """What each chamber should hold, by command, measured angle and the nominal device; and what contradicts it.
 
-The content of a chamber is p V, its mass times R T, which no movement of the ankle changes: a residual in pressure
-would grow without bounds where a foot squeezes a chamber at its stop, the content stays. So from sample to sample
+The gas content of a chamber is p V, its mass times R T, which no movement of the ankle changes: a residual in pressure
+would grow without bounds where a foot squeezes a chamber at its stop, the gas content stays. So from sample to sample
 
     content += residual h / ``FORGETS`` + flow h,    residual = (pressure shown - pressure expected) V
 
-and the flow is that of the nominal valve at the pressure *expected*, for an offset of a sensor would add up in it. An
+and the flow is the nominal valve's at the pressure *expected*, for an offset of a sensor would add up in it. An
 alarm is a residual beyond what devices, sensors and heat explain: a share of the gas that has passed lately, and an
 error of pressure and angle in a mean volume. Its sign names the likely cause: whether gas comes or goes, and where the
 valve is. A valve and a pressure sensor cannot be told apart at that moment, and both stop the device.
@@ -39,7 +39,7 @@ class NominalDevice(NamedTuple):
 
     ``nominal_flow`` is R T times the valve's conductance [m^3/s]: content that a choked flow moves in a second, over
     the pressure before it. ``nominal_pair`` is 1 for on/off valves that vent where they do not feed, else 0: a spool
-    with a dump valve, which follows its command with ``nominal_lag`` beyond ``nominal_dead_band``.
+    with a vent valve, which follows its command with ``nominal_lag`` beyond ``nominal_dead_band``.
     ``nominal_joining_time`` is how long both chambers are joined after chamber 1 was fed. ``nominal_lines`` count gas
     as its content p V [J]; a volume of 0 stands for a supply that needs none.
     """
@@ -94,7 +94,7 @@ NOMINAL_QUANTITIES = (
     _nominal("dead_volume_2", "m^3", "dead volume of chamber 2", 1.0),
     _nominal("angle_min", "rad", "lower stop", 10.0, -10.0),
     _nominal("angle_max", "rad", "upper stop", 10.0, -10.0),
-    _nominal("pair", "", "1 for a pair of on/off valves, 0 for a spool with a dump valve", 1.0),
+    _nominal("pair", "", "1 for a pair of on/off valves, 0 for a spool with a vent valve", 1.0),
     _nominal("opening_delay", "s", "time from energising a coil to flow", 1.0),
     _nominal("closing_delay", "s", "time from de-energising it to venting", 1.0),
     _nominal("switching_interval", "s", "shortest time between two switchings of a coil", 1.0),
@@ -141,7 +141,7 @@ class Chamber(NamedTuple):
 class Observer(NamedTuple):
     """Both chambers; the command in force; what the valve is believed to do; how long chambers are joined yet [s].
 
-    ``lines`` are contents [J]: those of lines behind regulators.
+    ``lines`` are the gas contents [J] of the lines behind regulators.
     """
 
     chamber_1: Chamber
@@ -164,7 +164,7 @@ FORGETS = 0.128
 """Time [s] in which contents follow what is measured, and gas that has passed is forgotten."""
 
 WARM = 1.1
-"""Flow over that of isothermal gas: between that and gas without walls."""
+"""Flow over isothermal flow: between isothermal gas and gas without walls."""
 
 OF_PASSED = 0.375
 """Part of the gas that has passed which errors of area, volume, supply and heat explain."""
@@ -198,7 +198,7 @@ def flow_share(nominal: NominalDevice, ratio: float) -> float:
 def flow_into(nominal: NominalDevice, pressure: float, node: float, is_relieving: float) -> float:
     """Content [J/s] that enters a chamber at ``pressure`` from a node [Pa] through the open valve; below 0 it leaves.
 
-    A node with ``is_relieving`` 0 takes no gas back. Equations (6), (7).
+    No gas flows back into a node with ``is_relieving`` 0. Equations (6), (7).
     """
     upstream = max(pressure, node)
     share = flow_share(nominal, min(pressure, node) / upstream)
@@ -245,6 +245,7 @@ def passed_chamber(
     """
     room = nominal.nominal_atmospheric_pressure
     held = chamber.content / volume
+    # At the expected pressure, not the measured one: an offset of the sensor would add up in the flow.
     entered = source * flow_into(nominal, held, supply, nominal.nominal_relieving) + vent * flow_into(
         nominal, held, room, 1.0
     )
@@ -252,6 +253,7 @@ def passed_chamber(
     low, high = min(held, room if vent > 0.0 else supply), max(held, supply if source > 0.0 else room)
     added = max((low - held) * volume, min((high - held) * volume, WARM * period * entered))
     share = period / FORGETS
+    # The lowest content counts from a change of the connection: what was before belongs to another cause.
     turns = (source > vent) != was_fed
     return Chamber(
         content=chamber.content + added,
@@ -280,6 +282,8 @@ def met_chamber(
     lag = nominal.nominal_sensor_lag
     expected = measured if blind else chamber.pressure + (held - chamber.pressure) * period / (period + lag)
     residual = (measured - expected) * volume
+    # Both limits add: one grows with the gas that has passed, the other with the pressure (12 kPa and a sixteenth of
+    # it).
     allowed = OF_PASSED * chamber.passed + mean_volume * (OFFSET + OF_PRESSURE * abs(measured))
     return Chamber(
         content=max(content + residual * min(period / FORGETS, 1.0), 0.0),
@@ -291,7 +295,7 @@ def met_chamber(
 
 
 def volumes(nominal: NominalDevice, angle: float) -> tuple[float, float]:
-    """Volumes of both chambers [m^3] at a measured angle [rad], not below the dead ones. Equations (4), (5)."""
+    """Volumes of both chambers [m^3] at a measured angle [rad], not below the dead volumes. Equations (4), (5)."""
     growth = nominal.nominal_volume_per_angle
     return (
         nominal.nominal_dead_volume_1 + max(growth * (angle - nominal.nominal_angle_min), 0.0),
@@ -333,6 +337,7 @@ def next_observer(
     lines = filled_lines(nominal) if begins else state.lines
     to_1, to_2 = supplied(nominal, lines)
     mean_1, mean_2 = volumes(nominal, 0.5 * (nominal.nominal_angle_min + nominal.nominal_angle_max))
+    # While the chambers are joined, gas passes that no nominal flow describes.
     blind = begins | ((joined > 0.0) & (coil_1.position < 0.5))
     passed_1, taken_1 = passed_chamber(
         nominal, state.chamber_1, before_1, last_1, source_1, vent_1, to_1, fed_1, period
@@ -368,7 +373,7 @@ def is_behind_lines(nominal: NominalDevice) -> bool:
 
 
 def supplied(nominal: NominalDevice, lines: LineState) -> tuple[float, float]:
-    """Absolute pressures [Pa] before the valve: of both lines, or of a supply that needs none."""
+    """Absolute pressures [Pa] before the valve: of both lines, or of a supply without lines."""
     first, second = max(nominal.nominal_lines.volume_1, TINY), max(nominal.nominal_lines.volume_2, TINY)
     has_lines = is_behind_lines(nominal)
     return (
@@ -427,10 +432,12 @@ def cause_of(
     period: float,
 ) -> float:
     """The flag of a chamber with a reading [Pa] in its volume [m^3], fed from a supply [Pa] or vented; 0 for none."""
+    # In samples too: at a slow rate 5 ms would be a single noisy reading.
     alarm = chamber.contrary > max(ALARM_TIME, ALARM_SAMPLES * period) - SAME
     room = nominal.nominal_atmospheric_pressure
     gains = measured > chamber.pressure
     some = measured - room > SHOWS_GAS * (chamber.pressure - room)
+    # Gas that comes to a vented chamber is a valve stuck open where the supply shows, else one stuck shut under a foot.
     into_vent = (measured > NEARLY_FULL * supply) | (measured * volume > chamber.least + 0.5 * OFFSET * volume)
     in_fill = SUPPLY_HIGH if gains else (SUPPLY_LOW if some else SUPPLY_LOST)
     in_vent = (VALVE_OPEN if into_vent else VALVE_SHUT) if gains else LEAK

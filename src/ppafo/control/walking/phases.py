@@ -2,7 +2,7 @@
 
 Each sensor is loaded above one threshold and unloaded below another (hysteresis), and a change counts only when it has
 lasted (debounce). The time between two heel strikes is followed by a moving average. The push-off begins at a fraction
-of it, once the heel is off the ground, and ends where the heel comes down again: who stands is not pushed.
+of it, once the heel is off the ground, and ends at the next heel contact: a standing wearer is not pushed.
 """
 
 from typing import NamedTuple
@@ -59,6 +59,7 @@ def lifts(phase: float) -> bool:
 
 def next_switch(rules: PhaseRules, switch: Switch, force: float, period: float) -> Switch:
     """The switch after a sample of its force [N]; ``period`` [s]."""
+    # Between both thresholds the switch stays as it is.
     indicated = 0.0 if force < rules.unload_threshold else switch.loaded
     indicated = 1.0 if force > rules.load_threshold else indicated
     against = switch.contradicted + period if indicated != switch.loaded else 0.0
@@ -102,8 +103,9 @@ def timed_phase_state(
     since = state.since_strike + period
     known = state.stride_time if state.stride_time > 0.0 else rules.first_stride_time
     phase = next_phase(rules, state._replace(stride_time=known), heel.loaded, toe.loaded, passed)
-    # A foot that comes down on its toes, or with a lost heel sensor, begins a stride too.
+    # A foot that lands on its toes, or with a lost heel sensor, begins a stride too.
     strikes = state.phase == SWING and phase != SWING
+    # Half and twice the known time: a stop or a missed strike does not teach a stride time.
     plausible = state.strikes > 0.5 and since > 0.5 * known and since < 2.0 * known
     learnt = known + rules.stride_weight * (since - known) if plausible else known
     return PhaseState(

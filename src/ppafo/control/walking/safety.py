@@ -1,16 +1,16 @@
 """When a controller of walking helps less: it lifts the foot only, vents until the wearer walks well, or for good.
 
-Only a fault gives readings that no foot and no chamber gives (out of range, gone at once), readings that contradict
-the valve (a chamber that was filled and shows no pressure, or was vented and shows one that does not fall), and a
-sensor that stays the same while the others show a step (frozen): these stop. Sitting, stumbles and rocking too give
-readings that contradict the gait: these pause. Who stands or sits is not helped, but needs no pause. A foot whose heel
+Only a fault gives readings that no foot and no chamber gives (out of range, gone at once), readings that contradict the
+valve (a chamber that was filled and shows no pressure, or was vented and shows one that does not fall), and a sensor
+that stays the same while the others show a step (frozen): these stop. Sitting, stumbles and rocking also give readings
+that contradict the gait: these pause. A wearer who stands or sits is not helped, but needs no pause. A foot whose heel
 is missed may be on a stair, or have a dead sensor: it is held up in the swing, which the toes tell, and not pushed. A
 pressure at rest may stay the same for long, most of all in the steps of a converter, so a frozen pressure is found by
 the valve: no single reading is right for a filled chamber and for a vented one.
 
 Help comes back step by step: after one good stride the foot is held up, after ``resume_strides`` it is pushed too.
 
-Flags are joined by ``&`` and ``|``: ``and`` and ``or`` are branches, which keep the lanes from running side by side.
+Flags are joined by ``&`` and ``|``: ``and`` and ``or`` are branches, which keep runs from running side by side.
 """
 
 from typing import NamedTuple
@@ -110,7 +110,7 @@ LIFT_STRIDES = 1.0
 """Good strides in a row after which a paused device holds the foot up again."""
 
 STANDS_UP = 0.5
-"""Who sat, and then has heel and toes on the ground for so long [s], is helped again."""
+"""Assistance resumes after sitting once heel and toes have been loaded for this time [s]."""
 
 STEADY = 0.1
 """A stride that is longer or shorter than the stride time by less than this fraction of it is a usual one."""
@@ -119,16 +119,17 @@ LATE = 1.3
 """Times ``vent_time`` after which chamber 2 shows no pressure: from 90 psig it takes that time itself."""
 
 RESTS = 0.05
-"""Angle [rad] within which an ankle rests: who sits unloads heel and toes too, but does not turn the ankle, and a foot
+"""Angle [rad] within which an ankle rests: sitting unloads heel and toes too, but does not turn the ankle, and a foot
 that steps has turned by more before its toes leave the ground."""
 
 ROLLS = 0.33
 """Of the largest force in a stance, that toes carry more than the heel before they leave the ground: 0.98 and more on
-recorded gaits, 0.40 and more behind the hard heel strikes of wearers who react, for the heel is off the ground by then.
+recorded gaits, 0.40 and more behind the hard heel strikes of neuromuscular gait models, for the heel is off the ground
+by then.
 Two channels that read one sensor have 0, swapped ones less than 0, toes that show 0.8 of the heel 0.3."""
 
 CARRIES = 100.0
-"""Force [N] in a stance below which that is not judged: the foot of who sits has less."""
+"""Force [N] in a stance below which rolling is not judged: a sitting wearer's foot carries less."""
 
 SITS_DOWN = 1.0
 """Stride times after a strike from which a foot may leave the ground without rolling over its toes: its wearer sits
@@ -174,7 +175,7 @@ def gait_flag(rules: fault_checks.SafetyRules, before: PhaseState, phase: PhaseS
     stays = (before.phase != SWING) & (phase.phase != SWING) & (before.since_strike > longest)
     returns = (phase.heel.loaded > before.heel.loaded) | (phase.toe.loaded > before.toe.loaded)
     skips_toes = (before.phase == LANDING) & (phase.phase == SWING) & (phase.strikes > 1.5)
-    # Who sits down unloads both alike, and may turn the ankle then, but late; the first step may begin anywhere.
+    # Sitting down unloads both alike, and may turn the ankle then, but late; the first step may begin anywhere.
     leaves = (phase.phase == SWING) & (stance.turned > 0.5) & (stance.largest > CARRIES)
     leaves = leaves & (phase.since_strike < SITS_DOWN * phase.stride_time) & (phase.strikes > 1.5)
     found = fault_flags.NO_TOE_OFF if leaves & (stance.rolled < 0.5) else fault_flags.NO_FLAG
@@ -240,7 +241,7 @@ def next_good_strides(state: SafetyState, before: PhaseState, phase: PhaseState,
 def level_after(rules: fault_checks.SafetyRules, state: SafetyState, good_strides: float, together: float) -> float:
     """The level after good strides in a row, and heel and toes on the ground for a time [s]; a stop lasts.
 
-    A swing without end is that of who sits: standing up shows that both forces are sound.
+    A swing without end is sitting: standing up shows that both forces are sound.
     """
     resting = (state.level == PAUSED) & (state.finding.fault_flag == fault_flags.ENDLESS_PHASE)
     resumes = (state.level < STOPPED) & (good_strides >= rules.resume_strides)
@@ -262,6 +263,7 @@ def remembered(
     on_toes = (state.stance.heel_seen < 0.5) & (before.strikes > 0.5)
     usual = abs(before.since_strike - phase.stride_time) < STEADY * phase.stride_time
     steady = (1.0 if usual else 0.0) if enters else state.steady
+    # Chamber 2 is joined to the atmosphere while chamber 1 is fed, and while both vent.
     vented = state.valve_times.filling_1 + state.valve_times.venting
     return state._replace(
         readings=seen,
@@ -298,6 +300,7 @@ def found_flag(
 ) -> float:
     """The fault flag of a sample that comes first; ``last`` are the readings before it, ``now`` remembers it."""
     late = max(now.landing.late, now.landing.late_toes) > fault_checks.LATE_STRIDES
+    # From the least urgent to the most: each line gives way to a flag that comes first.
     flag = fault_flags.LATE_FORCES if late else fault_flags.NO_FLAG
     flag = fault_flags.TOE_STRIDES if now.toe_strides > rules.most_toe_strides else flag
     flag = (
@@ -325,6 +328,7 @@ def monitor(
     now = remembered(rules, state, before, phase, measurement, period)
     flag = found_flag(rules, state.readings, now, before, phase, measurement, period)
     good_strides = next_good_strides(state, before, phase, flag)
+    # A flag of this sample outweighs what good strides would allow.
     level = max(level_after(rules, state, good_strides, now.stance.together), fault_flags.level_of(flag))
     vents = level > state.level
     return now._replace(
@@ -356,7 +360,7 @@ def permits(state: SafetyState, phase: float) -> bool:
     """True where the device may act in a phase.
 
     A push needs a heel that was loaded in this stance and has risen, and toes that carry in its place; a foot that is
-    lifted has turned and left the ground by its toes, for that of somebody who sits is unloaded where it stands.
+    lifted has turned and left the ground by its toes, whereas a sitting wearer's is unloaded where it stands.
     """
     rolled = state.stance.rolled > 0.5
     pushes = (state.level < LIFTS) & (state.stance.heel_seen > 0.5) & rolled

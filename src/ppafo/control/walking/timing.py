@@ -1,4 +1,4 @@
-"""The time in the stride: since the detected heel strike, or by a clock that is anchored anew at each event.
+"""Gait phase: time since the detected heel strike, or a clock that is anchored anew at each event.
 
 A force sensor shows an event some known time after (or, where a force fades, before) it happens: the force has to pass
 its threshold, the sensor follows late, the change has to last, samples are taken. Fractional timing takes these delays
@@ -6,10 +6,10 @@ off. Its clock runs at the pace of recent strides, and at each detected event (h
 off, toes off) it is anchored anew at the fraction at which that event has come in recent strides, plus its delay. So an
 event is known when the clock passes its fraction, before the sensors show it.
 
-The clock waits for an event that does not come: for the toes to come down, the heel or the toes to rise, the next
-strike. Who stands has no percent of gait. A stride whose heel and toes leave the ground late takes longer: the clock
-goes on at its pace. After a stride that was not even, as at starts, stops and stairs, nothing is predicted: events are
-known when they are detected.
+The clock waits for an event that does not come: for toe contact, heel-off, toe-off or the next strike. In standing
+there is no percent of gait. A stride whose heel and toes leave the ground late takes longer: the clock goes on at its
+pace. After a stride that was not even, as at starts, stops and stairs, nothing is predicted: events are known when they
+are detected.
 """
 
 from collections.abc import Callable
@@ -31,7 +31,7 @@ class GaitTime(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class TimingKind:
-    """A way to know the time in the stride.
+    """A way to know the gait phase.
 
     ``parameters`` is a NamedTuple class whose numbers are the quantities in order, ``initial`` the start of the state.
     ``follow(rules, phase_rules, clock, before, phase, measurement, period)`` returns the state after a sample, with
@@ -117,7 +117,7 @@ class Delays(NamedTuple):
 
 
 class Events(NamedTuple):
-    """Something of each event of a stride: heel strike, toes on the ground, heel off, toes off."""
+    """One number for each event of a stride: heel strike, toes on the ground, heel off, toes off."""
 
     strike: float
     toes_on: float
@@ -141,7 +141,7 @@ class Strides(NamedTuple):
 class GaitClock(NamedTuple):
     """Fraction of the stride [turns], the last event that the clock has passed, and at which fraction each comes.
 
-    ``come`` is that of recent strides, 0 for an event that was not seen yet.
+    ``come`` is from recent strides, 0 for an event that was not seen yet.
     """
 
     fraction: float
@@ -198,6 +198,7 @@ def next_come(come: float, seen: float, found: float, weight: float) -> float:
 def anchored(fraction: float, seen: float, come: float, late: float, weight: float) -> float:
     """Fraction [turns] after an event that comes at ``come`` may have been detected ``late`` [turns] after it."""
     missed = come + late - fraction
+    # Far from where it came in recent strides it is another event, or another gait.
     usable = (seen > 0.5) & (come > 0.0) & (abs(missed) < TOO_FAR)
     return fraction + weight * missed if usable else fraction
 
@@ -225,7 +226,7 @@ def last_event(clock: GaitClock, fraction: float, come: Events, seen: Events, ph
 
 def event_of_stance(event: float, fraction: float, come: Events, seen: Events, toe_loaded: float) -> float:
     """The last event passed in a stance: one after the other."""
-    # A foot that comes down on its toes has them on the ground at once.
+    # A foot that lands on its toes has them on the ground at once.
     toes_on = (
         (seen.toes_on > 0.5)
         | ((come.toes_on <= 0.0) & (toe_loaded > 0.5))
@@ -250,7 +251,7 @@ def events_found(since_strike: float, stride_time: float, late: Events) -> Event
 
 
 def learnt_events(come: Events, seen: Events, found: Events, weight: float) -> Events:
-    """Fractions at which events come [turns], after a sample with those ``seen`` at fractions ``found``."""
+    """Fractions at which events come [turns], after a sample with events ``seen`` at fractions ``found``."""
     return Events(
         strike=0.0,
         toes_on=next_come(come.toes_on, seen.toes_on, found.toes_on, weight),
@@ -300,10 +301,11 @@ def next_strides(
 def paced(strides: Strides, seen: Events, found: Events, come: Events, weight: float) -> Strides:
     """What the stride that has begun will take, after its heel or its toes have left the ground early or late.
 
-    ``found`` are the fractions of the mean stride at which they did, ``come`` those of recent strides.
+    ``found`` are the fractions of the mean stride at which they did, ``come`` the fractions of recent strides.
     """
     heel = (seen.heel_off > 0.5) & (come.heel_off > 0.0)
     toes = (seen.toes_off > 0.5) & (come.toes_off > 0.0)
+    # Toe-off comes later and says more: it replaces what heel-off said.
     pace = found.heel_off / come.heel_off if heel else 1.0
     pace = found.toes_off / come.toes_off if toes else pace
     told = strides.mean_time * (1.0 + weight * (max(1.0 - FASTER, min(1.0 + FASTER, pace)) - 1.0))
@@ -359,7 +361,7 @@ def next_clock(
 
 
 def place_in_stride(clock: GaitClock, lead: float, phase: PhaseState) -> GaitTime:
-    """The time in the stride that a clock shows, a ``lead`` [s] ahead; the strike is expected, not awaited.
+    """Gait phase that a clock shows, a ``lead`` [s] ahead, as a time; the strike is expected, not awaited.
 
     After an odd stride it is awaited, not expected. It is the fraction of the stride time that the phases go by, as a
     law makes it of this time again; 0 s at the start, and where a detected strike is ahead of the clock.

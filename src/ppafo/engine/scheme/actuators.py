@@ -1,7 +1,7 @@
-"""An actuator of any kind: what a program calls in the place of the functions of the vane, and its values from Python.
+"""An actuator of any kind: what a program calls in place of the vane's functions, and its values from Python.
 
 A program is linked: where its text calls ``chamber_volumes``, ``chamber_pressures`` and the other functions of the
-vane's chambers, it calls those of its actuator. ``chambers_at``, ``pressures_at`` and ``torque_at``
+vane's chambers, it calls its actuator's. ``chambers_at``, ``pressures_at`` and ``torque_at``
 stand for the kind's own.
 """
 
@@ -52,6 +52,7 @@ def pressures_at(plant: ShapedPlant, angle: float, mass_1: float, mass_2: float)
 
 def rest_volumes(plant: ShapedPlant, angle: float) -> tuple[float, float]:
     """Volumes of both chambers [m^3] at the pressures of their supplies: what errors of gas are seen against."""
+    # At the supplies' pressures, not the present ones: what an error is measured against must not move with it.
     still = chambers_at(plant, angle, plant.supply_pressure, plant.dorsiflexion_pressure)
     return still.volume_1, still.volume_2
 
@@ -82,6 +83,7 @@ def begin_shaped_gas(
     Mass answers to pressure as V + p dV/dp: a chamber that gives takes up more gas.
     """
     pressure_1, pressure_2 = pressures_at(plant, state.angle, state.mass_1, state.mass_2)
+    # Volumes at both angles at one pressure: the drift is what the angle alone does.
     here = chambers_at(plant, state.angle, pressure_1, pressure_2)
     ahead = chambers_at(plant, next_angle, pressure_1, pressure_2)
     per_mass_1 = plant.gas_product / (here.volume_1 + pressure_1 * here.compliance_1)
@@ -101,7 +103,7 @@ def begin_shaped_gas(
 
 
 def links_of(actuator: ActuatorModel) -> dict[Any, Any]:
-    """What a program with this actuator calls in place of the functions of the vane; nothing for the vane."""
+    """What a program with this actuator calls in place of the vane's functions; nothing for the vane."""
     if actuator is VANE:
         return {}
     return {
@@ -117,7 +119,7 @@ def links_of(actuator: ActuatorModel) -> dict[Any, Any]:
 
 
 def _of_plant(actuator: ActuatorModel, function: Callable[..., Any], plant: Any, *given: Any) -> Any:
-    """What a function of a model gives, of numbers any of which may be arrays of one length."""
+    """Result of a function of a model for numbers any of which may be arrays of one length."""
     if actuator is VANE:
         return function(plant, *given)
     flat = leaves(plant)

@@ -1,4 +1,4 @@
-"""Gas that keeps its temperature, as lines of a step: of a vane that stands still or moves, and of other actuators."""
+"""Gas that keeps its temperature, as lines of a step: for a vane at rest or in motion, and for other actuators."""
 
 from typing import Any
 

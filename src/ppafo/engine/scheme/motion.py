@@ -1,4 +1,4 @@
-"""One step of the vane, free between its stops or with a prescribed angle, with the gas in the chambers.
+"""One step of the vane, unconstrained between its stops or with a prescribed angle, with the gas in the chambers.
 
 Order of a free step: the angle is predicted with the present acceleration; the gas runs with volumes that lead to the
 predicted angle; the angular velocity follows from the trapezoidal rule with the new pressures. What ends or starts
@@ -28,6 +28,7 @@ SHORTEST_PART = 1.0e-6
 """A part [s] this short is taken as it is."""
 LOST = 1.0e5
 """Error of a part over what is allowed by default beyond which a run is lost: a fifth of the range of the angle."""
+# sqrt(0.81 / E) is 0.9 / sqrt(E), the error being of second order; squares here spare roots in the clip.
 SAFETY = 0.81
 MINIMUM_ERROR = 0.2025
 MAXIMUM_ERROR = 20.25
@@ -50,12 +51,14 @@ def until_jump(jump: float, remaining: float) -> float:
 
 def part_length(pace: Pace, remaining: float) -> float:
     """Length [s] of a part: what the error allows, in equal parts where two of them reach the end."""
+    # Two equal parts rather than a long one and a stub.
     halves = 0.5 * remaining if remaining < 2.0 * pace.length else pace.length
     return remaining if remaining <= pace.length else halves
 
 
 def is_refused(error: float, length: float) -> bool:
     """True for a part whose error [-] over what is allowed is above 1, or no number, and that can be shorter."""
+    # The negated comparison refuses NaN, too.
     return not error <= 1.0 and length > SHORTEST_PART
 
 
@@ -63,6 +66,7 @@ def next_pace(pace: Pace, error: float, length: float, refused: bool, longest: f
     """Length of the next part after one of ``length`` [s] with an error [-]; one that an event cut says little."""
     factor = math.sqrt(SAFETY / max(MINIMUM_ERROR, min(MAXIMUM_ERROR, error)))
     wanted = length * factor
+    # A part that an event cut short had little error for that reason: the next may be as long as before.
     kept = max(pace.length, wanted) if factor >= 1.0 and not refused else wanted
     return Pace(max(min(kept, longest), SHORTEST_PART))
 
@@ -79,7 +83,7 @@ LOWEST_REBOUND = 1.0e-7
 
 
 class Friction(NamedTuple):
-    """Sizes of the friction torque [N m]: the largest at rest, and that in motion."""
+    """Sizes of the friction torque [N m]: the largest at rest, and in motion."""
 
     at_rest: float
     in_motion: float
@@ -169,12 +173,14 @@ def next_velocity(
 ) -> float:
     """Angular velocity [rad/s] after ``duration`` [s], trapezoidal rule; ``torque`` at the end [N m], less friction."""
     half = 0.5 * duration
+    # Damping is implicit: a strongly damped vane settles instead of ringing.
     momentum = plant.inertia * (angular_velocity + half * acceleration)
     return (momentum + half * torque) / (plant.inertia + half * plant.viscous_damping)
 
 
 def time_to_stop(distance: float, angular_velocity: float, acceleration: float) -> float:
     """Time [s] to cover ``distance`` [rad] towards a stop at constant acceleration, all along the motion."""
+    # 2 d / (v + sqrt(v^2 + 2 a d)) subtracts no near numbers, unlike the textbook root, and holds for a = 0.
     reach = max(angular_velocity * angular_velocity + 2.0 * acceleration * distance, 0.0)
     return 2.0 * distance / max(angular_velocity + math.sqrt(reach), 1.0e-30)
 
@@ -201,6 +207,7 @@ def depart(
     leaves_later = not holds_still(next_torque, friction.at_rest, at_lower, at_upper)
     way = direction_of(torque if leaves_at_once else next_torque)
     change = next_torque - torque
+    # The torque runs linearly, so the instant of breakaway is where its line meets static friction.
     waits = (way * friction.at_rest - torque) / (change if change != 0.0 else 1.0)
     waits = 0.0 if moving or leaves_at_once else max(0.0, min(1.0, waits))
     start_torque = torque + waits * change
@@ -214,6 +221,7 @@ def depart(
     next_rate = next_velocity(plant, velocity, first, next_torque - sliding, duration)
     travel = duration * velocity + duration * duration * (first + first + last) * SIXTH
     goes = moving or leaves_at_once or leaves_later
+    # A vane that turned once more inside the rest of a step stops there: the next step decides what it does.
     turned = next_rate * way <= 0.0
     angle = departure.angle + (travel if goes and travel * way > 0.0 else 0.0)
     rate = next_rate if goes and not turned else 0.0
@@ -224,10 +232,10 @@ def depart(
 def begin_part(
     plant: PlantParameters, state: PlantState, added_torque: float, longest: float
 ) -> tuple[FreePart, float]:
-    """Where a part of a step of at most ``longest`` [s] leads a free vane, and its length [s]: until it meets a stop.
+    """Where a part of a step of at most ``longest`` [s] leads an unconstrained vane, and its length [s], up to a stop.
 
     So the gas works against the motion that happens. A vane at rest whose torque is above static friction slides.
-    ``added_torque`` [N m] drives the vane at the beginning beside what the plant has: that of a leg.
+    ``added_torque`` [N m] is the leg's at the beginning, beside the plant's own.
     """
     velocity = state.angular_velocity
     pressure_1, pressure_2 = chamber_pressures(plant, state.angle, state.mass_1, state.mass_2)
@@ -254,10 +262,10 @@ def begin_part(
 def slide_part(
     plant: PlantParameters, state: PlantState, begun: FreePart, added_torque: float, length: float
 ) -> tuple[PartSlide, PartEnd]:
-    """Where a part leads a free vane that slides on or stays at rest.
+    """Where a part leads an unconstrained vane that slides on or stays at rest.
 
-    ``state`` has the new gas and the motion of the begin; ``added_torque`` [N m] is that at the end, where the part
-    would lead without reversal.
+    ``state`` has the new gas and the motion of the begin; ``added_torque`` [N m] is the leg's at the end, where the
+    part would lead without reversal.
     """
     velocity, way = state.angular_velocity, begun.way
     next_1, next_2 = chamber_pressures(plant, begun.next_angle, state.mass_1, state.mass_2)
@@ -269,7 +277,7 @@ def slide_part(
     thrown_back = rebound_velocity(plant, full_velocity, next_torque)
     slid_velocity = thrown_back if begun.meets_stop > 0.5 else full_velocity
 
-    # The sums with 0 are those of ``depart``, so that a vane at rest has its bits.
+    # The sums with 0 are also in ``depart``, so that a vane at rest has its bits.
     place = clamp_angle(plant, state.angle + 0.0)
     at_lower, at_upper = place <= plant.angle_min, place >= plant.angle_max
     stays = holds_still(begun.torque + 0.0 * (next_torque - begun.torque), friction.at_rest, at_lower, at_upper)
@@ -289,7 +297,7 @@ def slide_part(
 def depart_part(
     plant: PlantParameters, state: PlantState, begun: FreePart, slid: PartSlide, ended: PartEnd, length: float
 ) -> PartEnd:
-    """The end of a part in which a vane turns or begins to move, the one that it had of any other.
+    """The end of a part in which a vane turns or begins to move; any other part ends as it did.
 
     ``state`` is as in ``slide_part``.
     """
@@ -314,6 +322,7 @@ def part_error(plant: PlantParameters, begun: FreePart, slid: PartSlide, angle: 
     sliding_torque = slid.torque - begun.way * slid.friction.in_motion
     last = (sliding_torque - plant.viscous_damping * slid.angular_velocity) * (1.0 / plant.inertia)
     bent = abs(last - begun.acceleration) * length * length * SIXTH if begun.way != 0.0 else 0.0
+    # The gas worked against a motion that did not happen: that is an error although the vane is where it is.
     missed = MISSED_FRACTION * abs(angle - begun.next_angle)
     # Where a chamber is small, a little of the angle is much of the pressure.
     volume_1, volume_2 = chamber_volumes(plant, begun.next_angle)
@@ -323,8 +332,9 @@ def part_error(plant: PlantParameters, begun: FreePart, slid: PartSlide, angle: 
 
 
 def rebound_velocity(plant: PlantParameters, angular_velocity: float, torque: float) -> float:
-    """Angular velocity [rad/s] after an impact; a vane that the torque [N m] would not let rise from the stop rests."""
+    """Angular velocity [rad/s] after an impact; a vane that the torque [N m] presses on the stop rests."""
     after = rebound(angular_velocity)
+    # Height of the next bounce: kinetic energy against the work of the torque that presses the vane on the stop.
     pressing = max(torque * direction_of(angular_velocity), 0.0)
     lowest = LOWEST_REBOUND * (plant.angle_max - plant.angle_min)
     return after if 0.5 * plant.inertia * after * after > pressing * lowest else 0.0
@@ -344,6 +354,7 @@ def first_event(
     """
     velocity = state.angular_velocity
     way = direction_of(velocity)
+    # The velocity runs linearly between begin and end: its zero is the reversal.
     fall = velocity - full_velocity
     reverses = way != 0.0 and full_velocity * way <= 0.0
     reversal = velocity / (fall if reverses else 1.0)
@@ -361,7 +372,7 @@ def first_event(
 def begin_free(
     plant: PlantParameters, state: PlantState, held: HeldChambers, added_torque: float, step: float
 ) -> FreeStep:
-    """Where one step [s] would lead a vane that is free between its stops. Equations (1), (2), (10).
+    """Where one step [s] would lead a vane that is unconstrained between its stops. Equations (1), (2), (10).
 
     ``added_torque`` [N m] drives the vane beside the actuator at the beginning of the step, gravity in it.
     """

@@ -125,6 +125,7 @@ def mean_curve(first: FlowCurve, second: FlowCurve, share: float) -> FlowCurve:
     )
 
 
+# gamma = 1 - 1/sqrt(2) makes the method L-stable; SHORTEST keeps a part without length from dividing by 0.
 GAMMA = 0.2928932188134524
 SHORTEST = 1.0e-30
 ALLOWED_OF_PRESSURE = 2.5e-5
@@ -285,7 +286,7 @@ def begin_moving_gas(
     flowing: SlopedFlows,
     step: float,
 ) -> MovingGas:
-    """First stage of one step [s] in which the volumes run linearly to those of ``next_angle`` [rad]."""
+    """First stage of one step [s] in which the volumes run linearly towards ``next_angle`` [rad]."""
     linear, flows = linearise(held.per_mass_1, held.per_mass_2, flowing, step)
     return begin_moving_stage(plant, state, held, next_angle, linear, flows, step)
 
@@ -330,6 +331,7 @@ def second_right_sides(first: Flows, flowing: StageFlows) -> Flows:
 def both_stages(first: Flows, second: Flows, step: float) -> GasChange:
     """Changes of mass [kg] in one step [s]."""
     return GasChange(
+        # Weights of the method: 3/2 of the first stage and 1/2 of the second.
         mass_1=step * (1.5 * first.mass_1 + 0.5 * second.mass_1),
         mass_2=step * (1.5 * first.mass_2 + 0.5 * second.mass_2),
         supplied=step * (1.5 * first.supplied + 0.5 * second.supplied),
@@ -367,12 +369,13 @@ def still_change(plant: PlantParameters, begun: StillGas, second: Flows, step: f
 def moving_change(plant: PlantParameters, begun: StillGas, second: Flows, step: float) -> GasChange:
     """Changes of mass [kg] in one step [s] with moving volumes, from both stages.
 
-    Where the supplies take no gas back, the draw is at least nothing: a chamber that rises above its source inside a
+    Where the supplies are not relieving, the draw is at least nothing: a chamber that rises above its source inside a
     step has slopes from below it, which would push the gas out again. That gas stays in the chamber that is fed.
     """
     change = both_stages(begun.first, second, step)
     supplied = admitted_flow(change.supplied, plant.relieving)
     kept = supplied - change.supplied
+    # The slope of a fed chamber's draw is below 0, the other's is 0.
     to_1 = kept if begun.linear.supplied_by_1 < begun.linear.supplied_by_2 else 0.0
     return GasChange(
         mass_1=change.mass_1 + to_1, mass_2=change.mass_2 + (kept - to_1), supplied=supplied, leaked=change.leaked
@@ -383,7 +386,7 @@ def gas_error(plant: PlantParameters, begun: StillGas, second: Flows, next_angle
     """Estimated error of both pressures at the end of a step [s] over what is allowed [-].
 
     What the second stage adds to the first, damped once by the matrix of the step, so that a chamber that has settled
-    asks for no short step; and what a supply that takes no gas back would have taken, because it shuts inside the step.
+    asks for no short step; and what a supply that is not relieving would have taken, because it shuts inside the step.
     """
     linear = begun.linear
     drawn = 1.5 * begun.first.supplied + 0.5 * second.supplied
@@ -391,6 +394,7 @@ def gas_error(plant: PlantParameters, begun: StillGas, second: Flows, next_angle
     added_1 = linear.d * (begun.first.mass_1 + second.mass_1) - linear.b * (begun.first.mass_2 + second.mass_2)
     added_2 = linear.a * (begun.first.mass_2 + second.mass_2) - linear.c * (begun.first.mass_1 + second.mass_1)
     volume_1, volume_2 = chamber_volumes(plant, next_angle)
+    # Damped by the matrix once, not twice: the estimate stays above the error that it stands for.
     scale = abs(linear.scale)
     content_1 = volume_1 * pressure_that_matters(plant, begun.end_1)
     content_2 = volume_2 * pressure_that_matters(plant, begun.end_2)
@@ -400,6 +404,7 @@ def gas_error(plant: PlantParameters, begun: StillGas, second: Flows, next_angle
 
 def larger_share(part_1: float, whole_1: float, part_2: float, whole_2: float) -> float:
     """The larger of both parts over their wholes, which are above 0; in one division."""
+    # A division costs ten products.
     return max(part_1 * whole_2, part_2 * whole_1) / (whole_1 * whole_2)
 
 
@@ -407,15 +412,15 @@ def opening_error(plant: PlantParameters, begun: StillGas, shift: float, next_an
     """Error of taking a valve's mean opening in a step [s] over what is allowed [-].
 
     ``shift`` [-] is the relative change of the opening. Opening and flow change together, and a twelfth of the product
-    of both changes is missed; the matrix of the step says how the flow answers to what flows.
+    of both changes is missed; the matrix of the step says how the flow responds to itself.
     """
     volume_1, volume_2 = chamber_volumes(plant, next_angle)
-    answer_1 = abs(begun.linear.a - 1.0) * abs(begun.first.mass_1)
-    answer_2 = abs(begun.linear.d - 1.0) * abs(begun.first.mass_2)
+    response_1 = abs(begun.linear.a - 1.0) * abs(begun.first.mass_1)
+    response_2 = abs(begun.linear.d - 1.0) * abs(begun.first.mass_2)
     content_1 = volume_1 * pressure_that_matters(plant, begun.end_1)
     content_2 = volume_2 * pressure_that_matters(plant, begun.end_2)
     weight = 1.0 / (12.0 * GAMMA * ALLOWED_OF_PRESSURE)
-    return weight * shift * step * plant.gas_product * larger_share(answer_1, content_1, answer_2, content_2)
+    return weight * shift * step * plant.gas_product * larger_share(response_1, content_1, response_2, content_2)
 
 
 def pressure_that_matters(plant: PlantParameters, pressure: float) -> float:
@@ -429,6 +434,7 @@ def supply_range(plant: PlantParameters) -> float:
     return max(supplied, MINIMUM_PRESSURE * plant.atmospheric_pressure)
 
 
+# Found by trying: with fewer steps for a filling the error of a plain step passes 1e-3 (docs/decisions/0002).
 STEPS_PER_FILLING = 70.0
 
 
@@ -445,4 +451,5 @@ def is_slow(plant: PlantParameters, step: float, lowest_angle: float, highest_an
     also fill faster. Any of the numbers may be an array (runs,), and the result is one then.
     """
     volume = smaller(chamber_volumes(plant, lowest_angle)[0], chamber_volumes(plant, highest_angle)[1])
+    # 1e-9 above, so that a step that was made from this very limit passes.
     return step * STEPS_PER_FILLING * stiffness <= filling_time(plant, volume) * (1.0 + 1.0e-9)

@@ -1,7 +1,7 @@
 """Gas of one temperature whose pressure is not in proportion to its density: the step of ``pneumatics`` on true masses.
 
-``PlantState`` counts the gas as its content, ``P V M / (R T_0)``, so that all that reads pressures stays as it is; the
-true masses stand beside it. The equation of state is that of the places ``gas_density`` and ``ideal_density``.
+``PlantState`` counts the gas as its gas content, ``P V M / (R T_0)``, so that all that reads pressures stays as it is;
+the true masses stand beside it. The ports ``gas_density`` and ``ideal_density`` give the equation of state.
 """
 
 from typing import Any, NamedTuple
@@ -36,7 +36,7 @@ class RealGas(NamedTuple):
 
 
 class RealChange(NamedTuple):
-    """What one step adds: as ``GasChange`` [kg], and to the contents of both chambers [kg]."""
+    """What one step adds: as ``GasChange`` [kg], and to the gas contents of both chambers [kg]."""
 
     gas: GasChange
     content_1: float
@@ -100,7 +100,8 @@ def begin_real_gas(
 def real_change(
     plant: PlantParameters, state: PlantState, masses: TrueMasses, begun: RealGas, second: Flows, step: float
 ) -> RealChange:
-    """What both stages of one step [s] add."""
+    """Changes by both stages of one step [s]."""
+    # The totals count true masses; the contents follow from these at the volumes of the end.
     gas = moving_change(plant, begun.moving.still, second, step)
     return RealChange(
         gas=gas,
@@ -128,7 +129,7 @@ def with_real_gas(state: PlantState, masses: TrueMasses, change: RealChange) -> 
 
 
 def at_angle(plant: PlantParameters, state: PlantState, masses: TrueMasses, angle: float) -> PlantState:
-    """State whose contents are those of its gas at the angle [rad] that the vane reached."""
+    """State with the gas contents at the angle [rad] that the vane reached."""
     volume_1, volume_2 = chamber_volumes(plant, angle)
     return state._replace(mass_1=content_of(masses.mass_1, volume_1), mass_2=content_of(masses.mass_2, volume_2))
 

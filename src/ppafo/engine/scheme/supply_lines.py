@@ -1,6 +1,6 @@
 """One step of both chambers with the lines that feed them: both gas schemes with supply pressures that change.
 
-The stages are those of ``pneumatics``, which keep their second order with any matrix: this one says that a line loses
+The stages of ``pneumatics`` keep their second order with any matrix: this one says that a line loses
 what its chamber gains, so that a chamber that has come to the pressure of a small line asks for no small step. The
 lines follow after each stage, with what the valves took from each of them. Gas in a line has the reference temperature,
 with an energy balance of the chambers too: what a warm chamber pushes back gives its heat to the line's walls.
@@ -88,7 +88,7 @@ def begin_fed_gas(
     flowing: SlopedFlows,
     step: float,
 ) -> FedGas:
-    """First stage of one step [s] with volumes that run to those of ``next_angle`` [rad]; ports at line pressures."""
+    """First stage of one step [s] with volumes that run towards ``next_angle`` [rad]; ports at line pressures."""
     held = held_chambers(plant, state.angle)
     linear, flows = linearise(held.per_mass_1, held.per_mass_2, flowing, step)
     volumes = chamber_volumes(plant, state.angle)
@@ -159,7 +159,7 @@ def with_line(flow: PortFlowSlopes, fraction: float) -> PortFlowSlopes:
 
 
 def mass_from_source(thermal: ThermalParameters, flow: float, state: PlantState, masses: ThermalState) -> float:
-    """True mass flow [kg/s] out of line 2 from the flow at the reference temperature, below 0 for warm gas back in."""
+    """True mass flow [kg/s] out of line 2 from the flow at the reference temperature; below 0, warm gas flows back."""
     return flow * transport(thermal, flow, 1.0, math.sqrt(state.mass_2 / masses.mass_2)).mass
 
 
@@ -174,7 +174,7 @@ def begin_fed_thermal_gas(
     flowing: SlopedFlows,
     step: float,
 ) -> FedThermalGas:
-    """First stage of one step [s] as ``begin_fed_gas``, of gas with an energy balance."""
+    """First stage of one step [s] as ``begin_fed_gas``, for gas with an energy balance."""
     at_begin = volumes_at_begin(plant, state, next_angle, step)
     share_1, share_2 = at_begin.volume_1 / lines.volume_1, at_begin.volume_2 / lines.volume_2
     # What comes from a line brings more energy than mass, by the ratio of heat capacities.

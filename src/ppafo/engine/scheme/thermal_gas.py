@@ -1,9 +1,9 @@
 """One step of both chambers with an energy balance: the Rosenbrock method of ``pneumatics`` on energies and masses.
 
-The energy of a chamber is counted as its content, ``P V M / (R T_0)`` [kg]: the mass that would give its pressure at
-the reference temperature. Content over true mass is ``T / T_0``. Gas comes from the source and from the atmosphere at
-``T_0``. Where the gas is isothermal the content is the mass, so all that reads pressures from ``PlantState`` stays as
-it is; here the true masses stand beside it. The matrix leaves out how the flows depend on the temperature upstream,
+The energy of a chamber is counted as its gas content, ``P V M / (R T_0)`` [kg]: the mass that would give its pressure
+at the reference temperature. Content over true mass is ``T / T_0``. Gas comes from the source and from the atmosphere
+at ``T_0``. Where the gas is isothermal the content is the mass, so all that reads pressures from ``PlantState`` stays
+as it is; here the true masses stand beside it. The matrix leaves out how the flows depend on the temperature upstream,
 which changes no faster than a chamber fills; the method keeps its order with any matrix.
 """
 
@@ -144,7 +144,7 @@ def flow_slopes(
     in_2: PortFlowSlopes,
     leak: LeakSlopes,
 ) -> FlowSlopes:
-    """How all flows answer to both contents; weights are gamma h times pressure over content [Pa s/kg]."""
+    """How all flows respond to both contents; weights are gamma h times pressure over content [Pa s/kg]."""
     leak_carries = transport(thermal, leak.flow, root_1, root_2)
     source_1 = transport(thermal, in_1.from_source, 1.0, root_1)
     source_2 = transport(thermal, in_2.from_source, 1.0, root_2)
@@ -208,7 +208,7 @@ def combine_flows(one: ThermalFlows, factor_one: float, other: ThermalFlows, fac
 
 
 class ThermalMatrix(NamedTuple):
-    """Matrix of both contents after the masses are eliminated, by rows; how the walls answer to the masses [-]."""
+    """Matrix of both contents after the masses are eliminated, by rows; how the walls respond to the masses [-]."""
 
     slopes: FlowSlopes
     a: float
@@ -269,6 +269,7 @@ def thermal_matrix(
     wall_1 = cooling_1 * state.mass_1 / masses.mass_1
     wall_2 = cooling_2 * state.mass_2 / masses.mass_2
     work = weight * (thermal.heat_capacity_ratio - 1.0) * growth
+    # The masses are eliminated first: they respond to the contents alone, so that a 2 by 2 matrix is left.
     a = 1.0 - slopes.content_1_by_1 + work / volume_1 + cooling_1 - wall_1 * slopes.mass_1_by_1
     b = -slopes.content_1_by_2 - wall_1 * slopes.mass_1_by_2
     c = -slopes.content_2_by_1 - wall_2 * slopes.mass_2_by_1
@@ -289,6 +290,7 @@ def thermal_matrix(
 
 def solve_thermal_stage(matrix: ThermalMatrix, right: ThermalFlows) -> ThermalFlows:
     """Stage slopes [kg/s] from the right-hand sides [kg/s]."""
+    # Right-hand sides of the contents after the masses are eliminated.
     right_1 = right.content_1 + matrix.wall_1 * right.mass_1
     right_2 = right.content_2 + matrix.wall_2 * right.mass_2
     content_1 = (matrix.d * right_1 - matrix.b * right_2) * matrix.scale
@@ -320,13 +322,13 @@ def begin_thermal_gas(
     flowing: SlopedFlows,
     step: float,
 ) -> ThermalGas:
-    """First stage of one step [s] in which the volumes run linearly to those of ``next_angle`` [rad]."""
+    """First stage of one step [s] in which the volumes run linearly towards ``next_angle`` [rad]."""
     at_begin = volumes_at_begin(plant, state, next_angle, step)
     return begin_thermal_stage(thermal, state, masses, at_begin, flowing, step)
 
 
 def volumes_at_begin(plant: PlantParameters, state: PlantState, next_angle: float, step: float) -> ThermalBegin:
-    """Both chambers at the begin of a step [s] whose volumes run to those of ``next_angle`` [rad]. Equation (3)."""
+    """Both chambers at the begin of a step [s] whose volumes run towards ``next_angle`` [rad]. Equation (3)."""
     volume_1, volume_2 = chamber_volumes(plant, state.angle)
     next_1, next_2 = chamber_volumes(plant, next_angle)
     growth = (next_1 - volume_1) / max(step, SHORTEST)
@@ -407,7 +409,7 @@ def second_thermal_stage(thermal: ThermalParameters, begun: ThermalGas, flowing:
 def thermal_change(
     plant: PlantParameters, thermal: ThermalParameters, begun: ThermalGas, second: ThermalFlows, step: float
 ) -> ThermalFlows:
-    """Changes [kg] in one step [s] from both stages; supplies that take no gas back are as in ``moving_change``."""
+    """Changes [kg] in one step [s] from both stages; supplies that are not relieving are as in ``moving_change``."""
     change = combine_flows(begun.first, 1.5 * step, second, 0.5 * step)
     supplied = admitted_flow(change.supplied, plant.relieving)
     kept = supplied - change.supplied
@@ -435,9 +437,9 @@ def thermal_error(plant: PlantParameters, begun: ThermalGas, second: ThermalFlow
 
 def thermal_opening_error(plant: PlantParameters, begun: ThermalGas, shift: float, step: float) -> float:
     """Error of taking a valve's mean opening in a step [s] over what is allowed [-], as ``opening_error``."""
-    answer_1 = (begun.matrix.a - 1.0) * begun.first.content_1
-    answer_2 = (begun.matrix.d - 1.0) * begun.first.content_2
-    return shift / (12.0 * GAMMA) * over_allowed(plant, begun, answer_1, answer_2, step)
+    response_1 = (begun.matrix.a - 1.0) * begun.first.content_1
+    response_2 = (begun.matrix.d - 1.0) * begun.first.content_2
+    return shift / (12.0 * GAMMA) * over_allowed(plant, begun, response_1, response_2, step)
 
 
 def over_allowed(plant: PlantParameters, begun: ThermalGas, rate_1: float, rate_2: float, step: float) -> float:
@@ -500,6 +502,7 @@ def with_work(plant: PlantParameters, masses: ThermalState, before: PlantState, 
     """True masses and totals with the work of the gas between two states, along the motion that happened."""
     before_1, before_2 = chamber_pressures(plant, before.angle, before.mass_1, before.mass_2)
     after_1, after_2 = chamber_pressures(plant, after.angle, after.mass_1, after.mass_2)
+    # The mean of the pressures at both ends, over the motion that happened: the trapezoidal rule, as for the vane.
     difference = 0.5 * (before_1 - before_2 + after_1 - after_2)
     return ThermalState(
         mass_1=masses.mass_1,

@@ -61,7 +61,7 @@ class Direction(NamedTuple):
 
 
 class CarriedFoot(NamedTuple):
-    """Torques [N m] that shank, knee and weight ask of the ankle: for the foot, for foot plate and vane."""
+    """Torques [N m] of shank, knee and weight about the ankle: on the foot, on foot plate and vane."""
 
     foot: float
     plate: float
@@ -87,7 +87,7 @@ def leg_torque(
     The ankle's row of equation (11) with the prescribed shank, the wearer, tissue, the foot plate, and the ground
     under the heel. Muscles are what a healthy ankle adds to tissue and ground along the measured angles, on the heel
     the measured moment less tissue, so that a wearer who has all of them and no device walks the measured gait.
-    ``ground_angle`` [rad] is that of a flat foot.
+    ``ground_angle`` [rad] of a flat foot.
     """
     return torque_with_carried(leg, contact, now, ground_angle, angle, carried_foot(leg, share, now, foot))
 
@@ -95,7 +95,7 @@ def leg_torque(
 def torque_with_carried(
     leg: LegParameters, contact: float, now: GaitNow, ground_angle: float, angle: float, carried: CarriedFoot
 ) -> float:
-    """As ``leg_torque`` [N m], where it is known what foot and foot plate ask."""
+    """Torque of ``leg_torque`` [N m], where the torques of foot and foot plate are known."""
     heel = ground.heel_torque(contact, now, leg, ground_angle, angle)
     active = now.moment if contact == ground.HEEL else now.healthy_torque
     muscles = active - passive_torque(leg, now.ankle)
@@ -104,7 +104,7 @@ def torque_with_carried(
 
 
 def carried_foot(leg: LegParameters, share: DeviceShare, now: GaitNow, foot: Direction) -> CarriedFoot:
-    """What foot and foot plate ask of the ankle in a direction of the foot."""
+    """Torques of foot and foot plate about the ankle in a direction of the foot."""
     mass_moment = leg.foot_mass * leg.foot_mass_centre
     return CarriedFoot(
         torque_of_body_on_foot(leg, mass_moment, foot_inertia_about_ankle(leg), now, foot),
@@ -115,7 +115,7 @@ def carried_foot(leg: LegParameters, share: DeviceShare, now: GaitNow, foot: Dir
 def torque_of_body_on_foot(
     leg: LegParameters, mass_moment: float, inertia: float, now: GaitNow, foot: Direction
 ) -> float:
-    """Torque [N m] that shank, knee and weight ask of the ankle for a body on the foot: see ``torque_of_shank_on``."""
+    """Torque [N m] of shank, knee and weight about the ankle, on a body on the foot: see ``torque_of_shank_on``."""
     return torque_of_shank_on(
         mass_moment,
         inertia,
@@ -176,6 +176,7 @@ class WalkEnd(NamedTuple):
     motion: FreeEnd
 
 
+# Higher than any foot [m]: the lowest clearance before the swing is looked at.
 NO_CLEARANCE = 1.0e3
 
 
@@ -193,6 +194,7 @@ def begin_walk(
     """Where one step [s] leads the foot, by its own dynamics and by the ground; ``carried`` is at its beginning."""
     torque = torque_with_carried(leg, walk.contact, walk.now, timing.ground_angle, state.angle, carried)
     free = begin_free(plant, state, held, torque, step)
+    # The difference fades implicitly, so that a step longer than the fading time does not overshoot.
     offset = walk.offset / (1.0 + step / ground.FADING_TIME)
     prescribed = ground.prescribed_ankle(walk.contact, next_gait, timing.ground_angle, leg.keeps_gait)
     led = ground.Ankle(
@@ -223,10 +225,12 @@ def external_torque(
 ) -> float:
     """T_ex [N m]: what a free foot needs, equation (11), or what equation (1) leaves of the actuator on the ground.
 
-    ``torque`` [N m] is that of the leg with the foot plate, ``plate`` the part of the plate.
+    ``torque`` [N m] of the leg with the foot plate, ``plate`` the plate's part of it.
     """
     speed = state.angular_velocity
     passive_damping = leg.ankle_damping * speed
+    # In the air the foot takes what its own motion needs; on the ground the shank leads, and the device gives what is
+    # left.
     needed = foot_inertia_about_ankle(leg) * acceleration + passive_damping - (torque - plate)
     pressure_1, pressure_2 = held_pressures(held, state)
     actuator = actuator_torque(pressure_1, pressure_2, plant.torque_constant)
@@ -272,7 +276,7 @@ def reach_end(
 def depart_in_walk(
     plant: PlantParameters, state: PlantState, begun: WalkStep, ended: WalkEnd, ahead: HeldChambers, step: float
 ) -> tuple[WalkEnd, HeldChambers]:
-    """End and chambers of a step [s] inside which an event leads the foot elsewhere; of any other foot as they are."""
+    """End and chambers of a step [s] inside which an event leads the foot elsewhere; else as they are."""
     angle, rate = depart_free(plant, state, ahead, begun.free, ended.motion, step)
     departs, slid = ended.motion.departs > 0.5, ended.motion
     there = held_chambers(plant, angle)
@@ -306,7 +310,7 @@ def end_walk(
 ) -> tuple[PlantState, WalkState]:
     """State at the end of the step [s], from ``state`` with the new gas and the angle of the begin.
 
-    ``now``, ``held`` and ``carried`` are gait, chambers and what the foot asks at the end.
+    ``now``, ``held`` and ``carried`` are gait, chambers and the foot's torques at the end.
     """
     free = ground.is_free(walk.contact, leg.keeps_gait)
     after = with_motion(state, ended.motion.angle, ended.motion.angular_velocity)
@@ -331,7 +335,7 @@ def advance_walk(
     turned: float,
     step: float,
 ) -> WalkState:
-    """What the sensors show and what adds up over the strides.
+    """Walk after a step: what the sensors show, and totals over the strides.
 
     ``height`` of the toes [m] against the healthy gait at the same instant, ``turned`` [rad] in this step.
     """
@@ -339,6 +343,7 @@ def advance_walk(
     touches_first = ground.foot_angle(now.shank, state.angle) < timing.ground_angle
     toes_first = (1.0 if touches_first else 0.0) if strikes else walk.toes_first
     heel, toe = ground.ground_forces(landed.contact, timing, now, toes_first)
+    # A first order, implicit: forces follow within one step where the sensor is quick.
     share = follow_rate * step / (1.0 + follow_rate * step)
     watched = now.phase >= timing.clearance_from and now.phase <= timing.clearance_to
     lowest = min(walk.clearance, height if watched else walk.clearance)
@@ -346,6 +351,7 @@ def advance_walk(
     clearance = NO_CLEARANCE if strikes else lowest
     toe_landing = 1.0 if strikes and touches_first else 0.0
     counted_clearance = lowest if strikes and lowest < NO_CLEARANCE else 0.0
+    # Trapezoidal rule over the angle that the ankle turned in this step.
     work = 0.5 * (given + walk.external_torque) * turned if on_toes else 0.0
     positive_work = max(work, 0.0)
     # Numba takes more than 15 keywords only where no choice stands among them.
@@ -383,7 +389,7 @@ def lead(rows: Any) -> Phases:
 
 
 def next_gait(rows: Any) -> Phases:
-    """Phases that make the gait at the end of the step: stride after stride, or on a course, with its marks."""
+    """Phases that make the gait at the end of the step: stride after stride, or in a task sequence, with its marks."""
     add = rows.add
     if rows.program.leg.takes_course:
         given = "gait, walk_course, gait_timing, leg, time + length"
@@ -448,7 +454,7 @@ def end(rows: Any) -> list[str]:
 
 
 def mark_stride(rows: Any) -> list[str]:
-    """Lines that add what marks a stride of a course: a scuff on the toe sensor, a forefoot on the edge of a stair."""
+    """Lines that add a stride's marks in a task sequence: a scuff on the toe sensor, a forefoot on a stair's edge."""
     if not rows.program.leg.takes_course:
         return []
     add, follow = rows.add, rows.cells["gait_sensors.follow_rate"]

@@ -50,10 +50,10 @@ def library_of(item: Scenario) -> Library:
 
 
 def scenario_library(scenario: Scenario) -> Library:
-    """A library whose settings are all numbers of a scenario. ProgramError for a controller on whole numbers."""
+    """A library whose settings are all numbers of a scenario. ProgramError for a fixed-point controller."""
     if CONTROLLERS[scenario.controller.kind].plan is not None:
         raise ProgramError(
-            f"{scenario.name}: a controller on whole numbers has no library yet; 'ppafo export firmware' writes it"
+            f"{scenario.name}: a fixed-point controller has no library yet; 'ppafo export firmware' writes it"
         )
     program = exported(batch_of(plan_run(scenario)).program)
     settings, links = settings_of(scenario), links_of(scenario)
@@ -140,12 +140,12 @@ def walk_library(configuration: "Scenario") -> Library:
 
 
 def _following(settings: Sequence[Setting], links: Graph) -> Further | None:
-    """What writes the function that lets settings follow others, None where none does."""
+    """The writer of the function that lets settings follow others, None where none does."""
     return (lambda collector, boundary: following_text(settings, links, collector, boundary)) if links else None
 
 
 def _switches(device: Device, others: Iterable[tuple[Sequence[str], bool]]) -> tuple[Switch, ...]:
-    """What chooses the program by being 0 or not: settings of the valve, and others."""
+    """Settings that choose the program by being 0 or not: of the valve, and others."""
     given = device.valve.settings
     of_valve = [((f"valve_{name}",), given[name] > 0.0) for name in choosing(device)]
     of_effects = [

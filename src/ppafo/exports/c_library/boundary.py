@@ -1,4 +1,4 @@
-"""What lies between the functions of an export and what calls them: structs by name, or arrays of all numbers.
+"""The interface between the functions of an export and their callers: structs by name, or arrays of all numbers.
 
 A library that people read hands over structs. Where runs go on side by side, as in a page, numbers lie in arrays with a
 row for each; the composed functions are the same but for their first and last lines.
@@ -31,7 +31,7 @@ class Boundary(Protocol):
         """Lines that hand back groups of rows, which have their names."""
 
     def head(self, name: str, parameters: Mapping[str, str]) -> str:
-        """The first lines of a function; ``parameters`` are those that it has, with their types as arrays."""
+        """The first lines of a function; ``parameters`` by name, with their types as arrays."""
 
 
 class Arrays:
@@ -42,7 +42,7 @@ class Arrays:
         return f"{array}[{place}]"
 
     def named(self, array: str, names: Sequence[str], body: Sequence[str]) -> list[str]:
-        """Lines behind those that give the numbers their names."""
+        """Lines that give the numbers their names, then ``body``."""
         return [*(f"{name} = {array}[{place}]" for place, name in enumerate(names)), *body]
 
     def taken(self, array: str, group: str, groups: Mapping[str, type], name_of: NameOf) -> str:
@@ -68,6 +68,7 @@ class Structs:
 
     def named(self, array: str, names: Sequence[str], body: Sequence[str]) -> list[str]:
         """Lines with what the numbers are in before their names; names of arguments stay as they are."""
+        # Not after a dot, where it is a field, and not before '=' or '(', where it is an argument or a function.
         words = re.compile(rf"(?<![.\w])({'|'.join(names)})\b(?!=|\()")
         return [words.sub(rf"{array}.\1", line) for line in body]
 

@@ -40,7 +40,7 @@ OUTPUTS = {
     "pressure_2": ("Pa", "pressure in chamber 2, absolute"),
     "torque": ("N m", "torque of the actuator, above 0 turns the toes down"),
     "command": ("-", "command to the valve, -1 to 1"),
-    "reference": ("N m", "torque that was asked for"),
+    "reference": ("N m", "requested torque"),
     "temperature_1": ("K", "temperature in chamber 1"),
     "temperature_2": ("K", "temperature in chamber 2"),
     "mass_1": ("kg", "gas in chamber 1"),
@@ -49,7 +49,7 @@ OUTPUTS = {
     "vented_mass": ("kg", "gas to the atmosphere so far"),
     "leaked_mass": ("kg", "gas leaked from chamber to chamber so far"),
     "strides": ("-", "heel strikes so far"),
-    "phase": ("-", "time in the stride, 0 at its heel strike, in turns"),
+    "phase": ("-", "gait phase, 0 at heel strike, in turns"),
     "contact": ("-", "where the foot stands: 0 swing, 1 heel, 2 flat, 3 toes"),
     "shank_angle": ("rad", "shank from the vertical, above 0 with the ankle before the knee"),
     "healthy_angle": ("rad", "angle of the healthy ankle of this gait"),
@@ -60,9 +60,9 @@ OUTPUTS = {
     "net_push_off_work": ("J", "net work of T_ex while the foot rolls over the toes, so far"),
     "controller_phase": ("-", "phase that the controller sees: 0 swing, 1 landing, 2 mid-stance, 3 push-off"),
     "safe_state": ("-", "0 the controller helps, 1 lifts only, 2 pauses, 3 has stopped"),
-    "gait_fraction": ("-", "time in the stride that the controller goes by, in turns"),
+    "gait_fraction": ("-", "gait phase that the controller goes by, in turns"),
 }
-"""Unit and meaning of what can be read at each sample."""
+"""Unit and meaning of the outputs at each sample."""
 UNITS = {"1": "-", "Pa_a": "Pa, absolute", "Pa_d": "Pa, a difference"}
 _SIGNS = {"below": "<", "at most": "<=", "at least": ">=", "above": ">"}
 _FILES = {"Makefile": "Makefile", "CMakeLists.txt": "CMakeLists.txt"}
@@ -141,9 +141,9 @@ class Library:
 
     ``further`` adds the function that makes the numbers of a run from the settings. ``switches`` choose the program,
     ``other_program`` has further conditions in C under which another would be needed, with the setting that is named;
-    ``keeps_times`` where its times are those that a file could have. ``following`` adds the function
-    that lets settings follow others, None where none does, and ``defaults`` names those whose default does so, which
-    has no range; ``links`` say what follows what. ``words`` fill the page. ``surface`` is how it is called.
+    ``keeps_times`` where a file could have its times. ``following`` adds the function that lets settings follow others,
+    None where none does, and ``defaults`` names the settings whose default does so, which has no range; ``links`` say
+    what follows what. ``words`` fill the page. ``surface`` is how it is called.
     """
 
     title: str
@@ -165,6 +165,7 @@ class Library:
     def name(self) -> str:
         """Its name in C, which its files have too."""
         name = c_identifier(self.title)
+        # A scenario may be called "main" or "math"; C, make and the board's files already are.
         return f"run_{name}" if name in _TAKEN else name
 
 
@@ -295,7 +296,7 @@ def conditions_of_program(library: Library) -> list[tuple[str, str]]:
 
 
 def conditions_of(library: Library) -> list[tuple[str, str]]:
-    """What settings must keep, as text in C, with the setting that is named where it is not kept, as by no number."""
+    """Conditions on settings as text in C, each with the setting that is named where it fails, also for NaN."""
     return [*map(_range, library.settings), *_relations(library)]
 
 
@@ -305,7 +306,7 @@ RULES_OF_TIMES = (
     ("run_duration", "{} / {} <= 5.0e6", ("run_duration", "run_output_interval")),
     ("sensors_delay", "{} / {} <= 1.0e5", ("sensors_delay", "run_step")),
 )
-"""What the file of a scenario must keep of its times (``simulation/clock.py``): setting named, rule, of what."""
+"""Rules of the times of a scenario (``simulation/clock.py``): setting named, rule, settings in it."""
 
 
 _IS_WHOLE = """
@@ -318,12 +319,12 @@ static bool is_whole(double count)
 
 
 def _relations(library: Library) -> list[tuple[str, str]]:
-    """What settings must keep together, as text in C, with the setting that is named."""
+    """Conditions between settings as text in C, each with the setting that is named."""
     return [*map(_related, library.relations), *_rules_of_times(library)]
 
 
 def _rules_of_times(library: Library) -> list[tuple[str, str]]:
-    """What the times of a scenario must keep, as text in C, with the setting that is named."""
+    """Conditions on the times of a scenario as text in C, each with the setting that is named."""
     rules = RULES_OF_TIMES if library.keeps_times and not library.program.program.walks else ()
     return [(rule.format(*(f"settings->{name}" for name in names)), named) for named, rule, names in rules]
 
@@ -355,9 +356,9 @@ def _limits(quantity: Quantity) -> tuple[float, float]:
 
 
 _METRICS_OF_SCENARIO = """\
-They are those of a study (`ppafo sweep`), to the bit. In `ppafo simulate` the same are computed from the recording,
-whose sums are rounded in another order: they agree to about 15 digits. Not here, since they need the whole course of a
-channel: {left_out}."""
+They equal the metrics of a study (`ppafo sweep`) to the bit. In `ppafo simulate` the same are computed from the
+recording, whose sums are rounded in another order: they agree to about 15 digits. Not here, since they need all samples
+of a channel: {left_out}."""
 _METRICS_OF_WALK = """\
 They are means over the strides with help, from the third on, and counts; on a course counts alone. In `ppafo walk` the
 same are computed from the recording, whose sums are rounded in another order: they agree to about 15 digits. Not here,
@@ -430,14 +431,14 @@ def words_of_walk(configuration: Scenario, links: Graph, failing: "Mapping[str, 
 
 
 def _fixed_of_device(device: Device, is_thermal: bool, has_lines: bool) -> list[str]:
-    """What no setting of a device changes."""
+    """Lines on what no setting of a device changes."""
     forms = {"valve": device.valve.orifice, "leak": device.actuator.leak}
     lines = "with lines behind the regulators" if has_lines else "constant supply pressures"
     effects = ", ".join(f"`{effect.name}`" for effect in effects_of(device) if effect.switch)
     return [
         *(f"the form of the {name}, `{_form(orifice)}`" for name, orifice in forms.items()),
         f"the gas, `{'thermal' if is_thermal else 'isothermal'}`; {lines}, which "
-        f"{'take' if device.supply.relieving else 'do not take'} gas back from a chamber above them",
+        f"{'let' if device.supply.relieving else 'do not let'} gas back in from a chamber above them",
         *([f"the effects, {effects}, none of which can be switched off"] if effects else []),
     ]
 
@@ -463,6 +464,7 @@ def choosing(device: Device) -> list[str]:
     kind = VALVES[device.valve.kind]
     names = [item.name for item in kind.quantities]
     chosen = {}
+    # A valve may look only at which settings are 0, so both cases of each tell what chooses.
     for pattern in itertools.product((0.0, 0.01), repeat=len(names)):
         model = kind.choose(dict(zip(names, pattern, strict=True)))
         chosen[pattern] = model, model.command_delay(dict(zip(names, pattern, strict=True))) > 0.0

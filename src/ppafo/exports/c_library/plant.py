@@ -1,4 +1,4 @@
-"""The plant of a scenario or a walk alone: what drives it from step to step comes from outside."""
+"""The plant of a scenario or a walk alone: its inputs come from outside at each step."""
 
 import re
 from collections.abc import Mapping
@@ -57,7 +57,7 @@ class PlantAlone:
     """A plant that is driven from outside: its library, inputs, and how the joint moves between them, in words.
 
     ``first`` are settings of a run that inputs decide, ``lead`` its parameters, both as C with the names of inputs;
-    ``hidden`` are the settings that count for nothing. ``step`` [s] is that of the engine and of the inputs.
+    ``hidden`` are the settings without effect. ``step`` [s] of the engine and of the inputs.
     """
 
     library: Library
@@ -88,11 +88,11 @@ _LEAD_ANGLE = (
 
 
 def plant_of(item: Scenario) -> PlantAlone:
-    """The plant; a free vane takes an external torque, one whose angle is prescribed takes angle and rate.
+    """The plant; an unconstrained vane takes an external torque, one with a prescribed angle takes angle and rate.
 
-    That of a walk is the device on its walking leg, which takes the command alone.
+    For a walk it is the device on its walking leg, which takes the command alone.
     """
-    chosen = _led_vane(item) if worn_kind(item) is None else _commanded_walk(item)
+    chosen = _prescribed_vane(item) if worn_kind(item) is None else _commanded_walk(item)
     library, motion = library_of(chosen), chosen.motion
     command, unseen, highest = COMMAND, {"command", "reference"}, 1.0
     further: tuple[Input, ...] = ()
@@ -103,6 +103,7 @@ def plant_of(item: Scenario) -> PlantAlone:
         angle = motion.profile.start_level
         settings = {one.path: one for one in library.settings}
         stops = [settings[f"actuator.angle_{end}"].value for end in ("min", "max")]
+        # So fast that the short ramp of the first angle still ends within what a level may be.
         fastest = (settings["motion.profile.level"].quantity.maximum - max(map(abs, stops))) / _SHORT
         further = (
             Input("angle", "rad", "angle of the ankle, 90 deg neutral, growing in plantarflexion", angle, *stops),
@@ -148,8 +149,8 @@ def plant_library(item: Scenario) -> dict[str, bytes]:
     return library_files(surfaced(plant_of(item)).library)
 
 
-def _room(alone: PlantAlone, names: list[str]) -> list[str]:
-    """Return conditions in C that both chambers of a led vane have gas in them, now and at the end of the step."""
+def _volume_conditions(alone: PlantAlone, names: list[str]) -> list[str]:
+    """Conditions in C that both chambers of a prescribed vane have a volume, now and at the end of the step."""
     if "angle" not in names or alone.library.program.program.has_shape:
         return []
     plant = "run->parameters.plant"
@@ -169,7 +170,7 @@ def surfaced(alone: PlantAlone) -> PlantAlone:
         "arguments": ", ".join(f"double {name}" for name in names),
         "inputs": ", ".join(names),
         "first_inputs": ", ".join(repr(0.5 if item.name == "command" else item.start) for item in alone.inputs),
-        "are_numbers": " && ".join([*(f"{name} - {name} == 0.0" for name in names), *_room(alone, names)]),
+        "are_numbers": " && ".join([*(f"{name} - {name} == 0.0" for name in names), *_volume_conditions(alone, names)]),
         "said_inputs": ";\n".join(f" * {line}" for line in says) + ".",
         "listed_inputs": "\n".join(f"- `{item.name}` [{item.unit}]: {item.summary}." for item in alone.inputs),
         "motion": alone.motion,
@@ -198,8 +199,8 @@ def follow_lines(alone: PlantAlone, settings: str, inputs: Mapping[str, str]) ->
     return "\n".join(f"    {settings}->{place} = {value.replace('@.', f'{settings}->')};" for place, value in lines)
 
 
-def _led_vane(scenario: Scenario) -> Scenario:
-    """The scenario under a command; an ankle is led from outside, from where the scenario has it at the start."""
+def _prescribed_vane(scenario: Scenario) -> Scenario:
+    """The scenario under a command; an ankle is prescribed from outside, beginning where the scenario has it."""
     motion = scenario.motion
     if isinstance(motion, PrescribedMotion):
         found: tuple[float, float, float] = PROFILES[motion.profile.kind].value(profile_parameters(motion.profile), 0.0)

@@ -75,6 +75,7 @@ def following_text(settings: Sequence[Setting], links: Graph, collector: Collect
     for path, found in links.items():
         name, own = c_identifier(path), cell("settings", path)
         text = own
+        # The first link that holds wins, so it is the outermost choice.
         for link in reversed(found):
             number = " + ".join([*(_term(term, rows, collector) for term in link.terms), repr(link.gap)])
             source = link.sources[0]
@@ -87,7 +88,7 @@ def following_text(settings: Sequence[Setting], links: Graph, collector: Collect
 
 
 def _term(term: Term, rows: list[str], collector: Collector) -> str:
-    """A term of what is followed; rows that only it has are added to ``rows``."""
+    """A term of what is followed; structs that only it has are added to ``rows``."""
     given = ", ".join(map(c_identifier, term.sources))
     if term.names:
         row = f"Followed{len(rows)}"
@@ -98,7 +99,7 @@ def _term(term: Term, rows: list[str], collector: Collector) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """A number of which the source has the text: what Python makes of one is written, operation by operation."""
+    """A number as text: arithmetic of Python on it is written, operation by operation."""
 
     text: str
 
@@ -173,7 +174,7 @@ class Writing:
         return "\n".join([*own, head, *indent(composed_lines(body, self.needs))])
 
     def _initial_rows(self) -> dict[str, type]:
-        """State rows that a run begins with; those of meters begin with the first sample."""
+        """States that a run begins with; meters begin with the first sample."""
         later = {"course", *self.program.meter_groups}
         return {name: row for name, row in self.program.state_rows().items() if name not in later}
 
@@ -205,6 +206,7 @@ class Writing:
             for section in SEEN_BY_EFFECTS
         }
         if self.program.has_shape:
+            # The vane's own numbers have no meaning for another shape; the text that reads them is shared.
             fields["actuator"] |= {"torque_constant": "0.0", "volume_per_angle": "0.0"}
         constant = f"{add(specific_gas_constant)}({UNIVERSAL_GAS_CONSTANT!r}, gas_molar_mass)"
         fields["gas"] = fields["gas"] | {"specific_gas_constant": constant}
@@ -228,7 +230,7 @@ class Writing:
             yield from self._shape(made, name)
 
     def _shape(self, vane: str, name: str) -> Iterator[str]:
-        """Lines that make a plant of that of a vane and the actuator's shape; what came from a file is constant."""
+        """Lines that make a plant from a vane's and the actuator's shape; what came from a file is constant."""
         add, actuator, model = self.add, self.device.actuator, self.program.actuator
         settings = self.section("actuator", list(actuator.settings))
         measured = "" if actuator.table is None else f", {self.constant(actuator.table, 'table')}"
@@ -301,12 +303,12 @@ SAID = {
     "run.output_interval": "time from one sample to the next",
     "controller.period": "time between two decisions of the controller",
 }
-"""What some settings are where no file stands around them."""
+"""Meanings of some settings outside a file."""
 
 
 def settings_of(scenario: Scenario) -> tuple[Setting, ...]:
     """Every number of a scenario in SI units, under the path that overrides know it by."""
-    # The step is that of the file, of which the engine takes one that divides a sample.
+    # The file's step, from which the engine makes one that divides a sample.
     texts = time_texts(scenario)
     duration, period = scenario.run.duration, scenario.controller.period
     step, output = (value_at(texts, f"run.{name}") for name in ("step", "output_interval"))
@@ -334,7 +336,7 @@ def settings_of(scenario: Scenario) -> tuple[Setting, ...]:
 
 
 def links_of(scenario: Scenario) -> Graph:
-    """What follows other settings as long as nobody changes it."""
+    """Settings that follow others as long as nobody changes them."""
     return {**links_that_hold(scenario), **links_of_times(time_texts(scenario))}
 
 

@@ -1,6 +1,6 @@
-"""The composed module of an exported scenario: its lane loop for one run, its metrics, the way from settings there.
+"""The composed module of an exported scenario: its loop for one run, its metrics, and its preparation from settings.
 
-What prepares and judges runs takes settings by their names as text, and numbers that may be columns of
+Preparation and metrics take settings by their names as text, and numbers that may be columns of
 ``model.columns``. For one run a name is a field, no number is a column, and a function over runs is called as it is.
 """
 
@@ -11,7 +11,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
-from importlib.resources.abc import Traversable
 from types import FunctionType
 from typing import Any
 
@@ -105,7 +104,7 @@ LOOP_TYPES: tuple[Type, ...] = (
     *map(Array, LOOP_ARRAYS.values()),
     *(FLOAT if kind == "float64" else INT for kind in LOOP_NUMBERS.values()),
 )
-"""Types of what the loop of a run takes beside its states and parameters."""
+"""Types of the arguments of a run's loop beside its states and parameters."""
 WHOLE, IN_PARTS = "advance", "advance_in_parts"
 """Names of the lane loops in C: of whole steps or of the one there is, and of steps in parts where there are both."""
 TOGETHER = "_together"
@@ -124,7 +123,7 @@ class ExportedProgram:
     def loops(self) -> dict[str, Program]:
         """Programs of its lane loops, by their names in C.
 
-        A held vane without lines has two: its settings decide whether the error decides about the parts of a step.
+        A locked vane without lines has two: its settings decide whether the error decides about the parts of a step.
         """
         if not self.chooses_parts:
             return {WHOLE: self.program}
@@ -152,10 +151,11 @@ class ExportedProgram:
 
 
 def exported(program: Program) -> ExportedProgram:
-    """The program as it is exported; a metric that needs the whole course of a channel is left out."""
+    """The program as it is exported; a metric that needs all samples of a channel is left out."""
     missing = _missing(program)
     offered = (kind for kind in METRICS.values() if has_channels(program, kind) and not kind.traced)
     metrics = tuple(kind for kind in offered if program.walks == (WALK in kind.needs))
+    # By name: the same metrics in another order are the same program.
     meters = dict(sorted({meter.name: meter for kind in metrics for meter in kind.meters}.items()))
     outputs = (*(name for name in TRACED if name not in missing), *walk_traces(program))
     return ExportedProgram(replace(program, meters=tuple(meters.values()), traced=outputs), metrics)
@@ -248,7 +248,11 @@ def _short(collector: SourceCollector) -> dict[str, str]:
 def _names_around() -> frozenset[str]:
     """Names of functions in the files around a library, of which some take its source in, and of its own entries."""
     folders = [folder.joinpath("templates") for folder in files("ppafo.exports").iterdir()]
-    texts = [_c_texts(folder) for folder in folders if folder.is_dir()]
+    texts = [
+        [item.read_text(encoding="utf-8") for item in folder.iterdir() if item.name.endswith(".c")]
+        for folder in folders
+        if folder.is_dir()
+    ]
     # What is around a library has the name of that library in it.
     found = (
         _FUNCTION.findall(text)
@@ -257,10 +261,6 @@ def _names_around() -> frozenset[str]:
         for text in of_folder
     )
     return frozenset(("advance", "metrics", "prepare", "follow")).union(*found)
-
-
-def _c_texts(folder: Traversable) -> list[str]:
-    return [item.read_text(encoding="utf-8") for item in folder.iterdir() if item.name.endswith(".c")]
 
 
 _FUNCTION = re.compile(r"^(?:static )?[\w ]+\b\*?(\w+)\(", re.MULTILINE)

@@ -134,7 +134,7 @@ def _numbers(configuration: Scenario) -> dict[str, tuple[Quantity, float]]:
 
 
 def sensors_that_fail(configuration: Scenario) -> dict[str, FaultSettings]:
-    """Faults of a walk by the name of the sensor, without those that have none."""
+    """Faults of a walk by the name of the sensor, only where there is one."""
     return {sensor: item for sensor, item in sensor_settings(configuration).faults.items() if item.kind}
 
 
@@ -147,7 +147,7 @@ def _control(configuration: Scenario) -> dict[str, Quantity]:
 
 
 def links_of_walk(configuration: Scenario) -> Graph:
-    """What follows other settings of a walk as long as nobody changes it."""
+    """Settings of a walk that follow others as long as nobody changes them."""
     known = _numbers(configuration)
     recorded = {"run.output_interval": (Follows((Term(("run.duration",), walk_of(configuration).who.interval),)),)}
     # A plant alone has no settings of the controller that its walk had.
@@ -178,12 +178,13 @@ def preparation_of_walk(configuration: Scenario, program: Program, collector: Co
     form: ExportedWalk = kind_at(walk_of(configuration).who.exported)
     lines = [
         *writing.plant("bare", "0.0"),
+        # Each line needs names that lines before it have made, so this order is fixed.
         *form.leg(configuration, writing),
         *_gait_sensors(configuration, writing),
         *_plant_faults(configuration, writing),
         *_steps(configuration, writing),
         *writing.timing("signal_delay"),
-        *_pieces(configuration, writing),
+        *_components(configuration, writing),
         *form.start(configuration, writing),
         *writing.start(),
     ]
@@ -248,7 +249,7 @@ def _steps(configuration: Scenario, writing: Writing) -> Iterator[str]:
     yield "needs_parts = False"
 
 
-def _pieces(configuration: Scenario, writing: Writing) -> Iterator[str]:
+def _components(configuration: Scenario, writing: Writing) -> Iterator[str]:
     """Lines that make the parameters of the controller, its noise, gas, lines and course."""
     control = law_of(configuration)
     given = [c_identifier(path) for path in _control(configuration)]

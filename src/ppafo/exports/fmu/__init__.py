@@ -1,7 +1,7 @@
 """A scenario or a walk as a functional mock-up unit: sources inside, no Python at run time.
 
-The unit holds the closed loop, or the plant alone: valve, gas and supply under a command, on a vane that is free or
-moved. It is for co-simulation.
+The unit holds the closed loop, or the plant alone: valve, gas and supply under a command, on a vane that is
+unconstrained or moved. It is for co-simulation.
 """
 
 import hashlib
@@ -78,7 +78,7 @@ def build(name: str, sources: Mapping[str, bytes], main: str) -> bytes:
 
 
 def build_library(name: str, sources: Mapping[str, bytes], main: str, flags: Sequence[str]) -> bytes:
-    """A library of some sources for a platform; ProgramError as of a unit."""
+    """A library of some sources for a platform; ProgramError as in ``build``."""
     command = [*compiler_for(name), *FLAGS, *flags]
     with tempfile.TemporaryDirectory() as folder:
         for file, content in sources.items():
@@ -104,9 +104,11 @@ def compiler_for(name: str) -> Sequence[str]:
             "-target",
             PLATFORMS[name].target,
             "-s",
+            # zig turns undefined behaviour into traps in what it calls a debug build.
             "-fno-sanitize=undefined",
         ]
     found = next(filter(None, map(shutil.which, ("gcc", "clang"))), None)
+    # A library of this system's gcc runs on systems that are at least as new; zig links against an old one.
     if name == host_platform() == "linux64" and found is not None:
         return [found, "-s"]
     needed = "gcc, clang or the package ziglang" if name == "linux64" else "the package ziglang"
@@ -138,6 +140,7 @@ def functional_unit(interface: Interface, fmi: int, platforms: Sequence[str]) ->
     identifier = interface.library.name
     sources = _sources(interface, fmi)
     token = hashlib.sha256(b"".join(sources.values())).hexdigest()[:32]
+    # The token is the hash of the sources before it stands in them.
     sources = {name: content.replace(b"@token@", token.encode()) for name, content in sources.items()}
     main = f"fmi{fmi}.c"
     contents = {
@@ -255,9 +258,9 @@ PLANT_TUNING = "They are taken at the next communication step."
 
 
 def plant_alone(item: Scenario) -> Interface:
-    """The plant; a free vane takes an external torque, one whose angle is prescribed takes angle and rate.
+    """The plant; an unconstrained vane takes an external torque, one with a prescribed angle takes angle and rate.
 
-    That of a walk is the device on its walking leg, which takes the command alone. It is that of ``export c``.
+    For a walk it is the device on its walking leg, which takes the command alone. It equals that of ``export c``.
     """
     alone = surfaced(plant_of(item))
     library = alone.library

@@ -1,4 +1,4 @@
-"""What a unit says of itself before it is loaded: its variables, and modelDescription.xml of FMI 2 and 3."""
+"""The description of a unit: its variables, and modelDescription.xml of FMI 2 and 3."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -13,9 +13,9 @@ from ppafo.version import __version__
 FIXED_SECTIONS = ("run", "initial", "gas", "actuator", "foot_plate", "wearer", "motion", "motion.profile")
 """Settings that the start of a run is made of: they cannot change under way."""
 FIXED_NAMES = ("period", "delay", "seed")
-"""So cannot these, which count steps or begin the noise."""
+"""Names of further settings that cannot change under way: they count steps or begin the noise."""
 TUNABLE_OF_WEARER = ("residual_share", "ankle_stiffness", "ankle_rest_angle", "ankle_damping")
-"""Of the wearer these may: what a leg weighs stays."""
+"""Settings of the wearer that may change: the weight of a leg stays."""
 STEPPED = ("command", "reference", "strides", "contact", "controller_phase", "safe_state")
 """Outputs that jump from sample to sample."""
 
@@ -40,7 +40,7 @@ class Variable:
 
 @dataclass(frozen=True, slots=True)
 class Interface:
-    """What a unit shows of a library: inputs, outputs, metrics, settings that are none of its variables.
+    """The interface of a unit: inputs, outputs, metrics, settings that are none of its variables.
 
     ``templates`` have the C that moves it on, ``words`` what is filled in there. ``time`` says for people how it goes
     on, ``tuning`` when a changed parameter is taken. ``step`` is the communication step that it takes by default [s],
@@ -74,7 +74,7 @@ def change_of(interface: Interface, setting: Setting) -> str:
 
 
 def variables_of(interface: Interface) -> tuple[Variable, ...]:
-    """All variables, in the order of their numbers, which are those of the C."""
+    """All variables, in the order of their numbers, which are also the C's."""
     library = interface.library
     first_metric = len(library.settings) + len(library.program.outputs)
     first_input = first_metric + len(library.program.metrics)
@@ -83,6 +83,7 @@ def variables_of(interface: Interface) -> tuple[Variable, ...]:
         change, quantity = change_of(interface, item), item.quantity
         if change == "h":
             continue
+        # The largest floats stand for no limit; XML would show them as one.
         low, high = (limit if abs(limit) < 1e308 else None for limit in (quantity.minimum, quantity.maximum))
         said = quantity.summary or quantity.name
         kind = "tunable" if change == "t" else "fixed"

@@ -1,4 +1,4 @@
-"""The plant's side of the wire: how its time goes on, what it takes of a controller, when it vents, how a run goes.
+"""The plant's side of the wire: its time, what it accepts from a controller, when it vents, and the course of a run.
 
 The plant sends a sample, listens until the next one is due, and goes on from that sample under the command that
 answered it. So a controller that answers in time decides as in a simulation. Time goes on as it goes by, or in lock
@@ -23,7 +23,7 @@ from ppafo.model.valves.kind import VENT
 from ppafo.simulation.sampled import SampledRun
 
 _AT_ONCE = 64
-"""Packets that are taken without a look at the clock: whoever sends without end must not hold the plant."""
+"""Packets that are taken without a look at the clock: a sender without end must not hold up the plant."""
 Take = Callable[[bytes], bool]
 """Takes what came in, and says whether what is waited for is there."""
 
@@ -98,12 +98,14 @@ class RealTime:
         self._start = self._clock()
 
     def now(self) -> float:
-        """Time [s] since the beginning, less that in which it stood still."""
+        """Time [s] since the beginning, less the time in which it stood still."""
         return self._clock() - self._start
 
     def late(self, due: float) -> float:
         """By how much a time [s] that was listened for has been missed [s]."""
         missed = max(0.0, self.now() - due)
+        # Less than a period late is jitter, which the next sample makes up; more would be made up by a burst of
+        # samples.
         if missed > self._period:
             self.stood_still.append(missed)
             self._start += missed
@@ -179,7 +181,7 @@ def stop_by_interrupt() -> Iterator[Callable[[], bool]]:
         yield asked.is_set
         return
     known = [getattr(signal, name) for name in SIGNALS if hasattr(signal, name)]
-    # A job in the background has Ctrl-C ignored by its shell, and ends all the same by whoever sends it the signal.
+    # A shell has background jobs ignore Ctrl-C; they end all the same when they are sent the signal.
     heard = [number for number in known if number == signal.SIGINT or signal.getsignal(number) != signal.SIG_IGN]
     before = {number: signal.signal(number, ask) for number in heard}
     try:
@@ -193,6 +195,7 @@ def stop_by_interrupt() -> Iterator[Callable[[], bool]]:
 def without_collections() -> Iterator[None]:
     """Keep Python from looking for garbage, which takes milliseconds."""
     was_on = gc.isenabled()
+    # Now, so that nothing is left to collect for long.
     gc.collect()
     gc.disable()
     try:
@@ -207,7 +210,8 @@ SILENCE = 0.020
 AFTER_STOP = 0.5
 """Seconds that a run goes on, vented, after it was stopped; not in real time."""
 LAST_PACKETS = 3
-"""How often the end is said: any of them may be lost."""
+"""Packets that announce the end: any of them may be lost."""
+# Between two calls of the controller [s]; and a number of periods that is whole but for rounding.
 _CALL_INTERVAL = 0.01
 _WHOLE = 1.0e-9
 
@@ -238,10 +242,11 @@ class Row(NamedTuple):
 
 @final
 class Judge:
-    """What a plant takes of a controller. Everything that is not the answer to a sample that waits is counted."""
+    """Accepts answers of a controller. Everything that is not the answer to a waiting sample is counted."""
 
     def __init__(self, run: int, period: float) -> None:
         self.run = run
+        # 1e-9 below, so that 20 ms at 1 kHz are 20 samples and not 21 by rounding.
         self.patience = math.ceil(SILENCE / period - _WHOLE)
         self.sent = -1
         self.answered = -1
@@ -260,6 +265,7 @@ class Judge:
             self.ignored["ahead of its sample"] += 1
         elif packet.sequence <= self.answered:
             self.ignored["doubled or overtaken"] += 1
+        # An answer older than the watchdog allows would act on a state that is long gone.
         elif self.sent - packet.sequence >= self.patience:
             self.ignored["too late"] += 1
         else:
@@ -287,7 +293,7 @@ class Judge:
 
 @dataclass(frozen=True, slots=True)
 class Exchange:
-    """What went over the wire in a run: the log, what was taken, what was counted, what ended it.
+    """The traffic of a run: the log, packets accepted and counted, and the end.
 
     ``refused`` are bytes that were no good packet, ``ignored`` good packets that were no answer to a sample that
     waited. ``stood_still`` are the times [s] through which the computer slept. ``vented`` says why the plant was
@@ -377,6 +383,7 @@ class Bench:
         """Wait for the answer to the sample that was sent [s], go on under it, and wait until the next one is due."""
         sequence = self.plant.taken
         next_due = (sequence + 1) * self.period
+        # In lock step nothing is waited for once the link is given up, or each sample would take a second.
         if not self.judge.is_answered and (self.pace.is_real or not self._is_given_up):
             self.pace.listen(next_due, self.port, self._take)
         answered = self._answered_at - sent if self.judge.is_answered else None
@@ -416,12 +423,13 @@ class Bench:
 
     @property
     def _is_going_on(self) -> bool:
-        """False at the end of the run, and where the plant has left what is possible."""
+        """False at the end of the run, and where the plant has become unphysical."""
         return self.plant.taken < self.plant.samples and not self._has_diverged
 
     def _show(self, flags: int) -> None:
         """Make the plant's present state the sample that is shown."""
         plant, seen = self.plant, self.plant.measurement()
+        # No packet can carry NaN: the last good sample stays shown.
         self._has_diverged = not all(map(math.isfinite, seen))
         if self._has_diverged:
             return

@@ -1,4 +1,4 @@
-"""A recording from a bench that speaks the protocol: its samples, put in order, as channels over time."""
+"""A recording from a bench by the protocol: its samples, put in order, as channels over time."""
 
 import contextlib
 import os
@@ -21,6 +21,7 @@ from ppafo.storage.comma_separated import mark_of
 MOST_SAMPLES = 5_000_000
 ASIDE = ".recording"
 """Stands before the ending of a file that is being recorded."""
+# Longest wait for bytes, and time between two writings of what came [s].
 _LISTENING = 0.1
 _BETWEEN_KEEPING = 0.5
 _HALF = wire.WRAP // 2
@@ -110,6 +111,8 @@ class Collector:
         if packet.counts.keys() != first.counts.keys():
             self.ignored["with other channels"] += 1
             return False
+        # Numbers of 32 bits wrap after 50 days at 1 kHz, time stamps after 71 minutes: both are taken as steps from the
+        # newest.
         number = self._newest + _difference(packet.sequence, self._newest)
         if number in self._seen:
             self.ignored["doubled"] += 1
@@ -270,7 +273,7 @@ def kept_aside(target: Path) -> Iterator[Callable[[str], None]]:
 
 
 def _why_ended(collector: Collector, port: wire.Port, duration: float | None, is_silent: bool, is_stopped: bool) -> str:
-    """What ends a recording now; empty while it goes on."""
+    """The reason why a recording ends now; empty while it goes on."""
     if is_stopped:
         return "stopped"
     if duration is not None and collector and collector.duration >= duration:

@@ -1,7 +1,7 @@
 """A scenario at the wire, from its settings to a folder: plant, run, result, log, how the link did.
 
-The plant is the lanes of one run, whose command comes from outside. Why in this process and not in one of its own:
-docs/decisions/0022-processor-and-hardware-in-the-loop.md.
+The plant is the compiled module with one run, whose command comes from outside. Why in this process and not in one of
+its own: docs/decisions/0022-processor-and-hardware-in-the-loop.md.
 """
 
 import csv
@@ -25,7 +25,7 @@ from ppafo.engine.run import Run, batch_of
 from ppafo.errors import ScenarioError
 from ppafo.exports.hil import wire
 from ppafo.exports.hil.loop import Bench, Exchange, LockStep, Pace, RealTime, Row, without_collections
-from ppafo.model.valves import dump
+from ppafo.model.valves import vent_valve
 from ppafo.report.recording_figure import recording_figure
 from ppafo.report.style import ACTUAL, VERMILION, Margins, figure_of_free_panels, house_style, render_figure
 from ppafo.simulation.plan import plan_run
@@ -58,19 +58,20 @@ class Plant:
 
 
 def plant_of(scenario: Scenario, rate: int = wire.RATE) -> Plant:
-    """The plant of a scenario, whose command is given ``rate`` times a second; a proportional valve can be dumped."""
+    """The plant of a scenario with ``rate`` commands a second; a proportional valve gets a vent valve."""
     if not wire.LOWEST_RATE <= rate <= wire.HIGHEST_RATE:
         raise ScenarioError(f"--rate {rate}: must be {wire.LOWEST_RATE} to {wire.HIGHEST_RATE} samples per second")
     period = 1.0 / rate
     chosen = replace(
         scenario,
+        # No step may be longer than a sample: a command acts from its sample on.
         run=replace(scenario.run, step=min(scenario.run.step, period)),
         controller=Control(PYTHON_CONTROLLER, {}, period),
     )
     run = plan_run(chosen)
     valve = chosen.device.valve
     if valve.kind == "proportional":
-        run = replace(run, program=replace(run.program, valve=dump.choose(valve.settings)))
+        run = replace(run, program=replace(run.program, valve=vent_valve.choose(valve.settings)))
     module = load_program(batch_of(run).program)
     return Plant(chosen, run, module, chosen_compiler().described(), period)
 
@@ -151,12 +152,12 @@ class HardwareRun:
 
     @property
     def _in_time(self) -> Sequence[Row]:
-        """The samples that were sent: not those with which a stopped run was vented."""
+        """The samples that were sent, without the samples with which a stopped run was vented."""
         count = next((place for place, row in enumerate(self.exchange.rows) if row.sent_late is None), None)
         return self.exchange.rows[:count]
 
     def document(self) -> dict[str, Any]:
-        """What ``link.json`` says, in SI units."""
+        """The content of ``link.json``, in SI units."""
         exchange = self.exchange
         return {
             "rate": round(1.0 / self.plant.period),
@@ -245,7 +246,7 @@ class HardwareRun:
         return found
 
     def plot_signals(self) -> "Figure":
-        """The signals of the run; what vented it stands below."""
+        """Figure of the signals of the run; the reason of venting stands below."""
         exchange, status = self.exchange, self.result.status
         vented = (
             ""
@@ -290,6 +291,7 @@ def run_plant(
     ``patience`` [s] is how long the controller is called; ``run`` its number, drawn where none is given.
     ScenarioError where nobody answers.
     """
+    # Not from a seed: packets of an earlier run that are still under way must have another number.
     number = random.SystemRandom().randint(0, _LARGEST_RUN) if run is None else run
     before = load_now()
     begun = plant.begin()
@@ -343,7 +345,7 @@ def spread(values: Sequence[float]) -> dict[str, float] | None:
 
 
 def described_spread(values: Sequence[float]) -> str:
-    """The same in words."""
+    """Median, 99th percentile and largest of some times, in words."""
     found = spread(values)
     if found is None:
         return "none"

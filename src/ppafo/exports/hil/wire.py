@@ -1,6 +1,6 @@
-"""The wire between a plant and a controller: packets, what is found in bytes of anybody, and where they come and go.
+"""The wire between a plant and a controller: packets, their search in bytes of any origin, and ports.
 
-The page ``docs/wire-protocol.md`` has the protocol as a table. Whatever comes in is judged here: a packet
+The page ``docs/wire-protocol.md`` has the protocol as a table. Whatever comes in is checked here: a packet
 is good to its last bit, or it is counted and dropped. A port is a UDP socket or a serial device, opened from a text
 such as ``udp:127.0.0.1:5000``.
 """
@@ -34,7 +34,7 @@ FULL_COMMAND = 1_000_000
 """Counts of a command of 1."""
 MICROSECONDS = 1_000_000
 WRAP = 2**32
-"""What a time stamp goes back to 0 at."""
+"""Value at which a time stamp goes back to 0."""
 
 _HEADER = struct.Struct("<2sBBBBHII")
 _WORD = struct.Struct("<i")
@@ -69,14 +69,14 @@ CHANNELS = (
     ChannelCode("direction", 1.0),
     ChannelCode("repetition", 1.0),
 )
-"""By the number of their bit."""
+"""Channels by the number of their bit."""
 _NUMBERS = {channel.name: number for number, channel in enumerate(CHANNELS)}
 LONGEST = _SHORTEST + _WORD.size * len(CHANNELS)
 """Bytes of the longest packet."""
 
 
 class Sample(NamedTuple):
-    """What a plant or a bench shows: flags, run, sequence number, time stamp [us], counts by channel."""
+    """A sample of a plant or a bench: flags, run, sequence number, time stamp [us], counts by channel."""
 
     flags: int
     run: int
@@ -86,7 +86,7 @@ class Sample(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """What a controller answers: flags, run and sequence of the sample, its own time stamp [us], counts of command."""
+    """An answer of a controller: flags, run and sequence of the sample, its own time stamp [us], counts of command."""
 
     flags: int
     run: int
@@ -116,6 +116,7 @@ def counts_per_unit(name: str) -> int:
 
 def sample_bytes(sample: Sample) -> bytes:
     """The packet of a sample."""
+    # In order of bits, whatever the order of the mapping: the receiver has only the mask.
     numbers = sorted(_NUMBERS[name] for name in sample.counts)
     mask = sum(1 << number for number in numbers)
     values = [sample.counts[CHANNELS[number].name] for number in numbers]
@@ -148,7 +149,7 @@ REFUSALS = ("stray bytes", "version", "kind", "length", "checksum", "content")
 class Reader:
     """Finds packets in bytes; ``refused`` counts what was dropped, by ``REFUSALS``.
 
-    Bytes of a stream go on from one call to the next, those of datagrams do not.
+    Bytes of a stream go on from one call to the next, datagrams do not.
     """
 
     def __init__(self, is_stream: bool) -> None:
@@ -165,6 +166,7 @@ class Reader:
         while True:
             at = waiting.find(MARK)
             if at < 0:
+                # The last byte may be the first half of a mark that is still to come.
                 at = len(waiting) - (1 if waiting.endswith(MARK[:1]) else 0)
                 self._drop("stray bytes", at)
                 break
@@ -176,6 +178,7 @@ class Reader:
             packet = _read(waiting[: waiting[4]]) if why is None else why
             if isinstance(packet, str):
                 self._drop(packet)
+                # Only the mark is dropped: a good packet may begin inside what looked like another one.
                 waiting = waiting[len(MARK) :]
             else:
                 found.append(packet)
@@ -256,7 +259,7 @@ _WRITE_TIMEOUT = 2.0e-4
 
 
 class Port(Protocol):
-    """Something that takes and gives bytes; what breaks under way is kept in ``failure``, and then nothing comes."""
+    """Something that takes and gives bytes; a failure under way is kept in ``failure``, and then nothing comes."""
 
     @property
     def is_stream(self) -> bool:
@@ -375,7 +378,7 @@ class SerialPort:
 
 
 def open_port(text: str, baud: int = DEFAULT_BAUD, listens: bool = False) -> Port:
-    """Open a port of a text; one that ``listens`` waits at a UDP address for whoever first sends a good packet there.
+    """Open a port of a text; one that ``listens`` waits at a UDP address for the first sender of a good packet.
 
     ScenarioError, in one line, for a text that is none, and for a port that is not there.
     """

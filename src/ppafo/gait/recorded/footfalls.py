@@ -89,6 +89,7 @@ def contacts_of(force: Signal) -> list[Contact]:
 
 def _without_short(time: Floats, contacts: list[tuple[int, int]]) -> list[tuple[int, int]]:
     """Return the contacts with short breaks closed, and then without short ones."""
+    # Breaks are closed first: a contact in pieces would otherwise be dropped piece by piece.
     joined: list[tuple[int, int]] = []
     for first, last in contacts:
         if joined and time[first] - time[joined[-1][1]] < SHORTEST_CONTACT:
@@ -136,6 +137,7 @@ def strides_from_shank(shank: Signal) -> list[Stride]:
 def _toe_off(shank: Signal, rate: Floats, first: int, last: int) -> int:
     """Return the sample of the fastest lean backwards between mid-stride and the start of the swing."""
     lowest = first + int(np.argmin(shank.values[first:last]))
+    # Toe-off lies in the second half of the lean: the shank turns as fast just after heel strike.
     middle = first + (lowest - first) // 2
     if lowest - middle < 2 or shank.values[lowest] > _DEEPEST:
         raise DataError(
@@ -146,10 +148,10 @@ def _toe_off(shank: Signal, rate: Floats, first: int, last: int) -> int:
 
 
 _LEAST_LEAN = 0.5
-"""Share of the range of the shank angle by which the shank leans forward over its own contact; over one of the other
-foot it swings back."""
+"""Fraction of the range of the shank angle by which the shank leans forward over its own contact; over the other
+foot's it swings back."""
 _LEAST_LEAN_OF_PART = 0.1
-"""The same of a contact that the record cuts."""
+"""The same for a contact that the record cuts."""
 
 
 def force_of_plates(
@@ -228,6 +230,7 @@ def wrap_cycle(walk: Mapping[str, Signal]) -> Cycle | None:
     )
     rates = np.gradient(curves, axis=1)
     features = np.concatenate([curves, rates / np.ptp(rates, axis=1, keepdims=True)])
+    # Every length of a cycle that leaves an overlap is tried; the best overlap is the period.
     shifts = np.arange(first, time.size)
     misfits = np.array(
         [np.sqrt(np.mean((features[:, shift:] - features[:, : time.size - shift]) ** 2)) for shift in shifts]
@@ -271,7 +274,7 @@ _NEAR = 0.15
 _ABOUT_STANCE = 0.05
 """Of the stride, at either end of the stance, which a load need not cover."""
 _COVERED = 0.9
-"""Share of the rest of the stance on the plate, for the load to be that of the stride."""
+"""Fraction of the rest of the stance on the plate, for the load to be the stride's."""
 
 
 def strides_within(signal: Signal, strides: Sequence[Stride]) -> list[Stride]:
@@ -281,7 +284,7 @@ def strides_within(signal: Signal, strides: Sequence[Stride]) -> list[Stride]:
 
 
 LEAST_STRIDES = 2
-"""Where nobody states it; a walk past a plate and one cycle have one."""
+"""Least number of strides by default; a walk past a plate and one cycle have one."""
 
 FORCE, SHANK, FILE = "vertical_force", "shank_angle", "events of the file"
 
@@ -343,7 +346,7 @@ def _of_walk(walk: Mapping[str, Signal], tables: Sequence[MotionTable], side: Si
     if recorded and contacts and len(usable_strides(walk, recorded)) > len(usable_strides(walk, forced)):
         return Footfalls(walk, recorded, FILE, is_overground=True)
     moved: list[Stride] = []
-    # The force has a stride or none, and its message says more than that of the shank.
+    # The force has a stride or none, and its message says more than the shank's.
     with suppress(DataError):
         moved = strides_from_shank(walk[SHANK]) if contacts else []
     if len(usable_strides(walk, moved)) <= len(usable_strides(walk, forced)):
@@ -367,7 +370,7 @@ def _strides_of_file(tables: Sequence[MotionTable], side: Side) -> list[Stride]:
 
 
 def _by_contacts(strides: list[Stride], contacts: Sequence[Contact]) -> tuple[list[Stride], str]:
-    """Return strides from the shank, moved by what contacts on plates say of its strikes and of its offs."""
+    """Return strides from the shank, whose strikes and toe-offs are moved by what contacts on plates show."""
     early = [
         (start - item.start, end - item.toe_off)
         for item in strides
@@ -386,7 +389,7 @@ def _by_contacts(strides: list[Stride], contacts: Sequence[Contact]) -> tuple[li
 
 
 def strides_of_curve(footfalls: Footfalls, name: str, signal: Signal, strides: Sequence[Stride]) -> list[Stride]:
-    """Return the strides that a curve covers: those within its record, and of a load those that it was measured in."""
+    """Return the strides that a curve covers: within its record, and for a load where it was measured."""
     inside = strides_within(signal, strides)
     if name not in LOADS or not (footfalls.is_overground or signal.absent is not None):
         return inside

@@ -1,9 +1,9 @@
-"""Recorded files in, a gait out: tables, map, gaps, filter, strides, checks, mean curves and their series.
+"""Import of a gait from recorded files: tables, map, gaps, filter, strides, checks, mean curves and their series.
 
 Curves over the stride: each brought to the same phases, their mean and their standard deviation.
 
-What no leg does is found here: columns that stay constant while the wearer walks, drop-outs that were filled with the
-last value, and strides that scatter too much, or that no series comes near.
+Found here is what no leg does: columns that stay constant while the wearer walks, drop-outs that were filled with the
+last value, and strides that scatter too much or that no series fits.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -115,6 +115,7 @@ def over_strides(name: str, curves: Floats, strides: Sequence[Stride]) -> CurveS
         fraction = float(np.mean([item.stance_share for item in strides]))
         inside = (percent > _UNLOADED_FORCE) & (percent < fraction - _UNLOADED_FORCE)
         at, first = percent[inside], float(mean[inside][0])
+        # The line over the swing goes on into the next stride, where the stance begins again.
         mean = np.interp(percent, [*at, 1.0 + at[0]], [*mean[inside], first], period=None)
         deviation = np.where(inside, deviation, 0.0)
     return CurveStatistics(curves, mean, deviation, tuple(strides))
@@ -122,7 +123,7 @@ def over_strides(name: str, curves: Floats, strides: Sequence[Stride]) -> CurveS
 
 @dataclass(frozen=True, slots=True)
 class Strides:
-    """Strides that are taken, those that are left out, each with the reason, and the least number to take."""
+    """Strides taken, strides left out, each with the reason, and the least number to take."""
 
     taken: tuple[Stride, ...]
     left_out: tuple[tuple[Stride, str], ...]
@@ -139,7 +140,7 @@ class Strides:
 
 
 def of_usual_time(strides: Sequence[Stride], least: int) -> Strides:
-    """Return strides, those left out whose time differs from the median by more than LARGEST_STRIDE_CHANGE of it."""
+    """Return strides without those whose time differs from the median by more than LARGEST_STRIDE_CHANGE of it."""
     if not strides:
         return Strides((), (), least)
     median = float(np.median([item.time for item in strides]))
@@ -223,7 +224,7 @@ _MOST_ODD = 0.4
 
 
 def without_odd_shapes(curves: Mapping[str, CurveStatistics], strides: Strides) -> Strides:
-    """Leave out strides whose curve is unlike those of all others: a stumble, a turn, markers that were exchanged."""
+    """Leave out strides whose curve is unlike all others: a stumble, a turn, markers that were exchanged."""
     for name, item in curves.items():
         if len(item.strides) < _FEWEST_TO_COMPARE or name == "centre_of_pressure":
             continue
@@ -231,6 +232,8 @@ def without_odd_shapes(curves: Mapping[str, CurveStatistics], strides: Strides) 
         away = np.abs(item.curves - middle)
         is_odd = np.zeros(len(item.strides), dtype=bool)
         for share, distances in ((ODD_SHAPE, np.sqrt(np.mean(away**2, axis=1))), (ODD_PHASE, np.max(away, axis=1))):
+            # Both a fraction of the range and a multiple of the usual distance: impaired strides differ, but all of
+            # them.
             is_odd |= distances > max(share * np.ptp(middle), ODD_AGAINST_OTHERS * np.median(distances))
         odd = [stride for stride, is_it in zip(item.strides, is_odd.tolist(), strict=True) if is_it]
         if len(odd) <= _MOST_ODD * len(item.strides):
@@ -241,7 +244,7 @@ def without_odd_shapes(curves: Mapping[str, CurveStatistics], strides: Strides) 
 
 
 def _by_coarse_steps(values: Floats, first: int, last: int) -> bool:
-    """Tell whether the value changes by a few of the smallest steps of a coarse sensor on both sides of a stretch."""
+    """Return whether the value changes by a few of a coarse sensor's smallest steps on both sides of a stretch."""
     steps = np.abs(np.diff(values))
     # Rounding makes equal steps of a sensor differ in the last digits.
     smallest = 1.001 * float(np.min(steps[steps > 0.0]))
@@ -272,7 +275,7 @@ class _Scatter:
 def check_scatter(
     curves: Mapping[str, CurveStatistics], errors: Mapping[str, FitError], walk: Mapping[str, Signal]
 ) -> None:
-    """Raise DataError for curves that scatter by a quarter of their range, or that no series comes near."""
+    """Raise DataError for curves that scatter by a quarter of their range, or that no series fits."""
     raise_noted(
         [
             DataError(
@@ -300,7 +303,7 @@ def _scatters(curves: Mapping[str, CurveStatistics], errors: Mapping[str, FitErr
 
 
 _SAME = 0.02
-"""Share by which two statements of one body mass may differ without a word."""
+"""Fraction by which two statements of one body mass may differ without a remark."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -316,7 +319,7 @@ class Source:
 
 
 def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: list[PpafoError]) -> Source:
-    """Return the signals in recorded files; what is wrong and leaves both angles to go on with is added to ``wrong``.
+    """Return the signals in recorded files; what is wrong but leaves both angles usable is added to ``wrong``.
 
     DataError for what ends the import, with everything in ``wrong``.
     """
@@ -331,6 +334,7 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: li
     if settings.columns is None:
         tables = [arranged(table) for table in tables]
     settings, said = _with_subject(settings, tables, wrong)
+    # Without a body mass loads are looked at per kg of 1 kg, and scaled to 1 below.
     person = Person(settings.body_mass or 1.0, settings.stature)
     convention = (
         find_convention(tables, settings.side, person.body_mass)
@@ -471,11 +475,13 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
     if not strides.taken:
         raise_noted(wrong)
     covered = {name: strides_of_curve(footfalls, name, signal, strides.taken) for name, signal in walk.items()}
+    # A load that no plate measured for a whole stance would otherwise look like one whose file is too short.
     unmeasured = [
         name for name in LOADS if name in walk and not covered[name] and strides_within(walk[name], strides.taken)
     ]
     walk = {name: signal for name, signal in walk.items() if name not in unmeasured}
     strides = without_drop_outs(walk, source.tables, covered, strides, wrong)
+    # Footfalls come from the unfiltered force, whose edges a low pass would move.
     smooth = walk if settings.low_pass is None else {n: low_pass(s, settings.low_pass) for n, s in walk.items()}
     curves = {
         name: statistics(name, signal, [item for item in covered[name] if item in strides.taken])

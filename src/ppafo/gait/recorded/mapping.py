@@ -1,7 +1,7 @@
 """Gait maps: which columns of recorded files make the curves of a gait, in which unit and with which sign.
 
 A map is a TOML file, or what the form of the files says where there is none. A term is the name of a column; ``-``
-before it takes it away.
+before it subtracts it.
 """
 
 import math
@@ -139,7 +139,7 @@ class GaitMap(StrictTable):
 
 
 def column_names(mapped: object) -> tuple[str, ...]:
-    """Return the columns that the map of one curve names, a minus before those that are taken away."""
+    """Return the columns that the map of one curve names, a minus before those that are subtracted."""
     if isinstance(mapped, KneeMap):
         return (*mapped.forward, *mapped.up, *(mapped.thigh or ()))
     if isinstance(mapped, ShankMap) and mapped.terms is None:
@@ -172,7 +172,7 @@ def package_map(_side: Side) -> GaitMap:
 def opensim_map(side: Side) -> GaitMap:
     """Return the map of OpenSim's gait models: knee below 0 in flexion as in gait2392, ankle above 0 in dorsiflexion.
 
-    The shank angle is the sum of pelvis tilt, hip and knee flexion: what the sagittal plane shows of them. So is the
+    The shank angle is the sum of pelvis tilt, hip and knee flexion in the sagittal plane. So is the
     lean of the thigh, which hangs at the origin of the pelvis here.
     """
     foot = side[0]
@@ -201,13 +201,13 @@ _NAME = "imported-gait"
 
 @dataclass(frozen=True, slots=True)
 class ImportSettings:
-    """What the files do not say: body mass [kg], side, speed [m/s], map, low pass [Hz], least number of strides.
+    """Settings of an import: body mass [kg], side, speed [m/s], map, low pass [Hz], least number of strides.
 
     The least number of strides is 2 unless given, and 1 overground and of one cycle that wraps around. ``body_mass``
     may be None where a file states it. ``form`` names the form of the files, empty for what they look like. ``stature``
     [m] gives the length of the thigh where no map does. ``start`` and ``end`` [s] cut the files, ``longest_gap`` [s] is
     up to where gaps are filled, and ``ankle_neutral`` [rad] the reading of the file with the foot perpendicular to the
-    shank, where it is not that of map or convention.
+    shank, where map and convention say another.
     """
 
     body_mass: float | None = None

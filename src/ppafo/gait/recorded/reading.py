@@ -1,6 +1,6 @@
 """The forms of gait recordings, tables of files in any of them, and the one map of files that come without one.
 
-To add a form: a module of its own with a ``GaitForm`` and one line below. Those of other packages are found by an
+To add a form: a module of its own with a ``GaitForm`` and one line below. Forms of other packages are found by an
 entry point, and are asked first whether a file is theirs.
 """
 
@@ -28,7 +28,7 @@ FORMS: Kinds[GaitForm] = Kinds(
 
 
 def form_of(path: str | Path, name: str = "") -> GaitForm:
-    """Return the form of a file: that of a name, else the first that recognises it. DataError where there is none."""
+    """Return the form of a file: the named one, else the first that recognises it. DataError where there is none."""
     if name:
         form = FORMS.get(name)
         if form is None:
@@ -37,6 +37,7 @@ def form_of(path: str | Path, name: str = "") -> GaitForm:
             )
         return form
     FORMS.load_all()
+    # Forms of other packages are asked first: a user who installs one wants it for his files.
     forms = sorted(FORMS.loaded().values(), key=lambda item: FORMS.is_own(item.name))
     suffix = Path(path).suffix.lower()
     for form in forms:
@@ -62,7 +63,7 @@ def read_table(
 
 
 def find_convention(tables: Sequence[MotionTable], side: Side, body_mass: float) -> Convention:
-    """Return the map of files by what is in them; ``body_mass`` [kg] tells moments of a body from those per mass."""
+    """Return the map of files by what is in them; ``body_mass`` [kg] tells moments from moments per mass."""
     names = sorted({table.form for table in tables})
     if len(names) > 1 and any(FORMS[name].is_whole for name in names):
         raise DataError(
@@ -88,5 +89,5 @@ def arranged(table: MotionTable) -> MotionTable:
 
 
 def _is_there(mapped: object, table: MotionTable) -> bool:
-    """Tell whether a table has all columns of a curve that is mapped."""
+    """Return whether a table has all columns of a curve that is mapped."""
     return mapped is not None and all(name.removeprefix("-") in table.columns for name in column_names(mapped))

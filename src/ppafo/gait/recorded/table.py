@@ -16,7 +16,7 @@ Events = dict[tuple[str, str], list[float]]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trial:
-    """What a file says beside its columns: subject (kg, m; None where not), events [s] by side and kind.
+    """Data of a file beside its columns: subject (kg, m; None where not stated), events [s] by side and kind.
 
     ``remarks`` say how its events were read, or why they were not.
     """
@@ -39,7 +39,7 @@ class Trial:
 class MotionTable:
     """Columns over time [s] as a file has them; a unit is empty where the file does not say it.
 
-    ``form`` is the name of its form, which whoever has it read fills in. ``kind`` is ``measured`` or ``synthetic``.
+    ``form`` is the name of its form, which the reader of any form fills in. ``kind`` is ``measured`` or ``synthetic``.
     ``remarks`` say what was mended, ``trial`` is what the file says of subject and events.
     """
 
@@ -98,7 +98,7 @@ LONGEST_FILLED = 0.25
 def fill_gaps(table: MotionTable, names: Iterable[str], longest: float) -> MotionTable:
     """Return the table with gaps of no longer than ``longest`` [s] in these columns filled by a cubic spline.
 
-    What is missing at the ends stays so, and longer gaps too: whoever uses the column refuses them.
+    What is missing at the ends stays so, and longer gaps too: the user of the column refuses them.
     """
     from scipy.interpolate import CubicSpline
 

@@ -49,7 +49,7 @@ class Signal:
     """Values over time [s], evenly enough sampled, of one file.
 
     ``is_position``: a position [m], of which the gait has the acceleration.
-    ``columns`` are those of the file behind it. ``absent`` tells where a load was not measured, and counts as 0; None
+    ``columns`` are the file's columns behind it. ``absent`` tells where a load was not measured, and counts as 0; None
     where it always was.
     """
 
@@ -88,6 +88,7 @@ def low_pass(signal: Signal, cut_off: float) -> Signal:
 
     if signal.time.size < _MINIMUM_SAMPLES:
         raise DataError(f"{signal.file}: {signal.time.size} rows are too short for a stride; give a longer recording")
+    # A filter needs even samples; the jitter of a clock is small beside a stride.
     even = np.linspace(signal.time[0], signal.time[-1], signal.time.size)
     relative = cut_off / _DOUBLE_PASS / (0.5 * signal.rate)
     if relative >= 1.0:
@@ -101,7 +102,7 @@ def low_pass(signal: Signal, cut_off: float) -> Signal:
 
 
 LOADS = ("ankle_moment", "vertical_force", "centre_of_pressure")
-"""Where they were not measured, off a force plate, is no gap."""
+"""Curves that are not measured off a force plate, which is no gap."""
 
 _LONGEST_SHOWN = 12
 
@@ -140,6 +141,7 @@ class CurveColumns:
         problem = ""
         for si_unit in si_units:
             try:
+                # Units are affine: two conversions give scale and zero for a whole column.
                 zero, one = (to_si(number, given, si_unit) for number in (0.0, 1.0))
             except UnitError as error:
                 problem = problem or str(error)
@@ -157,6 +159,7 @@ def check_finite(values: Floats, place: str, time: Floats) -> None:
     bad = first + np.flatnonzero(~np.isfinite(values[first : int(known[-1]) + 1]))
     if bad.size:
         row, longest = int(bad[0]), float(np.max(np.diff(time[known])))
+        # Rounded up, so that the value in the remedy fills the gap.
         needed = math.ceil(100.0 * longest - 1e-6) / 100.0
         remedy = f"(--fill-gaps '{needed:g} s', or --start, --end)"
         if longest > LONGEST_FILLED:
@@ -252,7 +255,7 @@ def knee_signals(
 ) -> dict[str, Signal]:
     """Return ``knee_forward`` and ``knee_up``, each a position [m] or an acceleration [m/s^2].
 
-    With a thigh they are the way of the hip and that of the knee about it: in the plane, with the hip where the columns
+    With a thigh they are the motion of the hip and of the knee about it: in the plane, with the hip where the columns
     of the map say it is. DataError where a column, unit or length is missing or does not fit.
     """
     if mapped.thigh is not None and mapped.thigh_length is None and stature is None:
@@ -275,7 +278,7 @@ def knee_signals(
             if np.ptp(values) == 0.0:
                 raise DataError(
                     f"{found.table.file}: the hip does not move ({', '.join(terms)} is constant), and without its "
-                    "motion that of the knee is unknown; omit the stature, or knee in the gait map"
+                    "motion the knee's is unknown; omit the stature, or knee in the gait map"
                 )
         height = float(np.mean(up[np.isfinite(up)]))
         if -height > _HIP_HEIGHT:

@@ -1,6 +1,6 @@
 """A double-acting cylinder between two pins that drives a lever: the law of cosines between joint, base and rod end.
 
-Chamber 1 is on the side of the piston, chamber 2 on that of the rod. The cylinder grows longer with the angle.
+Chamber 1 is on the side of the piston, chamber 2 on the rod's. The cylinder grows longer with the angle.
 """
 
 import math
@@ -49,18 +49,19 @@ class Pins(NamedTuple):
 def pins_at(lever: float, base: float, between: float) -> Pins:
     """Pins of a lever and a base [m] with an angle [rad] between them: the law of cosines."""
     sine, cosine = sine_and_cosine_of_turns(between * TURNS_OF_RADIAN)
+    # No test for a length of 0: ``problem`` refuses a lever near its dead centre, where the arm would vanish too.
     length = math.sqrt(lever * lever + base * base - 2.0 * lever * base * cosine)
     return Pins(length=length, arm=lever * base * sine / length)
 
 
 def chamber_1(shape: Cylinder, pins: Pins) -> LinearChamber:
-    """The side of the piston, which grows with the angle."""
+    """Chamber on the side of the piston, which grows with the angle."""
     swept = shape.piston_area * (pins.length - shape.shortest)
     return rigid(shape.dead_volume_1 + swept, shape.piston_area * pins.arm)
 
 
 def chamber_2(shape: Cylinder, pins: Pins) -> LinearChamber:
-    """The side of the rod, which shrinks with the angle."""
+    """Chamber on the side of the rod, which shrinks with the angle."""
     swept = shape.rod_side_area * (shape.longest - pins.length)
     return rigid(shape.dead_volume_2 + swept, -shape.rod_side_area * pins.arm)
 

@@ -53,7 +53,15 @@ class ActuatorModel:
     @property
     def plant(self) -> type:
         """The NamedTuple of a plant with this actuator."""
-        return PlantParameters if self.shape is None else _plant_with(self.shape)
+        if self.shape is None:
+            return PlantParameters
+        # One class for each shape, or two equal programs would differ by a type; all have one name in a program's text.
+        if self.shape not in _PLANTS:
+            make: Any = namedtuple
+            struct = make("ShapedPlant", (*PlantParameters._fields, "shape"))
+            struct.__annotations__ = get_type_hints(PlantParameters, include_extras=True) | {"shape": self.shape}
+            _PLANTS[self.shape] = struct
+        return _PLANTS[self.shape]
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,8 +81,8 @@ class ActuatorKind:
 class ShapedPlant(Protocol):
     """A plant whose actuator is no vane: ``PlantParameters`` with the numbers of its kind. What a kind may ask of it.
 
-    ``volume_per_angle`` is the mean growth of chamber 1 between the stops and ``torque_constant`` the same number:
-    what scales errors, and what laws that were made for a vane believe.
+    ``volume_per_angle`` is the mean displacement per radian of chamber 1, and ``torque_constant`` the same number:
+    they scale errors, and laws that were made for a vane rely on them.
     """
 
     @property
@@ -107,7 +115,7 @@ class ShapedPlant(Protocol):
 
 
 class AtRest(NamedTuple):
-    """What a kind's ``chambers`` ask of a plant, where pressures count from the atmosphere."""
+    """The part of a plant that a kind's ``chambers`` read, where pressures count from the atmosphere."""
 
     shape: Any
     atmospheric_pressure: float
@@ -122,18 +130,8 @@ def mean_growth(shape: Any, stops: Range, gauge: float, chambers: Callable[..., 
 
 
 def plant_in_shape(plant: PlantParameters, model: ActuatorModel, shape: Any, growth: float) -> Any:
-    """The plant of another kind from that of a vane with the same stops, gas and orifices; mean growth [m^3/rad]."""
+    """The plant of another kind from a vane's with the same stops, gas and orifices; mean growth [m^3/rad]."""
     return model.plant(*plant._replace(torque_constant=growth, volume_per_angle=growth), shape)
-
-
-def _plant_with(shape: type) -> type:
-    """A plant with the shape of one kind: one class for each, which stands under the same name in a program."""
-    if shape not in _PLANTS:
-        make: Any = namedtuple
-        row = make("ShapedPlant", (*PlantParameters._fields, "shape"))
-        row.__annotations__ = get_type_hints(PlantParameters, include_extras=True) | {"shape": shape}
-        _PLANTS[shape] = row
-    return _PLANTS[shape]
 
 
 _PLANTS: dict[type, type] = {}

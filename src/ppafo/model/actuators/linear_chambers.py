@@ -1,4 +1,4 @@
-"""Chambers whose volumes grow linearly with the pressure, V = rest + compliance p: what most kinds are made of.
+"""Chambers whose volumes grow linearly with the pressure, V = rest + compliance p, as in most kinds.
 
 The co-energy of one is Phi = rest p + compliance p^2/2 at gauge pressure p, rest and compliance functions of the angle.
 Rigid chambers have no compliance.
@@ -35,7 +35,9 @@ def turning(chamber: LinearChamber, gauge: float) -> float:
 
 
 def pressure_in(chamber: LinearChamber, content: float, atmosphere: float) -> float:
-    """Absolute pressure [Pa] at which p V is a content [J], by the root of p V that does not cancel."""
+    """Absolute pressure [Pa] at which p V is a gas content [J]."""
+    # p (rest + compliance (p - p_0)) = content is a quadratic. This form of its root subtracts no near numbers, and is
+    # exact for a rigid chamber too.
     above = content - chamber.rest * atmosphere
     half = 0.5 * (chamber.rest + chamber.compliance * atmosphere)
     return atmosphere + above / (half + math.sqrt(max(half * half + chamber.compliance * above, 0.0)))

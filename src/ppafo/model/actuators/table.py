@@ -1,4 +1,4 @@
-"""An actuator that was measured: volumes of both chambers over angle and pressure, from a file.
+"""A measured actuator: volumes of both chambers over angle and pressure, from a file.
 
 Over the angle a volume is a cubic spline through what was measured, with two continuous derivatives; over the pressure
 it runs straight from one measured pressure to the next, and no further. Its integral over the pressure is written down,
@@ -83,6 +83,7 @@ class Levels(NamedTuple):
 
 def bases_at(table: Table, angle: float) -> Bases:
     """Bases of all curves of a table at an angle [rad]."""
+    # Truncated powers: the cube of max(share - bend, 0) begins at its bend with two continuous derivatives.
     share = (angle - table.first_angle) * table.per_angle
     square, per = share * share, table.per_angle
     at = table.bends
@@ -153,6 +154,7 @@ def volume_at(chamber: Chamber, levels: Levels, gauge: float) -> float:
 
 def compliance_in(rise: Rise, gain: Level, gauge: float) -> float:
     """Growth of the volume with the pressure [m^3/Pa] in a stretch, 0 outside."""
+    # Half-open, so that no two stretches both count where they meet.
     return gain.volume / rise.length if gauge >= rise.lower and gauge < rise.lower + rise.length else 0.0
 
 
@@ -172,11 +174,12 @@ def turning(chamber: Chamber, levels: Levels, gauge: float) -> float:
 
 
 def climb(rise: Rise, gain: Level, volume: float, found: float, content: float, atmosphere: float) -> float:
-    """Absolute pressure [Pa] that a stretch says, where the content [J] reaches it; else the one found below it."""
+    """Absolute pressure [Pa] in a stretch that the gas content [J] reaches; else the one found below it."""
     begin = rise.lower + atmosphere
     stretch = LinearChamber(
         rest=volume, compliance=gain.volume / rise.length, rest_slope=gain.slope, compliance_slope=0.0
     )
+    # Stretches from the lowest up: the last one that the content reaches says the pressure.
     inside = pressure_in(stretch, content, begin)
     beyond = content / (volume + gain.volume)
     own = inside if inside < begin + rise.length else beyond
@@ -184,7 +187,7 @@ def climb(rise: Rise, gain: Level, volume: float, found: float, content: float, 
 
 
 def pressure_at(chamber: Chamber, levels: Levels, content: float, atmosphere: float) -> float:
-    """Absolute pressure [Pa] at which p V is a content [J]."""
+    """Absolute pressure [Pa] at which p V is a gas content [J]."""
     rises, gains = chamber.rises, levels.gains
     volume = levels.lowest.volume
     pressure = climb(rises[0], gains[0], volume, content / volume, content, atmosphere)
@@ -222,10 +225,11 @@ def pressures(plant: ShapedPlant, angle: float, mass_1: float, mass_2: float) ->
 
 
 def torque(plant: ShapedPlant, angle: float, pressure_1: float, pressure_2: float) -> float:
-    """Torque [N m] of two absolute pressures [Pa], and of what is passive."""
+    """Torque [N m] of two absolute pressures [Pa] and of the passive stiffness."""
     shape: Measured = plant.shape
     room = plant.atmospheric_pressure
     first, second, bases = shape.table.chamber_1, shape.table.chamber_2, bases_at(shape.table, angle)
+    # A dead volume does not change with the angle, so it gives no torque: 0 stands for it.
     active_1 = turning(first, levels_of(first, bases, 0.0), pressure_1 - room)
     active_2 = turning(second, levels_of(second, bases, 0.0), pressure_2 - room)
     return active_1 + active_2 - shape.stiffness * (angle - shape.rest_angle)

@@ -1,7 +1,7 @@
 """The vane of the paper: two chambers whose volumes run linearly with the angle. Equations (2), (4), (5).
 
-Torque constant and volume per angle are given apart, as they are printed. By virtual work they are one number but for
-losses; where they are not, the vane does not give the shaft what its gas does (docs/decisions/0014).
+Torque constant and displacement per radian are given apart, as they are reported. By virtual work they are one number
+but for losses; where they differ, the shaft does not get the work of the gas (docs/decisions/0014).
 """
 
 from collections.abc import Mapping

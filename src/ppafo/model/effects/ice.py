@@ -1,4 +1,4 @@
-"""Ice at the exhaust of the valve: cold gas lets moisture freeze there, which narrows the way and melts again."""
+"""Ice at the exhaust of the valve: cold gas lets moisture freeze there, which narrows the path and melts again."""
 
 from typing import Any, NamedTuple
 
@@ -16,7 +16,7 @@ class Ice(NamedTuple):
 
 
 class IceState(NamedTuple):
-    """Blockage [-]: the way is 1 / (1 + blockage) of what it was."""
+    """Blockage [-]: the exhaust conductance is divided by 1 + blockage."""
 
     blockage: float
 
@@ -27,7 +27,8 @@ def prepare(settings: Any, _device: Any) -> Ice:
 
 
 def narrowed(conductance: float, ice_state: IceState) -> float:
-    """Conductance [kg/(s Pa)] of the way out with ice in it; ``C / (1 + s)``."""
+    """Conductance [kg/(s Pa)] of the exhaust path with ice in it; ``C / (1 + s)``."""
+    # A stage of a step extrapolates the state, below 0 too.
     return exhaust_path(conductance / (1.0 + max(ice_state.blockage, 0.0)))
 
 
@@ -38,6 +39,7 @@ def start(_ice: Ice, _now: Moment) -> IceState:
 
 def advance(ice: Ice, ice_state: IceState, _before: Moment, after: Moment, step: float) -> IceState:
     """Blockage [-] after a step [s] with the mean flow in it: ``ds/dt = g m' - s / tau``, solved exactly."""
+    # Only gas that leaves grows ice; what flows in from the atmosphere does not melt it either.
     kept, mean = decay_factors(ice.melting, step)
     return IceState(kept * ice_state.blockage + step * mean * ice.blockage_per_gas * max(after.vented_flow, 0.0))
 

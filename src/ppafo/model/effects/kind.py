@@ -1,4 +1,4 @@
-"""What a physical effect is: one value, from which every door of the package takes what it needs.
+"""What a physical effect is: one value, from which every part of the package takes what it needs.
 
 Files, overrides, columns of studies, fits, exported libraries, the page, linear models, the reference solver and walks
 know an effect by this value alone; none of them names one.
@@ -35,15 +35,15 @@ class Moment(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class State:
-    """Numbers of an effect that change: ``row``, a NamedTuple of floats, and how it changes.
+    """State of an effect: ``row``, a NamedTuple of floats, and how it changes.
 
-    ``start(row, now)`` makes it of the effect's row and the plant at the beginning. ``advance(row, state, before,
-    after, step)`` brings it over a step [s] between two instants. ``slopes(row, state, now)`` are its rates in
+    ``start(row, now)`` makes it from the effect's parameters and the plant at the beginning. ``advance(row, state,
+    before, after, step)`` brings it over a step [s] between two instants. ``slopes(row, state, now)`` are its rates in
     continuous time: the reference solver integrates them, and the second stage of a step has ``state + step * slopes``
     where a law acts on the gas. ``tolerances`` has for each number the error of one step that is allowed, for which
     ``advance`` less ``state + step * slopes`` stands; without any, as where ``advance`` is exact, the state shortens no
-    step. ``settle(row, state, command)`` is the state after what changes at once where the valve gets a command: a
-    step does it in ``advance``, the reference solver between two stretches.
+    step. ``settle(row, state, command)`` is the state after what changes at once where the valve gets a command: a step
+    does it in ``advance``, the reference solver between two stretches.
     """
 
     row: type
@@ -56,7 +56,7 @@ class State:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Effect:
-    """A physical effect: its name in files, what it is, its settings in SI, its row of numbers, and its laws.
+    """A physical effect: its name in files, what it is, its settings in SI, its parameters, and its laws.
 
     ``switch`` names settings, none of them ever below 0; where all of them are 0 the effect is off, and programs are
     composed without it: they have the bits that they would have if it did not exist. One that is ``always`` on has no
@@ -64,14 +64,14 @@ class Effect:
 
     ``prepare(settings, device)`` makes the NamedTuple ``parameters`` from the settings by name and the numbers of the
     device (``device.gas``, ``.actuator``, ``.friction``, ``.foot_plate`` and ``.supply``, by their names in a parameter
-    set). It must be in the subset that is compiled, for an exported library has it in C. None where the row is the
-    settings in their order, which columns of an ensemble then fill without a call for each run.
+    set). It must be in the subset that is compiled, for an exported library has it in C. None where the parameters are
+    the settings in their order, which columns of an ensemble then fill without a call for each run.
 
-    ``laws`` has for places of ``ppafo.model.ports`` the functions that act there. A law takes what its place takes,
-    and its row by the effect's name as a further parameter, which whoever calls the place then hands on. A law that
-    calls its own place gets the law of the effect before, or the place as it is without effects.
+    ``laws`` has for ports of ``ppafo.model.ports`` the functions that act there. A law takes what its port takes,
+    and its parameters by the effect's name as one more argument, which the caller of the port passes on. A law that
+    calls its own port gets the law of the effect before, or the port as it is without effects.
 
-    ``state`` says how the effect's own numbers change, which laws ask for as ``NAME_state``; None where it has none.
+    ``state`` says how the effect's own state changes, which laws take as ``NAME_state``; None where it has none.
 
     ``of_gas`` has for settings whose default is a property of the gas these defaults [SI] by species, for all species.
 
@@ -106,16 +106,16 @@ class Effect:
 
     @property
     def state_name(self) -> str:
-        """Name of its state among the rows of a program, and the parameter by which laws ask for it."""
+        """Name of its state in a program, and the parameter by which laws take it."""
         return f"{self.name}_state"
 
     @property
     def rows(self) -> tuple[str, ...]:
-        """Names of the rows that its laws may ask for."""
+        """Names of the structs that its laws may take."""
         return (self.name,) if self.state is None else (self.name, self.state_name)
 
     def quantities_in(self, species: str) -> tuple[Quantity, ...]:
-        """Settings with the defaults that they have in a gas; those of the declaration in one that is unknown."""
+        """Settings with the defaults that they have in a gas; the declaration's own in one that is unknown."""
         return tuple(
             replace(item, default=self.of_gas.get(item.name, {}).get(species, item.default)) for item in self.quantities
         )
@@ -138,10 +138,10 @@ def nomenclature_lines(effect: Effect) -> list[str]:
 
 
 def equation_lines(effect: Effect) -> list[str]:
-    """Return what the page of the equations says of an effect: its laws by place, its equation and its source."""
+    """Return what the page of the equations says of an effect: its laws by port, its equation and its source."""
     laws = [
-        f"- `{law.__module__}.{law.__qualname__}`: at `{place.__name__}`; {effect.source}"
-        for place, law in effect.laws.items()
+        f"- `{law.__module__}.{law.__qualname__}`: at `{port.__name__}`; {effect.source}"
+        for port, law in effect.laws.items()
     ]
     return [f"### {effect.name}: {effect.summary}", "", f"    {effect.equation}", "", *laws]
 
@@ -153,7 +153,7 @@ def effect_problem(effect: Effect) -> str:
 
 def _problems(effect: Effect) -> Iterator[str]:
     if not effect.name.isidentifier():
-        yield "its name is the parameter by which laws ask for its row, and must be an identifier"
+        yield "its name is the parameter by which laws take its parameters, and must be an identifier"
     if effect.always and (effect.switch or effect.is_of_device):
         yield "is always on: it has no switch, and names the section of a parameter set that its settings have"
     if not effect.always:
@@ -163,10 +163,10 @@ def _problems(effect: Effect) -> Iterator[str]:
         if lacking or all(item.name != name for item in effect.quantities):
             missing = f"has no default for {', '.join(lacking)}" if lacking else "is no quantity"
             yield f"of_gas names '{name}', which {missing}"
-    for place, law in effect.laws.items():
-        given, taken = _parameters(place), [name for name in _parameters(law) if name not in effect.rows]
+    for port, law in effect.laws.items():
+        given, taken = _parameters(port), [name for name in _parameters(law) if name not in effect.rows]
         if taken != given:
-            yield f"{law.__name__}({', '.join(taken)}) must take ({', '.join(given)}), as {place.__name__} does"
+            yield f"{law.__name__}({', '.join(taken)}) must take ({', '.join(given)}), as {port.__name__} does"
 
 
 def _problems_of_switch(effect: Effect) -> Iterator[str]:
@@ -184,28 +184,26 @@ def _problems_of_switch(effect: Effect) -> Iterator[str]:
 
 
 def laws_in_order(effects: Sequence[Effect]) -> dict[Any, Any]:
-    """Return what stands for each place, and under pairs of law and place what a law that calls its place gets.
+    """Return the law for each port, and under pairs of law and port what a law that calls its port gets.
 
-    Effects act in the order in which they are given: each but the first of a place must call it, or it would be as if
+    Effects act in the order in which they are given: each but the first at a port must call it, or it would be as if
     those before it did not exist. ProgramError where one does not.
     """
     found: dict[Any, Any] = {}
     last: dict[Any, Effect] = {}
     for effect in effects:
-        for place, law in effect.laws.items():
-            if place in last and not _calls(law, place):
+        for port, law in effect.laws.items():
+            # A law calls its port by a global name of its own module, so that the names in its bytecode tell without a
+            # run of it.
+            if port in last and not any(law.__globals__.get(name) is port for name in law.__code__.co_names):
                 raise ProgramError(
-                    f"effects '{last[place].name}' and '{effect.name}' both act on {place.__name__}, and "
+                    f"effects '{last[port].name}' and '{effect.name}' both act on {port.__name__}, and "
                     f"{law.__name__} of '{effect.name}' does not call it: switch one of them off"
                 )
-            found[law, place] = found.get(place, place)
-            found[place], last[place] = law, effect
+            found[law, port] = found.get(port, port)
+            found[port], last[port] = law, effect
     return found
 
 
 def _parameters(function: Callable[..., Any]) -> list[str]:
     return list(inspect.signature(function).parameters)
-
-
-def _calls(law: Any, place: Callable[..., Any]) -> bool:
-    return any(law.__globals__.get(name) is place for name in law.__code__.co_names)

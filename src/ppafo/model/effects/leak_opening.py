@@ -15,17 +15,19 @@ class LeakOpening(NamedTuple):
 
 
 def prepare(settings: Any, _device: Any) -> LeakOpening:
-    """The row of the settings."""
+    """Parameters from the settings."""
     return LeakOpening(settings["pressure"], settings["rise"])
 
 
 def lifted(conductance: float, pressure_1: float, pressure_2: float, leak_opening: LeakOpening) -> float:
     """Conductance [kg/(s Pa)] of the leak: ``C e / (e + w P_o)`` with ``e = |P_1 - P_2| - P_o``, and 0 below ``P_o``.
 
-    The gas lifts the lip of a seal against its preload, in either direction. The flow begins without a jump, is half
-    that of the orifice at ``w P_o`` above the opening pressure ``P_o``, and far above it that of the orifice.
+    The gas lifts the lip of a seal against its preload, in either direction. The flow begins without a jump, is half of
+    the orifice's flow at ``w P_o`` above the opening pressure ``P_o``, and approaches the orifice's far above it.
     """
     opening, rise = leak_opening.opening_pressure, leak_opening.opening_rise
+    # e / (e + w P_o) written as 1 - w P_o / (e + w P_o), whose divisor is never 0, and whose sign shuts the leak below
+    # P_o.
     above = max(abs(pressure_1 - pressure_2), opening) + (rise - 1.0) * opening
     share = max(1.0 - rise * opening / above, 0.0)
     return leakage_path(conductance * share, pressure_1, pressure_2)

@@ -15,7 +15,7 @@ class LineResistance(NamedTuple):
 
 
 def prepare(settings: Any, device: Any) -> LineResistance:
-    """The row of an orifice that loses as much pressure as a line does, with the gas of the device. Equation (6)."""
+    """Parameters of an orifice that loses as much pressure as a line does, with the gas of the device. Equation (6)."""
     area, gas = settings["area"], device.gas
     conductance = area_conductance(
         area,
@@ -28,7 +28,7 @@ def prepare(settings: Any, device: Any) -> LineResistance:
 
 
 def fed_through_line(conductance: float, line_resistance: LineResistance) -> float:
-    """Conductance [kg/(s Pa)] from a supply to a chamber, from that of the valve: ``1/C^2 = 1/C_v^2 + 1/C_r^2``.
+    """Conductance [kg/(s Pa)] from a supply to a chamber, given the valve's: ``1/C^2 = 1/C_v^2 + 1/C_r^2``.
 
     The volume of a line belongs to the dead volume of its chamber, and is filled at the pressure of the chamber: right
     where the line is small beside it. Gas by which a valve joins both chambers passes no line.

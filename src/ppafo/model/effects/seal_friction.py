@@ -15,7 +15,7 @@ class SealFriction(NamedTuple):
 
 
 def prepare(settings: Any, _device: Any) -> SealFriction:
-    """The row of both settings."""
+    """Parameters from both settings."""
     return SealFriction(settings["static_per_pressure"], settings["dynamic_per_pressure"])
 
 

@@ -1,7 +1,8 @@
 """Gas that is not ideal: the virial equation of state cut after its second term, ``P = rho R T (1 + b rho)``.
 
-With a constant ``b`` the internal energy is that of the ideal gas, so that energy and state agree with each other; with
-``b = 0`` all of it is the ideal gas. Lanes, reference solver and simulated test bench have these functions.
+With a constant ``b`` the internal energy is the ideal gas's, so that energy and state agree with each other; with
+``b = 0`` all of it is the ideal gas. The engine, the reference solver and the simulated test bench share these
+functions.
 """
 
 import math
@@ -22,7 +23,7 @@ class SecondVirial(NamedTuple):
 
 
 def prepare(settings: Any, device: Any) -> SecondVirial:
-    """The row of a share of a molar coefficient, with the molar mass of the device's gas."""
+    """Parameters from a share of a molar coefficient, with the molar mass of the device's gas."""
     return SecondVirial(settings["share"] * settings["coefficient"] / device.gas.molar_mass)
 
 
@@ -40,8 +41,9 @@ def real_pressure(mass: float, volume: float, temperature: float, gas_constant: 
 def real_density(pressure: float, temperature: float, gas_constant: float, virial: float) -> float:
     """Density [kg/m^3] at an absolute pressure [Pa]; the inverse of ``real_pressure``, by its smaller root.
 
-    Where the gas would condense first, at 4 b rho_ideal below -1, it is twice that of the ideal gas.
+    Where the gas would condense first, at 4 b rho_ideal below -1, it is twice the ideal gas's density.
     """
+    # 2 c / (1 + sqrt(1 + 4 b c)) instead of the textbook root, which cancels where b c is small, as it is here.
     product = gas_constant * temperature
     return 2.0 * pressure / (product * (1.0 + math.sqrt(max(1.0 + 4.0 * virial * pressure / product, 0.0))))
 
@@ -52,7 +54,7 @@ def gas_enthalpy(temperature: float, density: float, gas_constant: float, heat_c
 
 
 def compressed(density: float, second_virial: SecondVirial) -> float:
-    """Density [kg/m^3] of the gas, from that of an ideal gas at its pressure and temperature."""
+    """Density [kg/m^3] of the gas, given an ideal gas's at its pressure and temperature."""
     return real_density(density, 1.0, 1.0, second_virial.per_mass)
 
 

@@ -15,12 +15,12 @@ class Silencer(NamedTuple):
 
 
 def behind_silencer(conductance: float, silencer: Silencer) -> float:
-    """Conductance [kg/(s Pa)] of valve and silencer in a row, from that of the valve: ``1/C^2 = 1/C_v^2 + 1/C_s^2``."""
+    """Conductance [kg/(s Pa)] of valve and silencer in a row, given the valve's: ``1/C^2 = 1/C_v^2 + 1/C_s^2``."""
     return exhaust_path(conductance_in_series(conductance, silencer.resistance))
 
 
 def prepare(settings: Any, device: Any) -> Silencer:
-    """The silencer's row from its sonic conductance and the gas of the device, as ISO 6358 counts it."""
+    """Parameters from the sonic conductance of the silencer and the gas of the device, as ISO 6358 counts it."""
     sonic, gas = settings["sonic_conductance"], device.gas
     conductance = sonic_conductance_mass(sonic, gas.specific_gas_constant, gas.temperature)
     return Silencer(1.0 / (conductance * conductance) if sonic > 0.0 else 0.0)

@@ -21,7 +21,7 @@ class SpoolPlace(NamedTuple):
 
 
 def prepare(settings: Any, _device: Any) -> SpoolPlay:
-    """The row of the setting."""
+    """Parameters from the setting."""
     return SpoolPlay(settings["width"])
 
 

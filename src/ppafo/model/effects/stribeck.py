@@ -15,7 +15,7 @@ class Stribeck(NamedTuple):
 
 
 def prepare(settings: Any, device: Any) -> Stribeck:
-    """The row from the velocity at which half of the rise is left, and the friction of the device."""
+    """Parameters from the velocity at which half of the rise is left, and the friction of the device."""
     velocity, friction = settings["velocity"], device.friction
     scale = 1.0 / (velocity * velocity) if velocity > 0.0 else 0.0
     return Stribeck(settings["share"] * (friction.static_torque - friction.dynamic_torque), scale)

@@ -14,8 +14,8 @@ from ppafo.model.declaration import Quantity
 class Joint:
     """A path of a valve from one chamber to the other: its opening over the valve's full area, 0 to 1, twice.
 
-    ``opening(shown)`` is that during a step, of what the valve shows the plant; ``instant(parameters, state, command)``
-    that at an instant, for the reference solver.
+    ``opening(shown)`` holds during a step, from what the valve shows the plant; ``instant(parameters, state, command)``
+    at an instant, for the reference solver.
     """
 
     opening: Callable[[Any], float]
@@ -63,7 +63,7 @@ class ValveModel:
 
 @dataclass(frozen=True, slots=True)
 class ValveKind:
-    """A valve as the catalogue knows it: name, what it is, its parameters beside the orifice's own, and its models.
+    """A valve as the catalogue knows it: name, what it is, its parameters beside the orifice's, and its models.
 
     ``lag(settings)`` is the time [s] after which its flow has followed a command, None for the dead time alone.
 
@@ -79,7 +79,8 @@ class ValveKind:
 
 
 VENT = 2.0
-"""Joins both chambers to the atmosphere: solenoids off; a proportional valve needs a dump valve for it."""
+"""Joins both chambers to the atmosphere: solenoids off; a proportional valve needs a vent valve for it."""
 
+# Half-way between full opening and VENT: either may pass through sums of floats.
 VENTS_ABOVE = 1.5
 """Commands above this vent."""

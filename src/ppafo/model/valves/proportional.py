@@ -22,6 +22,7 @@ from ppafo.model.plant import (
 )
 from ppafo.model.valves.kind import ValveKind, ValveModel
 
+# From shut to open within 1 ps, below any step; two instants within 10 ps are one; and a quotient of zeros is finite.
 NO_SLEW_LIMIT = 1.0e12
 SAME_INSTANT = 1.0e-11
 TINY = 1.0e-300
@@ -88,6 +89,7 @@ def advance_ideal(
 def slew_opening(requested: float, target: float, slew_limit: float, step: float) -> tuple[float, float]:
     """Requested opening after a step [s], and its rate [1/s], on the way to a target at the slew limit [1/s]."""
     distance = target - requested
+    # The sign by two selects, 0 at the target.
     way = (1.0 if distance > 0.0 else 0.0) - (1.0 if distance < 0.0 else 0.0)
     arrives = abs(distance) <= slew_limit * step
     rate = way * slew_limit
@@ -99,6 +101,8 @@ def towards_chamber_1(opening: float, next_opening: float, mean: float) -> float
     higher = max(opening, next_opening)
     lower = min(opening, next_opening)
     crosses = higher > 0.0 and lower < 0.0
+    # A straight line that crosses 0 is positive for the share higher / (higher - lower) of the step, higher / 2 on
+    # average.
     straight = 0.5 * higher * higher / max(higher - lower, TINY)
     return straight if crosses else max(mean, 0.0)
 
@@ -121,6 +125,7 @@ def advance_moving(
     spool_mean = requested_mean - behind + by.mean_by_opening * away + by.mean_by_rate * rate_away
     rate = slew + by.rate_by_opening * away + by.rate_by_rate * rate_away
     opening = spool if has_spool else requested
+    # A spool that overshoots full opening opens no further.
     mean = max(-1.0, min(1.0, spool_mean if has_spool else requested_mean))
     towards_1 = towards_chamber_1(settled.opening, opening, mean)
     towards_2 = towards_chamber_1(-settled.opening, -opening, -mean)
@@ -201,10 +206,11 @@ def settle_moving(valve: MovingProportional, state: SpoolState, command: float, 
 def spool_step(angular: float, damping_ratio: float, step: float) -> SpoolStep:
     """Exact step [s] of a free spool with an undamped angular frequency [rad/s], to rounding.
 
-    Series of exp and of its mean at a small fraction of the step, doubled until they are those of the whole. A function
+    Series of exp and of its mean at a small fraction of the step, doubled until they hold for the whole. A function
     of the matrix A of x and x'/w is ``p + q A``, so all of it is on pairs of numbers, without a library function.
     Where a spool has long arrived the series would not converge; the step ends there, and only the mean goes on.
     """
+    # Slower time constant times w: 1/d of an underdamped spool, at most 2 d of an overdamped one.
     slower = max(1.0 / damping_ratio, 2.0 * damping_ratio)
     fraction = min(1.0, ARRIVAL * slower / max(angular * step, TINY))
     moving = fraction * step

@@ -14,6 +14,7 @@ from ppafo.model.plant import Openings, PlantParameters, SinglePort, single_port
 from ppafo.model.ports import exhaust_path, opening_time, supply_path
 from ppafo.model.valves.kind import VENTS_ABOVE, ValveKind, ValveModel
 
+# Long ago, never, and two instants that are one [s]: times of a run are sums of floats, good to far below 1 ns.
 NEVER = -1.0e9
 FOREVER = 1.0e9
 SAME_INSTANT = 1.0e-9
@@ -55,7 +56,7 @@ class PairState(NamedTuple):
 
 
 def coil_commands(command: float) -> tuple[float, float]:
-    """Commands [-] of valves A and B: 1 energised, 0 not. Equation (14)'s two voltages."""
+    """Commands [-] of valves A and B, equation (14)'s two voltages: 1 energised, 0 not, as both are to vent."""
     return (1.0 if command > 0.0 and command < VENTS_ABOVE else 0.0), (1.0 if command < 0.0 else 0.0)
 
 
@@ -103,13 +104,15 @@ def flow_position(coil: Coil, time: float) -> float:
 
 
 def command_coil(valve: TimedSolenoid, coil: Coil, wanted: float, time: float, opening_delay: float) -> Coil:
-    """A coil at ``time`` [s] with an order standing: the flow moves if it is due, then the order is taken if it may be.
+    """A coil at ``time`` [s] with an order waiting: the flow moves if it is due, then the order is taken if it may be.
 
     A change that is still waiting when the coil is commanded otherwise is lost.
     """
+    # The due change first: an order at the same instant would otherwise cancel a flow that has already moved.
     position = flow_position(coil, time)
     accepts = wanted != coil.target and accept_time(coil, valve.switching_interval, time) <= time + SAME_INSTANT
     delay = opening_delay if wanted > 0.5 else valve.closing_delay
+    # Without a delay the flow follows in the same call, since no later event is scheduled for it.
     at_once = accepts and delay <= SAME_INSTANT
     return Coil(
         position=wanted if at_once else position,

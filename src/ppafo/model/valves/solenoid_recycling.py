@@ -1,10 +1,10 @@
 """Pair of solenoid valves with a third one between the chambers: the gas of plantarflexion powers dorsiflexion.
 
 When the flow of valve A (chamber 1) leaves the source, the third valve opens for the joining time and both of the pair
-are shut off: gas goes from chamber 1 to chamber 2 until their pressures meet, and the vane, whose chambers then share
-one pressure, is free. When the chambers part, chamber 1 vents, and chamber 2, if valve B is energised, keeps what it
-has got for the holding time, or until valve B lets it go; then valve B tops it up. The third valve has the area of the
-others. Without a joining time it is the pair of ``solenoid``.
+are shut off: gas goes from chamber 1 to chamber 2 until their pressures meet, and the vane, whose chambers then have
+one pressure, moves freely. When the chambers part, chamber 1 vents, and chamber 2, if valve B is energised, keeps what
+it has got for the holding time, or until valve B lets it go; then valve B tops it up. The third valve has the area of
+the others. Without a joining time it is the pair of ``solenoid``.
 """
 
 from collections.abc import Mapping
@@ -49,6 +49,7 @@ def settle(valve: RecyclingSolenoid, state: RecyclingState, command: float, time
     pair = solenoid.settle_timed(valve.pair, state.pair, command, time)
     feeds_1, feeds_2 = pair.coil_a.position > 0.5, pair.coil_b.position > 0.5
     shuts = state.pair.coil_a.position > 0.5 and not feeds_1
+    # A valve B that is switched off ends the hold at once: chamber 2 is then to vent.
     lets_go = state.keeps_gas > 0.5 and not feeds_2
     parting = time + valve.joining_time if shuts else state.parting_time
     release = parting + valve.holding_time if shuts else (time if lets_go else state.release_time)
@@ -86,7 +87,7 @@ def advance(
 
 
 def connect(plant: PlantParameters, shown: RecyclingPositions) -> tuple[SinglePort, SinglePort]:
-    """Ports of both chambers, shut while these are joined, that of chamber 2 while it keeps its gas. Equation (8)."""
+    """Ports of both chambers, shut while these are joined, and chamber 2's while it keeps its gas. Equation (8)."""
     port_1, port_2 = solenoid.connect_positions(plant, PairPositions(shown.position_a, shown.position_b))
     share_1 = 1.0 - shown.joined
     share_2 = share_1 * (1.0 - shown.keeps_gas)

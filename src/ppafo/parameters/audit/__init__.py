@@ -1,7 +1,7 @@
-"""Checks a parameter set for contradictions: any set, with whatever values it has.
+"""Checks of any parameter set for contradictions, with whatever values it has.
 
-All checks run, in the order of the report, and what the author of the set accepts is taken account of. To add one: a
-function in the module of its subject and one line here.
+All checks run, in the order of the report; reasons by which the set's author accepts a finding are taken into account.
+To add one: a function in the module of its subject and one line here.
 """
 
 from collections.abc import Callable, Iterator
@@ -59,13 +59,14 @@ def audit(parameter_set: ParameterSet, parent: ParameterSet | None = None) -> li
     found = [finding for check in CHECKS.values() for finding in check(evidence)]
     changed = overridden_paths(parameter_set)
     judged = [_judge(finding, parameter_set, changed, parent) for finding in found]
+    # With overrides a finding may be gone for that reason alone: its acceptance is not idle.
     if not changed:
         judged += _idle_reasons(parameter_set, {finding.id for finding in found})
     return sorted(judged, key=lambda finding: _ORDER[finding.severity])
 
 
 def changed_paths(parameter_set: ParameterSet, parent: ParameterSet | None) -> frozenset[str]:
-    """Return the paths whose values come from overrides, or are otherwise than in the parent."""
+    """Return the paths whose values come from overrides, or differ from the parent's."""
     of_file = frozenset[str]() if parent is None else {change.path for change in changes(parameter_set, parent)}
     return overridden_paths(parameter_set) | of_file
 
@@ -73,7 +74,7 @@ def changed_paths(parameter_set: ParameterSet, parent: ParameterSet | None) -> f
 def _judge(
     finding: Finding, parameter_set: ParameterSet, overridden: frozenset[str], parent: ParameterSet | None
 ) -> Finding:
-    """Apply the set's reason, which speaks of its author's values: not of overrides, nor of what a copy changes."""
+    """Apply the set's reason, which holds for its author's values, not for overrides or changes in a copy."""
     reason = parameter_set.accepted.get(finding.id, "")
     is_copied = parent is not None and parent.accepted.get(finding.id) == reason
     others = changed_paths(parameter_set, parent) if is_copied else overridden

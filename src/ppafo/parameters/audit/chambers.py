@@ -5,13 +5,14 @@ from collections.abc import Iterator
 
 from ppafo.parameters.audit.evidence import Evidence, Finding, Side, density_change
 
-# Does the torque constant equal the volume per angle, as virtual work wants: T dtheta = (P1 - P2) dV?
+# Does the torque constant equal the displacement per radian, as virtual work demands: T dtheta = (P1 - P2) dV?
 
 _TORQUE_CONSTANT = "actuator.torque_constant"
 _VOLUME_PER_ANGLE = "actuator.volume_per_angle"
 _EFFICIENCY = "reported.torque_efficiency"
 _SUPPLY = "supply.pressure"
 _ID = "virtual-work"
+# Below 10 % two reported numbers of two digits rarely differ for certain.
 _TOLERANCE = 0.1
 
 
@@ -27,13 +28,13 @@ def check_virtual_work(evidence: Evidence) -> Iterator[Finding]:
 
 
 def _closure(evidence: Evidence, ratio: float) -> Finding:
-    """Return the note that the shaft's work is that of the gas less the stated loss."""
+    """Return the note that the shaft's work is the gas's less the stated loss."""
     return Finding(
         id=_ID,
         severity="note",
-        title="torque constant and volume per angle agree, with the stated efficiency",
+        title="torque constant and displacement per radian agree, with the stated efficiency",
         values=evidence.values_of(_TORQUE_CONSTANT, _VOLUME_PER_ANGLE, _EFFICIENCY),
-        sides=(Side("torque constant over volume per angle", ratio, ""),),
+        sides=(Side("torque constant over displacement per radian", ratio, ""),),
         paragraph=(
             f"Energy closes: the shaft gets {100.0 * ratio:.3g} % of the work p dV of the gas, and the other "
             f"{100.0 * (1.0 - ratio):.3g} % are the stated loss. The model takes the same ratio where the shaft drives "
@@ -47,18 +48,20 @@ def _contradiction(evidence: Evidence, torque_constant: float, volume_per_angle:
     return Finding(
         id=_ID,
         severity="warning",
-        title="torque constant and volume per angle differ, against virtual work",
+        title="torque constant and displacement per radian differ, against virtual work",
         values=evidence.values_of(_TORQUE_CONSTANT, _VOLUME_PER_ANGLE, _EFFICIENCY, *gas_paths),
         sides=(
             Side("torque constant", torque_constant, "m^3"),
-            Side("volume per angle", volume_per_angle, "m^3/rad"),
+            Side("displacement per radian", volume_per_angle, "m^3/rad"),
             *gas_sides,
         ),
         paragraph=(
             f"A frictionless vane that turns by dtheta does the work T dtheta = (P1 - P2) dV, so that the torque "
-            f"constant {1e6 * torque_constant:.4g} cm^3 and the volume per angle {1e6 * volume_per_angle:.4g} cm^3/rad "
-            f"should be one number; the volume is {volume_per_angle / torque_constant:.2g} times the torque constant."
-            f"{gas_text} Reconciled by measuring the volume of gas that a full turn displaces; until then energy and "
+            f"constant {1e6 * torque_constant:.4g} cm^3 and the displacement per radian "
+            f"{1e6 * volume_per_angle:.4g} cm^3/rad "
+            f"should be one number; the displacement is {volume_per_angle / torque_constant:.2g} times the torque "
+            "constant."
+            f"{gas_text} Measure the volume of gas that a full turn displaces; until then energy and "
             f"efficiency figures are uncertain by the same factor."
         ),
     )
@@ -67,7 +70,7 @@ def _contradiction(evidence: Evidence, torque_constant: float, volume_per_angle:
 def _gas_use(
     evidence: Evidence, torque_constant: float, volume_per_angle: float
 ) -> tuple[tuple[str, ...], tuple[Side, ...], str]:
-    """Return paths, numbers and a sentence on the volume that the gas for one filling needs."""
+    """Return paths, numbers and a sentence on the volume that the gas of one filling occupies."""
     gas, supply, angles = evidence.gas(), evidence.number(_SUPPLY), evidence.angle_range()
     path = evidence.single_fill_gas()
     if gas is None or supply is None or supply <= evidence.atmosphere() or angles is None or path is None:
@@ -78,14 +81,15 @@ def _gas_use(
     sides = (
         Side("volume that the gas use needs", needed, "m^3"),
         Side("volume swept by the torque constant", by_torque, "m^3"),
-        Side("volume swept by the volume per angle", by_volume, "m^3"),
+        Side("volume swept by the displacement per radian", by_volume, "m^3"),
     )
     text = (
         f" Filling 1 cm^3 from atmosphere to supply takes {density:.3g} mg of gas, so the "
         f"{evidence.in_set_unit(path, used)} of one filling occupy {1e6 * needed:.3g} cm^3; over the whole "
         "range the vane "
-        f"sweeps {1e6 * by_torque:.3g} cm^3 by the torque constant and {1e6 * by_volume:.3g} cm^3 by the volume per "
-        "angle; lines and clearance hold a part of that gas."
+        f"sweeps {1e6 * by_torque:.3g} cm^3 by the torque constant and {1e6 * by_volume:.3g} cm^3 by the "
+        "displacement per "
+        "radian; lines and clearance contain a part of that gas."
     )
     return (path, _SUPPLY, angles[0], angles[2]), sides, text
 
@@ -109,7 +113,7 @@ def check_volumes(evidence: Evidence) -> Iterator[Finding]:
 
 
 def _chamber(evidence: Evidence, chamber: int, travel: float, turn: float, end_path: str) -> Iterator[Finding]:
-    """``travel`` [rad] is left between the end of the range and the angle where the swept volume is zero."""
+    """Yield an error where a chamber, with ``travel`` [rad] left to a swept volume of zero, has no volume."""
     slope = evidence.number(_SLOPE) or math.inf
     dead_path, stop_path = _DEAD[chamber - 1], _STOPS[chamber - 1]
     dead = evidence.number(dead_path) or 0.0
@@ -130,8 +134,9 @@ def _chamber(evidence: Evidence, chamber: int, travel: float, turn: float, end_p
         ),
         paragraph=(
             f"At {end} the volume of chamber {chamber} is {1e6 * smallest:.3g} cm^3; it is not positive over the last "
-            f"{math.degrees(empty):.3g} of {math.degrees(turn):.3g} deg. Reconciled by counting the volume from the "
-            f"end of the range ({stop_path} = {end}) with a dead volume for line and clearance, or by a dead volume of "
+            f"{math.degrees(empty):.3g} of {math.degrees(turn):.3g} deg. Count the volume from the "
+            f"end of the range ({stop_path} = {end}) with a dead volume for line and clearance, or give a dead "
+            "volume of "
             f"more than {-1e6 * slope * travel:.3g} cm^3."
         ),
     )
@@ -140,6 +145,7 @@ def _chamber(evidence: Evidence, chamber: int, travel: float, turn: float, end_p
 # Does the actuator turn as far as it is used?
 
 _RATED = "reported.rated_rotation"
+# 1 % of room for rounding of reported angles.
 _SAME_TURN = 1.01
 
 
@@ -157,8 +163,8 @@ def check_rotation(evidence: Evidence) -> Iterator[Finding]:
         sides=(Side("range of angles", turn, "rad"), Side("rotation by the designation", rated, "rad")),
         paragraph=(
             f"The range of angles is {math.degrees(turn):.3g} deg, the actuator turns by {math.degrees(rated):.3g} "
-            "deg. Either another actuator or a gear was used, or the angle is not that of the vane; volumes and torque "
-            "constant then belong to another shaft. Reconciled by the designation of what was on the bench."
+            "deg. Either another actuator or a gear was used, or the angle is not the vane's; volumes and torque "
+            "constant then belong to another shaft. The designation of the part on the bench would settle it."
         ),
     )
 
@@ -171,7 +177,7 @@ _LEAST, _MOST = 0.6, 1.1
 
 
 def check_filling(evidence: Evidence) -> Iterator[Finding]:
-    """Yield what a filling in the middle of the range takes: a note where the measured gas can be that, else a warning.
+    """Yield the gas of a filling in the middle of the range: a note where the measured gas agrees, else a warning.
 
     Silent where the set reports no gas of a single filling.
     """
@@ -203,7 +209,8 @@ def check_filling(evidence: Evidence) -> Iterator[Finding]:
             + (
                 ""
                 if agrees
-                else f" Reconciled by {1e6 * _LEAST * used / density:.3g} cm^3 or more, or by a longer task."
+                else f" Would be consistent with {1e6 * _LEAST * used / density:.3g} cm^3 or more, or with a longer "
+                "task."
             )
         ),
     )

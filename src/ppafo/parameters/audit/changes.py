@@ -1,4 +1,4 @@
-"""What a parameter set changed against the set that it began as: value by value, whatever the unit."""
+"""Changes of a parameter set against the set that it began as: value by value, whatever the unit."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -13,7 +13,7 @@ _SAME = 1e-12
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """A value that differs, as each set gives it; '' where a set has none. ``origin`` is that of the new value."""
+    """A value that differs, as each set gives it; '' where a set has none. ``origin`` of the new value."""
 
     path: str
     before: str
@@ -22,7 +22,7 @@ class Change:
 
 
 def changes(parameter_set: ParameterSet, parent: ParameterSet) -> list[Change]:
-    """Return what a set has otherwise than its parent: kinds and choices first, then values in the set's order.
+    """Return the differences of a set from its parent: kinds and choices first, then values in the set's order.
 
     Numbers are compared in SI, so that a value in another unit is the same value; sources and notes do not count.
     """
@@ -65,6 +65,6 @@ def _is_same(path: str, parameter_set: ParameterSet, parent: ParameterSet) -> bo
     try:
         mine = entry_in_si(new, quantity, atmospheric_pressure(parameter_set))
         theirs = entry_in_si(old, quantity, atmospheric_pressure(parent))
-    except UnitError:  # A unit that does not fit, as one may be printed: its mending is a change.
+    except UnitError:  # A unit that does not fit, as one may be reported: its correction is a change.
         return False
     return math.isclose(mine, theirs, rel_tol=_SAME)

@@ -1,4 +1,4 @@
-"""What an audit says, and what its checks are given: one contradiction or remark, with the numbers on both sides."""
+"""A finding of an audit, with the numbers on both sides, and the evidence that checks are given."""
 
 import math
 from collections.abc import Mapping
@@ -43,7 +43,7 @@ class Side:
 class Finding:
     """A contradiction (error), something to know before trusting a result (warning), or a check that holds (note).
 
-    ``paragraph`` says in words what was compared and what would reconcile it. ``accepted`` is the reason why the
+    ``paragraph`` says in words what was compared and what would be consistent. ``accepted`` is the reason why the
     author of the set keeps a contradiction; it lowers an error to a warning and is empty otherwise.
     """
 
@@ -84,7 +84,7 @@ class Interval(NamedTuple):
         return Interval(self.low / other.high, self.high / other.low)
 
     def meets(self, other: "Interval") -> bool:
-        """Tell whether one number could be meant by both."""
+        """Return whether one number could be meant by both."""
         return self.low <= other.high and other.low <= self.high
 
     def common(self, other: "Interval") -> "Interval":
@@ -120,6 +120,7 @@ class Evidence:
         value, entry = self.number(path), self.parameter_set.numbers.get(path)
         if value is None or entry is None or entry.value == 0.0:
             return None
+        # Below 1: the digits of "2" leave open 1.5 to 2.5, and never 0 or another sign.
         relative = min(reported_half_width(entry) / abs(entry.value), 0.99)
         return Interval(abs(value) * (1.0 - relative), abs(value) * (1.0 + relative))
 

@@ -44,11 +44,12 @@ _TUBES = {
     "3/8 inch": 3.0 * _INCH / 8.0,
 }
 """Diameters [m] in which tube and ports come."""
+# Areas are reported to three digits.
 _SAME_BORE = 0.005
 
 
 def check_bores(evidence: Evidence) -> Iterator[Finding]:
-    """Yield a note for each valve whose area is that of a tube: its coefficient is then no property of an orifice."""
+    """Yield a note for each valve whose area is a tube's: its coefficient is then no property of an orifice."""
     for valve in evidence.parameter_set.valve_kinds:
         path = f"valves.{valve}.area"
         area = evidence.number(path) or 0.0
@@ -79,7 +80,7 @@ def _two_forms(evidence: Evidence, section: str, names: tuple[str, ...]) -> Find
         sides=(),
         paragraph=(
             f"{section} has {', '.join(names)}, which specify one orifice twice, so no device can be built. "
-            "Reconciled by area and discharge_coefficient alone, or by sonic_conductance and critical_ratio alone."
+            "Give area and discharge_coefficient alone, or sonic_conductance and critical_ratio alone."
         ),
     )
 
@@ -98,7 +99,14 @@ def _open_flow(evidence: Evidence, name: str, section: str) -> Iterator[Finding]
     elif sonic is not None and min(sonic) > 0.0 and sonic[1] < 1.0:
         conductance = orifice_conductance(SonicOrifice(*sonic), gas)
         flow = conductance * supply * iso6358_flow_function(ratio, sonic[1])
-        form, origin = SONIC_FORM, _of_sonic_form(gas)
+        form, origin = (
+            SONIC_FORM,
+            (
+                f"of {gas.species} by its sonic conductance, which counts for air as in ISO 6358 and is "
+                "converted: another "
+                "gas passes sqrt(R_air / R) times as much mass at the same temperature"
+            ),
+        )
     else:
         return
     yield Finding(
@@ -115,14 +123,6 @@ def _open_flow(evidence: Evidence, name: str, section: str) -> Iterator[Finding]
     )
 
 
-def _of_sonic_form(gas: Gas) -> str:
-    """Return the words that say what the sonic conductance counts for."""
-    return (
-        f"of {gas.species} by its sonic conductance, which counts for air as in ISO 6358 and is converted: another "
-        "gas passes sqrt(R_air / R) times as much mass at the same temperature"
-    )
-
-
 _LONGEST = 80
 _LARGEST = 1e3
 _BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {
@@ -135,9 +135,11 @@ _BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {
 
 def evaluate(formula: str, heat_capacity_ratio: float) -> float | None:
     """Return the value of a formula such as ``(k + 1)/(k - 1)``, None where it is no such thing."""
+    # The formula comes from a file: neither its length nor its value may hold up the audit.
     if len(formula) > _LONGEST:
         return None
     try:
+        # Parsed and walked, never evaluated by Python: a set is data.
         value = _value(ast.parse(formula, mode="eval").body, heat_capacity_ratio)
     except (SyntaxError, ValueError, ZeroDivisionError, OverflowError):
         return None
@@ -188,7 +190,7 @@ def _constant(evidence: Evidence, path: str, expected: float) -> Iterator[Findin
     holds = digits.low * (1.0 - _ROUNDING) <= expected <= digits.high * (1.0 + _ROUNDING)
     quantity = evidence.declared[path]
     verdict = "agree to the reported digits" if holds else f"differ by {100.0 * (reported / expected - 1.0):+.2g} %"
-    remedy = "" if holds else f" Reconciled by {expected:.5g}, or by other gas data."
+    remedy = "" if holds else f" Would be consistent with {expected:.5g}, or with other gas data."
     yield Finding(
         id=path.rpartition(".")[2].replace("_", "-"),
         severity="note" if holds else "error",
@@ -213,7 +215,7 @@ def _exponent(evidence: Evidence, gas: Gas) -> Iterator[Finding]:
         return
     correct = choked_flow_constant(k, gas.specific_gas_constant, gas.temperature)
     values = evidence.values_of(_EXPONENT, _C1, *GAS_PATHS)
-    title = "the reported exponent inside C1 is not the one of choked flow"
+    title = "the reported exponent inside C1 is not the exponent of choked flow"
     if exponent is None:
         text = f"The formula '{formula}' cannot be read as arithmetic in k; the right exponent is (k + 1)/(k - 1)."
         yield Finding("choked-flow-exponent", "warning", title, values, (), text)
@@ -228,7 +230,7 @@ def _exponent(evidence: Evidence, gas: Gas) -> Iterator[Finding]:
         paragraph=(
             f"The reported exponent {formula} is {exponent:.4g} and gives C1 = {literal:.4g} s/m; the exponent "
             f"(k + 1)/(k - 1) = {right:.4g} gives {correct:.4g} s/m{_agreement(evidence, literal, correct)}. "
-            f"Reconciled by the exponent (k + 1)/(k - 1)."
+            f"Would be consistent with the exponent (k + 1)/(k - 1)."
         ),
     )
 
@@ -314,9 +316,9 @@ def _contradiction(evidence: Evidence, flow: _ValveFlow) -> Finding:
             f"Fully open at {pressure} the valve '{flow.name}' passes "
             f"{evidence.in_set_unit(flow_path, flow.predicted)} by Cd A = {flow.coefficient:.4g} x "
             f"{evidence.in_set_unit(area_path, flow.area)}, reported is {reported}: a factor "
-            f"{flow.predicted / flow.measured:.3g}. Reconciled by Cd A = {1e6 * needed:.4g} mm^2, that is "
+            f"{flow.predicted / flow.measured:.3g}. Would be consistent with Cd A = {1e6 * needed:.4g} mm^2, that is "
             f"Cd = {needed / flow.area:.3g} with the reported area, or "
-            f"{evidence.in_set_unit(area_path, needed / flow.coefficient)} with the reported Cd; or by "
+            f"{evidence.in_set_unit(area_path, needed / flow.coefficient)} with the reported Cd; or with "
             f"{evidence.in_set_unit(flow_path, flow.predicted)} as the flow."
         ),
     )
@@ -339,8 +341,9 @@ def _check_shared_coefficient(evidence: Evidence, flows: list[_ValveFlow]) -> It
             paragraph=(
                 f"With one discharge coefficient {first.coefficient:.4g} flow goes as area: '{first.name}' must pass "
                 f"{areas:.3g} times what '{other.name}' passes, the reported flows are as {measured:.3g} to 1. "
-                f"Reconciled by a coefficient of its own for each: {first.measured / first.per_area / first.area:.3g} "
-                f"and {other.measured / other.per_area / other.area:.3g}; or by two flows, measured one by one."
+                "Would be consistent with a coefficient of its own for each: "
+                f"{first.measured / first.per_area / first.area:.3g} "
+                f"and {other.measured / other.per_area / other.area:.3g}; or with two flows, measured one by one."
             ),
         )
 
@@ -381,7 +384,8 @@ def _valve(evidence: Evidence, name: str) -> Iterator[Finding]:
         ),
         paragraph=(
             f"Fully open the valve '{name}' passes {evidence.in_set_unit(flow, predicted)} by its sonic conductance, "
-            f"reported is {evidence.in_set_unit(flow, measured)}: a factor {predicted / measured:.3g}. Reconciled by a "
-            f"sonic conductance of {evidence.in_set_unit(size, needed)}, or by the other flow."
+            f"reported is {evidence.in_set_unit(flow, measured)}: a factor {predicted / measured:.3g}. Would be "
+            "consistent with a "
+            f"sonic conductance of {evidence.in_set_unit(size, needed)}, or with the other flow."
         ),
     )

@@ -18,6 +18,7 @@ _FRICTION = "friction.dynamic_torque"
 _DECAY = "reported.acceleration_over_velocity"
 _DECAY_INVERSE = "reported.velocity_over_acceleration"
 _DECELERATION = "reported.stopping_deceleration"
+# Powers of ten by which a slipped decimal point or a prefix changes a number.
 _SHIFTS = (-3, -2, -1, 1, 2, 3)
 
 
@@ -77,7 +78,8 @@ def _product(evidence: Evidence, product: str, rate_path: str, name: str, rate: 
             f"Inertia {evidence.in_set_unit(_INERTIA, inertia)} times {abs(float(ratio.value)):g} {ratio.unit} is "
             f"{evidence.in_set_unit(product, expected)}, reported is "
             f"{evidence.in_set_unit(product, reported)}: a factor "
-            f"{reported / expected:.3g}. Reconciled by an inertia of {evidence.in_set_unit(_INERTIA, implied)}, or by "
+            f"{reported / expected:.3g}. Would be consistent with an inertia of "
+            f"{evidence.in_set_unit(_INERTIA, implied)}, or with "
             f"{evidence.in_set_unit(product, expected)} as the {name}."
         ),
     )
@@ -90,6 +92,7 @@ def _one_inertia(evidence: Evidence, damping: Interval, friction: Interval, deca
     common = damping.common(friction)
     reported = evidence.number(_INERTIA) or 0.0
     shifted = [reported * 10.0**shift for shift in _SHIFTS if common.low <= reported * 10.0**shift <= common.high]
+    # A moved decimal point is the likeliest slip; else the middle of what both allow.
     best = shifted[0] if shifted else _middle(common)
     written = evidence.in_set_unit(_INERTIA, best)
     slip = (
@@ -116,7 +119,7 @@ def _one_inertia(evidence: Evidence, damping: Interval, friction: Interval, deca
     )
 
 
-# What torque can the supply hold at most, and is it enough? Equation (2).
+# What is the largest torque at this supply, and is it enough? Equation (2).
 
 _TORQUE_CONSTANT = "actuator.torque_constant"
 _DEMAND = "reported.demanded_torque"
@@ -138,12 +141,12 @@ def check_torque_ceiling(evidence: Evidence) -> Iterator[Finding]:
     yield Finding(
         id="torque-ceiling",
         severity=severity,
-        title=f"the supply holds at most {max(ceilings.values()):#.3g} N m",
+        title=f"the supply allows at most {max(ceilings.values()):#.3g} N m",
         values=evidence.values_of(_TORQUE_CONSTANT, *supplies, _DEMAND, _STATIC),
         sides=tuple(Side(f"ceiling at {path}", value, "N m") for path, value in ceilings.items()),
         paragraph=(
             f"The torque constant is {per_psi:#.3g} N m/psi. With one chamber at supply and the other at atmosphere "
-            f"the vane holds {', '.join(held)}, before friction.{verdict}"
+            f"the vane gives {', '.join(held)}, before friction.{verdict}"
         ),
     )
 
@@ -157,7 +160,7 @@ def _verdict(evidence: Evidence, ceiling: float, constant: float) -> tuple[Sever
         needed = demand / constant / 1e3
         return "warning", (
             f" The requested {demand:.3g} N m lie above it, so that every valve and controller keeps an error of "
-            f"{demand - ceiling:.3g} N m; reconciled by {needed:.4g} kPa_g of supply, or by requesting less."
+            f"{demand - ceiling:.3g} N m; it would take {needed:.4g} kPa_g of supply, or a smaller request."
         )
     return "note", " A reference above that cannot be followed by any valve or controller."
 
@@ -176,7 +179,7 @@ _PARTS = 200
 
 
 def check_published_torque(evidence: Evidence) -> Iterator[Finding]:
-    """Yield for each published torque whether the pressure holds it, and for that of walking whether it comes in time.
+    """Yield for each published torque whether the pressure gives it, and for walking whether it comes in time.
 
     Notes where it does, warnings where not; silent without published torques.
     """
@@ -202,7 +205,7 @@ def _at_rest(evidence: Evidence, name: str, paths: tuple[str, str], found: tuple
         values=evidence.values_of(_TORQUE_CONSTANT, *paths),
         sides=(Side("torque constant times pressure", held, "N m"), Side("published", torque, "N m")),
         paragraph=(
-            f"At {evidence.in_set_unit(paths[1], pressure)} the vane holds {held:.3g} N m, published are {torque:.3g} "
+            f"At {evidence.in_set_unit(paths[1], pressure)} the vane gives {held:.3g} N m, published are {torque:.3g} "
             "N m. This speaks of the torque constant alone: a vane at rest has any volume."
             f"{f' {note}' if note else ''}"
         ),

@@ -1,11 +1,10 @@
-"""Are the values of a set possible: dimensions, ranges, the gas that is named, and what the ideal gas law miscounts?"""
+"""Are the values of a set possible: dimensions, ranges, the named gas, and the error of the ideal gas law?"""
 
 import math
 from collections.abc import Iterator
 
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
 from ppafo.errors import UnitError
-from ppafo.model.declaration import Quantity
 from ppafo.model.effects.second_virial import SECOND_VIRIAL
 from ppafo.model.gas import SPECIES
 from ppafo.parameters.audit.evidence import Evidence, Finding, Side
@@ -35,8 +34,8 @@ def check_statements(evidence: Evidence) -> Iterator[Finding]:
             values=evidence.values_of(path),
             sides=(),
             paragraph=(
-                f"{path} is {number_text(entry)} and names '{entry.key}', which has {found}. Reconciled by that "
-                "number, or by the key of the statement that is meant (ppafo reproduce --list)."
+                f"{path} is {number_text(entry)} and names '{entry.key}', which has {found}. Give that "
+                "number, or the key of the statement that is meant (ppafo reproduce --list)."
             ),
         )
 
@@ -62,7 +61,7 @@ _NEEDS_PLAIN = "a plain number"
 
 
 def check_dimensions(evidence: Evidence) -> Iterator[Finding]:
-    """Yield one finding for values of a foreign dimension, and one for each whose unit is that of its inverse."""
+    """Yield one finding for values of a foreign dimension, and one for each whose unit belongs to its inverse."""
     refused = dict(_refusals(evidence))
     inverted = [path for path in refused if _fits_inverse(evidence, path)]
     for path in inverted:
@@ -106,7 +105,7 @@ def _upside_down(evidence: Evidence, path: str) -> Finding:
         paragraph=(
             f"{path} = {number_text(entry)} is meant as: {quantity.summary}. That has the unit "
             f"{quantity.unit}; the reported "
-            f"unit {entry.unit} is the one of its inverse. Reconciled by turning the ratio over and keeping the "
+            f"unit {entry.unit} belongs to its inverse. Turn the ratio over and keep the "
             f"number: taken literally it would be {1.0 / value:.3g} {quantity.unit}."
         ),
     )
@@ -121,7 +120,7 @@ def _foreign(evidence: Evidence, paths: list[str]) -> Finding:
         values=evidence.values_of(*paths),
         sides=tuple(Side(path, evidence.number(path) or 0.0, "as given, base units") for path in paths),
         paragraph=(
-            f"{described}. Reconciled by giving the same number in the unit that is needed, if only the unit was "
+            f"{described}. Give the same number in the unit that is needed, if only the unit was "
             f"misreported; the other checks use the number as it stands."
         ),
     )
@@ -147,17 +146,19 @@ def check_ranges(evidence: Evidence) -> Iterator[Finding]:
             severity="error",
             title=f"{path} is out of range",
             values=evidence.values_of(path),
-            sides=(Side("in the set", value, quantity.unit), *_limits(quantity)),
+            sides=(
+                Side("in the set", value, quantity.unit),
+                *(
+                    Side("lower limit", quantity.minimum, quantity.unit),
+                    Side("upper limit", quantity.maximum, quantity.unit),
+                ),
+            ),
             paragraph=(
                 f"{path} = {number_text(entry)}: {quantity.summary} must lie between {quantity.minimum:g} and "
                 f"{quantity.maximum:g} {quantity.unit}".rstrip()
-                + ". Reconciled by a value in that range."
+                + ". Give a value in that range."
             ),
         )
-
-
-def _limits(quantity: Quantity) -> tuple[Side, Side]:
-    return Side("lower limit", quantity.minimum, quantity.unit), Side("upper limit", quantity.maximum, quantity.unit)
 
 
 # Do molar mass and heat capacity ratio belong to the gas that the set names?
@@ -172,44 +173,42 @@ def check_gas_data(evidence: Evidence) -> Iterator[Finding]:
         return
     species = SPECIES.get(name)
     if species is None:
-        yield _unknown(evidence, name)
+        yield (
+            Finding(
+                id="gas-species",
+                severity="error",
+                title=f"no data for the gas '{name}'",
+                values=evidence.values_of("gas.species"),
+                sides=(),
+                paragraph=f"The gas '{name}' is not one of {', '.join(SPECIES)}; name one of these.",
+            )
+        )
         return
     tabulated = {"gas.molar_mass": species.molar_mass, "gas.heat_capacity_ratio": species.heat_capacity_ratio}
     for path, expected in tabulated.items():
         value = evidence.number(path)
         if value is not None and abs(value / expected - 1.0) > _TOLERANCE:
-            yield _differs(evidence, path, value, expected, species.source)
+            unit = evidence.declared[path].unit
+            yield (
+                Finding(
+                    id=path.replace(".", "-").replace("_", "-"),
+                    severity="error",
+                    title=f"{path} does not belong to the named gas",
+                    values=evidence.values_of("gas.species", path),
+                    sides=(Side("in the set", value, unit), Side("of the gas", expected, unit)),
+                    paragraph=(
+                        f"{path} is {evidence.in_set_unit(path, value)}, but {evidence.text('gas.species')} has "
+                        f"{evidence.in_set_unit(path, expected)} ({species.source}). "
+                        "Give that value, or name the gas in use."
+                    ),
+                )
+            )
 
 
-def _unknown(evidence: Evidence, name: str) -> Finding:
-    return Finding(
-        id="gas-species",
-        severity="error",
-        title=f"no data for the gas '{name}'",
-        values=evidence.values_of("gas.species"),
-        sides=(),
-        paragraph=f"The gas '{name}' is not one of {', '.join(SPECIES)}; name one of these.",
-    )
-
-
-def _differs(evidence: Evidence, path: str, value: float, expected: float, source: str) -> Finding:
-    unit = evidence.declared[path].unit
-    return Finding(
-        id=path.replace(".", "-").replace("_", "-"),
-        severity="error",
-        title=f"{path} is not that of the named gas",
-        values=evidence.values_of("gas.species", path),
-        sides=(Side("in the set", value, unit), Side("of the gas", expected, unit)),
-        paragraph=(
-            f"{path} is {evidence.in_set_unit(path, value)}, but {evidence.text('gas.species')} has "
-            f"{evidence.in_set_unit(path, expected)} ({source}). Reconciled by that value or by naming the gas in use."
-        ),
-    )
-
-
-# How much gas does the ideal gas law miscount at supply pressure? Equation (3).
+# How large is the error of the ideal gas law at supply pressure? Equation (3).
 
 _TABULATED_TEMPERATURE = 298.0
+# The coefficient of CO2 changes by about 15 % over 20 K: the estimate stays one.
 _TEMPERATURE_ROOM = 20.0
 _WORTH_A_WARNING = 0.05
 _SUPPLY = "supply.pressure"
@@ -238,7 +237,7 @@ def check_ideal_gas(evidence: Evidence) -> Iterator[Finding]:
             f"With the second virial coefficient {1e6 * virial:.3g} cm^3/mol the real-gas factor at "
             f"{evidence.in_set_unit(_SUPPLY, pressure)} is {compressibility:.4f}: the ideal gas law "
             f"{counts} the mass in a "
-            f"full chamber by {100.0 * abs(error):.2g} %. Reconciled by a real-gas factor in equation (3), where gas "
+            f"full chamber by {100.0 * abs(error):.2g} %. A real-gas factor in equation (3) corrects it, where gas "
             f"use matters to that precision."
         ),
     )

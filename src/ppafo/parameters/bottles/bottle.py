@@ -100,6 +100,7 @@ def scaled_entries(part: Part, paper: Mapping[str, Entry]) -> dict[str, Entry]:
         "bottle.volume": _entry(paper["bottle.volume"].value * ratio, "cm^3", "filled as densely as the paper's"),
         "bottle.wall_heat_capacity": _entry(_WALL * empty, "J/K", "its empty mass, at 885 J/(kg K) as the paper's"),
     }
+    # Heat passes surfaces: of similar bodies they grow with the two thirds power of the volume.
     surface = ratio ** (2.0 / 3.0)
     for path in _SURFACES:
         given = paper[path]
@@ -129,7 +130,7 @@ FILL_BY_PRESSURE = (
     ),
 )
 FILLS: Forms = {"bottle": tuple(tuple(item.name for item in form) for form in (FILL_BY_MASS, FILL_BY_PRESSURE))}
-"""Forms in which a bottle says how full it is."""
+"""Forms in which the filling of a bottle is given."""
 REGULATOR = (
     Quantity("set_pressure", "Pa_a", "outlet pressure of the regulator without flow", minimum=1e5, maximum=2e7),
     Quantity("droop", "Pa s/kg", "drop of the outlet pressure per mass flow", minimum=0.0, maximum=1e9),
@@ -147,7 +148,7 @@ REGULATOR = (
 
 
 def _passed(part: str, short: str) -> tuple[Quantity, ...]:
-    """Declare what a part that the gas passes has, in the order of ``Passage``."""
+    """Return the quantities of a part that the gas passes, in the order of ``Passage``."""
     warms = f"share of the way to the {short}'s temperature that the gas warms"
     return (
         Quantity("heat_capacity", "J/K", f"heat capacity of the {part}", minimum=1e-3, maximum=1e6),
@@ -191,7 +192,7 @@ NEEDED = tuple(
 )
 
 WARMING = (*(f"regulator.{item.name}" for item in BODY), *(f"hose.{item.name}" for item in HOSE))
-"""What warms the gas on its way; a file that says nothing of it has the values of the paper's bottle."""
+"""Values that warm the gas on its way; a file without them has the paper's bottle's."""
 
 
 def _section(name: str) -> Any:
@@ -265,10 +266,11 @@ def list_bottles() -> tuple[str, ...]:
 
 
 def load_bottle(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Bottle:
-    """Return a bottle by its name, that of a part of the catalogue, or the path of a TOML file, with values replaced.
+    """Return a bottle by its name, a part's name, or the path of a TOML file, with values replaced.
 
     ``overrides`` are texts such as ``bottle.gas_mass=567 g`` or ``room.temperature=5 degC``.
     """
+    # A bottle file has its own walls and regulator; a part of the same name has only a content and a mass.
     part = None if str(name_or_path) in FILE.names() else bottle_parts().get(str(name_or_path))
     _check_name(name_or_path)
     parsed, file = read_model(FILE, bottle_file(), name_or_path if part is None else PAPER_BOTTLE)
@@ -281,6 +283,7 @@ def load_bottle(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Bott
             raise ParameterError(f"override '{given}': a bottle has no value '{path}'{nearest_name(path, PATHS)}")
         with refused_as(ParameterError, f"override '{given}'", UnitError):
             value, unit = split_quantity(given.text)
+        # A new form of the filling replaces the old one, of which two would contradict each other.
         kept = {name: entry for name, entry in found.items() if name not in other_forms(path, FILLS)}
         found = kept | {path: Entry(value=value, unit=unit, origin="assumed", source="override")}
     return _build(parsed, found, file)
@@ -392,9 +395,10 @@ def _check_temperature(path: str, temperature: float, fluid: Fluid, file: str) -
 
 
 def _check_content(bottle: Bottle, file: str) -> None:
-    """Refuse a bottle that is overfull, or that cannot even begin."""
+    """Refuse a bottle that is overfull, or whose regulator has too little pressure from the start."""
     fluid, temperature = bottle.fluid, bottle.room_temperature
     _check_temperature("room.temperature", temperature, fluid, file)
+    # Liquid can fill the whole bottle; a gas without liquid ends where its table does.
     wet = has_liquid(fluid.table)
     most = bottle.volume * (liquid_density if wet else densest_gas)(fluid.table, temperature)
     if bottle.mass >= most:

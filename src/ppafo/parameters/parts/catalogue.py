@@ -1,4 +1,4 @@
-"""The catalogue of parts: what may stand in its file, real parts with figures of data sheets, and how it is read."""
+"""The catalogue of parts: layout of its file, real parts with figures of data sheets, and how it is read."""
 
 import math
 from collections.abc import Mapping
@@ -44,7 +44,7 @@ GROUPS: dict[str, tuple[Quantity, ...]] = {
     "processors": (MASS, POWER),
     "batteries": (MASS, ENERGY),
 }
-"""Figures by group; a valve has those of its kind."""
+"""Figures by group; a valve has its kind's."""
 
 NEEDED: dict[str, tuple[str, ...]] = {
     "valves": ("mass",),
@@ -58,7 +58,7 @@ NEEDED: dict[str, tuple[str, ...]] = {
 
 
 def figures_of(group: str, kind: str) -> tuple[Quantity, ...]:
-    """Return the figures that a part of a group can have; ``kind`` is that of a valve, an empty text for others."""
+    """Return the figures that a part of a group can have; ``kind`` of a valve, an empty text for others."""
     return VALVE + VALVES[kind].quantities if group == "valves" else GROUPS[group]
 
 
@@ -89,7 +89,7 @@ class Figure(StrictTable):
 class Part:
     """A part of the catalogue.
 
-    ``kind`` is that of a valve, else an empty text. ``figures`` as written and ``values`` in SI units (pressures
+    ``kind`` of a valve, else an empty text. ``figures`` as written and ``values`` in SI units (pressures
     absolute), by name; ``unknown`` names figures that are known to exist and that nobody could name.
     """
 
@@ -121,7 +121,7 @@ class Part:
 
     @property
     def model_numbers(self) -> dict[str, float]:
-        """Numbers of a valve by path, in SI; what its maker does not say is ideal, as the declarations have it."""
+        """Numbers of a valve by path, in SI; what its maker does not state is ideal, by the defaults."""
         settings = {item.name: item.default for item in VALVES[self.kind].quantities if item.default is not None}
         orifice = {item.name: self.values[item.name] for item in ORIFICE if item.name in self.values}
         own = {name: self.values[name] for name in settings if name in self.values}
@@ -273,6 +273,7 @@ def _in_si(place: str, figure: Figure, quantity: Quantity) -> float:
     if figure.origin in _NEEDS_A_REASON and not figure.note.strip():
         raise ParameterError(f"{place}.note is missing: a figure that is {figure.origin} needs its reason")
     with refused_as(ParameterError, f"{place} = {figure.value:g} {figure.unit}", UnitError):
+        # Data sheets give gauge pressures at sea level.
         value = to_si(figure.value, figure.unit, quantity.unit, STANDARD_ATMOSPHERE)
     if not is_within(value, quantity):
         limits = [f"{'at least' if quantity.minimum_allowed else 'more than'} {quantity.minimum:g}"]

@@ -1,4 +1,4 @@
-"""C3D files: points, what models made of them, analog channels and force plates, subject and events."""
+"""C3D files: points, outputs of models, analog channels and force plates, subject and events."""
 
 from collections.abc import Iterable, Iterator
 from itertools import count
@@ -41,7 +41,7 @@ def read_c3d(path: str | Path) -> MotionTable:
     """Return the columns of a C3D file and what it says of subject and events.
 
     Analog channels are faster; the samples at the times of the points are taken. Where a point was not seen it is NaN,
-    for whoever uses the column to fill or refuse. The clock is that of the trial, which may begin before the file.
+    to be filled or refused where the column is used. The clock is the trial's, which may begin before the file.
     """
     try:
         import ezc3d  # noqa: F401  # its absence is reported before the file is looked at
@@ -49,6 +49,7 @@ def read_c3d(path: str | Path) -> MotionTable:
         raise DataError(f"{path}: C3D files need ezc3d; install it with 'pip install ppafo[c3d]'") from error
     if read_bytes(path)[1:2] != _MARK:
         raise DataError(f"{path}: is not a C3D file")
+    # A damaged file ends ezc3d with a crash: another process tries it first.
     check_can_be_read(Path(path), __name__, "open_c3d", "ezc3d")
     content = open_c3d(path)
     parameters: Any = content["parameters"]
@@ -85,7 +86,7 @@ def read_c3d(path: str | Path) -> MotionTable:
 
 
 def open_c3d(path: str | Path) -> Any:
-    """Return what ezc3d makes of a file, with its force plates where it can; damage can bring down the process."""
+    """Return the content of a file read by ezc3d, with force plates where possible; damage can end the process."""
     import ezc3d
 
     try:
@@ -135,7 +136,7 @@ def _plates(content: Any, frames: int) -> Iterator[tuple[str, Floats]]:
 
 
 def _units(group: Any, labels: Iterable[str]) -> dict[str, str]:
-    """Return the unit of every point's coordinates: those of model outputs stand in groups of their own."""
+    """Return the unit of every point's coordinates; units of model outputs stand in groups of their own."""
     usual = _unit_name(next(iter(_texts(group, "UNITS")), ""))
     units = {label: usual for label in labels}
     for names, unit in _GROUPS:
@@ -159,7 +160,7 @@ def _texts(group: Any, key: str) -> list[str]:
 
 
 def _trial(parameters: Any) -> Trial:
-    """Return subject and events; those of other laboratories' spelling, or nonsense, are as if they were absent."""
+    """Return subject and events; an unknown spelling, or an implausible value, counts as absent."""
     group = parameters.get("PROCESSING", {})
     mass, height = _number(group, _BODY), _number(group, _HEIGHT)
     # Plug-in Gait keeps the height in mm.
@@ -181,7 +182,7 @@ def _number(group: Any, names: Iterable[str]) -> float | None:
 
 
 def _events(group: Any) -> tuple[Events, tuple[str, ...]]:
-    """Return the times of strikes and offs, and what there is to say of them.
+    """Return the times of strikes and offs, and remarks on them.
 
     A time is stored as minutes and seconds, in two rows; some programs write a flat list, of such pairs or of seconds.
     """

@@ -43,7 +43,7 @@ def _convention(_table: MotionTable, side: Side, _body_mass: float) -> Conventio
 
 
 def is_plain(path: str | Path) -> bool:
-    """Tell whether a CSV file has other delimiters than the package, or no unit in square brackets after its time."""
+    """Return whether a CSV file has other delimiters than the package, or no unit in square brackets after its time."""
     header = _header(path)
     return _delimiter(header) != "," or "[" not in header.split(",")[0]
 
@@ -80,6 +80,7 @@ def read_plain_csv(path: str | Path) -> MotionTable:
     channels["time"] = MappedChannel(column=1, unit=units[0] or _TIMES[names[0].lower()])
     mapped = ColumnMap(
         delimiter=_DELIMITERS[delimiter],
+        # A decimal comma shows only where commas do not separate the cells.
         decimal="point" if delimiter == "," or not re.search(r"\d,\d", _text(path)) else "comma",
         channels=channels,
     )

@@ -15,7 +15,7 @@ from ppafo.signals.recording import Floats
 from ppafo.storage.opensim import read_trc
 
 PLATE = "force plate "
-"""Columns ``force plate 1.x``, ``.y``, ``.z`` [N]: what the plate's channels make in the axes of the laboratory."""
+"""Columns ``force plate 1.x``, ``.y``, ``.z`` [N]: the plate's force in the axes of the laboratory."""
 
 _FORWARDS: tuple[Axis, ...] = ("x", "y", "z", "-x", "-y", "-z")
 
@@ -36,7 +36,7 @@ _HEELS = ("hee", "heel", "calc", "calcstudy")
 _TOES = ("toe", "toetip", "toestudy", "mt2")
 
 _LEAST_WAY = 0.5
-"""Metres; a marker that goes further shows the direction of walking, a shorter way is that of a treadmill."""
+"""Metres; a marker that goes further shows the direction of walking, a shorter way is a treadmill's."""
 
 _MOST_OBLIQUE = 25.0
 """Degrees between walk and axis; the lean of the shank is short by 10 % there."""
@@ -62,7 +62,7 @@ def marker_convention(table: MotionTable, side: Side, body_mass: float) -> Conve
 
 
 def _pair(labels: Sequence[str], foot: str) -> tuple[str, str]:
-    """Return the labels of knee and ankle; those of Plug-in Gait where there are none, for the message that says so."""
+    """Return the labels of knee and ankle; where there are none Plug-in Gait's, for the message that says so."""
     for names in zip(_KNEES, _ANKLES, strict=True):
         knee, ankle = (_label(labels, f"{foot}{name}") for name in names)
         if knee is not None and ankle is not None:
@@ -97,7 +97,7 @@ def _ankle_map(labels: Sequence[str], foot: str, axes: tuple[Axis, Vertical]) ->
 def _load_maps(
     table: MotionTable, labels: Sequence[str], foot: str, vertical: str, body_mass: float
 ) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """Return the maps of the loads that were measured, each with the unit that its size shows, and remarks."""
+    """Return the maps of the measured loads, each with the unit that its size shows, and remarks."""
     found: dict[str, Any] = {}
     remarks: list[str] = []
     moment = _label(labels, foot + _MOMENTS)
@@ -133,18 +133,23 @@ def _axes(
     if at_knee is None or at_ankle is None:
         return "x", "z", ()
     apart = at_knee - at_ankle
+    # From ankle to knee is large and steady upwards alone: forwards it is small or swings.
     up = int(np.argmax(np.abs(np.nanmean(apart, axis=1)) - 2.0 * np.nanstd(apart, axis=1)))
     # How far a point went, (3,), from where it is first seen to where it is last seen.
     seen = np.flatnonzero(np.isfinite(at_ankle).all(axis=0))
     way = at_ankle[:, seen[-1]] - at_ankle[:, seen[0]] if seen.size else np.zeros(3)
     pointing = _pointing(table, foot, labels)
-    if np.hypot(*np.delete(way, up)) < _LEAST_WAY * _per_metre(table, ankle):
+    # Most laboratories write millimetres, also where the file does not say so.
+    if np.hypot(*np.delete(way, up)) < _LEAST_WAY * {"m": 1.0, "cm": 100.0}.get(
+        table.units.get(f"{ankle}.x", ""), 1000.0
+    ):
         if pointing is None:
             return "x" if up else "y", _UPWARDS[up], ()
         way = pointing
     elif pointing is not None and np.delete(pointing, up) @ np.delete(way, up) < 0.0:
         way = -way
     along = max((axis for axis in range(3) if axis != up), key=lambda axis: abs(float(way[axis])))
+    # Indices of the axes are 0, 1 and 2, whose sum is 3.
     across = 3 - up - along
     oblique = float(np.degrees(np.arctan2(abs(way[across]), abs(way[along]))))
     if oblique > _MOST_OBLIQUE:
@@ -173,15 +178,11 @@ def _pointing(table: MotionTable, foot: str, labels: Sequence[str]) -> Floats | 
     return np.asarray(apart[:, seen].mean(axis=1)) if seen.any() else None
 
 
-def _per_metre(table: MotionTable, label: str) -> float:
-    return {"m": 1.0, "cm": 100.0}.get(table.units.get(f"{label}.x", ""), 1000.0)
-
-
 _FACTORS = {
     "moment": {"N m/kg": 1.0, "N mm/kg": 1.0e-3, "N m": None, "N mm": None},
     "force": {"N/kg": 1.0, "N": None, "": 9.8, "percent": 0.098},
 }
-"""What makes N m/kg or N/kg of a number in the unit; None where the body mass does."""
+"""Factor from the unit to N m/kg or N/kg; None where it is the body mass."""
 
 
 _PLAUSIBLE = {"moment": (0.35, 2.6), "force": (5.5, 20.0)}
@@ -195,6 +196,7 @@ def load_unit(table: MotionTable, name: str, kind: str, body_mass: float) -> tup
     """
     values = np.abs(table.columns[name][np.isfinite(table.columns[name])])
     stated = table.units.get(name, "")
+    # Not the largest: one spike would choose another unit.
     peak = float(np.percentile(values, 99.5)) if values.size else 0.0
     low, high = _PLAUSIBLE[kind]
     fitting = []

@@ -11,7 +11,6 @@ from ppafo.gait.recorded.form import Convention, GaitForm
 from ppafo.gait.recorded.forms.comma_separated import is_plain, plain_names, read_plain_csv
 from ppafo.gait.recorded.mapping import ForceMap, KneeMap, PressureMap, ShankMap, Side, opensim_map
 from ppafo.gait.recorded.table import MotionTable
-from ppafo.signals.recording import Floats
 from ppafo.storage.opensim import read_opensim_with_gaps
 
 _CSV = ".csv"
@@ -67,24 +66,21 @@ _KNEE = "knee_angle_"
 def _convention(table: MotionTable, side: Side, _body_mass: float) -> Convention:
     """Return the map of OpenSim's labels; a force plate with a number only is of the foot that moves with it."""
     usual = opensim_map(side)
-    terms = tuple(
-        # Where its flexion counts above 0, as in the newer OpenSim models, the knee is taken away.
-        f"-{name}" if name.startswith(_KNEE) and _counts_above(table.columns.get(name)) else name
-        for name in usual.shank_angle.terms or ()
-    )
-    usual = usual.model_copy(update={"shank_angle": ShankMap(terms=terms), **_own_columns(table, side[0])})
+    terms = []
+    for name in usual.shank_angle.terms or ():
+        flexion = table.columns.get(name) if name.startswith(_KNEE) else None
+        # Where its flexion counts above 0, as in the newer OpenSim models, the knee is subtracted.
+        counts_above = flexion is not None and bool(np.nanmax(flexion) > -np.nanmin(flexion))
+        terms.append(f"-{name}" if counts_above else name)
+    usual = usual.model_copy(update={"shank_angle": ShankMap(terms=tuple(terms)), **_own_columns(table, side[0])})
     own, other, numbered = _forces(table.columns, side)
     if own or (other and len(numbered) == 1):
-        terms = own or numbered
-        said = (f"vertical force: the sum of {' and '.join(terms)}",) if len(terms) > 1 else ()
-        return Convention(usual.model_copy(update={"vertical_force": ForceMap(terms=terms)}), (), said)
+        plates = own or numbered
+        said = (f"vertical force: the sum of {' and '.join(plates)}",) if len(plates) > 1 else ()
+        return Convention(usual.model_copy(update={"vertical_force": ForceMap(terms=plates)}), (), said)
     if len(numbered) == 1 and side == "right":
         return Convention(usual.model_copy(update={"vertical_force": ForceMap(terms=numbered)}))
     return Convention(usual.model_copy(update={"vertical_force": None}), numbered)
-
-
-def _counts_above(flexion: Floats | None) -> bool:
-    return flexion is not None and bool(np.nanmax(flexion) > -np.nanmin(flexion))
 
 
 def _own_columns(table: MotionTable, foot: str) -> dict[str, object]:

@@ -1,6 +1,6 @@
-"""A proportional valve with a dump valve behind it, which vents both chambers when the command says so.
+"""A proportional valve with a vent valve behind it, which vents both chambers when the command says so.
 
-A spool valve alone cannot leave the foot free: in its middle it holds the gas in both chambers. The dump valve has the
+A spool valve alone cannot let the foot move: in its middle it locks the gas in both chambers. The vent valve has the
 area of the proportional one and follows at once.
 """
 
@@ -14,8 +14,8 @@ from ppafo.model.valves.kind import VENTS_ABOVE, ValveModel
 from ppafo.model.valves.proportional import IdealProportional, MovingProportional, NoValveState, SpoolState
 
 
-class DumpedOpening(NamedTuple):
-    """Opening of the proportional valve from -1 to 1, and 1 where the dump valve vents."""
+class VentedOpening(NamedTuple):
+    """Opening of the proportional valve from -1 to 1, and 1 where the vent valve vents."""
 
     opening: float
     vents: float
@@ -28,6 +28,7 @@ def spool_command(command: float) -> float:
 
 def vent_chambers(openings: Openings, command: float) -> Openings:
     """Openings [-] with both chambers vented where the command says so."""
+    # The vent valve acts at once: it has neither delay nor spool.
     vents = command > VENTS_ABOVE
     return Openings(
         source_1=0.0 if vents else openings.source_1,
@@ -39,13 +40,14 @@ def vent_chambers(openings: Openings, command: float) -> Openings:
 
 def advance_ideal(
     valve: IdealProportional, state: NoValveState, command: float, time: float, step: float
-) -> tuple[DumpedOpening, NoValveState]:
+) -> tuple[VentedOpening, NoValveState]:
     """Opening [-] and venting during the step [s], and the state at its end."""
+    # The spool returns to its middle meanwhile, so that it feeds no chamber when the vent valve shuts.
     opening, after = proportional.advance_ideal(valve, state, spool_command(command), time, step)
-    return DumpedOpening(opening, 1.0 if command > VENTS_ABOVE else 0.0), after
+    return VentedOpening(opening, 1.0 if command > VENTS_ABOVE else 0.0), after
 
 
-def connect_ideal(plant: PlantParameters, shown: DumpedOpening) -> tuple[SinglePort, SinglePort]:
+def connect_ideal(plant: PlantParameters, shown: VentedOpening) -> tuple[SinglePort, SinglePort]:
     """Ports of both chambers. Equation (8)."""
     port_1, port_2 = single_ports(plant, shown.opening)
     vents = shown.vents > 0.5
