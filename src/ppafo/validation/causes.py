@@ -7,23 +7,20 @@ for a cause with a size. A common delay, and a start that was read from noisy sa
 """
 
 import math
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.constants import PASCALS_PER_PSI
 from ppafo.errors import PpafoError
-from ppafo.model.effects.second_virial import SECOND_VIRIAL
 from ppafo.parameters.device import Device
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.signals.faults import is_at_limit, is_noisy, noise_of, plateaus
 from ppafo.signals.recording import Floats
-from ppafo.simulation.numbers import declared_numbers, number_at, other_form, with_numbers
-from ppafo.simulation.recorded import COMMAND, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY, samples_at_rest
+from ppafo.simulation.numbers import with_numbers
+from ppafo.simulation.recorded import COMMAND, samples_at_rest
 from ppafo.validation.agreement import (
     LEAST_NOISE,
     ChannelAgreement,
@@ -32,18 +29,15 @@ from ppafo.validation.agreement import (
     measured_values,
     replay_of,
 )
+from ppafo.validation.candidates import SENSORS, Candidate, Change, Sensor, effects, exchanges, numbers, sizes
 from ppafo.validation.measured import ANGLE, PRESSURE_1, PRESSURE_2, Measured
-from ppafo.validation.replay import Motion, Replay, Replayed, replay_together, replayed_scenario
+from ppafo.validation.replay import Replay, Replayed, replay_together, replayed_scenario
 
 Flags = NDArray[np.bool_]
 
 ONLY_NOISE = 2.0
 """Mean square left over that of the noise up to which nothing but noise is left: noise that is not white has more."""
 
-USUAL_ANGLE, USUAL_PRESSURE, USUAL_GAIN, USUAL_DELAY = math.radians(0.5), 0.3 * PASCALS_PER_PSI, 0.005, 1.0e-3
-"""Zeros [rad], [Pa], gain [-] and delay [s] by which sensors of any bench are off: no disagreement."""
-
-_SENSORS = (ANGLE, PRESSURE_1, PRESSURE_2)
 _TOGETHER = 32
 _STEPS = 2
 _DIFFERENCE = 0.02
@@ -53,6 +47,12 @@ _FEWEST_CLIPPED, _OUTLIER, _OVER_STEPS = 5, 6.0, 3.0
 """Clipped samples over those of any other value; an outlier over the noise, and over the range of its neighbours."""
 
 _AT_REST = 2.0
+"""Standard deviation of the angle over its noise, below which a vane may be held."""
+
+_SWAPPED = {PRESSURE_1: PRESSURE_2, PRESSURE_2: PRESSURE_1}
+_SAMPLES = "samples of "
+_STARTS = (-0.05, 0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.05)
+"""Start of a channel whose first samples are wrong, over its range; the ends, which are refused, lie beyond it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,74 +86,11 @@ class Causes:
     is_noise: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class Sensor:
-    """What a sensor makes of a true value: a gain [-] about a value, a zero in the channel's unit, a delay [s]."""
-
-    gain: float = 1.0
-    zero: float = 0.0
-    about: float = 0.0
-    delay: float = 0.0
-
-    def of(self, true: Floats) -> Floats:
-        """Return the readings of true values."""
-        return self.about + self.gain * (true - self.about) + self.zero
-
-    def true(self, readings: Floats) -> Floats:
-        """Return the values of readings."""
-        return self.about + (readings - self.zero - self.about) / self.gain
-
-
-@dataclass(frozen=True, slots=True)
-class Change:
-    """How record and device differ from the set: sensors by channel, numbers by path [SI], settings of an effect.
-
-    With a ``start``, samples that no sensor made are left out. It is where a channel begins whose first samples are
-    among them, as a fraction [-] of its range.
-    """
-
-    sensors: Mapping[str, Sensor] = field(default_factory=dict)
-    numbers: Mapping[str, float] = field(default_factory=dict)
-    effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    is_swapped: bool = False
-    clock: float = 1.0
-    motion: Motion | None = None
-    start: float | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Candidate:
-    """A cause before its size is known: what a size changes, its words with the place of ``shown`` times the size.
-
-    ``sizes`` are tried first; a cause with one has nothing to fit. A size that ``is_ratio`` is sought as a logarithm.
-    ``usual`` is the largest size, or logarithm, that any bench has; ``unit`` is that of the number of the set.
-    """
-
-    name: str
-    words: str
-    change: Callable[[float], Change]
-    sizes: tuple[float, ...] = (0.0,)
-    is_ratio: bool = False
-    shown: float = 1.0
-    usual: float = 0.0
-    unit: str = ""
-
-    @property
-    def grid(self) -> list[float]:
-        """Sizes as they are sought."""
-        return [math.log(size) if self.is_ratio else size for size in self.sizes]
-
-    def at(self, size: float) -> Change:
-        """Return the change of a size that was sought."""
-        return self.change(math.exp(size) if self.is_ratio else size)
-
-
 class _Record(NamedTuple):
     """A recording that is compared: channels and values (channels, samples) over their noise.
 
-    ``good`` is 1 for a sample that a sensor made and 0 for others, which ``words`` describe. ``delay`` [s] was found with
-    the model of the set; ``starts`` are the changes of the readings with the standard error of each start that was read
-    from the samples.
+    ``good`` is 1 for a sample that a sensor made and 0 for others, which ``words`` describe. ``delay`` [s] was found
+    with the model of the set; ``starts`` are how readings change with the standard error of each start that was read.
     """
 
     measured: Measured
@@ -198,8 +135,8 @@ def causes_of(
     # A measured angle is an input: a delay of the sensors would be one of an input.
     if settings.motion != "measured":
         # Numbers of the set are compared with sensors: the gain of a command is the area of its valve.
-        sizes = [*_sizes(device, names), *_numbers(search)]
-        stages += [_motions(search), _exchanges(device, names), sizes, _effects(device)]
+        sized = [*sizes(device, names), *numbers(read[0], device, settings)]
+        stages += [_motions(search), exchanges(device, names), sized, effects(device)]
     tried: list[Cause] = []
     for stage in stages:
         tried += search.compared(list(stage), none.squares)
@@ -325,13 +262,10 @@ class _Search:
         return runs
 
 
-_SWAPPED = {PRESSURE_1: PRESSURE_2, PRESSURE_2: PRESSURE_1}
-
-
 def _record_of(measured: Measured, agreement: RecordingAgreement, device: Device, settings: ReplaySettings) -> _Record:
     """Return a recording with its samples that no sensor made, and how readings change with each start."""
     recording = measured.recording
-    chosen = [one for one in agreement.channels if one.channel in _SENSORS] or list(agreement.channels[:1])
+    chosen = [one for one in agreement.channels if one.channel in SENSORS] or list(agreement.channels[:1])
     series, noise, good, words = [], [], [], []
     for one in chosen:
         values = measured_values(recording, one.channel)
@@ -356,7 +290,7 @@ def _record_of(measured: Measured, agreement: RecordingAgreement, device: Device
     own, count = replay_of(measured, device, settings), samples_at_rest(recording)
     wanted = [own]
     for name, size in zip(names, noise, strict=True):
-        if name in _SENSORS and name not in settings.initial:
+        if name in SENSORS and name not in settings.initial:
             error = size / math.sqrt(count)
             # A vane at its upper stop can only be moved down.
             way = -1.0 if name == ANGLE and own.start.angle > device.actuator.angle_max - error else 1.0
@@ -371,12 +305,12 @@ def _record_of(measured: Measured, agreement: RecordingAgreement, device: Device
 
 
 def _starts(record: _Record, device: Device, share: float) -> dict[str, float]:
-    """Return the start [SI] of each channel with wrong samples there: of the good ones, else a ``share`` of its range."""
+    """Return the start [SI] of channels with wrong samples there: of the good ones, else a ``share`` of the range."""
     actuator, supply, count = device.actuator, device.supply, samples_at_rest(record.measured.recording)
     given = {}
     for name, values, good in zip(record.channels, record.values * record.noise[:, None], record.good, strict=True):
         of_sensor = values[:count][good[:count] > 0.0]
-        if name in _SENSORS and len(of_sensor) < count:
+        if name in SENSORS and len(of_sensor) < count:
             low, high = supply.atmospheric_pressure, max(supply.pressure, supply.dorsiflexion_pressure)
             if name == ANGLE:
                 low, high = actuator.angle_min, actuator.angle_max
@@ -404,7 +338,8 @@ def _left(record: _Record, replayed: Replayed, change: Change, longest_delay: fl
     interval = float(np.median(np.diff(record.measured.recording.time)))
     good = np.ones_like(record.good) if change.start is None else record.good
     options = []
-    for offset in {0.0, record.delay}:
+    for first in {0.0, record.delay}:
+        offset = first
         for _ in range(_STEPS + 1):
             readings = _readings(record, replayed, change, offset)
             columns = (np.stack([np.gradient(readings, axis=1), *record.starts]) * good).reshape(-1, good.size)
@@ -423,7 +358,7 @@ def _fault_of(values: Floats, one: ChannelAgreement, time: Floats) -> tuple[str,
     levels, counts = np.unique(values, return_counts=True)
     if len(levels) == 1:
         held = "the vane was held (--motion held), or " if one.channel == ANGLE else ""
-        return f"never changes: {held}its sensor is dead or not connected", values == values
+        return f"never changes: {held}its sensor is dead or not connected", np.ones(len(values), dtype=bool)
     for place, word in ((0, "least"), (-1, "largest")):
         is_there = values == levels[place]
         is_many = counts[place] >= _FEWEST_CLIPPED * int(counts[1:-1].max(initial=1))
@@ -437,11 +372,6 @@ def _fault_of(values: Floats, one: ChannelAgreement, time: Floats) -> tuple[str,
     count = int(is_out.sum())
     first = f"{float(time[int(np.argmax(is_out))]):.6g} s"
     return (f"has {count} isolated outlier{'s' * (count > 1)}, the first at {first}" if count else ""), is_out
-
-
-_SAMPLES = "samples of "
-_STARTS = (-0.05, 0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.05)
-"""Start of a channel whose first samples are wrong, over its range: any, so that a little beyond both of its ends."""
 
 
 def _samples(records: Sequence[_Record]) -> Iterator[Candidate]:
@@ -464,196 +394,3 @@ def _motions(search: _Search) -> Iterator[Candidate]:
         if own and all(float(np.std(one.values[place])) < _AT_REST for one, place in own):
             words = "the vane seems to be held, for its recorded angle rests (--motion held)"
             yield Candidate("motion", words, lambda _: Change(motion="held"))
-
-
-def _with_gain(names: Iterable[str], about: float, gain: float) -> Change:
-    return Change(dict.fromkeys(names, Sensor(gain, about=about)))
-
-
-def _with_zero(names: Iterable[str], zero: float) -> Change:
-    return Change(dict.fromkeys(names, Sensor(zero=zero)))
-
-
-def _late(names: Iterable[str], delay: float) -> Change:
-    return Change(dict.fromkeys(names, Sensor(delay=delay)))
-
-
-def _with_number(path: str, own: float, factor: float) -> Change:
-    return Change(numbers={path: factor * own})
-
-
-def _with_effect(name: str, scaled: Iterable[str], given: Mapping[str, float], size: float) -> Change:
-    return Change(effects={name: {**given, **dict.fromkeys(scaled, size)}})
-
-
-_UNITS = {
-    "kPa read as psi": PASCALS_PER_PSI / 1.0e3,
-    "psi read as kPa": 1.0e3 / PASCALS_PER_PSI,
-    "bar read as psi": PASCALS_PER_PSI / 1.0e5,
-    "psi read as bar": 1.0e5 / PASCALS_PER_PSI,
-    "kPa read as bar": 1.0e2,
-    "bar read as kPa": 1.0e-2,
-}
-
-
-def _groups(names: Collection[str]) -> Iterator[tuple[str, tuple[str, ...], str]]:
-    """Pressure sensors that may be wrong together: in words, by channel, and the verb that goes with them."""
-    chambers = tuple(name for name in (PRESSURE_1, PRESSURE_2) if name in names)
-    supplies = tuple(name for name in (SUPPLY, DORSIFLEXION_SUPPLY) if name in names)
-    every = {(name,) for name in (*chambers, *supplies)} | {chambers, supplies, (*chambers, *supplies)}
-    for group in sorted(every - {()}, key=lambda one: (-len(one), one)):
-        is_all = len(group) > 1 and len(group) == len(chambers) + len(supplies)
-        words = "all pressures" if is_all else " and ".join(group)
-        yield words, group, "seem" if len(group) > 1 else "seems"
-
-
-def _exchanges(device: Device, names: Collection[str]) -> Iterator[Candidate]:
-    """Units, gauge or absolute, swapped channels and signs: mistakes without a size."""
-    room, actuator = device.supply.atmospheric_pressure, device.actuator
-    for group_words, group, verb in _groups(names):
-        for unit, factor in _UNITS.items():
-            words = f"{group_words} {verb} to be {unit}"
-            yield Candidate(words, words, partial(_with_gain, group, room), (factor,))
-        for kind, zero in (("gauge read as absolute", -room), ("absolute read as gauge", room)):
-            words = f"{group_words} {verb} to be {kind}"
-            yield Candidate(words, words, partial(_with_zero, group), (zero,))
-    if PRESSURE_1 in names and PRESSURE_2 in names:
-        yield Candidate("swap", "pressure_1 and pressure_2 seem to be swapped", lambda _: Change(is_swapped=True))
-    for name in (COMMAND, EXTERNAL_TORQUE):
-        if name in names:
-            words = f"{name} seems to have the wrong sign"
-            yield Candidate(f"sign of {name}", words, partial(_with_gain, [name], 0.0), (-1.0,))
-    if ANGLE in names:
-        middle = 0.5 * (actuator.angle_min + actuator.angle_max)
-        words = "the angle seems to be counted from the other end"
-        yield Candidate("end of angle", words, partial(_with_gain, [ANGLE], middle), (-1.0,))
-
-
-def _both_ways(*sizes: float) -> tuple[float, ...]:
-    return (*(-size for size in reversed(sizes)), *sizes)
-
-
-_ZEROS = _both_ways(0.003, 0.01, 0.03, 0.1, 0.3, 0.6)
-"""In radians, full openings and gauge pressures of the supply."""
-_GAINS = (0.3, 0.6, 0.8, 0.95, 0.98, 1.02, 1.05, 1.25, 1.6, 3.0)
-_DELAYS = _both_ways(0.001, 0.003, 0.006, 0.012, 0.025)
-_LONG_DELAYS = _both_ways(0.015, 0.03, 0.05, 0.08, 0.12)
-_RATES = (0.7, 0.85, 0.94, 0.98, 0.995, 1.005, 1.02, 1.06, 1.15, 1.4)
-
-
-def _sizes(device: Device, names: Collection[str]) -> Iterator[Candidate]:
-    """Gain and zero of one sensor, of all pressures, of command and supply; delays and the rate of the clock."""
-    supply = device.supply
-    room = supply.atmospheric_pressure
-    gauge = max(supply.pressure, supply.dorsiflexion_pressure) - room
-    sensors = [
-        (words, group, verb, room, gauge, "kPa", 1.0e-3, USUAL_PRESSURE, USUAL_GAIN)
-        for words, group, verb in _groups(names)
-    ]
-    if ANGLE in names:
-        sensors.append((ANGLE, (ANGLE,), "seems", 0.0, 1.0, "deg", math.degrees(1.0), USUAL_ANGLE, USUAL_GAIN))
-    sensors.append((COMMAND, (COMMAND,), "seems", 0.0, 1.0, "of full opening", 1.0, 0.0, 0.0))
-    for words, group, verb, about, size, unit, shown, usual_zero, usual_gain in sensors:
-        yield Candidate(
-            f"zero of {words}",
-            f"the zero of {words} seems to be off by {{:+.3g}} {unit}",
-            partial(_with_zero, group),
-            tuple(size * part for part in _ZEROS),
-            shown=shown,
-            usual=usual_zero,
-        )
-        yield Candidate(
-            f"gain of {words}",
-            f"{words} {verb} to be read {{:.4g}} times too large",
-            partial(_with_gain, group, about),
-            _GAINS,
-            is_ratio=True,
-            usual=usual_gain,
-        )
-    compared = [name for name in _SENSORS if name in names]
-    for name in compared:
-        words = f"{name} seems to be later than the other channels by {{:.3g}} ms"
-        yield Candidate(f"delay of {name}", words, partial(_late, [name]), _DELAYS, shown=1.0e3, usual=USUAL_DELAY)
-    words = "all sensors seem to be later than the command by {:.3g} ms"
-    yield Candidate("delay of all sensors", words, partial(_late, compared), _LONG_DELAYS, shown=1.0e3)
-    words = "the clock of the recording seems to run {:.4g} times as fast"
-    yield Candidate("rate of the clock", words, lambda rate: Change(clock=rate), _RATES, is_ratio=True)
-
-
-_FACTORS = (0.01, 0.05, 0.2, 0.5, 0.8, 0.95, 1.05, 1.25, 2.0, 5.0, 20.0)
-_ROOMS = (0.6, 0.7, 0.8, 0.9, 0.95, 1.03, 1.1)
-_SECTIONS = ("valve", "actuator", "friction", "foot_plate", "supply", "gas")
-_NOT_TRIED = ("actuator.angle_min", "actuator.angle_max", "actuator.restitution")
-_ATMOSPHERE = "supply.atmospheric_pressure"
-_OF_SUPPLY = {"supply.pressure": SUPPLY, "supply.dorsiflexion_pressure": DORSIFLEXION_SUPPLY}
-
-
-def _numbers(search: _Search) -> Iterator[Candidate]:
-    """Each number of the set, and another atmosphere under sensors of gauge pressure."""
-    measured = search.records[0].measured
-    wanted = replay_of(measured, search.device, search.settings)
-    device = wanted.device
-    scenario = replace(replayed_scenario(wanted), device=device)
-    other_forms = {f"{part}.{name}" for part in ("actuator.leak", "valve") for name in other_form(device, part)}
-    followed = {path for path, name in _OF_SUPPLY.items() if measured.has(name)}
-    followed |= set(_OF_SUPPLY) if measured.has(SUPPLY) and device.supply.has_one_pressure else set()
-    declared = declared_numbers(scenario)
-    chosen = [path for section in _SECTIONS for path in declared if path.split(".")[0] == section]
-    for path in (path for path in chosen if path not in (*_NOT_TRIED, *other_forms, *followed)):
-        quantity = declared[path]
-        own = number_at(scenario, path)
-        factors = tuple(one for one in _FACTORS if quantity.minimum <= one * own <= quantity.maximum)
-        if own > 0.0 and len(factors) > 2:
-            words = f"{path} seems to be {{:.3g}} times that of the set"
-            change = partial(_with_number, path, own)
-            yield Candidate(path, words, change, factors, is_ratio=True, unit=quantity.unit or "-")
-    room = device.supply.atmospheric_pressure
-    pressures = {path: number_at(scenario, path) for path in _OF_SUPPLY if path not in followed}
-
-    def in_room(factor: float) -> Change:
-        higher = (factor - 1.0) * room
-        numbers = {_ATMOSPHERE: room + higher, **{path: own + higher for path, own in pressures.items()}}
-        return Change(dict.fromkeys((PRESSURE_1, PRESSURE_2, *_OF_SUPPLY.values()), Sensor(zero=-higher)), numbers)
-
-    words = "the atmosphere under gauge pressures seems to be {:.4g} kPa"
-    yield Candidate("atmosphere", words, in_room, _ROOMS, is_ratio=True, shown=1.0e-3 * room)
-
-
-_EFFECTS: tuple[tuple[str, str, tuple[str, ...], dict[str, float], tuple[float, ...]], ...] = (
-    ("leak_opening", "the leak seems to open at {:.3g} Pa", ("pressure",), {"rise": 0.3}, (1e3, 4e3, 1.6e4, 6e4, 2e5)),
-    (
-        "stribeck",
-        "friction seems to be higher up to {:.2g} rad/s (Stribeck)",
-        ("velocity",),
-        {"share": 0.9},
-        (0.02, 0.1, 0.4, 1.6, 6.0),
-    ),
-    (
-        "seal_friction",
-        "friction seems to grow with the pressure between the chambers by {:.2g} N m/Pa",
-        ("static_per_pressure", "dynamic_per_pressure"),
-        {},
-        (1e-8, 5e-8, 2e-7, 1e-6, 5e-6),
-    ),
-    (
-        "second_virial",
-        "the gas seems not to be ideal, with {:.2g} times the second virial coefficient of CO2",
-        ("share",),
-        {"coefficient": SECOND_VIRIAL["CO2"]},
-        (0.05, 0.2, 0.7, 2.5, 8.0),
-    ),
-    (
-        "spool_play",
-        "the spool seems to have a play of {:.2g} of its command",
-        ("width",),
-        {},
-        (0.005, 0.02, 0.08, 0.2, 0.4),
-    ),
-)
-"""Effects that a device may have and the model has not: the settings that grow with one size, those given, sizes."""
-
-
-def _effects(device: Device) -> Iterator[Candidate]:
-    for name, words, scaled, given, sizes in _EFFECTS:
-        if name not in device.effects:
-            yield Candidate(name, words, partial(_with_effect, name, scaled, given), sizes, is_ratio=True)
