@@ -48,7 +48,7 @@ def fitted(folder: Path, more: str) -> TrajectoryFit:
     return outcome.fit
 
 
-def test_planted_values_are_found_where_the_run_follows_the_recorded_supply(folder: Path) -> None:
+def test_true_values_are_found_where_the_run_follows_the_recorded_supply(folder: Path) -> None:
     found = fitted(folder, 'inputs = ["supply_pressure"]\n')
     supply = found.problem.experiments[0].recording["supply_pressure"]
     assert np.ptp(supply) > 3.0e4

@@ -1,8 +1,8 @@
-"""Faults of record and device, planted in recordings of the simulated test bench: the right one is named."""
+"""Faults of record and device, known in recordings of the simulated test bench: the right one is named."""
 
 import pytest
 
-from scripts.planted_disagreements import FAULTS, NOTHING, Fault, judged, validated
+from scripts.known_faults import FAULTS, NOTHING, Fault, judged, validated
 
 pytestmark = [pytest.mark.long, pytest.mark.thorough]
 

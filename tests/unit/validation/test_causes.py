@@ -1,4 +1,4 @@
-"""Causes of a disagreement: each stage names what was planted, and nothing is named that leaves more than noise."""
+"""Causes of a disagreement: each stage names the true one, and nothing is named that leaves more than noise."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -147,6 +147,17 @@ def test_two_mistakes_at_once_have_no_single_cause_and_the_nearest_is_said(bench
     found = causes(wrong)
     assert found.found is None
     assert found.nearest is not None
+    assert found.nearest.left**2 > 2.0
+
+
+@pytest.mark.parametrize("samples", [dead, clipped, with_outliers])
+def test_wrong_samples_are_no_cause_where_the_others_disagree_too(
+    samples: Callable[[Recording], Recording], bench: Recording
+) -> None:
+    found = causes(samples(with_channel(bench, "angle", 1.06 * bench["angle"])))
+    assert found.found is None
+    assert found.nearest is not None
+    assert found.nearest.name.startswith("samples of pressure_")
     assert found.nearest.left**2 > 2.0
 
 

@@ -1,11 +1,12 @@
-"""Plants 14 faults in recordings, and prints what `ppafo validate` names; then how often right recordings disagree.
+"""Prints what `ppafo validate` names of 14 known faults, of two at once, and how often right recordings disagree.
 
-    python scripts/planted_disagreements.py --seeds 4711 4712 --right 100
+    python scripts/known_faults.py --seeds 4711 4712 --pairs 40 --right 100
 
 Recordings are step responses of the simulated bench (ideal-laboratory), which shares no equation of motion and
 no integrator with the model: 1 kHz, free vane, its own noise. Each fault is one of the record or one number of the
 device. `right`: the fault is named first, or among those that the recordings cannot tell from the first; `wrong`:
-another is named; `none`: none is. ``--right`` plants nothing, as often as it says, with seeds from the first on.
+another is named; `none`: none is. ``--pairs`` has two different faults at once, drawn with the first seed: no single
+change explains them. ``--right`` has no fault, with seeds from the first on.
 """
 
 import argparse
@@ -21,6 +22,7 @@ import numpy as np
 import ppafo
 from ppafo.analyses.validate.solve import Validation, in_words
 from ppafo.constants import PASCALS_PER_PSI
+from ppafo.errors import PpafoError
 from ppafo.rig.experiments import record
 from ppafo.signals.recording import Recording
 from ppafo.storage import write_csv
@@ -127,7 +129,7 @@ def recorded(fault: Fault, seed: int) -> Recording:
 def validated(fault: Fault, seed: int) -> Validation:
     """What `ppafo validate` says of a recording with a fault."""
     with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "planted.csv"
+        file = Path(folder) / "recorded.csv"
         write_csv(file, recorded(fault, seed))
         return ppafo.validate("ppafo2011", [file], overrides=SUPPLY)
 
@@ -140,11 +142,39 @@ def judged(fault: Fault, found: Validation) -> str:
     return "right" if any(in_words(one).startswith(fault.named) for one in (best, *best.same)) else "wrong"
 
 
+def together(first: Fault, second: Fault) -> Fault:
+    """Both faults at once."""
+    return Fault(
+        f"{first.title}, {second.title}",
+        (*first.named, *second.named),
+        lambda one: second.record(first.record(one)),
+        (*first.device, *second.device),
+    )
+
+
+def pairs_judged(count: int, seed: int) -> str:
+    """How often two faults at once have a single cause that is neither, one of them that explains both, or none."""
+    random, found = np.random.default_rng(seed), Counter[str]()
+    for number in range(count):
+        first, second = (FAULTS[place] for place in random.choice(len(FAULTS), 2, replace=False).tolist())
+        both = together(first, second)
+        try:
+            verdict = judged(both, validated(both, seed + number))
+        except PpafoError:
+            verdict = "refused"
+        found[verdict] += 1
+        if verdict in ("right", "wrong"):
+            print(f"  {both.title}: {verdict}", flush=True)
+    words = {"wrong": "another named", "right": "one named that explains both", "none": "none named"}
+    return ", ".join(f"{found[name]} {text}" for name, text in (*words.items(), ("refused", "refused when read")))
+
+
 def main() -> None:
     """Print the table, a row when it is done."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, nargs="+", required=True)
-    parser.add_argument("--right", type=int, default=0, metavar="COUNT", help="nothing planted, COUNT times")
+    parser.add_argument("--right", type=int, default=0, metavar="COUNT", help="COUNT right recordings")
+    parser.add_argument("--pairs", type=int, default=0, metavar="COUNT", help="COUNT recordings with two faults")
     words = parser.parse_args()
     total: Counter[str] = Counter()
     begun = time.process_time()
@@ -158,6 +188,8 @@ def main() -> None:
         print(f"{fault.title}: {said} ({' or '.join(same)})", flush=True)
     spent = (time.process_time() - begun) / total.total()
     print(f"\n{', '.join(f'{total[verdict]} {verdict}' for verdict in VERDICTS)}; {spent:.1f} CPU s each", flush=True)
+    if words.pairs:
+        print(f"two faults at once: {pairs_judged(words.pairs, words.seeds[0])}", flush=True)
     if words.right:
         right = [validated(NOTHING, words.seeds[0] + number) for number in range(words.right)]
         alarms = sum(not one.passes for one in right)
