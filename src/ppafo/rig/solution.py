@@ -27,10 +27,10 @@ from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import SimulationError
 from ppafo.model.effects.spool_play import spool_position
 from ppafo.model.orifice import ExactOrifice
-from ppafo.model.plant import Openings, PlantParameters, actuator_torque, holds_still
+from ppafo.model.plant import Openings, actuator_torque, holds_still
 from ppafo.model.sensors import Measurement
 from ppafo.parameters.device import Device
-from ppafo.rig.dynamics import RigPhysics, RigState, observables, rig_rates
+from ppafo.rig.dynamics import RigNumbers, RigPhysics, RigState, observables, rig_rates
 from ppafo.rig.preset import Sensor
 from ppafo.rig.stiff import solve_stretch
 
@@ -86,15 +86,6 @@ INPUTS = 7
 """Numbers that come from outside: four openings, angle [rad] and prescribed rate [rad/s] of the vane, and the torque
 of a leg on it [N m]."""
 
-PARAMETER_GROUPS = {
-    "plant": PlantParameters,
-    "rig": RigPhysics,
-    "valve_orifice": ExactOrifice,
-    "leak_orifice": ExactOrifice,
-    "line_orifice": ExactOrifice,
-}
-"""Groups of numbers that both functions need, in order."""
-
 
 class RigProgram(NamedTuple):
     """``fill(y, slopes, parameters, inputs, direction)`` and ``show(y, outputs, parameters, inputs, direction)``.
@@ -111,22 +102,18 @@ def rig_source() -> str:
     """Source of the module."""
     collector = SourceCollector(INLINE)
     add = collector.add
-    cells: dict[str, str] = {}
-    for name, row in PARAMETER_GROUPS.items():
-        for path in leaf_paths(row, name):
-            cells[path] = f"parameters[{len(cells)}]"
+    cells = {path: f"parameters[{number}]" for number, path in enumerate(leaf_paths(RigNumbers, "given"))}
     cells |= {f"state.{field}": f"y[{number}]" for number, field in enumerate(RigState._fields)}
     cells |= {f"openings.{field}": f"inputs[{number}]" for number, field in enumerate(Openings._fields)}
-    rows = PARAMETER_GROUPS | {"state": RigState, "openings": Openings}
-    given = [f"{name} = {row_expression(row, name, cells, add)}" for name, row in rows.items()]
-    orifices = "valve_orifice, leak_orifice, line_orifice"
+    rows = {"given": RigNumbers, "state": RigState, "openings": Openings}
+    rebuilt = [f"{name} = {row_expression(row, name, cells, add)}" for name, row in rows.items()]
     motion = f"inputs[{ANGLE}], inputs[{RATE}], inputs[{ADDED}], direction"
-    fill = [f"rates = {add(rig_rates)}(plant, rig, {orifices}, openings, state, {motion})"]
+    fill = [f"rates = {add(rig_rates)}(given, openings, state, {motion})"]
     fill += [f"slopes[{number}] = rates.{field}" for number, field in enumerate(RigState._fields)]
-    show = [f"now = {add(observables)}(plant, rig, state, inputs[{ANGLE}], inputs[{ADDED}])"]
+    show = [f"now = {add(observables)}(given, state, inputs[{ANGLE}], inputs[{ADDED}])"]
     outputs = ("node_1.pressure", "node_2.pressure", "torque", "static_limit")
     show += [f"outputs[{number}] = now.{path}" for number, path in enumerate(outputs)]
-    functions = [_function("fill", "slopes", given + fill), _function("show", "outputs", given + show)]
+    functions = [_function("fill", "slopes", rebuilt + fill), _function("show", "outputs", rebuilt + show)]
     return "\n\n\n".join([HEADER, collector.text(), *functions])
 
 
@@ -161,8 +148,8 @@ class _Rig:
         self.plant = rig_run.run.plant
         self.is_free = rig_run.run.program.angle is None
         run = rig_run.run
-        groups = (run.plant, rig_run.physics, run.valve_orifice, run.leak_orifice, rig_run.line_orifice)
-        parameters = np.array([number for group in groups for number in numbers(group)])
+        given = RigNumbers(run.plant, rig_run.physics, run.valve_orifice, run.leak_orifice, rig_run.line_orifice)
+        parameters = np.array(numbers(given))
         self.y = np.array([*rig_run.initial, *numbers(run.program.valve.initial())], dtype=np.float64)
         self.outputs, self.inputs = np.empty(OUTPUTS), np.zeros(INPUTS)
         self.present, self.rates = np.empty(UNKNOWNS), np.empty(UNKNOWNS)
