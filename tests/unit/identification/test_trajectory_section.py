@@ -290,7 +290,7 @@ def test_the_published_schema_has_the_section() -> None:
         (f"{FIT}inputs = ['external_torque']\n", "has no channel 'external_torque' to follow"),
         (f"{FIT}channels = ['torque']\n", "channel 'torque' cannot be fitted"),
         (f"{FIT}noise = {{ angel = '1 deg' }}\n", "noise of 'angel', did you mean 'angle'"),
-        (f"{FIT}time_offset = '0 s'\n", "experiment 'step': time_offset = '0 s' must be above 0"),
+        (f"{FIT}time_offset = '0 s'\n", "experiment 'step': time_offset = '0 s' must be above zero"),
         (f"{FIT}time_offset = '5 mm'\n", "time_offset = '5 mm': unit 'mm' does not fit"),
         (f"{FIT}step = '1 min'\n", "step = '1 min': must be from"),
         (f"{FIT}start = '9 s'\n", "has 0 samples after 9 s"),
