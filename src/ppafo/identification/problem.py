@@ -295,7 +295,7 @@ class ProblemFile(StrictTable):
     device: DeviceProblem = Field(description="the set to start from")
     citation: Citation | None = Field(None, description="who measured; default: that of the set to start from")
     columns: dict[str, ColumnMap] = Field({}, description="column maps by name, for files from elsewhere")
-    bench: BenchSection | None = Field(None, description="what the bench does not know exactly, and what it can do")
+    bench: BenchSection | None = Field(None, description="what the bench does not know exactly")
     procedure: tuple[Annotated[ProcedureProblem, Field(discriminator="kind")], ...] = Field(
         (), strict=False, min_length=1, description="bench procedures to apply"
     )

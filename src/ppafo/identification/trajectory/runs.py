@@ -71,46 +71,24 @@ class Measured:
 
 
 @dataclass(frozen=True, slots=True)
-class Samples:
-    """What a run is compared with: times [s] of the run, channels, and how far [s] a fitted offset may move them."""
-
-    time: Floats
-    channels: tuple[Measured, ...]
-    reach: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
 class PreparedExperiment:
     """An experiment by its label, with its scenario completed and its samples placed in the record of a run.
 
-    ``run`` has the step and the clock of all columns; a sample is ``fraction`` [-] of the way from record ``place`` to
-    the next. ``inputs`` are what the run follows at each step, made of what ``recorded`` has; None where it follows
-    nothing.
+    ``time`` [s] is that of the samples in the run, ``reach`` how far [s] a fitted offset may move them. ``run`` has the
+    step and the clock of all columns; a sample is ``fraction`` [-] of the way from record ``place`` to the next.
+    ``inputs`` are what the run follows at each step, made of what ``recorded`` has; None where it follows nothing.
     """
 
     label: str
     scenario: Scenario
     run: Run
-    samples: Samples
+    time: Floats
+    channels: tuple[Measured, ...]
+    reach: float
     place: Indices
     fraction: Floats
     recorded: RecordedInputs | None = None
     inputs: StepInputs | None = None
-
-    @property
-    def time(self) -> Floats:
-        """Times of the samples in the time of the run [s]."""
-        return self.samples.time
-
-    @property
-    def channels(self) -> tuple[Measured, ...]:
-        """The channels that are compared."""
-        return self.samples.channels
-
-    @property
-    def record_interval(self) -> float:
-        """Time between two records of the run [s]."""
-        return self.run.step * self.run.record_every
 
 
 def prepare(experiment: Experiment, numbers: Mapping[str, float], reach: float = 0.0) -> PreparedExperiment:
@@ -140,29 +118,32 @@ def prepare(experiment: Experiment, numbers: Mapping[str, float], reach: float =
             )
     scenario = replace(scenario_of(experiment), duration=float(time[-1]) + reach)
     recorded = RecordedInputs(recording, experiment.inputs, experiment.start) if experiment.inputs else None
-    return prepare_samples(experiment.label, scenario, Samples(time, tuple(channels), reach), numbers, recorded)
+    return prepare_samples(experiment.label, scenario, time, channels, reach, numbers, recorded)
 
 
 def prepare_samples(
     label: str,
     scenario: Scenario,
-    samples: Samples,
+    time: Floats,
+    channels: Sequence[Measured],
+    reach: float,
     numbers: Mapping[str, float],
     recorded: RecordedInputs | None = None,
 ) -> PreparedExperiment:
-    """Return samples of a scenario's run made ready, at ``numbers`` [SI] by path."""
+    """Return samples of a scenario's run made ready, at ``numbers`` [SI] by path; an offset may be up to ``reach``."""
     run = replace(plan_run(with_numbers(scenario, numbers)), tolerance=FIT_TOLERANCE)
-    nowhere = np.zeros(samples.time.size)
-    unplaced = PreparedExperiment(label, scenario, run, samples, nowhere.astype(np.intp), nowhere, recorded)
+    nowhere = np.zeros(time.size)
+    place = nowhere.astype(np.intp)
+    unplaced = PreparedExperiment(label, scenario, run, time, tuple(channels), reach, place, nowhere, recorded)
     return _place_samples(unplaced, run)
 
 
 def _place_samples(prepared: PreparedExperiment, run: Run) -> PreparedExperiment:
     """Return the samples placed in a record of a run that is no finer than they need."""
-    samples, recorded = prepared.samples, prepared.recorded
-    every = _steps_between_samples(samples, run.step)
-    records = math.ceil((float(samples.time[-1]) + samples.reach) / (run.step * every) - _FITS)
-    position = samples.time / (run.step * every)
+    time, recorded = prepared.time, prepared.recorded
+    every = _steps_between_samples(time, prepared.reach, run.step)
+    records = math.ceil((float(time[-1]) + prepared.reach) / (run.step * every) - _FITS)
+    position = time / (run.step * every)
     place = np.minimum(np.floor(position + _FITS), records).astype(np.intp)
     fraction = np.maximum(position - place, 0.0)
     # Rounding of the clock must not make a sample lie between two records.
@@ -174,17 +155,17 @@ def _place_samples(prepared: PreparedExperiment, run: Run) -> PreparedExperiment
     return replace(prepared, run=frozen, place=place, fraction=fraction, inputs=inputs)
 
 
-def _steps_between_samples(samples: Samples, step: float) -> float:
+def _steps_between_samples(time: Floats, reach: float, step: float) -> float:
     """Return the steps between two records: as many as between two samples, fewer where these are read in between.
 
     A fraction of a step where a whole one is too long to be read in between.
     """
-    every = max(1, round(float(np.min(np.diff(samples.time))) / step))
-    position = samples.time / (step * every)
+    every = max(1, round(float(np.min(np.diff(time))) / step))
+    position = time / (step * every)
     is_aligned = bool(np.all(np.abs(position - np.round(position)) < _FITS * np.maximum(position, 1.0)))
-    if is_aligned and samples.reach == 0.0:
+    if is_aligned and reach == 0.0:
         return every
-    read_interval = max(_READ_INTERVAL, float(samples.time[-1]) / _MAXIMUM_RECORDS)
+    read_interval = max(_READ_INTERVAL, float(time[-1]) / _MAXIMUM_RECORDS)
     most = read_interval / step * (1.0 + _FITS)
     if most < 1.0:
         return 1.0 / math.ceil(1.0 / most)
@@ -194,6 +175,11 @@ def _steps_between_samples(samples: Samples, step: float) -> float:
 def columns_in(label: str, numbers: Sequence[Number], points: Floats) -> dict[str, Floats]:
     """Return the numbers [SI] by path that act in the experiment with a label, at points [SI] (numbers, points)."""
     return {item.path: row for item, row in zip(numbers, points, strict=True) if item.acts_in(label)}
+
+
+def numbers_in(label: str, numbers: Sequence[Number], point: Floats) -> dict[str, float]:
+    """Return the numbers [SI] by path that act in the experiment with a label, at one point [SI] (numbers,)."""
+    return {path: float(row[0]) for path, row in columns_in(label, numbers, point[:, None]).items()}
 
 
 def signals_of(
@@ -248,8 +234,7 @@ def blocks_of(experiments: Sequence[PreparedExperiment], numbers: Sequence[Numbe
 
 def _with_half_steps(prepared: PreparedExperiment, numbers: Sequence[Number], point: Floats) -> PreparedExperiment:
     scenario = replace(prepared.scenario, time_step=0.5 * prepared.run.step)
-    given = {path: float(row[0]) for path, row in columns_in(prepared.label, numbers, point[:, None]).items()}
-    run = plan_run(with_numbers(scenario, given))
+    run = plan_run(with_numbers(scenario, numbers_in(prepared.label, numbers, point)))
     return _place_samples(prepared, replace(run, tolerance=_FINER * prepared.run.tolerance))
 
 
@@ -268,25 +253,21 @@ def run_with(prepared: PreparedExperiment, numbers: Mapping[str, Any]) -> Run:
     base = prepared.run
     scenario = with_numbers(prepared.scenario, numbers)
     device = scenario.device
+    said, before = f"experiment '{prepared.label}'", prepared.scenario.device.valve.settings
     settings: Mapping[str, Any] = device.valve.settings
-    counts = [value.size for value in settings.values() if isinstance(value, np.ndarray)]
-    for run in range(max(counts, default=1)):
-        own = {name: at(value, run) for name, value in settings.items()}
-        valve = VALVES[device.valve.kind].choose(own)
-        if valve != base.program.valve or (valve.command_delay(own) > 0.0) != base.program.late_commands:
-            fitted = {path.rpartition(".")[2] for path in numbers if path.startswith("valves.")}
-            at_zero = [name for name in own if name in fitted and own[name] == 0.0]
-            moved = at_zero or [
-                name for name in own if name in fitted and prepared.scenario.device.valve.settings[name] == 0.0
-            ]
+    own = {path.rpartition(".")[2] for path in numbers if path.startswith("valves.")}
+    for run in range(max((value.size for value in settings.values() if isinstance(value, np.ndarray)), default=1)):
+        now = {name: at(value, run) for name, value in settings.items()}
+        valve = VALVES[device.valve.kind].choose(now)
+        if valve != base.program.valve or (valve.command_delay(now) > 0.0) != base.program.late_commands:
+            moved = " or ".join(f"valve.{name}" for name in now if name in own and 0.0 in (now[name], before[name]))
             raise IdentificationError(
-                f"experiment '{prepared.label}': {' or '.join(f'valve.{name}' for name in moved)} went to or from 0, "
-                "which is another model of the valve; give a start and a lower bound above 0"
+                f"{said}: {moved} went to or from 0, which is another model of the valve; give a start and a lower bound "
+                "above 0"
             )
     if any(np.any(is_on != (effect in base.program.effects)) for effect, is_on in switches_of(device).items()):
         raise IdentificationError(
-            f"experiment '{prepared.label}': an effect went on or off, which is another model; start above 0 and give "
-            "a lower bound above 0"
+            f"{said}: an effect went on or off, which is another model; start above 0 and give a lower bound above 0"
         )
     planned, _ = plan_runs(scenario)
     # The engine allows a fraction of the supply pressure. Where that is fitted, the error in pascals must stay.
@@ -399,7 +380,8 @@ def _at_samples(values: Floats, prepared: PreparedExperiment, offsets: Floats) -
     """Return a state at the times of the samples, by straight lines between records; each run with its offset [s]."""
     if offsets.any():
         # Before the first record the device stands still.
-        position = np.clip((prepared.time[:, None] - offsets) / prepared.record_interval, 0.0, len(values) - 1.0)
+        interval = prepared.run.step * prepared.run.record_every
+        position = np.clip((prepared.time[:, None] - offsets) / interval, 0.0, len(values) - 1.0)
         place = np.minimum(position.astype(np.intp), len(values) - 2)
         elements = np.arange(len(offsets))
         here, following = values[place, elements], values[place + 1, elements]
