@@ -25,6 +25,7 @@ from ppafo.identification.bench.static_torque import StaticTorqueSettings, stati
 from ppafo.identification.bench.valve_map import ValveMapSettings, valve_map
 from ppafo.identification.bench.vane_leak import VaneLeakSettings, vane_leak
 from ppafo.identification.keys import Columns, Confidence, positive_in, quantity_in
+from ppafo.identification.new_set import stated_half_width
 from ppafo.identification.source import Source
 from ppafo.identification.tolerances import DEFAULTS, BenchSection, Tolerances, deviation_of_limit
 from ppafo.identification.trajectory.section import TrajectorySection, refuse_removed
@@ -32,7 +33,6 @@ from ppafo.model.gas import SPECIES
 from ppafo.parameters.device import VANE
 from ppafo.parameters.parameter_set import Citation, ParameterSet, chosen_valve, number_in_si
 from ppafo.storage.foreign import ColumnMap
-from ppafo.units import to_si
 
 _Recordings = Annotated[tuple[Text, ...], Field(strict=False, min_length=1, description="files, relative to this one")]
 _Start = Annotated[Text | None, Field(description="first time to use, such as '2 s'")]
@@ -72,17 +72,13 @@ class Setting:
 
         IdentificationError for an unknown species.
         """
-        temperature, species = quantity_in(problem, "temperature", "K", self.place), problem.gas
+        temperature, species = quantity_in(problem, "temperature", "K", self.place, _COLDEST, _HOTTEST), problem.gas
         if temperature is None:
             temperature = self.number("gas.temperature")
             deviation = self.deviation("gas.temperature", temperature, "K")
-        elif _COLDEST <= temperature <= _HOTTEST:
+        else:
             limit = self.tolerances.gas_temperature
             deviation = deviation_of_limit(_THERMOMETER if limit is None else limit)
-        else:
-            raise IdentificationError(
-                f"{self.place}: temperature = {problem.temperature!r} must be from {_COLDEST:g} to {_HOTTEST:g} K"
-            )
         if species is None:
             own = self.number("gas.molar_mass"), self.number("gas.heat_capacity_ratio")
             return GasAt(*own, temperature, deviation)
@@ -95,10 +91,8 @@ class Setting:
 
     def deviation(self, path: str, value: float, unit: str) -> float:
         """Return the standard deviation of a number that the set has or leaves to the problem, at a value [unit]."""
-        entry, half_width = self.parameter_set.numbers.get(path), 0.0
-        if entry is not None and entry.uncertainty:
-            half_width = to_si(entry.value + entry.uncertainty, entry.unit, unit) - to_si(entry.value, entry.unit, unit)
-        return self.tolerances.deviation_of(path, value, half_width)
+        entry = self.parameter_set.numbers.get(path)
+        return self.tolerances.deviation_of(path, value, 0.0 if entry is None else stated_half_width(entry, unit))
 
     def valve_path(self, name: str | None) -> str:
         """Return the path of a valve in the set, ``valves.main``."""
@@ -316,12 +310,6 @@ def parse_problem(content: bytes, file: str) -> ProblemFile:
     IdentificationError for one that is not usable.
     """
     document = _FILE.parse(content, file)
-    procedures = document.get("procedure")
-    for item in procedures if isinstance(procedures, list) else ():
-        # 0.1 wrote ``static_torque``.
-        kind = item.get("kind") if isinstance(item, dict) else None
-        if isinstance(kind, str) and kind.replace("_", "-") in PROCEDURES:
-            item["kind"] = kind.replace("_", "-")
     refuse_removed(document, file)
     problem = validate(ProblemFile, document, file, IdentificationError)
     if not problem.procedure and problem.trajectory is None:

@@ -42,11 +42,6 @@ def source_of(path: Path, recording: Recording) -> Source:
     return Source(recording, f"{path.name} sha256:{hashlib.sha256(read_bytes(path)).hexdigest()}")
 
 
-def traces(sources: tuple[Source, ...]) -> tuple[str, ...]:
-    """Return what an estimate from these recordings names as its origin."""
-    return tuple(source.trace for source in sources)
-
-
 @dataclass(frozen=True, slots=True)
 class Use:
     """A recording as it is used: by what, the file's trace, the channels that count, first and last time [s]."""

@@ -39,13 +39,13 @@ from ppafo.rig.preset import (
     Outcome,
     Preset,
     Request,
-    line_orifice,
+    list_presets,
     load_preset,
     random_stream,
     real_device,
     rig_physics,
-    rig_plant,
     sensor,
+    with_line,
 )
 from ppafo.rig.solution import RigRun, sensor_signals, solve_rig
 from ppafo.signals.recording import CHANNELS, Channel, Recording
@@ -284,14 +284,14 @@ def rig_run(scenario: Scenario, request: Request, highest_rate: float = math.inf
         raise ScenarioError(
             f"the simulated test bench has no valve between the chambers: valve '{device.valve.kind}' has one"
         )
-    run = replace(run, plant=rig_plant(run.plant, preset))
-    physics = rig_physics(device, preset)
+    physics, (plant, line) = rig_physics(device, preset), with_line(device, run.plant, preset)
+    run = replace(run, plant=plant)
     times = np.arange(int(scenario.duration * rate + _WHOLE) + 1, dtype=np.float64) / rate
     return RigRun(
         device=device,
         run=run,
         physics=physics,
-        line_orifice=line_orifice(device, preset),
+        line_orifice=line,
         initial=initial_state(scenario, run, physics),
         sensors={name: sensor(preset, name, request.seed, times.size) for name in (*_SENSED, *_SUPPLIES)},
         sample_times=times,
@@ -389,6 +389,21 @@ EXPERIMENTS: dict[str, Experiment] = {
         Experiment("torque-task", "figure 8: torque ramp and hold under control", record_torque_task),
     )
 }
+
+
+def overview() -> tuple[str, dict[str, Any]]:
+    """Return the experiments and the presets with what they are, as text and as plain data."""
+    experiments = {item.name: item.summary for item in EXPERIMENTS.values()}
+    presets = {name: load_preset(name).title for name in list_presets()}
+    width = max(map(len, [*experiments, *presets]))
+    lines = ["experiments (recordings are synthetic):"]
+    lines += [f"  {name:<{width}}  {summary}" for name, summary in experiments.items()]
+    lines += ["presets:", *(f"  {name:<{width}}  {title}" for name, title in presets.items())]
+    document = {
+        "experiments": [{"name": name, "summary": summary} for name, summary in experiments.items()],
+        "presets": [{"name": name, "title": title} for name, title in presets.items()],
+    }
+    return "\n".join(lines), document
 
 
 LARGEST_SEED = 2**32 - 1

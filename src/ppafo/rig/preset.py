@@ -25,7 +25,7 @@ from ppafo.errors import ParameterError, UnitError, nearest_name, refused_as
 from ppafo.model.catalog import VALVES
 from ppafo.model.declaration import Quantity, range_rule
 from ppafo.model.effects import stribeck
-from ppafo.model.effects.kind import SECTION, Effect
+from ppafo.model.effects.kind import SECTION
 from ppafo.model.effects.seal_friction import SealFriction
 from ppafo.model.effects.second_virial import SECOND_VIRIAL
 from ppafo.model.gas import heat_capacity_at_constant_volume
@@ -230,44 +230,26 @@ def real_device(device: Device, preset: Preset) -> Device:
 
     ParameterError for a device with an effect that is on: the rig has physics of its own, and would record without it.
     """
-    for effect, is_on in switches_of(device).items():
-        if is_on:
-            raise ParameterError(
-                f"the simulated bench has no effect '{effect.name}': switch it off with {_off(effect)}, or take the "
-                "recording of a simulated run"
-            )
+    for effect in (effect for effect, is_on in switches_of(device).items() if is_on):
+        zeros = {item.name: f"0 {item.unit}".strip() for item in effect.quantities}
+        off = " and ".join(f"'{SECTION}.{effect.name}.{name}={zeros[name]}'" for name in effect.switch)
+        raise ParameterError(
+            f"the simulated bench has no effect '{effect.name}': switch it off with {off}, or take the recording of a "
+            "simulated run"
+        )
     declared = {item.name for item in VALVES[device.valve.kind].quantities}
-    added = {name: value for name, value in preset.section("valve").items() if name in declared}
-    given = {name for name in added if device.valve.settings.get(name, 0.0) != 0.0 and name != "spool_damping_ratio"}
-    kept = {name: value for name, value in added.items() if name not in given}
-    valve = replace(device.valve, settings={**device.valve.settings, **kept})
+    settings, added = dict(device.valve.settings), preset.section("valve")
+    for name in (name for name in added if name in declared):
+        # What the set states of its valve counts; a damping ratio is stated beside any frequency.
+        if settings.get(name, 0.0) == 0.0 or name == "spool_damping_ratio":
+            settings[name] = added[name]
+    valve = replace(device.valve, settings=settings)
     leak, factor = device.actuator.leak, preset.values["leak.conductance_factor"]
     if isinstance(leak, SonicOrifice):
         leak = replace(leak, sonic_conductance=leak.sonic_conductance * factor)
     else:
         leak = replace(leak, area=leak.area * factor)
     return replace(device, valve=valve, actuator=replace(device.actuator, leak=leak))
-
-
-def _off(effect: Effect) -> str:
-    """Settings that switch an effect off, such as "effects.ice.blockage=0 1/kg"."""
-    units = {item.name: item.unit for item in effect.quantities}
-    return " and ".join(f"'{SECTION}.{effect.name}.{name}={f'0 {units[name]}'.strip()}'" for name in effect.switch)
-
-
-def rig_plant(plant: PlantParameters, preset: Preset) -> PlantParameters:
-    """Return the plant with the lines taken out of the dead volumes, of which they are a part.
-
-    ParameterError where a line is larger than a dead volume.
-    """
-    line = preset.values["line.volume"]
-    smallest = min(plant.dead_volume_1, plant.dead_volume_2)
-    if line >= smallest:
-        raise ParameterError(
-            f"preset '{preset.name}': line.volume = {line:g} m^3 must be below the dead volumes of the device, "
-            f"of which it is a part; the smaller one is {smallest:g} m^3"
-        )
-    return plant._replace(dead_volume_1=plant.dead_volume_1 - line, dead_volume_2=plant.dead_volume_2 - line)
 
 
 def rig_physics(device: Device, preset: Preset) -> RigPhysics:
@@ -304,19 +286,27 @@ def rig_physics(device: Device, preset: Preset) -> RigPhysics:
     )
 
 
-def line_orifice(device: Device, preset: Preset) -> ExactOrifice:
-    """Return the orifice between line and chamber. ParameterError for a line without an orifice."""
+def with_line(device: Device, plant: PlantParameters, preset: Preset) -> tuple[PlantParameters, ExactOrifice]:
+    """Return the plant with the lines taken out of the dead volumes, of which they are a part, and their orifice.
+
+    ParameterError for a line larger than a dead volume, and for one without an orifice.
+    """
     gas, line = device.gas, preset.section("line")
-    if line["volume"] > 0.0 and line["area"] * line["discharge_coefficient"] <= 0.0:
+    volume, smallest = line["volume"], min(plant.dead_volume_1, plant.dead_volume_2)
+    if volume >= smallest:
+        raise ParameterError(
+            f"preset '{preset.name}': line.volume = {volume:g} m^3 must be below the dead volumes of the device, "
+            f"of which it is a part; the smaller one is {smallest:g} m^3"
+        )
+    if volume > 0.0 and line["area"] * line["discharge_coefficient"] <= 0.0:
         raise ParameterError(
             f"preset '{preset.name}': line.area and line.discharge_coefficient must be above 0 with a line"
         )
     conductance = area_conductance(
         line["area"], line["discharge_coefficient"], gas.heat_capacity_ratio, gas.specific_gas_constant, gas.temperature
     )
-    return ExactOrifice(
-        conductance=conductance, is_iso6358=0.0, number=gas.heat_capacity_ratio, linear_ratio=device.flow.linear_ratio
-    )
+    shorter = plant._replace(dead_volume_1=plant.dead_volume_1 - volume, dead_volume_2=plant.dead_volume_2 - volume)
+    return shorter, ExactOrifice(conductance, 0.0, gas.heat_capacity_ratio, device.flow.linear_ratio)
 
 
 Floats = NDArray[np.float64]

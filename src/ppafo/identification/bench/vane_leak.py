@@ -252,9 +252,17 @@ def _decaying_leak(
                 parts.append(true * (1.0 + at[f"relaxation of {name}, decay {number}"] * faded) + at[f"zero of {name}"])
         return np.concatenate(parts)
 
+    shut = [item.changes for item in closed if not item.is_a_room]
+    ratio: tuple[Free, ...] = ()
+    if shut and volumes[0] and volumes[1]:
+        # Two volumes, each known to the deviation.
+        known = volumes[0] / volumes[1]
+        ratio = tolerance(_RATIO, math.sqrt(2.0) * settings.volume_deviation * known, known)
+    elif shut:
+        ratio = (sought(_RATIO, max(float(np.mean([rise / fall for fall, rise in shut])), 1.0e-3), 1.0e-6),)
     numbers = (
         sought(size.path, _rough_size(closed, opening, constant * gas.temperature / emptied), 0.0),
-        *_ratio_numbers(closed, volumes, settings.volume_deviation),
+        *ratio,
         *(one for number, item in enumerate(closed, start=1) for one in _starts(names, number, item)),
         *(
             one
@@ -320,20 +328,6 @@ def _rough_size(closed: tuple[ClosedChambers, ...], opening: Opening, rate: floa
         # Of a chamber that holds, what its noise would hide.
         found.append(max(item.changes[0], 0.01 * scatter, 1.0e-9) / (rate * flow * float(item.time[-1])))
     return float(np.mean(found))
-
-
-def _ratio_numbers(
-    closed: tuple[ClosedChambers, ...], volumes: tuple[float | None, ...], deviation: float
-) -> tuple[Free, ...]:
-    """Return the ratio of the volumes as a tolerance where both are known, else as a number that is sought."""
-    shut = [item.changes for item in closed if not item.is_a_room]
-    if not shut:
-        return ()
-    if volumes[0] and volumes[1]:
-        ratio = volumes[0] / volumes[1]
-        # Two volumes, each known to the deviation.
-        return tolerance(_RATIO, math.sqrt(2.0) * deviation * ratio, ratio)
-    return (sought(_RATIO, max(float(np.mean([rise / fall for fall, rise in shut])), 1.0e-3), 1.0e-6),)
 
 
 def _steady_leak(sources: tuple[Source, ...], settings: VaneLeakSettings) -> BenchResult:

@@ -1,7 +1,5 @@
 """The trajectory fit: runs as residuals of the one estimator, and what comes of it as values of the device."""
 
-import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -143,7 +141,23 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
     conflict = conflict_in_words(found, "the model lacks something")
     sought = [place for place, item in enumerate(numbers) if not item.is_tolerance]
     estimates = tuple(_estimate(problem, found, numbers[place], place, conflict) for place in sought)
-    errors = np.sqrt(np.diag(found.covariance))
+    errors, known = np.sqrt(np.diag(found.covariance)), []
+    for place in (place for place, item in enumerate(numbers) if item.is_tolerance):
+        name, item = free[place].name, numbers[place]
+        shares = {one.path: dict(found.shares[one.path]).get(name, 0.0) for one in estimates}
+        widens = max(shares, key=lambda path: shares[path], default="")
+        known.append(
+            Known(
+                name=name,
+                unit=item.unit,
+                before=item.free.start,
+                before_error=item.free.deviation,
+                after=float(found.values[place]),
+                after_error=float(errors[place]),
+                widens=widens,
+                share=shares.get(widens, 0.0),
+            )
+        )
     part = found.covariance[np.ix_(sought, sought)]
     signals = signals_of(prepared, numbers, found.values[:, None])
     scenarios = tuple(with_numbers(one.scenario, numbers_in(one.label, numbers, found.values)) for one in prepared)
@@ -164,11 +178,7 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
         estimates=estimates,
         covariance=part,
         correlation=part / np.outer(errors[sought], errors[sought]),
-        known=tuple(
-            _known(found, item, place, [one.path for one in estimates])
-            for place, item in enumerate(numbers)
-            if item.is_tolerance
-        ),
+        known=tuple(known),
         channels=tuple(channels),
         models=tuple(models),
         measurements=tuple(measurements),
@@ -210,21 +220,6 @@ def _estimate(problem: TrajectoryProblem, found: Fit, item: Number, place: int, 
         path=name, value=value, unit=item.unit, low=low, high=high, verdict=verdict, explanation=text,
         recordings=recordings, confidence=problem.confidence,
     )  # fmt: skip
-
-
-def _known(found: Fit, item: Number, place: int, sought: Sequence[str]) -> Known:
-    shares = {one: dict(found.shares[one]).get(item.free.name, 0.0) for one in sought}
-    widens = max(shares, key=lambda name: shares[name], default="")
-    return Known(
-        name=item.free.name,
-        unit=item.unit,
-        before=item.free.start,
-        before_error=item.free.deviation,
-        after=float(found.values[place]),
-        after_error=float(math.sqrt(found.covariance[place, place])),
-        widens=widens,
-        share=shares.get(widens, 0.0),
-    )
 
 
 def _channel(found: Fit, experiment: str, measured: Measured, model: Floats) -> ChannelFit:

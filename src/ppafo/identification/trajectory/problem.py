@@ -85,31 +85,26 @@ def check_experiment(experiment: Experiment) -> None:
         if name not in recording:
             have = ", ".join(recording.names)
             raise IdentificationError(f"{said}: {recording.label} has no channel '{name}'{use}; it has {have}")
-    motion, has_torque = experiment.scenario.motion, EXTERNAL_TORQUE in inputs
-    is_free = isinstance(motion, FreeMotion)
+    scenario, has_torque = experiment.scenario, EXTERNAL_TORQUE in inputs
+    is_free, follows = isinstance(scenario.motion, FreeMotion), {ANGLE} & set(inputs) & set(experiment.channels)
+    is_python = scenario.control.kind == PYTHON_CONTROLLER and COMMAND not in inputs
+    has_leg = isinstance(scenario.motion, FreeMotion) and scenario.motion.leg is not None
     _refuse_first(
         said,
         (not experiment.channels, "there is no channel to compare"),
-        (
-            ANGLE in inputs and ANGLE in experiment.channels,
-            "the angle of the vane is prescribed by the recording, so it cannot be compared",
-        ),
+        (bool(follows), "the angle of the vane is prescribed by the recording, so it cannot be compared"),
         (
             experiment.channels == (ANGLE,) and not is_free,
             "the angle of the vane is prescribed, so it carries no information; add a pressure",
         ),
-        (
-            experiment.scenario.control.kind == PYTHON_CONTROLLER and COMMAND not in inputs,
-            "a Python controller cannot run in lanes; use one of the catalogue",
-        ),
+        (is_python, "a Python controller cannot run in lanes; use one of the catalogue"),
         (
             has_torque and not is_free,
-            "the angle of the vane is prescribed, so a torque on it has no effect; remove it from inputs",
+            "a torque has no effect on a vane whose angle is prescribed; remove it from inputs",
         ),
         (
-            has_torque and isinstance(motion, FreeMotion) and motion.leg is not None,
-            "the vane carries the foot of a leg, which T_ex follows from; remove it from inputs, or take a scenario "
-            "whose motion is free",
+            has_torque and has_leg,
+            "the leg of the motion prescribes T_ex; remove it from inputs, or let the motion be free",
         ),
         *(
             (not 0.0 < deviation < math.inf, f"the noise of '{name}' must be above 0, not {deviation!r}")

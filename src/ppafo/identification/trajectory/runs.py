@@ -221,7 +221,12 @@ def blocks_of(experiments: Sequence[PreparedExperiment], numbers: Sequence[Numbe
     blocks, first = [], 0
     coarse = signals_of(experiments, numbers, point[:, None])
     # What half as long steps change is about the error of the engine.
-    fine = signals_of([_with_half_steps(one, numbers, point) for one in experiments], numbers, point[:, None])
+    halved = []
+    for one in experiments:
+        scenario = replace(one.scenario, time_step=0.5 * one.run.step)
+        run = plan_run(with_numbers(scenario, numbers_in(one.label, numbers, point)))
+        halved.append(_place_samples(one, replace(run, tolerance=_FINER * one.run.tolerance)))
+    fine = signals_of(halved, numbers, point[:, None])
     for prepared, before, after in zip(experiments, coarse, fine, strict=True):
         for channel in prepared.channels:
             error = float(np.sqrt(np.mean(np.square(after[channel.name] - before[channel.name]))))
@@ -230,12 +235,6 @@ def blocks_of(experiments: Sequence[PreparedExperiment], numbers: Sequence[Numbe
             blocks.append(Block(prepared.label, channel.name, slice(first, last), floor))
             first = last
     return tuple(blocks)
-
-
-def _with_half_steps(prepared: PreparedExperiment, numbers: Sequence[Number], point: Floats) -> PreparedExperiment:
-    scenario = replace(prepared.scenario, time_step=0.5 * prepared.run.step)
-    run = plan_run(with_numbers(scenario, numbers_in(prepared.label, numbers, point)))
-    return _place_samples(prepared, replace(run, tolerance=_FINER * prepared.run.tolerance))
 
 
 _NUMBERS_OF_RUN = (
@@ -262,8 +261,7 @@ def run_with(prepared: PreparedExperiment, numbers: Mapping[str, Any]) -> Run:
         if valve != base.program.valve or (valve.command_delay(now) > 0.0) != base.program.late_commands:
             moved = " or ".join(f"valve.{name}" for name in now if name in own and 0.0 in (now[name], before[name]))
             raise IdentificationError(
-                f"{said}: {moved} went to or from 0, which is another model of the valve; give a start and a lower bound "
-                "above 0"
+                f"{said}: {moved} went to or from 0, another model of the valve; give a start and a lower bound above 0"
             )
     if any(np.any(is_on != (effect in base.program.effects)) for effect, is_on in switches_of(device).items()):
         raise IdentificationError(

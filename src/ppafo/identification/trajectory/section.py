@@ -226,13 +226,9 @@ def candidates_of(section: TrajectorySection, setting: Setting) -> tuple[Candida
     found = []
     for item in section.candidates:
         said = f"{setting.file}: candidate '{item.label}'"
-        interval = quantity_of(f"{said}: interval", item.interval, "s")
         scenario = _scenario(item.scenario, item.overrides, setting)
-        if not SHORTEST_STEP <= interval <= scenario.duration:
-            raise IdentificationError(
-                f"{said}: interval = '{item.interval}': must be from {SHORTEST_STEP:g} s to {scenario.duration:g} s, "
-                "the duration of its run"
-            )
+        interval = quantity_in(item, "interval", "s", said, SHORTEST_STEP, scenario.duration)
+        assert interval is not None, "it has a default"
         found.append(Candidate(item.label, scenario, noise_of_channels(item.noise, said), interval))
     return tuple(found)
 
@@ -250,13 +246,8 @@ def _experiment(item: ExperimentSection, setting: Setting) -> Experiment:
                 )
         scenario = _scenario(item.scenario, item.overrides, setting)
         start, inputs = quantity_in(item, "start", "s", said) or 0.0, item.inputs or ()
-    step = quantity_in(item, "step", "s", said)
-    if step is not None:
-        if not SHORTEST_STEP <= step <= LONGEST_STEP:
-            raise IdentificationError(
-                f"{said}: step = '{item.step}': must be from {SHORTEST_STEP:g} s to {LONGEST_STEP:g} s"
-            )
-        scenario = replace(scenario, time_step=step)
+    step = quantity_in(item, "step", "s", said, SHORTEST_STEP, LONGEST_STEP)
+    scenario = scenario if step is None else replace(scenario, time_step=step)
     # The scenario of a replay has the state of the samples already.
     is_read = item.scenario is not None and item.initial_state in ("recording", "fitted")
     return Experiment(
@@ -285,10 +276,10 @@ def _parameter(item: ParameterSection, scenarios: Mapping[str, Scenario], settin
     atmosphere = acting.device.supply.atmospheric_pressure
     said = f"{setting.file}: parameter '{item.path}'"
 
-    def number(name: str, text: str | None) -> float | None:
-        return None if text is None else quantity_of(f"{said}: {name}", text, quantity.unit, atmosphere)
-
-    start, deviation = number("start", item.start), math.inf
+    start, low, high = (
+        quantity_in(item, key, quantity.unit, said, atmosphere=atmosphere) for key in ("start", "low", "high")
+    )
+    deviation = math.inf
     if item.prior == "bench":
         estimate = setting.bench.get(full_path(item.path, acting))
         if estimate is None or not estimate.is_usable:
@@ -300,14 +291,7 @@ def _parameter(item: ParameterSection, scenarios: Mapping[str, Scenario], settin
     elif item.prior is not None:
         start = quantity_of(f"{said}: prior.mean", item.prior.mean, quantity.unit, atmosphere)
         deviation = abs(start) * item.prior.relative
-    return FreeParameter(
-        path=item.path,
-        start=start,
-        low=number("low", item.low),
-        high=number("high", item.high),
-        deviation=deviation,
-        recordings=item.recordings,
-    )
+    return FreeParameter(item.path, start, low, high, deviation, item.recordings)
 
 
 def _replay(
