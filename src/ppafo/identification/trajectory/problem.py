@@ -89,7 +89,7 @@ def check_experiment(experiment: Experiment) -> None:
     is_free, follows = isinstance(scenario.motion, FreeMotion), {ANGLE} & set(inputs) & set(experiment.channels)
     is_python = scenario.control.kind == PYTHON_CONTROLLER and COMMAND not in inputs
     has_leg = isinstance(scenario.motion, FreeMotion) and scenario.motion.leg is not None
-    _refuse_first(
+    refuse_first(
         said,
         (not experiment.channels, "there is no channel to compare"),
         (bool(follows), "the angle of the vane is prescribed by the recording, so it cannot be compared"),
@@ -118,7 +118,7 @@ def check_experiment(experiment: Experiment) -> None:
         check_absolute(recording, experiment.scenario.device.supply.atmospheric_pressure, said)
 
 
-def _refuse_first(said: str, *checks: tuple[bool, str]) -> None:
+def refuse_first(said: str, *checks: tuple[bool, str]) -> None:
     """Refuse the first that is wrong of pairs, whether it is and why; ``said`` begins the line."""
     for is_wrong, why in checks:
         if is_wrong:
@@ -334,7 +334,7 @@ def number_of(parameter: FreeParameter, experiments: Sequence[Experiment]) -> Nu
     has_size = math.isfinite(high - low) or math.isfinite(parameter.deviation)
     is_allowed = quantity.minimum <= low and high <= quantity.maximum
     allowed = f"{quantity.minimum:.6g} to {quantity.maximum:.6g} {unit}".rstrip()
-    _refuse_first(
+    refuse_first(
         parameter.name,
         (not math.isfinite(start) or math.isnan(low) or math.isnan(high), "start and bounds must be finite numbers"),
         (not low < high, f"low, {low:.6g}, must be below high, {high:.6g}"),

@@ -31,6 +31,7 @@ from ppafo.identification.trajectory.problem import (
     TrajectoryProblem,
     declaration_of,
     full_path,
+    refuse_first,
     use_of,
 )
 from ppafo.identification.trajectory.tolerances import stated_by, tolerance_parameters
@@ -275,7 +276,6 @@ def _parameter(item: ParameterSection, scenarios: Mapping[str, Scenario], settin
     quantity = declaration_of(item.path, acting)
     atmosphere = acting.device.supply.atmospheric_pressure
     said = f"{setting.file}: parameter '{item.path}'"
-
     start, low, high = (
         quantity_in(item, key, quantity.unit, said, atmosphere=atmosphere) for key in ("start", "low", "high")
     )
@@ -303,23 +303,34 @@ def _replay(
     """
     if setting.parameter_set is None:
         raise IdentificationError(f"{said}: needs a scenario, because no device was given")
-    if item.initial_state == "scenario":
-        raise IdentificationError(f"{said}: initial_state = 'scenario', but it has no scenario; omit it")
-    start_of_run = quantity_in(item, "start", "s", said)
-    first = float(recording.time[0]) if start_of_run is None else start_of_run
+    inputs = tuple(name for name in INPUTS if name in recording) if item.inputs is None else item.inputs
+    is_held, is_fixed = item.held is not None, item.volume is not None
+    refuse_first(
+        said,
+        (item.initial_state == "scenario", "initial_state = 'scenario', but it has no scenario; omit it"),
+        (
+            (is_held or is_fixed) and ANGLE in inputs,
+            f"the vane is held or absent, but inputs has '{ANGLE}': omit one of them",
+        ),
+        (is_held and is_fixed, "held and volume: with a fixed volume there is no vane; omit one of them"),
+        (
+            COMMAND not in recording,
+            f"has no scenario, so its recording needs a channel '{COMMAND}'; it has {', '.join(recording.names)}",
+        ),
+        (COMMAND not in inputs, f"has no scenario, so inputs must have '{COMMAND}'"),
+    )
+    first = quantity_in(item, "start", "s", said)
+    first = float(recording.time[0]) if first is None else first
     used = recording.between(first, float(recording.time[-1]))
     device = build_device(apply_overrides(setting.parameter_set, item.overrides, setting.valve), setting.valve)
-    device, fixed = _fix_vane(item, device, said)
-    if COMMAND not in recording:
-        have = ", ".join(recording.names)
-        raise IdentificationError(
-            f"{said}: has no scenario, so its recording needs a channel '{COMMAND}'; it has {have}"
-        )
-    inputs = tuple(name for name in INPUTS if name in recording) if item.inputs is None else item.inputs
-    if COMMAND not in inputs:
-        raise IdentificationError(f"{said}: has no scenario, so inputs must have '{COMMAND}'")
-    start = _start_of(used, device, fixed, said)
-    motion = locked_vane(start.angle) if fixed else None
+    angle, volume = quantity_in(item, "held", "rad", said), positive_in(item, "volume", "m^3", said)
+    known = {} if angle is None else {ANGLE: angle}
+    if volume is not None:
+        # Without a vane chamber 1 is the volume, and chamber 2 the room.
+        known = {ANGLE: device.actuator.angle_min, "pressure_2": device.supply.atmospheric_pressure}
+        device = with_fixed_volume(device, volume)
+    start = _start_of(used, device, known, said)
+    motion = locked_vane(start.angle) if known else None
     return replay_scenario(recording, device, start, used.duration, said, motion), first, inputs
 
 
@@ -331,19 +342,6 @@ def _compared_channels(item: ExperimentSection) -> tuple[str, ...]:
         return ("pressure_1",)
     is_prescribed = item.held is not None or ANGLE in (item.inputs or ())
     return FITTED_CHANNELS[1:] if is_prescribed else FITTED_CHANNELS
-
-
-def _fix_vane(item: ExperimentSection, device: Device, said: str) -> tuple[Device, dict[str, float]]:
-    """Return the device and what of its state is known where the vane is held, or where there is none."""
-    if (item.held is not None or item.volume is not None) and ANGLE in (item.inputs or ()):
-        raise IdentificationError(f"{said}: the vane is held or absent, but inputs has '{ANGLE}': omit one of them")
-    if item.held is not None and item.volume is not None:
-        raise IdentificationError(f"{said}: held and volume: with a fixed volume there is no vane; omit one of them")
-    angle, volume = quantity_in(item, "held", "rad", said), positive_in(item, "volume", "m^3", said)
-    if volume is None:
-        return device, {} if angle is None else {ANGLE: angle}
-    known = {ANGLE: device.actuator.angle_min, "pressure_2": device.supply.atmospheric_pressure}
-    return with_fixed_volume(device, volume), known
 
 
 def _start_of(recording: Recording, device: Device, known: Mapping[str, float], said: str) -> Start:
@@ -391,16 +389,9 @@ def solve_section(section: TrajectorySection, setting: Setting, report: Report) 
             raise
         raise type(error)(f"{setting.file}: {error}") from error
     sources = tuple(Source(item.recording, item.source) for item in problem.experiments)
-    return TrajectoryOutcome(
-        found, expected, (*told_of_readings(sources), *found.remarks, *_contradictions(found, setting.bench))
-    )
-
-
-def _contradictions(found: TrajectoryFit, bench: Mapping[str, Estimate]) -> list[str]:
-    """Return a sentence for each number whose interval does not meet that of a bench procedure."""
-    remarks = []
+    remarks = [*told_of_readings(sources), *found.remarks]
     for fitted in found.estimates:
-        other = bench.get(fitted.path)
+        other = setting.bench.get(fitted.path)
         if other is None or not (other.is_usable and fitted.is_usable):
             continue
         if fitted.low > other.high or fitted.high < other.low:
@@ -410,4 +401,4 @@ def _contradictions(found: TrajectoryFit, bench: Mapping[str, Estimate]) -> list
                 f"{fitted.path}: fitted {low} to {high} {ends[0][1]}, from the bench {lowest} to {highest}: one of the "
                 "two models is incomplete"
             )
-    return remarks
+    return TrajectoryOutcome(found, expected, tuple(remarks))
