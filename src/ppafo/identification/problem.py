@@ -312,6 +312,7 @@ def parse_problem(content: bytes, file: str) -> ProblemFile:
     document = _FILE.parse(content, file)
     refuse_removed(document, file)
     problem = validate(ProblemFile, document, file, IdentificationError)
+    # Each may be left out, which the layout allows, but not both.
     if not problem.procedure and problem.trajectory is None:
         raise IdentificationError(f"{file}: has nothing to do: neither a [[procedure]] nor a [trajectory]")
     fitted = () if problem.trajectory is None else problem.trajectory.experiments

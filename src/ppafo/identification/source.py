@@ -82,6 +82,7 @@ def _digest(recording: Recording) -> str:
     """Return the hash of times and values, whatever the file looks like."""
     total = hashlib.sha256(recording.time.tobytes())
     for name in sorted(recording.names):
+        # The name too: two channels that are exchanged make another recording.
         total.update(name.encode())
         total.update(recording[name].tobytes())
     return total.hexdigest()

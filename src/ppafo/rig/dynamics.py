@@ -154,6 +154,7 @@ def orifice_exchange(
     flow = admitted_flow(exact_flow(a.pressure, b.pressure, fraction * orifice.conductance, orifice), is_relieving)
     upstream_temperature = a.temperature if flow >= 0.0 else b.temperature
     enthalpy = a.enthalpy if flow >= 0.0 else b.enthalpy
+    # The conductance is stated at the temperature of the set; flow goes with one over the root of it.
     flow = flow * temperature_flow_factor(rig.reference_temperature, upstream_temperature)
     return Exchange(flow, flow * enthalpy)
 
@@ -162,6 +163,7 @@ def leak_exchange(rig: RigPhysics, a: Node, b: Node, orifice: ExactOrifice) -> E
     """Leak across the vane [kg/s], [W], positive from a to b: an orifice, and a laminar gap if there is one."""
     through_orifice = orifice_exchange(rig, a, b, 1.0, orifice, 1.0)
     laminar = rig.laminar_conductance * (a.pressure * a.pressure - b.pressure * b.pressure)
+    # Gas brings the enthalpy of where it comes from.
     enthalpy = a.enthalpy if laminar >= 0.0 else b.enthalpy
     return Exchange(through_orifice.mass + laminar, through_orifice.energy + laminar * enthalpy)
 
@@ -174,6 +176,7 @@ def wall_heat(rig: RigPhysics, node: Node, volume: float) -> float:
 
 def chamber_nodes(plant: PlantParameters, rig: RigPhysics, state: RigState, angle: float) -> tuple[Node, Node]:
     """Gas in both chambers [Pa], [K], [J/kg] at an angle [rad]; the air of the room where the chambers are open."""
+    # A number, not a truth value: all that the compiled functions read is a float.
     if rig.chambers_open > 0.5:
         room = ambient_node(rig, plant.atmospheric_pressure, rig.wall_temperature)
         return room, room

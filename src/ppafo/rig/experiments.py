@@ -111,6 +111,7 @@ def record_static_torque(request: Request) -> Outcome:
     for repetition in scatter:
         pressed = 0.0
         for pressure, direction, deviation in zip(once, directions, repetition, strict=True):
+            # On the way to the turn friction has changed sides, whatever was read before.
             if direction < 0.0 and pressure == once[rising.size]:
                 pressed = device.actuator.torque_constant * (HIGHEST + TURN)
             limit = device.friction.static_torque + values["friction.static_per_pressure"] * pressure
@@ -173,6 +174,7 @@ def record_valve_map(request: Request) -> Outcome:
     parameters = model.prepare(still)
     rising = np.linspace(-1.0, 1.0, COMMAND_STEPS + 1)
     commands = np.concatenate([rising, rising[-2::-1]])
+    # The sweep begins at the lowest command, where the play lies behind the spool.
     spool, flows, upstream = -1.0, [], []
     for command in commands:
         spool = spool_position(spool, float(command), request.preset.values["valve.hysteresis"])
@@ -242,6 +244,7 @@ def record_step_response(request: Request) -> Outcome:
 
 def record_torque_task(request: Request) -> Outcome:
     """Return the torque task of figure 8 with the controller that belongs to the kind of valve."""
+    # Overrides may be of the scenario, which is chosen by the valve first.
     kind = load_device(request.parameter_set, request.valve).valve.kind
     scenario = _of_package(f"torque-task-{kind}", request)
     return _recorded("torque-task", scenario, rig_run(scenario, request), (*_IN_MOTION, "reference", "torque"))
@@ -252,6 +255,7 @@ def record_free_decay(request: Request) -> Outcome:
     motion = {"kind": "free", "angle": "25 deg", "angular_velocity": "380 deg/s", "external_torque": "0 N m"}
     scenario = _of_bench("free-decay", request, motion, {}, "2 s")
     bench_run = rig_run(scenario, request)
+    # On its side gravity turns nothing.
     run = replace(bench_run.run, plant=bench_run.run.plant._replace(gravity_torque=0.0))
     opened = replace(bench_run, run=run, physics=bench_run.physics._replace(chambers_open=1.0))
     return _recorded("free-decay", scenario, opened, ("angle",))

@@ -261,6 +261,7 @@ def rig_physics(device: Device, preset: Preset) -> RigPhysics:
     constant = gas.specific_gas_constant
     droop, recovery = values["supply.droop"], values["supply.recovery_time"]
     velocity = values["friction.stribeck_velocity"]
+    # Without a velocity the rise has no place, and is none.
     share = stribeck.EFFECT.defaults(gas.species)["share"] if velocity > 0.0 else 0.0
     if droop > 0.0 and recovery <= 0.0:
         raise ParameterError(f"preset '{preset.name}': supply.recovery_time must be above 0 s with a droop")
@@ -274,6 +275,7 @@ def rig_physics(device: Device, preset: Preset) -> RigPhysics:
         wall_area_per_volume=values["gas.wall_area_per_volume"],
         virial=values["gas.real_gas_share"] * SECOND_VIRIAL[gas.species] / gas.molar_mass,
         supply_droop=values["supply.droop"],
+        # A regulator without droop has no state to recover.
         supply_rate=1.0 / recovery if droop > 0.0 else 0.0,
         line_volume=values["line.volume"],
         laminar_conductance=values["leak.laminar_conductance"],
@@ -329,6 +331,7 @@ CHANNEL_SENSORS = {
 The order decides the streams: a new channel comes last, so that the numbers of the others stay.
 """
 
+# By its place, not its name: renaming a channel leaves its noise.
 _STREAMS = {name: number for number, name in enumerate(CHANNEL_SENSORS)}
 
 
@@ -362,5 +365,6 @@ def sensor(preset: Preset, channel: str, seed: int, samples: int, fraction_of_ra
     given = preset.section(CHANNEL_SENSORS[channel])
     offset, noise, quantum = (fraction_of_range * given[name] for name in ("offset", "noise", "quantum"))
     stream = random_stream(seed, channel)
+    # The offset comes first, so that a longer recording begins with the same noise.
     drawn = offset * float(stream.standard_normal())
     return Sensor(drawn, quantum, noise * stream.standard_normal(samples))

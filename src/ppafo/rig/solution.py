@@ -77,6 +77,7 @@ UNKNOWNS = len(RigState._fields)
 OUTPUTS = 4
 """Numbers that ``show`` writes: both pressures [Pa], driving torque and static limit of friction [N m]."""
 
+# The valve has the first four.
 ANGLE, RATE, ADDED = 4, 5, 6
 INPUTS = 7
 """Numbers that come from outside: four openings, angle [rad] and prescribed rate [rad/s] of the vane, and the torque
@@ -117,6 +118,7 @@ _ENERGY_TOLERANCE, _VALVE_TOLERANCE = 1e-8, 1e-10
 def absolute_tolerances(valve_unknowns: int) -> Floats:
     """Return the absolute tolerances of all unknowns [SI], those of the valve last."""
     found = []
+    # Below a millionth of usual values: of a chamber 1e-4 kg and 10 J, of a supply 1e5 Pa.
     for name in RigState._fields:
         by_kind = next((size for kind, size in _BY_KIND.items() if kind in name), _ENERGY_TOLERANCE)
         found.append(_TOLERANCES.get(name, by_kind))
@@ -182,6 +184,7 @@ class _Rig:
         path, leg = self.run.program.angle, self.run.leg
         if leg is not None:
             self.inputs[ADDED] = torque_of_leg(self.run.program, leg, t, float(y[0]))
+        # The rate of a free vane is one of the unknowns.
         self.inputs[ANGLE], self.inputs[RATE] = (y[0], 0.0) if path is None else path.value(self.run.path, t)[:2]
         self.present[:] = y[:UNKNOWNS]
 
@@ -251,6 +254,7 @@ class _Rig:
                 self.command = self.pending_commands.pop(0)[1]
             state = valve.settle(self.run.valve, self.valve_state(self.y), self.command, self.time)
             self.y[UNKNOWNS:] = numbers(state)
+            # An event that is now would not let time go on.
             event = max(valve.next_event(self.run.valve, state, self.command, self.time), self.time + 2 * SAME_TIME)
             later = [moment for moment, _ in self.pending_commands if moment > self.time + SAME_TIME]
             self.integrate(min([end, event, *later]))
@@ -298,9 +302,11 @@ class _Rig:
             self.direction = 1.0 if self.observe(self.time, self.y)[2] > 0.0 else -1.0
             self.result.breakaways.append(self.time)
             return
+        # Of the two distances the one that ended the stretch is 0 but for rounding.
         roots = self.roots(self.time, self.y)
         if abs(roots.second) < abs(roots.first):
             self.result.impacts.append(self.time)
+            # Onto the stop itself: a rounding beyond it would be another impact at once.
             self.y[0] = self.plant.angle_max if self.direction > 0.0 else self.plant.angle_min
             self.y[1] = after_stop(self.run, {}, float(self.y[1]))
         else:

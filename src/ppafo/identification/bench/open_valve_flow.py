@@ -111,6 +111,7 @@ def open_readings(sources: tuple[Source, ...], gas: GasAt) -> tuple[Floats, Floa
         check_not_clipped(source, PROCEDURE, "mass_flow", "orifice flow at these pressures", driving)
     recordings = [source.recording for source in sources]
     commands = [one["command"] if "command" in one else np.ones(len(one)) for one in recordings]
+    # A recording without commands is taken for one of an open valve.
     is_open = np.abs(np.concatenate(commands)) >= _FULLY_OPEN
     if is_open.sum() < MINIMUM_SAMPLES:
         raise IdentificationError(
@@ -119,6 +120,7 @@ def open_readings(sources: tuple[Source, ...], gas: GasAt) -> tuple[Floats, Floa
         )
     upstream, downstream, flow = (pool(sources, name)[is_open] for name in CHANNELS)
     wrong = np.flatnonzero(downstream >= upstream)
+    # A few readings may cross by noise where both pressures are nearly equal.
     if wrong.size > flow.size // 10:
         raise IdentificationError(
             f"{sources[0].name}: {PROCEDURE}: downstream_pressure is at or above upstream_pressure in {wrong.size} of "

@@ -208,6 +208,7 @@ def _figure(panels: tuple[Panel, ...], kinds: tuple[RecordingKind, ...]) -> "Fig
 def _draw(axes: "Axes", letter: str, panel: Panel) -> None:
     (x_unit, x_scale), (y_unit, y_scale) = (_SHOWN_IN.get(unit, (unit, 1.0)) for unit in (panel.x_unit, panel.y_unit))
     for item in sorted(panel.series, key=lambda one: one.role == "law"):
+        # A page with every sample would be some megabytes, and look the same.
         thin = slice(None, None, 1 if item.role == "law" else max(1, item.x.size // _MAXIMUM_POINTS))
         axes.plot(x_scale * item.x[thin], y_scale * item.y[thin], label=item.name, **_LOOKS[item.role])
     axes.set_title(f"$\\bf{{{letter}}}$   {panel.title}", pad=20)

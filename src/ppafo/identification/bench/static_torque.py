@@ -132,6 +132,7 @@ def _straight_line(readings: "Readings", names: str) -> tuple[float, float, floa
             "one channel"
         )
     deviation = float(np.std(readings.torque - design @ rough))
+    # Where friction is small its sign is that of the noise, and no reason to refuse.
     if friction < -_SIGMAS * deviation / np.sqrt(readings.pressure.size):
         raise IdentificationError(
             f"{names}: {PROCEDURE}: the rising branch lies above the falling one, as if friction drove the motion; "
@@ -259,6 +260,7 @@ def readings_of(sources: tuple[Source, ...]) -> Readings:
             )
     if pressure.max() == pressure.min():
         check_moves(sources[0], PROCEDURE, "pressure_difference")
+    # Two levels fix a line, but do not show whether it is one.
     places = np.floor(_PARTS * (pressure - pressure.min()) / np.ptp(pressure))
     levels = np.unique(np.minimum(places, _PARTS - 1)).size
     if levels < _MINIMUM_LEVELS:

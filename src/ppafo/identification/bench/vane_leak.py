@@ -163,6 +163,7 @@ def closed_chambers(source: Source, settings: VaneLeakSettings) -> ClosedChamber
     skipped = check_no_gap(source, PROCEDURE, part)
     for name in CHANNELS:
         for plateau in plateaus(part[name]):
+            # Later plateaus may be the quantum of the sensor, as the pressure hardly falls any more.
             if plateau.first < EDGE and stands_out(part[name], plateau):
                 raise IdentificationError(
                     f"{source.name}: {PROCEDURE}: channel '{name}' stays at exactly {1e-3 * plateau.value:g} kPa for "
@@ -174,6 +175,7 @@ def closed_chambers(source: Source, settings: VaneLeakSettings) -> ClosedChamber
     fuller = 1 if np.mean((pair[0] - pair[1])[:EDGE]) > 0.0 else 2
     first, second = pair if fuller == 1 else pair[::-1]
     difference = first - second
+    # Near equal pressures the zeros of the sensors are all that is left.
     low = np.flatnonzero(difference < _NEARLY_EQUAL * float(np.mean(difference[:EDGE])))
     last = int(low[0]) if low.size else difference.size
     if last < MINIMUM_SAMPLES:
@@ -345,6 +347,7 @@ def _steady_leak(sources: tuple[Source, ...], settings: VaneLeakSettings) -> Ben
             f"{sources[0].name}: {PROCEDURE}: the flow runs from the lower to the higher pressure; reverse its sign"
         )
     opening, size = settings.opening, settings.size
+    # A leak of another law parts low from high pressures.
     halves = np.where(difference > np.median(difference), "higher", "lower")
     labels = [f"recording {number}" for number, one in enumerate(sources, start=1) for _ in range(len(one.recording))]
     found, model = solve_flow(

@@ -60,6 +60,7 @@ def _expect(fit: TrajectoryFit, candidate: Candidate) -> Expected:
         raise IdentificationError(
             f"candidate '{candidate.label}': noise must be above 0 for at least one of {', '.join(FITTED_CHANNELS)}"
         )
+    # What belongs to one recording, such as its trigger, another experiment says nothing of.
     place = [index for index, item in enumerate(fit.numbers) if not item.recordings]
     acting = [fit.numbers[index] for index in place]
     point, scale = fit.fit.values[place], np.array([item.free.scale for item in acting])
@@ -89,6 +90,7 @@ def _expect(fit: TrajectoryFit, candidate: Candidate) -> Expected:
     sizes = np.sqrt(np.diag(whole))
     jacobian = np.concatenate(rows) * sizes[place]
     before = whole / np.outer(sizes, sizes)
+    # In units of today's standard errors, for pascals and radians differ by many powers of ten.
     information = np.linalg.inv(before)
     information[np.ix_(place, place)] += jacobian.T @ jacobian
     after = np.linalg.inv(information)

@@ -158,6 +158,7 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
                 share=shares.get(widens, 0.0),
             )
         )
+    # Tolerances are marginalised: their rows are left out, their share of the variance stays.
     part = found.covariance[np.ix_(sought, sought)]
     signals = signals_of(prepared, numbers, found.values[:, None])
     scenarios = tuple(with_numbers(one.scenario, numbers_in(one.label, numbers, found.values)) for one in prepared)

@@ -197,6 +197,7 @@ def full_path(path: str, scenario: Scenario) -> str:
 def declared_numbers(scenario: Scenario) -> dict[str, Quantity]:
     """Return every number that can be fitted in this scenario, with its declaration, by path."""
     device = scenario.device
+    # An orifice has two forms, and the device one of them.
     other = {f"{section}.{name}" for section in ("actuator.leak", "valve") for name in other_form(device, section)}
     found = {
         full_path(path, scenario): item for path, item in numbers.device_numbers(device).items() if path not in other
@@ -228,6 +229,7 @@ def number_at(scenario: Scenario, path: str) -> float:
 
 def with_numbers(scenario: Scenario, changed: Mapping[str, float]) -> Scenario:
     """Return the scenario with numbers [SI] replaced, by paths of ``declared_numbers``, but those of recordings."""
+    # Those of a recording change what is compared, not the run.
     return numbers.with_numbers(scenario, {path: one for path, one in changed.items() if path not in _OF_RECORDING})
 
 

@@ -99,6 +99,7 @@ def prepare(experiment: Experiment, numbers: Mapping[str, float], reach: float =
     """
     recording, said = experiment.recording, f"experiment '{experiment.label}'"
     inside = recording.time >= experiment.start - _FITS
+    # A sample that rounding puts before the start is the one at the start.
     time = np.maximum(recording.time[inside] - experiment.start, 0.0)
     if time.size < MINIMUM_SAMPLES:
         raise IdentificationError(
@@ -344,6 +345,7 @@ def _run_signals(prepared: PreparedExperiment, columns: Mapping[str, Floats], co
     kept, failure = _rows_of(run.program)
     records: Floats | None = None
     failed = np.zeros(count, dtype=np.bool_)
+    # A program has up to 32 lanes; more runs are several batches.
     for members, batch in batches_of(run, count):
         outcome = run_batch(batch, threads=1) if prepared.inputs is None else replay(batch, prepared.inputs)
         ends = outcome.states
@@ -358,6 +360,7 @@ def _run_signals(prepared: PreparedExperiment, columns: Mapping[str, Floats], co
     angle, mass_1, mass_2 = (_at_samples(one, prepared, offsets) for one in records)
     found = {name: np.full(angle.shape, np.nan) for name in ("angle", "pressure_1", "pressure_2")}
     numbers = leaves(run.plant)
+    # Pressures follow from mass and angle by the plant, whose numbers differ from run to run.
     for element in np.flatnonzero(~failed).tolist():
         plant = rebuilt(run.program.actuator.plant, [at(number, element) for number in numbers])
         own = angle[:, element], mass_1[:, element], mass_2[:, element]

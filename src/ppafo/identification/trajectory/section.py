@@ -266,6 +266,7 @@ def _experiment(item: ExperimentSection, setting: Setting) -> Experiment:
 
 def _scenario(name: str, overrides: tuple[str, ...], setting: Setting) -> Scenario:
     found = name if name in list_scenarios() else str(setting.folder / name)
+    # The valve of the problem goes before what the experiment changes of it.
     chosen = () if setting.valve is None else (f"device.valve={setting.valve}",)
     return load_scenario(found, over(chosen, overrides, ScenarioError), setting.parameter_set)
 
@@ -358,6 +359,7 @@ def _start_of(recording: Recording, device: Device, known: Mapping[str, float], 
             )
         return value_at_rest(recording.time[:count], recording[name][:count])
 
+    # The mean of many samples has less noise than the first one.
     angle, pressure_1, pressure_2 = (first(name) for name in FITTED_CHANNELS)
     rate = first("angular_velocity") if "angular_velocity" in recording and ANGLE not in known else 0.0
     return Start(float(between_stops(np.array([angle]), device, said)[0]), rate, pressure_1, pressure_2)
