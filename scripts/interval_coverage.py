@@ -33,7 +33,7 @@ from ppafo.identification.trajectory import (
     tolerance_parameters,
 )
 from ppafo.identification.trajectory.problem import FITTED_CHANNELS, number_at, numbers_of
-from ppafo.identification.trajectory.runs import Floats, columns_in, prepare, signals_of
+from ppafo.identification.trajectory.runs import Floats, numbers_in, prepare, signals_of
 from ppafo.identification.trajectory.tolerances import stated_by
 from ppafo.parameters.loading import load_parameter_set
 from ppafo.rig.experiments import record
@@ -141,10 +141,7 @@ def of_model(kind: str, random: np.random.Generator) -> tuple[Recording, ...]:
             truth[place] = min(max(moved, item.free.low), item.free.high)
         else:
             truth[place] = SOUGHT[item.path.replace("valves.proportional.", "valve.")]
-    prepared = [
-        prepare(one, {path: float(row[0]) for path, row in columns_in(one.label, numbers, truth[:, None]).items()})
-        for one in problem.experiments
-    ]
+    prepared = [prepare(one, numbers_in(one.label, numbers, truth)) for one in problem.experiments]
     return tuple(
         noisy(Recording(one.label, one.time, {name: Channel(column[:, 0], clean[0].unit(name))
                                              for name, column in signals.items()}, "synthetic"), KINDS[kind], random)

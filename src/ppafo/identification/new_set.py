@@ -18,7 +18,7 @@ from ppafo.parameters.parameter_set import (
     links_of_set,
     number_text,
 )
-from ppafo.units import from_si
+from ppafo.units import from_si, to_si
 
 _AREA_NAMES, _SONIC_NAMES = ({item.name for item in form} for form in (AREA_FORM, SONIC_FORM))
 _FORMS = ((_AREA_NAMES, _SONIC_NAMES), (_SONIC_NAMES, _AREA_NAMES))
@@ -100,6 +100,13 @@ def fitting_unit(unit: str, quantity: Quantity) -> str:
             continue
         return item
     return quantity.unit
+
+
+def stated_half_width(entry: Entry, unit: str) -> float:
+    """Return half the 95 % interval that a set states of a number, in an SI unit that fits its own; 0 for none."""
+    if not entry.uncertainty:
+        return 0.0
+    return to_si(entry.value + entry.uncertainty, entry.unit, unit) - to_si(entry.value, entry.unit, unit)
 
 
 def in_set_unit(number: float, path: str, si_unit: str, parameter_set: ParameterSet) -> tuple[float, str]:

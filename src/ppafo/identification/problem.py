@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from ppafo.documents.models import NAME, StrictTable, Text, make_schema, validate
+from ppafo.documents.models import NAME, StrictTable, Text, Texts, make_schema, validate
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import IdentificationError, nearest_name
 from ppafo.identification.bench.flow import GasAt, Law
@@ -24,26 +24,21 @@ from ppafo.identification.bench.result import BenchResult
 from ppafo.identification.bench.static_torque import StaticTorqueSettings, static_torque
 from ppafo.identification.bench.valve_map import ValveMapSettings, valve_map
 from ppafo.identification.bench.vane_leak import VaneLeakSettings, vane_leak
+from ppafo.identification.keys import Columns, Confidence, positive_in, quantity_in
+from ppafo.identification.new_set import stated_half_width
 from ppafo.identification.source import Source
-from ppafo.identification.tolerances import DEFAULTS, BenchSection, Tolerances, deviation_of_limit, quantity_of
+from ppafo.identification.tolerances import DEFAULTS, BenchSection, Tolerances, deviation_of_limit
 from ppafo.identification.trajectory.section import TrajectorySection, refuse_removed
 from ppafo.model.gas import SPECIES
 from ppafo.parameters.device import VANE
 from ppafo.parameters.parameter_set import Citation, ParameterSet, chosen_valve, number_in_si
 from ppafo.storage.foreign import ColumnMap
-from ppafo.units import to_si
 
 _Recordings = Annotated[tuple[Text, ...], Field(strict=False, min_length=1, description="files, relative to this one")]
-_Columns = Annotated[
-    Text | None, Field(description="name of a column map; without one the file has units in its header")
-]
-_Confidence = Annotated[float, Field(gt=0.5, lt=1.0, description="confidence of the intervals; default 0.95")]
 _Start = Annotated[Text | None, Field(description="first time to use, such as '2 s'")]
 _End = Annotated[Text | None, Field(description="last time to use, such as '8 s'")]
 _Gas = Annotated[Text | None, Field(description="species of the gas on the bench; default: that of the set")]
-_Temperature = Annotated[
-    Text | None, Field(description="temperature of the gas on the bench, such as '17 degC'; default: that of the set")
-]
+_Temperature = Annotated[Text | None, Field(description="of the gas on the bench, '17 degC'; default: that of the set")]
 _Valve = Annotated[Text | None, Field(description="name of a valve of the set; default: the chosen one")]
 
 UNKNOWN = "unknown"
@@ -72,29 +67,18 @@ class Setting:
             raise IdentificationError(f"{self.place}: needs {path}, which {self.parameter_set.file} does not have")
         return value
 
-    def quantity(self, name: str, text: str | None, unit: str) -> float | None:
-        """Return a quantity of the problem file [unit], None where it was left out.
-
-        IdentificationError where its text does not fit the unit.
-        """
-        return None if text is None else quantity_of(f"{self.place}: {name}", text, unit)
-
-    def gas(self, species: str | None, text: str | None) -> GasAt:
+    def gas(self, problem: "OpenValveFlowProblem | VaneLeakProblem | ValveMapProblem") -> GasAt:
         """Return the gas of the bench; species and temperature are the set's where none is named.
 
         IdentificationError for an unknown species.
         """
-        temperature = self.quantity("temperature", text, "K")
+        temperature, species = quantity_in(problem, "temperature", "K", self.place, _COLDEST, _HOTTEST), problem.gas
         if temperature is None:
             temperature = self.number("gas.temperature")
             deviation = self.deviation("gas.temperature", temperature, "K")
-        elif _COLDEST <= temperature <= _HOTTEST:
+        else:
             limit = self.tolerances.gas_temperature
             deviation = deviation_of_limit(_THERMOMETER if limit is None else limit)
-        else:
-            raise IdentificationError(
-                f"{self.place}: temperature = {text!r} must be from {_COLDEST:g} to {_HOTTEST:g} K"
-            )
         if species is None:
             own = self.number("gas.molar_mass"), self.number("gas.heat_capacity_ratio")
             return GasAt(*own, temperature, deviation)
@@ -107,10 +91,8 @@ class Setting:
 
     def deviation(self, path: str, value: float, unit: str) -> float:
         """Return the standard deviation of a number that the set has or leaves to the problem, at a value [unit]."""
-        entry, half_width = self.parameter_set.numbers.get(path), 0.0
-        if entry is not None and entry.uncertainty:
-            half_width = to_si(entry.value + entry.uncertainty, entry.unit, unit) - to_si(entry.value, entry.unit, unit)
-        return self.tolerances.deviation_of(path, value, half_width)
+        entry = self.parameter_set.numbers.get(path)
+        return self.tolerances.deviation_of(path, value, 0.0 if entry is None else stated_half_width(entry, unit))
 
     def valve_path(self, name: str | None) -> str:
         """Return the path of a valve in the set, ``valves.main``."""
@@ -122,8 +104,8 @@ class StaticTorqueProblem(StrictTable):
 
     kind: Literal["static-torque"]
     recordings: _Recordings
-    columns: _Columns = None
-    confidence: _Confidence = 0.95
+    columns: Columns = None
+    confidence: Confidence = 0.95
 
     def settings(self, setting: Setting) -> StaticTorqueSettings:
         """Return the settings of the procedure."""
@@ -135,21 +117,17 @@ class FreeDecayProblem(StrictTable):
 
     kind: Literal["free-decay"]
     recordings: _Recordings
-    columns: _Columns = None
-    confidence: _Confidence = 0.95
+    columns: Columns = None
+    confidence: Confidence = 0.95
     start: _Start = None
     end: _End = None
-    inertia: Annotated[
-        Text | None, Field(description="such as '8.4 g m^2', or 'unknown'; default: that of the set")
-    ] = None
+    inertia: Text | None = Field(None, description="such as '8.4 g m^2', or 'unknown'; default: that of the set")
 
     def settings(self, setting: Setting) -> FreeDecaySettings:
         """Return the settings of the procedure [SI]; the inertia is the set's where none is named, if it has one."""
-        start, end = setting.quantity("start", self.start, "s"), setting.quantity("end", self.end, "s")
-        inertia = setting.quantity("inertia", None if self.inertia == UNKNOWN else self.inertia, "kg m^2")
-        if inertia is not None and inertia <= 0.0:
-            raise IdentificationError(f"{setting.place}: inertia = {self.inertia!r} must be above zero")
-        path, deviation = "foot_plate.inertia", 0.0
+        start, end = (quantity_in(self, name, "s", setting.place) for name in ("start", "end"))
+        is_known, path, deviation = self.inertia != UNKNOWN, "foot_plate.inertia", 0.0
+        inertia = positive_in(self, "inertia", "kg m^2", setting.place) if is_known else None
         if self.inertia is None:
             inertia = number_in_si(setting.parameter_set, path)
             deviation = 0.0 if inertia is None else setting.deviation(path, inertia, "kg m^2")
@@ -167,8 +145,8 @@ class OpenValveFlowProblem(StrictTable):
 
     kind: Literal["open-valve-flow"]
     recordings: _Recordings
-    columns: _Columns = None
-    confidence: _Confidence = 0.95
+    columns: Columns = None
+    confidence: Confidence = 0.95
     gas: _Gas = None
     temperature: _Temperature = None
     valve: _Valve = None
@@ -178,7 +156,7 @@ class OpenValveFlowProblem(StrictTable):
         """Return the settings of the procedure [SI]."""
         path = setting.valve_path(self.valve)
         area = number_in_si(setting.parameter_set, f"{path}.area")
-        gas = setting.gas(self.gas, self.temperature)
+        gas = setting.gas(self)
         return OpenValveFlowSettings(gas, self.law, area, path, self.confidence, setting.tolerances)
 
 
@@ -187,18 +165,16 @@ class VaneLeakProblem(StrictTable):
 
     kind: Literal["vane-leak"]
     recordings: _Recordings
-    columns: _Columns = None
-    confidence: _Confidence = 0.95
+    columns: Columns = None
+    confidence: Confidence = 0.95
     gas: _Gas = None
     temperature: _Temperature = None
     start: _Start = None
     end: _End = None
-    angle: Annotated[Text | None, Field(description="vane angle, from which the set's volumes follow")] = None
-    law: Annotated[
-        Literal["orifice", "laminar"], Field(description="law of the leak; an orifice is written as the set has it")
-    ] = "orifice"
-    volume_1: Annotated[Text | None, Field(description="volume of chamber 1 with its line, such as '40 cm^3'")] = None
-    volume_2: Annotated[Text | None, Field(description="volume of chamber 2 with its line")] = None
+    angle: Text | None = Field(None, description="vane angle, from which the set's volumes follow")
+    law: Literal["orifice", "laminar"] = Field("orifice", description="an orifice is written as the set has it")
+    volume_1: Text | None = Field(None, description="volume of chamber 1 with its line, such as '40 cm^3'")
+    volume_2: Text | None = Field(None, description="volume of chamber 2 with its line")
 
     def settings(self, setting: Setting) -> VaneLeakSettings:
         """Return the settings of the procedure [SI]; volumes as given, else from the angle.
@@ -206,13 +182,11 @@ class VaneLeakProblem(StrictTable):
         Equations (4), (5): V1 = V_dead1 + v (theta - theta_min) and V2 = V_dead2 + v (theta_max - theta), with v the
         volume per angle [m^3/rad].
         """
-        start, end = setting.quantity("start", self.start, "s"), setting.quantity("end", self.end, "s")
-        volumes = {}
-        for name, text in (("volume_1", self.volume_1), ("volume_2", self.volume_2)):
-            volume = volumes[name] = setting.quantity(name, text, "m^3")
-            if volume is not None and volume <= 0.0:
-                raise IdentificationError(f"{setting.place}: {name} = {text!r} must be above zero")
-        angle = setting.quantity("angle", self.angle, "rad")
+        start, end, angle = (
+            quantity_in(self, name, unit, setting.place)
+            for name, unit in (("start", "s"), ("end", "s"), ("angle", "rad"))
+        )
+        volumes = {name: positive_in(self, name, "m^3", setting.place) for name in ("volume_1", "volume_2")}
         deviation = setting.tolerances.deviation_of("actuator.dead_volume_1", 1.0, 0.0)
         if angle is not None:
             if setting.parameter_set.actuator_kind != VANE:
@@ -232,7 +206,7 @@ class VaneLeakProblem(StrictTable):
         forms = ("discharge_coefficient", "critical_ratio")
         coefficient, ratio = (number_in_si(setting.parameter_set, f"actuator.leak.{name}") for name in forms)
         return VaneLeakSettings(
-            gas=setting.gas(self.gas, self.temperature),
+            gas=setting.gas(self),
             discharge_coefficient=coefficient,
             start=start,
             end=end,
@@ -250,26 +224,24 @@ class ValveMapProblem(StrictTable):
 
     kind: Literal["valve-map"]
     recordings: _Recordings
-    columns: _Columns = None
-    confidence: _Confidence = 0.95
+    columns: Columns = None
+    confidence: Confidence = 0.95
     gas: _Gas = None
     temperature: _Temperature = None
     valve: _Valve = None
 
     def settings(self, setting: Setting) -> ValveMapSettings:
         """Return the settings of the procedure [SI]."""
-        gas = setting.gas(self.gas, self.temperature)
+        gas = setting.gas(self)
         return ValveMapSettings(gas, setting.valve_path(self.valve), self.confidence, setting.tolerances)
 
 
 class DeviceProblem(StrictTable):
     """The set to start from, its valve, and changes to it."""
 
-    set: Annotated[Text, Field(description="name of a parameter set, or a path relative to this file")]
+    set: Text = Field(description="name of a parameter set, or a path relative to this file")
     valve: _Valve = None
-    overrides: Annotated[
-        tuple[Text, ...], Field(strict=False, description="changes to the set, kept in the new one")
-    ] = ()
+    overrides: Texts = Field((), description="changes to the set, kept in the new one")
 
 
 ProcedureProblem = StaticTorqueProblem | FreeDecayProblem | OpenValveFlowProblem | VaneLeakProblem | ValveMapProblem
@@ -302,34 +274,26 @@ def run_procedure(sources: tuple[Source, ...], problem: ProcedureProblem, settin
 
 def window_of(problem: ProcedureProblem, setting: Setting) -> tuple[float, float]:
     """Return first and last time [s] that a procedure uses of its recordings."""
-    texts = {name: getattr(problem, name, None) for name in ("start", "end")}
-    first, last = (setting.quantity(name, text, "s") for name, text in texts.items())
+    if not isinstance(problem, FreeDecayProblem | VaneLeakProblem):
+        return -math.inf, math.inf
+    first, last = (quantity_in(problem, name, "s", setting.place) for name in ("start", "end"))
     return -math.inf if first is None else first, math.inf if last is None else last
 
 
 class ProblemFile(StrictTable):
     """A problem file, as it is written."""
 
-    schema_version: Annotated[Literal[1], Field(description="version of this layout")]
-    name: Annotated[str, Field(pattern=NAME, max_length=100, description="name of the new parameter set")]
-    title: Annotated[str, Field(description="title of the new parameter set")] = ""
-    device: Annotated[DeviceProblem, Field(description="the set to start from")]
-    citation: Annotated[
-        Citation | None, Field(description="who measured, of the new set; default: that of the set to start from")
-    ] = None
-    columns: Annotated[dict[str, ColumnMap], Field(description="column maps by name, for files from elsewhere")] = (
-        Field(default={})
+    schema_version: Literal[1] = Field(description="version of this layout")
+    name: str = Field(pattern=NAME, max_length=100, description="name of the new parameter set")
+    title: str = Field("", description="title of the new parameter set")
+    device: DeviceProblem = Field(description="the set to start from")
+    citation: Citation | None = Field(None, description="who measured; default: that of the set to start from")
+    columns: dict[str, ColumnMap] = Field({}, description="column maps by name, for files from elsewhere")
+    bench: BenchSection | None = Field(None, description="what the bench does not know exactly")
+    procedure: tuple[Annotated[ProcedureProblem, Field(discriminator="kind")], ...] = Field(
+        (), strict=False, min_length=1, description="bench procedures to apply"
     )
-    bench: Annotated[
-        BenchSection | None, Field(description="what the bench does not know exactly, and what it can do")
-    ] = None
-    procedure: Annotated[
-        tuple[Annotated[ProcedureProblem, Field(discriminator="kind")], ...],
-        Field(strict=False, min_length=1, description="bench procedures to apply"),
-    ] = ()
-    trajectory: Annotated[
-        TrajectorySection | None, Field(description="a fit to recordings of motion, after the bench procedures")
-    ] = None
+    trajectory: TrajectorySection | None = Field(None, description="a fit to recordings of motion, after the bench")
 
 
 def load_problem(path: str | Path) -> ProblemFile:
@@ -346,14 +310,9 @@ def parse_problem(content: bytes, file: str) -> ProblemFile:
     IdentificationError for one that is not usable.
     """
     document = _FILE.parse(content, file)
-    procedures = document.get("procedure")
-    for item in procedures if isinstance(procedures, list) else ():
-        # 0.1 wrote ``static_torque``.
-        kind = item.get("kind") if isinstance(item, dict) else None
-        if isinstance(kind, str) and kind.replace("_", "-") in PROCEDURES:
-            item["kind"] = kind.replace("_", "-")
     refuse_removed(document, file)
     problem = validate(ProblemFile, document, file, IdentificationError)
+    # Each may be left out, which the layout allows, but not both.
     if not problem.procedure and problem.trajectory is None:
         raise IdentificationError(f"{file}: has nothing to do: neither a [[procedure]] nor a [trajectory]")
     fitted = () if problem.trajectory is None else problem.trajectory.experiments

@@ -42,11 +42,6 @@ def source_of(path: Path, recording: Recording) -> Source:
     return Source(recording, f"{path.name} sha256:{hashlib.sha256(read_bytes(path)).hexdigest()}")
 
 
-def traces(sources: tuple[Source, ...]) -> tuple[str, ...]:
-    """Return what an estimate from these recordings names as its origin."""
-    return tuple(source.trace for source in sources)
-
-
 @dataclass(frozen=True, slots=True)
 class Use:
     """A recording as it is used: by what, the file's trace, the channels that count, first and last time [s]."""
@@ -87,6 +82,7 @@ def _digest(recording: Recording) -> str:
     """Return the hash of times and values, whatever the file looks like."""
     total = hashlib.sha256(recording.time.tobytes())
     for name in sorted(recording.names):
+        # The name too: two channels that are exchanged make another recording.
         total.update(name.encode())
         total.update(recording[name].tobytes())
     return total.hexdigest()

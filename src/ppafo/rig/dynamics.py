@@ -49,6 +49,16 @@ class RigPhysics(NamedTuple):
     ports_open: float
 
 
+class RigNumbers(NamedTuple):
+    """Numbers of one run, in the order in which the compiled functions read them."""
+
+    plant: PlantParameters
+    rig: RigPhysics
+    valve_orifice: ExactOrifice
+    leak_orifice: ExactOrifice
+    line_orifice: ExactOrifice
+
+
 class RigState(NamedTuple):
     """Unknowns of the rig, SI units.
 
@@ -144,6 +154,7 @@ def orifice_exchange(
     flow = admitted_flow(exact_flow(a.pressure, b.pressure, fraction * orifice.conductance, orifice), is_relieving)
     upstream_temperature = a.temperature if flow >= 0.0 else b.temperature
     enthalpy = a.enthalpy if flow >= 0.0 else b.enthalpy
+    # The conductance is stated at the temperature of the set; flow goes with one over the root of it.
     flow = flow * temperature_flow_factor(rig.reference_temperature, upstream_temperature)
     return Exchange(flow, flow * enthalpy)
 
@@ -152,6 +163,7 @@ def leak_exchange(rig: RigPhysics, a: Node, b: Node, orifice: ExactOrifice) -> E
     """Leak across the vane [kg/s], [W], positive from a to b: an orifice, and a laminar gap if there is one."""
     through_orifice = orifice_exchange(rig, a, b, 1.0, orifice, 1.0)
     laminar = rig.laminar_conductance * (a.pressure * a.pressure - b.pressure * b.pressure)
+    # Gas brings the enthalpy of where it comes from.
     enthalpy = a.enthalpy if laminar >= 0.0 else b.enthalpy
     return Exchange(through_orifice.mass + laminar, through_orifice.energy + laminar * enthalpy)
 
@@ -162,16 +174,9 @@ def wall_heat(rig: RigPhysics, node: Node, volume: float) -> float:
     return heat_from_wall(node.temperature, rig.wall_temperature, rig.heat_transfer_coefficient, area)
 
 
-def kinetic_friction(
-    plant: PlantParameters, rig: RigPhysics, angular_velocity: float, pressure_1: float, pressure_2: float
-) -> float:
-    """Size of the friction torque in motion [N m]: dynamic, and near standstill more (Stribeck). Equation (10)."""
-    dynamic = pressed_in_motion(plant.dynamic_torque, angular_velocity, pressure_1, pressure_2, rig.seal_friction)
-    return more_near_standstill(dynamic, angular_velocity, pressure_1, pressure_2, rig.stribeck)
-
-
 def chamber_nodes(plant: PlantParameters, rig: RigPhysics, state: RigState, angle: float) -> tuple[Node, Node]:
     """Gas in both chambers [Pa], [K], [J/kg] at an angle [rad]; the air of the room where the chambers are open."""
+    # A number, not a truth value: all that the compiled functions read is a float.
     if rig.chambers_open > 0.5:
         room = ambient_node(rig, plant.atmospheric_pressure, rig.wall_temperature)
         return room, room
@@ -181,10 +186,9 @@ def chamber_nodes(plant: PlantParameters, rig: RigPhysics, state: RigState, angl
     return node_1, node_2
 
 
-def observables(
-    plant: PlantParameters, rig: RigPhysics, state: RigState, angle: float, added_torque: float
-) -> Observables:
+def observables(given: RigNumbers, state: RigState, angle: float, added_torque: float) -> Observables:
     """What a bench could observe at an angle [rad]; ``added_torque`` [N m] is that of a leg."""
+    plant, rig = given.plant, given.rig
     node_1, node_2 = chamber_nodes(plant, rig, state, angle)
     torque = driving_torque(plant, angle, node_1.pressure, node_2.pressure) + added_torque
     return Observables(
@@ -195,115 +199,51 @@ def observables(
     )
 
 
-def droop_rate(rig: RigPhysics, drop: float, flow: float) -> float:
-    """Rate [Pa/s] at which the fall of a regulated pressure grows under a mass flow [kg/s]."""
-    return rig.supply_rate * (rig.supply_droop * flow - drop)
+def port_node(rig: RigPhysics, node: Node, line_mass: float, line_energy: float) -> Node:
+    """Gas at a port of the valve: in the line, or in the chamber itself where there is none."""
+    if rig.line_volume <= 0.0:
+        return node
+    return gas_node(rig, line_mass, line_energy, rig.line_volume)
+
+
+def into_chamber(given: RigNumbers, port: Node, node: Node, through_valve: Exchange) -> Exchange:
+    """Mass [kg/s] and enthalpy [W] from the line, or from the valve where there is none, into a chamber."""
+    if given.rig.line_volume <= 0.0:
+        return through_valve
+    return orifice_exchange(given.rig, port, node, 1.0, given.line_orifice, 1.0)
 
 
 def side(
-    rig: RigPhysics,
-    node: Node,
-    port: Node,
-    source: Node,
-    room: Node,
-    source_fraction: float,
-    vent_fraction: float,
-    valve_orifice: ExactOrifice,
-    line_orifice: ExactOrifice,
-    is_relieving: float,
+    given: RigNumbers, node: Node, regulated: float, line_mass: float, line_energy: float, source: float, vent: float
 ) -> Side:
-    """Flows [kg/s], [W] between the valve and one chamber; without a line the port is the chamber itself.
+    """Flows [kg/s], [W] between the valve and one chamber; ``source`` and ``vent`` are openings of the valve [-].
 
-    ``source_fraction`` and ``vent_fraction`` are the openings of the valve [-].
+    ``regulated`` is the pressure of the source [Pa], ``line_mass`` [kg] and ``line_energy`` [J] are of the line.
     """
-    supplied = orifice_exchange(rig, source, port, rig.ports_open * source_fraction, valve_orifice, is_relieving)
-    vented = orifice_exchange(rig, port, room, rig.ports_open * vent_fraction, valve_orifice, 1.0)
+    plant, rig, orifice = given.plant, given.rig, given.valve_orifice
+    supply = ambient_node(rig, regulated, rig.supply_temperature)
+    room = ambient_node(rig, plant.atmospheric_pressure, rig.wall_temperature)
+    port = port_node(rig, node, line_mass, line_energy)
+    supplied = orifice_exchange(rig, supply, port, rig.ports_open * source, orifice, plant.relieving)
+    vented = orifice_exchange(rig, port, room, rig.ports_open * vent, orifice, 1.0)
     mass, energy = supplied.mass - vented.mass, supplied.energy - vented.energy
-    if rig.line_volume <= 0.0:
-        return Side(
-            supplied_mass=supplied.mass,
-            vented_mass=vented.mass,
-            enthalpy_in=energy,
-            into_mass=mass,
-            into_energy=energy,
-            line_mass=0.0,
-            line_energy=0.0,
-            line_heat=0.0,
-        )
-    through = orifice_exchange(rig, port, node, 1.0, line_orifice, 1.0)
+    into = into_chamber(given, port, node, Exchange(mass, energy))
+    # Without a line its gas keeps its 0 kg: all that the valve passes enters the chamber, and there is no wall.
     heat = wall_heat(rig, port, rig.line_volume)
-    line_energy = energy_rate(energy - through.energy, port.pressure, 0.0, heat)
     return Side(
         supplied_mass=supplied.mass,
         vented_mass=vented.mass,
         enthalpy_in=energy,
-        into_mass=through.mass,
-        into_energy=through.energy,
-        line_mass=mass - through.mass,
-        line_energy=line_energy,
+        into_mass=into.mass,
+        into_energy=into.energy,
+        line_mass=mass - into.mass,
+        line_energy=energy_rate(energy - into.energy, port.pressure, 0.0, heat),
         line_heat=heat,
     )
 
 
-def line_nodes(rig: RigPhysics, state: RigState, node_1: Node, node_2: Node) -> tuple[Node, Node]:
-    """Gas at the ports of the valve: in the lines, or in the chambers where there are none."""
-    if rig.line_volume <= 0.0:
-        return node_1, node_2
-    port_1 = gas_node(rig, state.line_mass_1, state.line_energy_1, rig.line_volume)
-    port_2 = gas_node(rig, state.line_mass_2, state.line_energy_2, rig.line_volume)
-    return port_1, port_2
-
-
-def sides(
-    plant: PlantParameters,
-    rig: RigPhysics,
-    valve_orifice: ExactOrifice,
-    line_orifice: ExactOrifice,
-    openings: Openings,
-    state: RigState,
-    node_1: Node,
-    node_2: Node,
-) -> tuple[Side, Side]:
-    """Both sides between valve and chamber."""
-    port_1, port_2 = line_nodes(rig, state, node_1, node_2)
-    source_1 = ambient_node(rig, plant.supply_pressure - state.supply_drop_1, rig.supply_temperature)
-    source_2 = ambient_node(rig, plant.dorsiflexion_pressure - state.supply_drop_2, rig.supply_temperature)
-    room = ambient_node(rig, plant.atmospheric_pressure, rig.wall_temperature)
-    open_1, open_2 = (openings.source_1, openings.vent_1), (openings.source_2, openings.vent_2)
-    back = plant.relieving
-    side_1 = side(rig, node_1, port_1, source_1, room, open_1[0], open_1[1], valve_orifice, line_orifice, back)
-    side_2 = side(rig, node_2, port_2, source_2, room, open_2[0], open_2[1], valve_orifice, line_orifice, back)
-    return side_1, side_2
-
-
-def sliding_acceleration(
-    plant: PlantParameters,
-    rig: RigPhysics,
-    state: RigState,
-    node_1: Node,
-    node_2: Node,
-    angle: float,
-    added_torque: float,
-    direction: float,
-) -> float:
-    """Angular acceleration [rad/s^2] of a vane that slides towards ``direction`` (1 or -1). Equation (1).
-
-    0 for one that does not slide. ``added_torque`` [N m] is that of a leg.
-    """
-    if direction == 0.0:
-        return 0.0
-    speed = state.angular_velocity
-    torque = driving_torque(plant, angle, node_1.pressure, node_2.pressure) + added_torque
-    friction = direction * kinetic_friction(plant, rig, speed, node_1.pressure, node_2.pressure)
-    return vane_acceleration(torque, speed, friction, plant.viscous_damping, plant.inertia)
-
-
 def rig_rates(
-    plant: PlantParameters,
-    rig: RigPhysics,
-    valve_orifice: ExactOrifice,
-    leak_orifice: ExactOrifice,
-    line_orifice: ExactOrifice,
+    given: RigNumbers,
     openings: Openings,
     state: RigState,
     angle: float,
@@ -313,19 +253,32 @@ def rig_rates(
 ) -> RigState:
     """Time derivatives of all unknowns [SI]; the vane slides towards ``direction`` (0: it is held or prescribed).
 
-    ``added_torque`` [N m] is that of a leg.
+    ``added_torque`` [N m] is that of a leg. Equations (1), (10): friction in motion is dynamic, and more near
+    standstill (Stribeck).
     """
+    plant, rig, speed = given.plant, given.rig, state.angular_velocity
     node_1, node_2 = chamber_nodes(plant, rig, state, angle)
     volume_1, volume_2 = chamber_volumes(plant, angle)
-    side_1, side_2 = sides(plant, rig, valve_orifice, line_orifice, openings, state, node_1, node_2)
-    leak = leak_exchange(rig, node_1, node_2, leak_orifice)
-    sliding = state.angular_velocity if direction != 0.0 else 0.0
-    grows = plant.volume_per_angle * (sliding if direction != 0.0 else rate)
+    regulated_1 = plant.supply_pressure - state.supply_drop_1
+    regulated_2 = plant.dorsiflexion_pressure - state.supply_drop_2
+    side_1 = side(
+        given, node_1, regulated_1, state.line_mass_1, state.line_energy_1, openings.source_1, openings.vent_1
+    )
+    side_2 = side(
+        given, node_2, regulated_2, state.line_mass_2, state.line_energy_2, openings.source_2, openings.vent_2
+    )
+    leak = leak_exchange(rig, node_1, node_2, given.leak_orifice)
+    torque = driving_torque(plant, angle, node_1.pressure, node_2.pressure) + added_torque
+    pressed = pressed_in_motion(plant.dynamic_torque, speed, node_1.pressure, node_2.pressure, rig.seal_friction)
+    friction = direction * more_near_standstill(pressed, speed, node_1.pressure, node_2.pressure, rig.stribeck)
+    acceleration = vane_acceleration(torque, speed, friction, plant.viscous_damping, plant.inertia)
+    grows = plant.volume_per_angle * (speed if direction != 0.0 else rate)
     heat_1, heat_2 = wall_heat(rig, node_1, volume_1), wall_heat(rig, node_2, volume_2)
+    # Chambers that are open to the room take part in nothing, and their gas stays as it was.
     gas = 1.0 - rig.chambers_open
     return RigState(
-        angle=sliding,
-        angular_velocity=sliding_acceleration(plant, rig, state, node_1, node_2, angle, added_torque, direction),
+        angle=speed if direction != 0.0 else 0.0,
+        angular_velocity=acceleration if direction != 0.0 else 0.0,
         mass_1=gas * (side_1.into_mass - leak.mass),
         energy_1=gas * energy_rate(side_1.into_energy - leak.energy, node_1.pressure, grows, heat_1),
         mass_2=gas * (side_2.into_mass + leak.mass),
@@ -337,8 +290,8 @@ def rig_rates(
         supplied_mass=gas * (side_1.supplied_mass + side_2.supplied_mass),
         vented_mass=gas * (side_1.vented_mass + side_2.vented_mass),
         leaked_mass=gas * leak.mass,
-        supply_drop_1=droop_rate(rig, state.supply_drop_1, side_1.supplied_mass),
-        supply_drop_2=droop_rate(rig, state.supply_drop_2, side_2.supplied_mass),
+        supply_drop_1=rig.supply_rate * (rig.supply_droop * side_1.supplied_mass - state.supply_drop_1),
+        supply_drop_2=rig.supply_rate * (rig.supply_droop * side_2.supplied_mass - state.supply_drop_2),
         enthalpy_in=gas * (side_1.enthalpy_in + side_2.enthalpy_in),
         work_done=gas * grows * (node_1.pressure - node_2.pressure),
         heat_in=gas * (heat_1 + heat_2 + side_1.line_heat + side_2.line_heat),

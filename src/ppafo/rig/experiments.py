@@ -9,6 +9,7 @@ experiment, and ``rig.json`` with the truth behind all of them.
 """
 
 import copy
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -38,15 +39,15 @@ from ppafo.rig.preset import (
     Outcome,
     Preset,
     Request,
-    line_orifice,
+    list_presets,
     load_preset,
     random_stream,
     real_device,
     rig_physics,
-    rig_plant,
     sensor,
+    with_line,
 )
-from ppafo.rig.solution import RigRun, RigSolution, sensor_signals, solve_rig
+from ppafo.rig.solution import RigRun, sensor_signals, solve_rig
 from ppafo.signals.recording import CHANNELS, Channel, Recording
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
 from ppafo.simulation.plan import exact_orifice, plan_run, profile_values
@@ -110,6 +111,7 @@ def record_static_torque(request: Request) -> Outcome:
     for repetition in scatter:
         pressed = 0.0
         for pressure, direction, deviation in zip(once, directions, repetition, strict=True):
+            # On the way to the turn friction has changed sides, whatever was read before.
             if direction < 0.0 and pressure == once[rising.size]:
                 pressed = device.actuator.torque_constant * (HIGHEST + TURN)
             limit = device.friction.static_torque + values["friction.static_per_pressure"] * pressure
@@ -172,6 +174,7 @@ def record_valve_map(request: Request) -> Outcome:
     parameters = model.prepare(still)
     rising = np.linspace(-1.0, 1.0, COMMAND_STEPS + 1)
     commands = np.concatenate([rising, rising[-2::-1]])
+    # The sweep begins at the lowest command, where the play lies behind the spool.
     spool, flows, upstream = -1.0, [], []
     for command in commands:
         spool = spool_position(spool, float(command), request.preset.values["valve.hysteresis"])
@@ -215,86 +218,89 @@ def _bench(request: Request) -> tuple[Device, RigPhysics]:
 
 
 def _flow(physics: RigPhysics, upstream: float, downstream: float, fraction: float, orifice: ExactOrifice) -> float:
-    """Mass flow [kg/s] of gas at the supply's temperature."""
-    a = ambient_node(physics, float(upstream), physics.supply_temperature)
-    return orifice_exchange(
-        physics, a, ambient_node(physics, float(downstream), physics.wall_temperature), fraction, orifice, 1.0
-    ).mass
+    """Return the mass flow [kg/s] of gas at the supply's temperature."""
+    before = ambient_node(physics, float(upstream), physics.supply_temperature)
+    behind = ambient_node(physics, float(downstream), physics.wall_temperature)
+    return orifice_exchange(physics, before, behind, fraction, orifice, 1.0).mass
 
 
 LEAK_RATE = 20.0
 """Samples in a second [Hz] of a leak that takes half a minute."""
 
 _SUPPLIES = {"supply_pressure": "supply_drop_1", "dorsiflexion_pressure": "supply_drop_2"}
-_IN_MOTION = ("angle", "pressure_1", "pressure_2", *_SUPPLIES, "command")
+_SENSED = ("angle", "pressure_1", "pressure_2")
+_IN_MOTION = (*_SENSED, *_SUPPLIES, "command")
 _WHOLE = 1.0e-9
-_OPEN_LOOP = "constant"
+"""Fraction of a sample by which the end of a run may miss it, by rounding."""
+
 _CLOSED_VALVE = {"kind": "constant", "command": 0, "rate": "1 kHz"}
 
 
 def record_step_response(request: Request) -> Outcome:
     """Return the step response of figure 7: the valve opens fully and the vane turns from stop to stop."""
     scenario = _of_package("step-response", request)
-    bench_run = rig_run(scenario, request, request.preset.values["sampling.rate"])
-    return _outcome("step-response", scenario, bench_run, (*_IN_MOTION, "torque"))
+    return _recorded("step-response", scenario, rig_run(scenario, request), (*_IN_MOTION, "torque"))
 
 
 def record_torque_task(request: Request) -> Outcome:
     """Return the torque task of figure 8 with the controller that belongs to the kind of valve."""
+    # Overrides may be of the scenario, which is chosen by the valve first.
     kind = load_device(request.parameter_set, request.valve).valve.kind
     scenario = _of_package(f"torque-task-{kind}", request)
-    bench_run = rig_run(scenario, request, request.preset.values["sampling.rate"])
-    return _outcome("torque-task", scenario, bench_run, (*_IN_MOTION, "reference", "torque"))
+    return _recorded("torque-task", scenario, rig_run(scenario, request), (*_IN_MOTION, "reference", "torque"))
 
 
 def record_free_decay(request: Request) -> Outcome:
     """Return the angle after an impulse, device on its side, both chambers open to the room."""
     motion = {"kind": "free", "angle": "25 deg", "angular_velocity": "380 deg/s", "external_torque": "0 N m"}
     scenario = _of_bench("free-decay", request, motion, {}, "2 s")
-    bench_run = rig_run(scenario, request, request.preset.values["sampling.rate"])
+    bench_run = rig_run(scenario, request)
+    # On its side gravity turns nothing.
     run = replace(bench_run.run, plant=bench_run.run.plant._replace(gravity_torque=0.0))
     opened = replace(bench_run, run=run, physics=bench_run.physics._replace(chambers_open=1.0))
-    return _outcome("free-decay", scenario, opened, ("angle",))
+    return _recorded("free-decay", scenario, opened, ("angle",))
 
 
 def record_vane_leak(request: Request) -> Outcome:
     """Return both pressures after chamber 1 was filled and both ports were plugged, the vane held in the middle."""
-    actuator = load_device(request.parameter_set, request.valve, device_overrides(request)).actuator
+    sections = {section.partition(".")[0] for section in SECTIONS} | {"valve", "valves"}
+    # What belongs to the scenario is no override of a device.
+    of_device = [item for item in request.overrides if item.strip().partition(".")[0] in sections]
+    actuator = load_device(request.parameter_set, request.valve, of_device).actuator
     motion = {"kind": "held", "angle": f"{0.5 * (actuator.angle_min + actuator.angle_max)!r} rad"}
     initial = {"pressure_1": "supply", "pressure_2": "atmosphere"}
     scenario = _of_bench("vane-leak", request, motion, initial, "30 s")
-    bench_run = rig_run(scenario, request, min(LEAK_RATE, request.preset.values["sampling.rate"]))
+    bench_run = rig_run(scenario, request, LEAK_RATE)
     plugged = replace(bench_run, physics=bench_run.physics._replace(ports_open=0.0))
-    return _outcome("vane-leak", scenario, plugged, ("pressure_1", "pressure_2"))
+    return _recorded("vane-leak", scenario, plugged, ("pressure_1", "pressure_2"))
 
 
-def rig_run(scenario: Scenario, request: Request, rate: float) -> RigRun:
-    """Return the run of a scenario on the rig of a request, recorded ``rate`` times a second [Hz].
+def rig_run(scenario: Scenario, request: Request, highest_rate: float = math.inf) -> RigRun:
+    """Return the run of a scenario on the rig of a request, recorded at most ``highest_rate`` times a second [Hz].
 
     ScenarioError for a valve that the rig does not have.
     """
-    preset, seed = request.preset, request.seed
+    preset = request.preset
+    rate = min(highest_rate, preset.values["sampling.rate"])
     device = real_device(scenario.device, preset)
     run = plan_run(replace(scenario, device=device))
     if run.program.valve.joint is not None:
         raise ScenarioError(
             f"the simulated test bench has no valve between the chambers: valve '{device.valve.kind}' has one"
         )
-    run = replace(run, plant=rig_plant(run.plant, preset))
-    physics = rig_physics(device, preset)
+    physics, (plant, line) = rig_physics(device, preset), with_line(device, run.plant, preset)
+    run = replace(run, plant=plant)
     times = np.arange(int(scenario.run.duration * rate + _WHOLE) + 1, dtype=np.float64) / rate
-    is_open_loop = scenario.controller.kind == _OPEN_LOOP
     return RigRun(
         device=device,
         run=run,
         physics=physics,
-        line_orifice=line_orifice(device, preset),
+        line_orifice=line,
         initial=initial_state(scenario, run, physics),
-        sensors={
-            name: sensor(preset, name, seed, times.size) for name in ("angle", "pressure_1", "pressure_2", *_SUPPLIES)
-        },
+        sensors={name: sensor(preset, name, request.seed, times.size) for name in (*_SENSED, *_SUPPLIES)},
         sample_times=times,
-        control_period=2.0 * scenario.run.duration if is_open_loop else run.period,
+        # A constant command is decided once.
+        control_period=2.0 * scenario.run.duration if scenario.controller.kind == "constant" else run.period,
         command_delay=run.command_delay + preset.values["line.delay"],
         hysteresis=preset.values["valve.hysteresis"],
     )
@@ -302,45 +308,32 @@ def rig_run(scenario: Scenario, request: Request, rate: float) -> RigRun:
 
 def initial_state(scenario: Scenario, run: Run, physics: RigPhysics) -> RigState:
     """Return vane and gas at the start [SI], everything at the temperature of the walls."""
-    angle, rate = run.initial.angle, run.initial.angular_velocity
-    warm = physics.wall_temperature
+    angle, warm = run.initial.angle, physics.wall_temperature
+    start = dict.fromkeys(RigState._fields, 0.0)
+    start |= {"angle": angle, "angular_velocity": run.initial.angular_velocity, "sensor_angle": angle}
     pressures = (scenario.initial.pressure_1, scenario.initial.pressure_2)
-    densities = [real_density(pressure, warm, physics.gas_constant, physics.virial) for pressure in pressures]
-    volumes = chamber_volumes(run.plant, angle)
-    mass_1, mass_2 = (density * volume for density, volume in zip(densities, volumes, strict=True))
-    line_1, line_2 = (density * physics.line_volume for density in densities)
-    energy_1, energy_2, line_energy_1, line_energy_2 = (
-        gas_energy(mass, warm, physics.heat_capacity) for mass in (mass_1, mass_2, line_1, line_2)
-    )
-    return RigState(
-        angle=angle,
-        angular_velocity=rate,
-        mass_1=mass_1,
-        energy_1=energy_1,
-        mass_2=mass_2,
-        energy_2=energy_2,
-        line_mass_1=line_1,
-        line_energy_1=line_energy_1,
-        line_mass_2=line_2,
-        line_energy_2=line_energy_2,
-        supplied_mass=0.0,
-        vented_mass=0.0,
-        leaked_mass=0.0,
-        supply_drop_1=0.0,
-        supply_drop_2=0.0,
-        enthalpy_in=0.0,
-        work_done=0.0,
-        heat_in=0.0,
-        sensor_angle=angle,
-        sensor_pressure_1=pressures[0],
-        sensor_pressure_2=pressures[1],
-    )
+    for number, (pressure, volume) in enumerate(zip(pressures, chamber_volumes(run.plant, angle), strict=True), 1):
+        density = real_density(pressure, warm, physics.gas_constant, physics.virial)
+        start[f"sensor_pressure_{number}"] = pressure
+        for place, filled in (("", volume), ("line_", physics.line_volume)):
+            start[f"{place}mass_{number}"] = mass = density * filled
+            start[f"{place}energy_{number}"] = gas_energy(mass, warm, physics.heat_capacity)
+    return RigState(**start)
 
 
-def _outcome(name: str, scenario: Scenario, bench_run: RigRun, names: tuple[str, ...]) -> Outcome:
-    solution = solve_rig(bench_run)
-    values = sensor_readings(scenario, bench_run, solution)
-    channels = {item: Channel(values[item], CHANNELS[item].unit) for item in names}
+def _recorded(name: str, scenario: Scenario, bench_run: RigRun, names: tuple[str, ...]) -> Outcome:
+    """Return what the sensors read at every sample; the torque is computed from the measured pressures."""
+    solution, plant = solve_rig(bench_run), bench_run.run.plant
+    pairs = zip(solution.states, solution.pressures, strict=True)
+    signals = np.array([sensor_signals(bench_run.physics, *pair) for pair in pairs])
+    true = dict(zip(_SENSED, signals.T, strict=True))
+    for supply, drop in _SUPPLIES.items():
+        true[supply] = getattr(plant, supply) - solution.states[:, RigState._fields.index(drop)]
+    readings = {item: bench_run.sensors[item].readings(values) for item, values in true.items()}
+    readings["command"] = solution.commands
+    readings["torque"] = plant.torque_constant * (readings["pressure_1"] - readings["pressure_2"])
+    readings["reference"] = profile_values(scenario.reference, bench_run.sample_times)[0]
+    channels = {item: Channel(readings[item], CHANNELS[item].unit) for item in names}
     recording = Recording(name, bench_run.sample_times, channels, kind="synthetic")
     offsets = {item: bench_run.sensors[item].offset for item in names if item in bench_run.sensors}
     settings = {
@@ -351,26 +344,6 @@ def _outcome(name: str, scenario: Scenario, bench_run: RigRun, names: tuple[str,
         "breakaways": solution.breakaways,
     }
     return Outcome(recording, bench_run.device, offsets, settings)
-
-
-def sensor_readings(scenario: Scenario, bench_run: RigRun, solution: RigSolution) -> dict[str, Floats]:
-    """Return what the sensors read at every sample [SI]; the torque is computed from the measured pressures."""
-    signals = [sensor_signals(bench_run, *pair) for pair in zip(solution.states, solution.pressures, strict=True)]
-    true = dict(zip(("angle", "pressure_1", "pressure_2"), np.array(signals).T, strict=True))
-    for name, drop in _SUPPLIES.items():
-        regulated = getattr(bench_run.run.plant, name)
-        true[name] = regulated - solution.states[:, RigState._fields.index(drop)]
-    readings = {name: bench_run.sensors[name].readings(values) for name, values in true.items()}
-    readings["command"] = solution.commands
-    readings["torque"] = bench_run.run.plant.torque_constant * (readings["pressure_1"] - readings["pressure_2"])
-    readings["reference"] = profile_values(scenario.reference, bench_run.sample_times)[0]
-    return readings
-
-
-def device_overrides(request: Request) -> tuple[str, ...]:
-    """Return the overrides that belong to the device and not to the scenario of an experiment."""
-    sections = {section.partition(".")[0] for section in SECTIONS} | {"valve", "valves"}
-    return tuple(item for item in request.overrides if item.strip().partition(".")[0] in sections)
 
 
 def _of_package(name: str, request: Request) -> Scenario:
@@ -422,6 +395,21 @@ EXPERIMENTS: dict[str, Experiment] = {
 }
 
 
+def overview() -> tuple[str, dict[str, Any]]:
+    """Return the experiments and the presets with what they are, as text and as plain data."""
+    experiments = {item.name: item.summary for item in EXPERIMENTS.values()}
+    presets = {name: load_preset(name).title for name in list_presets()}
+    width = max(map(len, [*experiments, *presets]))
+    lines = ["experiments (recordings are synthetic):"]
+    lines += [f"  {name:<{width}}  {summary}" for name, summary in experiments.items()]
+    lines += ["presets:", *(f"  {name:<{width}}  {title}" for name, title in presets.items())]
+    document = {
+        "experiments": [{"name": name, "summary": summary} for name, summary in experiments.items()],
+        "presets": [{"name": name, "title": title} for name, title in presets.items()],
+    }
+    return "\n".join(lines), document
+
+
 LARGEST_SEED = 2**32 - 1
 DEFAULT_DEVICE = "ppafo2011"
 DEFAULT_PRESET = "paper-bench"
@@ -452,48 +440,30 @@ def record(
     time) or ``rig.pressure_sensor.noise=0 Pa_d`` (preset). SimulationError where the solver gives up.
     """
     chosen = find_experiment(experiment)
-    # Raise ParameterError for a seed that is not a whole number from 0 to 4294967295.
     if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed <= LARGEST_SEED:
         raise ParameterError(f"seed = {seed} must be a whole number from 0 to {LARGEST_SEED}")
     words = tuple(overrides)
     of_preset = tuple(item for item in words if item.strip().startswith(PREFIX))
     others = tuple(item for item in words if item not in of_preset)
-    used = _refuse_overrides(preset, of_preset) if isinstance(preset, Preset) else load_preset(preset, of_preset)
+    if not isinstance(preset, Preset):
+        preset = load_preset(preset, of_preset)
+    elif of_preset:
+        raise ParameterError(f"override '{of_preset[0]}': change a preset object itself, with Preset.with_value")
     kind = load_parameter_set(device).actuator_kind
     if kind != VANE:
         raise ParameterError(
             f"the simulated test bench is made for a vane, and '{one_line(device)}' has an actuator '{kind}'"
         )
-    outcome = chosen.record(Request(used, seed, device, valve, others))
-    return RigRecording(outcome.recording, outcome.device, _truth(chosen, used, seed, device, words, outcome))
-
-
-def find_experiment(name: str) -> Experiment:
-    """Return the experiment of this name. ParameterError where there is none."""
-    if name not in EXPERIMENTS:
-        hint = nearest_name(name, EXPERIMENTS)
-        raise ParameterError(f"there is no experiment '{one_line(name)}'{hint}; available: {', '.join(EXPERIMENTS)}")
-    return EXPERIMENTS[name]
-
-
-def _refuse_overrides(preset: Preset, overrides: tuple[str, ...]) -> Preset:
-    if overrides:
-        raise ParameterError(f"override '{overrides[0]}': change a preset object itself, with Preset.with_value")
-    return preset
-
-
-def _truth(
-    experiment: Experiment, preset: Preset, seed: int, parameter_set: str, overrides: tuple[str, ...], outcome: Outcome
-) -> dict[str, Any]:
-    return {
+    outcome = chosen.record(Request(preset, seed, device, valve, others))
+    truth = {
         "notice": NOTICE,
         "units": UNITS,
         "version": __version__,
-        "experiment": experiment.name,
-        "summary": experiment.summary,
+        "experiment": chosen.name,
+        "summary": chosen.summary,
         "seed": seed,
-        "parameter_set": parameter_set,
-        "overrides": list(overrides),
+        "parameter_set": device,
+        "overrides": list(words),
         "device": plain(outcome.device),
         "preset": {
             "name": preset.name,
@@ -506,21 +476,25 @@ def _truth(
         "channels": {name: outcome.recording.unit(name) for name in outcome.recording.names},
         "samples": len(outcome.recording),
     }
+    return RigRecording(outcome.recording, outcome.device, truth)
+
+
+def find_experiment(name: str) -> Experiment:
+    """Return the experiment of this name. ParameterError where there is none."""
+    if name not in EXPERIMENTS:
+        hint = nearest_name(name, EXPERIMENTS)
+        raise ParameterError(f"there is no experiment '{one_line(name)}'{hint}; available: {', '.join(EXPERIMENTS)}")
+    return EXPERIMENTS[name]
 
 
 RIG_FILE = "rig.json"
 FORMAT = "ppafo rig"
 
 
-def csv_name(experiment: str) -> str:
-    """Return the file name of an experiment's recording."""
-    return f"{experiment}.csv"
-
-
 def check_rig_folder(folder: Path, experiment: str) -> None:
     """Raise DataError, before anything runs, for a folder that cannot be written or belongs to something else."""
-    _check_own(folder, csv_name(experiment))
-    check_files_can_be_added(folder, [csv_name(experiment), RIG_FILE])
+    _earlier(folder, f"{experiment}.csv")
+    check_files_can_be_added(folder, [f"{experiment}.csv", RIG_FILE])
 
 
 def write_rig_recording(folder: Path, made: RigRecording) -> tuple[str, ...]:
@@ -528,9 +502,8 @@ def write_rig_recording(folder: Path, made: RigRecording) -> tuple[str, ...]:
 
     DataError for a folder that belongs to something else.
     """
-    name = csv_name(made.truth["experiment"])
-    _check_own(folder, name)
-    recordings = {**_earlier(folder), name: dict(made.truth)}
+    name = f"{made.truth['experiment']}.csv"
+    recordings = {**_earlier(folder, name), name: dict(made.truth)}
     document = {
         "format": FORMAT,
         "schema_version": 1,
@@ -542,32 +515,31 @@ def write_rig_recording(folder: Path, made: RigRecording) -> tuple[str, ...]:
     return name, RIG_FILE
 
 
-def _check_own(folder: Path, name: str) -> None:
-    """Refuse a folder of others, and a file of others that a recording would replace."""
-    earlier = _earlier(folder)
+def _earlier(folder: Path, name: str) -> dict[str, Any]:
+    """Return what ``rig.json`` says of recordings that are already in a folder.
+
+    DataError for a folder of others, and for a file of others that the recording ``name`` would replace.
+    """
     try:
         there = {entry.name for entry in folder.iterdir()} if folder.is_dir() else set()
     except OSError as error:
         raise DataError(f"{folder}: cannot be read: {reason(error)}") from error
+    # What a killed writer left is no file of others.
     present = {entry for entry in there if LEFT_ASIDE not in entry}
-    if present and RIG_FILE not in present:
+    recordings: Any = {}
+    if RIG_FILE in present:
+        path = folder / RIG_FILE
+        try:
+            document = read_json(path)
+        except DataError as error:
+            raise DataError(f"{error}, so it is not overwritten") from error
+        if not isinstance(document, dict) or document.get("format") != FORMAT:
+            raise DataError(f"{path}: was not written by the rig, so it is not overwritten")
+        recordings = document.get("recordings")
+        if not isinstance(recordings, dict):
+            raise DataError(f"{path}: has no 'recordings', so it is not overwritten")
+    elif present:
         raise DataError(f"{folder}: is not empty and has no recordings of the rig ({RIG_FILE}); choose another folder")
-    if name in present and name not in earlier:
+    if name in present and name not in recordings:
         raise DataError(f"{folder}: has a {name} that the rig did not write; move it or choose another folder")
-
-
-def _earlier(folder: Path) -> dict[str, Any]:
-    """Return what ``rig.json`` says of recordings that are already in a folder; refuse a file of another kind."""
-    path = folder / RIG_FILE
-    if not path.exists():
-        return {}
-    try:
-        document = read_json(path)
-    except DataError as error:
-        raise DataError(f"{error}, so it is not overwritten") from error
-    if not isinstance(document, dict) or document.get("format") != FORMAT:
-        raise DataError(f"{path}: was not written by the rig, so it is not overwritten")
-    recordings = document.get("recordings")
-    if not isinstance(recordings, dict):
-        raise DataError(f"{path}: has no 'recordings', so it is not overwritten")
-    return recordings
+    return dict(recordings)

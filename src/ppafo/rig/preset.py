@@ -7,6 +7,7 @@ The bandwidth of sensors is integrated with the rig; noise, offset and quantisat
 channel has a stream of random numbers of its own, so that one more channel changes none of the others.
 """
 
+import functools
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -16,15 +17,15 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import BaseModel, Field
 
-from ppafo.documents.models import StrictTable, make_schema, quote, table
-from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import ParameterError, UnitError, nearest_name, one_line, refused_as
+from ppafo.documents.models import StrictTable, make_schema, read_model, table
+from ppafo.documents.toml_text import TomlKind
+from ppafo.errors import ParameterError, UnitError, nearest_name, refused_as
 from ppafo.model.catalog import VALVES
 from ppafo.model.declaration import Quantity, range_rule
 from ppafo.model.effects import stribeck
-from ppafo.model.effects.kind import SECTION, Effect
+from ppafo.model.effects.kind import SECTION
 from ppafo.model.effects.seal_friction import SealFriction
 from ppafo.model.effects.second_virial import SECOND_VIRIAL
 from ppafo.model.gas import heat_capacity_at_constant_volume
@@ -39,97 +40,63 @@ from ppafo.rig.dynamics import RigPhysics
 from ppafo.signals.recording import Recording
 from ppafo.units import parse_quantity, to_si
 
-GAS = (
-    Quantity("heat_transfer_coefficient", "W/(m^2 K)", "heat transfer between gas and wall", minimum=0.0, maximum=1e9),
-    Quantity(
-        "wall_area_per_volume", "1/m", "inner surface of chamber or line over its volume", minimum=0.0, maximum=1e5
-    ),
-    Quantity(
-        "wall_temperature_difference", "K", "wall and room above the set's temperature", minimum=-80.0, maximum=80.0
-    ),
-    Quantity(
-        "supply_temperature_difference", "K", "supplied gas above the set's temperature", minimum=-80.0, maximum=80.0
-    ),
-    Quantity(
-        "real_gas_share", "", "fraction of the gas's second virial coefficient, 0: ideal", minimum=0.0, maximum=1.0
-    ),
-)
-SUPPLY = (
-    Quantity("droop", "Pa s/kg", "fall of a regulated pressure per mass flow", minimum=0.0, maximum=1e9),
-    Quantity(
-        "recovery_time",
-        "s",
-        "time constant with which the regulated pressure falls and recovers",
-        minimum=0.0,
-        maximum=10.0,
-    ),
-)
-LINE = (
-    Quantity("volume", "m^3", "volume of each line, a part of the dead volume, 0 for none", minimum=0.0, maximum=1e-2),
-    Quantity(
-        "area",
-        "m^2",
-        "area of an orifice between line and chamber with the same pressure loss",
-        minimum=0.0,
-        maximum=1e-2,
-    ),
-    Quantity("discharge_coefficient", "", "discharge coefficient of that orifice", minimum=0.0, maximum=2.0),
-    Quantity("delay", "s", "time that a wave needs through the line, added to the command", minimum=0.0, maximum=0.1),
-)
-VALVE = (
-    Quantity("hysteresis", "", "play between command and spool, whole width", minimum=0.0, maximum=0.5),
-    Quantity("dead_band", "", "proportional: smallest command that opens the valve", minimum=0.0, maximum=0.9),
-    Quantity("delay", "s", "proportional: dead time between command and spool", minimum=0.0, maximum=0.2),
-    Quantity(
-        "spool_frequency", "Hz", "proportional: undamped frequency of the spool, 0 for none", minimum=0.0, maximum=2e3
-    ),
-    Quantity("spool_damping_ratio", "", "proportional: damping ratio of the spool", minimum=0.05, maximum=5.0),
-    Quantity("opening_delay", "s", "solenoid: time from energising to flow from the source", minimum=0.0, maximum=0.2),
-    Quantity("closing_delay", "s", "solenoid: time from de-energising to venting", minimum=0.0, maximum=0.2),
-)
-FRICTION = (
-    Quantity(
-        "static_per_pressure", "m^3", "static limit per pressure difference across the vane", minimum=0.0, maximum=1e-2
-    ),
-    Quantity("dynamic_per_pressure", "m^3", "dynamic friction per pressure difference", minimum=0.0, maximum=1e-2),
-    Quantity(
-        "stribeck_velocity", "rad/s", "speed at which half of the rise at standstill is left", minimum=0.0, maximum=1e2
-    ),
-    Quantity("scatter", "", "standard deviation of the static limit from reading to reading", minimum=0.0, maximum=0.5),
-)
-LEAK = (
-    Quantity("conductance_factor", "", "leak of the device times this", minimum=0.0, maximum=1e3),
-    Quantity(
-        "laminar_conductance",
-        "kg/(s Pa^2)",
-        "further leak per difference of squared pressures",
-        minimum=0.0,
-        maximum=1e-8,
-    ),
-)
-SAMPLING = (Quantity("rate", "Hz", "samples recorded per second", minimum=1.0, maximum=1e5),)
+
+def _from_zero(name: str, unit: str, summary: str, maximum: float = math.inf) -> Quantity:
+    return Quantity(name, unit, summary, minimum=0.0, maximum=maximum)
 
 
 def _sensor(unit: str, what: str) -> tuple[Quantity, ...]:
     return (
-        Quantity("noise", unit, f"standard deviation of the noise of the {what}", minimum=0.0),
-        Quantity("offset", unit, f"standard deviation of the offset of the {what}, drawn once", minimum=0.0),
-        Quantity("quantum", unit, f"step of the {what}, 0 for none", minimum=0.0),
+        _from_zero("noise", unit, f"standard deviation of the noise of the {what}"),
+        _from_zero("offset", unit, f"standard deviation of the offset of the {what}, drawn once"),
+        _from_zero("quantum", unit, f"step of the {what}, 0 for none"),
     )
 
 
 def _bandwidth(what: str) -> Quantity:
-    return Quantity("bandwidth", "Hz", f"first-order bandwidth of the {what}, 0 for none", minimum=0.0, maximum=1e5)
+    return _from_zero("bandwidth", "Hz", f"first-order bandwidth of the {what}, 0 for none", 1e5)
 
+
+_WALL, _SUPPLIED = "wall and room above the set's temperature", "supplied gas above the set's temperature"
 
 SECTIONS: dict[str, tuple[Quantity, ...]] = {
-    "gas": GAS,
-    "supply": SUPPLY,
-    "line": LINE,
-    "valve": VALVE,
-    "friction": FRICTION,
-    "leak": LEAK,
-    "sampling": SAMPLING,
+    "gas": (
+        _from_zero("heat_transfer_coefficient", "W/(m^2 K)", "heat transfer between gas and wall", 1e9),
+        _from_zero("wall_area_per_volume", "1/m", "inner surface of chamber or line over its volume", 1e5),
+        Quantity("wall_temperature_difference", "K", _WALL, minimum=-80.0, maximum=80.0),
+        Quantity("supply_temperature_difference", "K", _SUPPLIED, minimum=-80.0, maximum=80.0),
+        _from_zero("real_gas_share", "", "fraction of the gas's second virial coefficient, 0: ideal", 1.0),
+    ),
+    "supply": (
+        _from_zero("droop", "Pa s/kg", "fall of a regulated pressure per mass flow", 1e9),
+        _from_zero("recovery_time", "s", "time constant with which the regulated pressure falls and recovers", 10.0),
+    ),
+    "line": (
+        _from_zero("volume", "m^3", "volume of each line, a part of the dead volume, 0 for none", 1e-2),
+        _from_zero("area", "m^2", "area of an orifice between line and chamber with the same pressure loss", 1e-2),
+        _from_zero("discharge_coefficient", "", "discharge coefficient of that orifice", 2.0),
+        _from_zero("delay", "s", "time that a wave needs through the line, added to the command", 0.1),
+    ),
+    "valve": (
+        _from_zero("hysteresis", "", "play between command and spool, whole width", 0.5),
+        _from_zero("dead_band", "", "proportional: smallest command that opens the valve", 0.9),
+        _from_zero("delay", "s", "proportional: dead time between command and spool", 0.2),
+        _from_zero("spool_frequency", "Hz", "proportional: undamped frequency of the spool, 0 for none", 2e3),
+        Quantity("spool_damping_ratio", "", "proportional: damping ratio of the spool", minimum=0.05, maximum=5.0),
+        _from_zero("opening_delay", "s", "solenoid: time from energising to flow from the source", 0.2),
+        _from_zero("closing_delay", "s", "solenoid: time from de-energising to venting", 0.2),
+    ),
+    "friction": (
+        _from_zero("static_per_pressure", "m^3", "static limit per pressure difference across the vane", 1e-2),
+        _from_zero("dynamic_per_pressure", "m^3", "dynamic friction per pressure difference", 1e-2),
+        _from_zero("stribeck_velocity", "rad/s", "speed at which half of the rise at standstill is left", 1e2),
+        _from_zero("scatter", "", "standard deviation of the static limit from reading to reading", 0.5),
+    ),
+    "leak": (
+        _from_zero("conductance_factor", "", "leak of the device times this", 1e3),
+        _from_zero("laminar_conductance", "kg/(s Pa^2)", "further leak per difference of squared pressures", 1e-8),
+    ),
+    "sampling": (Quantity("rate", "Hz", "samples recorded per second", minimum=1.0, maximum=1e5),),
     "angle_sensor": (_bandwidth("angle sensor"), *_sensor("rad", "angle sensor")),
     "pressure_sensor": (_bandwidth("pressure sensors"), *_sensor("Pa_d", "pressure sensors")),
     "torque_sensor": _sensor("N m", "scale"),
@@ -150,8 +117,8 @@ class PresetValue(StrictTable):
     reason: str = Field(min_length=1, description="reason for the number: a source, or why it was chosen")
 
 
-def json_schema() -> dict[str, Any]:
-    """Return the JSON Schema of a preset; every value is needed."""
+@functools.cache
+def _layout() -> type[BaseModel]:
     fields: dict[str, Any] = {
         "schema_version": (Literal[1], Field(description="version of this layout")),
         "name": (str, Field(description="name of the preset")),
@@ -163,15 +130,18 @@ def json_schema() -> dict[str, Any]:
             item.name: (PresetValue, Field(description=f"{item.summary} [{item.unit or '-'}]")) for item in members
         }
         fields[name] = (table("".join(part.capitalize() for part in name.split("_")), values), Field())
-    return make_schema(table("RigPreset", fields), "ppafo rig preset")
+    return table("RigPreset", fields)
+
+
+def json_schema() -> dict[str, Any]:
+    """Return the JSON Schema of a preset; every value is needed."""
+    return make_schema(_layout(), "ppafo rig preset")
 
 
 PREFIX = "rig."
 """An override whose path begins so belongs to the preset, any other one to the device or the experiment."""
 
 _FILE = TomlKind("preset of the rig", "rig", resources.files("ppafo.rig") / "presets", ParameterError)
-_ENTRY = ("value", "unit", "reason")
-_HEAD = ("schema_version", "name", "title", "notes")
 
 
 @dataclass(frozen=True, slots=True)
@@ -210,8 +180,16 @@ def load_preset(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Pres
     ``overrides`` are texts such as ``rig.pressure_sensor.noise=0 Pa_d``. ParameterError for anything that cannot be
     used.
     """
-    file = label(str(name_or_path))
-    preset = _parse(_FILE.parse(_FILE.read(name_or_path), file), file)
+    layout, file = read_model(_FILE, _layout(), name_or_path)
+    read: Any = layout
+    preset = Preset(read.name, read.title, read.notes.strip(), {}, {})
+    for path, quantity in PATHS.items():
+        section, _, name = path.partition(".")
+        entry: PresetValue = getattr(getattr(read, section), name)
+        with refused_as(ParameterError, f"{file}: {path}", UnitError):
+            in_si = to_si(entry.value, entry.unit, quantity.unit)
+        with refused_as(ParameterError, file, ParameterError):
+            preset = preset.with_value(path, in_si, entry.reason)
     for typed, given in override_set(overrides).items():
         path = typed.removeprefix(PREFIX)
         if path not in PATHS or not typed.startswith(PREFIX):
@@ -221,53 +199,6 @@ def load_preset(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Pres
             value = parse_quantity(given.text, PATHS[path].unit)
         preset = preset.with_value(path, value, "override")
     return preset
-
-
-def _parse(document: dict[str, Any], file: str) -> Preset:
-    """Check keys, units and ranges of a document; every value must be there."""
-    if not document:
-        raise ParameterError(f"{file}: holds no values; 'ppafo doctor --schema rig' prints its format")
-    _check_names(document, (*_HEAD, *SECTIONS), "", file)
-    if document.get("schema_version") != 1:
-        raise ParameterError(f"{file}: schema_version must be 1, it is {quote(document.get('schema_version'))}")
-    for key in _HEAD[1:]:
-        if not isinstance(document.get(key), str):
-            raise ParameterError(f"{file}: '{key}' must be a text in quotation marks")
-    preset = Preset(document["name"], document["title"], document["notes"].strip(), {}, {})
-    for section, members in SECTIONS.items():
-        table = _table(document, section, file)
-        _check_names(table, [item.name for item in members], f"{section}.", file)
-        for item in members:
-            preset = _with_entry(preset, f"{section}.{item.name}", _table(table, item.name, file, f"{section}."), file)
-    return preset
-
-
-def _with_entry(preset: Preset, path: str, entry: dict[str, Any], file: str) -> Preset:
-    _check_names(entry, _ENTRY, f"{path}.", file)
-    value, unit, reason = (entry.get(name) for name in _ENTRY)
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ParameterError(f"{file}: {path}.value = {quote(value)} must be a number")
-    if not isinstance(unit, str) or not isinstance(reason, str) or not reason:
-        raise ParameterError(f"{file}: {path} needs a unit and a reason, both texts")
-    with refused_as(ParameterError, f"{file}: {path}", UnitError):
-        in_si = to_si(float(value), unit, PATHS[path].unit)
-    with refused_as(ParameterError, file, ParameterError):
-        return preset.with_value(path, in_si, reason)
-
-
-def _table(parent: Mapping[str, Any], key: str, file: str, before: str = "") -> dict[str, Any]:
-    table = parent.get(key)
-    if not isinstance(table, dict):
-        raise ParameterError(f"{file}: there is no table [{before}{key}]")
-    return table
-
-
-def _check_names(table: Mapping[str, Any], allowed: Iterable[str], before: str, file: str) -> None:
-    names = list(allowed)
-    unknown = next((key for key in table if key not in names), None)
-    if unknown is not None:
-        hint = nearest_name(unknown, names)
-        raise ParameterError(f"{file}: unknown key '{before}{one_line(unknown)}'{hint}; allowed: {', '.join(names)}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -299,44 +230,26 @@ def real_device(device: Device, preset: Preset) -> Device:
 
     ParameterError for a device with an effect that is on: the rig has physics of its own, and would record without it.
     """
-    for effect, is_on in switches_of(device).items():
-        if is_on:
-            raise ParameterError(
-                f"the simulated bench has no effect '{effect.name}': switch it off with {_off(effect)}, or take the "
-                "recording of a simulated run"
-            )
+    for effect in (effect for effect, is_on in switches_of(device).items() if is_on):
+        zeros = {item.name: f"0 {item.unit}".strip() for item in effect.quantities}
+        off = " and ".join(f"'{SECTION}.{effect.name}.{name}={zeros[name]}'" for name in effect.switch)
+        raise ParameterError(
+            f"the simulated bench has no effect '{effect.name}': switch it off with {off}, or take the recording of a "
+            "simulated run"
+        )
     declared = {item.name for item in VALVES[device.valve.kind].quantities}
-    added = {name: value for name, value in preset.section("valve").items() if name in declared}
-    given = {name for name in added if device.valve.settings.get(name, 0.0) != 0.0 and name != "spool_damping_ratio"}
-    kept = {name: value for name, value in added.items() if name not in given}
-    valve = replace(device.valve, settings={**device.valve.settings, **kept})
+    settings, added = dict(device.valve.settings), preset.section("valve")
+    for name in (name for name in added if name in declared):
+        # What the set states of its valve counts; a damping ratio is stated beside any frequency.
+        if settings.get(name, 0.0) == 0.0 or name == "spool_damping_ratio":
+            settings[name] = added[name]
+    valve = replace(device.valve, settings=settings)
     leak, factor = device.actuator.leak, preset.values["leak.conductance_factor"]
     if isinstance(leak, SonicOrifice):
         leak = replace(leak, sonic_conductance=leak.sonic_conductance * factor)
     else:
         leak = replace(leak, area=leak.area * factor)
     return replace(device, valve=valve, actuator=replace(device.actuator, leak=leak))
-
-
-def _off(effect: Effect) -> str:
-    """Settings that switch an effect off, such as "effects.ice.blockage=0 1/kg"."""
-    units = {item.name: item.unit for item in effect.quantities}
-    return " and ".join(f"'{SECTION}.{effect.name}.{name}={f'0 {units[name]}'.strip()}'" for name in effect.switch)
-
-
-def rig_plant(plant: PlantParameters, preset: Preset) -> PlantParameters:
-    """Return the plant with the lines taken out of the dead volumes, of which they are a part.
-
-    ParameterError where a line is larger than a dead volume.
-    """
-    line = preset.values["line.volume"]
-    smallest = min(plant.dead_volume_1, plant.dead_volume_2)
-    if line >= smallest:
-        raise ParameterError(
-            f"preset '{preset.name}': line.volume = {line:g} m^3 must be below the dead volumes of the device, "
-            f"of which it is a part; the smaller one is {smallest:g} m^3"
-        )
-    return plant._replace(dead_volume_1=plant.dead_volume_1 - line, dead_volume_2=plant.dead_volume_2 - line)
 
 
 def rig_physics(device: Device, preset: Preset) -> RigPhysics:
@@ -348,6 +261,7 @@ def rig_physics(device: Device, preset: Preset) -> RigPhysics:
     constant = gas.specific_gas_constant
     droop, recovery = values["supply.droop"], values["supply.recovery_time"]
     velocity = values["friction.stribeck_velocity"]
+    # Without a velocity the rise has no place, and is none.
     share = stribeck.EFFECT.defaults(gas.species)["share"] if velocity > 0.0 else 0.0
     if droop > 0.0 and recovery <= 0.0:
         raise ParameterError(f"preset '{preset.name}': supply.recovery_time must be above 0 s with a droop")
@@ -361,6 +275,7 @@ def rig_physics(device: Device, preset: Preset) -> RigPhysics:
         wall_area_per_volume=values["gas.wall_area_per_volume"],
         virial=values["gas.real_gas_share"] * SECOND_VIRIAL[gas.species] / gas.molar_mass,
         supply_droop=values["supply.droop"],
+        # A regulator without droop has no state to recover.
         supply_rate=1.0 / recovery if droop > 0.0 else 0.0,
         line_volume=values["line.volume"],
         laminar_conductance=values["leak.laminar_conductance"],
@@ -373,19 +288,27 @@ def rig_physics(device: Device, preset: Preset) -> RigPhysics:
     )
 
 
-def line_orifice(device: Device, preset: Preset) -> ExactOrifice:
-    """Return the orifice between line and chamber. ParameterError for a line without an orifice."""
+def with_line(device: Device, plant: PlantParameters, preset: Preset) -> tuple[PlantParameters, ExactOrifice]:
+    """Return the plant with the lines taken out of the dead volumes, of which they are a part, and their orifice.
+
+    ParameterError for a line larger than a dead volume, and for one without an orifice.
+    """
     gas, line = device.gas, preset.section("line")
-    if line["volume"] > 0.0 and line["area"] * line["discharge_coefficient"] <= 0.0:
+    volume, smallest = line["volume"], min(plant.dead_volume_1, plant.dead_volume_2)
+    if volume >= smallest:
+        raise ParameterError(
+            f"preset '{preset.name}': line.volume = {volume:g} m^3 must be below the dead volumes of the device, "
+            f"of which it is a part; the smaller one is {smallest:g} m^3"
+        )
+    if volume > 0.0 and line["area"] * line["discharge_coefficient"] <= 0.0:
         raise ParameterError(
             f"preset '{preset.name}': line.area and line.discharge_coefficient must be above 0 with a line"
         )
     conductance = area_conductance(
         line["area"], line["discharge_coefficient"], gas.heat_capacity_ratio, gas.specific_gas_constant, gas.temperature
     )
-    return ExactOrifice(
-        conductance=conductance, is_iso6358=0.0, number=gas.heat_capacity_ratio, linear_ratio=device.flow.linear_ratio
-    )
+    shorter = plant._replace(dead_volume_1=plant.dead_volume_1 - volume, dead_volume_2=plant.dead_volume_2 - volume)
+    return shorter, ExactOrifice(conductance, 0.0, gas.heat_capacity_ratio, device.flow.linear_ratio)
 
 
 Floats = NDArray[np.float64]
@@ -408,6 +331,7 @@ CHANNEL_SENSORS = {
 The order decides the streams: a new channel comes last, so that the numbers of the others stay.
 """
 
+# By its place, not its name: renaming a channel leaves its noise.
 _STREAMS = {name: number for number, name in enumerate(CHANNEL_SENSORS)}
 
 
@@ -441,5 +365,6 @@ def sensor(preset: Preset, channel: str, seed: int, samples: int, fraction_of_ra
     given = preset.section(CHANNEL_SENSORS[channel])
     offset, noise, quantum = (fraction_of_range * given[name] for name in ("offset", "noise", "quantum"))
     stream = random_stream(seed, channel)
+    # The offset comes first, so that a longer recording begins with the same noise.
     drawn = offset * float(stream.standard_normal())
     return Sensor(drawn, quantum, noise * stream.standard_normal(samples))

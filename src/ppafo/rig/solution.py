@@ -11,9 +11,8 @@ a new computer compiles once.
 """
 
 import functools
-from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,12 +26,12 @@ from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import SimulationError
 from ppafo.model.effects.spool_play import spool_position
 from ppafo.model.orifice import ExactOrifice
-from ppafo.model.plant import Openings, PlantParameters, actuator_torque, holds_still
+from ppafo.model.plant import Openings, actuator_torque, holds_still
 from ppafo.model.sensors import Measurement
 from ppafo.parameters.device import Device
-from ppafo.rig.dynamics import RigPhysics, RigState, observables, rig_rates
+from ppafo.rig.dynamics import RigNumbers, RigPhysics, RigState, observables, rig_rates
 from ppafo.rig.preset import Sensor
-from ppafo.rig.stiff import solve_stretch
+from ppafo.rig.stiff import Stretch, solve_stretch
 
 Floats = NDArray[np.float64]
 
@@ -67,88 +66,67 @@ class RigSolution:
     breakaways: list[float] = field(default_factory=list)
 
 
-def sensor_signals(rig_run: RigRun, state: Floats, pressures: Floats) -> tuple[float, float, float]:
-    """Angle [rad] and both pressures [Pa] behind the bandwidth of the sensors, before noise."""
-    names = RigState._fields
-    slow_angle, slow_pressure = rig_run.physics.angle_follow_rate > 0.0, rig_run.physics.pressure_follow_rate > 0.0
-    angle = state[names.index("sensor_angle")] if slow_angle else state[0]
-    first = state[names.index("sensor_pressure_1")] if slow_pressure else pressures[0]
-    second = state[names.index("sensor_pressure_2")] if slow_pressure else pressures[1]
-    return float(angle), float(first), float(second)
+def sensor_signals(physics: RigPhysics, state: Floats, pressures: Floats) -> tuple[float, float, float]:
+    """Return angle [rad] and both pressures [Pa] behind the bandwidth of the sensors, before noise."""
+    now, is_slow = RigState(*state.tolist()), physics.pressure_follow_rate > 0.0
+    first, second = (now.sensor_pressure_1, now.sensor_pressure_2) if is_slow else pressures.tolist()
+    return now.sensor_angle if physics.angle_follow_rate > 0.0 else now.angle, first, second
 
 
 UNKNOWNS = len(RigState._fields)
 OUTPUTS = 4
 """Numbers that ``show`` writes: both pressures [Pa], driving torque and static limit of friction [N m]."""
 
+# The valve has the first four.
 ANGLE, RATE, ADDED = 4, 5, 6
 INPUTS = 7
 """Numbers that come from outside: four openings, angle [rad] and prescribed rate [rad/s] of the vane, and the torque
 of a leg on it [N m]."""
 
-PARAMETER_GROUPS = {
-    "plant": PlantParameters,
-    "rig": RigPhysics,
-    "valve_orifice": ExactOrifice,
-    "leak_orifice": ExactOrifice,
-    "line_orifice": ExactOrifice,
-}
-"""Groups of numbers that both functions need, in order."""
-
-
-class RigProgram(NamedTuple):
-    """``fill(y, slopes, parameters, inputs, direction)`` and ``show(y, outputs, parameters, inputs, direction)``.
-
-    ``y`` and ``slopes`` are those of the unknowns of ``RigState``.
-    """
-
-    fill: Callable[..., None]
-    show: Callable[..., None]
-
 
 @functools.cache
 def rig_source() -> str:
-    """Source of the module."""
+    """Return the module of ``fill(y, slopes, parameters, inputs, direction)`` and of ``show`` with ``outputs``.
+
+    ``y`` and ``slopes`` are those of the unknowns of ``RigState``.
+    """
     collector = SourceCollector(INLINE)
     add = collector.add
-    cells: dict[str, str] = {}
-    for name, row in PARAMETER_GROUPS.items():
-        for path in leaf_paths(row, name):
-            cells[path] = f"parameters[{len(cells)}]"
+    cells = {path: f"parameters[{number}]" for number, path in enumerate(leaf_paths(RigNumbers, "given"))}
     cells |= {f"state.{field}": f"y[{number}]" for number, field in enumerate(RigState._fields)}
     cells |= {f"openings.{field}": f"inputs[{number}]" for number, field in enumerate(Openings._fields)}
-    rows = PARAMETER_GROUPS | {"state": RigState, "openings": Openings}
-    given = [f"{name} = {row_expression(row, name, cells, add)}" for name, row in rows.items()]
-    orifices = "valve_orifice, leak_orifice, line_orifice"
+    rows = {"given": RigNumbers, "state": RigState, "openings": Openings}
+    rebuilt = [f"{name} = {row_expression(row, name, cells, add)}" for name, row in rows.items()]
     motion = f"inputs[{ANGLE}], inputs[{RATE}], inputs[{ADDED}], direction"
-    fill = [f"rates = {add(rig_rates)}(plant, rig, {orifices}, openings, state, {motion})"]
+    fill = [f"rates = {add(rig_rates)}(given, openings, state, {motion})"]
     fill += [f"slopes[{number}] = rates.{field}" for number, field in enumerate(RigState._fields)]
-    show = [f"now = {add(observables)}(plant, rig, state, inputs[{ANGLE}], inputs[{ADDED}])"]
+    show = [f"now = {add(observables)}(given, state, inputs[{ANGLE}], inputs[{ADDED}])"]
     outputs = ("node_1.pressure", "node_2.pressure", "torque", "static_limit")
     show += [f"outputs[{number}] = now.{path}" for number, path in enumerate(outputs)]
-    functions = [_function("fill", "slopes", given + fill), _function("show", "outputs", given + show)]
+    functions = []
+    for name, output, lines in (("fill", "slopes", fill), ("show", "outputs", show)):
+        arrays = dict.fromkeys(("y", output, "parameters", "inputs"), ARRAY)
+        functions.append(entry_text(name, arrays | {"direction": FLOAT}, rebuilt + lines))
     return "\n\n\n".join([HEADER, collector.text(), *functions])
 
 
-def _function(name: str, output: str, lines: list[str]) -> str:
-    arrays = dict.fromkeys(("y", output, "parameters", "inputs"), ARRAY)
-    return entry_text(name, arrays | {"direction": FLOAT}, lines)
+_TOLERANCES = {"angle": 1e-10, "angular_velocity": 1e-9, "sensor_angle": 1e-9}
+_BY_KIND = {"mass": 1e-13, "drop": 1e-2, "pressure": 1e-2}
+_ENERGY_TOLERANCE, _VALVE_TOLERANCE = 1e-8, 1e-10
 
 
-_TOLERANCES = {
-    "angle": 1e-10,
-    "angular_velocity": 1e-9,
-    "supply_drop_1": 1e-2,
-    "supply_drop_2": 1e-2,
-    "sensor_angle": 1e-9,
-    "sensor_pressure_1": 1e-2,
-    "sensor_pressure_2": 1e-2,
-}
-_MASS_TOLERANCE, _ENERGY_TOLERANCE, _VALVE_TOLERANCE = 1e-13, 1e-8, 1e-10
+def absolute_tolerances(valve_unknowns: int) -> Floats:
+    """Return the absolute tolerances of all unknowns [SI], those of the valve last."""
+    found = []
+    # Below a millionth of usual values: of a chamber 1e-4 kg and 10 J, of a supply 1e5 Pa.
+    for name in RigState._fields:
+        by_kind = next((size for kind, size in _BY_KIND.items() if kind in name), _ENERGY_TOLERANCE)
+        found.append(_TOLERANCES.get(name, by_kind))
+    return np.array(found + [_VALVE_TOLERANCE] * valve_unknowns)
 
 
 def solve_rig(rig_run: RigRun) -> RigSolution:
-    """Solve a run; SimulationError where the solver gives up."""
+    """Return the solution of a run; SimulationError where the solver gives up."""
     return _Rig(rig_run).solve()
 
 
@@ -156,23 +134,20 @@ class _Rig:
     """State of one solution while it is being made."""
 
     def __init__(self, rig_run: RigRun) -> None:
-        self.rig_run = rig_run
-        self.run = rig_run.run
-        self.plant = rig_run.run.plant
-        self.is_free = rig_run.run.program.angle is None
-        run = rig_run.run
-        groups = (run.plant, rig_run.physics, run.valve_orifice, run.leak_orifice, rig_run.line_orifice)
-        parameters = np.array([number for group in groups for number in numbers(group)])
-        self.y = np.array([*rig_run.initial, *numbers(run.program.valve.initial())], dtype=np.float64)
+        self.rig_run, self.run, self.plant = rig_run, rig_run.run, rig_run.run.plant
+        run, state = rig_run.run, rig_run.run.program.valve.initial()
+        self.is_free = run.program.angle is None
+        given = RigNumbers(run.plant, rig_run.physics, run.valve_orifice, run.leak_orifice, rig_run.line_orifice)
+        parameters = np.array(numbers(given))
+        self.y = np.array([*rig_run.initial, *numbers(state)], dtype=np.float64)
+        self.tolerances = absolute_tolerances(self.y.size - UNKNOWNS)
         self.outputs, self.inputs = np.empty(OUTPUTS), np.zeros(INPUTS)
         self.present, self.rates = np.empty(UNKNOWNS), np.empty(UNKNOWNS)
-        # The compiled right-hand side and observables of the rig.
         module = load_source(rig_source())
-        functions = RigProgram(module.fill, module.show)
-        self.fill = with_arrays(functions.fill, self.present, self.rates, parameters, self.inputs)
-        self.show = with_arrays(functions.show, self.present, self.outputs, parameters, self.inputs)
+        self.fill = with_arrays(module.fill, self.present, self.rates, parameters, self.inputs)
+        self.show = with_arrays(module.show, self.present, self.outputs, parameters, self.inputs)
         self.valve_moves = True
-        state = run.program.valve.initial()
+        # Each evaluation makes a state of numbers, for which a flat one needs no search for what it nests.
         self.has_flat_valve = not any(isinstance(value, tuple) for value in state)
         self.time, self.command, self.direction = 0.0, 0.0, 0.0
         self.decided, self.spool = 0.0, 0.0
@@ -181,23 +156,14 @@ class _Rig:
         self.recorded = 0
         count = rig_run.sample_times.size
         self.result = RigSolution(np.empty((count, UNKNOWNS)), np.empty((count, 2)), np.zeros(count))
-        self.tolerances = self.absolute_tolerances()
         if self.is_free:
             self.direction = float(np.sign(self.y[1])) if self.y[1] != 0.0 else self.rest_mode()
 
-    def absolute_tolerances(self) -> Floats:
-        """Absolute tolerances of all unknowns."""
-        plain = [
-            _TOLERANCES.get(name, _MASS_TOLERANCE if "mass" in name else _ENERGY_TOLERANCE) for name in RigState._fields
-        ]
-        return np.array(plain + [_VALVE_TOLERANCE] * (self.y.size - UNKNOWNS))
-
     def slopes(self, t: float, y: Floats) -> Floats:
-        """Right-hand side; the valve is asked anew only while it moves."""
+        """Return the right-hand side; the valve is asked anew only while it moves."""
         slopes = np.empty_like(y)
         slopes[UNKNOWNS:] = self.ask_valve(y) if self.valve_moves else 0.0
         self.place_vane(t, y)
-        self.present[:] = y[:UNKNOWNS]
         self.fill(self.direction)
         slopes[:UNKNOWNS] = self.rates
         return slopes
@@ -208,42 +174,43 @@ class _Rig:
         self.inputs[:ANGLE] = valve.instant(self.run.valve, state, self.command)
         return numbers(valve.rates(self.run.valve, state, self.command))
 
+    def valve_state(self, y: Floats) -> Any:
+        """Return the valve's part of the unknowns."""
+        state, values = self.run.program.valve.state, y[UNKNOWNS:].tolist()
+        return state(*values) if self.has_flat_valve else rebuild(state, values)
+
     def place_vane(self, t: float, y: Floats) -> None:
-        """Put the angle into the inputs, the rate of a vane whose angle is prescribed, and the torque of a leg."""
+        """Put a state into the arrays of the compiled functions, with a prescribed angle and the torque of a leg."""
         path, leg = self.run.program.angle, self.run.leg
         if leg is not None:
             self.inputs[ADDED] = torque_of_leg(self.run.program, leg, t, float(y[0]))
+        # The rate of a free vane is one of the unknowns.
         self.inputs[ANGLE], self.inputs[RATE] = (y[0], 0.0) if path is None else path.value(self.run.path, t)[:2]
-
-    def roots(self, t: float, y: Floats) -> Roots:
-        """Distance from breakaway, or from standstill and the stop ahead."""
-        if self.direction != 0.0:
-            return roots_sliding(self.plant, float(y[0]), float(y[1]), self.direction)
-        torque, limit = self.torque_and_limit(t, y)
-        return roots_at_rest(self.plant._replace(static_torque=limit), float(y[0]), torque)
+        self.present[:] = y[:UNKNOWNS]
 
     def observe(self, t: float, y: Floats) -> Floats:
-        """Pressures, driving torque and static limit of a state."""
+        """Return both pressures [Pa], driving torque and static limit of friction [N m] of a state."""
         self.place_vane(t, y)
-        self.present[:] = y[:UNKNOWNS]
         self.show(self.direction)
         return self.outputs
 
-    def torque_and_limit(self, t: float, y: Floats) -> tuple[float, float]:
-        """Driving torque and static limit of friction [N m]."""
-        signals = self.observe(t, y)
-        return float(signals[2]), float(signals[3])
+    def roots(self, t: float, y: Floats) -> Roots:
+        """Return the distance from breakaway, or from standstill and the stop ahead."""
+        if self.direction != 0.0:
+            return roots_sliding(self.plant, float(y[0]), float(y[1]), self.direction)
+        _, _, torque, limit = self.observe(t, y).tolist()
+        return roots_at_rest(self.plant._replace(static_torque=limit), float(y[0]), torque)
 
     def rest_mode(self) -> float:
-        """Way in which a vane at rest sets off, 0 where it is held."""
-        torque, limit = self.torque_and_limit(self.time, self.y)
+        """Return the way in which a vane at rest sets off, 0 where it is held."""
+        _, _, torque, limit = self.observe(self.time, self.y).tolist()
         angle, plant = float(self.y[0]), self.plant
         if holds_still(torque, limit, angle <= plant.angle_min, angle >= plant.angle_max):
             return 0.0
         return 1.0 if torque > 0.0 else -1.0
 
     def solve(self) -> RigSolution:
-        """From sample to sample of the controller."""
+        """Return the solution, from sample to sample of the controller."""
         end = float(self.rig_run.sample_times[-1])
         sample = 0
         while self.time < end - SAME_TIME:
@@ -255,31 +222,29 @@ class _Rig:
 
     def decide(self, sample: int) -> None:
         """Let the controller see the sensors and send its command on its way."""
-        run, controller = self.run, self.run.program.controller
+        given, run, controller = self.rig_run, self.run, self.run.program.controller
         if controller is None:
             raise SimulationError("the simulated test bench runs controllers of the catalogue only")
-        requested = run.program.reference.value(run.reference, sample * self.rig_run.control_period)[0]
-        self.decided, self.controller_state = controller.update(
-            run.controller, self.controller_state, requested, self.measurement(), run.period
+        # The noise is that of the last recorded sample.
+        index = max(0, int(np.searchsorted(given.sample_times, self.time + SAME_TIME, side="right")) - 1)
+        pressures = self.observe(self.time, self.y)[:2]
+        signals = sensor_signals(given.physics, self.prescribe_angle(self.y, self.time), pressures)
+        angle, first, second = (
+            given.sensors[name].reads(value, index)
+            for name, value in zip(("angle", "pressure_1", "pressure_2"), signals, strict=True)
         )
-        self.spool = spool_position(self.spool, self.decided, self.rig_run.hysteresis)
-        self.pending_commands.append((self.time + self.rig_run.command_delay, self.spool))
-
-    def measurement(self) -> Measurement:
-        """What the sensors read now; the noise is that of the last recorded sample's time."""
-        times, sensors = self.rig_run.sample_times, self.rig_run.sensors
-        index = max(0, int(np.searchsorted(times, self.time + SAME_TIME, side="right")) - 1)
-        signals = sensor_signals(
-            self.rig_run, self.prescribe_angle(self.y, self.time), self.observe(self.time, self.y)[:2]
-        )
-        names = ("angle", "pressure_1", "pressure_2")
-        angle, first, second = (sensors[name].reads(value, index) for name, value in zip(names, signals, strict=True))
-        return Measurement(
+        measured = Measurement(
             angle=angle,
             pressure_1=first,
             pressure_2=second,
             torque=actuator_torque(first, second, self.plant.torque_constant),
         )
+        requested = run.program.reference.value(run.reference, sample * given.control_period)[0]
+        self.decided, self.controller_state = controller.update(
+            run.controller, self.controller_state, requested, measured, run.period
+        )
+        self.spool = spool_position(self.spool, self.decided, given.hysteresis)
+        self.pending_commands.append((self.time + given.command_delay, self.spool))
 
     def advance_to(self, end: float) -> None:
         """Integrate over all that happens on the way."""
@@ -289,14 +254,10 @@ class _Rig:
                 self.command = self.pending_commands.pop(0)[1]
             state = valve.settle(self.run.valve, self.valve_state(self.y), self.command, self.time)
             self.y[UNKNOWNS:] = numbers(state)
+            # An event that is now would not let time go on.
             event = max(valve.next_event(self.run.valve, state, self.command, self.time), self.time + 2 * SAME_TIME)
             later = [moment for moment, _ in self.pending_commands if moment > self.time + SAME_TIME]
             self.integrate(min([end, event, *later]))
-
-    def valve_state(self, y: Floats) -> Any:
-        """The valve's part of the unknowns."""
-        state, values = self.run.program.valve.state, y[UNKNOWNS:].tolist()
-        return state(*values) if self.has_flat_valve else rebuild(state, values)
 
     def integrate(self, end: float) -> None:
         """Integrate to ``end`` or to the next event of the vane, and change the mode there."""
@@ -317,7 +278,7 @@ class _Rig:
         else:
             self.time = end
 
-    def record_until(self, end: float, solution: Any) -> None:
+    def record_until(self, end: float, solution: Stretch | None) -> None:
         """Keep the states at the samples before ``end``."""
         times = self.rig_run.sample_times
         while self.recorded < times.size and times[self.recorded] < end - 2 * SAME_TIME:
@@ -329,23 +290,24 @@ class _Rig:
             self.recorded += 1
 
     def prescribe_angle(self, state: Floats, time: float) -> Floats:
-        """The unknowns of ``RigState`` with the prescribed angle put in, where there is one."""
+        """Return the unknowns of ``RigState`` with the prescribed angle put in, where there is one."""
         unknowns = np.array(state[:UNKNOWNS])
-        if not self.is_free and self.run.program.angle is not None:
+        if self.run.program.angle is not None:
             unknowns[0], unknowns[1], _ = self.run.program.angle.value(self.run.path, time)
         return unknowns
 
     def change_mode(self) -> None:
-        """The vane breaks away, comes to rest, or meets a stop."""
-        plant = self.plant
+        """Let the vane break away, come to rest, or meet a stop."""
         if self.direction == 0.0:
-            self.direction = 1.0 if self.torque_and_limit(self.time, self.y)[0] > 0.0 else -1.0
+            self.direction = 1.0 if self.observe(self.time, self.y)[2] > 0.0 else -1.0
             self.result.breakaways.append(self.time)
             return
+        # Of the two distances the one that ended the stretch is 0 but for rounding.
         roots = self.roots(self.time, self.y)
         if abs(roots.second) < abs(roots.first):
             self.result.impacts.append(self.time)
-            self.y[0] = plant.angle_max if self.direction > 0.0 else plant.angle_min
+            # Onto the stop itself: a rounding beyond it would be another impact at once.
+            self.y[0] = self.plant.angle_max if self.direction > 0.0 else self.plant.angle_min
             self.y[1] = after_stop(self.run, {}, float(self.y[1]))
         else:
             self.y[1] = 0.0

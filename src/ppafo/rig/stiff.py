@@ -36,15 +36,18 @@ def solve_stretch(
     solver = LSODA(slopes, time, y, end, rtol=TOLERANCE, atol=tolerances)
     times, states = [time], [np.array(y)]
     before = None if roots is None else roots(time, y)
+    # The ends are states of the solver itself, not of its interpolant.
     waiting = list(wanted[(wanted > time) & (wanted < end)])
     for _ in range(MAXIMUM_STEPS):
         said = solver.step()
         if solver.status == "failed":
             raise SimulationError(f"the rig's solver stopped at t = {solver.t:.6g} s: {said}")
         after, found = float(solver.t), None
+        # The interpolant is valid in the last step only, so it is asked for in each.
         inside = solver.dense_output()
         if roots is not None and before is not None:
             now = roots(after, solver.y)
+            # Strictly above 0 before: a vane that just came to rest has not done so again.
             crossed = [place for place in (0, 1) if before[place] > 0.0 >= now[place]]
             found = min((_root(roots, place, inside, float(solver.t_old), after) for place in crossed), default=None)
             before = now

@@ -351,16 +351,10 @@ def test_a_measured_gas_temperature_takes_the_place_of_the_set_s(solved: Solve) 
     assert cool.value / plain.value == pytest.approx((290.0 / 298.0) ** 0.5, rel=1e-4)
 
 
-def test_a_file_that_spells_its_procedures_with_underscores_is_the_same_problem() -> None:
-    head = 'schema_version = 1\nname = "bench"\ndevice.set = "ppafo2011"\n'
-    written = f"{head}{STATIC}{DECAY}{FLOW}{MAP}{LEAK}"
-    kinds = ("static-torque", "free-decay", "open-valve-flow", "valve-map", "vane-leak")
-    former = written
-    for kind in kinds:
-        former = former.replace(f'"{kind}"', f'"{kind.replace("-", "_")}"')
-    problem = parse_problem(former.encode(), "bench.toml")
-    assert problem == parse_problem(written.encode(), "bench.toml")
-    assert tuple(item.kind for item in problem.procedure) == kinds
+def test_a_procedure_that_is_spelt_with_underscores_is_answered_with_its_name() -> None:
+    former = f'schema_version = 1\nname = "bench"\ndevice.set = "ppafo2011"\n{STATIC}'.replace("static-t", "static_t")
+    with pytest.raises(IdentificationError, match="kind = 'static_torque' is not known, did you mean 'static-torque'"):
+        parse_problem(former.encode(), "bench.toml")
 
 
 def estimate(value: float, low: float, high: float, verdict: str = "identified") -> Estimate:

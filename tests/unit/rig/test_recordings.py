@@ -214,10 +214,10 @@ def test_bad_input_is_one_line_with_the_nearest_name(words: dict[str, object], m
             "did you mean 'heat_transfer_coefficient'",
         ),
         ('unit = "1/m"', 'unit = "K"', "gas.wall_area_per_volume"),
-        ("value = 60.0", 'value = "60"', "must be a number"),
+        ("value = 60.0", 'value = "60"', "must be a valid number"),
         ("value = 60.0", "value = -60.0", "must be from 0"),
-        ("schema_version = 1", "schema_version = 2", "schema_version must be 1"),
-        ("reason =", "note =", "allowed: value, unit, reason"),
+        ("schema_version = 1", "schema_version = 2", "schema_version = 2 is not allowed; allowed: 1"),
+        ("reason =", "note =", "allowed here: value, unit, reason"),
         ("[sampling.rate]", "[sampling.rates]", "did you mean 'rate'"),
     ],
 )
@@ -262,10 +262,13 @@ def test_a_folder_is_the_rig_s_again_whenever_a_writer_is_killed(
     assert read_csv(tmp_path / "static-torque.csv").kind == "synthetic"
 
 
-def test_an_empty_preset_points_to_the_schema(tmp_path: Path) -> None:
-    for text in ("", "# nothing yet\n"):
+def test_an_empty_preset_points_to_the_schema_or_names_what_is_missing(tmp_path: Path) -> None:
+    for text, message in (
+        ("", "'ppafo doctor --schema rig' prints its format"),
+        ("# nothing yet\n", "'gas', 'supply'"),
+    ):
         (tmp_path / "mine.toml").write_text(text)
-        with pytest.raises(ParameterError, match="'ppafo doctor --schema rig' prints its format"):
+        with pytest.raises(ParameterError, match=message):
             load_preset(tmp_path / "mine.toml")
 
 

@@ -104,7 +104,7 @@ def rig_record(
 def list_rig() -> Said:
     """Return the experiments and the presets with what they are."""
     from ppafo.cli.output import Said
-    from ppafo.rig.overview import overview
+    from ppafo.rig.experiments import overview
 
     return Said(*overview())
 

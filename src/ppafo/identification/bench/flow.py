@@ -8,7 +8,7 @@ With r the downstream over the upstream pressure and k the heat capacity ratio, 
     laminar    c (P_a^2 - P_b^2)
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -91,33 +91,31 @@ def true_pressure(at: Values, name: str, shown: Floats) -> Floats:
 def orifice_shape(first: Floats, second: Floats, heat_capacity_ratio: float) -> Floats:
     """Return upstream pressure times flow function [Pa], positive from first to second; (6), (7) over Cd A C1."""
     k = heat_capacity_ratio
-    ratio, inside, upstream = _ratio(first, second)
-    inside = np.maximum(inside, critical_pressure_ratio(k))
-    curve = np.sqrt(2.0 * k / (k - 1.0)) * inside ** (1.0 / k) * np.sqrt(1.0 - inside ** ((k - 1.0) / k))
-    curve = curve / np.sqrt(k * (2.0 / (k + 1.0)) ** ((k + 1.0) / (k - 1.0)))
-    return _signed(first, second, ratio, upstream * curve)
+
+    def curve(ratio: Floats) -> Floats:
+        inside = np.maximum(ratio, critical_pressure_ratio(k))
+        flow = np.sqrt(2.0 * k / (k - 1.0)) * inside ** (1.0 / k) * np.sqrt(1.0 - inside ** ((k - 1.0) / k))
+        return np.asarray(flow / np.sqrt(k * (2.0 / (k + 1.0)) ** ((k + 1.0) / (k - 1.0))))
+
+    return _shape(first, second, curve)
 
 
 def iso6358_shape(first: Floats, second: Floats, critical_ratio: float) -> Floats:
     """Return upstream pressure times flow function [Pa], positive from first to second; ISO 6358 over C rho_0."""
-    ratio, inside, upstream = _ratio(first, second)
-    position = np.maximum(inside - critical_ratio, 0.0) / (1.0 - critical_ratio)
-    return _signed(first, second, ratio, upstream * np.sqrt(1.0 - position**2))
+
+    def curve(ratio: Floats) -> Floats:
+        position = np.maximum(ratio - critical_ratio, 0.0) / (1.0 - critical_ratio)
+        return np.asarray(np.sqrt(1.0 - position**2))
+
+    return _shape(first, second, curve)
 
 
-def laminar_shape(first: Floats, second: Floats) -> Floats:
-    """Return the difference of squared pressures [Pa^2], positive from first to second."""
-    return np.asarray(first**2 - second**2)
-
-
-def _ratio(first: Floats, second: Floats) -> tuple[Floats, Floats, Floats]:
+def _shape(first: Floats, second: Floats, curve: Callable[[Floats], Floats]) -> Floats:
+    """Return upstream pressure times a curve of the pressure ratio, with the sign of the flow."""
     upstream = np.maximum(np.maximum(first, second), 1.0)
     ratio = np.maximum(np.minimum(first, second), 0.0) / upstream
-    return ratio, np.minimum(ratio, LINEAR_RATIO), upstream
-
-
-def _signed(first: Floats, second: Floats, ratio: Floats, flow: Floats) -> Floats:
-    """Return a flow with its sign, on a straight line to zero near equal pressures."""
+    flow = upstream * curve(np.minimum(ratio, LINEAR_RATIO))
+    # Near equal pressures the root has no slope that a search could follow: a straight line goes to zero there.
     return np.asarray(np.sign(first - second) * flow * np.minimum((1.0 - ratio) / (1.0 - LINEAR_RATIO), 1.0))
 
 
@@ -140,7 +138,7 @@ class Opening:
         The size is Cd, A or Cd A, C [m^3/(s Pa)], or c [kg/(s Pa^2)].
         """
         if self.law == "laminar":
-            return size * laminar_shape(first, second)
+            return np.asarray(size * (first**2 - second**2))
         if self.law == "iso6358":
             ratio = critical_ratio if self.critical_ratio is None else self.critical_ratio
             return size * self.gas.flow_per_sonic_conductance * iso6358_shape(first, second, ratio)

@@ -225,6 +225,7 @@ def decay_of(source: Source, start: float | None, end: float | None) -> Decay:
     sign = 1.0 if velocity[first] > 0.0 else -1.0
     # A push ends a little after the highest speed of the smoothed signal; that much is left out.
     first += 0 if start is not None else _smoothing_width(part.time.size) // 2
+    # A vane at rest has a rate of 0 but for noise; one that swings back has more.
     back = np.flatnonzero(sign * velocity[first:] < -0.02 * np.abs(velocity).max())
     last = first + int(back[0]) if back.size else part.time.size
     if last - first < MINIMUM_SAMPLES:

@@ -51,6 +51,7 @@ def solve(
     """
     names = [one.name for one in numbers]
     keys = list(zip(*labels, strict=True))
+    # In the order of their first reading, so that the first block is the first recording.
     ranks = {key: rank for rank, key in enumerate(dict.fromkeys(keys))}
     # A block of the fit is a slice, so that readings of one label must lie side by side.
     order = np.argsort([ranks[key] for key in keys], kind="stable")

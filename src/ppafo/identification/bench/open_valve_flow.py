@@ -24,6 +24,8 @@ CHANNELS = ("upstream_pressure", "downstream_pressure", "mass_flow")
 MINIMUM_SAMPLES = 5
 _FULLY_OPEN = 0.99
 _NEARLY_EQUAL = 0.9
+_LEVELS = "choked flow", "subsonic flow", "flow at nearly equal pressures"
+"""What a reading is, by its pressure ratio."""
 _SPAN, _SUBSONIC = 0.15, 0.6
 """Span of the pressure ratios, and the largest of them, from which both numbers of ISO 6358 can be fitted."""
 
@@ -57,12 +59,13 @@ def open_valve_flow(sources: tuple[Source, ...], settings: OpenValveFlowSettings
             f"{sources[0].name}: {PROCEDURE}: C and b need choked and subsonic flow, pressure ratios that span "
             f"{_SPAN:g} or more and go beyond {_SUBSONIC:g}; these go from {ratio.min():.3g} to {ratio.max():.3g}"
         )
+    choked = critical_pressure_ratio(settings.gas.heat_capacity_ratio)
     found, model = solve_flow(
         Opening(settings.gas, settings.law, settings.area or 1.0),
         (size.path, critical),
         dict(zip(CHANNELS, (upstream, downstream), strict=False)),
         flow,
-        (labels, _levels(ratio, settings.gas)),
+        (labels, [_LEVELS[place] for place in np.digitize(ratio, (choked, _NEARLY_EQUAL)).tolist()]),
         settings.tolerances,
         settings.confidence,
     )
@@ -108,6 +111,7 @@ def open_readings(sources: tuple[Source, ...], gas: GasAt) -> tuple[Floats, Floa
         check_not_clipped(source, PROCEDURE, "mass_flow", "orifice flow at these pressures", driving)
     recordings = [source.recording for source in sources]
     commands = [one["command"] if "command" in one else np.ones(len(one)) for one in recordings]
+    # A recording without commands is taken for one of an open valve.
     is_open = np.abs(np.concatenate(commands)) >= _FULLY_OPEN
     if is_open.sum() < MINIMUM_SAMPLES:
         raise IdentificationError(
@@ -116,6 +120,7 @@ def open_readings(sources: tuple[Source, ...], gas: GasAt) -> tuple[Floats, Floa
         )
     upstream, downstream, flow = (pool(sources, name)[is_open] for name in CHANNELS)
     wrong = np.flatnonzero(downstream >= upstream)
+    # A few readings may cross by noise where both pressures are nearly equal.
     if wrong.size > flow.size // 10:
         raise IdentificationError(
             f"{sources[0].name}: {PROCEDURE}: downstream_pressure is at or above upstream_pressure in {wrong.size} of "
@@ -126,10 +131,3 @@ def open_readings(sources: tuple[Source, ...], gas: GasAt) -> tuple[Floats, Floa
     labels = [f"recording {number}" for number, one in enumerate(recordings, start=1) for _ in range(len(one))]
     kept = [label for label, is_kept in zip(labels, is_open.tolist(), strict=True) if is_kept]
     return upstream, downstream, np.abs(flow), kept
-
-
-def _levels(ratio: Floats, gas: GasAt) -> list[str]:
-    """Return what each reading is by its pressure ratio [-]."""
-    critical = critical_pressure_ratio(gas.heat_capacity_ratio)
-    words = ("choked flow", "subsonic flow", "flow at nearly equal pressures")
-    return [words[place] for place in np.digitize(ratio, (critical, _NEARLY_EQUAL)).tolist()]

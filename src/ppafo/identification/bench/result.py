@@ -13,7 +13,7 @@ import numpy as np
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.identification.estimate import Estimate, Verdict
 from ppafo.identification.fit import Fit
-from ppafo.identification.source import Source, kind_of, told_of_readings, traces
+from ppafo.identification.source import Source, kind_of, told_of_readings
 from ppafo.identification.wording import conflict_in_words, widened_by
 from ppafo.report.style import BLACK, BLUE, VERMILION, house_style, mark_kind
 from ppafo.signals import RecordingKind
@@ -108,11 +108,22 @@ class Reported:
 _AT_BOUND = 1.0e-6
 
 
-def estimates_of(
-    found: Fit, reported: Sequence[Reported], sources: tuple[Source, ...], confidence: float
-) -> tuple[Estimate, ...]:
-    """Return the estimates of a fit, each with its verdict and the tolerances that widen its interval."""
-    made = []
+def result_of(
+    procedure: str,
+    sources: tuple[Source, ...],
+    found: Fit,
+    reported: Sequence[Reported],
+    confidence: float,
+    summary: str,
+    panels: tuple[Panel, ...],
+    remedy: str,
+    remarks: tuple[str, ...] = (),
+) -> BenchResult:
+    """Return what a procedure has found: an estimate for each number that is reported, and what to know of them.
+
+    ``remedy`` is what to do where some readings want other numbers than all together.
+    """
+    estimates = []
     for item in reported:
         place = found.index(item.path)
         value, low, high = (float(one[place]) for one in (found.values, found.low, found.high))
@@ -131,30 +142,10 @@ def estimates_of(
             verdict, sentence = "not identifiable", f"{sentence} The interval is as wide as the value."
         elif found.conflict is not None:
             verdict = "holds for this model only"
-        made.append(Estimate(item.path, value, item.unit, low, high, verdict, sentence, traces(sources), confidence))
-    return tuple(made)
-
-
-def result_of(
-    procedure: str,
-    sources: tuple[Source, ...],
-    found: Fit,
-    reported: Sequence[Reported],
-    confidence: float,
-    summary: str,
-    panels: tuple[Panel, ...],
-    remedy: str,
-    remarks: tuple[str, ...] = (),
-) -> BenchResult:
-    """Return what a procedure has found: an estimate for each number that is reported, and what to know of them.
-
-    ``remedy`` is what to do where some readings want other numbers than all together.
-    """
-    estimates, conflict = estimates_of(found, reported, sources, confidence), conflict_in_words(found, remedy)
-    told = (*remarks, *told_of_readings(sources))
-    return BenchResult(
-        procedure, summary, estimates, panels, kind_of(one.recording.kind for one in sources), conflict, told
-    )
+        origin = tuple(source.trace for source in sources)
+        estimates.append(Estimate(item.path, value, item.unit, low, high, verdict, sentence, origin, confidence))
+    kind, told = kind_of(one.recording.kind for one in sources), (*remarks, *told_of_readings(sources))
+    return BenchResult(procedure, summary, tuple(estimates), panels, kind, conflict_in_words(found, remedy), told)
 
 
 _SIZE = (8.4, 3.7)
@@ -168,16 +159,10 @@ _SHOWN_IN = {
     "rad/s^2": ("rad/s$^2$", 1.0),
     "-": ("", 1.0),
 }
+_READING = {"linestyle": "none", "markersize": 5, "markeredgewidth": 1.1}
 _LOOKS: dict[Role, dict[str, Any]] = {
-    "rising": {"marker": "x", "color": BLUE, "linestyle": "none", "markersize": 5, "markeredgewidth": 1.1},
-    "falling": {
-        "marker": "o",
-        "color": VERMILION,
-        "linestyle": "none",
-        "markersize": 5,
-        "markerfacecolor": "none",
-        "markeredgewidth": 1.1,
-    },
+    "rising": {"marker": "x", "color": BLUE, **_READING},
+    "falling": {"marker": "o", "color": VERMILION, "markerfacecolor": "none", **_READING},
     "measured": {"marker": ".", "color": BLUE, "linestyle": "none", "markersize": 4},
     "law": {"color": BLACK, "linewidth": 1.4},
 }
@@ -192,9 +177,9 @@ def procedure_figure(result: BenchResult) -> "Figure":
 def figure_3(results: Sequence[BenchResult]) -> "Figure | None":
     """Return figure 3 of the paper, torque over pressure and damping; None unless both were identified."""
     by_name = {result.procedure: result for result in reversed(results)}
-    if not {"static-torque", "free-decay"} <= set(by_name):
+    torque, decay = by_name.get("static-torque"), by_name.get("free-decay")
+    if torque is None or decay is None:
         return None
-    torque, decay = by_name["static-torque"], by_name["free-decay"]
     return _figure((torque.panels[0], decay.panels[1]), (torque.kind, decay.kind))
 
 
@@ -223,6 +208,7 @@ def _figure(panels: tuple[Panel, ...], kinds: tuple[RecordingKind, ...]) -> "Fig
 def _draw(axes: "Axes", letter: str, panel: Panel) -> None:
     (x_unit, x_scale), (y_unit, y_scale) = (_SHOWN_IN.get(unit, (unit, 1.0)) for unit in (panel.x_unit, panel.y_unit))
     for item in sorted(panel.series, key=lambda one: one.role == "law"):
+        # A page with every sample would be some megabytes, and look the same.
         thin = slice(None, None, 1 if item.role == "law" else max(1, item.x.size // _MAXIMUM_POINTS))
         axes.plot(x_scale * item.x[thin], y_scale * item.y[thin], label=item.name, **_LOOKS[item.role])
     axes.set_title(f"$\\bf{{{letter}}}$   {panel.title}", pad=20)

@@ -33,6 +33,7 @@ from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.signals.recording import Floats
 
 Labels = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 PROCEDURE = "static-torque"
 _TORQUE, _FORCE = "torque", "force"
@@ -99,6 +100,12 @@ def static_torque(sources: tuple[Source, ...], settings: StaticTorqueSettings | 
     )
     values = found.values.tolist()
     count = count_of(int(readings.clusters.max()) + 1, "repetition")
+    ends = np.array([pressure.min(), pressure.max()])
+    branches: dict[Role, Mask] = {"rising": branch > 0.0, "falling": branch < 0.0}
+    series = [Series(f"pressure {role}", pressure[on], torque[on], role) for role, on in branches.items()]
+    series.append(Series("nominal", ends, values[0] * ends + values[3], "law"))
+    load = names.load
+    panel = Panel(f"Static {load}", "Pressure difference", "Pa_d", load.capitalize(), names.unit, tuple(series))
     return result_of(
         PROCEDURE,
         sources,
@@ -107,7 +114,7 @@ def static_torque(sources: tuple[Source, ...], settings: StaticTorqueSettings | 
         chosen.confidence,
         f"{pressure.size} readings, {count}; {names.slope} {values[0]:.4g} {names.slope_unit}, {names.friction} "
         f"{values[1]:.3g} {names.unit}; scatter {np.std(torque - model):.3g} {names.unit}",
-        with_residuals(_panel(readings, values[0], values[3]), pressure, torque - model),
+        with_residuals(panel, pressure, torque - model),
         f"one {names.slope} and a {names.friction} linear in pressure do not describe them",
     )
 
@@ -125,6 +132,7 @@ def _straight_line(readings: "Readings", names: str) -> tuple[float, float, floa
             "one channel"
         )
     deviation = float(np.std(readings.torque - design @ rough))
+    # Where friction is small its sign is that of the noise, and no reason to refuse.
     if friction < -_SIGMAS * deviation / np.sqrt(readings.pressure.size):
         raise IdentificationError(
             f"{names}: {PROCEDURE}: the rising branch lies above the falling one, as if friction drove the motion; "
@@ -252,6 +260,7 @@ def readings_of(sources: tuple[Source, ...]) -> Readings:
             )
     if pressure.max() == pressure.min():
         check_moves(sources[0], PROCEDURE, "pressure_difference")
+    # Two levels fix a line, but do not show whether it is one.
     places = np.floor(_PARTS * (pressure - pressure.min()) / np.ptp(pressure))
     levels = np.unique(np.minimum(places, _PARTS - 1)).size
     if levels < _MINIMUM_LEVELS:
@@ -291,15 +300,3 @@ def _runs(pressure: Floats, labels: NDArray[np.float64]) -> Labels:
         begun = place if is_new else begun
         places[place] = places[place - 1] + is_new
     return places
-
-
-def _panel(readings: Readings, slope: float, zero: float) -> Panel:
-    ends = np.array([readings.pressure.min(), readings.pressure.max()])
-    branches: dict[Role, float] = {"rising": 1.0, "falling": -1.0}
-    series = []
-    for role, sign in branches.items():
-        on = readings.branch == sign
-        series.append(Series(f"pressure {role}", readings.pressure[on], readings.torque[on], role))
-    series.append(Series("nominal", ends, slope * ends + zero, "law"))
-    load, unit = readings.names.load, readings.names.unit
-    return Panel(f"Static {load}", "Pressure difference", "Pa_d", load.capitalize(), unit, tuple(series))

@@ -163,6 +163,7 @@ def closed_chambers(source: Source, settings: VaneLeakSettings) -> ClosedChamber
     skipped = check_no_gap(source, PROCEDURE, part)
     for name in CHANNELS:
         for plateau in plateaus(part[name]):
+            # Later plateaus may be the quantum of the sensor, as the pressure hardly falls any more.
             if plateau.first < EDGE and stands_out(part[name], plateau):
                 raise IdentificationError(
                     f"{source.name}: {PROCEDURE}: channel '{name}' stays at exactly {1e-3 * plateau.value:g} kPa for "
@@ -174,6 +175,7 @@ def closed_chambers(source: Source, settings: VaneLeakSettings) -> ClosedChamber
     fuller = 1 if np.mean((pair[0] - pair[1])[:EDGE]) > 0.0 else 2
     first, second = pair if fuller == 1 else pair[::-1]
     difference = first - second
+    # Near equal pressures the zeros of the sensors are all that is left.
     low = np.flatnonzero(difference < _NEARLY_EQUAL * float(np.mean(difference[:EDGE])))
     last = int(low[0]) if low.size else difference.size
     if last < MINIMUM_SAMPLES:
@@ -252,9 +254,17 @@ def _decaying_leak(
                 parts.append(true * (1.0 + at[f"relaxation of {name}, decay {number}"] * faded) + at[f"zero of {name}"])
         return np.concatenate(parts)
 
+    shut = [item.changes for item in closed if not item.is_a_room]
+    ratio: tuple[Free, ...] = ()
+    if shut and volumes[0] and volumes[1]:
+        # Two volumes, each known to the deviation.
+        known = volumes[0] / volumes[1]
+        ratio = tolerance(_RATIO, math.sqrt(2.0) * settings.volume_deviation * known, known)
+    elif shut:
+        ratio = (sought(_RATIO, max(float(np.mean([rise / fall for fall, rise in shut])), 1.0e-3), 1.0e-6),)
     numbers = (
         sought(size.path, _rough_size(closed, opening, constant * gas.temperature / emptied), 0.0),
-        *_ratio_numbers(closed, volumes, settings.volume_deviation),
+        *ratio,
         *(one for number, item in enumerate(closed, start=1) for one in _starts(names, number, item)),
         *(
             one
@@ -322,20 +332,6 @@ def _rough_size(closed: tuple[ClosedChambers, ...], opening: Opening, rate: floa
     return float(np.mean(found))
 
 
-def _ratio_numbers(
-    closed: tuple[ClosedChambers, ...], volumes: tuple[float | None, ...], deviation: float
-) -> tuple[Free, ...]:
-    """Return the ratio of the volumes as a tolerance where both are known, else as a number that is sought."""
-    shut = [item.changes for item in closed if not item.is_a_room]
-    if not shut:
-        return ()
-    if volumes[0] and volumes[1]:
-        ratio = volumes[0] / volumes[1]
-        # Two volumes, each known to the deviation.
-        return tolerance(_RATIO, math.sqrt(2.0) * deviation * ratio, ratio)
-    return (sought(_RATIO, max(float(np.mean([rise / fall for fall, rise in shut])), 1.0e-3), 1.0e-6),)
-
-
 def _steady_leak(sources: tuple[Source, ...], settings: VaneLeakSettings) -> BenchResult:
     """Return the leak from flow over pressures; the zero of the flow meter shows where the pressures differ."""
     check_sources(sources, PROCEDURE, STEADY, _FEWEST_STEADY)
@@ -351,6 +347,7 @@ def _steady_leak(sources: tuple[Source, ...], settings: VaneLeakSettings) -> Ben
             f"{sources[0].name}: {PROCEDURE}: the flow runs from the lower to the higher pressure; reverse its sign"
         )
     opening, size = settings.opening, settings.size
+    # A leak of another law parts low from high pressures.
     halves = np.where(difference > np.median(difference), "higher", "lower")
     labels = [f"recording {number}" for number, one in enumerate(sources, start=1) for _ in range(len(one.recording))]
     found, model = solve_flow(

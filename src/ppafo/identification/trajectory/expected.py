@@ -10,7 +10,7 @@ from ppafo.errors import IdentificationError
 from ppafo.identification.fit import Noise, whiten
 from ppafo.identification.trajectory.fitting import TrajectoryFit
 from ppafo.identification.trajectory.problem import FITTED_CHANNELS, reach_of
-from ppafo.identification.trajectory.runs import Measured, Samples, columns_in, prepare_samples, signals_at
+from ppafo.identification.trajectory.runs import Measured, columns_in, numbers_in, prepare_samples, signals_at
 from ppafo.simulation.scenario import Scenario
 
 _STEPS, _UNITS_OF_NOISE = (1.0e-7, 1.0e-3), 3.0
@@ -60,14 +60,15 @@ def _expect(fit: TrajectoryFit, candidate: Candidate) -> Expected:
         raise IdentificationError(
             f"candidate '{candidate.label}': noise must be above 0 for at least one of {', '.join(FITTED_CHANNELS)}"
         )
+    # What belongs to one recording, such as its trigger, another experiment says nothing of.
     place = [index for index, item in enumerate(fit.numbers) if not item.recordings]
     acting = [fit.numbers[index] for index in place]
     point, scale = fit.fit.values[place], np.array([item.free.scale for item in acting])
     count = math.floor(candidate.scenario.run.duration / candidate.interval + 1.0e-6)
     times = candidate.interval * np.arange(count + 1, dtype=np.float64)
-    samples = Samples(times, tuple(Measured(name, np.zeros(times.size)) for name in noise), reach_of(acting))
-    given = {path: float(row[0]) for path, row in columns_in("", acting, point[:, None]).items()}
-    prepared = prepare_samples(candidate.label, candidate.scenario, samples, given)
+    channels = [Measured(name, np.zeros(times.size)) for name in noise]
+    given = numbers_in("", acting, point)
+    prepared = prepare_samples(candidate.label, candidate.scenario, times, channels, reach_of(acting), given)
     low, high = (np.array([getattr(item.free, end) for item in acting]) for end in ("low", "high"))
     step = _STEPS[1] * scale
     # As in the fit, the second differences are as long as changes the samples by three units of noise in all.
@@ -89,6 +90,7 @@ def _expect(fit: TrajectoryFit, candidate: Candidate) -> Expected:
     sizes = np.sqrt(np.diag(whole))
     jacobian = np.concatenate(rows) * sizes[place]
     before = whole / np.outer(sizes, sizes)
+    # In units of today's standard errors, for pascals and radians differ by many powers of ten.
     information = np.linalg.inv(before)
     information[np.ix_(place, place)] += jacobian.T @ jacobian
     after = np.linalg.inv(information)

@@ -1,7 +1,5 @@
 """The trajectory fit: runs as residuals of the one estimator, and what comes of it as values of the device."""
 
-import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +9,6 @@ from ppafo.identification.estimate import Estimate, Verdict
 from ppafo.identification.fit import Fit
 from ppafo.identification.fit import fit as estimate
 from ppafo.identification.trajectory.problem import (
-    Experiment,
     Number,
     TrajectoryProblem,
     broken_rule,
@@ -22,16 +19,16 @@ from ppafo.identification.trajectory.problem import (
 )
 from ppafo.identification.trajectory.runs import (
     Floats,
-    PreparedExperiment,
+    Measured,
     blocks_of,
-    columns_in,
+    numbers_in,
     prepare,
     residuals_of,
     signals_of,
 )
 from ppafo.identification.wording import conflict_in_words, in_shown_unit, widened_by
 from ppafo.progress import Progress, Report, report_nothing
-from ppafo.signals.recording import CHANNELS, Channel, Recording, RecordingKind
+from ppafo.signals.recording import CHANNELS, Channel, Recording
 from ppafo.simulation.scenario import Scenario
 
 
@@ -96,7 +93,6 @@ class TrajectoryFit:
     models: tuple[Recording, ...]
     measurements: tuple[Recording, ...]
     scenarios: tuple[Scenario, ...]
-    prepared: tuple[PreparedExperiment, ...]
     conflict: str
     remarks: tuple[str, ...]
 
@@ -127,10 +123,13 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
     free = [item.free for item in numbers]
     start = np.array([one.start for one in free])
     prepared = tuple(
-        prepare(item, {path: float(row[0]) for path, row in columns_in(item.label, numbers, start[:, None]).items()},
-                reach_of([one for one in numbers if one.acts_in(item.label)]))
+        prepare(
+            item,
+            numbers_in(item.label, numbers, start),
+            reach_of([one for one in numbers if one.acts_in(item.label)]),
+        )
         for item in problem.experiments
-    )  # fmt: skip
+    )
     report(Progress(f"trajectory fit: {len(free)} numbers, {len(prepared)} recordings"))
     found = estimate(
         lambda points: residuals_of(prepared, numbers, points),
@@ -142,22 +141,34 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
     conflict = conflict_in_words(found, "the model lacks something")
     sought = [place for place, item in enumerate(numbers) if not item.is_tolerance]
     estimates = tuple(_estimate(problem, found, numbers[place], place, conflict) for place in sought)
-    errors = np.sqrt(np.diag(found.covariance))
-    part = found.covariance[np.ix_(sought, sought)]
-    point = found.values[:, None]
-    signals = signals_of(prepared, numbers, point)
-    scenarios = tuple(
-        with_numbers(
-            item.scenario, {path: float(row[0]) for path, row in columns_in(item.label, numbers, point).items()}
+    errors, known = np.sqrt(np.diag(found.covariance)), []
+    for place in (place for place, item in enumerate(numbers) if item.is_tolerance):
+        name, item = free[place].name, numbers[place]
+        shares = {one.path: dict(found.shares[one.path]).get(name, 0.0) for one in estimates}
+        widens = max(shares, key=lambda path: shares[path], default="")
+        known.append(
+            Known(
+                name=name,
+                unit=item.unit,
+                before=item.free.start,
+                before_error=item.free.deviation,
+                after=float(found.values[place]),
+                after_error=float(errors[place]),
+                widens=widens,
+                share=shares.get(widens, 0.0),
+            )
         )
-        for item in prepared
-    )
-    models, measurements = [], []
+    # Tolerances are marginalised: their rows are left out, their share of the variance stays.
+    part = found.covariance[np.ix_(sought, sought)]
+    signals = signals_of(prepared, numbers, found.values[:, None])
+    scenarios = tuple(with_numbers(one.scenario, numbers_in(one.label, numbers, found.values)) for one in prepared)
+    models, measurements, channels = [], [], []
     for experiment, one, values in zip(problem.experiments, prepared, signals, strict=True):
-        samples = {channel.name: channel.values for channel in one.channels}
-        fitted = {name: column[:, 0] for name, column in values.items()}
-        models.append(_recording(f"model of {one.label}", one, fitted, "simulated"))
-        measurements.append(_recording(experiment.label, one, samples, experiment.recording.kind))
+        fitted = {name: Channel(column[:, 0], CHANNELS[name].unit) for name, column in values.items()}
+        samples = {item.name: Channel(item.values, CHANNELS[item.name].unit) for item in one.channels}
+        models.append(Recording(f"model of {one.label}", one.time, fitted, kind="simulated"))
+        measurements.append(Recording(experiment.label, one.time, samples, kind=experiment.recording.kind))
+        channels += [_channel(found, experiment.label, item, values[item.name][:, 0]) for item in one.channels]
     remarks = [text for text in dict.fromkeys(broken_rule(item.device) for item in scenarios) if text]
     if not found.has_converged:
         remarks.append(f"the search stopped after {found.evaluations} runs before it converged: give nearer starts")
@@ -168,16 +179,11 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
         estimates=estimates,
         covariance=part,
         correlation=part / np.outer(errors[sought], errors[sought]),
-        known=tuple(
-            _known(found, item, place, [one.path for one in estimates])
-            for place, item in enumerate(numbers)
-            if item.is_tolerance
-        ),
-        channels=tuple(_channels(problem.experiments, found, measurements, models)),
+        known=tuple(known),
+        channels=tuple(channels),
         models=tuple(models),
         measurements=tuple(measurements),
         scenarios=scenarios,
-        prepared=prepared,
         conflict=conflict,
         remarks=tuple(remarks),
     )
@@ -217,43 +223,15 @@ def _estimate(problem: TrajectoryProblem, found: Fit, item: Number, place: int, 
     )  # fmt: skip
 
 
-def _known(found: Fit, item: Number, place: int, sought: Sequence[str]) -> Known:
-    shares = {one: dict(found.shares[one]).get(item.free.name, 0.0) for one in sought}
-    widens = max(shares, key=lambda name: shares[name], default="")
-    return Known(
-        name=item.free.name,
-        unit=item.unit,
-        before=item.free.start,
-        before_error=item.free.deviation,
-        after=float(found.values[place]),
-        after_error=float(math.sqrt(found.covariance[place, place])),
-        widens=widens,
-        share=shares.get(widens, 0.0),
+def _channel(found: Fit, experiment: str, measured: Measured, model: Floats) -> ChannelFit:
+    left = measured.values - model
+    return ChannelFit(
+        experiment=experiment,
+        channel=measured.name,
+        unit=CHANNELS[measured.name].unit,
+        noise=found.noise[measured.name],
+        order=found.correlation[measured.name],
+        rms=float(np.sqrt(np.mean(left * left))),
+        largest=float(np.max(np.abs(left))),
+        span=float(np.ptp(measured.values)),
     )
-
-
-def _channels(
-    requested: Sequence[Experiment], found: Fit, measurements: Sequence[Recording], models: Sequence[Recording]
-) -> "list[ChannelFit]":
-    fits = []
-    for experiment, measured, model in zip(requested, measurements, models, strict=True):
-        for name in measured.names:
-            left = measured[name] - model[name]
-            fits.append(
-                ChannelFit(
-                    experiment=experiment.label,
-                    channel=name,
-                    unit=CHANNELS[name].unit,
-                    noise=found.noise[name],
-                    order=found.correlation[name],
-                    rms=float(np.sqrt(np.mean(left * left))),
-                    largest=float(np.max(np.abs(left))),
-                    span=float(np.ptp(measured[name])),
-                )
-            )
-    return fits
-
-
-def _recording(label: str, prepared: PreparedExperiment, values: dict[str, Floats], kind: RecordingKind) -> Recording:
-    channels = {name: Channel(value, CHANNELS[name].unit) for name, value in values.items()}
-    return Recording(label, prepared.time, channels, kind=kind)

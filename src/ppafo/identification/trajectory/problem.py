@@ -71,59 +71,58 @@ class Experiment:
 
 def check_experiment(experiment: Experiment) -> None:
     """Refuse an experiment that cannot be fitted; the message begins with its label. It is an IdentificationError."""
-    said = f"experiment '{experiment.label}'"
-    if len(experiment.recording) < 2:
-        raise IdentificationError(f"{said}: {experiment.recording.label} has only one sample")
+    said, recording, inputs = f"experiment '{experiment.label}'", experiment.recording, experiment.inputs
+    if len(recording) < 2:
+        raise IdentificationError(f"{said}: {recording.label} has only one sample")
     for name in experiment.channels:
         if name not in FITTED_CHANNELS:
             raise IdentificationError(f"{said}: channel '{name}' cannot be fitted; {', '.join(FITTED_CHANNELS)} can")
-        if name not in experiment.recording:
-            have = ", ".join(experiment.recording.names)
-            raise IdentificationError(f"{said}: {experiment.recording.label} has no channel '{name}'; it has {have}")
-    if not experiment.channels:
-        raise IdentificationError(f"{said}: there is no channel to compare")
-    if ANGLE in experiment.inputs and ANGLE in experiment.channels:
-        raise IdentificationError(
-            f"{said}: the angle of the vane is prescribed by the recording, so it cannot be compared"
-        )
-    if experiment.channels == ("angle",) and not isinstance(experiment.scenario.motion, FreeMotion):
-        raise IdentificationError(
-            f"{said}: the angle of the vane is prescribed, so it carries no information; add a pressure"
-        )
-    if experiment.scenario.controller.kind == PYTHON_CONTROLLER and COMMAND not in experiment.inputs:
-        raise IdentificationError(f"{said}: a Python controller cannot run in lanes; use one of the catalogue")
-    _check_inputs(experiment, said)
-
-
-def _check_inputs(experiment: Experiment, said: str) -> None:
-    """Refuse measured inputs that a run cannot follow, and a noise that is none."""
-    for name in experiment.inputs:
+    for name in inputs:
         if name not in ALL_INPUTS:
             hint = nearest_name(name, ALL_INPUTS)
             raise IdentificationError(f"{said}: '{name}' is not a measured input{hint}; use {', '.join(ALL_INPUTS)}")
-        if name not in experiment.recording:
-            have = ", ".join(experiment.recording.names)
-            raise IdentificationError(
-                f"{said}: {experiment.recording.label} has no channel '{name}' to follow; it has {have}"
-            )
-    if EXTERNAL_TORQUE in experiment.inputs and not isinstance(experiment.scenario.motion, FreeMotion):
-        raise IdentificationError(
-            f"{said}: the angle of the vane is prescribed, so a torque on it has no effect; remove it from inputs"
-        )
-    motion = experiment.scenario.motion
-    if EXTERNAL_TORQUE in experiment.inputs and isinstance(motion, FreeMotion) and motion.leg is not None:
-        raise IdentificationError(
-            f"{said}: the vane carries the foot of a leg, which T_ex follows from; remove it from inputs, or take a "
-            "scenario whose motion is free"
-        )
-    if COMMAND in experiment.inputs:
-        check_command(experiment.recording, said)
-    if experiment.inputs:
-        check_gaps(experiment.recording, said)
-        check_absolute(experiment.recording, experiment.scenario.device.supply.atmospheric_pressure, said)
-    for name, deviation in experiment.noise.items():
-        if not (math.isfinite(deviation) and deviation > 0.0):
-            raise IdentificationError(f"{said}: the noise of '{name}' must be above 0, not {deviation!r}")
+    for name, use in (*((one, "") for one in experiment.channels), *((one, " to follow") for one in inputs)):
+        if name not in recording:
+            have = ", ".join(recording.names)
+            raise IdentificationError(f"{said}: {recording.label} has no channel '{name}'{use}; it has {have}")
+    scenario, has_torque = experiment.scenario, EXTERNAL_TORQUE in inputs
+    is_free, follows = isinstance(scenario.motion, FreeMotion), {ANGLE} & set(inputs) & set(experiment.channels)
+    is_python = scenario.controller.kind == PYTHON_CONTROLLER and COMMAND not in inputs
+    has_leg = isinstance(scenario.motion, FreeMotion) and scenario.motion.leg is not None
+    refuse_first(
+        said,
+        (not experiment.channels, "there is no channel to compare"),
+        (bool(follows), "the angle of the vane is prescribed by the recording, so it cannot be compared"),
+        (
+            experiment.channels == (ANGLE,) and not is_free,
+            "the angle of the vane is prescribed, so it carries no information; add a pressure",
+        ),
+        (is_python, "a Python controller cannot run in lanes; use one of the catalogue"),
+        (
+            has_torque and not is_free,
+            "a torque has no effect on a vane whose angle is prescribed; remove it from inputs",
+        ),
+        (
+            has_torque and has_leg,
+            "the leg of the motion prescribes T_ex; remove it from inputs, or let the motion be free",
+        ),
+        *(
+            (not 0.0 < deviation < math.inf, f"the noise of '{name}' must be above 0, not {deviation!r}")
+            for name, deviation in experiment.noise.items()
+        ),
+    )
+    if COMMAND in inputs:
+        check_command(recording, said)
+    if inputs:
+        check_gaps(recording, said)
+        check_absolute(recording, experiment.scenario.device.supply.atmospheric_pressure, said)
+
+
+def refuse_first(said: str, *checks: tuple[bool, str]) -> None:
+    """Refuse the first that is wrong of pairs, whether it is and why; ``said`` begins the line."""
+    for is_wrong, why in checks:
+        if is_wrong:
+            raise IdentificationError(f"{said}: {why}")
 
 
 _FITS = 1.0e-6
@@ -195,6 +194,7 @@ def full_path(path: str, scenario: Scenario) -> str:
 def declared_numbers(scenario: Scenario) -> dict[str, Quantity]:
     """Return every number that can be fitted in this scenario, with its declaration, by path."""
     device = scenario.device
+    # An orifice has two forms, and the device one of them.
     other = {f"{section}.{name}" for section in ("actuator.leak", "valve") for name in other_form(device, section)}
     found = {
         full_path(path, scenario): item for path, item in numbers.device_numbers(device).items() if path not in other
@@ -226,6 +226,7 @@ def number_at(scenario: Scenario, path: str) -> float:
 
 def with_numbers(scenario: Scenario, changed: Mapping[str, float]) -> Scenario:
     """Return the scenario with numbers [SI] replaced, by paths of ``declared_numbers``, but those of recordings."""
+    # Those of a recording change what is compared, not the run.
     return numbers.with_numbers(scenario, {path: one for path, one in changed.items() if path not in _OF_RECORDING})
 
 
@@ -306,7 +307,15 @@ def number_of(parameter: FreeParameter, experiments: Sequence[Experiment]) -> Nu
     path = paths.pop()
     quantity = [declaration_of(path, scenario) for scenario in scenarios][-1]
     for experiment in experiments:
-        _refuse_followed(parameter, path, experiment)
+        followed = dict.fromkeys(supply_paths(experiment.scenario.device), SUPPLY)
+        if DORSIFLEXION_SUPPLY in experiment.inputs:
+            followed["plant.dorsiflexion_pressure"] = DORSIFLEXION_SUPPLY
+        channel = EXTERNAL_TORQUE if path == "motion.external_torque" else followed.get(_SUPPLIES.get(path, ""))
+        if channel in experiment.inputs:
+            raise IdentificationError(
+                f"{parameter.name}: the run of experiment '{experiment.label}' follows the recorded '{channel}', so "
+                "this number has no effect in it; omit one of the two"
+            )
     start = parameter.start
     if start is None:
         # Of how a run begins the recording may say more than the scenario.
@@ -320,56 +329,34 @@ def number_of(parameter: FreeParameter, experiments: Sequence[Experiment]) -> Nu
         low = max(quantity.minimum, start / _FURTHEST) if start > 0.0 <= quantity.minimum else quantity.minimum
         high = min(quantity.maximum, start * _FURTHEST) if start > 0.0 else quantity.maximum
     low, high = (low if parameter.low is None else parameter.low), (high if parameter.high is None else parameter.high)
-    _refuse_nonsense(parameter, start, low, high)
-    if low < quantity.minimum or high > quantity.maximum:
-        raise IdentificationError(
-            f"{parameter.name}: bounds {low:.6g} to {high:.6g} exceed what is allowed, "
-            f"{quantity.minimum:.6g} to {quantity.maximum:.6g} {quantity.unit}".rstrip()
-        )
+    bounds, unit = f"{low:.6g} and {high:.6g}", quantity.unit
+    has_size = math.isfinite(high - low) or math.isfinite(parameter.deviation)
+    is_allowed = quantity.minimum <= low and high <= quantity.maximum
+    allowed = f"{quantity.minimum:.6g} to {quantity.maximum:.6g} {unit}".rstrip()
+    refuse_first(
+        parameter.name,
+        (not math.isfinite(start) or math.isnan(low) or math.isnan(high), "start and bounds must be finite numbers"),
+        (not low < high, f"low, {low:.6g}, must be below high, {high:.6g}"),
+        (not low <= start <= high, f"start {start:.6g} must lie between the bounds {bounds}"),
+        (start == 0.0 and not has_size, "a start at 0 needs bounds, because they define what a small step is"),
+        (not parameter.deviation > 0.0, "the standard deviation of a prior must be above 0"),
+        (not is_allowed, f"the bounds {bounds} exceed what is allowed, {allowed}"),
+    )
     # Differences are a thousandth of the scale at most, which for a prior is a tenth of its deviation.
     scale = abs(start) or 0.5 * (high - low)
     if math.isfinite(parameter.deviation):
         scale = _SCALE * parameter.deviation
     name = full_path(parameter.name, scenarios[0])
     free = Free(name, start, low, high, scale, parameter.deviation)
-    unit = quantity.unit.removesuffix("_a").removesuffix("_d") or "-"
-    return Number(path, unit, free, parameter.recordings, parameter.is_tolerance)
+    return Number(
+        path, unit.removesuffix("_a").removesuffix("_d") or "-", free, parameter.recordings, parameter.is_tolerance
+    )
 
 
 def reach_of(chosen: Sequence[Number]) -> float:
     """Return the largest time offset [s] among the bounds of numbers; 0 where none is fitted."""
     ends = [end for item in chosen if item.path == TIME_OFFSET for end in (item.free.low, item.free.high)]
     return max(map(abs, ends), default=0.0)
-
-
-def _refuse_followed(parameter: FreeParameter, path: str, experiment: Experiment) -> None:
-    """Refuse a number that a run takes from its recording instead."""
-    followed = dict.fromkeys(supply_paths(experiment.scenario.device), SUPPLY)
-    if DORSIFLEXION_SUPPLY in experiment.inputs:
-        followed["plant.dorsiflexion_pressure"] = DORSIFLEXION_SUPPLY
-    channel = EXTERNAL_TORQUE if path == "motion.external_torque" else followed.get(_SUPPLIES.get(path, ""))
-    if channel in experiment.inputs:
-        raise IdentificationError(
-            f"{parameter.name}: the run of experiment '{experiment.label}' follows the recorded '{channel}', so this "
-            f"number has no effect in it; omit one of the two"
-        )
-
-
-def _refuse_nonsense(parameter: FreeParameter, start: float, low: float, high: float) -> None:
-    if not math.isfinite(start) or math.isnan(low) or math.isnan(high):
-        raise IdentificationError(f"{parameter.name}: start and bounds must be finite numbers")
-    if not low < high:
-        raise IdentificationError(f"{parameter.name}: low, {low:.6g}, must be below high, {high:.6g}")
-    if not low <= start <= high:
-        raise IdentificationError(
-            f"{parameter.name}: start {start:.6g} must lie between the bounds {low:.6g} and {high:.6g}"
-        )
-    if start == 0.0 and not (math.isfinite(high - low) or math.isfinite(parameter.deviation)):
-        raise IdentificationError(
-            f"{parameter.name}: a start at 0 needs bounds, because they define what a small step is"
-        )
-    if not parameter.deviation > 0.0:
-        raise IdentificationError(f"{parameter.name}: the standard deviation of a prior must be above 0")
 
 
 @dataclass(frozen=True, slots=True)
@@ -383,13 +370,13 @@ class TrajectoryProblem:
     def __post_init__(self) -> None:
         if not self.parameters or not self.experiments:
             raise IdentificationError("a trajectory fit needs at least one parameter and at least one recording")
-        _refuse_twice("experiment", [item.label for item in self.experiments])
+        labels = [item.label for item in self.experiments]
+        _refuse_twice("experiment", labels)
         for experiment in self.experiments:
             check_experiment(experiment)
         twice = double_use(use_of(item) for item in self.experiments)
         if twice:
             raise IdentificationError(twice)
-        labels = [item.label for item in self.experiments]
         for parameter in self.parameters:
             for label in parameter.recordings:
                 if label not in labels:
@@ -397,16 +384,13 @@ class TrajectoryProblem:
                     raise IdentificationError(f"{parameter.path}: there is no experiment '{label}'{hint}")
         _refuse_twice("parameter", [item.free.name for item in numbers_of(self)])
 
-    def experiments_with(self, parameter: FreeParameter) -> tuple[Experiment, ...]:
-        """Return the experiments in which a parameter acts."""
-        return tuple(
-            item for item in self.experiments if not parameter.recordings or item.label in parameter.recordings
-        )
-
 
 def numbers_of(problem: TrajectoryProblem) -> tuple[Number, ...]:
     """Return all parameters of a problem with start and bounds settled; refuses those that contradict."""
-    return tuple(number_of(parameter, problem.experiments_with(parameter)) for parameter in problem.parameters)
+    return tuple(
+        number_of(one, [item for item in problem.experiments if not one.recordings or item.label in one.recordings])
+        for one in problem.parameters
+    )
 
 
 def use_of(item: Experiment) -> Use:

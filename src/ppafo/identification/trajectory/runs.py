@@ -71,46 +71,24 @@ class Measured:
 
 
 @dataclass(frozen=True, slots=True)
-class Samples:
-    """What a run is compared with: times [s] of the run, channels, and how far [s] a fitted offset may move them."""
-
-    time: Floats
-    channels: tuple[Measured, ...]
-    reach: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
 class PreparedExperiment:
     """An experiment by its label, with its scenario completed and its samples placed in the record of a run.
 
-    ``run`` has the step and the clock of all columns; a sample is ``fraction`` [-] of the way from record ``place`` to
-    the next. ``inputs`` are what the run follows at each step, made of what ``recorded`` has; None where it follows
-    nothing.
+    ``time`` [s] is that of the samples in the run, ``reach`` how far [s] a fitted offset may move them. ``run`` has the
+    step and the clock of all columns; a sample is ``fraction`` [-] of the way from record ``place`` to the next.
+    ``inputs`` are what the run follows at each step, made of what ``recorded`` has; None where it follows nothing.
     """
 
     label: str
     scenario: Scenario
     run: Run
-    samples: Samples
+    time: Floats
+    channels: tuple[Measured, ...]
+    reach: float
     place: Indices
     fraction: Floats
     recorded: RecordedInputs | None = None
     inputs: StepInputs | None = None
-
-    @property
-    def time(self) -> Floats:
-        """Times of the samples in the time of the run [s]."""
-        return self.samples.time
-
-    @property
-    def channels(self) -> tuple[Measured, ...]:
-        """The channels that are compared."""
-        return self.samples.channels
-
-    @property
-    def record_interval(self) -> float:
-        """Time between two records of the run [s]."""
-        return self.run.step * self.run.record_every
 
 
 def prepare(experiment: Experiment, numbers: Mapping[str, float], reach: float = 0.0) -> PreparedExperiment:
@@ -121,6 +99,7 @@ def prepare(experiment: Experiment, numbers: Mapping[str, float], reach: float =
     """
     recording, said = experiment.recording, f"experiment '{experiment.label}'"
     inside = recording.time >= experiment.start - _FITS
+    # A sample that rounding puts before the start is the one at the start.
     time = np.maximum(recording.time[inside] - experiment.start, 0.0)
     if time.size < MINIMUM_SAMPLES:
         raise IdentificationError(
@@ -141,29 +120,32 @@ def prepare(experiment: Experiment, numbers: Mapping[str, float], reach: float =
     before = scenario_of(experiment)
     scenario = replace(before, run=replace(before.run, duration=float(time[-1]) + reach))
     recorded = RecordedInputs(recording, experiment.inputs, experiment.start) if experiment.inputs else None
-    return prepare_samples(experiment.label, scenario, Samples(time, tuple(channels), reach), numbers, recorded)
+    return prepare_samples(experiment.label, scenario, time, channels, reach, numbers, recorded)
 
 
 def prepare_samples(
     label: str,
     scenario: Scenario,
-    samples: Samples,
+    time: Floats,
+    channels: Sequence[Measured],
+    reach: float,
     numbers: Mapping[str, float],
     recorded: RecordedInputs | None = None,
 ) -> PreparedExperiment:
-    """Return samples of a scenario's run made ready, at ``numbers`` [SI] by path."""
+    """Return samples of a scenario's run made ready, at ``numbers`` [SI] by path; an offset may be up to ``reach``."""
     run = replace(plan_run(with_numbers(scenario, numbers)), tolerance=FIT_TOLERANCE)
-    nowhere = np.zeros(samples.time.size)
-    unplaced = PreparedExperiment(label, scenario, run, samples, nowhere.astype(np.intp), nowhere, recorded)
+    nowhere = np.zeros(time.size)
+    place = nowhere.astype(np.intp)
+    unplaced = PreparedExperiment(label, scenario, run, time, tuple(channels), reach, place, nowhere, recorded)
     return _place_samples(unplaced, run)
 
 
 def _place_samples(prepared: PreparedExperiment, run: Run) -> PreparedExperiment:
     """Return the samples placed in a record of a run that is no finer than they need."""
-    samples, recorded = prepared.samples, prepared.recorded
-    every = _steps_between_samples(samples, run.step)
-    records = math.ceil((float(samples.time[-1]) + samples.reach) / (run.step * every) - _FITS)
-    position = samples.time / (run.step * every)
+    time, recorded = prepared.time, prepared.recorded
+    every = _steps_between_samples(time, prepared.reach, run.step)
+    records = math.ceil((float(time[-1]) + prepared.reach) / (run.step * every) - _FITS)
+    position = time / (run.step * every)
     place = np.minimum(np.floor(position + _FITS), records).astype(np.intp)
     fraction = np.maximum(position - place, 0.0)
     # Rounding of the clock must not make a sample lie between two records.
@@ -175,17 +157,17 @@ def _place_samples(prepared: PreparedExperiment, run: Run) -> PreparedExperiment
     return replace(prepared, run=frozen, place=place, fraction=fraction, inputs=inputs)
 
 
-def _steps_between_samples(samples: Samples, step: float) -> float:
+def _steps_between_samples(time: Floats, reach: float, step: float) -> float:
     """Return the steps between two records: as many as between two samples, fewer where these are read in between.
 
     A fraction of a step where a whole one is too long to be read in between.
     """
-    every = max(1, round(float(np.min(np.diff(samples.time))) / step))
-    position = samples.time / (step * every)
+    every = max(1, round(float(np.min(np.diff(time))) / step))
+    position = time / (step * every)
     is_aligned = bool(np.all(np.abs(position - np.round(position)) < _FITS * np.maximum(position, 1.0)))
-    if is_aligned and samples.reach == 0.0:
+    if is_aligned and reach == 0.0:
         return every
-    read_interval = max(_READ_INTERVAL, float(samples.time[-1]) / _MAXIMUM_RECORDS)
+    read_interval = max(_READ_INTERVAL, float(time[-1]) / _MAXIMUM_RECORDS)
     most = read_interval / step * (1.0 + _FITS)
     if most < 1.0:
         return 1.0 / math.ceil(1.0 / most)
@@ -195,6 +177,11 @@ def _steps_between_samples(samples: Samples, step: float) -> float:
 def columns_in(label: str, numbers: Sequence[Number], points: Floats) -> dict[str, Floats]:
     """Return the numbers [SI] by path that act in the experiment with a label, at points [SI] (numbers, points)."""
     return {item.path: row for item, row in zip(numbers, points, strict=True) if item.acts_in(label)}
+
+
+def numbers_in(label: str, numbers: Sequence[Number], point: Floats) -> dict[str, float]:
+    """Return the numbers [SI] by path that act in the experiment with a label, at one point [SI] (numbers,)."""
+    return {path: float(row[0]) for path, row in columns_in(label, numbers, point[:, None]).items()}
 
 
 def signals_of(
@@ -236,7 +223,12 @@ def blocks_of(experiments: Sequence[PreparedExperiment], numbers: Sequence[Numbe
     blocks, first = [], 0
     coarse = signals_of(experiments, numbers, point[:, None])
     # What half as long steps change is about the error of the engine.
-    fine = signals_of([_with_half_steps(one, numbers, point) for one in experiments], numbers, point[:, None])
+    halved = []
+    for one in experiments:
+        scenario = replace(one.scenario, run=replace(one.scenario.run, step=0.5 * one.run.step))
+        run = plan_run(with_numbers(scenario, numbers_in(one.label, numbers, point)))
+        halved.append(_place_samples(one, replace(run, tolerance=_FINER * one.run.tolerance)))
+    fine = signals_of(halved, numbers, point[:, None])
     for prepared, before, after in zip(experiments, coarse, fine, strict=True):
         for channel in prepared.channels:
             error = float(np.sqrt(np.mean(np.square(after[channel.name] - before[channel.name]))))
@@ -245,13 +237,6 @@ def blocks_of(experiments: Sequence[PreparedExperiment], numbers: Sequence[Numbe
             blocks.append(Block(prepared.label, channel.name, slice(first, last), floor))
             first = last
     return tuple(blocks)
-
-
-def _with_half_steps(prepared: PreparedExperiment, numbers: Sequence[Number], point: Floats) -> PreparedExperiment:
-    scenario = replace(prepared.scenario, run=replace(prepared.scenario.run, step=0.5 * prepared.run.step))
-    given = {path: float(row[0]) for path, row in columns_in(prepared.label, numbers, point[:, None]).items()}
-    run = plan_run(with_numbers(scenario, given))
-    return _place_samples(prepared, replace(run, tolerance=_FINER * prepared.run.tolerance))
 
 
 _NUMBERS_OF_RUN = (
@@ -269,25 +254,20 @@ def run_with(prepared: PreparedExperiment, numbers: Mapping[str, Any]) -> Run:
     base = prepared.run
     scenario = with_numbers(prepared.scenario, numbers)
     device = scenario.device
+    said, before = f"experiment '{prepared.label}'", prepared.scenario.device.valve.settings
     settings: Mapping[str, Any] = device.valve.settings
-    counts = [value.size for value in settings.values() if isinstance(value, np.ndarray)]
-    for run in range(max(counts, default=1)):
-        own = {name: at(value, run) for name, value in settings.items()}
-        valve = VALVES[device.valve.kind].choose(own)
-        if valve != base.program.valve or (valve.command_delay(own) > 0.0) != base.program.late_commands:
-            fitted = {path.rpartition(".")[2] for path in numbers if path.startswith("valves.")}
-            at_zero = [name for name in own if name in fitted and own[name] == 0.0]
-            moved = at_zero or [
-                name for name in own if name in fitted and prepared.scenario.device.valve.settings[name] == 0.0
-            ]
+    own = {path.rpartition(".")[2] for path in numbers if path.startswith("valves.")}
+    for run in range(max((value.size for value in settings.values() if isinstance(value, np.ndarray)), default=1)):
+        now = {name: at(value, run) for name, value in settings.items()}
+        valve = VALVES[device.valve.kind].choose(now)
+        if valve != base.program.valve or (valve.command_delay(now) > 0.0) != base.program.late_commands:
+            moved = " or ".join(f"valve.{name}" for name in now if name in own and 0.0 in (now[name], before[name]))
             raise IdentificationError(
-                f"experiment '{prepared.label}': {' or '.join(f'valve.{name}' for name in moved)} went to or from 0, "
-                "which is another model of the valve; give a start and a lower bound above 0"
+                f"{said}: {moved} went to or from 0, another model of the valve; give a start and a lower bound above 0"
             )
     if any(np.any(is_on != (effect in base.program.effects)) for effect, is_on in switches_of(device).items()):
         raise IdentificationError(
-            f"experiment '{prepared.label}': an effect went on or off, which is another model; start above 0 and give "
-            "a lower bound above 0"
+            f"{said}: an effect went on or off, which is another model; start above 0 and give a lower bound above 0"
         )
     planned, _ = plan_runs(scenario)
     # The engine allows a fraction of the supply pressure. Where that is fitted, the error in pascals must stay.
@@ -366,6 +346,7 @@ def _run_signals(prepared: PreparedExperiment, columns: Mapping[str, Floats], co
     kept, failure = _rows_of(run.program)
     records: Floats | None = None
     failed = np.zeros(count, dtype=np.bool_)
+    # A program has up to 32 lanes; more runs are several batches.
     for members, batch in batches_of(run, count):
         outcome = run_batch(batch, threads=1) if prepared.inputs is None else replay(batch, prepared.inputs)
         ends = outcome.states
@@ -380,6 +361,7 @@ def _run_signals(prepared: PreparedExperiment, columns: Mapping[str, Floats], co
     angle, mass_1, mass_2 = (_at_samples(one, prepared, offsets) for one in records)
     found = {name: np.full(angle.shape, np.nan) for name in ("angle", "pressure_1", "pressure_2")}
     numbers = leaves(run.plant)
+    # Pressures follow from mass and angle by the plant, whose numbers differ from run to run.
     for element in np.flatnonzero(~failed).tolist():
         plant = rebuilt(run.program.actuator.plant, [at(number, element) for number in numbers])
         own = angle[:, element], mass_1[:, element], mass_2[:, element]
@@ -400,7 +382,8 @@ def _at_samples(values: Floats, prepared: PreparedExperiment, offsets: Floats) -
     """Return a state at the times of the samples, by straight lines between records; each run with its offset [s]."""
     if offsets.any():
         # Before the first record the device stands still.
-        position = np.clip((prepared.time[:, None] - offsets) / prepared.record_interval, 0.0, len(values) - 1.0)
+        interval = prepared.run.step * prepared.run.record_every
+        position = np.clip((prepared.time[:, None] - offsets) / interval, 0.0, len(values) - 1.0)
         place = np.minimum(position.astype(np.intp), len(values) - 2)
         elements = np.arange(len(offsets))
         here, following = values[place, elements], values[place + 1, elements]

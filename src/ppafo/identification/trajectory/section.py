@@ -5,8 +5,7 @@ refused before the search begins.
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -17,6 +16,7 @@ from pydantic import Field
 from ppafo.documents.models import NAME, StrictTable, Text, Texts
 from ppafo.errors import DataError, IdentificationError, ScenarioError, nearest_name
 from ppafo.identification.estimate import Estimate, interval_factor
+from ppafo.identification.keys import Columns, Confidence, positive_in, quantity_in
 from ppafo.identification.source import Source, Use, double_use, told_of_readings
 from ppafo.identification.tolerances import Tolerances, deviation_of_limit, quantity_of
 from ppafo.identification.trajectory.expected import Candidate, Expected, expected_information
@@ -31,6 +31,7 @@ from ppafo.identification.trajectory.problem import (
     TrajectoryProblem,
     declaration_of,
     full_path,
+    refuse_first,
     use_of,
 )
 from ppafo.identification.trajectory.tolerances import stated_by, tolerance_parameters
@@ -70,94 +71,65 @@ class PriorSection(StrictTable):
 class ParameterSection(StrictTable):
     """A number to be fitted."""
 
-    path: Annotated[Text, Field(description="dotted path, such as friction.viscous_damping or initial.pressure_1")]
-    start: Annotated[
-        Text | None,
-        Field(
-            description="where the search begins; default: what the bench procedures found, else the value of the set"
-        ),
-    ] = None
-    low: Annotated[Text | None, Field(description="lower bound")] = None
-    high: Annotated[Text | None, Field(description="upper bound")] = None
-    prior: Annotated[
-        PriorSection | Literal["bench"] | None,
-        Field(description="what is known beforehand; 'bench': the interval of a bench procedure of this file"),
-    ] = None
-    recordings: Annotated[Texts, Field(description="experiments in which it acts, by label; default: all")] = ()
+    path: Text = Field(description="dotted path, such as friction.viscous_damping or initial.pressure_1")
+    start: Text | None = Field(
+        None, description="start of the search; default: from the bench procedures, else the set"
+    )
+    low: Text | None = Field(None, description="lower bound")
+    high: Text | None = Field(None, description="upper bound")
+    prior: PriorSection | Literal["bench"] | None = Field(
+        None, description="what is known beforehand; 'bench': the interval of a bench procedure of this file"
+    )
+    recordings: Texts = Field((), description="experiments in which it acts, by label; default: all")
 
 
 class ExperimentSection(StrictTable):
-    """A recording and the scenario that is to explain it."""
+    """A recording and the scenario that is to explain it.
+
+    A scenario has the device of the problem. Without one the run follows what the recording has of command, supply and
+    external torque, and begins as the recording does.
+    """
 
     label: _Label
-    recording: Annotated[Text, Field(description="file, relative to this one")]
-    columns: Annotated[
-        Text | None, Field(description="name of a column map; without one the file has units in its header")
-    ] = None
-    scenario: Annotated[
-        Text | None,
-        Field(
-            description="name of a scenario, or a file relative to this one; its device is that of the problem. "
-            "Without one the run follows what the recording has of command, supply and external torque"
-        ),
-    ] = None
-    overrides: Annotated[Texts, Field(description="changes to the scenario, or to the device without one")] = ()
-    start: Annotated[
-        Text | None, Field(description="time of the recording at which the run begins; 0 s, or the first sample")
-    ] = None
-    step: Annotated[Text | None, Field(description="longest step of time in the run, such as '0.1 ms'")] = None
-    channels: Annotated[
-        Texts | None,
-        Field(description="channels to compare; default: angle and both pressures, without what is held or followed"),
-    ] = None
-    noise: Annotated[
-        _Noise, Field(description="least standard deviation by channel, '0.1 deg', '500 Pa_d'; default: none")
-    ] = Field(default={})
-    inputs: Annotated[
-        Texts | None, Field(description=f"what the run follows in the recording: {', '.join(ALL_INPUTS)}")
-    ] = None
-    held: Annotated[
-        Text | None, Field(description="angle at which the vane is held, such as '75 deg'; without a scenario")
-    ] = None
-    volume: Annotated[
-        Text | None, Field(description="no vane: a fixed volume, such as '60 cm^3', is chamber 1; without a scenario")
-    ] = None
-    initial_state: Annotated[
-        Literal["scenario", "recording", "fitted"] | None,
-        Field(
-            description="where the state at the start comes from; 'recording' and 'fitted', which are one: from its "
-            "samples, to their noise. Default: the scenario, if there is one, else the recording"
-        ),
-    ] = None
-    time_offset: Annotated[
-        Text | None, Field(description="fit the delay of the samples behind the run, up to this: '20 ms'")
-    ] = None
+    recording: Text = Field(description="file, relative to this one")
+    columns: Columns = None
+    scenario: Text | None = Field(None, description="name or relative file of a scenario; default: the recorded inputs")
+    overrides: Texts = Field((), description="changes to the scenario, or to the device without one")
+    start: Text | None = Field(
+        None, description="time of the recording at which the run begins; 0 s, or the first sample"
+    )
+    step: Text | None = Field(None, description="longest step of time in the run, such as '0.1 ms'")
+    channels: Texts | None = Field(None, description="compared; default: angle and pressures, unless held or followed")
+    noise: _Noise = Field({}, description="least standard deviation by channel, '0.1 deg', '500 Pa_d'; default: none")
+    inputs: Texts | None = Field(None, description=f"recorded channels that the run follows: {', '.join(ALL_INPUTS)}")
+    held: Text | None = Field(None, description="angle at which the vane is held, such as '75 deg'; without a scenario")
+    volume: Text | None = Field(None, description="fixed volume in place of the vane, '60 cm^3'; without a scenario")
+    initial_state: Literal["scenario", "recording", "fitted"] | None = Field(
+        None,
+        description="state at the start; 'recording' and 'fitted' are one; default: the scenario, else the recording",
+    )
+    time_offset: Text | None = Field(None, description="limit of a fitted delay of the samples behind the run, '20 ms'")
 
 
 class CandidateSection(StrictTable):
     """An experiment that could be done next."""
 
     label: _Label
-    scenario: Annotated[Text, Field(description="name of a scenario, or a file relative to this one")]
-    overrides: Annotated[Texts, Field(description="changes to the scenario")] = ()
-    noise: Annotated[_Noise, Field(description="by channel; default: what the fit finds")] = Field(default={})
-    interval: Annotated[Text, Field(description="time between two samples")] = "1 ms"
+    scenario: Text = Field(description="name of a scenario, or a file relative to this one")
+    overrides: Texts = Field((), description="changes to the scenario")
+    noise: _Noise = Field({}, description="by channel; default: what the fit finds")
+    interval: Text = Field("1 ms", description="time between two samples")
 
 
 class TrajectorySection(StrictTable):
     """A trajectory fit, as it is written."""
 
-    parameters: Annotated[
-        tuple[ParameterSection, ...], Field(strict=False, min_length=1, description="free parameters")
-    ]
-    experiments: Annotated[
-        tuple[ExperimentSection, ...], Field(strict=False, min_length=1, description="recordings to be explained")
-    ]
-    confidence: Annotated[float, Field(gt=0.5, lt=1.0, description="confidence of the intervals")] = 0.95
-    candidates: Annotated[
-        tuple[CandidateSection, ...],
-        Field(strict=False, description="experiments to rank by the information that they would bring"),
-    ] = ()
+    parameters: tuple[ParameterSection, ...] = Field(strict=False, min_length=1, description="free parameters")
+    experiments: tuple[ExperimentSection, ...] = Field(strict=False, min_length=1, description="recordings to explain")
+    confidence: Confidence = 0.95
+    candidates: tuple[CandidateSection, ...] = Field(
+        (), strict=False, description="experiments to rank by the information that they would bring"
+    )
 
 
 _REMOVED = {
@@ -168,20 +140,20 @@ _REMOVED = {
     "profiles": "intervals are those of the table; omit it",
     "scale": "the search scales numbers by itself; omit it",
 }
-_CAN = "proposals within limits of the bench are not made; write [[trajectory.candidates]], which are ranked"
 
 
 def refuse_removed(document: Mapping[str, Any], file: str) -> None:
     """Refuse keys that earlier versions had, with what to write instead; IdentificationError."""
     section, bench = document.get("trajectory"), document.get("bench")
     if isinstance(bench, dict) and "can" in bench:
-        raise IdentificationError(f"{file}: bench.can: {_CAN}")
-    if isinstance(section, dict):
-        parameters = section.get("parameters")
-        tables = [item for item in (section, *(parameters if isinstance(parameters, list) else ()))]
-        for key, instead in _REMOVED.items():
-            if any(isinstance(table, dict) and key in table for table in tables):
-                raise IdentificationError(f"{file}: trajectory: {key}: {instead}")
+        raise IdentificationError(
+            f"{file}: bench.can: experiments are not proposed; write [[trajectory.candidates]], which are ranked"
+        )
+    parameters = section.get("parameters") if isinstance(section, dict) else None
+    tables = [section, *(parameters if isinstance(parameters, list) else ())]
+    for key, instead in _REMOVED.items():
+        if any(isinstance(table, dict) and key in table for table in tables):
+            raise IdentificationError(f"{file}: trajectory: {key}: {instead}")
 
 
 _NOISE_UNITS = {"angle": "rad", "pressure_1": "Pa_d", "pressure_2": "Pa_d"}
@@ -207,30 +179,18 @@ class Setting:
     tolerances: Tolerances = field(default_factory=Tolerances)
 
 
-@contextmanager
-def name_in_refusals(file: str) -> Iterator[None]:
-    """Begin the line of every refusal with the file, where it does not yet.
-
-    IdentificationError and DataError keep their kind.
-    """
-    try:
-        yield
-    except (IdentificationError, DataError) as error:
-        if str(error).startswith(file):
-            raise
-        raise type(error)(f"{file}: {error}") from error
-
-
 def noise_of_channels(given: Mapping[str, str], said: str) -> dict[str, float]:
     """Return the standard deviations [rad], [Pa] that are given by channel.
 
     IdentificationError for a channel that has none here.
     """
-    for name in given:
+    found = {}
+    for name, text in given.items():
         if name not in _NOISE_UNITS:
             hint = nearest_name(name, _NOISE_UNITS)
             raise IdentificationError(f"{said}: noise of '{name}'{hint}: only {', '.join(_NOISE_UNITS)} have one here")
-    return {name: quantity_of(f"{said}: noise.{name}", text, _NOISE_UNITS[name]) for name, text in given.items()}
+        found[name] = quantity_of(f"{said}: noise.{name}", text, _NOISE_UNITS[name])
+    return found
 
 
 SHORTEST_STEP = 1.0e-6
@@ -246,12 +206,20 @@ def trajectory_problem(section: TrajectorySection, setting: Setting) -> Trajecto
     if twice:
         raise IdentificationError(f"{setting.file}: {twice}; bench values are where the fit starts and what it holds")
     parameters = [_parameter(item, scenarios, setting) for item in section.parameters]
-    offsets = [one for item in section.experiments for one in _time_offset(item, setting)]
-    fitted = (*parameters, *offsets)
+    for item in section.experiments:
+        said = f"{setting.file}: experiment '{item.label}'"
+        longest = positive_in(item, "time_offset", "s", said)
+        if longest is not None:
+            # The delay of the samples of one recording is known within a limit, as a tolerance is.
+            parameters.append(
+                FreeParameter(
+                    TIME_OFFSET, 0.0, -longest, longest, deviation_of_limit(longest), (item.label,), is_tolerance=True
+                )
+            )
     chosen = setting.parameter_set
     stated = {} if chosen is None else stated_by(chosen, experiments[0].scenario)
-    held = tolerance_parameters(setting.tolerances, experiments, fitted, stated)
-    return TrajectoryProblem((*fitted, *held), experiments, section.confidence)
+    held = tolerance_parameters(setting.tolerances, experiments, parameters, stated)
+    return TrajectoryProblem((*parameters, *held), experiments, section.confidence)
 
 
 def candidates_of(section: TrajectorySection, setting: Setting) -> tuple[Candidate, ...]:
@@ -259,13 +227,9 @@ def candidates_of(section: TrajectorySection, setting: Setting) -> tuple[Candida
     found = []
     for item in section.candidates:
         said = f"{setting.file}: candidate '{item.label}'"
-        interval = quantity_of(f"{said}: interval", item.interval, "s")
         scenario = _scenario(item.scenario, item.overrides, setting)
-        if not SHORTEST_STEP <= interval <= scenario.run.duration:
-            raise IdentificationError(
-                f"{said}: interval = '{item.interval}': must be from {SHORTEST_STEP:g} s to "
-                f"{scenario.run.duration:g} s, the duration of its run"
-            )
+        interval = quantity_in(item, "interval", "s", said, SHORTEST_STEP, scenario.run.duration)
+        assert interval is not None, "it has a default"
         found.append(Candidate(item.label, scenario, noise_of_channels(item.noise, said), interval))
     return tuple(found)
 
@@ -273,7 +237,6 @@ def candidates_of(section: TrajectorySection, setting: Setting) -> tuple[Candida
 def _experiment(item: ExperimentSection, setting: Setting) -> Experiment:
     said = f"{setting.file}: experiment '{item.label}'"
     source = setting.read(item)
-    is_replay = item.scenario is None
     if item.scenario is None:
         scenario, start, inputs = _replay(item, source.recording, setting, said)
     else:
@@ -283,44 +246,29 @@ def _experiment(item: ExperimentSection, setting: Setting) -> Experiment:
                     f"{said}: {name} and a scenario: the scenario prescribes how the vane moves; omit one of them"
                 )
         scenario = _scenario(item.scenario, item.overrides, setting)
-        start, inputs = quantity_of(f"{said}: start", item.start or "0 s", "s"), item.inputs or ()
-    if item.step is not None:
-        step = quantity_of(f"{said}: step", item.step, "s")
-        if not SHORTEST_STEP <= step <= LONGEST_STEP:
-            raise IdentificationError(
-                f"{said}: step = '{item.step}': must be from {SHORTEST_STEP:g} s to {LONGEST_STEP:g} s"
-            )
-        scenario = replace(scenario, run=replace(scenario.run, step=step))
+        start, inputs = quantity_in(item, "start", "s", said) or 0.0, item.inputs or ()
+    step = quantity_in(item, "step", "s", said, SHORTEST_STEP, LONGEST_STEP)
+    scenario = scenario if step is None else replace(scenario, run=replace(scenario.run, step=step))
+    # The scenario of a replay has the state of the samples already.
+    is_read = item.scenario is not None and item.initial_state in ("recording", "fitted")
     return Experiment(
         label=item.label,
         scenario=scenario,
         recording=source.recording,
         start=start,
-        channels=compared_channels(item),
+        channels=_compared_channels(item),
         noise=noise_of_channels(item.noise, said),
         inputs=inputs,
-        # The scenario of a replay has the state of the samples already.
-        initial_state="scenario" if is_replay or item.initial_state in (None, "scenario") else "recording",
+        initial_state="recording" if is_read else "scenario",
         source=source.trace,
     )
 
 
 def _scenario(name: str, overrides: tuple[str, ...], setting: Setting) -> Scenario:
     found = name if name in list_scenarios() else str(setting.folder / name)
+    # The valve of the problem goes before what the experiment changes of it.
     chosen = () if setting.valve is None else (f"device.valve={setting.valve}",)
     return load_scenario(found, over(chosen, overrides, ScenarioError), setting.parameter_set)
-
-
-def _time_offset(item: ExperimentSection, setting: Setting) -> list[FreeParameter]:
-    """Return the delay of the samples of one recording, as a tolerance, where it may have one."""
-    if item.time_offset is None:
-        return []
-    said = f"{setting.file}: experiment '{item.label}': time_offset"
-    longest = quantity_of(said, item.time_offset, "s")
-    if longest <= 0.0:
-        raise IdentificationError(f"{said} = '{item.time_offset}' must be above 0")
-    deviation = deviation_of_limit(longest)
-    return [FreeParameter(TIME_OFFSET, 0.0, -longest, longest, deviation, (item.label,), is_tolerance=True)]
 
 
 def _parameter(item: ParameterSection, scenarios: Mapping[str, Scenario], setting: Setting) -> FreeParameter:
@@ -329,11 +277,10 @@ def _parameter(item: ParameterSection, scenarios: Mapping[str, Scenario], settin
     quantity = declaration_of(item.path, acting)
     atmosphere = acting.device.supply.atmospheric_pressure
     said = f"{setting.file}: parameter '{item.path}'"
-
-    def number(name: str, text: str | None) -> float | None:
-        return None if text is None else quantity_of(f"{said}: {name}", text, quantity.unit, atmosphere)
-
-    start, deviation = number("start", item.start), math.inf
+    start, low, high = (
+        quantity_in(item, key, quantity.unit, said, atmosphere=atmosphere) for key in ("start", "low", "high")
+    )
+    deviation = math.inf
     if item.prior == "bench":
         estimate = setting.bench.get(full_path(item.path, acting))
         if estimate is None or not estimate.is_usable:
@@ -345,14 +292,7 @@ def _parameter(item: ParameterSection, scenarios: Mapping[str, Scenario], settin
     elif item.prior is not None:
         start = quantity_of(f"{said}: prior.mean", item.prior.mean, quantity.unit, atmosphere)
         deviation = abs(start) * item.prior.relative
-    return FreeParameter(
-        path=item.path,
-        start=start,
-        low=number("low", item.low),
-        high=number("high", item.high),
-        deviation=deviation,
-        recordings=item.recordings,
-    )
+    return FreeParameter(item.path, start, low, high, deviation, item.recordings)
 
 
 def _replay(
@@ -364,26 +304,38 @@ def _replay(
     """
     if setting.parameter_set is None:
         raise IdentificationError(f"{said}: needs a scenario, because no device was given")
-    if item.initial_state == "scenario":
-        raise IdentificationError(f"{said}: initial_state = 'scenario', but it has no scenario; omit it")
-    first = float(recording.time[0]) if item.start is None else quantity_of(f"{said}: start", item.start, "s")
+    inputs = tuple(name for name in INPUTS if name in recording) if item.inputs is None else item.inputs
+    is_held, is_fixed = item.held is not None, item.volume is not None
+    refuse_first(
+        said,
+        (item.initial_state == "scenario", "initial_state = 'scenario', but it has no scenario; omit it"),
+        (
+            (is_held or is_fixed) and ANGLE in inputs,
+            f"the vane is held or absent, but inputs has '{ANGLE}': omit one of them",
+        ),
+        (is_held and is_fixed, "held and volume: with a fixed volume there is no vane; omit one of them"),
+        (
+            COMMAND not in recording,
+            f"has no scenario, so its recording needs a channel '{COMMAND}'; it has {', '.join(recording.names)}",
+        ),
+        (COMMAND not in inputs, f"has no scenario, so inputs must have '{COMMAND}'"),
+    )
+    first = quantity_in(item, "start", "s", said)
+    first = float(recording.time[0]) if first is None else first
     used = recording.between(first, float(recording.time[-1]))
     device = build_device(apply_overrides(setting.parameter_set, item.overrides, setting.valve), setting.valve)
-    device, fixed = _fix_vane(item, device, said)
-    if COMMAND not in recording:
-        have = ", ".join(recording.names)
-        raise IdentificationError(
-            f"{said}: has no scenario, so its recording needs a channel '{COMMAND}'; it has {have}"
-        )
-    inputs = tuple(name for name in INPUTS if name in recording) if item.inputs is None else item.inputs
-    if COMMAND not in inputs:
-        raise IdentificationError(f"{said}: has no scenario, so inputs must have '{COMMAND}'")
-    start = _start_of(used, device, fixed, said)
-    motion = locked_vane(start.angle) if fixed else None
+    angle, volume = quantity_in(item, "held", "rad", said), positive_in(item, "volume", "m^3", said)
+    known = {} if angle is None else {ANGLE: angle}
+    if volume is not None:
+        # Without a vane chamber 1 is the volume, and chamber 2 the room.
+        known = {ANGLE: device.actuator.angle_min, "pressure_2": device.supply.atmospheric_pressure}
+        device = with_fixed_volume(device, volume)
+    start = _start_of(used, device, known, said)
+    motion = locked_vane(start.angle) if known else None
     return replay_scenario(recording, device, start, used.duration, said, motion), first, inputs
 
 
-def compared_channels(item: ExperimentSection) -> tuple[str, ...]:
+def _compared_channels(item: ExperimentSection) -> tuple[str, ...]:
     """Return what an experiment is compared in: as given, else all that is neither held nor followed."""
     if item.channels is not None:
         return item.channels
@@ -391,23 +343,6 @@ def compared_channels(item: ExperimentSection) -> tuple[str, ...]:
         return ("pressure_1",)
     is_prescribed = item.held is not None or ANGLE in (item.inputs or ())
     return FITTED_CHANNELS[1:] if is_prescribed else FITTED_CHANNELS
-
-
-def _fix_vane(item: ExperimentSection, device: Device, said: str) -> tuple[Device, dict[str, float]]:
-    """Return the device and what of its state is known where the vane is held, or where there is none."""
-    if (item.held is not None or item.volume is not None) and ANGLE in (item.inputs or ()):
-        raise IdentificationError(f"{said}: the vane is held or absent, but inputs has '{ANGLE}': omit one of them")
-    if item.held is not None and item.volume is not None:
-        raise IdentificationError(f"{said}: held and volume: with a fixed volume there is no vane; omit one of them")
-    if item.held is not None:
-        return device, {ANGLE: quantity_of(f"{said}: held", item.held, "rad")}
-    if item.volume is None:
-        return device, {}
-    volume = quantity_of(f"{said}: volume", item.volume, "m^3")
-    if not volume > 0.0:
-        raise IdentificationError(f"{said}: volume = '{item.volume}' must be above zero")
-    known = {ANGLE: device.actuator.angle_min, "pressure_2": device.supply.atmospheric_pressure}
-    return with_fixed_volume(device, volume), known
 
 
 def _start_of(recording: Recording, device: Device, known: Mapping[str, float], said: str) -> Start:
@@ -424,6 +359,7 @@ def _start_of(recording: Recording, device: Device, known: Mapping[str, float], 
             )
         return value_at_rest(recording.time[:count], recording[name][:count])
 
+    # The mean of many samples has less noise than the first one.
     angle, pressure_1, pressure_2 = (first(name) for name in FITTED_CHANNELS)
     rate = first("angular_velocity") if "angular_velocity" in recording and ANGLE not in known else 0.0
     return Start(float(between_stops(np.array([angle]), device, said)[0]), rate, pressure_1, pressure_2)
@@ -445,22 +381,19 @@ class TrajectoryOutcome:
 
 def solve_section(section: TrajectorySection, setting: Setting, report: Report) -> TrajectoryOutcome:
     """Return the outcome of a section; everything that can be refused is refused before the search begins."""
-    with name_in_refusals(setting.file):
+    try:
         problem = trajectory_problem(section, setting)
         candidates = candidates_of(section, setting)
         found = fit(problem, report)
         expected = expected_information(found, candidates)
+    except (IdentificationError, DataError) as error:
+        if str(error).startswith(setting.file):
+            raise
+        raise type(error)(f"{setting.file}: {error}") from error
     sources = tuple(Source(item.recording, item.source) for item in problem.experiments)
-    return TrajectoryOutcome(
-        found, expected, (*told_of_readings(sources), *found.remarks, *_contradictions(found, setting.bench))
-    )
-
-
-def _contradictions(found: TrajectoryFit, bench: Mapping[str, Estimate]) -> list[str]:
-    """Return a sentence for each number whose interval does not meet that of a bench procedure."""
-    remarks = []
+    remarks = [*told_of_readings(sources), *found.remarks]
     for fitted in found.estimates:
-        other = bench.get(fitted.path)
+        other = setting.bench.get(fitted.path)
         if other is None or not (other.is_usable and fitted.is_usable):
             continue
         if fitted.low > other.high or fitted.high < other.low:
@@ -470,4 +403,4 @@ def _contradictions(found: TrajectoryFit, bench: Mapping[str, Estimate]) -> list
                 f"{fitted.path}: fitted {low} to {high} {ends[0][1]}, from the bench {lowest} to {highest}: one of the "
                 "two models is incomplete"
             )
-    return remarks
+    return TrajectoryOutcome(found, expected, tuple(remarks))

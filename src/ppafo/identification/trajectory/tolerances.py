@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 
-from ppafo.identification.new_set import fitting_unit
+from ppafo.identification.new_set import fitting_unit, stated_half_width
 from ppafo.identification.tolerances import Tolerances, deviation_of_limit
 from ppafo.identification.trajectory.problem import (
     FITTED_CHANNELS,
@@ -20,7 +20,6 @@ from ppafo.parameters.parameter_set import ParameterSet
 from ppafo.signals.faults import noise_of
 from ppafo.simulation.recorded import ANGLE, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, FreeMotion, Scenario
-from ppafo.units import to_si
 
 _WIDEST = 12.0
 """Standard deviations of its prior that a tolerance may be off at most in the search."""
@@ -38,10 +37,7 @@ def stated_by(parameter_set: ParameterSet, scenario: Scenario) -> dict[str, floa
     for path, quantity in declared_numbers(scenario).items():
         entry = parameter_set.numbers.get(path)
         if entry is not None and entry.uncertainty:
-            unit = fitting_unit(entry.unit, quantity)
-            found[path] = to_si(entry.value + entry.uncertainty, entry.unit, unit) - to_si(
-                entry.value, entry.unit, unit
-            )
+            found[path] = stated_half_width(entry, fitting_unit(entry.unit, quantity))
     return found
 
 

@@ -1,0 +1,44 @@
+"""Keys that several tables of a problem file share, and their texts as numbers in SI units."""
+
+import math
+from typing import Annotated
+
+from pydantic import Field
+
+from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.documents.models import StrictTable, Text
+from ppafo.errors import IdentificationError
+from ppafo.identification.tolerances import quantity_of
+
+Columns = Annotated[Text | None, Field(description="name of a column map; default: units in the header of the file")]
+Confidence = Annotated[float, Field(gt=0.5, lt=1.0, description="confidence of the intervals; default 0.95")]
+
+
+def quantity_in(
+    table: StrictTable,
+    key: str,
+    unit: str,
+    said: str,
+    low: float = -math.inf,
+    high: float = math.inf,
+    atmosphere: float = STANDARD_ATMOSPHERE,
+) -> float | None:
+    """Return the number at a key of a table [unit], None where it was left out; ``said`` is what messages call it.
+
+    IdentificationError where its text does not fit the unit, or the number is not from ``low`` to ``high``.
+    """
+    text = getattr(table, key)
+    if text is None:
+        return None
+    value = quantity_of(f"{said}: {key}", text, unit, atmosphere)
+    if not low <= value <= high:
+        raise IdentificationError(f"{said}: {key} = {text!r} must be from {low:g} to {high:g} {unit}")
+    return value
+
+
+def positive_in(table: StrictTable, key: str, unit: str, said: str) -> float | None:
+    """Return the number at a key as ``quantity_in`` does; IdentificationError also where it is not above 0."""
+    value = quantity_in(table, key, unit, said)
+    if value is not None and value <= 0.0:
+        raise IdentificationError(f"{said}: {key} = {getattr(table, key)!r} must be above zero")
+    return value
