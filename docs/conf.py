@@ -8,8 +8,11 @@ release = version = __version__
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "sphinx.ext.viewcode", "scripts.docstrings"]
 root_doc = "index"
 
-# Pages: Markdown as a forge shows it; every heading can be linked to. Blocks without a language are plain text.
+# Pages: Markdown as a forge shows it, with its mathematics; every heading can be linked to. Blocks without a language are plain text.
 myst_heading_anchors = 4
+myst_enable_extensions = ["dollarmath"]
+myst_fence_as_directive = ["math"]
+html_math_renderer = "mathml"
 highlight_language = "text"
 
 # The tutorial is run each time, and what it prints to the error stream (progress) is left out.

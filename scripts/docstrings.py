@@ -1,4 +1,4 @@
-"""What Sphinx is taught about this package: its docstrings are plain text, and dotted names in the pages are links.
+"""What Sphinx is taught about this package: docstrings are plain text, dotted names in pages are links, mathematics is MathML.
 
 An extension of Sphinx, named in ``docs/conf.py``.
 """
@@ -96,9 +96,22 @@ def lead_back_to_one_page(app: Any) -> list[Any]:
     return []
 
 
+def mathematics(translator: Any, node: Any) -> None:
+    """Write an equation as MathML, which browsers draw themselves: MathJax would be fetched from another host."""
+    from docutils import nodes
+    from docutils.utils.math.latex2mathml import tex2mathml
+
+    is_block = isinstance(node, nodes.math_block)
+    drawn = tex2mathml(node.astext().strip(), as_block=is_block)
+    translator.body.append(f'<div style="overflow-x: auto">{drawn}</div>' if is_block else drawn)
+    raise nodes.SkipNode
+
+
 def setup(app: Any) -> dict[str, bool]:
     """Add these to Sphinx, and a language that forges know and Pygments does not."""
     from pygments.lexers.special import TextLexer
+
+    app.add_html_math_renderer("mathml", (mathematics, None), (mathematics, None))
 
     app.connect("autodoc-process-docstring", _plain)
     app.connect("doctree-resolved", link_names)
