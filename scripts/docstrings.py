@@ -1,4 +1,4 @@
-"""What Sphinx is taught about this package: docstrings are plain text, dotted names in pages are links, mathematics is MathML.
+"""What Sphinx is taught about this package: docstrings are plain text, dotted names are links, mathematics is MathML.
 
 An extension of Sphinx, named in ``docs/conf.py``.
 """
@@ -23,14 +23,23 @@ _CODE = re.compile(r"``(.+?)``|`([^`\n]+?)`", re.DOTALL)
 _MARKS = re.compile(r"([\\*|])|(?<=\w)(_)(?!\w)")
 _ALIAS = re.compile(r"Alias for field number \d+")
 _DOTTED = re.compile(r"(ppafo(?:\.\w+)+)(?:\(.*\))?")
+_ARGUMENT = re.compile(r"(\w+): (.+)")
+_ACCENT = re.compile(r'<munderover>\s*(<mi>\w</mi>)(.*?)(<mo stretchy="false">\S</mo>)\s*</munderover>', re.DOTALL)
+"""Docutils puts the index of an accented symbol below it."""
 
 
 def restructured(lines: Iterable[str]) -> list[str]:
-    """Return a plain docstring as reStructuredText: code in backticks, indented blocks as they stand, marks as text."""
+    """Return a plain docstring as reStructuredText: code in backticks, indented blocks as they stand, marks as text.
+
+    Arguments of a command, ``name: help`` with further lines indented, are a list.
+    """
     text: list[str] = []
     for block in re.split(r"\n{2,}", "\n".join(lines).strip("\n")):
+        entries = [_ARGUMENT.fullmatch(entry) for entry in re.sub(r"\n {4}", " ", block).split("\n")]
         if block.startswith("    "):
             text += ["::", block]
+        elif all(entries):
+            text.append("\n".join(f"- ``{entry[1]}``: {_with_code(entry[2])}" for entry in entries if entry))
         elif not _ALIAS.fullmatch(block):
             text.append(_with_code(block))
     return "\n\n".join(text).split("\n")
@@ -103,7 +112,8 @@ def mathematics(translator: Any, node: Any) -> None:
 
     is_block = isinstance(node, nodes.math_block)
     drawn = tex2mathml(node.astext().strip(), as_block=is_block)
-    translator.body.append(f'<div style="overflow-x: auto">{drawn}</div>' if is_block else drawn)
+    drawn = _ACCENT.sub(r'<msub><mover accent="true">\1\3</mover>\2</msub>', drawn)
+    translator.body.append(f'<div style="overflow: auto hidden; padding: 0.4em 0">{drawn}</div>' if is_block else drawn)
     raise nodes.SkipNode
 
 

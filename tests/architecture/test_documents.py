@@ -46,9 +46,8 @@ MACHINE_TRACES = (
 def sections_of_equations() -> dict[int, list[str]]:
     """Equation number to the dotted names of its section."""
     text = (ROOT / "docs" / "equations.md").read_text(encoding="utf-8")
-    parts = re.split(r"^## \((\d+)\).*$", text, flags=re.MULTILINE)
-    bodies = zip(parts[1::2], parts[2::2], strict=True)
-    return {int(number): re.findall(r"`(ppafo\.[\w.]+)`", body) for number, body in bodies}
+    sections = re.findall(r"^## \((\d+)\)[^\n]*\n(.*?)(?=^## )", text, flags=re.MULTILINE | re.DOTALL)
+    return {int(number): re.findall(r"`(ppafo\.[\w.]+)`", body) for number, body in sections}
 
 
 def equations_of(docstring: str) -> set[int]:
@@ -128,6 +127,23 @@ def test_every_dotted_name_on_the_page_of_equations_is_a_function() -> None:
     assert [name for name in names if not inspect.isfunction(inspect.unwrap(found(name) or str))] == []
 
 
+def test_every_function_on_the_page_of_equations_leads_to_the_file_that_has_it() -> None:
+    text = (ROOT / "docs" / "equations.md").read_text(encoding="utf-8")
+    links = dict(re.findall(r"\[`(ppafo\.[\w.]+)`\]\(\.\./(src/[\w/]+)\.py\)", text))
+    assert set(links) == set(dotted_names("equations.md"))
+    assert {
+        name: file for name, file in links.items() if f"src.{name.rpartition('.')[0]}" != file.replace("/", ".")
+    } == {}
+
+
+def test_every_equation_has_its_mathematics_and_the_units_of_its_symbols() -> None:
+    text = (ROOT / "docs" / "equations.md").read_text(encoding="utf-8")
+    sections = re.findall(r"^## (\(\d+\))[^\n]*\n(.*?)(?=^## )", text, flags=re.MULTILINE | re.DOTALL)
+    assert [
+        number for number, body in sections if not re.search(r"```math\n.+?\n```\n\n[^\n]*\[", body, re.DOTALL)
+    ] == []
+
+
 @pytest.mark.parametrize("number", PAPER_EQUATIONS)
 def test_the_functions_of_an_equation_name_it_in_their_docstrings(number: int) -> None:
     silent = [name for name in sections_of_equations()[number] if number not in equations_of(found(name).__doc__ or "")]
@@ -178,9 +194,12 @@ def test_an_effect_has_its_lines_in_nomenclature_and_equations(effect: Effect) -
     )
     missing = [line for line in nomenclature_lines(effect) if line not in nomenclature_page.splitlines()]
     missing = ["paste into docs/nomenclature.md, below 'Effects':", *missing] if missing else []
-    section = "\n".join(equation_lines(effect))
-    if section not in equations:
-        missing += ["paste into docs/equations.md, below 'Effects beside the paper's equations':", section]
+    title, _, equation, _, *laws = equation_lines(effect)
+    section = equations.partition(f"\n{title}\n")[2].partition("\n#")[0]
+    names = re.findall(r"`([\w.]+)`", "\n".join(laws))
+    if "```math" not in section or any(f"`{name}`" not in section for name in names):
+        missing += ["paste into docs/equations.md, below 'Effects beside the paper's equations', with its mathematics:"]
+        missing += [title, equation, *laws]
     assert missing == [], "\n".join(missing)
 
 
@@ -230,6 +249,36 @@ def test_the_page_on_architecture_lists_every_room_and_no_other() -> None:
     packages = {path.parent.name for path in SOURCE.glob("*/__init__.py")}
     modules = {path.stem for path in SOURCE.glob("*.py")} - {"__init__"}
     assert listed == packages | modules
+
+
+def test_decisions_are_few_and_at_most_half_a_page() -> None:
+    pages = sorted((ROOT / "docs" / "decisions").glob("0*.md"))
+    words = {page.name: len(page.read_text(encoding="utf-8").split()) for page in pages}
+    assert len(pages) <= 20
+    assert {name: count for name, count in words.items() if count > 250} == {}
+
+
+def test_the_documents_stay_short() -> None:
+    words = {page: len(page.read_text(encoding="utf-8").split()) for page in ROOT.rglob("*.md") if _is_ours(page)}
+    assert words[ROOT / "README.md"] <= 500
+    assert sum(words.values()) <= 60_000
+
+
+def _is_ours(page: Path) -> bool:
+    """True for a page of this repository, not of what was installed or built in it."""
+    return page.relative_to(ROOT).parts[0] in {
+        "README.md",
+        "CHANGELOG.md",
+        "CONTRIBUTING.md",
+        "SECURITY.md",
+        "docs",
+        "src",
+    }
+
+
+def test_every_picture_of_the_documents_is_named_by_a_page() -> None:
+    text = "".join(page.read_text(encoding="utf-8") for page in PAGES)
+    assert [file.name for file in (ROOT / "docs" / "images").iterdir() if f"images/{file.name}" not in text] == []
 
 
 def test_pictures_of_the_documents_are_small_enough_for_a_repository() -> None:
