@@ -77,7 +77,7 @@ def nomenclature() -> Iterator[tuple[str, str]]:
     """Name and unit of every row of the nomenclature; a row may have several names, and a unit for each."""
     for line in (ROOT / "docs" / "nomenclature.md").read_text(encoding="utf-8").splitlines():
         cells = [cell.strip() for cell in line.strip("|").split("|")]
-        names = re.findall(r"`(\w+)`", cells[1]) if line.startswith("| ") and len(cells) == 4 else []
+        names = re.findall(r"`(\w+)`", cells[1]) if line.startswith("| ") and len(cells) == 5 else []
         units = cells[2].split(", ") if names else []
         units = units * len(names) if len(units) == 1 else units
         yield from zip(names, units, strict=True)
@@ -162,6 +162,12 @@ def test_no_name_of_the_nomenclature_is_listed_twice() -> None:
     assert sorted({name for name in names if names.count(name) > 1}) == []
 
 
+def test_every_row_of_the_nomenclature_says_where_its_symbol_stands() -> None:
+    rows = re.findall(r"^\| .*`.*$", (ROOT / "docs" / "nomenclature.md").read_text(encoding="utf-8"), re.MULTILINE)
+    assert len(rows) > 100
+    assert [row for row in rows if not re.search(r"\| \[[^\]]+\]\(\S+\.md\S*\) \|$", row)] == []
+
+
 def test_every_name_of_the_nomenclature_is_a_parameter_or_field_or_declared_value() -> None:
     used = set(declared_units())
     for package in ("model", "parameters", "control"):
@@ -172,7 +178,9 @@ def test_every_name_of_the_nomenclature_is_a_parameter_or_field_or_declared_valu
 @pytest.mark.parametrize("group", [*GROUPS_OF_NUMBERS, *DEVICE_PARTS], ids=lambda group: group.__name__)
 def test_every_field_of_plant_state_and_device_is_in_the_nomenclature(group: Any) -> None:
     fields = [item.name for item in dataclasses.fields(group)] if dataclasses.is_dataclass(group) else group._fields
-    missing = [f"| - | `{name}` | - | what it is |" for name in fields if name not in dict(nomenclature())]
+    missing = [
+        f"| - | `{name}` | - | what it is | [page](page.md) |" for name in fields if name not in dict(nomenclature())
+    ]
     assert missing == [], f"paste into docs/nomenclature.md, with symbol, unit and meaning of {group.__name__}:\n" + (
         "\n".join(missing)
     )
@@ -180,7 +188,7 @@ def test_every_field_of_plant_state_and_device_is_in_the_nomenclature(group: Any
 
 def test_every_channel_of_a_recording_is_in_the_nomenclature() -> None:
     missing = [
-        f"| - | `{name}` | {CHANNELS[name].unit} | what it is |"
+        f"| - | `{name}` | {CHANNELS[name].unit} | what it is | [page](page.md) |"
         for name in CHANNELS
         if name not in dict(nomenclature())
     ]
@@ -192,7 +200,8 @@ def test_an_effect_has_its_lines_in_nomenclature_and_equations(effect: Effect) -
     nomenclature_page, equations = (
         (ROOT / "docs" / name).read_text(encoding="utf-8") for name in ("nomenclature.md", "equations.md")
     )
-    missing = [line for line in nomenclature_lines(effect) if line not in nomenclature_page.splitlines()]
+    rows = [line.rpartition(" [")[0] for line in nomenclature_page.splitlines()]
+    missing = [line for line in nomenclature_lines(effect) if line not in rows]
     missing = ["paste into docs/nomenclature.md, below 'Effects':", *missing] if missing else []
     title, _, equation, _, *laws = equation_lines(effect)
     section = equations.partition(f"\n{title}\n")[2].partition("\n#")[0]
