@@ -308,35 +308,3 @@ def test_lock_files_have_no_address_at_all() -> None:
     locks = sorted(ROOT.glob("*.lock"))
     assert len(locks) >= 2
     assert [lock.name for lock in locks if "://" in lock.read_text(encoding="utf-8")] == []
-
-
-PRIVATE_WORDS = (
-    r"virtual rig",
-    r"whole numbers?",
-    r"who reacts?",
-    r"takes? back",
-    r"left open",
-    r"attitude of the shank",
-    r"hunts",
-    r"chatters?",
-    r"comes? down",
-    r"those of who",
-    r"hangs? (?:the device )?on",
-    r"quantum",
-    r"foot slap comes",
-    r"lanes?",
-    r"chips?",
-)
-"""Words of our own for which the field has others; names of files and keys, in code or links, may have them."""
-PAGES_OF_THE_ENGINE = ("docs/architecture.md", "docs/evidence.md", "docs/decisions/", "CONTRIBUTING.md")
-"""Where lanes of a processor and chips are meant."""
-
-
-@pytest.mark.parametrize("page", [page for page in PAGES if page.name != "CHANGELOG.md"], ids=lambda page: page.name)
-def test_documents_use_the_words_of_the_field(page: Path) -> None:
-    name = str(page.relative_to(ROOT))
-    words = PRIVATE_WORDS[:-2] if name.startswith(PAGES_OF_THE_ENGINE) else PRIVATE_WORDS
-    text = re.sub(
-        r"```.*?```|`[^`]*`|\]\([^)]*\)|^ {4}.*$", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE
-    )
-    assert re.findall(rf"\b(?:{'|'.join(words)})\b", text, re.IGNORECASE) == []

@@ -40,9 +40,9 @@ _Columns = Annotated[
 _Confidence = Annotated[float, Field(gt=0.5, lt=1.0, description="confidence of the intervals; default 0.95")]
 _Start = Annotated[Text | None, Field(description="first time to use, such as '2 s'")]
 _End = Annotated[Text | None, Field(description="last time to use, such as '8 s'")]
-_Gas = Annotated[Text | None, Field(description="species of the gas on the bench; default: that of the set")]
+_Gas = Annotated[Text | None, Field(description="species of the gas on the bench; default: the set's")]
 _Temperature = Annotated[
-    Text | None, Field(description="temperature of the gas on the bench, such as '17 degC'; default: that of the set")
+    Text | None, Field(description="temperature of the gas on the bench, such as '17 degC'; default: the set's")
 ]
 _Valve = Annotated[Text | None, Field(description="name of a valve of the set; default: the chosen one")]
 
@@ -139,9 +139,7 @@ class FreeDecayProblem(StrictTable):
     confidence: _Confidence = 0.95
     start: _Start = None
     end: _End = None
-    inertia: Annotated[
-        Text | None, Field(description="such as '8.4 g m^2', or 'unknown'; default: that of the set")
-    ] = None
+    inertia: Annotated[Text | None, Field(description="such as '8.4 g m^2', or 'unknown'; default: the set's")] = None
 
     def settings(self, setting: Setting) -> FreeDecaySettings:
         """Return the settings of the procedure [SI]; the inertia is the set's where none is named, if it has one."""
@@ -315,7 +313,7 @@ class ProblemFile(StrictTable):
     title: Annotated[str, Field(description="title of the new parameter set")] = ""
     device: Annotated[DeviceProblem, Field(description="the set to start from")]
     citation: Annotated[
-        Citation | None, Field(description="who measured, of the new set; default: that of the set to start from")
+        Citation | None, Field(description="who measured, of the new set; default: the set's to start from")
     ] = None
     columns: Annotated[dict[str, ColumnMap], Field(description="column maps by name, for files from elsewhere")] = (
         Field(default={})

@@ -165,7 +165,7 @@ _CATALOGUE = [
     PlantFault(
         "bottle",
         "empty",
-        "its pressure falls to that of the atmosphere",
+        "its pressure falls to atmospheric",
         (TIME, Quantity("lag", "s", "time in which most of it is gone", 0.2, 1.0e-3, 1.0e3)),
         {"time": "empty_time", "lag": "empty_lag"},
     ),
@@ -173,7 +173,7 @@ _CATALOGUE = [
         "vane",
         "leaking",
         "leaks more between the chambers",
-        (TIME, Quantity("factor", "1", "its leak over that of a sound one", 50.0, 0.0, 1.0e4)),
+        (TIME, Quantity("factor", "1", "its leak over a sound one's", 50.0, 0.0, 1.0e4)),
         {"time": "leak_time", "factor": "leak_factor"},
     ),
     PlantFault(

@@ -364,7 +364,9 @@ def opensim_recording(
     that of a wearer who reacts.
     """
     if "other_hip_angle" in recording.names:
-        raise DataError(f"{recording.label}: a wearer who reacts walks on two legs, which has no form of OpenSim yet")
+        raise DataError(
+            f"{recording.label}: a neuromuscular gait model walks on two legs, which has no form of OpenSim yet"
+        )
     foot = side[0]
     missing = tuple(name for name in _PER_MASS if name in recording.names and _is_per_mass(recording, name))
     missing = missing if body_mass is None else ()

@@ -91,7 +91,7 @@ def _apply_overrides(
     given = {key: value for key, value in sample.items() if value is not None}
     if given and parsed.sample is None:
         raise StudyError(
-            f"{file}: has no [sample], so the number of runs is that of its grid and nothing is random: "
+            f"{file}: has no [sample], so the number of runs is its grid's and nothing is random: "
             "it takes neither draws nor a seed"
         )
     if given:

@@ -401,7 +401,7 @@ def _fault_of(one: _Channel, time: Floats) -> str:
     if len(levels) == 1:
         dead = "its sensor is dead or not connected"
         return (
-            f"never changes: the vane was held (--motion held), or {dead}"
+            f"never changes: the vane was locked (--motion held), or {dead}"
             if one.name == ANGLE
             else f"never changes: {dead}"
         )
@@ -446,7 +446,7 @@ def _motions(search: _Search) -> Iterator[Candidate]:
     if search.settings.motion in ("free", "leg"):
         angles = [one for record in search.records for one in record.channels if one.name == ANGLE]
         if angles and all(float(np.std(one.values)) < _AT_REST * one.noise for one in angles):
-            words = "the vane seems to be held, for its recorded angle rests (--motion held)"
+            words = "the vane seems to be locked, for its recorded angle rests (--motion held)"
             yield Candidate("motion", words, lambda _: Change(motion="held"))
 
 
@@ -572,7 +572,7 @@ def _numbers(search: _Search) -> Iterator[Candidate]:
         own = number_at(scenario, path)
         factors = tuple(one for one in _FACTORS if quantity.minimum <= one * own <= quantity.maximum)
         if own > 0.0 and len(factors) > 2:
-            words = f"{path} seems to be {{:.3g}} times that of the set"
+            words = f"{path} seems to be {{:.3g}} times the set's value"
             change = partial(_with_number, path, own)
             yield Candidate(path, words, change, factors, is_ratio=True, unit=quantity.unit or "-")
     room = device.supply.atmospheric_pressure

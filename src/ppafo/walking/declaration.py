@@ -48,8 +48,8 @@ THRESHOLDS = next(iter(TIMINGS))
 """The way to know the time in the stride of a walk file that names none."""
 
 REACTS_SUMMARY = (
-    "name of a wearer who reacts, or the path of its file; the gait is prescribed unless given, and strengths of "
-    "muscles, gains and the start speed are for a wearer who reacts alone"
+    "name of a neuromuscular gait model, or the path of its file; the gait is prescribed unless given, and strengths "
+    "of muscles, gains and the start speed are for it alone"
 )
 
 
@@ -65,9 +65,7 @@ PERSON = Quantity(
     0.0,
     float(LARGEST_SEED),
 )
-DURATION = Quantity(
-    "duration", "s", "length of the walk; that of its course, else a minute unless given", None, 1.0, 3600.0
-)
+DURATION = Quantity("duration", "s", "length of the walk; its course's, else a minute unless given", None, 1.0, 3600.0)
 
 WALK_SENSORS = (
     *(item for item in SENSORS if item.name != "delay"),
@@ -294,7 +292,7 @@ def _walk_file(_kinds: Any) -> type[BaseModel]:
             controller_table(walking_controllers(), "Walking"),
             Field(description="what commands the valve"),
         ),
-        "timing": optional(_timing(), "how the controller knows the time in the stride; thresholds unless given"),
+        "timing": optional(_timing(), "how the controller estimates the gait phase; thresholds unless given"),
         "wearer": optional(
             table(
                 "Wearer",
@@ -312,7 +310,7 @@ def _walk_file(_kinds: Any) -> type[BaseModel]:
             "normally closed 3/2 valve in the supply line, part of the safe state; none unless given",
         ),
         BOTTLE: optional(
-            table("WalkBottle", _bottle()), "bottle that the device hangs on; a supply without end unless given"
+            table("WalkBottle", _bottle()), "bottle that supplies the device; a supply without end unless given"
         ),
     }
     return file_model("WalkFile", own)

@@ -69,7 +69,7 @@ class WalkMotion:
         """The motion in a few words."""
         if self.reacts is not None:
             way = self.reacts.course
-            return f"a walk of a wearer who reacts, {self.reacts.name}" + (
+            return f"a walk of a neuromuscular gait model, {self.reacts.name}" + (
                 "" if way is None else f", course {way.name}"
             )
         return f"a walk, gait {self.gait.name}" + ("" if self.course is None else f", course {self.course.name}")
@@ -86,8 +86,8 @@ def check_led(scenario: Scenario, doing: str) -> None:
     """Raise ScenarioError for a wearer who reacts, where ``doing`` needs a gait that is prescribed."""
     if walk_of(scenario).reacts is not None:
         raise ScenarioError(
-            f"{scenario.name}: {doing} needs a prescribed gait, and its wearer reacts; leave wearer.reacts out "
-            "(simulate, walk, find, sweep, sensitivity and tune take a wearer who reacts)"
+            f"{scenario.name}: {doing} needs a prescribed gait, and this walk has a neuromuscular model; leave "
+            "wearer.reacts out (simulate, walk, find, sweep, sensitivity and tune take a neuromuscular gait model)"
         )
 
 
@@ -96,7 +96,7 @@ def person_remarks(scenario: Scenario) -> list[str]:
     motion = walk_of(scenario)
     if motion.reacts is not None:
         mass = f"{motion.reacts.mass:.4g} kg"
-        return [f"wearer: {motion.reacts.name}, who reacts, {mass}; the device is on the left leg"]
+        return [f"wearer: {motion.reacts.name}, neuromuscular, {mass}; the device is on the left leg"]
     remarks = [f"remark: {text}" for text in gait_file_remarks(motion.gait)]
     return [who_walks(motion.wearer, motion.gait, motion.wearer_origin), *remarks]
 

@@ -126,7 +126,7 @@ def _components_of_walk(
 def _plan_reacting(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
     """As ``plan_walks``, of a wearer who reacts: the body begins at its start speed, with vented chambers."""
     device, wearer = fed_device(scenario), walk_of(scenario).reacts
-    assert wearer is not None, "a wearer who reacts comes here"
+    assert wearer is not None, "a neuromuscular gait model comes here"
     bare, sensors, start = plant_parameters(device), gait_sensors_of(scenario), start_of_body(wearer)
     walk = ReactingWalk(
         share=device_share(bare, STANDARD_GRAVITY),
@@ -155,7 +155,7 @@ def _too_long(scenario: Scenario) -> Problem:
     step = scenario.time_step
     return np.asarray(
         step > LONGEST_STEP
-    ), lambda run: f"run.step = {at(step, run):g} s: a wearer who reacts needs {LONGEST_STEP:g} s or less"
+    ), lambda run: f"run.step = {at(step, run):g} s: a neuromuscular gait model needs {LONGEST_STEP:g} s or less"
 
 
 def batch_of_many(scenario: Scenario, build: Build, gaits: VariedGaits, generator: np.random.Generator) -> Batch:

@@ -39,7 +39,7 @@ def recording_of_reacting(
     of_bottle: Mapping[str, tuple[Floats, str]],
 ) -> Recording:
     """The recording of a wearer who reacts [SI] from rows (samples,) by path, with the channels of a bottle."""
-    assert run.reacting is not None, "of a wearer who reacts"
+    assert run.reacting is not None, "of a neuromuscular gait model"
     weight = run.reacting.body.weight
     left, right = (angles_of(record, side) for side in ("left", "right"))
     channels: Channels = {

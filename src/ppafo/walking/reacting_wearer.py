@@ -38,16 +38,14 @@ REACTS = "wearer.reacts"
 """Where the file of a walk names a wearer who reacts."""
 
 STRENGTHS = tuple(
-    Quantity(
-        f"{name}_strength", "1", f"strength of the {name} of the left leg, over that of the wearer", 1.0, 0.01, 2.0
-    )
+    Quantity(f"{name}_strength", "1", f"strength of the {name} of the left leg, over the wearer's", 1.0, 0.01, 2.0)
     for name in Fibres._fields
 )
 GAINS = tuple(
     Quantity(
         f"{side}_{name}",
         "rad" if name in IN_RADIANS else "1",
-        f"reflex gain {name} of the {side} leg; that of the wearer unless given",
+        f"reflex gain {name} of the {side} leg; the wearer's unless given",
         0.0,
         0.0,
         LARGEST_GAINS[name],
@@ -64,10 +62,10 @@ RATIOS = tuple(
 """Gains of both legs in proportion, for studies that scatter them whoever walks."""
 
 LENGTH_RATIO = Quantity(
-    "length_ratio", "1", "lengths of the body, its muscles and levers, over those of the wearer", 1.0, 0.7, 1.3
+    "length_ratio", "1", "lengths of the body, its muscles and levers, over the wearer's", 1.0, 0.7, 1.3
 )
 MASS_RATIO = Quantity(
-    "mass_ratio", "1", "masses of the body and forces of its muscles, over those of the wearer", 1.0, 0.3, 2.0
+    "mass_ratio", "1", "masses of the body and forces of its muscles, over the wearer's", 1.0, 0.3, 2.0
 )
 START_SPEED = Quantity("start_speed", "m/s", "speed with which the walk begins", 1.3, SLOWEST_START, FASTEST_START)
 REACTIONS = (*STRENGTHS, *GAINS, *RATIOS, LENGTH_RATIO, MASS_RATIO, START_SPEED, *OF_THE_WAY)
@@ -205,7 +203,9 @@ def read_reacting(
     if name is None:
         for item in REACTIONS:
             if item.name in given:
-                raise reading.refusal(f"wearer.{item.name}", f'needs a wearer who reacts: give {REACTS} = "NAME"')
+                raise reading.refusal(
+                    f"wearer.{item.name}", f'needs a neuromuscular gait model: give {REACTS} = "NAME"'
+                )
         return None
     if "gait" in instead:
         raise ScenarioError(f"{reading.file}: gait '{instead['gait']}' does not go with {REACTS} yet: leave it out")
@@ -218,7 +218,7 @@ def read_reacting(
         if name_given not in known:
             words = f"{', '.join(item.name for item in (*STRENGTHS, START_SPEED))} and gains such as {GAINS[0].name}"
             raise reading.refusal(
-                f"wearer.{name_given}", f"is of a leg that a gait leads; a wearer who reacts has {words}"
+                f"wearer.{name_given}", f"is of a leg that a gait leads; a neuromuscular gait model has {words}"
             )
     with refused_as(DataError, reading.quote(REACTS), DataError):
         file = find_wearer(folder / name if Path(name).suffix == ".toml" else name)

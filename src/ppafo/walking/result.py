@@ -254,8 +254,8 @@ def lacks(scenario: Scenario, kind: MetricKind) -> str:
             "a walk has no one reference that its torque follows: push_off_error is the error in push-off",
         ),
         (bool(kind.traced), "it needs the course of the whole run, which is not kept of a walk"),
-        (LED_SHANK in needs, "it needs a leg without ground, whose shank is that of a gait"),
-        (REACTS in needs and not reacts, "it needs a wearer who reacts (wearer.reacts)"),
+        (LED_SHANK in needs, "it needs a leg without ground, whose shank follows a gait"),
+        (REACTS in needs and not reacts, "it needs a neuromuscular gait model (wearer.reacts)"),
         (
             LED in needs and reacts,
             "it is measured from the gait that leads a leg, and this wearer reacts: lowest_toes is over the ground",

@@ -186,7 +186,7 @@ def test_a_walk_on_a_bottle_ends_with_the_fall_and_strides_are_those_of_the_wear
     assert isinstance(life, Endurance)
     assert life.draw.stride_time == pytest.approx(walk(load_walk(WALK), 0.1).metrics["stride_time"].value)
     (tmp_path / "walk.json").write_text(json.dumps({"format": answer_of(pair).data["format"]}))
-    with pytest.raises(DataError, match="is the walk of a wearer who reacts: walk on the bottle"):
+    with pytest.raises(DataError, match="is the walk of a neuromuscular gait model: walk on the bottle"):
         endurance(tmp_path)
 
 
@@ -272,13 +272,13 @@ def test_a_ratio_changes_a_gain_of_both_legs() -> None:
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"wearer": {"tibialis_strength": 0.3}}, 'needs a wearer who reacts: give wearer.reacts = "NAME"'),
-        ({"course": "stairs"}, "segment 1 (stand): a wearer who reacts walks on"),
+        ({"wearer": {"tibialis_strength": 0.3}}, 'needs a neuromuscular gait model: give wearer.reacts = "NAME"'),
+        ({"course": "stairs"}, "segment 1 (stand): a neuromuscular gait model walks on"),
         (
             {"course": "ramp-and-kerb", "wearer": {"reacts": "geyer-herr", "slope": 0.01}},
             "wearer.slope = 0.01: does not go with course 'ramp-and-kerb'",
         ),
-        ({"course": "ramp-and-kerb", "wearer": {}}, "segment 1 (walk): distance is for a wearer who reacts"),
+        ({"course": "ramp-and-kerb", "wearer": {}}, "segment 1 (walk): distance is for a neuromuscular gait model"),
         ({"gait": "normal"}, "does not go with wearer.reacts yet"),
         ({"wearer": {"reacts": "geyer-herr", "body_mass": "70 kg"}}, "is of a leg that a gait leads"),
         ({"wearer": {"reacts": "geyer-her"}}, "did you mean 'geyer-herr'"),
@@ -312,8 +312,8 @@ def test_what_needs_a_prescribed_gait_refuses_in_one_line() -> None:
     with pytest.raises(ScenarioError, match=line):
         walk_population(scenario, 0.1, 8)
     assert "lowest_toes is over the ground" in lacking(scenario, METRICS["toe_clearance"])
-    assert "it needs a wearer who reacts (wearer.reacts)" in lacking(load_walk("solenoid"), METRICS["fall_time"])
-    with pytest.raises(DataError, match="a wearer who reacts walks on two legs"):
+    assert "it needs a neuromuscular gait model (wearer.reacts)" in lacking(load_walk("solenoid"), METRICS["fall_time"])
+    with pytest.raises(DataError, match="a neuromuscular gait model walks on two legs"):
         opensim_recording(walk(load_walk(WALK, ["run.duration=6 s"])).recording)
 
 

@@ -146,8 +146,8 @@ def read_walk_gas(folder: Path) -> WalkGas:
     document = read_json(path)
     if isinstance(document, dict) and document.get("format") == REACTING_WALK_FORMAT:
         raise DataError(
-            f"{path}: is the walk of a wearer who reacts: walk on the bottle, with 'ppafo walk --bottle', or give gas "
-            "and time of a stride, with --gas-per-stride and --stride-time"
+            f"{path}: is the walk of a neuromuscular gait model: walk on the bottle, with 'ppafo walk --bottle', or "
+            "give gas and time of a stride, with --gas-per-stride and --stride-time"
         )
     if not isinstance(document, dict) or document.get("format") != WALK_FORMAT:
         raise DataError(f"{path}: is not the result of a ppafo walk (its 'format' is not '{WALK_FORMAT}')")

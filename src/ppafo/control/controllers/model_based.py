@@ -50,7 +50,7 @@ NOMINAL_QUANTITIES = (
     Quantity("angle_max", "rad", "believed upper stop", math.radians(130.0), -10.0, 10.0),
     Quantity("dead_volume_1", "m^3", "believed dead volume of chamber 1", 2.65e-5, 1.0e-9, 1.0),
     Quantity("dead_volume_2", "m^3", "believed dead volume of chamber 2", 2.65e-5, 1.0e-9, 1.0),
-    Quantity("gas_product", "J/kg", "believed R T / M, that of CO2 at 298 K", 5.6308454545e4, 1.0e3, 1.0e7),
+    Quantity("gas_product", "J/kg", "believed R T / M, of CO2 at 298 K", 5.6308454545e4, 1.0e3, 1.0e7),
     Quantity("valve_conductance", "kg/(s Pa)", "believed Cd A C1 of the valve", 1.0040962467e-8, 1.0e-15, 1.0),
     Quantity("leak_conductance", "kg/(s Pa)", "believed Cd A C1 of the leak", 9.532559304e-11, 0.0, 1.0),
     Quantity("critical_ratio", "", "believed critical pressure ratio, ISO 6358", 0.545727733814, 0.01, 0.95),

@@ -50,10 +50,10 @@ def library_of(item: Scenario) -> Library:
 
 
 def scenario_library(scenario: Scenario) -> Library:
-    """A library whose settings are all numbers of a scenario. ProgramError for a controller on whole numbers."""
+    """A library whose settings are all numbers of a scenario. ProgramError for a fixed-point controller."""
     if CONTROLLERS[scenario.control.kind].plan is not None:
         raise ProgramError(
-            f"{scenario.name}: a controller on whole numbers has no library yet; 'ppafo export firmware' writes it"
+            f"{scenario.name}: a fixed-point controller has no library yet; 'ppafo export firmware' writes it"
         )
     program = exported(batch_of(plan_run(scenario)).program)
     settings, links = settings_of(scenario), links_of(scenario)

@@ -45,7 +45,7 @@ OUTPUTS = {
     "vented_mass": ("kg", "gas to the atmosphere so far"),
     "leaked_mass": ("kg", "gas leaked from chamber to chamber so far"),
     "strides": ("-", "heel strikes so far"),
-    "phase": ("-", "time in the stride, 0 at its heel strike, in turns"),
+    "phase": ("-", "gait phase, 0 at heel strike, in turns"),
     "contact": ("-", "where the foot stands: 0 swing, 1 heel, 2 flat, 3 toes"),
     "shank_angle": ("rad", "shank from the vertical, above 0 with the ankle before the knee"),
     "healthy_angle": ("rad", "angle of the healthy ankle of this gait"),
@@ -56,7 +56,7 @@ OUTPUTS = {
     "net_push_off_work": ("J", "net work of T_ex while the foot rolls over the toes, so far"),
     "controller_phase": ("-", "phase that the controller sees: 0 swing, 1 landing, 2 mid-stance, 3 push-off"),
     "safe_state": ("-", "0 the controller helps, 1 lifts only, 2 pauses, 3 has stopped"),
-    "gait_fraction": ("-", "time in the stride that the controller goes by, in turns"),
+    "gait_fraction": ("-", "gait phase that the controller goes by, in turns"),
 }
 """Unit and meaning of what can be read at each sample."""
 UNITS = {"1": "-", "Pa_a": "Pa, absolute", "Pa_d": "Pa, a difference"}
@@ -351,7 +351,7 @@ def _limits(quantity: Quantity) -> tuple[float, float]:
 
 
 _METRICS_OF_SCENARIO = """\
-They are those of a study (`ppafo sweep`), to the bit. In `ppafo simulate` the same are computed from the recording,
+A study (`ppafo sweep`) has the same, to the bit. In `ppafo simulate` the same are computed from the recording,
 whose sums are rounded in another order: they agree to about 15 digits. Not here, since they need the whole course of a
 channel: {left_out}."""
 _METRICS_OF_WALK = """\

@@ -275,7 +275,7 @@ def knee_signals(
             if np.ptp(values) == 0.0:
                 raise DataError(
                     f"{found.table.file}: the hip does not move ({', '.join(terms)} is constant), and without its "
-                    "motion that of the knee is unknown; omit the stature, or knee in the gait map"
+                    "motion the knee's is unknown; omit the stature, or knee in the gait map"
                 )
         height = float(np.mean(up[np.isfinite(up)]))
         if -height > _HIP_HEIGHT:

@@ -91,7 +91,7 @@ def check_experiment(experiment: Experiment) -> None:
             f"{said}: the angle of the vane is prescribed, so it carries no information; add a pressure"
         )
     if experiment.scenario.control.kind == PYTHON_CONTROLLER and COMMAND not in experiment.inputs:
-        raise IdentificationError(f"{said}: a Python controller cannot run in lanes; use one of the catalogue")
+        raise IdentificationError(f"{said}: a Python controller cannot run in a batch; use one of the catalogue")
     _check_inputs(experiment, said)
 
 

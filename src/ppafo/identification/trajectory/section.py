@@ -97,7 +97,7 @@ class ExperimentSection(StrictTable):
     scenario: Annotated[
         Text | None,
         Field(
-            description="name of a scenario, or a file relative to this one; its device is that of the problem. "
+            description="name of a scenario, or a file relative to this one; its device is the problem's. "
             "Without one the run follows what the recording has of command, supply and external torque"
         ),
     ] = None
@@ -108,7 +108,7 @@ class ExperimentSection(StrictTable):
     step: Annotated[Text | None, Field(description="longest step of time in the run, such as '0.1 ms'")] = None
     channels: Annotated[
         Texts | None,
-        Field(description="channels to compare; default: angle and both pressures, without what is held or followed"),
+        Field(description="channels to compare; default: angle and both pressures, without what is locked or followed"),
     ] = None
     noise: Annotated[
         _Noise, Field(description="least standard deviation by channel, '0.1 deg', '500 Pa_d'; default: none")
@@ -117,7 +117,7 @@ class ExperimentSection(StrictTable):
         Texts | None, Field(description=f"what the run follows in the recording: {', '.join(ALL_INPUTS)}")
     ] = None
     held: Annotated[
-        Text | None, Field(description="angle at which the vane is held, such as '75 deg'; without a scenario")
+        Text | None, Field(description="angle at which the vane is locked, such as '75 deg'; without a scenario")
     ] = None
     volume: Annotated[
         Text | None, Field(description="no vane: a fixed volume, such as '60 cm^3', is chamber 1; without a scenario")
@@ -165,7 +165,7 @@ _REMOVED = {
     "other_starts": "other starts are tried where the first does not explain the recordings; omit it",
     "seed": "nothing is drawn; omit it",
     "directions": "recordings that want other numbers are found by themselves; omit it",
-    "profiles": "intervals are those of the table; omit it",
+    "profiles": "intervals are the table's; omit it",
     "scale": "the search scales numbers by itself; omit it",
 }
 _CAN = "proposals within limits of the bench are not made; write [[trajectory.candidates]], which are ranked"
@@ -396,7 +396,7 @@ def compared_channels(item: ExperimentSection) -> tuple[str, ...]:
 def _fix_vane(item: ExperimentSection, device: Device, said: str) -> tuple[Device, dict[str, float]]:
     """Return the device and what of its state is known where the vane is held, or where there is none."""
     if (item.held is not None or item.volume is not None) and ANGLE in (item.inputs or ()):
-        raise IdentificationError(f"{said}: the vane is held or absent, but inputs has '{ANGLE}': omit one of them")
+        raise IdentificationError(f"{said}: the vane is locked or absent, but inputs has '{ANGLE}': omit one of them")
     if item.held is not None and item.volume is not None:
         raise IdentificationError(f"{said}: held and volume: with a fixed volume there is no vane; omit one of them")
     if item.held is not None:

@@ -31,9 +31,9 @@ def _closure(evidence: Evidence, ratio: float) -> Finding:
     return Finding(
         id=_ID,
         severity="note",
-        title="torque constant and volume per angle agree, with the stated efficiency",
+        title="torque constant and displacement agree, with the stated efficiency",
         values=evidence.values_of(_TORQUE_CONSTANT, _VOLUME_PER_ANGLE, _EFFICIENCY),
-        sides=(Side("torque constant over volume per angle", ratio, ""),),
+        sides=(Side("torque constant over displacement", ratio, ""),),
         paragraph=(
             f"Energy closes: the shaft gets {100.0 * ratio:.3g} % of the work p dV of the gas, and the other "
             f"{100.0 * (1.0 - ratio):.3g} % are the stated loss. The model takes the same ratio where the shaft drives "
@@ -47,16 +47,16 @@ def _contradiction(evidence: Evidence, torque_constant: float, volume_per_angle:
     return Finding(
         id=_ID,
         severity="warning",
-        title="torque constant and volume per angle differ, against virtual work",
+        title="torque constant and displacement differ, against virtual work",
         values=evidence.values_of(_TORQUE_CONSTANT, _VOLUME_PER_ANGLE, _EFFICIENCY, *gas_paths),
         sides=(
             Side("torque constant", torque_constant, "m^3"),
-            Side("volume per angle", volume_per_angle, "m^3/rad"),
+            Side("displacement per radian", volume_per_angle, "m^3/rad"),
             *gas_sides,
         ),
         paragraph=(
             f"A frictionless vane that turns by dtheta does the work T dtheta = (P1 - P2) dV, so that the torque "
-            f"constant {1e6 * torque_constant:.4g} cm^3 and the volume per angle {1e6 * volume_per_angle:.4g} cm^3/rad "
+            f"constant {1e6 * torque_constant:.4g} cm^3 and the displacement {1e6 * volume_per_angle:.4g} cm^3/rad "
             f"should be one number; the volume is {volume_per_angle / torque_constant:.2g} times the torque constant."
             f"{gas_text} Reconciled by measuring the volume of gas that a full turn displaces; until then energy and "
             f"efficiency figures are uncertain by the same factor."
@@ -78,14 +78,14 @@ def _gas_use(
     sides = (
         Side("volume that the gas use needs", needed, "m^3"),
         Side("volume swept by the torque constant", by_torque, "m^3"),
-        Side("volume swept by the volume per angle", by_volume, "m^3"),
+        Side("volume swept by the displacement", by_volume, "m^3"),
     )
     text = (
         f" Filling 1 cm^3 from atmosphere to supply takes {density:.3g} mg of gas, so the "
         f"{evidence.in_set_unit(path, used)} of one filling occupy {1e6 * needed:.3g} cm^3; over the whole "
         "range the vane "
-        f"sweeps {1e6 * by_torque:.3g} cm^3 by the torque constant and {1e6 * by_volume:.3g} cm^3 by the volume per "
-        "angle; lines and clearance hold a part of that gas."
+        f"sweeps {1e6 * by_torque:.3g} cm^3 by the torque constant and {1e6 * by_volume:.3g} cm^3 by the "
+        "displacement; lines and clearance hold a part of that gas."
     )
     return (path, _SUPPLY, angles[0], angles[2]), sides, text
 
@@ -157,7 +157,7 @@ def check_rotation(evidence: Evidence) -> Iterator[Finding]:
         sides=(Side("range of angles", turn, "rad"), Side("rotation by the designation", rated, "rad")),
         paragraph=(
             f"The range of angles is {math.degrees(turn):.3g} deg, the actuator turns by {math.degrees(rated):.3g} "
-            "deg. Either another actuator or a gear was used, or the angle is not that of the vane; volumes and torque "
+            "deg. Either another actuator or a gear was used, or the angle is not the vane's; volumes and torque "
             "constant then belong to another shaft. Reconciled by the designation of what was on the bench."
         ),
     )

@@ -197,7 +197,7 @@ def _differs(evidence: Evidence, path: str, value: float, expected: float, sourc
     return Finding(
         id=path.replace(".", "-").replace("_", "-"),
         severity="error",
-        title=f"{path} is not that of the named gas",
+        title=f"{path} does not fit the named gas",
         values=evidence.values_of("gas.species", path),
         sides=(Side("in the set", value, unit), Side("of the gas", expected, unit)),
         paragraph=(

@@ -269,7 +269,7 @@ def lacking(scenario: Scenario, kind: MetricKind) -> str:
         return "it needs a walk"
     motion = scenario.motion
     if LED_SHANK in kind.needs and not (isinstance(motion, FreeMotion) and motion.leg is not None and motion.leg.gait):
-        return "it needs a leg whose shank is that of a gait"
+        return "it needs a leg whose shank follows a gait"
     is_open = scenario.control.kind == OPEN_LOOP
     return "its controller follows no reference" if is_open and REFERENCE in kind.channels else ""
 
