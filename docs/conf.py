@@ -8,8 +8,12 @@ release = version = __version__
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "sphinx.ext.viewcode", "scripts.docstrings"]
 root_doc = "index"
 
-# Pages: Markdown as a forge shows it; every heading can be linked to. Blocks without a language are plain text.
+# Pages: Markdown as a forge shows it, with its mathematics; every heading can be linked to. Blocks without a
+# language are plain text.
 myst_heading_anchors = 4
+myst_enable_extensions = ["dollarmath"]
+myst_fence_as_directive = ["math"]
+html_math_renderer = "mathml"
 highlight_language = "text"
 
 # The tutorial is run each time, and what it prints to the error stream (progress) is left out.
@@ -33,6 +37,8 @@ python_maximum_signature_line_length = 100
 # Every reference must lead somewhere, but for types in signatures: those of other packages and inner ones have no page.
 nitpicky = True
 nitpick_ignore_regex = [("py:(class|obj|data|exc|attr)", r".*")]
+# A type that is imported for annotations alone is looked up by its short name, which two classes may have.
+suppress_warnings = ["ref.python"]
 
 # One folder that is opened without a server and asks no other host for anything. Search results have no
 # extracts, because a page from a file may not read another one.

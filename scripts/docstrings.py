@@ -1,4 +1,4 @@
-"""What Sphinx is taught about this package: its docstrings are plain text, and dotted names in the pages are links.
+"""What Sphinx is taught about this package: docstrings are plain text, dotted names are links, mathematics is MathML.
 
 An extension of Sphinx, named in ``docs/conf.py``.
 """
@@ -23,14 +23,23 @@ _CODE = re.compile(r"``(.+?)``|`([^`\n]+?)`", re.DOTALL)
 _MARKS = re.compile(r"([\\*|])|(?<=\w)(_)(?!\w)")
 _ALIAS = re.compile(r"Alias for field number \d+")
 _DOTTED = re.compile(r"(ppafo(?:\.\w+)+)(?:\(.*\))?")
+_ARGUMENT = re.compile(r"(\w+): (.+)")
+_ACCENT = re.compile(r'<munderover>\s*(<mi>\w</mi>)(.*?)(<mo stretchy="false">\S</mo>)\s*</munderover>', re.DOTALL)
+"""Docutils puts the index of an accented symbol below it."""
 
 
 def restructured(lines: Iterable[str]) -> list[str]:
-    """Return a plain docstring as reStructuredText: code in backticks, indented blocks as they stand, marks as text."""
+    """Return a plain docstring as reStructuredText: code in backticks, indented blocks as they stand, marks as text.
+
+    Arguments of a command, ``name: help`` with further lines indented, are a list.
+    """
     text: list[str] = []
     for block in re.split(r"\n{2,}", "\n".join(lines).strip("\n")):
+        entries = [_ARGUMENT.fullmatch(entry) for entry in re.sub(r"\n {4}", " ", block).split("\n")]
         if block.startswith("    "):
             text += ["::", block]
+        elif all(entries):
+            text.append("\n".join(f"- ``{entry[1]}``: {_with_code(entry[2])}" for entry in entries if entry))
         elif not _ALIAS.fullmatch(block):
             text.append(_with_code(block))
     return "\n\n".join(text).split("\n")
@@ -96,9 +105,23 @@ def lead_back_to_one_page(app: Any) -> list[Any]:
     return []
 
 
+def mathematics(translator: Any, node: Any) -> None:
+    """Write an equation as MathML, which browsers draw themselves: MathJax would be fetched from another host."""
+    from docutils import nodes
+    from docutils.utils.math.latex2mathml import tex2mathml
+
+    is_block = isinstance(node, nodes.math_block)
+    drawn = tex2mathml(node.astext().strip(), as_block=is_block)
+    drawn = _ACCENT.sub(r'<msub><mover accent="true">\1\3</mover>\2</msub>', drawn)
+    translator.body.append(f'<div style="overflow: auto hidden; padding: 0.4em 0">{drawn}</div>' if is_block else drawn)
+    raise nodes.SkipNode
+
+
 def setup(app: Any) -> dict[str, bool]:
     """Add these to Sphinx, and a language that forges know and Pygments does not."""
     from pygments.lexers.special import TextLexer
+
+    app.add_html_math_renderer("mathml", (mathematics, None), (mathematics, None))
 
     app.connect("autodoc-process-docstring", _plain)
     app.connect("doctree-resolved", link_names)

@@ -18,7 +18,7 @@ import shutil
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -291,36 +291,16 @@ def _first_curve(chromium: Any, file: Path) -> float:
     return float(page.evaluate("first_curve"))
 
 
-FIRST_SCREEN = "workbench-settings"
-PICTURES: Sequence[tuple[str, dict[str, Any], str]] = (
-    ("workbench", {"viewport": {"width": 1400, "height": 1000}, "color_scheme": "light"}, ""),
-    # Of the README, which a forge shows about 830 pixels wide.
-    (
-        FIRST_SCREEN,
-        {"viewport": {"width": 1120, "height": 1000}, "color_scheme": "light", "device_scale_factor": 1.5},
-        "",
-    ),
-)
-
-
 def take_pictures(chromium: Any, file: Path, folder: Path) -> Iterator[Path]:
-    """Write the pictures of the documentation into a folder, small; gives their paths."""
+    """Write the picture of the documentation into a folder, small; gives its path."""
     from PIL import Image
 
-    for name, context, address in PICTURES:
-        page = opened(chromium, file, address, **context)
-        page.wait_for_timeout(600)
-        path = folder / f"{name}.png"
-        page.screenshot(path=str(path), clip=_settings_and_torque(page) if name == FIRST_SCREEN else None)
-        Image.open(path).convert("RGB").quantize(128).save(path, optimize=True)
-        yield path
-
-
-def _settings_and_torque(page: Any) -> dict[str, float]:
-    """The part of a page from the head of the settings to the end of the first curve."""
-    top, width = (page.locator(".columns-of-page").bounding_box()["y"] - 10, page.viewport_size["width"])
-    curve = page.locator(".panel").first.bounding_box()
-    return {"x": 0, "y": top, "width": width, "height": curve["y"] + curve["height"] - top}
+    page = opened(chromium, file, "", viewport={"width": 1400, "height": 1000}, color_scheme="light")
+    page.wait_for_timeout(600)
+    path = folder / "workbench.png"
+    page.screenshot(path=str(path))
+    Image.open(path).convert("RGB").quantize(128).save(path, optimize=True)
+    yield path
 
 
 def main() -> int:

@@ -223,7 +223,7 @@ SECTIONS: Mapping[str, Mapping[str, Check]] = {
             "tests/unit/walking/test_on_bottle.py",
         ),
         "wearer": tested(
-            "The wearer who reacts: its parts, the first step, ten strides",
+            "The neuromuscular gait model: its parts, the first step, ten strides",
             "a simulator of its own in which MuJoCo moves the segments",
             "tests/judge/test_wearer_against_judge.py",
         ),

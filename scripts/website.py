@@ -27,8 +27,8 @@ from scripts.docstrings import KERNEL, restructured
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 FRONT = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md")
-LONG = 10
-"""A section of the index with more pages than this has a page of its own in the table of contents."""
+DECISIONS = "docs/decisions/README.md"
+"""The list of the decisions, which are below it in the table of contents."""
 WORKBENCH = "workbench.html"
 """The page that simulates, as `ppafo workbench` writes it, beside the pages of the site."""
 ROOMS = ("control", "control.controllers", "control.profiles", "control.walking", "metrics", "model", "model.valves")
@@ -36,15 +36,16 @@ ROOMS = ("control", "control.controllers", "control.profiles", "control.walking"
 LANGUAGES = {".py": "python", ".toml": "toml", ".cff": "yaml"}
 
 _LINK = re.compile(r"(?<=\]\()([^)\s#]+)")
+_NAMED = re.compile(r"\[(`ppafo\.[\w.]+`)\]\([^)]*\)")
+"""A function with a link to its file, as a forge needs it; the site describes the function."""
 _MEMBERS = "   :members:\n   :undoc-members:\n"
 _CLASS = _MEMBERS + "   :inherited-members: object, tuple, BaseException\n"
 
 
 class Section(NamedTuple):
-    """A part of the index: its title, its list as it is written, and the pages, as paths in the repository."""
+    """A part of the index: its title, and the pages, as paths in the repository."""
 
     title: str
-    text: str
     pages: tuple[str, ...]
 
 
@@ -59,8 +60,14 @@ def contents() -> list[Section]:
     found = []
     for title, body in zip(parts[1::2], parts[2::2], strict=True):
         places = (os.path.normpath(f"docs/{target}") for target in _LINK.findall(body) if target.endswith(".md"))
-        found.append(Section(title, body.strip(), tuple(dict.fromkeys(places))))
+        found.append(Section(title, tuple(dict.fromkeys(places))))
     return found
+
+
+def decisions() -> list[str]:
+    """The decisions in the order of their list, as paths in the repository."""
+    text = (ROOT / DECISIONS).read_text(encoding="utf-8")
+    return [f"docs/decisions/{target}" for target in _LINK.findall(text)]
 
 
 def stage(folder: Path) -> None:
@@ -70,8 +77,10 @@ def stage(folder: Path) -> None:
         text = (ROOT / page).read_text(encoding="utf-8")
         _write(folder / ("index.md" if page == "README.md" else page), _linked(text, page, files))
     with (folder / "index.md").open("a", encoding="utf-8") as front:
-        front.write(_hidden("", ["docs/README"]) + "".join(_toctree(folder, section) for section in contents()))
-        front.write("\n```{toctree}\n:hidden:\n:caption: Reference\n\napi/index\napi/kinds\napi/rooms\n```\n")
+        front.write(_hidden("", ["docs/README.md"]) + "".join(_hidden(*section) for section in contents()))
+        front.write(_hidden("Reference", ["api/index", "api/kinds", "api/rooms"]))
+    with (folder / DECISIONS).open("a", encoding="utf-8") as front:
+        front.write(_hidden("", [Path(page).name for page in decisions()]))
     for file in sorted(files):
         text = (ROOT / file).read_text(encoding="utf-8")
         language = LANGUAGES.get(Path(file).suffix, "text")
@@ -94,27 +103,17 @@ def _linked(text: str, page: str, files: set[str]) -> str:
         files.add(place)
         return os.path.relpath(f"files/{place}.md", here)
 
-    text = _LINK.sub(led, text)
+    text = _LINK.sub(led, _NAMED.sub(r"\1", text))
     if page == "docs/how-to/export.md":
         text = text.replace(f"Open `out/{WORKBENCH}`", f'Open <a href="../../{WORKBENCH}">{WORKBENCH}</a>')
     return text
 
 
-def _toctree(folder: Path, section: Section) -> str:
-    """A section in the table of contents; a long one has a page that lists it."""
-    listed = [page.removesuffix(".md") for page in section.pages]
-    if len(listed) <= LONG:
-        return _hidden(section.title, listed)
-    name = "docs/" + section.title.lower().replace(" ", "-")
-    inner = [os.path.relpath(page, "docs") for page in listed]
-    text = _linked(section.text, "docs/README.md", set())
-    _write(folder / f"{name}.md", f"# {section.title}\n\n{text}\n{_hidden('', inner)}")
-    return _hidden(section.title, [name])
-
-
 def _hidden(caption: str, pages: Sequence[str]) -> str:
     head = f":caption: {caption}\n" if caption else ""
-    return "\n```{toctree}\n:hidden:\n" + head + "\n" + "\n".join(pages) + "\n```\n"
+    return (
+        "\n```{toctree}\n:hidden:\n" + head + "\n" + "\n".join(page.removesuffix(".md") for page in pages) + "\n```\n"
+    )
 
 
 def interface() -> dict[str, str]:

@@ -58,7 +58,7 @@ def test_the_simulated_chip_decides_as_the_page_says(
     text = capsys.readouterr().out.strip()
     said = text.splitlines()
     if "--samples" in command:
-        assert said[-1].endswith("1000, 0 other than those of the integer controller in Python")
+        assert said[-1].endswith("1000, 0 different from the fixed-point controller in Python")
     elif "--table" in command:
         check_table(said)
     else:

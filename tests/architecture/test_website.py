@@ -4,14 +4,14 @@ from pathlib import Path
 
 import ppafo
 from scripts.docstrings import restructured
-from scripts.website import FRONT, WORKBENCH, contents, documents, faults, interface, stage
+from scripts.website import DOCS, FRONT, WORKBENCH, contents, decisions, documents, faults, interface, stage
 
 INDEX = {"README.md", "docs/README.md"}
 
 
 def test_every_page_of_the_documents_is_in_the_table_of_contents_once() -> None:
     listed = [page for section in contents() for page in section.pages]
-    assert sorted(listed) == sorted(set(documents()) - INDEX)
+    assert sorted([*listed, *decisions()]) == sorted(set(documents()) - INDEX)
     assert set(FRONT) <= set(documents())
 
 
@@ -38,6 +38,17 @@ def test_a_docstring_is_text_with_code_in_it() -> None:
         "",
         "    a = b * c",
     ]
+
+
+def test_the_arguments_of_a_command_are_a_list_with_its_further_lines() -> None:
+    lines = ["draws: how many; default", "    4096", "seed: of the draws"]
+    assert restructured(lines) == ["- ``draws``: how many; default 4096", "- ``seed``: of the draws"]
+
+
+def test_a_function_leads_to_its_file_on_a_forge_and_to_its_description_on_the_site(tmp_path: Path) -> None:
+    assert "](../src/ppafo/model/plant.py)" in (DOCS / "equations.md").read_text(encoding="utf-8")
+    stage(tmp_path)
+    assert "src/ppafo/model/plant.py" not in (tmp_path / "docs" / "equations.md").read_text(encoding="utf-8")
 
 
 def test_links_that_lead_nowhere_and_other_hosts_are_found(tmp_path: Path) -> None:

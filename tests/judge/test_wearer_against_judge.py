@@ -1,4 +1,4 @@
-"""The wearer who reacts against an independent simulator, in which MuJoCo moves the segments.
+"""The neuromuscular gait model against an independent simulator, in which MuJoCo moves the segments.
 
 First each part at random states: accelerations, torques of the muscles, velocities of fibres, stimulation, ground; then
 energy and momentum of the body in the air by MuJoCo, step by step of the package; then walks.

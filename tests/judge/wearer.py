@@ -1,4 +1,4 @@
-"""An independent simulator of the wearer who reacts: MuJoCo moves the segments, all forces on them are written here.
+"""An independent simulator of the neuromuscular gait model: MuJoCo moves the segments, the forces are written here.
 
 It reads the numbers of a wearer (``Wearer``: lengths, masses, muscles, gains) and knows no step, no matrix and no
 program of the package. Muscles, reflexes and ground follow H. Geyer and H. Herr, IEEE Trans. Neural Syst. Rehabil. Eng.

@@ -1,4 +1,4 @@
-"""A shipped wearer who reacts in the package and before the judge: the first step, and ten strides."""
+"""A shipped neuromuscular gait model in the package and before the judge: the first step, and ten strides."""
 
 from collections.abc import Sequence
 from dataclasses import replace

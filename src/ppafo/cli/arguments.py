@@ -193,7 +193,7 @@ Overrides = Annotated[
         help="override one value, for example valve.area=12.6mm^2; may be repeated",
     ),
 ]
-Seed = Annotated[int, Word("N", whole_number, help="random seed; default: that of the file")]
+Seed = Annotated[int, Word("N", whole_number, help="random seed; default: the file's")]
 Threads = Annotated[int, Word("N", counting_number, help="number of threads; default: all cores")]
 Confidence = Annotated[float, Word("FRACTION", fraction, help="confidence of all intervals; default 95%")]
 MaximumFailed = Annotated[

@@ -30,7 +30,7 @@ see it
   ppafo walk solenoid                       a minute of walking with the device
   ppafo workbench --out page.html           all of it with sliders, in a browser
 the paper
-  ppafo reproduce                           its experiments against its printed numbers
+  ppafo reproduce                           its experiments against its reported numbers
 your device
   ppafo new set mine                        a file to fill in; also for a scenario, a study, a walk
   ppafo design push-off                     from a torque profile to valve, pressure and bottle; also from a wearer

@@ -298,7 +298,7 @@ def turning_places(rate: float, bend: float, square: float) -> list[float]:
 def _quantity(name: str) -> Quantity:
     number = int(name.rpartition("_")[2])
     if name.startswith("time"):
-        return Quantity(name, "s", f"time of knot {number}, later than that of the one before", NEVER, 0.0, NEVER)
+        return Quantity(name, "s", f"time of knot {number}, later than the one before", NEVER, 0.0, NEVER)
     return Quantity(name, "", f"value of knot {number}", 0.0)
 
 

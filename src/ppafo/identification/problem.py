@@ -37,8 +37,8 @@ from ppafo.storage.foreign import ColumnMap
 _Recordings = Annotated[tuple[Text, ...], Field(strict=False, min_length=1, description="files, relative to this one")]
 _Start = Annotated[Text | None, Field(description="first time to use, such as '2 s'")]
 _End = Annotated[Text | None, Field(description="last time to use, such as '8 s'")]
-_Gas = Annotated[Text | None, Field(description="species of the gas on the bench; default: that of the set")]
-_Temperature = Annotated[Text | None, Field(description="of the gas on the bench, '17 degC'; default: that of the set")]
+_Gas = Annotated[Text | None, Field(description="species of the gas on the bench; default: the set's")]
+_Temperature = Annotated[Text | None, Field(description="of the gas on the bench, '17 degC'; default: the set's")]
 _Valve = Annotated[Text | None, Field(description="name of a valve of the set; default: the chosen one")]
 
 UNKNOWN = "unknown"
@@ -121,7 +121,7 @@ class FreeDecayProblem(StrictTable):
     confidence: Confidence = 0.95
     start: _Start = None
     end: _End = None
-    inertia: Text | None = Field(None, description="such as '8.4 g m^2', or 'unknown'; default: that of the set")
+    inertia: Text | None = Field(None, description="such as '8.4 g m^2', or 'unknown'; default: the set's")
 
     def settings(self, setting: Setting) -> FreeDecaySettings:
         """Return the settings of the procedure [SI]; the inertia is the set's where none is named, if it has one."""
@@ -287,7 +287,7 @@ class ProblemFile(StrictTable):
     name: str = Field(pattern=NAME, max_length=100, description="name of the new parameter set")
     title: str = Field("", description="title of the new parameter set")
     device: DeviceProblem = Field(description="the set to start from")
-    citation: Citation | None = Field(None, description="who measured; default: that of the set to start from")
+    citation: Citation | None = Field(None, description="who measured; default: the set's to start from")
     columns: dict[str, ColumnMap] = Field({}, description="column maps by name, for files from elsewhere")
     bench: BenchSection | None = Field(None, description="what the bench does not know exactly")
     procedure: tuple[Annotated[ProcedureProblem, Field(discriminator="kind")], ...] = Field(

@@ -169,7 +169,7 @@ METRICS = (
     MetricKind(
         "foot_angle_error",
         "rad",
-        "RMS difference of the angle of the foot from that of the measured gait",
+        "RMS difference between the angle of the foot and the measured one",
         ("foot_angle", "measured_foot_angle"),
         foot_angle_error,
         read_foot_angle_error,
@@ -179,7 +179,7 @@ METRICS = (
     MetricKind(
         "toe_clearance_error",
         "m",
-        "lowest height of the toes against those of the measured gait, below 0 where they hang lower",
+        "lowest height of the toes over the measured gait's, below 0 where lower",
         ("toe_difference",),
         toe_clearance_error,
         read_toe_clearance_error,

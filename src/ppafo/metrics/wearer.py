@@ -1,4 +1,4 @@
-"""Metrics of a wearer who reacts, without a recording: whether and when a fall ended the walk, speed, toes, muscles."""
+"""Metrics of a neuromuscular gait model, without a recording: falls and their time, speed, toes, muscles."""
 
 import math
 from collections.abc import Callable
@@ -157,4 +157,4 @@ METRICS = (
     _kind("metabolic_power_umberger", "W", "metabolic rate of all muscles, Umberger 2010", _metabolic_power_umberger),
     _kind("metabolic_power_bhargava", "W", "metabolic rate of all muscles, Bhargava 2004", _metabolic_power_bhargava),
 )
-"""Those of a wearer who reacts; gas and the others of a walk are in ``strides``."""
+"""Those of a neuromuscular gait model; gas and the others of a walk are in ``strides``."""

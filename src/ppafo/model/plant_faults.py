@@ -173,7 +173,7 @@ _CATALOGUE = [
         "vane",
         "leaking",
         "leaks more between the chambers",
-        (TIME, Quantity("factor", "1", "its leak over that of a sound one", 50.0, 0.0, 1.0e4)),
+        (TIME, Quantity("factor", "1", "its leak over a sound one's", 50.0, 0.0, 1.0e4)),
         {"time": "leak_time", "factor": "leak_factor"},
     ),
     PlantFault(

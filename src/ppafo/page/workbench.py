@@ -331,7 +331,7 @@ _LABELS = {
     "off": "Without help",
 }
 _WALK = "Walk"
-_TASKS = {"held": "Torque task", "prescribed": "Moving ankle", "free": "Free vane"}
+_TASKS = {"held": "Torque task", "prescribed": "Moving ankle", "free": "Unconstrained vane"}
 _STEP = "Step response"
 
 
@@ -474,6 +474,6 @@ def _tab(title: str, group: Sequence[Simulated]) -> dict[str, Any]:
 
 
 _SUMMARIES = {
-    "Torque task": "The foot stays flat on the ground while the actuator follows a torque that ramps up and is held.",
+    "Torque task": "The foot stays flat on the ground while the actuator follows a torque that ramps up and stays.",
     "Walk": "A leg that walks with the device; the dashed line is what a healthy ankle would do.",
 }

@@ -136,7 +136,7 @@ def ticks_of(name: str, period: float) -> int:
     ticks = round(period / TICK)
     if not 1 <= ticks <= MOST_TICKS // 2 or abs(ticks * TICK - period) > 1.0e-9 * period:
         raise ScenarioError(
-            f"{name}: controller.period = {period:.9g} s: on the chip a multiple of 0.125 ms, "
+            f"{name}: controller.period = {period:.9g} s: on the processor a multiple of 0.125 ms, "
             f"up to {MOST_TICKS // 2 * TICK:.3g} s"
         )
     return ticks
@@ -179,10 +179,10 @@ def integer_form(scenario: Scenario) -> Scenario:
         return scenario
     if f"{kind}{ON_CHIP}" not in FIXED_LAWS:
         raise ScenarioError(
-            f"{scenario.name}: the controller '{kind}' has no form on whole numbers; those that have one: "
+            f"{scenario.name}: the controller '{kind}' has no fixed-point form; controllers that have one: "
             f"{', '.join(name.removesuffix(ON_CHIP) for name in FIXED_LAWS)}"
         )
-    scenario.device.check_vane("a controller on whole numbers")
+    scenario.device.check_vane("a fixed-point controller")
     settings = {**scenario.controller.settings, **{item.name: item.default or 0.0 for item in SETTINGS}}
     return replace(scenario, controller=replace(scenario.controller, kind=f"{kind}{ON_CHIP}", settings=settings))
 
@@ -228,7 +228,7 @@ def firmware(scenario: Scenario, target: str = TARGETS[0]) -> dict[str, bytes]:
     texts["LICENSE"] = licence()
     texts["controller.c"] = law_source(
         chip.law,
-        f"The controller '{chip.law.name}' of ppafo {__version__} on whole numbers.",
+        f"The controller '{chip.law.name}' of ppafo {__version__} in fixed point.",
         (", ".join(f"int16_t {name}" for name in Readings._fields), "readings", ", ".join(Readings._fields)),
         {"bool controller_is_sound": "state.sound == 1"},
     )

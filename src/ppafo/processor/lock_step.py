@@ -1,4 +1,4 @@
-"""A controller on the chip's simulator beside the same in Python: drawn samples, or a run with the lanes as plant."""
+"""A controller on the processor's simulator beside the same in Python: drawn samples, or a run of the plant."""
 
 import random
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
@@ -119,7 +119,7 @@ class ChipRun:
 
 
 def run_on_chip(scenario: Scenario, target: str = TARGETS[0]) -> ChipRun:
-    """Run a scenario with its controller on the chip's simulator, in virtual time, and once more in the lanes.
+    """Run a scenario with its controller on the processor's simulator, in virtual time, and once more in the lanes.
 
     ScenarioError where the controller has no integer form, SimulationError where a tool is missing.
     """
@@ -138,7 +138,7 @@ def run_on_chip(scenario: Scenario, target: str = TARGETS[0]) -> ChipRun:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """Drawn samples on the chip's simulator and in Python: how many, how many decisions differ, and the cost."""
+    """Drawn samples on the processor's simulator and in Python: how many, how many decisions differ, and the cost."""
 
     samples: int
     differences: int
@@ -185,7 +185,7 @@ def compare_with(
     differ = [place for place, found in enumerate(decisions) if found[:2] != wanted[place]]
     first = ""
     if differ:
-        first = f"sample {differ[0]}: {decisions[differ[0]][:2]} on the chip, {wanted[differ[0]]} in Python"
+        first = f"sample {differ[0]}: {decisions[differ[0]][:2]} on the processor, {wanted[differ[0]]} in Python"
     return Comparison(samples, len(differ), first, cost)
 
 
@@ -219,7 +219,7 @@ def drawn_readings(top: int, samples: int, seed: int) -> Iterator[Readings]:
 def cost_of(target: Target, image: Image, stack: int, decisions: list[Decision]) -> Cost:
     """What the decisions of a chip took of it. SimulationError where there are none."""
     if not decisions:
-        raise SimulationError("no sample was taken on the chip")
+        raise SimulationError("no sample was taken on the processor")
     work = [item.work for item in decisions]
     return Cost(target, image.shipped, stack, worst=max(work), mean=sum(work) / len(work))
 
@@ -253,14 +253,14 @@ def _draw(torque: "Axes", command: "Axes", run: ChipRun) -> None:
     """Draw a run, and that in the lanes as dots on its lines."""
     colour = look_of_valve(run.scenario.device.valve.kind).colour
     chip, lanes, target = run.chip.recording, run.lanes.recording, run.cost.target.name
-    bits = "same bits as in the lanes" if run.same_bits else "NOT the bits of the lanes"
+    bits = "same bits as in the simulation" if run.same_bits else "NOT the bits of the simulation"
     torque.set_title(f"{run.scenario.name}: {run.differences} of {run.samples} decisions differ, {bits}")
     torque.plot(chip.time, chip["reference"], REFERENCE.line, color=REFERENCE.colour, linewidth=1.3, label="reference")
     for axes, name in ((torque, "torque"), (command, "command")):
         step = "steps-post" if name == "command" else "default"
         axes.plot(chip.time, chip[name], color=colour, drawstyle=step, label=f"{target} in its simulator")
         axes.plot(
-            lanes.time, lanes[name], color=BLACK, linewidth=0.9, linestyle=_LANES, drawstyle=step, label="the lanes"
+            lanes.time, lanes[name], color=BLACK, linewidth=0.9, linestyle=_LANES, drawstyle=step, label="simulation"
         )
     torque.set_ylabel("Torque (N m)")
     torque.legend(loc="lower right")

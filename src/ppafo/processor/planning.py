@@ -62,7 +62,7 @@ def on_chip(
     return replace(
         floats,
         name=plan.name,
-        summary=f"{floats.summary} On whole numbers, as a small processor computes.",
+        summary=f"{floats.summary} In fixed point, as a small processor computes.",
         quantities=(*floats.quantities, *SETTINGS),
         parameters=parameters,
         initial=initial,

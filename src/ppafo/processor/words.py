@@ -53,7 +53,7 @@ def _runs(scenarios: Sequence[Scenario], target: str) -> Tried:
     for one in found:
         metrics = {name: one.chip.metrics[name].value for name in _SHOWN if name in one.chip.metrics}
         lines = [
-            f"{one.scenario.name} with the controller on the chip's simulator, the lanes as the plant",
+            f"{one.scenario.name} with the controller on the processor's simulator, ppafo as the plant",
             "",
             *_cost_lines(one.cost, one.scenario.controller.period),
             *_compared_lines(one),
@@ -81,10 +81,10 @@ def _runs(scenarios: Sequence[Scenario], target: str) -> Tried:
 def _drawn(found: Comparison, name: str, period: float, about: dict[str, Any]) -> Tried:
     """Drawn samples on the chip and in Python."""
     lines = [
-        f"{found.samples} drawn samples of the controller of {name} on the chip's simulator",
+        f"{found.samples} drawn samples of the controller of {name} on the processor's simulator",
         "",
         *_cost_lines(found.cost, period),
-        f"decisions   {found.samples}, {found.differences} other than those of the integer controller in Python",
+        f"decisions   {found.samples}, {found.differences} different from the fixed-point controller in Python",
         *([f"the first: {found.first_difference}"] if found.differences else []),
     ]
     document = {**about, **_compared(found), **_cost_document(found.cost)}
@@ -117,8 +117,8 @@ def _compared(found: ChipRun | Comparison) -> dict[str, Any]:
 
 def _compared_lines(found: ChipRun) -> list[str]:
     return [
-        f"decisions   {found.samples}, {found.differences} other than those of the integer controller in the lanes",
-        f"recording   {'the same bits' if found.same_bits else 'NOT the same bits'} as without the chip",
+        f"decisions   {found.samples}, {found.differences} different from the fixed-point controller in the simulation",
+        f"recording   {'the same bits' if found.same_bits else 'NOT the same bits'} as without the processor",
     ]
 
 

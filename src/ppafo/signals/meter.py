@@ -40,7 +40,7 @@ class StrideSample(NamedTuple):
 
 
 class WearerSample(NamedTuple):
-    """A wearer who reacts at a sample: totals since the start, as in the state of the leg.
+    """A neuromuscular gait model at a sample: totals since the start, as in the state of the leg.
 
     ``strides``; ``way`` of the hip [m]; ``clearances`` [m]; ``muscle_work`` [J]; metabolic energy [J] by two
     models; ``fall_time`` [s], below 0 before a fall; ``time`` [s].

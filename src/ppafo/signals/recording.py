@@ -52,7 +52,7 @@ CHANNELS: dict[str, ChannelKind] = {
     "shank_angle": ChannelKind("rad", "shank from the vertical, above 0 while the ankle is in front of the knee"),
     "foot_angle": ChannelKind("rad", "foot over the horizontal, above 0 with the toes up"),
     "measured_foot_angle": ChannelKind("rad", "foot of the measured gait over the horizontal at the same instant"),
-    "toe_difference": ChannelKind("m", "toes over those of the measured gait at the same instant"),
+    "toe_difference": ChannelKind("m", "toes over the measured gait's at the same instant"),
     "healthy_angle": ChannelKind(
         "rad", "ankle angle of the gait that the wearer would walk, growing in plantarflexion"
     ),
@@ -114,7 +114,7 @@ CHANNELS: dict[str, ChannelKind] = {
     "gas_work": ChannelKind("J", "work of the gas in both chambers since the start, pressure times change of volume"),
     "bottle_mass": ChannelKind("kg", "gas in the bottle, liquid and vapour"),
     "liquid_mass": ChannelKind("kg", "liquid in the bottle"),
-    "bottle_temperature": ChannelKind("K", "temperature of the content of the bottle"),
+    "bottle_temperature": ChannelKind("K", "temperature of the fluid in the bottle"),
     "wall_temperature": ChannelKind("K", "temperature of the wall of the bottle"),
     "bottle_pressure": ChannelKind("Pa", "absolute pressure in the bottle"),
     "line_pressure_1": ChannelKind("Pa", "absolute pressure in the line behind the bottle's regulator"),

@@ -193,12 +193,12 @@ def find_kinds(document: Mapping[str, Any], file: str) -> None:
 def no_arithmetic(kind: str, text: object) -> str:
     """Return what to write in the place of ``controller.arithmetic``, which ``text`` was once given for."""
     if text == "float":
-        return "is no setting any more; leave it out: every controller but those on a chip computes with floats"
+        return "is no setting any more; leave it out: every controller but the fixed-point ones computes with floats"
     integer = kind if kind.endswith(ON_CHIP) else f"{kind}{ON_CHIP}"
     if integer in CONTROLLERS:
         return f'is no setting any more; leave it out and write controller.kind = "{integer}"'
     known = ", ".join(name for name in CONTROLLERS if name.endswith(ON_CHIP))
-    return f"is no setting any more, and '{kind}' has no form on whole numbers; those that are: {known}"
+    return f"is no setting any more, and '{kind}' has no fixed-point form; controllers that have one: {known}"
 
 
 def check_known_motion(kind: str, file: str) -> None:

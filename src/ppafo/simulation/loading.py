@@ -132,7 +132,7 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
         if scenario.gas_model is not None:
             scenario.device.check_vane("gas with an energy balance")
         if CONTROLLERS[scenario.controller.kind].plan is not None:
-            scenario.device.check_vane("a controller on whole numbers")
+            scenario.device.check_vane("a fixed-point controller")
     except ParameterError as error:
         raise _of_device(reading, error) from error
     return scenario

@@ -154,7 +154,7 @@ def _gait_measurements(batch: Batch, block: LaneBlock) -> Callable[[int], GaitMe
     """
     program, rows = batch.program, row_numbers(batch.program.state_rows())
     if program.late_readings or program.is_thermal:
-        raise ScenarioError("a walk with a late sensor or with gas that warms has no controller outside the lanes")
+        raise ScenarioError("a walk with a late sensor or with gas that warms has no controller in Python")
     plant, sensors, gait_sensors = (_group(batch, name) for name in ("plant", "sensors", "gait_sensors"))
     period, last = batch.clock.steps_per_sample * _group(batch, "timing").step, NOTHING_SEEN
 

@@ -109,7 +109,7 @@ class PrescribedMotion:
         """The motion in a few words."""
         level = self.profile.settings.get("level", math.nan)
         if self.profile.kind == "constant":
-            return f"held at {math.degrees(level):.4g} deg"
+            return f"locked at {math.degrees(level):.4g} deg"
         return f"prescribed, along the profile {self.profile.kind}"
 
 

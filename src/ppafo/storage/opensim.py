@@ -361,10 +361,12 @@ def opensim_recording(
     """Return a recording of a walk in OpenSim's names, zero and signs, and the channels that need ``body_mass`` [kg].
 
     Moment and force per mass become those of the body; without a body mass they are left out and named. DataError for
-    that of a wearer who reacts.
+    that of a neuromuscular gait model.
     """
     if "other_hip_angle" in recording.names:
-        raise DataError(f"{recording.label}: a wearer who reacts walks on two legs, which has no form of OpenSim yet")
+        raise DataError(
+            f"{recording.label}: a neuromuscular gait model walks on two legs, which has no form of OpenSim yet"
+        )
     foot = side[0]
     missing = tuple(name for name in _PER_MASS if name in recording.names and _is_per_mass(recording, name))
     missing = missing if body_mass is None else ()

@@ -205,7 +205,7 @@ class StudyFile(StrictTable):
 
     schema_version: Annotated[Literal[1], Field(description="version of this layout")]
     name: Annotated[str, Field(pattern=NAME, max_length=100)]
-    description: Annotated[str, Field(description="the question of this study, and its reason")] = ""
+    description: Annotated[str, Field(description="what this study asks, and why")] = ""
     configurations: Annotated[tuple[Configuration, ...], Field(strict=False, min_length=1)]
     vary: Annotated[tuple[Annotated[Varied, Field(discriminator="kind")], ...], Field(strict=False)] = ()
     correlations: Annotated[tuple[Correlation, ...], Field(strict=False)] = ()

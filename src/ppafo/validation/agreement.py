@@ -354,13 +354,13 @@ def _remarks(measured: Measured, device: Device, settings: ReplaySettings) -> tu
         other = f"{followed / own:.3g} times the gauge pressure of the set" if own > 0.0 else "pressure, the set's none"
         remarks.append(f"the recorded supply has {other}; the recorded supply was used")
     if not measured.has(SUPPLY):
-        remarks.append("the supply pressure was not recorded; that of the parameter set was used")
+        remarks.append("the supply pressure was not recorded; the parameter set's was used")
     if regular_interval(measured.recording.time) is None:
         remarks.append("samples are not regular in time; changes of the command were moved to the nearest step")
     if settings.volume is not None:
         remarks.append(f"chamber 1 was treated as a fixed volume of {settings.volume * 1e6:.4g} cm^3 without a vane")
     elif settings.motion == "held":
-        remarks.append("the vane was held at its initial angle; the angle is not compared")
+        remarks.append("the vane was locked at its initial angle; the angle is not compared")
     if settings.motion == "measured":
         remarks.append("the recorded angle was prescribed, and is therefore not compared")
     return tuple(remarks)

@@ -357,7 +357,7 @@ def _fault_of(values: Floats, one: ChannelAgreement, time: Floats) -> tuple[str,
     """Return what is wrong with samples of a channel, and with which: constant, clipped, isolated; else no words."""
     levels, counts = np.unique(values, return_counts=True)
     if len(levels) == 1:
-        held = "the vane was held (--motion held), or " if one.channel == ANGLE else ""
+        held = "the vane was locked (--motion held), or " if one.channel == ANGLE else ""
         return f"never changes: {held}its sensor is dead or not connected", np.ones(len(values), dtype=bool)
     for place, word in ((0, "least"), (-1, "largest")):
         is_there = values == levels[place]
@@ -392,5 +392,5 @@ def _motions(search: _Search) -> Iterator[Candidate]:
     if search.settings.motion in ("free", "leg"):
         own = [(one, one.channels.index(ANGLE)) for one in search.records if ANGLE in one.channels]
         if own and all(float(np.std(one.values[place])) < _AT_REST for one, place in own):
-            words = "the vane seems to be held, for its recorded angle rests (--motion held)"
+            words = "the vane seems to be locked, for its recorded angle rests (--motion held)"
             yield Candidate("motion", words, lambda _: Change(motion="held"))

@@ -277,7 +277,7 @@ def _gap_remarks(recording: Recording) -> tuple[str, ...]:
         return ()
     first = float(recording.time[int(np.argmax(gaps > _REMARKED_GAP * usual))])
     noun = "gap" if count == 1 else "gaps"
-    return (f"{count} {noun} in time, the first after {first:.6g} s; inputs were held across",)
+    return (f"{count} {noun} in time, the first after {first:.6g} s; inputs were kept across",)
 
 
 def _constant_remarks(recording: Recording) -> tuple[str, ...]:

@@ -48,7 +48,7 @@ from ppafo.units import format_quantity
 
 BOTTLE = "bottle"
 BOTTLE_NAME = f"{BOTTLE}.name"
-FILL = Quantity("fill", "1", "gas in the bottle over that of a full one", 1.0, 0.0, 1.0, minimum_allowed=False)
+FILL = Quantity("fill", "1", "gas in the bottle over a full one's", 1.0, 0.0, 1.0, minimum_allowed=False)
 TEMPERATURE = Quantity("temperature", "K", "temperature of bottle, regulator and hose at the start", None, 200.0, 400.0)
 LEAST_TORQUE = Quantity("least_torque", "1", "torque that ends the walk, over that at the set pressure", 0.9, 0.0, 1.0)
 COUPLING = Quantity("coupling", "s", "time between two exchanges of bottle and device", 0.1, 1.0e-3, 1.0)
@@ -586,7 +586,7 @@ def _ending(
     bottle = supply.bottle
     left = _grams(state.mass)
     if now.content.temperature <= bottle.fluid.table.temperatures[0] + _ABOVE_FREEZING:
-        return SupplyEnding("frozen", f"the content of the bottle freezes, with {left} left", time)
+        return SupplyEnding("frozen", f"the fluid in the bottle freezes, with {left} left", time)
     if reached >= supply.least_torque:
         return None
     short = f"the supply gives less than {100.0 * supply.least_torque:.0f} % of the torque"

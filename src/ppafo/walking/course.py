@@ -31,17 +31,17 @@ FILE = TomlKind("course", "course", resources.files("ppafo.walking") / "courses"
 SLOWEST, FASTEST = 0.4, 1.6
 """Walking speeds of a course [m/s]."""
 
-SPEED = Quantity("speed", "m/s", "walking speed; that of the gait unless given", None, SLOWEST, FASTEST)
+SPEED = Quantity("speed", "m/s", "walking speed; the gait's unless given", None, SLOWEST, FASTEST)
 CADENCE = Quantity("cadence", "1/s", "steps of both legs in a time, in place of a speed", None, 0.5, 4.0)
 DURATION = Quantity("duration", "s", "how long", None, 0.5, 3600.0)
 WALKED_FOR = Quantity("duration", "s", "how long; to the nearest whole number of strides", None, 0.5, 3600.0)
 STRIDES = Quantity("strides", "1", "number of strides, in place of a duration", None, 1.0, 1.0e4)
 ONE_STRIDE = Quantity("strides", "1", "number of strides that it takes", 1.0, 1.0, 20.0)
 CONTACT = Quantity("contact", "s", "how long the toes touch the ground in the swing", 0.04, 1.0e-3, 0.2)
-TIME = Quantity("time", "1", "time of the stride over that of the others", 0.75, 0.6, 1.6)
-LENGTH = Quantity("length", "1", "length in the middle of the stride over that of the others", 0.6, 0.2, 1.4)
+TIME = Quantity("time", "1", "time of the stride over the others'", 0.75, 0.6, 1.6)
+LENGTH = Quantity("length", "1", "length in the middle of the stride over the others'", 0.6, 0.2, 1.4)
 SLOPE = Quantity("slope", "rad", "slope of the ground, above 0 uphill; level unless given", None, -0.175, 0.175)
-DISTANCE = Quantity("distance", "m", "length of the way, of a wearer who reacts", None, 0.2, 1.0e4)
+DISTANCE = Quantity("distance", "m", "length of the way, of a neuromuscular gait model", None, 0.2, 1.0e4)
 HEIGHT = Quantity("height", "m", "height of the step, below 0 down", None, -0.1, 0.1)
 FORCE = Quantity("force", "N", "push on the trunk, forward above 0", None, -1000.0, 1000.0)
 PUSHED_FOR = Quantity("duration", "s", "how long it lasts", 0.1, 1.0e-3, 10.0)
@@ -59,8 +59,8 @@ KINDS: dict[str, tuple[str, tuple[Quantity, ...]]] = {
     "stairs": ("climbs: the toes meet the ground before the heel", _PACE),
     "scuff": ("one stride in which the toes touch the ground in mid-swing", (CONTACT,)),
     "stumble": ("one stride of another time, shorter or longer in its middle", (TIME, LENGTH)),
-    "step": ("a step of the ground, for a wearer who reacts", (HEIGHT,)),
-    "push": ("a push on the trunk, for a wearer who reacts", (FORCE, PUSHED_FOR)),
+    "step": ("a step of the ground, for a neuromuscular gait model", (HEIGHT,)),
+    "push": ("a push on the trunk, for a neuromuscular gait model", (FORCE, PUSHED_FOR)),
 }
 """Kinds of segment: what the wearer does, and the values that it takes."""
 
@@ -161,7 +161,7 @@ def _contradictions(segments: Iterable[Segment]) -> Iterator[tuple[int, str]]:
             yield index, f"radius must be at least {TIGHTEST:g} m, either way"
         lengths = [name for name in ("duration", "strides", "distance") if name in values]
         if segment.kind in ("walk", "ramp", "stairs", "turn") and len(lengths) != 1:
-            others = " (or distance alone, for a wearer who reacts)" if segment.kind == "walk" else ""
+            others = " (or distance alone, for a neuromuscular gait model)" if segment.kind == "walk" else ""
             yield index, f"give either duration or strides{', not both' if lengths else ''}{others}"
         if segment.kind == "ramp" and not {"speed", "cadence"} & values.keys():
             yield index, "give the speed or the cadence at its end"
@@ -179,7 +179,7 @@ def check_led_course(course: WalkingCourse) -> None:
         kind = course.segments[index].kind
         what = "distance" if kind == "walk" else f"a {kind}"
         raise course.refusal(
-            index, f"{what} is for a wearer who reacts, and this gait is prescribed: set motion.kind = '{REACT}'"
+            index, f"{what} is for a neuromuscular gait model, and this gait is prescribed: set motion.kind = '{REACT}'"
         )
 
 

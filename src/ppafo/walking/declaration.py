@@ -58,9 +58,7 @@ PERSON = Quantity(
     0.0,
     float(LARGEST_SEED),
 )
-DURATION = Quantity(
-    "duration", "s", "length of the walk; that of its course, else a minute unless given", None, 1.0, 3600.0
-)
+DURATION = Quantity("duration", "s", "length of the walk; its course's, else a minute unless given", None, 1.0, 3600.0)
 
 WALK_SENSORS = (
     *(item for item in SENSORS if item.name != "delay"),
@@ -294,7 +292,7 @@ def _walk_file(_controllers: Any, walks: tuple[WalkKind, ...]) -> type[BaseModel
             controller_table(walking_controllers(), "Walking"),
             Field(description="what commands the valve"),
         ),
-        "timing": optional(_timing(), "how the controller knows the time in the stride; thresholds unless given"),
+        "timing": optional(_timing(), "how the controller estimates the gait phase; thresholds unless given"),
         "wearer": optional(
             table("Wearer", wearer), "who walks; the subject of the gait that is named, else the paper's, unless given"
         ),
@@ -305,7 +303,7 @@ def _walk_file(_controllers: Any, walks: tuple[WalkKind, ...]) -> type[BaseModel
             "normally closed 3/2 valve in the supply line, part of the safe state; none unless given",
         ),
         BOTTLE: optional(
-            table("WalkBottle", _bottle()), "bottle that the device hangs on; a supply without end unless given"
+            table("WalkBottle", _bottle()), "bottle that supplies the device; a supply without end unless given"
         ),
     }
     return file_model("WalkFile", own)

@@ -270,7 +270,7 @@ def _assumed(reading: Reading, carried: BottleSupply | None) -> tuple[Assumption
 
 
 def _check_timing(law: ControllerKind, reading: Reading) -> None:
-    """Raise ScenarioError for a timing of a controller that goes by no time in the stride."""
+    """Raise ScenarioError for a timing of a controller that uses no gait phase."""
     with refused_as(ScenarioError, f"{reading.file}", ScenarioError):
         with_timing(law, TIMINGS[timing_of(reading.document)])
 

@@ -260,7 +260,7 @@ def lacks(scenario: Scenario, kind: MetricKind) -> str:
             "a walk has no one reference that its torque follows: push_off_error is the error in push-off",
         ),
         (bool(kind.traced), "it needs the course of the whole run, which is not kept of a walk"),
-        (LED_SHANK in needs, "it needs a leg without ground, whose shank is that of a gait"),
+        (LED_SHANK in needs, "it needs a leg without ground, whose shank follows a gait"),
         (REACTS in needs and subject != REACTS, f"it needs a neuromuscular gait model (motion.kind = '{REACT}')"),
         (
             LED in needs and subject != LED,

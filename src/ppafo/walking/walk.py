@@ -101,7 +101,7 @@ def bottle_life(scenario: Scenario, schedule: Schedule, progress: Progress = sil
     scenario = replace(scenario, motion=replace(walk_of(scenario), faults=sound, broken={}))
     motion, planned = walk_of(scenario), course_of_walk(scenario)
     if motion.bottle is None:
-        raise ScenarioError(f"{scenario.name}: hangs on no bottle")
+        raise ScenarioError(f"{scenario.name}: has no bottle")
     if scenario.controller.custom is not None:
         check_no_bottle(scenario)
     strides = math.ceil(schedule.longest / motion.gait.stride_time)

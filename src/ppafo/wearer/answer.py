@@ -1,4 +1,4 @@
-"""The answer of a walk of a wearer who reacts: with the device and with it off, until a fall where there is one."""
+"""The result of a walk of a neuromuscular gait model: with the device and with it off, until a fall if any."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -49,7 +49,7 @@ ROWS = (
 
 _EXPLAINED = (
     "'Device off' is the same wearer with the same device and both chambers vented: it still rubs and has inertia. The "
-    "first two strides are left out of the means, and those of gas and push-off also leave out strides with less help. "
+    "first two strides are left out of the means, and means of gas and push-off also leave out strides with less help. "
     "The device is on the left leg, and a stride is one step of that leg."
 )
 
@@ -59,7 +59,7 @@ _EFFORT = (
     "by a factor of two."
 )
 _LIMITS = (
-    "The gains of the reflexes are those of the wearer's file, with the device on and off: the wearer is unadapted. "
+    "The gains of the reflexes are the wearer's file's, with the device on and off: the wearer is unadapted. "
     "The body is planar and has no arms, and the device adds no weight, only friction, damping and the inertia of vane "
     "and foot plate about the ankle. No number here is a benefit to a person: it is what this model does."
 )
@@ -69,8 +69,8 @@ _CURVES = (
 )
 _LIKENESS = (
     "Of the mean stride: correlation r, root mean square of the difference, and the delay of the wearer, below 0 where "
-    "the wearer is early, at which r is largest. The measured gait is that of healthy people without a device; numbers "
-    "are printed whatever they are."
+    "the wearer is early, at which r is largest. The measured gait is from healthy people without a device; numbers "
+    "appear whatever they are."
 )
 _COMPARED = (
     ("ground_force", "vertical_force", "Vertical ground force (body weights)"),
@@ -104,7 +104,7 @@ def reacting_answer(comparison: Comparison) -> Answer:
     ended = "walks to the end" if stays else f"falls after {worn.metrics['fall_time'].value:.1f} s"
     return Answer(
         name="walk",
-        kicker=f"A walk of a wearer who reacts, {scenario.run.duration / 60.0:.3g} min",
+        kicker=f"A walk of a neuromuscular gait model, {scenario.run.duration / 60.0:.3g} min",
         title=f"Walking with {scenario.name}",
         lead=(f"{scenario.name}: {wearer.name} {ended}, {strides}",),
         sections=(
@@ -271,7 +271,7 @@ def _curves(comparison: Comparison) -> tuple[Section, ...]:
 
 
 def stride_figure(comparison: Comparison) -> "Drawn":
-    """Return the mean stride of a wearer who reacts, with the device and with it off."""
+    """Return the mean stride of a neuromuscular gait model, with the device and with it off."""
     from matplotlib.figure import Figure as Drawn
 
     walks: dict[str, tuple[WalkResult, str]] = {
@@ -301,7 +301,7 @@ def stride_figure(comparison: Comparison) -> "Drawn":
         handles, labels = figure.axes[4].get_legend_handles_labels()
         figure.legend(handles, labels, loc="upper center", bbox_to_anchor=(0.53, 0.955), ncols=3)
         scenario = comparison.with_device.scenario
-        title = f"{scenario.name}: {wearer_of_walk(walk_of(scenario)).name}, who reacts"
+        title = f"{scenario.name}: {wearer_of_walk(walk_of(scenario)).name}, neuromuscular"
         figure.text(0.012, 0.985, title, ha="left", va="top", fontweight="bold")
         mark_kind(figure, "simulated")
         return figure

@@ -15,7 +15,7 @@ from ppafo.wearer.settings import ReactingWearer, start_of_body, wearer_of_walk
 
 
 def _body(configuration: Scenario, writing: Writing) -> Iterator[str]:
-    """Lines that make the body of a wearer who reacts, its share of the device and the plant without a leg."""
+    """Lines that make the body of a neuromuscular gait model, its share of the device and the plant without a leg."""
     add, wearer = writing.add, wearer_of_walk(walk_of(configuration))
     yield f"share = {add(device_share)}(bare, {STANDARD_GRAVITY!r})"
     yield f"plant = {add(without_leg)}(bare)"
@@ -28,7 +28,7 @@ def _as_settings(wearer: ReactingWearer) -> ReactingWearer:
 
 
 def _start(configuration: Scenario, writing: Writing) -> Iterator[str]:
-    """Lines that make the states at the start of a wearer who reacts."""
+    """Lines that make the states at the start of a neuromuscular gait model."""
     add, start = writing.add, start_of_body(_as_settings(wearer_of_walk(walk_of(configuration))))
     rows = {"walk": start.walk, "walker": start.walker, "reflexes": start.reflexes, "nerves": start.nerves}
     for name, row in rows.items():

@@ -35,7 +35,7 @@ _FILE = TomlKind("wearer", "wearer", resources.files("ppafo.wearer") / "files", 
 
 @dataclass(frozen=True)
 class WearerFile:
-    """A wearer who reacts: name, title in one line, source, notes, speed at the start [m/s], how the gains were found.
+    """A neuromuscular gait model: name, title in one line, source, notes, start speed [m/s], origin of the gains.
 
     Gains of both legs in the units of ``Gains``; strengths of the muscles of both legs, 1 healthy, those not named 1;
     their largest velocities as a factor, and the stiffness of the ankles beside muscles [N m/rad].

@@ -1,4 +1,4 @@
-"""A walk of a wearer who reacts as a recording with its metrics: rows of the engine as channels with units.
+"""A walk of a neuromuscular gait model as a recording with its metrics: rows of the engine as channels with units.
 
 A body of its own walks here, so that nothing is compared with a gait: toes are over the ground, and strides are those
 that the wearer makes.
@@ -50,7 +50,7 @@ def recording_of_reacting(
     record: Mapping[str, Floats],
     of_bottle: Mapping[str, tuple[Floats, str]],
 ) -> Recording:
-    """The recording of a wearer who reacts [SI] from rows (samples,) by path, with the channels of a bottle."""
+    """The recording of a neuromuscular gait model [SI] from rows (samples,) by path, with the channels of a bottle."""
     assert isinstance(run.walk, ReactingWalk), "the walk of a neuromuscular gait model"
     body = run.walk.body
     left, right = (angles_of(record, side) for side in ("left", "right"))
@@ -135,7 +135,7 @@ def reacting_metrics(
     helped: NDArray[np.bool_],
     fall_time: float,
 ) -> dict[str, Metric]:
-    """Metrics of a wearer who reacts by name, in SI, of the strides without the first ones until a fall.
+    """Metrics of a neuromuscular gait model by name, in SI, of the strides without the first ones until a fall.
 
     ``starts`` are the samples after each strike, ``strides`` numbers of each whole stride, ``helped`` those with help.
     """
@@ -172,7 +172,7 @@ def reacting_result(
     status: Status,
     supply: SupplyCourse | None,
 ) -> WalkResult:
-    """The result of a wearer who reacts, until the end or a fall."""
+    """The result of a neuromuscular gait model, until the end or a fall."""
     fall_time = float(record[FELL][-1])
     stands = record[FELL] < 0.0
     stands[0] = True

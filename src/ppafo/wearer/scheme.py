@@ -1,4 +1,4 @@
-"""One step of a wearer who reacts: muscles, reflexes and ground move a body, and the device acts on its left ankle.
+"""One step of a neuromuscular gait model: muscles, reflexes, ground, and a device that acts on the left ankle.
 
 It stands beside ``walking.py``, where a gait leads the leg: here the body step comes before the gas, with the
 pressures at its begin, and the ankle that the gas sees is the body's. Device and body exchange torque and angle once a
@@ -425,7 +425,7 @@ def _scheme(fails: bool) -> LegScheme:
 
 
 REACTING, FAILING_REACTING = _scheme(fails=False), _scheme(fails=True)
-"""A leg of a wearer who reacts, and the same with a plant that may fail, or whose line has a shut-off valve."""
+"""A leg of a neuromuscular gait model, and the same with a plant that may fail, or whose line has a shut-off valve."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""A wearer who reacts, in the file of a walk: whose reflexes, how strong which muscle is, how fast the walk begins.
+"""A neuromuscular gait model in the file of a walk: whose reflexes, strength of each muscle, speed at the start.
 
 The device is on the left leg. A strength is that of a muscle of the left leg over the one that
 the wearer's file gives it; the body, the right leg and all gains are those of the file.
@@ -42,16 +42,14 @@ DEFAULT_NAME = "healthy-128"
 NAME_SUMMARY = f"name of a wearer of the package, or the path of its file; {DEFAULT_NAME} unless given"
 
 STRENGTHS = tuple(
-    Quantity(
-        f"{name}_strength", "1", f"strength of the {name} of the left leg, over that of the wearer", 1.0, 0.01, 2.0
-    )
+    Quantity(f"{name}_strength", "1", f"strength of the {name} of the left leg, over the wearer's", 1.0, 0.01, 2.0)
     for name in Fibres._fields
 )
 GAINS = tuple(
     Quantity(
         f"{side}_{name}",
         "rad" if name in IN_RADIANS else "1",
-        f"reflex gain {name} of the {side} leg; that of the wearer unless given",
+        f"reflex gain {name} of the {side} leg; the wearer's unless given",
         0.0,
         0.0,
         LARGEST_GAINS[name],
@@ -68,17 +66,17 @@ RATIOS = tuple(
 """Gains of both legs in proportion, for studies that scatter them whoever walks."""
 
 LENGTH_RATIO = Quantity(
-    "length_ratio", "1", "lengths of the body, its muscles and levers, over those of the wearer", 1.0, 0.7, 1.3
+    "length_ratio", "1", "lengths of the body, its muscles and levers, over the wearer's", 1.0, 0.7, 1.3
 )
 MASS_RATIO = Quantity(
-    "mass_ratio", "1", "masses of the body and forces of its muscles, over those of the wearer", 1.0, 0.3, 2.0
+    "mass_ratio", "1", "masses of the body and forces of its muscles, over the wearer's", 1.0, 0.3, 2.0
 )
 START_SPEED = Quantity("start_speed", "m/s", "speed with which the walk begins", 1.3, SLOWEST_START, FASTEST_START)
 REACTIONS = (*STRENGTHS, *GAINS, *RATIOS, LENGTH_RATIO, MASS_RATIO, START_SPEED, *OF_THE_WAY)
-"""Numbers of a wearer who reacts."""
+"""Numbers of a neuromuscular gait model."""
 
 LONGEST_STEP = 1.0e-4
-"""Longest step [s] of a wearer who reacts, and the default: 0.2 ms is wrong by 4 % in the speed of walking."""
+"""Longest step [s] of a neuromuscular gait model, and the default: 0.2 ms is wrong by 4 % in the speed of walking."""
 
 STEP_OF_BODY = Quantity("step", "s", "largest step; 0.1 ms unless given", LONGEST_STEP, 1.0e-6, LONGEST_STEP)
 
@@ -88,7 +86,7 @@ FIRST_STRIDE = 1.0
 
 @dataclass(frozen=True, slots=True)
 class ReactingWearer:
-    """A wearer who reacts: its file, the body with muscles and gains that this gives, and its numbers by name.
+    """A neuromuscular gait model: its file, the body with muscles and gains that this gives, and its numbers by name.
 
     ``settings`` has the numbers of ``REACTIONS``, without those of the way where there is a ``course``; each may be an
     array (runs,).
@@ -204,10 +202,10 @@ def _check_way(reading: Reading, given: Mapping[str, Any], course: WalkingCourse
 def read_reacting(
     reading: Reading, folder: Path, instead: Mapping[str, str], course: WalkingCourse | None
 ) -> ReactingWearer:
-    """Return the wearer who reacts of the file of a walk.
+    """Return the neuromuscular gait model of the file of a walk.
 
     A relative path begins in ``folder``; ``instead`` has the files that options name in place of those of the
-    document. ScenarioError for what does not go with a wearer who reacts;
+    document. ScenarioError for what does not go with a neuromuscular gait model;
     DataError for a file that cannot be used.
     """
     name = value_at(reading.document, NAME) or DEFAULT_NAME

@@ -75,12 +75,12 @@ def _too_long(scenario: Scenario) -> Problem:
     step = scenario.run.step
     return np.asarray(
         step > LONGEST_STEP
-    ), lambda run: f"run.step = {at(step, run):g} s: a wearer who reacts needs {LONGEST_STEP:g} s or less"
+    ), lambda run: f"run.step = {at(step, run):g} s: a neuromuscular gait model needs {LONGEST_STEP:g} s or less"
 
 
 def _label(motion: WalkMotion) -> str:
     wearer = wearer_of_walk(motion)
-    return f"a walk of a wearer who reacts, {wearer.name}" + (
+    return f"a walk of a neuromuscular gait model, {wearer.name}" + (
         "" if wearer.course is None else f", course {wearer.course.name}"
     )
 
@@ -110,7 +110,7 @@ def _duration(motion: WalkMotion) -> float | None:
 
 def _remarks(motion: WalkMotion) -> list[str]:
     wearer = wearer_of_walk(motion)
-    return [f"wearer: {wearer.name}, who reacts, {wearer.mass:.4g} kg; the device is on the left leg"]
+    return [f"wearer: {wearer.name}, neuromuscular, {wearer.mass:.4g} kg; the device is on the left leg"]
 
 
 def _document(motion: WalkMotion) -> dict[str, Any]:

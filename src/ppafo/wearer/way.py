@@ -1,4 +1,4 @@
-"""What a wearer who reacts meets on the way: slopes, steps and pushes, of a course or of settings; and the way of them.
+"""Ground of a neuromuscular gait model: slopes, steps and pushes, of a task sequence or of settings, as one path.
 
 Any number may be an array (runs,), or one that an export writes down.
 """
@@ -86,26 +86,26 @@ def stretches_of_settings(settings: Mapping[str, Any]) -> tuple[Stretch, ...]:
 
 
 def check_reacting_course(course: WalkingCourse) -> None:
-    """Raise ScenarioError for what a wearer who reacts cannot do."""
+    """Raise ScenarioError for what a neuromuscular gait model cannot do."""
     for index, segment in enumerate(course.segments):
         if segment.kind not in _REFLEXES:
             raise course.refusal(
                 index,
-                "a wearer who reacts walks on, for the reflexes know nothing else; such a course has walk (with "
+                "a neuromuscular gait model walks on, for the reflexes know nothing else; such a course has walk (with "
                 "distance and slope), step and push",
             )
         others = [name for name in segment.values if segment.kind == "walk" and name not in ("distance", "slope")]
         if others:
             raise course.refusal(
-                index, f"{others[0]}: the reflexes set the pace of a wearer who reacts: give distance, and slope"
+                index, f"{others[0]}: the reflexes set the pace of a neuromuscular gait model: give distance, and slope"
             )
     first = course.segments[0]
     if first.kind != "walk" or first.values["distance"] < _LEVEL_START or first.values.get("slope"):
-        raise course.refusal(0, f"a wearer who reacts begins with a level walk of {_LEVEL_START:g} m or more")
+        raise course.refusal(0, f"a neuromuscular gait model begins with a level walk of {_LEVEL_START:g} m or more")
 
 
 def stretches_of_course(course: WalkingCourse) -> tuple[Stretch, ...]:
-    """The way of a course, which was checked to be one of a wearer who reacts."""
+    """The way of a course, which was checked to be one of a neuromuscular gait model."""
     return tuple(_laid(course))
 
 

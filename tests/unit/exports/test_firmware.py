@@ -222,7 +222,7 @@ def test_numbers_stand_in_a_header_with_range_and_origin() -> None:
 @pytest.mark.parametrize(
     ("name", "overrides", "said"),
     [
-        ("step-response", (), "'constant' has no form on whole numbers; those that have one: pid, on_off"),
+        ("step-response", (), "'constant' has no fixed-point form; controllers that have one: pid, on_off"),
         ("torque-task-solenoid", ("controller.rate=900 Hz",), r"a multiple of 0.125 ms, up to 2.05 s"),
     ],
 )

@@ -307,7 +307,7 @@ def test_the_published_schema_has_the_section() -> None:
         (f"[trajectory]\nexperiments = []\n{PARAMETERS}", "problem.toml: trajectory.experiments"),
         (
             FIT.replace("[trajectory]", "[trajectory]\nprofiles = ['foot_plate.inertia']"),
-            "problem.toml: trajectory: profiles: intervals are those of the table; omit it",
+            "problem.toml: trajectory: profiles: intervals are the table's; omit it",
         ),
         (FIT.replace("[trajectory]", "[trajectory]\nloss = 'huber'"), "loss: the first pass is robust by itself; omit"),
         (FIT.replace("low =", "scale = 'log'\nlow ="), "scale: the search scales numbers by itself; omit it"),
@@ -398,7 +398,7 @@ def test_a_held_vane_is_fitted_in_its_pressures(solve: Solve, laboratory: Path) 
         (f"{TANK}held = '75 deg'\n", "held and volume: with a fixed volume there is no vane"),
         (TANK.replace("60 cm^3", "0 cm^3"), "volume = '0 cm^3' must be above zero"),
         (TANK.replace("60 cm^3", "60 psi"), "volume"),
-        (f"{TANK}inputs = ['command', 'angle']\n", "the vane is held or absent, but inputs has 'angle'"),
+        (f"{TANK}inputs = ['command', 'angle']\n", "the vane is locked or absent, but inputs has 'angle'"),
         (f"{TANK}scenario = 'step-response'\n", "volume and a scenario"),
         (f"{STEP}inputs = ['angel']\n", "did you mean 'angle'"),
     ],

@@ -85,7 +85,7 @@ def test_a_converter_without_whole_numbers_is_refused() -> None:
         ("torque-task-proportional", "fixed", r'write controller.kind = "pid_on_chip"'),
         ("torque-task-solenoid", "fixed", r'write controller.kind = "on_off_on_chip"'),
         ("torque-task-proportional", "float", "leave it out: every controller but those on a chip"),
-        ("step-response", "fixed", "'constant' has no form on whole numbers; those that are: pid_on_chip"),
+        ("step-response", "fixed", "'constant' has no fixed-point form; controllers that have one: pid_on_chip"),
     ],
 )
 def test_a_file_with_the_old_arithmetic_is_told_the_kind_to_write(name: str, given: str, said: str) -> None:

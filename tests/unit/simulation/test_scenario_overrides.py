@@ -93,7 +93,7 @@ def test_any_other_value_must_say_its_unit(override: str) -> None:
 def test_an_assumption_that_was_replaced_says_so() -> None:
     assumptions = {item.path: item for item in load_scenario(TASK, ["motion.angle=80 deg"]).assumptions}
     assert assumptions["motion.angle"].value == "80 deg"
-    assert assumptions["motion.angle"].note.startswith("set by an override; the scenario has 75 deg: not printed")
+    assert assumptions["motion.angle"].note.startswith("set by an override; the scenario has 75 deg: not reported")
     assert "override" not in assumptions["reference.level"].note
 
 

@@ -1,4 +1,4 @@
-"""A wearer who reacts under the device: body and gas step by step, falls, columns, and what refuses one."""
+"""A neuromuscular gait model under the device: body and gas step by step, falls, columns, and what refuses one."""
 
 import json
 from dataclasses import replace
@@ -189,7 +189,7 @@ def test_a_walk_on_a_bottle_ends_with_the_fall_and_strides_are_those_of_the_wear
     assert isinstance(life, Endurance)
     assert life.draw.stride_time == pytest.approx(walk(load_walk(WALK), 0.1).metrics["stride_time"].value)
     (tmp_path / "walk.json").write_text(json.dumps({"format": answer_of(pair).data["format"]}))
-    with pytest.raises(DataError, match="is the walk of a wearer who reacts: walk on the bottle"):
+    with pytest.raises(DataError, match="is the walk of a neuromuscular gait model: walk on the bottle"):
         endurance(tmp_path)
 
 
@@ -282,14 +282,14 @@ def test_a_ratio_changes_a_gain_of_both_legs() -> None:
             {"wearer": {"reacts": "geyer-herr"}},
             'wearer.reacts = \'geyer-herr\': is now motion.kind = "react" and wearer.name = "geyer-herr"',
         ),
-        ({"course": "stairs"}, "segment 1 (stand): a wearer who reacts walks on"),
+        ({"course": "stairs"}, "segment 1 (stand): a neuromuscular gait model walks on"),
         (
             {"course": "ramp-and-kerb", "wearer": {"name": "geyer-herr", "slope": 0.01}},
             "wearer.slope = 0.01: does not go with course 'ramp-and-kerb'",
         ),
         (
             {"course": "ramp-and-kerb", "motion": {"kind": "walk"}, "wearer": {}},
-            "segment 1 (walk): distance is for a wearer who reacts",
+            "segment 1 (walk): distance is for a neuromuscular gait model",
         ),
         ({"gait": "falisse2019-subject1"}, "does not go with motion.kind = 'react' yet"),
         ({"wearer": {"name": "geyer-herr", "body_mass": "70 kg"}}, "unknown key 'wearer.body_mass'"),
@@ -327,7 +327,7 @@ def test_what_needs_a_prescribed_gait_refuses_in_one_line() -> None:
     assert "it needs a neuromuscular gait model (motion.kind = 'react')" in lacking(
         load_walk("solenoid"), METRICS["fall_time"]
     )
-    with pytest.raises(DataError, match="a wearer who reacts walks on two legs"):
+    with pytest.raises(DataError, match="a neuromuscular gait model walks on two legs"):
         opensim_recording(walk(load_walk(WALK, ["run.duration=6 s"])).recording)
 
 

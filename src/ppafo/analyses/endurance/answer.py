@@ -113,8 +113,8 @@ def _draw_temperature(axes: "Axes", found: Endurance, minutes: Floats) -> None:
 
 FORMAT = "ppafo bottle"
 _LEFT_OUT = (
-    "Not in the model: a regulator that its gas cools or ices, unless somebody walks on the bottle; liquid carried out "
-    "with the vapour, a bottle held upside down, leaking connections, and ice on the outside of the bottle."
+    "Not in the model: a regulator that its gas cools or ices, unless a walk is on the bottle; liquid carried out "
+    "with the vapour, a bottle upside down, leaking connections, and ice on the outside of the bottle."
 )
 _CAPTION = "Temperature, pressure and gas in the bottle from full to the end."
 _USE = (Column("gas use"), Column("gas per stride", "gas mass", ".3g"))
@@ -187,7 +187,7 @@ def _facts(found: Endurance) -> list[tuple[str, str]]:
         ("gas", f"{_gas(draw.mass_per_stride)} a stride, {flows[0]}, largest {flows[1]}"),
         ("heat that it lacks", _lacking_heat(found)),
         (
-            "lowest temperature of the content",
+            "lowest temperature of the fluid",
             quantity_text(float(np.min(recording["bottle_temperature"])), "temperature", ".1f"),
         ),
         ("pressure at the end", quantity_text(float(recording["bottle_pressure"][-1]), "pressure", ".0f")),

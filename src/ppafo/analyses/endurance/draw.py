@@ -123,7 +123,7 @@ def walk_gas(result: WalkResult) -> WalkGas:
     """Return the gas of a walk."""
     configuration, course = result.scenario, walk_of(result.scenario).course
     gas = result.metrics.get("gas" if course is None else "course_gas")
-    # A wearer who reacts sets the pace, and one who took gas made strides.
+    # A neuromuscular gait model sets the pace, and one who took gas made strides.
     time = result.metrics.get("stride_time" if course is None else "course_time")
     return WalkGas(
         configuration.name,
@@ -146,8 +146,8 @@ def read_walk_gas(folder: Path) -> WalkGas:
     document = read_json(path)
     if isinstance(document, dict) and document.get("format") == REACTING_WALK_FORMAT:
         raise DataError(
-            f"{path}: is the walk of a wearer who reacts: walk on the bottle, with 'ppafo walk --bottle', or give gas "
-            "and time of a stride, with --gas-per-stride and --stride-time"
+            f"{path}: is the walk of a neuromuscular gait model: walk on the bottle, with 'ppafo walk --bottle', or "
+            "give gas and time of a stride, with --gas-per-stride and --stride-time"
         )
     if not isinstance(document, dict) or document.get("format") != WALK_FORMAT:
         raise DataError(f"{path}: is not the result of a ppafo walk (its 'format' is not '{WALK_FORMAT}')")

@@ -128,7 +128,7 @@ def _name_set(found: Identification, problem: ProblemFile) -> ParameterSet:
     recordings = "" if found.kind == "measured" else f", whose recordings are {found.kind}"
     origins = (
         f"Values with origin 'identified' or 'fitted' come from the problem '{problem.name}'{recordings}, the fitted "
-        f"ones being true for this model only; the others are those of '{old.name}'."
+        f"ones being true for this model only; the others are from '{old.name}'."
     )
     return replace(
         old,

@@ -548,7 +548,7 @@ def sides_of(run: Run, point: Point) -> dict[str, str]:
     vane = motion[point.way]
     if point.way == 0.0:
         is_at_stop = not plant.angle_min < at["angle"] < plant.angle_max
-        vane = "held by a stop" if is_at_stop else "sticks: friction holds it"
+        vane = "against a stop" if is_at_stop else "sticks: friction holds it"
     valve = f"feeds chamber {1 if openings.source_1 > 0.0 else 2}, open by {max(openings):.4g}" if any(openings) else ""
     return {"valve": valve or "closed", "ankle": vane, **said}
 

@@ -407,7 +407,7 @@ def _swept_volume(reported: Reported) -> Claim:
     efficiency = reported.in_si(constant) / reported.in_si(path)
     return Claim(
         id="swept_volume",
-        statement="The vane sweeps this volume per angle, from the data sheet of the actuator.",
+        statement="The vane has this displacement per radian, from the data sheet of the actuator.",
         paper=reported.number(path),
         value=None,
         unit=reported.unit(path),
@@ -415,7 +415,7 @@ def _swept_volume(reported: Reported) -> Claim:
         source=reported.source(path),
         note=f"Virtual work with the reported torque constant. {reported.quotation(path)} would give the shaft "
         f"{100.0 * efficiency:.0f} % of the gas's work. Equation (5) is negative beyond 90 deg; figure 7 goes to 130.",
-        assumptions=("a torque efficiency of 70 to 90 %, that of vane actuators in general",),
+        assumptions=("a torque efficiency of 70 to 90 %, as vane actuators in general",),
         range=(low, high),
         found=f"{low:.0f} to {high:.0f} {reported.unit(path)}",
     )

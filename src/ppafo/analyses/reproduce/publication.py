@@ -127,7 +127,7 @@ COMPUTATIONS: dict[str, Computation] = {
     "share_of_healthy_moment": Computation(
         "the same over the largest ankle moment of the built-in gait", "1", _OF_PRESSURE, share_of_healthy_moment
     ),
-    "swept_volume": Computation("volume per angle of the chambers", "m^3/rad", {}, swept_volume),
+    "swept_volume": Computation("displacement of the chambers per radian", "m^3/rad", {}, swept_volume),
     "walking_torque": Computation(
         "largest torque of the mean stride of the walk 'solenoid'", "N m", _OF_PRESSURE, walking_torque
     ),

@@ -30,7 +30,7 @@ _BOTTLE_EXPLAINED = (
     "stays in the seat and narrows it. The gas in lines and chambers keeps the temperature with which it leaves the "
     "hose; in truth their walls warm it, so its effect here is the largest that it can have.",
     "A walk ends where the line behind the regulator no longer comes within the given share of the set pressure in two "
-    "strides, or where the content of the bottle freezes.",
+    "strides, or where the fluid in the bottle freezes.",
 )
 
 
@@ -144,7 +144,7 @@ _EXPLAINED = (
     "plantarflexion while the heel carries more than a tenth of the body weight.",
     "Angles go with the length of the stride, which goes with the square root of the speed, as the strides per second "
     "do: a constant walk ratio. Standing is a vertical shank over a flat foot. The forces of a stride and the fraction "
-    "of the stance stay those of the gait at every speed.",
+    "of the stance stay the same at every speed.",
 )
 _MEAN = (
     "Mean over the strides at an even speed on level ground, of all speeds together, with the standard deviation as a "

@@ -98,7 +98,7 @@ def reproduce(
 ) -> Reproduction | Studies:
     """Reproduce the paper's experiments and check its claims.
 
-    ``overrides`` change the experiments (not the paper's printed numbers): a path of a scenario reaches those that
+    ``overrides`` change the experiments (not the paper's reported numbers): a path of a scenario reaches those that
     have it, a path of the device all of them. SimulationError where a run diverges, ScenarioError for a study that is
     none.
 
@@ -362,7 +362,7 @@ def bottle(
 ) -> Endurance | Endurances:
     """Compute how long a bottle of gas lasts, and why it ends.
 
-    A walk, its result or its folder, walks on the bottle until that ends it. Any other gas use is that of
+    A walk, its result or its folder, walks on the bottle until that ends it. Any other gas use is in
     ``recordings``, or else ``gas_per_stride`` every ``stride_time`` with at most ``peak_flow``. ``overrides`` are texts
     such as ``room.temperature=5 degC``. ParameterError or DataError for bad input, SimulationError where the solver
     fails.
@@ -372,7 +372,7 @@ def bottle(
     gas_per_stride: gas per stride, for example '0.3 g'
     stride_time: time of one stride; default: '1.1 s', the whole recording, one stride of a walk, or its whole course
     peak_flow: largest flow, for example '4.5 g/s'; default: the mean flow
-    bottle: name of a bottle or a .toml file; default: that of the walk, or the paper's bottle
+    bottle: name of a bottle or a .toml file; default: the walk's, or the paper's bottle
     walk: time of walking between two rests, with --rest; default '10 min'
     rest: time of each rest; default '0 s' (no rest)
     longest: maximum simulated time; default '1440 min'

@@ -153,8 +153,8 @@ def validate(
     parameter_set: name of a parameter set, or a .toml file
     recordings: a .csv or .nc file, or a result folder; several may be given
     valve: valve of the parameter set; default: its default valve
-    motion: free: the model moves the vane; measured: the vane follows the recorded angle; held: the vane stays at its
-        initial angle; leg: the model moves vane and foot on the fixture of step-response (default free)
+    motion: free: the model moves the vane; measured: the vane follows the recorded angle; held: the vane is locked at
+        its initial angle; leg: the model moves vane and foot on the fixture of step-response (default free)
     volume: no vane: the valve fills and vents chamber 1 of this fixed volume, for example '60 cm^3'; pressure_1 is
         compared
     initial: initial value of a channel that was not recorded, for example 'pressure_2=0 psi_g'

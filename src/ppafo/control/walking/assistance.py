@@ -48,7 +48,7 @@ def profile_torque(profile: TorqueProfile, phase: float) -> float:
 
 
 HOLD_QUANTITIES = (
-    Quantity("swing_angle", "rad", "angle about which the lifted foot is held", 1.28, 0.5, 2.5),
+    Quantity("swing_angle", "rad", "angle about which the lifted foot is kept", 1.28, 0.5, 2.5),
     Quantity("hold_stiffness", "N m/rad", "requested torque per angle from it", 3.7, 0.0, 1.0e3),
     Quantity("hold_damping", "N m s/rad", "requested torque against the angle's rate", 0.35, 0.0, 1.0e3),
     Quantity("angle_rate_filter", "s", "time constant of the filter on the angle's rate", 0.006, 0.0, 1.0),

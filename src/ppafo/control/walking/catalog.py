@@ -327,7 +327,7 @@ def with_timing(kind: ControllerKind, timing: TimingKind) -> ControllerKind:
     if timing is THRESHOLDS:
         return kind
     if not keeps_time(kind):
-        raise ScenarioError(f"controller '{kind.name}' goes by no gait phase: timing.kind cannot be given")
+        raise ScenarioError(f"controller '{kind.name}' uses no gait phase: timing.kind cannot be given")
     name, before = f"{kind.name}_{timing.name}", type(kind.initial)
     title = timing.name.capitalize()
     state = row_with(f"{before.__name__}{title}", before, clock=type(timing.initial))

@@ -68,7 +68,7 @@ EVENT_ON_OFF = ControllerKind(
     summary="Event-based: dorsiflexion in swing and landing, free in mid-stance, plantarflexion in push-off.",
     source="the paper, figure 1A and section 'PPAFO Hardware': binary, event-based control",
     quantities=(
-        Quantity("swing_angle", "rad", "angle at which the foot is held in the swing", 1.68, 0.5, 2.5),
+        Quantity("swing_angle", "rad", "angle at which the foot is kept in the swing", 1.68, 0.5, 2.5),
         Quantity(
             "band", "rad", "the foot is lifted above the angle plus this, let go below it less this", 0.145, 0.0, 0.5
         ),

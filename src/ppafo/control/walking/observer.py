@@ -69,7 +69,7 @@ class NominalDevice(NamedTuple):
 def _nominal(name: str, unit: str, summary: str, maximum: float, lowest: float = 0.0) -> Quantity:
     follows = (PRESSURE_LAG,) if name == "sensor_lag" else (NOMINAL[name],)
     return Quantity(
-        f"nominal_{name}", unit, f"{summary}; that of the device unless given", 0.0, lowest, maximum, follows=follows
+        f"nominal_{name}", unit, f"{summary}; the device's unless given", 0.0, lowest, maximum, follows=follows
     )
 
 
@@ -78,7 +78,7 @@ NOMINAL_QUANTITIES = (
         "nominal_flow",
         "m^3/s",
         "R T times the conductance of the valve, which the observer of the chambers believes; 0 switches it off; "
-        "that of the device unless given",
+        "the device's unless given",
         0.0,
         0.0,
         1.0,
@@ -106,8 +106,8 @@ NOMINAL_QUANTITIES = (
         _nominal(f"line_{name}_{line}", unit, f"{what} of line {line}", most)
         for line in (1, 2)
         for name, unit, what, most in (
-            ("droop", "Pa s/J", "droop per content that flows", 1.0e10),
-            ("largest_flow", "W", "largest flow of content", 1.0e10),
+            ("droop", "Pa s/J", "droop per gas content (p V) that flows", 1.0e10),
+            ("largest_flow", "W", "largest flow of gas content (p V)", 1.0e10),
             ("volume", "m^3", "volume, 0 without lines,", 1.0),
         )
     ),

@@ -381,7 +381,7 @@ ANCHOR_WEIGHT = Quantity(
 
 DELAY_QUANTITIES = (
     Quantity("heel_loading_rate", "N/s", "how fast the heel is loaded after its strike", 5.6e3, 100.0, 1.0e6),
-    Quantity("toe_loading_rate", "N/s", "how fast the toes are loaded as they come down", 4.0e4, 100.0, 1.0e6),
+    Quantity("toe_loading_rate", "N/s", "how fast the toes are loaded at contact", 4.0e4, 100.0, 1.0e6),
     Quantity("heel_unloading_rate", "N/s", "how fast the load of the heel fades before it rises", 1.3e3, 100.0, 1.0e6),
     Quantity("toe_unloading_rate", "N/s", "how fast the load of the toes fades before they rise", 7.0e3, 100.0, 1.0e6),
     Quantity(

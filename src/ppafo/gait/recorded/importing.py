@@ -384,7 +384,7 @@ def _with_subject(
         wrong.append(
             DataError(
                 f"{tables[0].file}: does not state the body mass; give it, such as --body-mass '62 kg' (until then "
-                "loads are judged relative to their largest value)"
+                "loads are taken relative to their largest value)"
             )
         )
     elif settings.body_mass is None:

@@ -97,7 +97,7 @@ def check_experiment(experiment: Experiment) -> None:
             experiment.channels == (ANGLE,) and not is_free,
             "the angle of the vane is prescribed, so it carries no information; add a pressure",
         ),
-        (is_python, "a Python controller cannot run in lanes; use one of the catalogue"),
+        (is_python, "a Python controller cannot run in a batch; use one of the catalogue"),
         (
             has_torque and not is_free,
             "a torque has no effect on a vane whose angle is prescribed; remove it from inputs",

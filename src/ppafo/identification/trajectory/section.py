@@ -102,7 +102,9 @@ class ExperimentSection(StrictTable):
     channels: Texts | None = Field(None, description="compared; default: angle and pressures, unless held or followed")
     noise: _Noise = Field({}, description="least standard deviation by channel, '0.1 deg', '500 Pa_d'; default: none")
     inputs: Texts | None = Field(None, description=f"recorded channels that the run follows: {', '.join(ALL_INPUTS)}")
-    held: Text | None = Field(None, description="angle at which the vane is held, such as '75 deg'; without a scenario")
+    held: Text | None = Field(
+        None, description="angle at which the vane is locked, such as '75 deg'; without a scenario"
+    )
     volume: Text | None = Field(None, description="fixed volume in place of the vane, '60 cm^3'; without a scenario")
     initial_state: Literal["scenario", "recording", "fitted"] | None = Field(
         None,
@@ -137,7 +139,7 @@ _REMOVED = {
     "other_starts": "other starts are tried where the first does not explain the recordings; omit it",
     "seed": "nothing is drawn; omit it",
     "directions": "recordings that want other numbers are found by themselves; omit it",
-    "profiles": "intervals are those of the table; omit it",
+    "profiles": "intervals are the table's; omit it",
     "scale": "the search scales numbers by itself; omit it",
 }
 
@@ -311,7 +313,7 @@ def _replay(
         (item.initial_state == "scenario", "initial_state = 'scenario', but it has no scenario; omit it"),
         (
             (is_held or is_fixed) and ANGLE in inputs,
-            f"the vane is held or absent, but inputs has '{ANGLE}': omit one of them",
+            f"the vane is locked or absent, but inputs has '{ANGLE}': omit one of them",
         ),
         (is_held and is_fixed, "held and volume: with a fixed volume there is no vane; omit one of them"),
         (

@@ -39,7 +39,7 @@ KIND = ActuatorKind(
     summary="A vane between two chambers whose volumes run linearly with the angle.",
     quantities=(
         Quantity("torque_constant", "m^3", "torque per pressure difference", minimum=SMALLEST_VOLUME),
-        Quantity("volume_per_angle", "m^3/rad", "chamber volume per angle", minimum=SMALLEST_VOLUME),
+        Quantity("volume_per_angle", "m^3/rad", "displacement per radian", minimum=SMALLEST_VOLUME),
     ),
     model=MODEL,
     problem=problem,

@@ -112,7 +112,7 @@ EFFECT = Effect(
         ("-", "slowing_squared", "1/K^2", "the same, by its square"),
         ("x", "rise`, `rise_a`, `rise_b", "K", "rises of temperature of a coil, and of both"),
         ("q", "pull_in_share", "-", "current that lifts a valve, over the last one of a cold coil"),
-        ("-", "is_coil_a", "-", "1 for the coil of chamber 1, 0 for that of chamber 2"),
+        ("-", "is_coil_a", "-", "1 for the coil of chamber 1, 0 for chamber 2's"),
     ),
     state=State(row=CoilRises, start=start, advance=advance, slopes=slopes),
 )

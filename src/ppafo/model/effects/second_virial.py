@@ -72,7 +72,7 @@ EFFECT = Effect(
         Quantity(
             "coefficient",
             "m^3/mol",
-            "second virial coefficient, by default that of gas.species at 298 K",
+            "second virial coefficient, by default of gas.species at 298 K",
             SECOND_VIRIAL["CO2"],
             -1.0e-3,
             1.0e-3,

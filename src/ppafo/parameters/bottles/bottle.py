@@ -104,7 +104,7 @@ def scaled_entries(part: Part, paper: Mapping[str, Entry]) -> dict[str, Entry]:
     surface = ratio ** (2.0 / 3.0)
     for path in _SURFACES:
         given = paper[path]
-        found[path] = _entry(given.value * surface, given.unit, "the paper's bottle, with the surface of its content")
+        found[path] = _entry(given.value * surface, given.unit, "the paper's bottle, with the surface of its fluid")
     return dict(paper) | found
 
 
@@ -119,7 +119,7 @@ FILE = TomlKind("bottle", "bottle", resources.files("ppafo.parameters.bottles") 
 BOTTLE = (
     Quantity("volume", "m^3", "internal volume of the bottle", minimum=1e-6, maximum=1.0),
     Quantity("wall_heat_capacity", "J/K", "heat capacity of the bottle's wall", minimum=1e-3, maximum=1e9),
-    Quantity("content_heat_transfer", "W/K", "heat conductance from wall to content", minimum=0.0, maximum=1e6),
+    Quantity("content_heat_transfer", "W/K", "heat conductance from wall to fluid", minimum=0.0, maximum=1e6),
     Quantity("room_heat_transfer", "W/K", "heat conductance from the room to the wall", minimum=0.0, maximum=1e6),
 )
 FILL_BY_MASS = (Quantity("gas_mass", "kg", "mass of gas in a full bottle", minimum=0.0, minimum_allowed=False),)

@@ -38,7 +38,7 @@ class ClaimEntry(StrictTable):
         "equal", description="what is stated: a number, a maximum ('up to'), or less or more, which needs a limit"
     )
     where: Text = Field(description="where it was read")
-    source: str = Field("", description="publication, where it is not that of the file")
+    source: str = Field("", description="publication, where it is not the file's")
     computation: str = Field("", description="name of a computation of 'ppafo reproduce'")
     arguments: dict[str, str] = Field(default_factory=dict, description="arguments of the computation, with units")
     at_least: float | None = Field(None, allow_inf_nan=False, description="lowest value that agrees, in 'unit'")

@@ -269,13 +269,13 @@ def lacking(scenario: Scenario, kind: MetricKind) -> str:
         return "it needs a walk"
     motion = scenario.motion
     if LED_SHANK in kind.needs and not (isinstance(motion, FreeMotion) and motion.leg is not None and motion.leg.gait):
-        return "it needs a leg whose shank is that of a gait"
+        return "it needs a leg whose shank follows a gait"
     is_open = scenario.controller.kind == OPEN_LOOP
     return "its controller follows no reference" if is_open and REFERENCE in kind.channels else ""
 
 
 def reacts(scenario: Scenario) -> bool:
-    """True of a wearer who reacts, whose minute takes a fraction of a second where other runs take milliseconds."""
+    """True of a neuromuscular gait model, whose minute takes a fraction of a second, of other runs milliseconds."""
     return not lacking(scenario, METRICS["fall_time"])
 
 

@@ -339,7 +339,7 @@ def _draw_supply(axes: "Axes", result: WalkResult, scale: float) -> None:
     recording, supply, edges = result.recording, result.supply, result.starts
     assert supply is not None, "drawn for a walk on a bottle"
     held = display_values(supply.values["regulated_pressure"], "pressure")
-    axes.plot(supply.times / scale, held, color=GREY, linestyle="--", linewidth=1.2, label="held at most")
+    axes.plot(supply.times / scale, held, color=GREY, linestyle="--", linewidth=1.2, label="delivered at most")
     line = display_values(recording["line_pressure_1"], "pressure")
     if edges.size > 1:
         times = recording.time[edges[:-1]] / scale

@@ -165,7 +165,7 @@ def test_which_side_was_taken_is_said(steady: LinearModel) -> None:
     assert steady.sides["source to chamber 2"] == "closed"
     assert steady.edges == ()
     at_stop = linearise("step-response")
-    assert at_stop.sides["ankle"] == "held by a stop"
+    assert at_stop.sides["ankle"] == "against a stop"
     assert "straight line" in at_stop.sides["source to chamber 1"]
     edges = {edge.place: edge.is_true for edge in at_stop.edges}
     assert edges["model.valves.proportional.opening_of_command: 1.0 <= abs(command)"] is False

@@ -1,4 +1,4 @@
-"""How alike the stride of a wearer who reacts is to a measured gait: planted delays, and the moment on the ankle."""
+"""Likeness of the stride of a neuromuscular gait model to a measured gait: known delays, and the ankle moment."""
 
 from dataclasses import replace
 from typing import Any, cast

@@ -1,4 +1,4 @@
-"""What the answer says where a wearer who reacts gets less help: flag, strides that had help, and the picture."""
+"""What the result says where a neuromuscular gait model gets less help: flag, strides with help, picture."""
 
 from dataclasses import replace
 

@@ -223,9 +223,9 @@ _CAPTION = (
     "first, evenly spread designs that the front dominates, over the number of designs tried."
 )
 _MEANS = (
-    "Error and gas are weighted means over the tasks. Friction, leak and stops are those of the scenarios' "
+    "Error and gas are weighted means over the tasks. Friction, leak and stops follow the scenarios' "
     "device, whatever the actuator. What the data sheet of a valve does not state (dead band, delay) is taken as "
-    "ideal; the sensors are those of the scenarios."
+    "ideal; the sensors are the scenarios'."
 )
 
 

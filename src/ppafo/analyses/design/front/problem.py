@@ -35,7 +35,7 @@ OWN = {
     SIZE: Quantity(
         "size",
         "",
-        "scale of the actuator's torque constant, volume per angle and mass relative to the part",
+        "scale of the actuator's torque constant, displacement and mass relative to the part",
         None,
         0.05,
         20.0,

@@ -240,7 +240,7 @@ _ORIGINS = {
     "synthetic": "synthetic, not measured",
 }
 _CAPTION = (
-    "A: the prescribed torque and that of the suggestion. B, C: every valve over supply pressure, each dot with the "
+    "A: the prescribed torque and the suggestion's. B, C: every valve over supply pressure, each dot with the "
     "gains that use least gas within the limit; rings are the chosen pressures."
 )
 _READING = (
@@ -355,10 +355,10 @@ def _method(sizing: Sizing) -> list[str]:
     carried = [*problem.regulators, *([] if problem.actuator is None else [problem.actuator])]
     others = f" with {', '.join(part.title for part in carried)}" if carried else ""
     return [
-        f"The mass is that of valve and full bottle{others}.",
+        f"The mass counts valve and full bottle{others}.",
         f"{problem.simulated} repetitions of the profile were simulated from the initial state of the scenario; "
         "error and gas cover all of them, including the first filling of the chambers. Friction, leak, dead volumes "
-        "and sensors are those of the scenario; what the data sheet of a valve does not state is taken as ideal.",
+        "and sensors are the scenario's; what the data sheet of a valve does not state is taken as ideal.",
         f"Made with: ppafo design {problem.file}",
     ]
 

@@ -187,7 +187,7 @@ class SizingPartsTable(StrictTable):
 
     valves: Annotated[_Names, Field(description="valves to choose from, of the kind that the scenario has")]
     bottles: Annotated[_Names, Field(description="bottles to choose from")]
-    actuator: Annotated[str | None, Field(description="actuator; default: that of the scenario's device")] = None
+    actuator: Annotated[str | None, Field(description="actuator; default: the scenario's")] = None
     regulators: Annotated[Texts, Field(description="regulators that are carried (all of those listed)")] = ()
 
 

@@ -1,6 +1,6 @@
 """Two McKibben muscles on a pulley, one against the other: inflated, each grows thick and short.
 
-The volume of a braided muscle of length L is that of a cylinder whose surface is the braid,
+The volume of a braided muscle of length L is the volume of a cylinder whose surface is the braid,
 V = L (b^2 - L^2)/(4 pi n^2) with threads of length b wound n times, and its force is -p dV/dL: Chou and Hannaford,
 Measurement and modeling of McKibben pneumatic artificial muscles, IEEE Transactions on Robotics and Automation 12(1),
 1996. Muscle 1 drives plantarflexion. What rubber and braid lose is friction of the set, what rubber stores its passive
