@@ -46,10 +46,10 @@ def simulate(scenario: Scenario, *, check: bool = False, overrides: Overrides = 
     from ppafo.report.writing import REPORT, page_of
 
     figures = figure_files(result.plot())
-    report = page_of(_answer(result, checked), {FIGURE: figures[f"{FIGURE}.svg"]})
+    report = page_of(_answer(result, checked).finding(), {FIGURE: figures[f"{FIGURE}.svg"]})
     files = {} if checked is None else {CHECK_FILE: f"{json_text(checked.document())}\n".encode()}
     result.save(folder, {**figures, REPORT: report, **files})
-    from ppafo.simulation.scenario import plain
+    from ppafo.documents.json_text import plain
 
     metrics = {name: plain(metric) for name, metric in result.metrics.items()}
     document = {

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import matplotlib.figure
 
+    from ppafo.report.finding import Finding, LivePart
+
 Cell = str | float | None
 """A number in SI, a text, or None where there is nothing to say."""
 
@@ -66,18 +68,6 @@ class Section:
 
 
 @dataclass(frozen=True, slots=True)
-class LivePart:
-    """A part of a page that simulates: HTML with its own script, and the policy that allows that script alone.
-
-    ``difference`` is a sentence on how its runs begin otherwise than those of the page, empty where they do not.
-    """
-
-    policy: str
-    html: str
-    difference: str = ""
-
-
-@dataclass(frozen=True, slots=True)
 class Answer:
     """What an analysis found.
 
@@ -95,16 +85,53 @@ class Answer:
     sections: tuple[Section, ...]
     data: Mapping[str, Any]
     passed: bool = True
-    kind: str = "simulated"
+    kind: Any = "simulated"
     files: Mapping[str, Callable[[], bytes]] = field(default_factory=dict)
     command: str = ""
     page: Callable[[Mapping[str, bytes]], bytes] | None = None
-    live: Callable[[], LivePart | None] | None = None
+    live: "Callable[[], LivePart | None] | None" = None
 
-    @property
-    def figures(self) -> tuple[Figure, ...]:
-        """The figures of all sections, in their order."""
-        return tuple(section.figure for section in self.sections if section.figure is not None)
+    def finding(self) -> "Finding[Any]":
+        """Return it in the form that is written."""
+        from ppafo.report.finding import Finding, Part, columns_of
+        from ppafo.report.kind import Kind
+
+        parts = []
+        for item in self.sections:
+            table, figure = item.table, item.figure
+            titles: list[Any] = []
+            if table is not None:
+                titles = [(head.title, Kind("", "", head.quantity, head.form)) for head in table.head]
+                titles = titles or [""] * len(table.rows[0] if table.rows else ())
+            parts.append(
+                Part(
+                    item.heading,
+                    [] if table is None else columns_of(titles, table.rows),
+                    item.paragraphs,
+                    item.remarks,
+                    name="" if figure is None else figure.name,
+                    caption="" if figure is None else figure.caption,
+                    draw=None if figure is None else figure.draw,
+                    code=item.code,
+                    left=1 if table is None else table.left,
+                    marked=() if table is None else table.marked,
+                    is_detail=item.is_detail,
+                )
+            )
+        return Finding(
+            self.name,
+            self.kicker,
+            self.title,
+            self.lead,
+            parts,
+            self.data,
+            self.passed,
+            self.files,
+            self.command,
+            self.live,
+            self.kind,
+            self.page,
+        )
 
 
-__all__ = ["Answer", "Cell", "Column", "Figure", "LivePart", "Section", "Table"]
+__all__ = ["Answer", "Cell", "Column", "Figure", "Section", "Table"]

@@ -24,7 +24,7 @@ class Solved:
         """Return what the command prints."""
         from ppafo.report.writing import text_of
 
-        return text_of(self.answer())
+        return text_of(self.answer().finding())
 
     def __repr__(self) -> str:
         """Return the class and the title of the result."""
@@ -34,7 +34,7 @@ class Solved:
         """Return the page, which a notebook shows."""
         from ppafo.report.writing import notebook_of
 
-        return notebook_of(self.answer())
+        return notebook_of(self.answer().finding())
 
     def to_dict(self) -> dict[str, Any]:
         """Return what ``--json`` prints, as plain data in SI."""
@@ -42,15 +42,8 @@ class Solved:
 
     def plot(self, name: str | None = None) -> "matplotlib.figure.Figure":
         """Return a figure of the result, the first unless named; LookupError where it has none of that name."""
-        figures = {figure.name: figure for figure in self.answer().figures}
-        chosen = figures.get(name or next(iter(figures), ""))
-        drawn = None if chosen is None else chosen.draw()
-        if drawn is None or isinstance(drawn, bytes):
-            raise LookupError(f"there is no figure '{name or ''}'; available: {', '.join(figures) or 'none'}")
-        return drawn
+        return self.answer().finding().plot(name)
 
     def save(self, folder: str | Path) -> None:
         """Write text, JSON, page and figures into a folder: absent, empty or an earlier result, else DataError."""
-        from ppafo.report.writing import write_answer
-
-        write_answer(self.answer(), Path(folder))
+        self.answer().finding().save(folder)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ppafo.constants import PASCALS_PER_PSI, STANDARD_ATMOSPHERE
+from ppafo.documents.json_text import plain
 from ppafo.errors import DataError
 from ppafo.identification.bench.result import BenchResult, count_of, figure_3, procedure_figure
 from ppafo.identification.estimate import Estimate
@@ -32,7 +33,6 @@ from ppafo.report.style import (
     mark_kind,
 )
 from ppafo.signals import Recording, RecordingKind
-from ppafo.simulation.scenario import plain
 from ppafo.units import percentage
 
 if TYPE_CHECKING:

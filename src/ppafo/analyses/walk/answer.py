@@ -22,6 +22,7 @@ from ppafo.analyses.walk.course import (
 from ppafo.analyses.walk.document import versions, walk_data, walk_document
 from ppafo.analyses.walk.reacting import reacting_answer
 from ppafo.analyses.walk.safety import over_time_sections, safety_remarks
+from ppafo.documents.json_text import plain
 from ppafo.live.workbench import live_part
 from ppafo.metrics import Metric
 from ppafo.metrics.strides import PER_STRIDE
@@ -31,7 +32,7 @@ from ppafo.report import Answer, Column, Figure, Section, Table
 from ppafo.report.display_units import rounded_text, title_with_unit
 from ppafo.report.solved import Solved
 from ppafo.signals.recording import Floats
-from ppafo.simulation.scenario import UNITS, Scenario, plain
+from ppafo.simulation.scenario import UNITS, Scenario
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.walking import course as courses

@@ -8,12 +8,13 @@ import numpy as np
 from ppafo.analyses.walk.course import bottle_data, bottle_remark, bottle_sections
 from ppafo.analyses.walk.document import walk_data
 from ppafo.analyses.walk.safety import over_time_sections, safety_remarks
+from ppafo.documents.json_text import plain
 from ppafo.gait.document import load_gait
 from ppafo.metrics.strides import SETTLING
 from ppafo.report import Answer, Column, Figure, Section, Table
 from ppafo.report.display_units import display_values, rounded_text, title_with_unit
 from ppafo.report.style import BLUE, GREY, VERMILION, house_style, mark_kind
-from ppafo.simulation.scenario import Scenario, plain
+from ppafo.simulation.scenario import Scenario
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.walking.motion import person_remarks, walk_of

@@ -47,9 +47,9 @@ if TYPE_CHECKING:
     from ppafo.analyses.tune.answer import Tuned
     from ppafo.analyses.tune.problem import Problem
     from ppafo.progress import Report
+    from ppafo.report.finding import Finding
     from ppafo.simulation.scenario import Scenario
     from ppafo.studies.study import Configurations, Study
-    from ppafo.study.finding import Finding
 
 StudyLike = Annotated["Study | str | Path | Mapping[str, Any]", Word("STUDY")]
 DistributedStudy = Annotated[
@@ -304,7 +304,7 @@ def linearise(
     *,
     at: Point = "equilibrium",
     overrides: Overrides = (),
-) -> LinearModel:
+) -> Finding[LinearModel]:
     """Make a linear model of the plant near one point, for control design.
 
     The equilibrium is the steady state whose torque is the last value of the reference, or, where the controller is a

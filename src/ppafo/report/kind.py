@@ -18,7 +18,21 @@ from ppafo.report.display_units import (
     quantity_of_unit,
 )
 from ppafo.report.setting_names import label_of
-from ppafo.studies.distributions import Floats, Interval
+from ppafo.signals.recording import Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """An estimate and the ends of its confidence interval, all in one unit; an end may be infinite."""
+
+    value: float
+    low: float
+    high: float
+
+    @property
+    def width(self) -> float:
+        """Distance of the two ends."""
+        return self.high - self.low
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +48,11 @@ class Kind:
     def shown_unit(self) -> str:
         """The unit in which it is shown; empty for a plain number."""
         return display_unit(self.quantity) if self.quantity else self.unit.removeprefix("-")
+
+    @property
+    def shown_change_unit(self) -> str:
+        """The unit in which a difference of two values is shown."""
+        return "psi" if self.quantity == "pressure" else self.shown_unit
 
     @property
     def title(self) -> str:
