@@ -35,8 +35,8 @@ class Panel:
     """A panel of a figure: what its axes are, and the marks on them.
 
     ``scale`` is what the colours of a map or of points stand for; panels that follow each other with one scale share
-    its bar. ``legend`` is "above", "inside" or empty. ``then`` has the last word on the axes. ``tall`` is its height
-    over that of others; two below each other that ``shares_x`` have one horizontal axis.
+    its bar. ``legend`` is "above", "inside", "figure" (above all panels) or empty. ``then`` has the last word on the
+    axes. ``tall`` is its height over that of others; two below each other that ``shares_x`` have one horizontal axis.
     """
 
     x: Kind
@@ -136,7 +136,10 @@ def draw_panels(
         _share_scales(figure, [(axes, panel, each) for axes, panel, each in zip(grid, panels, drawn, strict=False)])
         if title:
             figure.suptitle(title, x=0.01, ha="left", fontsize=11, wrap=True, parse_math=False)
-        figure.text(0.012, 0.06 / height, "\n".join(notes), va="bottom", fontsize=9, color=VERMILION, parse_math=False)
+        if notes:
+            figure.text(
+                0.012, 0.06 / height, "\n".join(notes), va="bottom", fontsize=9, color=VERMILION, parse_math=False
+            )
         mark_kind(figure, kind)
         return figure
 
@@ -153,6 +156,9 @@ def _draw(axes: "Axes", panel: Panel) -> Any:
     if panel.legend and any(mark.label for mark in panel.marks):
         if panel.legend == "above":
             label_lines(axes)
+        elif panel.legend == "figure":
+            names = axes.get_legend_handles_labels()
+            axes.figure.legend(*names, loc="outside upper left", ncols=3, columnspacing=1.4, handlelength=1.4)
         else:
             axes.legend(loc="best", frameon=True, framealpha=0.85, edgecolor="none", handlelength=1.2)
     if panel.then is not None:

@@ -330,7 +330,7 @@ def design(
     pressure: Pressure | None = None,
     minutes: Minutes | None = None,
     progress: Report | None = None,
-) -> Design | Sizing | WearerSizing:
+) -> Finding[Design] | Finding[Sizing] | Finding[WearerSizing]:
     """Find a device: for a wearer, for a torque profile, or Pareto-optimal in error, gas and mass.
 
     A wearer has a body mass and may have a stature; torque, pressure and minutes of walking are what the device is for.
