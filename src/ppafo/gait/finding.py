@@ -88,7 +88,7 @@ def gait_finding(gait: Gait, imported: ImportedGait | None = None) -> Finding[Ga
                 panels=lambda: gait_panels(gait, imported),
                 name="gait",
                 caption=_CAPTION,
-                size=(7.0, 1.9),
+                size=(7.0, 1.7),
                 title=f"{gait.name}: {gait.body_mass:.4g} kg{speed}, stride {gait.stride_time:.3g} s",
                 is_detail=True,
             ),
@@ -164,13 +164,13 @@ def _stride(stride: Stride) -> dict[str, float]:
 _STANCE = "#dddddd"
 _STRIDE = Kind("Stride", "%")
 _PANELS: dict[str, Kind] = {
-    "shank_angle": Kind("Shank angle\n(above 0: ankle in front of the knee)", "rad", "angle"),
-    "ankle_angle": Kind("Ankle angle\n(0 neutral, dorsiflexion positive)", "rad", "angle"),
-    "ankle_moment": Kind("Ankle moment\n(above 0: plantarflexion)", "N m/kg"),
-    "vertical_force": Kind("Vertical ground\nreaction (body weights)"),
-    "centre_of_pressure": Kind("Centre of pressure\nin front of the ankle", "m", "body length"),
-    "knee_forward": Kind("Acceleration of\nthe knee forward", "m/s^2", "acceleration"),
-    "knee_up": Kind("Acceleration of the knee\nupwards (without gravity)", "m/s^2", "acceleration"),
+    "shank_angle": Kind("Shank angle (above 0: ankle in front of the knee)", "rad", "angle"),
+    "ankle_angle": Kind("Ankle angle (0 neutral, dorsiflexion positive)", "rad", "angle"),
+    "ankle_moment": Kind("Ankle moment (above 0: plantarflexion)", "N m/kg"),
+    "vertical_force": Kind("Vertical ground reaction (body weights)"),
+    "centre_of_pressure": Kind("Centre of pressure in front of the ankle", "m", "body length"),
+    "knee_forward": Kind("Acceleration of the knee forward", "m/s^2", "acceleration"),
+    "knee_up": Kind("Acceleration of the knee upwards (without gravity)", "m/s^2", "acceleration"),
 }
 
 

@@ -62,8 +62,13 @@ class Kind:
     @property
     def axis(self) -> str:
         """Words and unit for an axis."""
+        return f"{self.words} ({self.axis_unit})" if self.axis_unit else self.words
+
+    @property
+    def axis_unit(self) -> str:
+        """The unit for an axis, empty for a plain number."""
         unit = axis_unit(self.quantity) if self.quantity else self.shown_unit
-        return self.words if unit in ("", "1") else f"{self.words} ({unit})"
+        return "" if unit == "1" else unit
 
     def values(self, values: ArrayLike) -> Floats:
         """Return values in SI in the unit in which they are shown."""

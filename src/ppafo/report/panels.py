@@ -36,7 +36,8 @@ class Panel:
 
     ``scale`` is what the colours of a map or of points stand for; panels that follow each other with one scale share
     its bar. ``legend`` is "above", "inside", "figure" (above all panels) or empty. ``then`` has the last word on the
-    axes. ``tall`` is its height over that of others; two below each other that ``shares_x`` have one horizontal axis.
+    axes. ``tall`` is its height over that of others. Two below each other that ``shares_x`` have one horizontal axis,
+    and say above them what the vertical one is. Where one has no marks, its place stays empty.
     """
 
     x: Kind
@@ -122,14 +123,15 @@ def draw_panels(
     below = _LINE * len(notes)
     width, height = size[0] * across + 0.3, size[1] * sum(heights) + 0.4 + below
     with house_style():
-        rect = (0.0, below / height, 1.0, 1.0 - (_TOP + below) / height)
+        above = 0.0 if any(panel.legend == "figure" for panel in panels) else _TOP
+        rect = (0.0, below / height, 1.0, 1.0 - (above + below) / height)
         figure = Figure(figsize=(width, height), layout=ConstrainedLayoutEngine(w_pad=0.1, h_pad=0.08, rect=rect))
         grid = list(figure.subplots(rows, across, squeeze=False, height_ratios=heights).flat)
         drawn = [_draw(axes, panel) for axes, panel in zip(grid, panels, strict=False)]
         for axes in grid[len(panels) :]:
             axes.set_axis_off()
         for upper, lower, panel, other in zip(grid, grid[across:], panels, panels[across:], strict=False):
-            if panel.shares_x and other.shares_x:
+            if panel.shares_x and other.shares_x and other.marks:
                 upper.sharex(lower)
                 upper.tick_params(labelbottom=False)
                 upper.set_xlabel("")
@@ -146,13 +148,16 @@ def draw_panels(
 
 def _draw(axes: "Axes", panel: Panel) -> Any:
     """Draw a panel, and return what has colours that stand for numbers."""
+    if not panel.marks:
+        axes.set_axis_off()
+        return None
     mapped = None
     for mark in panel.marks:
         shown = SHAPES[mark.shape](axes, mark, panel.x.values(mark.x), panel.y.values(mark.y))
         mapped = shown if mark.shape in ("map", "points") else mapped
     axes.set_xlabel(panel.x.axis)
-    axes.set_ylabel(panel.y.axis)
-    axes.set_title(panel.title)
+    axes.set_ylabel(panel.y.axis if not panel.shares_x else panel.y.axis_unit if panel.title else "")
+    axes.set_title(panel.title or (panel.y.axis if panel.shares_x else ""))
     if panel.legend and any(mark.label for mark in panel.marks):
         if panel.legend == "above":
             label_lines(axes)

@@ -24,7 +24,7 @@ def fit_figure(samples: Recording, model: Recording) -> Figure:
 
 def test_every_fitted_channel_has_a_panel_and_one_for_what_is_left() -> None:
     figure = fit_figure(recording("measured", 0.0), recording("simulated", 0.5))
-    names = [axes.get_ylabel() for axes in figure.axes]
+    names = [axes.get_title(loc="left") for axes in figure.axes]
     assert names == [
         "Vane angle (deg)",
         "model minus sample (deg)",

@@ -106,7 +106,7 @@ def trajectory_panels(measurement: Recording, model: Recording, atmosphere: floa
             Mark("line", times, fitted, (), "model", look.colour, {"linewidth": 1.2}),
         ]
         legend = "" if panels else "above"
-        panels.append(Panel(TIME, kind, marks, legend=legend, then=_set_time(measurement), tall=1.0, shares_x=True))
+        panels.append(Panel(TIME, kind, marks, legend=legend, then=_set_time(measurement), shares_x=True))
         left = [
             Mark("line", times, fitted - samples, colour=look.colour, style=_DOTS),
             Mark("level", (), 0.0, colour=GREY, style={"linewidth": 0.8}),

@@ -14,7 +14,7 @@ from ppafo.errors import DataError, nearest_name, one_line
 from ppafo.parameters import load_device
 from ppafo.parameters.device import Device
 from ppafo.progress import Progress, Report, report_nothing
-from ppafo.report.display_units import quantity_of_unit
+from ppafo.report.display_units import display_value, quantity_of_unit
 from ppafo.report.finding import Finding, Part, columns_of, facts
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Mark, Panel
@@ -188,7 +188,9 @@ def agreement_panels(agreement: RecordingAgreement, atmosphere: float) -> list[P
     pairs = [_channel_panels(agreement, channel, atmosphere) for channel in agreement.channels]
     across = _across(agreement)
     rows = [pairs[first : first + across] for first in range(0, len(pairs), across)]
-    return [panel for row in rows for column in zip(*row, strict=True) for panel in column]
+    empty = (Panel(TIME, TIME, ()), Panel(TIME, TIME, (), tall=0.5))
+    filled = [[*row, *[empty] * (across - len(row))] for row in rows]
+    return [panel for row in filled for line in zip(*row, strict=True) for panel in line]
 
 
 def _across(agreement: RecordingAgreement) -> int:
@@ -199,8 +201,7 @@ def _channel_panels(agreement: RecordingAgreement, channel: ChannelAgreement, at
     """Return samples and model over time, and below them model less measured."""
     name, measured, model = channel.channel, agreement.measured, agreement.model
     given = measured_values(measured, name)
-    if given is None:
-        return _EMPTY, _EMPTY
+    assert given is not None, "a channel that is compared was measured"
     line = np.interp(measured.time - agreement.delay.correction, model.time, model[name])
     is_short, is_chamber = measured.duration < _SHORT, name in (PRESSURE_1, PRESSURE_2)
     time, scale = (Kind("Time", "ms"), _MILLISECONDS) if is_short else (TIME, 1.0)
@@ -236,13 +237,11 @@ def _channel_panels(agreement: RecordingAgreement, channel: ChannelAgreement, at
         ],
         f"{COMPARED[name].title}: RMS {100 * channel.fraction:.2g} %",
         legend="figure" if is_first else "",
-        tall=1.0,
         shares_x=True,
     )
     return upper, Panel(time, replace(change, words="Model less measured"), marks, tall=0.5, shares_x=True)
 
 
-_EMPTY = Panel(TIME, TIME, ())
 _MILLISECONDS = 1.0e3
 _HEAD = ("channel", "RMS error", "in noise", "variation", "of range", "limit", "bias", "largest", "at", "verdict")
 _UNUSUAL = re.compile(r"[^A-Za-z0-9_.-]+")
@@ -406,7 +405,7 @@ def channel_cells(channel: ChannelAgreement) -> tuple[str, ...]:
 
 def _error(channel: ChannelAgreement, value: float) -> str:
     kind = Kind("", "", COMPARED[channel.channel].quantity)
-    return f"{_number(float(kind.values(value)))} {kind.shown_unit}"
+    return f"{_number(display_value(value, kind.quantity))} {kind.shown_unit}"
 
 
 def _number(value: float) -> str:
@@ -448,5 +447,5 @@ def _channel_data(channel: ChannelAgreement) -> dict[str, Any]:
         "bias": channel.bias,
         "largest": channel.largest,
         "largest_time": channel.largest_time,
-        "shown": {"unit": kind.shown_unit, "rms": float(kind.values(channel.rms))},
+        "shown": {"unit": kind.shown_unit, "rms": display_value(channel.rms, kind.quantity)},
     }

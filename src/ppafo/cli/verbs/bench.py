@@ -149,7 +149,8 @@ def validate(
     no single change of record, set or model may explain the recordings better than noise of the sensors could. The
     result's ``found`` has ``passes`` and, in ``recordings``, one ``RecordingAgreement`` each: ``measured`` and
     ``model`` are recordings, their channels of shape (samples,) in SI; ``channels`` has RMS error, bias, largest error
-    and delay [s] of each channel in its SI unit (rad, Pa, N m). DataError, ParameterError or SimulationError for bad input.
+    and delay [s] of each channel in its SI unit (rad, Pa, N m). DataError, ParameterError or SimulationError for bad
+    input.
 
     parameter_set: name of a parameter set, or a .toml file
     recordings: a .csv or .nc file, or a result folder; several may be given

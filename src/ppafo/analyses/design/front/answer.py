@@ -258,7 +258,7 @@ def finding_of(design: Design) -> Finding[Design]:
                 name="front",
                 caption=_CAPTION,
                 across=2,
-                size=(4.5, 3.4),
+                size=(4.5, 3.5),
                 is_detail=True,
             ),
             *_suggestion(design),
