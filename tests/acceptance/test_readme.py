@@ -183,12 +183,12 @@ def test_the_answers_of_the_five_minutes_are_those_of_runs() -> None:
 
 @pytest.mark.short
 def test_the_table_of_claims_is_that_of_a_run(studies: Studies) -> None:
-    assert shown_claims() == claims_of("\n".join(text_of(studies.answer()).splitlines()[1:-2]))
+    assert shown_claims() == claims_of("\n".join(text_of(studies).splitlines()[1:-2]))
 
 
 def test_the_interpretations_of_u_on_the_page_are_those_of_a_run(reproduction: Reproduction) -> None:
     (shown,) = re.findall(r"^    U is .*\n(?:    .*\n){3}", STUDIES_PAGE, re.MULTILINE)
-    assert textwrap.dedent(shown) in text_of(reproduction.answer())
+    assert textwrap.dedent(shown) in text_of(reproduction)
 
 
 def test_the_limits_of_accuracy_are_those_of_the_tests() -> None:

@@ -4,11 +4,11 @@ import sys
 from pathlib import Path
 
 import pytest
+from ppafo.report.solved import Solved
 
 import ppafo
 from ppafo.cli.main import main
 from ppafo.kinds import kind_at
-from ppafo.report.solved import Solved
 
 FEWEST_ANSWERS = 14
 
@@ -26,7 +26,7 @@ def test_a_printed_answer_is_what_its_command_prints(capsys: pytest.CaptureFixtu
     assert main(["sets", "parts"]) == 0
     found = ppafo.parts()
     assert capsys.readouterr().out == f"{found}\n"
-    assert repr(found) == f"<Parts: {found.answer().title}>"
+    assert repr(found) == f"<Parts: {found.title}>"
 
 
 def test_every_public_answer_prints_its_table_and_has_a_short_form() -> None:

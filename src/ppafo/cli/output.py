@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from ppafo.documents.json_text import json_text
 from ppafo.errors import DataError, reason
@@ -17,8 +17,6 @@ from ppafo.progress import ProgressLine
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from ppafo.report import Answer
 
 
 EXIT_GOOD = 0
@@ -81,17 +79,10 @@ class Said:
     draw: "Callable[[], Figure] | None" = None
 
 
-class Answering(Protocol):
-    """What a solved question can do."""
-
-    def answer(self) -> "Answer":
-        """Return sections for people and data for programs."""
-
-
 def deliver(found: Any, as_json: bool, out: Path | None, command: str, *, has_written: bool = False) -> int:
     """Write what a verb returned into a folder where requested, print it as text or JSON, and return the exit code.
 
-    ``has_written`` is true of a verb which writes itself; the data of its answer name the folder.
+    ``has_written`` is true of a verb which writes itself; what it found names the folder.
     """
     if isinstance(found, Said):
         if out is not None:
@@ -100,11 +91,8 @@ def deliver(found: Any, as_json: bool, out: Path | None, command: str, *, has_wr
         if found.aside:
             print(f"ppafo: {found.aside}", file=sys.stderr)
         return found.exit_code
-    from ppafo.report.finding import Finding
     from ppafo.report.writing import REPORT, text_of
 
-    if not isinstance(found, Finding):
-        found = getattr(found, "answer", lambda: found)().finding()
     text, document = text_of(found), found.to_dict()
     folder = str(document["folder"]) if has_written else None
     if out is not None:

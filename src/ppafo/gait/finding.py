@@ -213,5 +213,5 @@ def _panel(gait: Gait, name: str, imported: ImportedGait | None, is_first: bool)
                 text, (at, height), xycoords=place, xytext=(3, 0), textcoords=offset, color=GREY, fontsize=8.5
             )
 
-    legend = "above" if is_first else ""
+    legend = "inside" if is_first else ""
     return Panel(_STRIDE, _PANELS[name], marks, legend=legend, then=name_events, shares_x=True)

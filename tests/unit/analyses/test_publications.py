@@ -156,7 +156,7 @@ def test_changed_values_go_with_the_paper_only(capsys: pytest.CaptureFixture[str
 
 def test_a_study_is_written_as_claims_text_and_page(tmp_path: Path) -> None:
     out = tmp_path / "out"
-    answer = studied(tmp_path, TEXT).answer()
+    answer = studied(tmp_path, TEXT)
     assert answer.data["claims"][0]["value"] == pytest.approx(9.0, rel=1e-3)
     assert answer.data["counts"]["consistent"] == 1
     assert main(["reproduce", "--study", written(tmp_path, TEXT), "--out", str(out)]) == 0

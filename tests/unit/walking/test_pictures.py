@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from ppafo.analyses.walk.answer import comparison_table, wearers_answer
+from ppafo.analyses.walk.answer import comparison_table, wearers_finding
 from ppafo.report.writing import text_of
 from ppafo.signals import Channel, Recording
 from ppafo.walking import Comparison, WalkResult, compare_walks, load_walk, walk, walk_population
@@ -163,7 +163,7 @@ def test_histograms_hold_every_wearer() -> None:
     figure = population_figure(people)
     heights = [patch.get_height() for patch in figure.axes[0].patches]
     assert sum(heights) == 60
-    lines = text_of(wearers_answer(people)).splitlines()
+    lines = text_of(wearers_finding(people)).splitlines()
     assert lines[0] == "proportional: 60 wearers, 0.1 min each"
     gas = [float(cell) for cell in next(line for line in lines if line.startswith("Gas")).split()[4:]]
     assert gas == sorted(gas)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, overload
+from typing import TYPE_CHECKING, Annotated, Any
 
 from ppafo.cli.arguments import (
     Confidence,
@@ -81,21 +81,9 @@ Agreed = Annotated[bool, Word(option="--yes")]
 GasUseLike = Annotated["GasUse | Sequence[GasUse]", Word("RECORDING", Path, is_repeated=True)]
 
 
-@overload
-def reproduce(
-    *, study: Literal["ppafo-2011"] = ..., overrides: Overrides = ..., progress: Report | None = ...
-) -> Reproduction: ...
-
-
-@overload
-def reproduce(
-    *, study: str = ..., overrides: Overrides = ..., progress: Report | None = ...
-) -> Reproduction | Studies: ...
-
-
 def reproduce(
     *, study: Name = "ppafo-2011", overrides: Overrides = (), progress: Report | None = None
-) -> Reproduction | Studies:
+) -> Finding[Reproduction] | Finding[Studies]:
     """Reproduce the paper's experiments and check its claims.
 
     ``overrides`` change the experiments (not the paper's printed numbers): a path of a scenario reaches those that
@@ -359,7 +347,7 @@ def bottle(
     rest: Time | None = None,
     longest: Time = 86400.0,
     overrides: Overrides = (),
-) -> Endurance | Endurances:
+) -> Finding[Endurance] | Finding[Endurances]:
     """Compute how long a bottle of gas lasts, and why it ends.
 
     A walk, its result or its folder, walks on the bottle until that ends it. Any other gas use is that of

@@ -25,6 +25,7 @@ from ppafo.cli.arguments import (
 
 if TYPE_CHECKING:
     from ppafo.analyses.walk.answer import WalkPair, Wearers
+    from ppafo.analyses.walk.reacting import ReactingPair
     from ppafo.cli.output import Said
     from ppafo.gait.finding import GaitFound
     from ppafo.progress import Report
@@ -45,7 +46,7 @@ def walk(
     seed: Whole = 1,
     overrides: Overrides = (),
     progress: Report | None = None,
-) -> WalkPair | Wearers:
+) -> Finding[WalkPair] | Finding[ReactingPair] | Finding[Wearers]:
     """Simulate walking with the device, without it, and healthy.
 
     configuration: name of a walk configuration, or a .toml file; default solenoid
