@@ -38,9 +38,9 @@ def test_the_answer_of_a_wearer_who_reacts_says_and_shows_where_help_was_less() 
     assert first.startswith("lift-only (no push-off) from 2.00 s: ")
     assert first.endswith("; heel 0 N, toe 319 N")
     assert second == f"help in 1 of {helped.size} strides: fewer than half"
-    ends = {name for name, *_ in answer.parts[0].table.rows}  # type: ignore[union-attr]
+    ends = {name for name, *_ in answer.parts[0].rows}
     assert "Strides with help, of gas and push-off" in ends
-    (written,) = answer.data["events"]
+    (written,) = answer.to_dict()["events"]
     assert (written["time"], written["fault_flag"]) == (2.0, flag.name)
 
 
