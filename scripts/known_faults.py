@@ -131,7 +131,7 @@ def validated(fault: Fault, seed: int) -> Validation:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "recorded.csv"
         write_csv(file, recorded(fault, seed))
-        return ppafo.validate("ppafo2011", [file], overrides=SUPPLY)
+        return ppafo.validate("ppafo2011", [file], overrides=SUPPLY).found
 
 
 def judged(fault: Fault, found: Validation) -> str:

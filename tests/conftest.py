@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from ppafo.analyses.reproduce.answer import Reproduction
-from ppafo.analyses.reproduce.solve import reproduce
+from ppafo.analyses.reproduce.solve import reproduce_paper
 from ppafo.engine import cache
 from ppafo.engine.loading import BACKEND_VARIABLE, NUMBA
 from ppafo.simulation.loading import load_scenario
@@ -80,7 +80,7 @@ def shorter() -> Callable[[Scenario, float], Scenario]:
 @pytest.fixture(scope="session")
 def reproduction() -> Reproduction:
     """The paper's experiments."""
-    return reproduce()
+    return reproduce_paper()
 
 
 @pytest.fixture

@@ -72,6 +72,7 @@ if TYPE_CHECKING:
     from ppafo.parameters.parts import Catalogue as Catalogue
     from ppafo.parameters.parts import Part as Part
     from ppafo.parameters.parts import load_catalogue as load_catalogue
+    from ppafo.report.finding import Finding as Finding
     from ppafo.running import simulate as simulate
     from ppafo.signals import Channel as Channel
     from ppafo.signals import Recording as Recording
@@ -84,7 +85,6 @@ if TYPE_CHECKING:
     from ppafo.storage import read_result as read_result
     from ppafo.studies.loading import list_studies as list_studies
     from ppafo.studies.loading import load_study as load_study
-    from ppafo.study.finding import Finding as Finding
     from ppafo.walking import compare_walks as compare_walks
     from ppafo.walking import list_walks as list_walks
     from ppafo.walking import load_walk as load_walk
@@ -146,7 +146,7 @@ _HOMES = {
     "ppafo.simulation.simulate": ("Result", "Status", "simulate_many"),
     "ppafo.storage": ("read_recording", "read_result"),
     "ppafo.studies.loading": ("list_studies", "load_study"),
-    "ppafo.study.finding": ("Finding",),
+    "ppafo.report.finding": ("Finding",),
     "ppafo.walking": ("compare_walks", "list_walks", "load_walk", "walk_population"),
     "ppafo.walking.walk": ("walk",),
 }

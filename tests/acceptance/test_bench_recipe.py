@@ -29,7 +29,7 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def found(bench: Path) -> Identification:
     """What the five procedures make of it."""
-    return identify(bench / "problem.toml")
+    return identify(bench / "problem.toml").found
 
 
 def test_every_value_lies_inside_its_interval_or_is_flagged(bench: Path, found: Identification) -> None:

@@ -34,7 +34,7 @@ def raw_files(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def cylinder(raw_files: Path) -> Identification:
     """What the first problem of the page gives."""
     (raw_files / "cylinder-problem.toml").write_text(blocks("toml")[0], encoding="utf-8")
-    return identify(raw_files / "cylinder-problem.toml")
+    return identify(raw_files / "cylinder-problem.toml").found
 
 
 def test_the_known_area_lies_inside_the_interval_and_within_a_quarter_percent(cylinder: Identification) -> None:
@@ -65,7 +65,7 @@ def test_with_its_lever_arm_the_friction_of_a_sliding_cylinder_is_friction_in_mo
         'force = { column = 7, unit = "N" }', 'torque = { column = 7, unit = "N", times = "22 mm" }'
     )
     (raw_files / "lever.toml").write_text(text, encoding="utf-8")
-    found = identify(raw_files / "lever.toml")
+    found = identify(raw_files / "lever.toml").found
     growth = "effects.seal_friction.dynamic_per_pressure"
     assert set(found.new_set.fitted) == {"actuator.torque_constant", "friction.dynamic_torque", growth}
     assert found.results[0]["friction.dynamic_torque"].value == pytest.approx(0.022 * 4.23, rel=0.01)
@@ -82,7 +82,7 @@ def test_a_wrong_sign_of_the_direction_is_found_in_the_real_data(raw_files: Path
 def test_a_chamber_whose_gas_comes_to_rest_gets_no_area(raw_files: Path, name: str, start: str) -> None:
     text = CHAMBER.replace("Prusa", name).replace("10 s", start)
     (raw_files / "chamber-problem.toml").write_text(text, encoding="utf-8")
-    outcome = identify(raw_files / "chamber-problem.toml")
+    outcome = identify(raw_files / "chamber-problem.toml").found
     assert outcome.new_set.written == ()
     (area,) = outcome.results[0].estimates
     assert area.path == "vane_leak.area_over_volume"

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from ppafo.analyses.reproduce.answer import Reproduction, Studies
+from ppafo.analyses.reproduce.answer import Reproduction, Studies, finding_of, finding_of_studies
 from ppafo.analyses.reproduce.solve import reproduce
 from ppafo.cli.commands import COMMANDS
 from ppafo.cli.main import build_parser, main
@@ -67,7 +67,7 @@ def claims_of(printed: str) -> dict[str, list[str]]:
 @pytest.fixture(scope="module")
 def studies() -> Studies:
     """One run of every study, which the tests below only read."""
-    found = reproduce(study="all")
+    found = reproduce(study="all").found
     assert isinstance(found, Studies)
     return found
 
@@ -183,12 +183,12 @@ def test_the_answers_of_the_five_minutes_are_those_of_runs() -> None:
 
 @pytest.mark.short
 def test_the_table_of_claims_is_that_of_a_run(studies: Studies) -> None:
-    assert shown_claims() == claims_of("\n".join(text_of(studies.answer()).splitlines()[1:-2]))
+    assert shown_claims() == claims_of("\n".join(text_of(finding_of_studies(studies)).splitlines()[1:-2]))
 
 
 def test_the_interpretations_of_u_on_the_page_are_those_of_a_run(reproduction: Reproduction) -> None:
     (shown,) = re.findall(r"^    U is .*\n(?:    .*\n){3}", STUDIES_PAGE, re.MULTILINE)
-    assert textwrap.dedent(shown) in text_of(reproduction.answer())
+    assert textwrap.dedent(shown) in text_of(finding_of(reproduction))
 
 
 def test_the_limits_of_accuracy_are_those_of_the_tests() -> None:

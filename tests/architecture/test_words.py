@@ -54,7 +54,7 @@ ALLOWED_IN_PAGES: Mapping[str, tuple[str, str]] = {
 }
 """By page: words that stand there for something else, and for what."""
 
-COMPOSED = ("engine/", "translation/", "gym/episodes.py")
+COMPOSED = ("engine/", "translation/", "gym/episodes.py", "wearer/scheme.py")
 """Strings there are source text, in which a lane is a lane of a processor."""
 SOMETHING_ELSE = ("answers?", "courses?", "whole numbers?")
 """Words that messages need for something else: an answer of a board, `--course`, 'must be a whole number'."""

@@ -136,7 +136,9 @@ def test_the_reference_solver_has_the_same_law() -> None:
 
 def test_a_linear_model_has_it_as_a_difference_of_two_runs_has() -> None:
     venting = ("controller.kind=constant", "controller.command=-0.4", "run.duration=0.3 s")
-    rates = [linearise("torque-task-proportional", 0.2, (*venting, text)).rates for text in (f"{AREA}=0 mm^2", NARROW)]
+    rates = [
+        linearise("torque-task-proportional", 0.2, (*venting, text)).found.rates for text in (f"{AREA}=0 mm^2", NARROW)
+    ]
     step = ("run.step=0.01 ms", "run.output_interval=0.01 ms")
     found = simulate(load_scenario("torque-task-proportional", (*venting, NARROW, *step))).recording
     here = int(np.searchsorted(found.time, 0.2 - 1e-9))

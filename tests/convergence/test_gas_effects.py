@@ -72,7 +72,7 @@ def test_a_valve_that_joins_the_chambers_passes_gas_where_the_leak_is_shut() -> 
 
 def test_a_linear_model_has_the_leak_as_a_difference_of_two_runs_has() -> None:
     venting = ("controller.kind=constant", "controller.command=-0.4", "run.duration=0.3 s", *OPENING)
-    rates = linearise("torque-task-proportional", 0.2, venting).rates
+    rates = linearise("torque-task-proportional", 0.2, venting).found.rates
     step = ("run.step=0.01 ms", "run.output_interval=0.01 ms")
     found = simulate(load_scenario("torque-task-proportional", (*venting, *step))).recording
     here = int(np.searchsorted(found.time, 0.2 - 1e-9))
@@ -210,7 +210,7 @@ def test_a_column_of_the_second_virial_coefficient_has_the_bits_and_the_gas_of_t
 
 def test_a_linear_model_of_gas_that_is_not_ideal_is_a_difference_of_two_runs() -> None:
     moving = ("controller.kind=constant", "controller.command=-0.4", "run.duration=0.3 s", *REAL)
-    rates = linearise("torque-task-proportional", 0.2, moving).rates
+    rates = linearise("torque-task-proportional", 0.2, moving).found.rates
     step = ("run.step=0.01 ms", "run.output_interval=0.01 ms")
     found = simulate(load_scenario("torque-task-proportional", (*moving, *step))).recording
     here = int(np.searchsorted(found.time, 0.2 - 1e-9))

@@ -43,7 +43,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def fitted(folder: Path, more: str) -> TrajectoryFit:
     (folder / "problem.toml").write_text(f"{HEAD}{more}")
-    outcome = identify(folder / "problem.toml").trajectory
+    outcome = identify(folder / "problem.toml").found.trajectory
     assert outcome is not None
     return outcome.fit
 

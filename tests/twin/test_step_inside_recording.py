@@ -79,7 +79,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_right_model_is_no_misfit_where_its_step_lies_inside_the_recording(folder: Path) -> None:
     (folder / "problem.toml").write_text(PROBLEM)
-    outcome = identify(folder / "problem.toml").trajectory
+    outcome = identify(folder / "problem.toml").found.trajectory
     assert outcome is not None
     assert outcome.fit.conflict == ""
     for path, truth in TRUTH.items():
@@ -90,6 +90,6 @@ def test_the_right_model_is_no_misfit_where_its_step_lies_inside_the_recording(f
 
 
 def test_the_right_model_has_no_delay_where_its_step_lies_inside_the_recording(folder: Path) -> None:
-    (agreement,) = validate("ppafo2011", [folder / "there.csv"], overrides=THERE).recordings
+    (agreement,) = validate("ppafo2011", [folder / "there.csv"], overrides=THERE).found.recordings
     assert agreement.delay.value == pytest.approx(0.0, abs=1.5e-4)
     assert max(channel.fraction for channel in agreement.channels) < 0.005

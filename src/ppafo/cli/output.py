@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from ppafo.documents.json_text import json_text
 from ppafo.errors import DataError, reason
@@ -17,8 +17,6 @@ from ppafo.progress import ProgressLine
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from ppafo.report import Answer
 
 
 EXIT_GOOD = 0
@@ -81,19 +79,10 @@ class Said:
     draw: "Callable[[], Figure] | None" = None
 
 
-class Answering(Protocol):
-    """What a solved question can do."""
-
-    def answer(self) -> "Answer":
-        """Return sections for people and data for programs."""
-
-
-def deliver(
-    found: "Said | Answer | Answering", as_json: bool, out: Path | None, command: str, *, has_written: bool = False
-) -> int:
+def deliver(found: Any, as_json: bool, out: Path | None, command: str, *, has_written: bool = False) -> int:
     """Write what a verb returned into a folder where requested, print it as text or JSON, and return the exit code.
 
-    ``has_written`` is true of a verb which writes itself; the data of its answer name the folder.
+    ``has_written`` is true of a verb which writes itself; what it found names the folder.
     """
     if isinstance(found, Said):
         if out is not None:
@@ -102,23 +91,22 @@ def deliver(
         if found.aside:
             print(f"ppafo: {found.aside}", file=sys.stderr)
         return found.exit_code
-    from ppafo.report import Answer
     from ppafo.report.writing import REPORT, text_of
 
-    answer = found if isinstance(found, Answer) else found.answer()
-    text, folder = text_of(answer), str(answer.data["folder"]) if has_written else None
+    text, document = text_of(found), found.to_dict()
+    folder = str(document["folder"]) if has_written else None
     if out is not None:
         from ppafo.report.drawing import load_drawing
 
         load_drawing()
         from ppafo.report.writing import files_of
 
-        write_files(out, files_of(answer), command)
+        write_files(out, files_of(found), command)
         folder = str(out)
     if folder is not None:
         text += f"\n\nreport: {folder}/{REPORT}"
-    print_result(text, answer.data if folder is None else {**answer.data, "folder": folder}, as_json)
-    return EXIT_GOOD if answer.passed else EXIT_CHECK_FAILED
+    print_result(text, document if folder is None else {**document, "folder": folder}, as_json)
+    return EXIT_GOOD if found.passed else EXIT_CHECK_FAILED
 
 
 def said_files(said: Said) -> dict[str, bytes]:

@@ -9,7 +9,7 @@ from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, Said
 from ppafo.documents.json_text import json_text
 
 if TYPE_CHECKING:
-    from ppafo.report import Answer
+    from ppafo.report.finding import Finding
     from ppafo.simulation.accuracy import ErrorEstimate
     from ppafo.simulation.check import Check
     from ppafo.simulation.simulate import Result
@@ -46,10 +46,10 @@ def simulate(scenario: Scenario, *, check: bool = False, overrides: Overrides = 
     from ppafo.report.writing import REPORT, page_of
 
     figures = figure_files(result.plot())
-    report = page_of(_answer(result, checked), {FIGURE: figures[f"{FIGURE}.svg"]})
+    report = page_of(_finding(result, checked), {FIGURE: figures[f"{FIGURE}.svg"]})
     files = {} if checked is None else {CHECK_FILE: f"{json_text(checked.document())}\n".encode()}
     result.save(folder, {**figures, REPORT: report, **files})
-    from ppafo.simulation.scenario import plain
+    from ppafo.documents.json_text import plain
 
     metrics = {name: plain(metric) for name, metric in result.metrics.items()}
     document = {
@@ -76,38 +76,34 @@ def _error(result: "Result") -> "ErrorEstimate | None":
     return result.error() if result.status.is_completed and worn_kind(result.scenario) is None else None
 
 
-def _answer(result: "Result", check: "Check | None") -> "Answer":
+def _finding(result: "Result", check: "Check | None") -> "Finding[None]":
     """Return what the page of a result says: the metrics, the figure, and the run again, to be dragged."""
-    from ppafo.report import Answer, Figure, Section
+    from ppafo.report.display_units import metric_level, metric_words
+    from ppafo.report.finding import Finding, Part, columns_of
     from ppafo.report.live_parts import live_part
 
     scenario, status = result.scenario, result.status
     device = f"device '{scenario.device.name}', valve '{scenario.device.valve_name}'"
     changed = f"; values changed for this run: {', '.join(scenario.origin.overrides)}"
-    figure = Figure(FIGURE, "What the device does over time. Pressures count from the atmosphere.", result.plot)
-    from ppafo.report import Column, Table
-    from ppafo.report.display_units import metric_level, metric_words
-
+    caption = "What the device does over time. Pressures count from the atmosphere."
     zero = result.scenario.device.supply.atmospheric_pressure
     shown = {name: metric_level(metric.value, metric.unit, zero) for name, metric in result.metrics.items()}
     rows = [
         (metric_words(name), f"{value:.4g} {unit}".strip(), result.metrics[name].summary)
         for name, (value, unit) in shown.items()
     ]
-    return Answer(
+    return Finding(
         name="run",
         kicker=f"A run of {scenario.run.duration:g} s",
         title=scenario.name,
-        lead=(" ".join(scenario.description.split()), f"{device}{changed if scenario.origin.overrides else ''}"),
-        sections=(
-            Section(remarks=() if status.is_completed else (f"The run {status.message}",)),
-            Section(
-                "Metrics", table=Table((Column("Metric"), Column("Value"), Column("What it is")), tuple(rows), left=3)
-            ),
-            Section("Over time", figure=figure),
-            Section() if check is None else Section("What can be repeated", code=repr(check)),
+        said=(" ".join(scenario.description.split()), f"{device}{changed if scenario.origin.overrides else ''}"),
+        parts=(
+            Part(remarks=() if status.is_completed else (f"The run {status.message}",)),
+            Part("Metrics", columns_of(("Metric", "Value", "What it is"), rows), left=3),
+            Part("Over time", name=FIGURE, caption=caption, draw=result.plot),
+            Part() if check is None else Part("What can be repeated", code=repr(check)),
         ),
-        data={},
+        found=None,
         live=lambda: live_part([scenario]),
     )
 

@@ -1,6 +1,9 @@
 """Plain data as JSON, in the one form that files and ``--json`` have, and back; data from elsewhere has a limit."""
 
+import dataclasses
 import json
+import math
+import numbers
 from collections.abc import Mapping
 from typing import Any
 
@@ -15,6 +18,32 @@ def json_text(document: Mapping[str, Any]) -> str:
     """
     text = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False)
     return text.encode("utf-8", "backslashreplace").decode("utf-8")
+
+
+def plain(value: Any) -> Any:
+    """Return dicts, lists, texts and finite numbers; an infinite number becomes None, a controller its type's name."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        # Links are no part of what is run: what is not compared is not shown.
+        shown = {field.name: plain(getattr(value, field.name)) for field in dataclasses.fields(value) if field.compare}
+        if hasattr(type(value), "__getattr__"):  # then their numbers are its own attributes
+            for inner in ("orifice", "settings"):
+                shown |= shown.pop(inner, {})
+        return shown
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, tuple | list):
+        return [plain(item) for item in value]
+    return _plain_leaf(value)
+
+
+def _plain_leaf(value: Any) -> str | bool | int | float | None:
+    if value is None or isinstance(value, str | bool):
+        return value
+    if isinstance(value, numbers.Integral):
+        return int(value)
+    if isinstance(value, numbers.Real):
+        return float(value) if math.isfinite(value) else None
+    return f"{type(value).__module__}.{type(value).__qualname__}"
 
 
 def json_document(content: bytes) -> Any:

@@ -17,7 +17,7 @@ from ppafo.page.wasm import WasmModule, module_of
 from ppafo.page.words import words
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.overrides import over
-from ppafo.report import LivePart
+from ppafo.report.finding import LivePart
 from ppafo.report.setting_names import label_of
 from ppafo.report.style import PAGE_LOOKS
 from ppafo.simulation.declaration import OF_A_VANE, PRESSURE_WORDS

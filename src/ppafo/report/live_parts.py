@@ -6,7 +6,7 @@ from typing import Any
 
 from ppafo.errors import KindError
 from ppafo.kinds import Kinds
-from ppafo.report import LivePart
+from ppafo.report.finding import LivePart
 
 LIVE_PARTS: Kinds[FunctionType] = Kinds(
     "ppafo.live_parts", "live part", FunctionType, {"workbench": "ppafo.page.workbench:live_part"}

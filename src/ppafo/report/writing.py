@@ -1,17 +1,14 @@
-"""The one writer of answers: as text, as a page, and every file by name in a folder that holds exactly these."""
+"""The one writer of findings: as text, as a page, and every file by name in a folder that holds exactly these."""
 
 import base64
 import html
 import re
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ppafo.documents.json_text import json_text
-from ppafo.report import Answer, Cell, Column, Figure, Section, Table
-from ppafo.report.display_units import display_difference, display_unit, display_value, title_with_unit
+from ppafo.report.finding import Finding, Part
 from ppafo.report.style import render_figure
-from ppafo.storage.result_folder import write_marked_folder
 from ppafo.version import __version__
 
 if TYPE_CHECKING:
@@ -90,36 +87,12 @@ def format_reported_quantity(value: float, unit: str) -> str:
 
 
 MARK = "*"
-_NOTHING = "-"
 
 
-def text_of(answer: Answer) -> str:
-    """Return the lead and every section that is no mere detail of the page."""
-    blocks = ["\n".join(answer.lead), *(_section_text(section) for section in answer.sections if not section.is_detail)]
+def text_of(finding: Finding[Any]) -> str:
+    """Return what is said first and every part that is no mere detail of the page."""
+    blocks = ["\n".join(finding.said), *(_part_text(part) for part in finding.parts if not part.is_detail)]
     return "\n\n".join(block for block in blocks if block)
-
-
-def head_texts(table: Table) -> list[str]:
-    """Return the titles of the columns with the units in which they are shown."""
-    return [_title(column) for column in table.head]
-
-
-def row_texts(table: Table) -> list[list[str]]:
-    """Return the cells as text, numbers in the units in which they are shown."""
-    columns = table.head or (Column(""),) * len(table.rows[0] if table.rows else ())
-    return [[cell_text(cell, column) for cell, column in zip(row, columns, strict=True)] for row in table.rows]
-
-
-def cell_text(cell: Cell, column: Column) -> str:
-    """Return a cell as text: a number in its shown unit and form, whole plain numbers with commas, a dash for None."""
-    if cell is None:
-        return _NOTHING
-    if isinstance(cell, str):
-        return cell
-    if isinstance(cell, int) and not column.quantity:
-        return f"{cell:,}"
-    number = (display_difference if column.is_change else display_value)(float(cell), column.quantity)
-    return f"{number:{column.form}}"
 
 
 def align_columns(rows: Sequence[Sequence[str]], left: int = 1) -> list[str]:
@@ -128,29 +101,22 @@ def align_columns(rows: Sequence[Sequence[str]], left: int = 1) -> list[str]:
     return ["  ".join(_pad_row(row, widths, left)).rstrip() for row in rows]
 
 
-def _section_text(section: Section) -> str:
-    body = [*section.paragraphs, *(_table_lines(section.table) if section.table else []), *section.remarks]
-    body += [section.code] if section.code else []
-    return "\n".join([section.heading, *body] if section.heading and body else body)
+def _part_text(part: Part) -> str:
+    body = [*part.said, *_table_lines(part), *part.remarks, *([part.code] if part.code else [])]
+    return "\n".join([part.heading, *body] if part.heading and body else body)
 
 
-def _table_lines(table: Table) -> list[str]:
-    rows = row_texts(table)
-    if not table.rows:
+def _table_lines(part: Part) -> list[str]:
+    rows: list[tuple[str, ...]] = part.rows
+    if not rows:
         return []
-    if not table.head:
-        return align_columns(rows, len(rows[0]))
-    rows = [head_texts(table), *rows]
-    if table.marked:
-        marks = ["", *(MARK if place in table.marked else "" for place in range(len(table.rows)))]
-        rows = [[mark, *row] for mark, row in zip(marks, rows, strict=True)]
-    return align_columns(rows, table.left + bool(table.marked))
-
-
-def _title(column: Column) -> str:
-    if column.is_change and column.quantity == "pressure":
-        return f"{column.title} (psi)"
-    return title_with_unit(column.title, column.quantity) if display_unit(column.quantity) else column.title
+    if not part.has_head:
+        return align_columns(rows, len(part.columns))
+    rows = [tuple(column.head for column in part.columns), *rows]
+    if part.marked:
+        marks = ["", *(MARK if place in part.marked else "" for place in range(len(rows) - 1))]
+        rows = [(mark, *row) for mark, row in zip(marks, rows, strict=True)]
+    return align_columns(rows, part.left + bool(part.marked))
 
 
 def _pad_row(row: Sequence[str], widths: Sequence[int], left: int) -> list[str]:
@@ -165,35 +131,25 @@ _ORIGINS = {
 }
 
 
-def page_of(answer: Answer, drawn: Mapping[str, bytes]) -> bytes:
-    """Return the page of an answer; ``drawn`` has the SVG or GIF content of each of its figures by name."""
-    if answer.page is not None:
-        return answer.page(drawn)
+def page_of(finding: Finding[Any], drawn: Mapping[str, bytes]) -> bytes:
+    """Return the page of a finding; ``drawn`` has the SVG or GIF content of each of its figures by name."""
+    if finding.page is not None:
+        return finding.page(drawn)
     values = {
-        "answer": answer,
-        "sections": [_section(section, drawn) for section in answer.sections],
-        "origin": _ORIGINS[answer.kind],
-        "data": f"{answer.name}.json",
+        "finding": finding,
+        "parts": [
+            (
+                part,
+                [_unbroken_unit(column.head) for column in part.columns] if part.has_head else [],
+                inline_figure(drawn[part.name]) if part.name else "",
+            )
+            for part in finding.parts
+        ],
+        "origin": _ORIGINS[finding.kind],
         "versions": f"ppafo {__version__}",
-        "live": None if answer.live is None else answer.live(),
+        "live": None if finding.live is None else finding.live(),
     }
-    return render_page("answer.html.jinja", values).encode()
-
-
-def _section(section: Section, drawn: Mapping[str, bytes]) -> dict[str, Any]:
-    table, figure = section.table, section.figure
-    return {
-        "heading": section.heading,
-        "paragraphs": section.paragraphs,
-        "head": [_unbroken_unit(text) for text in head_texts(table)] if table else [],
-        "rows": row_texts(table) if table else [],
-        "left": table.left if table else 1,
-        "marked": table.marked if table else (),
-        "remarks": section.remarks,
-        "code": section.code,
-        "figure": inline_figure(drawn[figure.name]) if figure else "",
-        "caption": figure.caption if figure else "",
-    }
+    return render_page("finding.html.jinja", values).encode()
 
 
 def _unbroken_unit(title: str) -> str:
@@ -231,30 +187,22 @@ REPORT = "report.html"
 FORMATS = ("png", "svg")
 
 
-def files_of(answer: Answer) -> dict[str, bytes]:
-    """Return text, JSON, page, figures and further files of an answer by name; figures are drawn here."""
-    drawn = {figure.name: _files_of_figure(figure) for figure in answer.figures}
+def files_of(finding: Finding[Any]) -> dict[str, bytes]:
+    """Return text, JSON, page, figures and further files of a finding by name; figures are drawn here."""
+    drawn: dict[str, Mapping[str, bytes]] = {}
+    for name, part in finding.figures.items():
+        figure = part.drawn(finding.kind)
+        drawn[name] = {"gif": figure} if isinstance(figure, bytes) else render_figure(figure, FORMATS)
     return {
         **{f"{name}.{form}": content for name, forms in drawn.items() for form, content in forms.items()},
-        **{name: content() for name, content in answer.files.items()},
-        f"{answer.name}.json": f"{json_text(answer.data)}\n".encode(),
-        f"{answer.name}.txt": f"{text_of(answer)}\n".encode(),
-        REPORT: page_of(answer, {name: forms.get("svg") or forms["gif"] for name, forms in drawn.items()}),
+        **{name: content() for name, content in finding.files.items()},
+        f"{finding.name}.json": f"{json_text(finding.to_dict())}\n".encode(),
+        f"{finding.name}.txt": f"{text_of(finding)}\n".encode(),
+        REPORT: page_of(finding, {name: forms.get("svg") or forms["gif"] for name, forms in drawn.items()}),
     }
 
 
-def _files_of_figure(figure: Figure) -> dict[str, bytes]:
-    """Return the contents of a figure by the ending of their names."""
-    drawn = figure.draw()
-    return {"gif": drawn} if isinstance(drawn, bytes) else render_figure(drawn, FORMATS)
-
-
-def notebook_of(answer: Answer) -> str:
-    """Return the page of an answer as a frame, which a notebook shows."""
-    page = files_of(answer)[REPORT].decode()
+def notebook_of(finding: Finding[Any]) -> str:
+    """Return the page of a finding as a frame, which a notebook shows."""
+    page = files_of(finding)[REPORT].decode()
     return f'<iframe srcdoc="{html.escape(page)}" width="100%" height="700" style="border: 0"></iframe>'
-
-
-def write_answer(answer: Answer, folder: Path) -> None:
-    """Make a folder hold the files of an answer, and no others; DataError where it holds anything of others."""
-    write_marked_folder(folder, files_of(answer), answer.command or answer.name)

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ppafo.constants import PASCALS_PER_PSI
-from ppafo.documents.json_text import json_text
+from ppafo.documents.json_text import json_text, plain
 from ppafo.engine.run import Run
 from ppafo.errors import DataError, ParameterError, ScenarioError, nearest_name, one_line, reason
 from ppafo.model.catalog import VALVES
@@ -51,7 +51,7 @@ from ppafo.rig.solution import RigRun, sensor_signals, solve_rig
 from ppafo.signals.recording import CHANNELS, Channel, Recording
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
 from ppafo.simulation.plan import exact_orifice, plan_run, profile_values
-from ppafo.simulation.scenario import UNITS, Scenario, plain
+from ppafo.simulation.scenario import UNITS, Scenario
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.files import LEFT_ASIDE, add_files, check_files_can_be_added
 from ppafo.storage.result_folder import read_json

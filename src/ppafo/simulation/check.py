@@ -10,8 +10,8 @@ from functools import partial
 from typing import Any
 
 from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.documents.json_text import plain
 from ppafo.simulation.accuracy import ErrorEstimate
-from ppafo.simulation.scenario import plain
 
 MOVE = 1.0e-7
 """How far a start or a measurement is moved, as a fraction of its range."""

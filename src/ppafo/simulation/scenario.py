@@ -4,14 +4,13 @@
 an object of your own in charge of the valve.
 """
 
-import dataclasses
 import math
-import numbers
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, Protocol
 
 from ppafo.control.kind import PythonController
+from ppafo.documents.json_text import plain
 from ppafo.engine.scheme.pneumatics import KEPT_OF_PRESSURE
 from ppafo.errors import ScenarioError
 from ppafo.model.declaration import Number, attribute_among
@@ -359,29 +358,3 @@ def worn_kind(scenario: Scenario) -> MotionKind | None:
 def scenario_document(scenario: Scenario) -> dict[str, Any]:
     """Return the whole scenario with every number of the device, in SI units, as data that JSON can hold."""
     return {"units": UNITS, **plain(scenario)}
-
-
-def plain(value: Any) -> Any:
-    """Return dicts, lists, texts and finite numbers; an infinite number becomes None, a controller its type's name."""
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        # Links are no part of what is run: what is not compared is not shown.
-        shown = {field.name: plain(getattr(value, field.name)) for field in dataclasses.fields(value) if field.compare}
-        if hasattr(type(value), "__getattr__"):  # then their numbers are its own attributes
-            for inner in ("orifice", "settings"):
-                shown |= shown.pop(inner, {})
-        return shown
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, tuple | list):
-        return [plain(item) for item in value]
-    return _plain_leaf(value)
-
-
-def _plain_leaf(value: Any) -> str | bool | int | float | None:
-    if value is None or isinstance(value, str | bool):
-        return value
-    if isinstance(value, numbers.Integral):
-        return int(value)
-    if isinstance(value, numbers.Real):
-        return float(value) if math.isfinite(value) else None
-    return f"{type(value).__module__}.{type(value).__qualname__}"

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from ppafo.control.profiles import CONSTANT
+from ppafo.documents.json_text import plain
 from ppafo.engine.lane_source import SAME_MOMENT
 from ppafo.engine.lanes import BatchResult, Floats, load_program, load_programs
 from ppafo.engine.led_leg import GAIT_SHANK, shank_over_samples
@@ -36,7 +37,6 @@ from ppafo.simulation.scenario import (
     Leg,
     PrescribedMotion,
     Scenario,
-    plain,
     scenario_document,
     worn_kind,
 )

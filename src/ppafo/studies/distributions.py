@@ -10,6 +10,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.report.kind import Interval
+
 Floats = NDArray[np.float64]
 
 
@@ -153,20 +155,6 @@ class WholeNumbersBetween:
 
 FEWEST_EFFECTIVE = 50.0
 """Draws that must carry a mean before its interval by the central limit theorem is believed to half a percent."""
-
-
-@dataclass(frozen=True, slots=True)
-class Interval:
-    """An estimate and the ends of its confidence interval, all in one unit; an end may be infinite."""
-
-    value: float
-    low: float
-    high: float
-
-    @property
-    def width(self) -> float:
-        """Distance of the two ends."""
-        return self.high - self.low
 
 
 def replicates_interval(values: Floats, replicates: int, confidence: float) -> Interval:

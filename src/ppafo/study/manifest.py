@@ -16,13 +16,13 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from ppafo.control.kind import PythonController
-from ppafo.documents.json_text import json_text
+from ppafo.documents.json_text import json_text, plain
 from ppafo.documents.models import quote, validate
 from ppafo.engine.lanes import write_source
 from ppafo.errors import DataError, StudyError
 from ppafo.metrics import METRICS
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.scenario import Scenario, plain, scenario_document
+from ppafo.simulation.scenario import Scenario, scenario_document
 from ppafo.storage.places import Place, read_document
 from ppafo.studies.study import Study
 from ppafo.study.blocks import chunk_count, chunk_size

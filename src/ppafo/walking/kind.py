@@ -23,7 +23,7 @@ class WalkKind:
     ``subject`` is the word of metrics for what walks. ``result(scenario, run, time, record, status, supply)`` is that
     of the rows up to where a run failed, ``remarks(motion)`` say who walks, ``document(motion)`` has that as data.
     ``without`` gives the same walk without the help of the device, ``healthy`` the numbers to compare it with.
-    ``answer`` and ``exported`` are places, ``module:NAME``, of what an analysis and an exported library have for it.
+    ``finding`` and ``exported`` are places, ``module:NAME``, of what an analysis and an exported library have for it.
     """
 
     name: str
@@ -43,7 +43,7 @@ class WalkKind:
     document: Callable[[Any], dict[str, Any]]
     without: Callable[[Any], Any]
     healthy: Callable[[Any], Any]
-    answer: str
+    finding: str
     exported: str
 
 

@@ -3,13 +3,13 @@
 from collections.abc import Mapping
 from typing import Any
 
+from ppafo.documents.json_text import plain
 from ppafo.gait import Gait
 from ppafo.gait.plausible import gait_file_remarks
 from ppafo.metrics.metric import LED
 from ppafo.simulation.declaration import Reading
 from ppafo.simulation.loading import ScenarioRequest
 from ppafo.simulation.motion_kind import WALK, MotionKind
-from ppafo.simulation.scenario import plain
 from ppafo.walking.contradictions import rules
 from ppafo.walking.course import WalkingCourse, check_led_course
 from ppafo.walking.declaration import PERSON, STEP
@@ -88,7 +88,7 @@ WALK_KIND = MotionKind(
         document=_document,
         without=without_device,
         healthy=healthy_metrics,
-        answer="ppafo.analyses.walk.answer:pair_answer",
+        finding="ppafo.analyses.walk.answer:finding_of",
         exported="ppafo.exports.c_library.walk_preparation:LED_WALK",
     ),
 )

@@ -1,19 +1,21 @@
-"""The result of a walk of a neuromuscular gait model: with the device and with it off, until a fall if any."""
+"""A walk of a neuromuscular gait model: with the device and with it off, until a fall where there is one."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ppafo.analyses.walk.course import bottle_data, bottle_remark, bottle_sections
+from ppafo.analyses.walk.course import bottle_data, bottle_parts, bottle_remark
 from ppafo.analyses.walk.document import walk_data
-from ppafo.analyses.walk.safety import over_time_sections, safety_remarks
+from ppafo.analyses.walk.safety import over_time_parts, safety_remarks
+from ppafo.documents.json_text import plain
 from ppafo.gait.document import load_gait
 from ppafo.metrics.strides import SETTLING
-from ppafo.report import Answer, Column, Figure, Section, Table
-from ppafo.report.display_units import display_values, rounded_text, title_with_unit
-from ppafo.report.style import BLUE, GREY, VERMILION, house_style, mark_kind
-from ppafo.simulation.scenario import plain
+from ppafo.report.display_units import rounded_text, title_with_unit
+from ppafo.report.finding import Cell, Column, Finding, Part, columns_of
+from ppafo.report.kind import Kind
+from ppafo.report.panels import Mark, Panel
+from ppafo.report.style import BLUE, GREY, VERMILION
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.walking.motion import person_remarks, walk_of
@@ -24,7 +26,7 @@ from ppafo.wearer.settings import ReactingWearer, wearer_of_walk
 from ppafo.wearer.way import EDGE, met_by
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure as Drawn
+    from matplotlib.axes import Axes
 
 SCHEMA_VERSION = 2
 
@@ -82,17 +84,36 @@ _COMPARED = (
 MOST_LAG = 10
 """Delays that are tried, in percent of the stride."""
 _PANELS = (
-    ("angle", "Ankle angle", "angle"),
-    ("knee_angle", "Knee angle", "angle"),
-    ("toe_height", "Toes over the ground", "body length"),
-    ("ground_force", "Vertical ground force", "force"),
-    ("torque", "Actuator torque", "torque"),
-    ("tibialis_activation", "Activation of the tibialis", ""),
+    ("angle", Kind("Ankle angle", "rad", "angle")),
+    ("knee_angle", Kind("Knee angle", "rad", "angle")),
+    ("toe_height", Kind("Toes over the ground", "m", "body length")),
+    ("ground_force", Kind("Vertical ground force", "N", "force")),
+    ("torque", Kind("Actuator torque", "N m", "torque")),
+    ("tibialis_activation", Kind("Activation of the tibialis")),
 )
 
 
-def reacting_answer(comparison: Comparison) -> Answer:
-    """Return the answer; one of a wearer who falls with the device has not passed."""
+@dataclass(frozen=True, slots=True, eq=False)
+class ReactingPair:
+    """A walk of a neuromuscular gait model with the device, and with it off."""
+
+    comparison: Comparison
+
+    def json_document(self) -> dict[str, Any]:
+        """Return metrics, events and how alike the gait is to a measured one, as plain data in SI."""
+        worn, bare = self.comparison.with_device, self.comparison.without_device
+        return {
+            **walk_data(REACTING_WALK_FORMAT, SCHEMA_VERSION, self.comparison),
+            "likeness": {
+                words: {name: plain(item) for name, item in likeness(walked).items()}
+                for words, walked in (("with", worn), ("off", bare))
+            },
+            **bottle_data(worn),
+        }
+
+
+def reacting_finding(comparison: Comparison) -> Finding[ReactingPair]:
+    """Return a walk of a neuromuscular gait model; one who falls with the device has not passed."""
     worn, bare = comparison.with_device, comparison.without_device
     scenario = worn.scenario
     wearer = wearer_of_walk(walk_of(scenario))
@@ -102,39 +123,27 @@ def reacting_answer(comparison: Comparison) -> Answer:
     stays = worn.metrics["stays_up"].value > 0.5
     strides = f"{worn.metrics['strides'].value:.0f} strides"
     ended = "walks to the end" if stays else f"falls after {worn.metrics['fall_time'].value:.1f} s"
-    return Answer(
+    return Finding(
         name="walk",
         kicker=f"A walk of a neuromuscular gait model, {scenario.run.duration / 60.0:.3g} min",
         title=f"Walking with {scenario.name}",
-        lead=(f"{scenario.name}: {wearer.name} {ended}, {strides}",),
-        sections=(
-            Section(table=reacting_table(comparison), remarks=tuple(remarks)),
-            *_way_section(comparison),
-            *bottle_sections(worn),
-            *_likeness_section(comparison),
-            Section(
-                "How to read it",
-                (_EXPLAINED, _EFFORT, _LIMITS),
-                is_detail=True,
-            ),
-            *over_time_sections(worn),
+        said=(f"{scenario.name}: {wearer.name} {ended}, {strides}",),
+        parts=(
+            Part(columns=reacting_table(comparison), remarks=remarks),
+            *_way_part(comparison),
+            *bottle_parts(worn),
+            *_likeness_part(comparison),
+            Part("How to read it", said=(_EXPLAINED, _EFFORT, _LIMITS), is_detail=True),
+            *over_time_parts(worn),
             *_curves(comparison),
         ),
-        data=walk_data(REACTING_WALK_FORMAT, SCHEMA_VERSION, comparison)
-        | {
-            "likeness": {
-                words: {name: plain(item) for name, item in likeness(walked).items()}
-                for words, walked in (("with", worn), ("off", bare))
-            },
-            **bottle_data(worn),
-        },
+        found=ReactingPair(comparison),
         passed=comparison.is_completed and stays and worn.is_helped,
         files={
             "recording.nc": lambda: netcdf_bytes(worn.recording, None),
             "recording.csv": lambda: marked_csv_bytes(worn.recording),
             "recording-off.nc": lambda: netcdf_bytes(bare.recording, None),
         },
-        command="walk",
     )
 
 
@@ -171,13 +180,13 @@ def likeness(walked: WalkResult) -> dict[str, Likeness]:
     return found
 
 
-def _likeness_section(comparison: Comparison) -> tuple[Section, ...]:
+def _likeness_part(comparison: Comparison) -> tuple[Part, ...]:
     found = [likeness(walked) for walked in (comparison.with_device, comparison.without_device)]
     if not any(found):
         return ()
-    head = [Column("Mean stride of the wearer and measured gait")]
+    head = ["Mean stride of the wearer and measured gait"]
     for words in ("with", "device off"):
-        head += [Column(f"r {words}"), Column("RMS"), Column("delay (%)"), Column("r then")]
+        head += [f"r {words}", "RMS", "delay (%)", "r then"]
     rows = []
     for _, curve, title in _COMPARED:
         cells: list[str | None] = []
@@ -193,7 +202,7 @@ def _likeness_section(comparison: Comparison) -> tuple[Section, ...]:
                 f"{item.delayed_r:.2f}",
             ]
         rows.append((title, *cells))
-    return (Section("Compared with a measured gait", (_LIKENESS,), Table(tuple(head), tuple(rows)), is_detail=True),)
+    return (Part("Compared with a measured gait", columns_of(head, rows), (_LIKENESS,), is_detail=True),)
 
 
 def weak_remarks(wearer: ReactingWearer) -> list[str]:
@@ -225,20 +234,20 @@ def fall_remarks(comparison: Comparison) -> list[str]:
     return found
 
 
-def reacting_table(comparison: Comparison) -> Table:
+def reacting_table(comparison: Comparison) -> list[Column]:
     """Return a row for each number, with the device and with it off."""
     columns = (comparison.with_device.metrics, comparison.without_device.metrics)
-    rows = []
+    rows: list[tuple[Cell, ...]] = []
     for name, title, quantity, digits in ROWS:
         if not any(name in metrics for metrics in columns):
             continue
         head = title_with_unit(title, quantity) if quantity else title
         found = (metrics.get(name) for metrics in columns)
         rows.append((head, *(None if one is None else rounded_text(one.value, quantity, digits) for one in found)))
-    return Table((Column(""), Column("with"), Column("device off")), tuple(rows))
+    return columns_of(("", "with", "device off"), rows)
 
 
-def _way_section(comparison: Comparison) -> tuple[Section, ...]:
+def _way_part(comparison: Comparison) -> tuple[Part, ...]:
     """Return what was walked on each stretch of the way, with the device and without; nothing on level ground."""
     stretches = [
         item for item in wearer_of_walk(walk_of(comparison.with_device.scenario)).stretches if item.kind == "walk"
@@ -246,9 +255,7 @@ def _way_section(comparison: Comparison) -> tuple[Section, ...]:
     met = [item for item in wearer_of_walk(walk_of(comparison.with_device.scenario)).stretches if not item.is_plain]
     if not met:
         return ()
-    head = [Column("On the way"), Column("from (m)")]
-    for words in ("with", "off"):
-        head += [Column(f"strides {words}"), Column("lowest toes (cm)")]
+    head = ["On the way", "from (m)", "strides with", "lowest toes (cm)", "strides off", "lowest toes (cm)"]
     rows = []
     for place, stretch in enumerate(stretches):
         until = stretches[place + 1].start if place + 1 < len(stretches) else np.inf
@@ -260,48 +267,46 @@ def _way_section(comparison: Comparison) -> tuple[Section, ...]:
             toes = walked.strides["toe_clearance"][on_it]
             cells += [str(int(on_it.sum())), f"{100.0 * float(toes.min()):.1f}" if toes.size else None]
         rows.append((", ".join([*own, stretch.title]), f"{stretch.start:.2f}", *cells))
-    return (Section(table=Table(tuple(head), tuple(rows))),)
+    return (Part(columns=columns_of(head, rows)),)
 
 
-def _curves(comparison: Comparison) -> tuple[Section, ...]:
+def _curves(comparison: Comparison) -> tuple[Part, ...]:
     if not comparison.with_device.averages:
         return ()
-    figure = Figure("mean-stride", _CURVES, lambda: stride_figure(comparison))
-    return (Section("The mean stride", figure=figure, is_detail=True),)
+    scenario = comparison.with_device.scenario
+    return (
+        Part(
+            "The mean stride",
+            panels=lambda: stride_panels(comparison),
+            name="mean-stride",
+            caption=_CURVES,
+            across=3,
+            size=(3.1, 2.5),
+            title=f"{scenario.name}: {wearer_of_walk(walk_of(scenario)).name}, neuromuscular",
+            is_detail=True,
+        ),
+    )
 
 
-def stride_figure(comparison: Comparison) -> "Drawn":
+def stride_panels(comparison: Comparison) -> list[Panel]:
     """Return the mean stride of a neuromuscular gait model, with the device and with it off."""
-    from matplotlib.figure import Figure as Drawn
-
-    walks: dict[str, tuple[WalkResult, str]] = {
-        "device off (vented)": (comparison.without_device, VERMILION),
-        "with the device": (comparison.with_device, BLUE),
-    }
-    with house_style():
-        figure = Drawn(figsize=(9.4, 5.6))
-        figure.subplots_adjust(left=0.075, right=0.985, top=0.87, bottom=0.09, hspace=0.28, wspace=0.3)
-        for axes, (channel, title, quantity) in zip(figure.subplots(2, 3).ravel(), _PANELS, strict=True):
-            for label, (walked, color) in walks.items():
-                if channel not in walked.averages:
-                    continue
+    walks = (
+        ("device off (vented)", comparison.without_device, VERMILION),
+        ("with the device", comparison.with_device, BLUE),
+    )
+    panels: list[Panel] = []
+    stride, percent = Kind("Stride", "%"), 100.0 * PHASES
+    for channel, kind in _PANELS:
+        marks = [Mark("level", (), 0.0, colour=GREY, style={"linewidth": 0.8})] if channel == "toe_height" else []
+        for label, walked, colour in walks:
+            if channel in walked.averages:
                 curves = walked.averages[channel]
-                mean, spread = (
-                    display_values(values, quantity) if quantity else values
-                    for values in (curves.mean, curves.mean + curves.deviation)
-                )
-                axes.plot(100.0 * PHASES, mean, color=color, linewidth=1.6, label=label)
-                axes.fill_between(100.0 * PHASES, 2.0 * mean - spread, spread, color=color, alpha=0.2, linewidth=0)
-            if channel == "toe_height":
-                axes.axhline(0.0, color=GREY, linewidth=0.8)
-            axes.set_ylabel(title_with_unit(title, quantity) if quantity else title, fontsize=9)
-            axes.set_xlim(0.0, 100.0)
-        for axes in figure.axes[3:]:
-            axes.set_xlabel("Stride (%)", fontsize=9)
-        handles, labels = figure.axes[4].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="upper center", bbox_to_anchor=(0.53, 0.955), ncols=3)
-        scenario = comparison.with_device.scenario
-        title = f"{scenario.name}: {wearer_of_walk(walk_of(scenario)).name}, neuromuscular"
-        figure.text(0.012, 0.985, title, ha="left", va="top", fontweight="bold")
-        mark_kind(figure, "simulated")
-        return figure
+                band = (curves.mean - curves.deviation, curves.mean + curves.deviation)
+                marks.append(Mark("line", percent, curves.mean, (), "" if panels else label, colour))
+                marks.append(Mark("band", percent, band, colour=colour, style={"alpha": 0.2}))
+        panels.append(Panel(stride, kind, marks, legend="" if panels else "inside", then=_whole_stride, shares_x=True))
+    return panels
+
+
+def _whole_stride(axes: "Axes") -> None:
+    axes.set_xlim(0.0, 100.0)

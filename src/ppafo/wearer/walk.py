@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ppafo.constants import STANDARD_GRAVITY
+from ppafo.documents.json_text import plain
 from ppafo.engine.run import Run
 from ppafo.gait import Gait
 from ppafo.metrics.metric import REACTS
@@ -18,7 +19,7 @@ from ppafo.simulation.declaration import Reading
 from ppafo.simulation.loading import ScenarioRequest
 from ppafo.simulation.motion_kind import REACT
 from ppafo.simulation.plan import compose_run, too_many_steps
-from ppafo.simulation.scenario import Scenario, plain
+from ppafo.simulation.scenario import Scenario
 from ppafo.walking.course import WalkingCourse
 from ppafo.walking.kind import WalkKind
 from ppafo.walking.led import WALK_KIND
@@ -148,7 +149,7 @@ REACT_KIND = replace(
         document=_document,
         without=with_device_off,
         healthy=_nothing_healthy,
-        answer="ppafo.wearer.answer:reacting_answer",
+        finding="ppafo.wearer.answer:reacting_finding",
         exported="ppafo.wearer.export:REACTING_WALK",
     ),
 )

@@ -45,7 +45,7 @@ def written(folder: Path, text: str) -> str:
 
 
 def studied(folder: Path, text: str) -> Studies:
-    found = reproduce(study=written(folder, text))
+    found = reproduce(study=written(folder, text)).found
     assert isinstance(found, Studies)
     return found
 
@@ -156,9 +156,9 @@ def test_changed_values_go_with_the_paper_only(capsys: pytest.CaptureFixture[str
 
 def test_a_study_is_written_as_claims_text_and_page(tmp_path: Path) -> None:
     out = tmp_path / "out"
-    answer = studied(tmp_path, TEXT).answer()
-    assert answer.data["claims"][0]["value"] == pytest.approx(9.0, rel=1e-3)
-    assert answer.data["counts"]["consistent"] == 1
+    document = studied(tmp_path, TEXT).json_document()
+    assert document["claims"][0]["value"] == pytest.approx(9.0, rel=1e-3)
+    assert document["counts"]["consistent"] == 1
     assert main(["reproduce", "--study", written(tmp_path, TEXT), "--out", str(out)]) == 0
     assert {"claims.json", "claims.txt", "report.html"} <= {file.name for file in out.iterdir()}
     page = (out / "report.html").read_text(encoding="utf-8")

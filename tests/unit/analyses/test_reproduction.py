@@ -18,7 +18,7 @@ from ppafo.analyses.reproduce.claim import (
     load_reported,
     verdict_counts,
 )
-from ppafo.analyses.reproduce.solve import EXPERIMENTS, ORDER, reproduce
+from ppafo.analyses.reproduce.solve import EXPERIMENTS, ORDER, reproduce, reproduce_paper
 from ppafo.analyses.reproduce.torque_task import phased_runs, readings_of_u, torque_task_observations
 from ppafo.errors import PpafoError, SimulationError
 from ppafo.parameters.audit.evidence import Evidence
@@ -54,7 +54,7 @@ def test_a_claim_as_a_document_is_plain_data_with_all_that_a_reader_needs(reprod
 def test_sixteen_rows_have_six_verdicts(reproduction: Reproduction) -> None:
     counts = verdict_counts(reproduction.claims)
     assert tuple(counts.values()) == (2, 3, 6, 1, 3, 1)
-    assert reproduction.to_dict()["counts"] == counts
+    assert reproduction.json_document()["counts"] == counts
     assert count_sentence(reproduction.claims).startswith("16 claims: 2 consistent, 3 inconsistent as reported, 6 met")
 
 
@@ -80,7 +80,7 @@ def test_what_the_rig_records_is_marked_synthetic(reproduction: Reproduction) ->
 
 
 def test_overrides_reach_the_rig_s_torque_task_but_not_the_identification(reproduction: Reproduction) -> None:
-    changed = reproduce(["reference.level=4 N m"])
+    changed = reproduce_paper(["reference.level=4 N m"])
     assert isinstance(changed.synthetic, SyntheticEvidence)
     assert isinstance(reproduction.synthetic, SyntheticEvidence)
     assert changed.synthetic.proportional["reference"].max() == pytest.approx(4.0)
@@ -172,7 +172,7 @@ def test_what_the_file_of_an_experiment_sets_is_no_assumption(reproduction: Repr
 
 
 def test_an_override_of_the_device_reaches_all_experiments_and_is_listed() -> None:
-    changed = reproduce(["supply.atmospheric_pressure=100 kPa_a"])
+    changed = reproduce_paper(["supply.atmospheric_pressure=100 kPa_a"])
     for run in (changed.step, changed.solenoid, changed.proportional):
         assert run.scenario.device.supply.atmospheric_pressure == pytest.approx(1.0e5)
     listed = next(value for value in changed.assumed if value.path == "supply.atmospheric_pressure")
@@ -181,32 +181,32 @@ def test_an_override_of_the_device_reaches_all_experiments_and_is_listed() -> No
 
 
 def test_an_override_of_a_scenario_reaches_those_that_have_the_value() -> None:
-    changed = reproduce(["controller.proportional_gain=0.2 1/(N m)"])
+    changed = reproduce_paper(["controller.proportional_gain=0.2 1/(N m)"])
     assert changed.proportional.scenario.controller.proportional_gain == pytest.approx(0.2)
     assert changed.step.scenario.origin.overrides == changed.solenoid.scenario.origin.overrides == ()
 
 
 def test_an_override_that_nothing_knows_is_refused_with_the_nearest_name() -> None:
     with pytest.raises(PpafoError, match=r"did you mean 'supply\.pressure'"):
-        reproduce(["supply.presure=60 psi_g"])
+        reproduce_paper(["supply.presure=60 psi_g"])
 
 
 def test_overrides_leave_the_paper_s_own_arithmetic_alone(reproduction: Reproduction) -> None:
-    changed = reproduce(["gas.species=air"])
+    changed = reproduce_paper(["gas.species=air"])
     before, after = ({claim.id: claim.found for claim in run.claims} for run in (reproduction, changed))
     assert after["swept_volume"] == before["swept_volume"]
     assert after["co2_solenoid"] != before["co2_solenoid"]
 
 
 def test_a_window_that_is_missed_leaves_the_claim_undetermined() -> None:
-    changed = reproduce(["valves.solenoid.area=31.6 mm^2"])
+    changed = reproduce_paper(["valves.solenoid.area=31.6 mm^2"])
     assert "co2_solenoid" in {claim.id for claim in changed.missed}
     assert {claim.verdict for claim in changed.missed} == {"undetermined"}
 
 
 @pytest.mark.thorough
 def test_a_task_without_a_ramp_has_nothing_to_oscillate_on() -> None:
-    changed = reproduce(["reference.kind=constant", "reference.level=3 N m"])
+    changed = reproduce_paper(["reference.kind=constant", "reference.level=3 N m"])
     told = {item.id: item for item in changed.torque_observations}
     assert told["solenoid_oscillates_on_ramp"].holds is False
     assert "no ramp" in told["solenoid_oscillates_on_ramp"].evidence

@@ -12,7 +12,7 @@ from ppafo.analyses.reproduce.answer import (
     STEP_FIGURE,
     TORQUE_FIGURE,
     Reproduction,
-    answer_of,
+    finding_of,
     holding_torque,
     reproduction_page,
     result_on_u,
@@ -41,20 +41,20 @@ def words(page: str) -> str:
 
 
 def test_the_table_has_a_line_for_every_claim_and_fits_a_terminal(reproduction: Reproduction) -> None:
-    lines = text_of(answer_of(reproduction)).splitlines()
+    lines = text_of(finding_of(reproduction)).splitlines()
     for claim in reproduction.claims:
         assert sum(line.startswith(f"{claim.id} ") for line in lines) == 1
     assert max(len(line) for line in lines) <= 125
 
 
 def test_the_table_aligns_its_columns(reproduction: Reproduction) -> None:
-    _, _, head, *rows = text_of(answer_of(reproduction)).splitlines()[: 3 + len(reproduction.claims)]
+    _, _, head, *rows = text_of(finding_of(reproduction)).splitlines()[: 3 + len(reproduction.claims)]
     column = head.index("verdict")
     assert all(row[column - 2 : column] == "  " and row[column] != " " for row in rows)
 
 
 def test_the_table_begins_with_what_it_does_not_show_and_ends_with_what_u_decides(reproduction: Reproduction) -> None:
-    first, *lines = text_of(answer_of(reproduction)).splitlines()
+    first, *lines = text_of(finding_of(reproduction)).splitlines()
     assert first == "No experimental result is confirmed independently of fitted settings."
     assert any(line.startswith("16 claims: ") for line in lines)
     assert lines[-1] == (

@@ -1,8 +1,10 @@
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
-from ppafo.analyses.identify.answer import trajectory_fit_figure
+from ppafo.analyses.identify.answer import trajectory_panels
 from ppafo.errors import DataError
+from ppafo.report.panels import draw_panels
 from ppafo.signals.recording import Channel, Recording, RecordingKind
 
 TIME = np.linspace(0.0, 1.0, 101)
@@ -16,10 +18,14 @@ def recording(kind: RecordingKind, shift: float) -> Recording:
     return Recording("bench", TIME, channels, kind)
 
 
+def fit_figure(samples: Recording, model: Recording) -> Figure:
+    return draw_panels(trajectory_panels(samples, model), kind=samples.kind)
+
+
 def test_every_fitted_channel_has_a_panel_and_one_for_what_is_left() -> None:
-    figure = trajectory_fit_figure(recording("measured", 0.0), recording("simulated", 0.5))
-    titles = [axes.get_title(loc="left") for axes in figure.axes]
-    assert titles == [
+    figure = fit_figure(recording("measured", 0.0), recording("simulated", 0.5))
+    names = [axes.get_title(loc="left") for axes in figure.axes]
+    assert names == [
         "Vane angle (deg)",
         "model minus sample (deg)",
         "Pressure in chamber 1 (psig)",
@@ -30,23 +36,18 @@ def test_every_fitted_channel_has_a_panel_and_one_for_what_is_left() -> None:
 
 
 def test_samples_are_dots_and_the_model_is_a_line() -> None:
-    samples, model = trajectory_fit_figure(recording("synthetic", 0.0), recording("simulated", 0.5)).axes[0].lines
+    samples, model = fit_figure(recording("synthetic", 0.0), recording("simulated", 0.5)).axes[0].lines
     assert (samples.get_marker(), samples.get_label()) == ("o", "synthetic measurement")
     assert (model.get_marker(), model.get_linestyle(), model.get_label()) == ("None", "-", "model")
 
 
 def test_a_figure_of_synthetic_samples_says_so() -> None:
-    said = [
-        text.get_text()
-        for text in trajectory_fit_figure(recording("synthetic", 0.0), recording("simulated", 0.0)).texts
-    ]
+    said = [text.get_text() for text in fit_figure(recording("synthetic", 0.0), recording("simulated", 0.0)).texts]
     assert "synthetic" in said
-    measured = [
-        text.get_text() for text in trajectory_fit_figure(recording("measured", 0.0), recording("simulated", 0.0)).texts
-    ]
+    measured = [text.get_text() for text in fit_figure(recording("measured", 0.0), recording("simulated", 0.0)).texts]
     assert "synthetic" not in measured
 
 
 def test_a_model_at_other_times_is_refused() -> None:
     with pytest.raises(DataError, match="is not at the times of"):
-        trajectory_fit_figure(recording("measured", 0.0), recording("simulated", 0.0).between(0.0, 0.5))
+        fit_figure(recording("measured", 0.0), recording("simulated", 0.0).between(0.0, 0.5))

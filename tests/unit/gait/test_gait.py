@@ -15,8 +15,8 @@ import pytest
 
 from ppafo.errors import DataError
 from ppafo.gait import Gait, at_speed, list_gaits, load_gait, speed_range, walk_recording
-from ppafo.gait.answer import gait_figure
 from ppafo.gait.document import gait_toml, json_schema, parse_gait
+from ppafo.gait.finding import gait_finding
 from ppafo.gait.gait import KNEE, Curve
 from ppafo.gait.plausible import gait_file_remarks, standing_tilt
 from ppafo.gait.recorded import ImportedGait, ImportSettings, import_gait
@@ -336,7 +336,7 @@ def imported(tmp_path: Path) -> ImportedGait:
 
 def test_every_curve_has_a_panel_with_its_events() -> None:
     gait = load_gait()
-    figure = gait_figure(gait)
+    figure = gait_finding(gait).plot()
     assert len(figure.axes) == len(gait.curves) == 6
     top = figure.axes[0]
     assert {text.get_text() for text in top.texts} == {"heel strike", "toe-off"}
@@ -349,13 +349,13 @@ def test_the_ankle_angle_is_drawn_from_neutral_with_dorsiflexion_positive(import
     flexion = 90.0 - np.degrees(gait.ankle_angle.values_at([0.45, 0.67]))
     assert flexion[0] > 10.0, "the shank leans forward over the foot before push-off"
     assert flexion[1] < -10.0, "the toes point down after push-off"
-    np.testing.assert_allclose(gait_figure(gait).axes[1].lines[-1].get_ydata()[[45, 67]], flexion)
-    drawn = gait_figure(imported.gait, imported).axes[1].lines
+    np.testing.assert_allclose(gait_finding(gait).plot().axes[1].lines[-1].get_ydata()[[45, 67]], flexion)
+    drawn = gait_finding(imported.gait, imported).plot().axes[1].lines
     np.testing.assert_allclose(drawn[2].get_ydata(), 90.0 - np.degrees(imported.curves["ankle_angle"].curves[0]))
 
 
 def test_single_strides_and_their_mean_are_drawn_after_an_import(imported: ImportedGait) -> None:
-    figure = gait_figure(imported.gait, imported)
+    figure = gait_finding(imported.gait, imported).plot()
     assert len(figure.axes[1].lines) == 2 + len(imported.strides) + 2
     assert "synthetic" in {text.get_text() for text in figure.texts}
 
@@ -363,4 +363,4 @@ def test_single_strides_and_their_mean_are_drawn_after_an_import(imported: Impor
 def test_a_gait_of_angles_only_has_two_panels() -> None:
     missing = dict.fromkeys(("ankle_moment", "vertical_force", "knee_forward", "knee_up", "walking_speed"))
     gait = dataclasses.replace(load_gait(), **missing)
-    assert len(gait_figure(gait).axes) == 2
+    assert len(gait_finding(gait).plot().axes) == 2

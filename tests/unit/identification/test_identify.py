@@ -9,7 +9,7 @@ from types import ModuleType
 
 import pytest
 
-from ppafo.analyses.identify.answer import Identification
+from ppafo.analyses.identify.answer import Identification, finding_of
 from ppafo.analyses.identify.solve import identify
 from ppafo.cli.main import main
 from ppafo.errors import IdentificationError, PpafoError
@@ -59,7 +59,7 @@ def solved(bench: Path) -> Solve:
     def solve(text: str) -> Identification:
         path = bench / "problem.toml"
         path.write_text(HEAD + text)
-        return identify(path)
+        return identify(path).found
 
     return solve
 
@@ -114,7 +114,7 @@ def test_a_value_that_is_not_identified_is_written_as_fitted_and_not_counted(
     assert entry.origin == "fitted"
     assert entry.note.startswith("holds for this model only")
     assert not outcome.is_good
-    said = text_of(outcome.answer())
+    said = text_of(finding_of(outcome))
     assert said.count("alone wants other numbers than all readings together") == 1
 
 
@@ -180,13 +180,13 @@ def test_friction_that_contradicts_itself_is_told_and_fails(solved: Solve) -> No
 
 
 def test_figures_and_files_are_there_for_each_procedure_and_figure_3_for_both(solved: Solve) -> None:
-    files = files_of(solved(STATIC + DECAY).answer())
+    files = files_of(finding_of(solved(STATIC + DECAY)))
     names = {"twin.toml", "identify.json", "identify.txt", "report.html"}
     names |= {f"{name}.{kind}" for name in ("static-torque", "free-decay", "figure-3") for kind in ("png", "svg")}
     assert set(files) == names
     assert files["figure-3.png"].startswith(b"\x89PNG")
     assert json.loads(files["identify.json"])["procedures"][0]["recordings_are"] == "synthetic"
-    assert "figure-3.png" not in files_of(solved(STATIC).answer())
+    assert "figure-3.png" not in files_of(finding_of(solved(STATIC)))
 
 
 def test_the_published_schema_knows_every_procedure() -> None:
@@ -245,7 +245,7 @@ def test_a_refusal_about_all_recordings_names_the_procedure_of_the_file(solved: 
 def test_the_leak_of_a_cylinder_is_identified_as_that_of_a_vane(bench: Path) -> None:
     head = HEAD.replace("ppafo2011", "cylinder-lever")
     (bench / "problem.toml").write_text(f'{head}{LEAK}gas = "CO2"\n')
-    outcome = identify(bench / "problem.toml")
+    outcome = identify(bench / "problem.toml").found
     assert outcome.new_set.written == ("actuator.leak.area",)
     assert outcome.results[0].estimates[0].value == pytest.approx(0.3e-6 * 0.113 / 0.6, rel=0.05)
     (bench / "problem.toml").write_text(head + LEAK.partition("volume_1")[0] + 'angle = "60 deg"\n')
@@ -282,7 +282,7 @@ def test_a_leak_in_the_form_of_the_standard_is_written_in_that_form(bench: Path)
     (bench / "sonic.toml").write_text(head + sonic + other)
     problem = HEAD.replace("ppafo2011", "sonic.toml") + LEAK
     (bench / "problem.toml").write_text(problem)
-    outcome = identify(bench / "problem.toml")
+    outcome = identify(bench / "problem.toml").found
     assert {*outcome.new_set.written, *outcome.new_set.fitted} == {"actuator.leak.sonic_conductance"}
     numbers = outcome.new_set.parameter_set.numbers
     assert numbers["actuator.leak.critical_ratio"].origin == "assumed"
@@ -320,7 +320,7 @@ def test_the_gas_temperature_is_known_as_well_as_it_is_stated(solved: Solve, ben
     head, half = HEAD.replace("ppafo2011", "warm.toml"), {}
     for stated in ("", "gas_temperature = '1 K'", "gas_temperature = '35.348 K'", "held = '1 %'"):
         (bench / "problem.toml").write_text(f"{head}[bench]\n{stated}\n{FLOW}")
-        half[stated] = identify(bench / "problem.toml").results[0][path].half_width
+        half[stated] = identify(bench / "problem.toml").found.results[0][path].half_width
     assert half[""] > 1.4 * usual.half_width
     # The set states half a 95 % interval: 40 K / 1.96 is the standard deviation of a limit of 35.348 K.
     assert half[""] == half["held = '1 %'"] == pytest.approx(half["gas_temperature = '35.348 K'"], rel=1e-4)

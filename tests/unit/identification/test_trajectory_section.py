@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ppafo.analyses.identify.answer import Identification
+from ppafo.analyses.identify.answer import Identification, finding_of
 from ppafo.analyses.identify.solve import identify
 from ppafo.cli.main import main
 from ppafo.errors import PpafoError
@@ -93,7 +93,7 @@ def solve(laboratory: Path) -> Solve:
     def solved(text: str) -> Identification:
         path = laboratory / "problem.toml"
         path.write_text(HEAD + text)
-        return identify(path)
+        return identify(path).found
 
     return solved
 
@@ -163,14 +163,14 @@ def test_the_document_has_all_that_the_fit_says(both: Identification) -> None:
 
 def test_every_recording_has_a_figure(both: Identification) -> None:
     names = {"fit-step", "fit-replayed"}
-    files = files_of(both.answer())
+    files = files_of(finding_of(both))
     pictures = {f"trajectory-{name}.{kind}" for name in names for kind in ("png", "svg")}
     assert set(files) == pictures | {"fitted.toml", "identify.json", "identify.txt", "report.html"}
     assert files["trajectory-fit-step.png"].startswith(b"\x89PNG")
 
 
 def test_the_table_shows_units_of_the_set_tolerances_and_the_next_experiment(both: Identification) -> None:
-    text = text_of(both.answer())
+    text = text_of(finding_of(both))
     assert "trajectory (synthetic): 2 numbers fitted to 2 recordings" in text
     assert "foot_plate.inertia: variance from actuator.torque_constant" in text
     assert "tolerance: actuator.torque_constant: stated (1.451 +- 0.017)e-05 m^3, fitted (1.45" in text

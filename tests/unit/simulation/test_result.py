@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 import ppafo
+from ppafo.documents.json_text import plain
 from ppafo.errors import DataError
 from ppafo.metrics import Metric
 from ppafo.signals import Channel, Recording
-from ppafo.simulation.scenario import Scenario, plain, scenario_document
+from ppafo.simulation.scenario import Scenario, scenario_document
 from ppafo.simulation.simulate import Result, Status
 from ppafo.storage import read_result
 

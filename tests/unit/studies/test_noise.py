@@ -12,7 +12,8 @@ import ppafo
 from ppafo.analyses.compare.solve import compare
 from ppafo.analyses.sweep.statistic import Statistic, StoppingRule, draw_until, mean_of, quantile_of
 from ppafo.errors import StudyError
-from ppafo.studies.distributions import Floats, Interval, NormalAround, noise_interval
+from ppafo.report.kind import Interval
+from ppafo.studies.distributions import Floats, NormalAround, noise_interval
 from ppafo.studies.draws import Uncertainty, uncertainty_of
 from ppafo.studies.loading import load_study
 from ppafo.studies.sampling import NOISE, other_noise, with_noise

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from ppafo.analyses.walk.answer import comparison_table, wearers_answer
+from ppafo.analyses.walk.answer import comparison_table, wearers_finding
+from ppafo.report.finding import Part
 from ppafo.report.writing import text_of
 from ppafo.signals import Channel, Recording
 from ppafo.walking import Comparison, WalkResult, compare_walks, load_walk, walk, walk_population
@@ -139,8 +140,8 @@ def test_parts_of_the_plant_that_fail_are_marked_and_close_failures_have_one_lab
 
 
 def test_the_table_has_a_cell_for_each_walk() -> None:
-    rows = {title: cells for title, *cells in comparison_table(compared("solenoid")).rows}
-    assert rows["Gas per stride (g)"][1:] == ["0.000", None]
+    rows = {title: cells for title, *cells in Part(columns=comparison_table(compared("solenoid"))).rows}
+    assert rows["Gas per stride (g)"][1:] == ["0.000", "-"]
     assert rows["Strides that begin on the toes (%)"] == ["0", "0", "0"]
     assert float(rows["... of the healthy ankle's positive work (%)"][0]) == pytest.approx(6.9, abs=0.1)
     assert {len(cells) for cells in rows.values()} == {3}
@@ -163,7 +164,7 @@ def test_histograms_hold_every_wearer() -> None:
     figure = population_figure(people)
     heights = [patch.get_height() for patch in figure.axes[0].patches]
     assert sum(heights) == 60
-    lines = text_of(wearers_answer(people)).splitlines()
+    lines = text_of(wearers_finding(people)).splitlines()
     assert lines[0] == "proportional: 60 wearers, 0.1 min each"
     gas = [float(cell) for cell in next(line for line in lines if line.startswith("Gas")).split()[4:]]
     assert gas == sorted(gas)

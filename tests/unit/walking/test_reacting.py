@@ -11,7 +11,7 @@ import pytest
 import ppafo
 from ppafo.analyses.endurance.answer import Endurance
 from ppafo.analyses.endurance.solve import endurance
-from ppafo.analyses.walk.answer import answer_of, walk_with_and_without
+from ppafo.analyses.walk.answer import walk_with_and_without
 from ppafo.cli.main import main
 from ppafo.engine.lanes import BatchResult, run_batch, write_source
 from ppafo.engine.rows import leaf_paths, numbers, rebuild, row_numbers
@@ -180,32 +180,31 @@ def test_a_study_counts_nothing_that_comes_after_a_fall_as_a_single_walk_does(
 def test_a_walk_on_a_bottle_ends_with_the_fall_and_strides_are_those_of_the_wearer(tmp_path: Path) -> None:
     early = [*FALLS[:2], "wearer.soleus_strength=0.3", "run.duration=6 s", "bottle.name=paper-co2-9oz"]
     pair = walk_with_and_without(load_walk(WALK, early))
-    worn, bare = pair.comparison.with_device, pair.comparison.without_device
+    worn, bare = pair.found.comparison.with_device, pair.found.comparison.without_device
     assert worn.supply is not None
     assert worn.metrics["fall_time"].value < worn.supply.ending.time < worn.metrics["fall_time"].value + 0.2 < 5.0
     assert worn.supply.ending.message.startswith("the wearer fell, and 25")
     assert bare.status.message.startswith("completed: the wearer fell"), "as long a walk, whoever fell in the other"
-    life = endurance(walk(load_walk(WALK), 0.1), overrides=["bottle.gas_mass=6 g", "bottle.volume=30 cm^3"])
+    life = endurance(walk(load_walk(WALK), 0.1), overrides=["bottle.gas_mass=6 g", "bottle.volume=30 cm^3"]).found
     assert isinstance(life, Endurance)
     assert life.draw.stride_time == pytest.approx(walk(load_walk(WALK), 0.1).metrics["stride_time"].value)
-    (tmp_path / "walk.json").write_text(json.dumps({"format": answer_of(pair).data["format"]}))
-    with pytest.raises(DataError, match="is the walk of a neuromuscular gait model: walk on the bottle"):
+    (tmp_path / "walk.json").write_text(json.dumps({"format": pair.to_dict()["format"]}))
+    with pytest.raises(DataError, match="is the walk of a wearer who reacts: walk on the bottle"):
         endurance(tmp_path)
 
 
 @pytest.mark.long
 def test_a_weak_tibialis_falls_without_the_device_and_walks_on_with_it() -> None:
     pair = walk_with_and_without(load_walk(WALK, [WEAK]), 0.25)
-    worn, bare = pair.comparison.with_device, pair.comparison.without_device
+    worn, bare = pair.found.comparison.with_device, pair.found.comparison.without_device
     assert worn.metrics["stays_up"].value == 1.0
     assert worn.metrics["lowest_toes"].value > 0.0
     assert bare.metrics["stays_up"].value == 0.0
     fall = bare.metrics["fall_time"].value
     assert bare.recording.time[-1] <= fall < bare.recording.time[-1] + 0.01, "the recording ends with the fall"
     assert f"fell at t = {fall:.4g} s" in bare.status.message
-    answer = answer_of(pair)
-    assert answer.passed
-    assert "unadapted" in str(answer.sections)
+    assert pair.passed
+    assert "unadapted" in str(pair.parts)
 
 
 @pytest.mark.long
@@ -246,9 +245,9 @@ def test_the_same_wearer_with_the_device_off_takes_columns_as_well() -> None:
 
 @pytest.mark.long
 def test_the_answer_says_on_which_slope_a_wearer_falls_and_what_was_walked_before() -> None:
-    answer = answer_of(walk_with_and_without(load_walk(WALK, ["wearer.slope=0.2", "controller.kind=off"]), 0.15))
-    assert "with the device: the wearer falls on the slope of +20 % at" in str(answer.sections)
-    assert "level ground" in str(answer.sections)
+    answer = walk_with_and_without(load_walk(WALK, ["wearer.slope=0.2", "controller.kind=off"]), 0.15)
+    assert "with the device: the wearer falls on the slope of +20 % at" in str(answer.parts)
+    assert "level ground" in str(answer.parts)
     assert not answer.passed
 
 

@@ -9,14 +9,14 @@ import numpy as np
 
 from ppafo.analyses.compare.pairs import Paired, pareto_front
 from ppafo.metrics import Metric
+from ppafo.report.finding import Column, Finding, Part
+from ppafo.report.kind import Interval, Kind, of_metric
 from ppafo.report.live_parts import live_part
+from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import BLACK, COLOURS, GREY
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Status
-from ppafo.studies.distributions import FEWEST_EFFECTIVE, Floats, Interval, fraction_text
-from ppafo.study.finding import Column, Finding, Part
-from ppafo.study.kind import Kind, of_metric
-from ppafo.study.panels import Mark, Panel
+from ppafo.studies.distributions import FEWEST_EFFECTIVE, Floats, fraction_text
 from ppafo.study.runs import Rows
 
 if TYPE_CHECKING:

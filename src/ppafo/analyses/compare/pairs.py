@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.report.kind import Interval
 from ppafo.studies.distributions import (
     Floats,
-    Interval,
     effective_sample_size,
     noise_interval,
     replicates_interval,

@@ -12,11 +12,12 @@ from ppafo.analyses.compare.pairs import COMPARED, Paired, best_probabilities, c
 from ppafo.errors import StudyError
 from ppafo.metrics import METRICS
 from ppafo.progress import Report
+from ppafo.report.finding import Finding
+from ppafo.report.kind import Interval
 from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate_many
-from ppafo.studies.distributions import Interval
 from ppafo.studies.draws import (
     Uncertainty,
     check_confidence,
@@ -35,7 +36,6 @@ from ppafo.studies.study import (
     valid_baseline,
     with_overrides,
 )
-from ppafo.study.finding import Finding
 from ppafo.study.runs import Rows, Runs, Tally, failures_of
 
 AS_WRITTEN = "as written"

@@ -2,15 +2,19 @@
 
 from pathlib import Path
 
+from ppafo.analyses.design.front import answer as front
 from ppafo.analyses.design.front.answer import Design
 from ppafo.analyses.design.front.problem import DesignProblem, with_seed
 from ppafo.analyses.design.front.solve import find_front
 from ppafo.analyses.design.loading import load_design
+from ppafo.analyses.design.profile import answer as profile
 from ppafo.analyses.design.profile.answer import Sizing, size_for_profile
 from ppafo.analyses.design.profile.problem import SizingProblem
+from ppafo.analyses.design.wearer import solve as wearer
 from ppafo.analyses.design.wearer.solve import WearerSizing, Wish, size_for_wearer
 from ppafo.errors import StudyError
 from ppafo.progress import Report, report_nothing
+from ppafo.report.finding import Finding
 
 FOR_A_WEARER = "--mass '72.5 kg' --torque '2.5 N m' --pressure '50 psi_g' --minutes 5"
 
@@ -25,7 +29,7 @@ def design(
     pressure: float | None = None,
     minutes: float | None = None,
     progress: Report | None = None,
-) -> Design | Sizing | WearerSizing:
+) -> Finding[Design] | Finding[Sizing] | Finding[WearerSizing]:
     """Return the device for a wearer or for a torque profile, or the designs that no other beats.
 
     A wearer has a body ``mass`` [kg] and may have a ``stature`` [m]; ``torque`` [N m], ``pressure`` [Pa absolute]
@@ -43,13 +47,13 @@ def design(
             raise StudyError(f"for a wearer give {', '.join(missing)} too, for example {FOR_A_WEARER}")
         if seed is not None:
             raise StudyError("--seed: nothing is drawn for a wearer; leave it out")
-        return size_for_wearer(Wish(mass, stature, torque, pressure, 60.0 * minutes), report)
+        return wearer.finding_of(size_for_wearer(Wish(mass, stature, torque, pressure, 60.0 * minutes), report))
     given = [f"--{name}" for name, value in {**wished, "stature": stature}.items() if value is not None]
     if given:
         raise StudyError(f"{', '.join(given)}: the design file states what is wanted; give one or the other")
     chosen = load_design(problem, seed) if isinstance(problem, str | Path) else problem
     if isinstance(chosen, SizingProblem):
-        return size_for_profile(chosen, threads, report)
+        return profile.finding_of(size_for_profile(chosen, threads, report))
     if seed is not None and chosen is problem:
         chosen = with_seed(chosen, seed)
-    return find_front(chosen, threads, report)
+    return front.finding_of(find_front(chosen, threads, report))

@@ -1,9 +1,8 @@
-"""The answer about a bottle: how long it lasts and why it ends, its values with their sources; several side by side."""
+"""How long a bottle lasts and why it ends, its values with their sources; several gas uses side by side."""
 
-import textwrap
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -12,34 +11,22 @@ from ppafo.analyses.endurance.draw import Draw
 from ppafo.model.cold_gas import heat_to_warm
 from ppafo.model.source import bottle_content
 from ppafo.parameters.bottles.bottle import Bottle
-from ppafo.report import Answer, Column, Figure, Section, Table
-from ppafo.report.display_units import axis_unit, display_value, display_values, quantity_text
-from ppafo.report.solved import Solved
-from ppafo.report.style import (
-    BLUE,
-    GREY,
-    ORANGE,
-    VERMILION,
-    Margins,
-    figure_of_panels,
-    house_style,
-    label_lines,
-    mark_kind,
-)
-from ppafo.signals.recording import Floats
+from ppafo.report.finding import Finding, Part, columns_of, facts
+from ppafo.report.kind import TIME, Kind
+from ppafo.report.panels import Mark, Panel
+from ppafo.report.style import BLUE, GREEN, GREY, ORANGE, VERMILION
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.units import format_quantity
 from ppafo.version import __version__
 from ppafo.walking.bottle import Schedule, minutes_text, strides_text
-from ppafo.walking.figures.over_time import draw_bottle_pressure, draw_gas_left
 
-if TYPE_CHECKING:
-    import matplotlib.figure
-    from matplotlib.axes import Axes
+_MASS, _FLOW = Kind("Left in the bottle", "kg", "gas mass", ".3g"), Kind("", "kg/s", "mass flow", ".3g")
+_DURATION, _PRESSURE = Kind("Time", "s", "duration"), Kind("Pressure in the bottle", "Pa_a", "pressure", ".0f")
+_WARMTH = Kind("Temperature of the bottle", "K", "temperature", ".1f")
 
 
-@dataclass(frozen=True, slots=True, repr=False)
-class Endurance(Solved):
+@dataclass(frozen=True, slots=True)
+class Endurance:
     """The request and its result.
 
     ``discharge`` is the requested course. ``strides_when_warm`` is the number of strides that a bottle which stays at
@@ -53,62 +40,48 @@ class Endurance(Solved):
     strides_when_warm: float
     is_of_course: bool = False
 
+    def json_document(self) -> dict[str, Any]:
+        """Return the course, its ending and the bottle as plain data in SI."""
+        course, bottle = self.discharge, self.bottle
+        recording = course.recording
+        return {
+            "format": FORMAT,
+            "schema_version": 1,
+            "kind": "simulated",
+            "ppafo": __version__,
+            "result": {
+                "walking_time": course.walking_time,
+                "total_time": course.total_time,
+                "strides": course.strides,
+                "ending": asdict(course.ending),
+                "coldest_temperature": float(np.min(recording["bottle_temperature"])),
+                "at_end": {name: float(recording[name][-1]) for name in recording.names},
+                "balance": course.balance._asdict(),
+                "strides_when_warm": self.strides_when_warm,
+            },
+            "draw": asdict(self.draw) | {"mean_flow": self.draw.mean_flow},
+            "schedule": self.schedule._asdict(),
+            "bottle": {
+                "name": bottle.name,
+                "title": bottle.title,
+                "fluid": bottle.fluid.name,
+                "properties": bottle.fluid.source,
+                "gas_mass": bottle.mass,
+                "volume": bottle.volume,
+                "values": {path: entry.model_dump() for path, entry in bottle.entries.items()},
+            },
+        }
 
-@dataclass(frozen=True, slots=True, repr=False)
-class Endurances(Solved):
+
+@dataclass(frozen=True, slots=True)
+class Endurances:
     """Several gas uses on the same bottle, by name."""
 
     uses: Mapping[str, Endurance]
 
-
-_WIDTH, _LEFT, _RIGHT = 7.2, 0.62, 0.2
-_PANEL, _GAP, _TOP, _BOTTOM, _REMARK_LINE = 1.5, 0.45, 0.75, 0.62, 0.17
-"""Inches."""
-_REMARK_WIDTH = 105
-_PANELS = 3
-
-
-def endurance_figure(found: Endurance) -> "matplotlib.figure.Figure":
-    """Return the figure of the requested course; below it stands how it ended."""
-    recording = found.discharge.recording
-    minutes = display_values(recording.time, "duration")
-    remarks = textwrap.wrap(f"End: {found.discharge.ending.message}.", _REMARK_WIDTH)
-    bottom = _BOTTOM + _REMARK_LINE * len(remarks)
-    height = _TOP + _PANELS * _PANEL + (_PANELS - 1) * _GAP + bottom
-    with house_style():
-        figure, rows = figure_of_panels((_WIDTH, height), Margins(_LEFT, _RIGHT, _TOP, bottom, _GAP), _PANELS)
-        grid = [axes for (axes,) in rows]
-        _draw_temperature(grid[0], found, minutes)
-        draw_bottle_pressure(grid[1], minutes, recording["bottle_pressure"], found.bottle.regulator)
-        draw_gas_left(grid[2], minutes, recording, found.bottle.mass)
-        for axes in grid:
-            axes.locator_params(axis="y", nbins=5)
-        grid[-1].set_xlabel(f"Time ({axis_unit('duration')})")
-        grid[-1].set_xlim(0.0, float(minutes[-1]))
-        figure.text(0.12 / _WIDTH, 1.0 - 0.12 / height, _title(found), va="top", fontsize=13, fontweight="bold")
-        figure.text(0.12 / _WIDTH, 0.1 / height, "\n".join(remarks), va="bottom", fontsize=9, color=VERMILION)
-        mark_kind(figure, recording.kind)
-        return figure
-
-
-def _title(found: Endurance) -> str:
-    gas, time = quantity_text(found.draw.mass_per_stride, "gas mass"), quantity_text(found.draw.stride_time, "time")
-    return f"{found.bottle.name}: {gas} per stride of {time}"
-
-
-def _draw_temperature(axes: "Axes", found: Endurance, minutes: Floats) -> None:
-    recording = found.discharge.recording
-    axes.axhline(
-        display_value(found.bottle.room_temperature, "temperature"),
-        color=GREY,
-        linestyle=":",
-        linewidth=1.2,
-        label="room",
-    )
-    axes.plot(minutes, display_values(recording["wall_temperature"], "temperature"), color=ORANGE, label="wall")
-    axes.plot(minutes, display_values(recording["bottle_temperature"], "temperature"), color=BLUE, label="content")
-    axes.set_title(f"Temperature of the bottle ({axis_unit('temperature')})")
-    label_lines(axes)
+    def json_document(self) -> dict[str, Any]:
+        """Return each as plain data in SI."""
+        return {"recordings": {name: one.json_document() for name, one in self.uses.items()}}
 
 
 FORMAT = "ppafo bottle"
@@ -117,65 +90,112 @@ _LEFT_OUT = (
     "with the vapour, a bottle upside down, leaking connections, and ice on the outside of the bottle."
 )
 _CAPTION = "Temperature, pressure and gas in the bottle from full to the end."
-_USE = (Column("gas use"), Column("gas per stride", "gas mass", ".3g"))
-_COURSE = (Column("walking", "duration"), Column("strides"))
+_USES = ("gas use", ("gas per stride", _MASS), ("walking", _DURATION), "strides", "ended")
 
 
-def answer_of(found: Endurance | Endurances) -> Answer:
-    """Return the answer for one gas use, or for several side by side."""
-    return _answer_of_one(found) if isinstance(found, Endurance) else _answer_of_several(found)
-
-
-def _answer_of_one(found: Endurance) -> Answer:
-    figure = Figure("endurance", _CAPTION, lambda: endurance_figure(found))
-    head = tuple(map(Column, ("value", "", "origin", "source")))
-    rows = tuple(
+def finding_of(found: Endurance) -> Finding[Endurance]:
+    """Return how long the bottle lasts for one gas use, in words, tables and panels."""
+    values = [
         (path, format_quantity(entry.value, entry.unit), entry.origin, entry.source)
         for path, entry in found.bottle.entries.items()
-    )
-    properties = f"Gas properties: {found.bottle.fluid.source}."
-    return Answer(
+    ]
+    return Finding(
         name="endurance",
         kicker="Endurance",
-        title="How long the bottle lasts",
-        lead=(found.bottle.title, f"gas use: {found.draw.origin}"),
-        sections=(
-            Section(table=Table((), tuple(_facts(found)))),
-            Section("The bottle over time", figure=figure, remarks=(_LEFT_OUT,), is_detail=True),
-            Section("Values", table=Table(head, rows, left=4), remarks=(properties,), is_detail=True),
+        title=_TITLE,
+        said=(found.bottle.title, f"gas use: {found.draw.origin}"),
+        parts=(
+            Part(columns=facts(_facts(found))),
+            Part(
+                "The bottle over time",
+                panels=lambda: endurance_panels(found),
+                name="endurance",
+                caption=_CAPTION,
+                size=(7.0, 1.9),
+                title=f"{found.bottle.name}: {_MASS.text(found.draw.mass_per_stride)} per stride of "
+                f"{TIME.text(found.draw.stride_time, '.3g')}",
+                note=f"End: {found.discharge.ending.message}.",
+                remarks=(_LEFT_OUT,),
+                is_detail=True,
+            ),
+            Part(
+                "Values",
+                columns_of(("value", "", "origin", "source"), values),
+                remarks=(f"Gas properties: {found.bottle.fluid.source}.",),
+                left=4,
+                is_detail=True,
+            ),
         ),
-        data=_data(found),
+        found=found,
         files={"bottle.csv": lambda: marked_csv_bytes(found.discharge.recording)},
     )
 
 
-def _answer_of_several(several: Endurances) -> Answer:
-    uses = several.uses
-    first = next(iter(uses.values()))
-    head = (*_USE, *_COURSE, Column("ended"))
-    return Answer(
+def finding_of_several(several: Endurances) -> Finding[Endurances]:
+    """Return how long the bottle lasts for several gas uses, side by side."""
+    rows = [
+        (
+            name,
+            one.draw.mass_per_stride,
+            one.discharge.walking_time,
+            strides_text(one.discharge.strides),
+            one.discharge.ending.kind,
+        )
+        for name, one in several.uses.items()
+    ]
+    return Finding(
         name="endurance",
         kicker="Endurance",
-        title="How long the bottle lasts",
-        lead=(first.bottle.title,),
-        sections=(
-            Section(table=Table(head, tuple((name, *_cells(one)) for name, one in uses.items()))),
-            Section("What is not in the model", (_LEFT_OUT,), is_detail=True),
+        title=_TITLE,
+        said=(next(iter(several.uses.values())).bottle.title,),
+        parts=(
+            Part(columns=columns_of(_USES, rows)),
+            Part("What is not in the model", said=(_LEFT_OUT,), is_detail=True),
         ),
-        data={"recordings": {name: _data(one) for name, one in uses.items()}},
+        found=several,
     )
 
 
-def _cells(one: Endurance) -> tuple[str | float, ...]:
-    course = one.discharge
-    return one.draw.mass_per_stride, course.walking_time, strides_text(course.strides), course.ending.kind
+_TITLE = "How long the bottle lasts"
+
+
+def endurance_panels(found: Endurance) -> list[Panel]:
+    """Return temperature, pressure and gas of the bottle over the requested course."""
+    recording, bottle = found.discharge.recording, found.bottle
+    time, needed = recording.time, bottle.regulator.set_pressure + bottle.regulator.pressure_margin
+    dotted, dashed = ({"linestyle": style, "linewidth": 1.2} for style in (":", "--"))
+    gases = (("bottle_mass", "total gas", BLUE), ("liquid_mass", "liquid", GREEN))
+    shown: list[tuple[Kind, list[Mark]]] = [
+        (
+            _WARMTH,
+            [
+                Mark("level", (), bottle.room_temperature, (), "room", GREY, dotted),
+                Mark("line", time, recording["wall_temperature"], (), "wall", ORANGE),
+                Mark("line", time, recording["bottle_temperature"], (), "content", BLUE),
+            ],
+        ),
+        (
+            _PRESSURE,
+            [
+                Mark("level", (), needed, (), "needed", VERMILION, dashed),
+                Mark("line", time, recording["bottle_pressure"], (), "bottle", BLUE),
+            ],
+        ),
+        (
+            _MASS,
+            [Mark("line", time, recording[name], (), label, look) for name, label, look in gases if name in recording],
+        ),
+    ]
+    end = float(_DURATION.values(time[-1]))
+    return [
+        Panel(_DURATION, kind, marks, then=lambda axes: axes.set_xlim(0.0, end), shares_x=True) for kind, marks in shown
+    ]
 
 
 def _facts(found: Endurance) -> list[tuple[str, str]]:
     """Return name and value of everything that a reader wants first."""
     course, draw = found.discharge, found.draw
     recording = course.recording
-    flows = [quantity_text(flow, "mass flow") for flow in (draw.mean_flow, draw.peak_flow)]
     rows = [
         ("run time", f"{minutes_text(course.walking_time)} of walking, {minutes_text(course.total_time)} in total"),
         ("strides", strides_text(course.strides)),
@@ -184,16 +204,19 @@ def _facts(found: Endurance) -> list[tuple[str, str]]:
             f"{strides_text(found.strides_when_warm)} (a bottle that stays at room temperature)",
         ),
         ("ended", course.ending.message),
-        ("gas", f"{_gas(draw.mass_per_stride)} a stride, {flows[0]}, largest {flows[1]}"),
-        ("heat that it lacks", _lacking_heat(found)),
         (
-            "lowest temperature of the fluid",
-            quantity_text(float(np.min(recording["bottle_temperature"])), "temperature", ".1f"),
+            "gas",
+            f"{_MASS.text(draw.mass_per_stride)} a stride, {_FLOW.text(draw.mean_flow)}, largest "
+            f"{_FLOW.text(draw.peak_flow)}",
         ),
-        ("pressure at the end", quantity_text(float(recording["bottle_pressure"][-1]), "pressure", ".0f")),
+        ("heat that it lacks", _lacking_heat(found)),
+        ("lowest temperature of the fluid", _WARMTH.text(float(np.min(recording["bottle_temperature"])))),
+        ("pressure at the end", _PRESSURE.text(float(recording["bottle_pressure"][-1]))),
     ]
     if "liquid_mass" in recording:
-        rows.append(("liquid used up", _dry_since(course)))
+        dry = np.flatnonzero(recording["liquid_mass"] <= 0.0)
+        left = f"no, {_MASS.text(float(recording['liquid_mass'][-1]))} left"
+        rows.append(("liquid used up", f"after {minutes_text(float(recording.time[dry[0]]))}" if dry.size else left))
     return rows
 
 
@@ -202,56 +225,4 @@ def _lacking_heat(found: Endurance) -> str:
     bottle, room = found.bottle, found.bottle.room_temperature
     content = bottle_content(bottle.fluid.table, bottle.mass, bottle.volume, room)
     heat = heat_to_warm(bottle.fluid.table, content, room, bottle.regulator.set_pressure)
-    return f"{quantity_text(heat * found.draw.mean_flow, 'power')}, {heat / 1000.0:.3g} kJ/kg, at the start"
-
-
-def _dry_since(course: Discharge) -> str:
-    liquid = course.recording["liquid_mass"]
-    dry = np.flatnonzero(liquid <= 0.0)
-    if not dry.size:
-        return f"no, {_gas(float(liquid[-1]))} left"
-    return f"after {minutes_text(float(course.recording.time[dry[0]]))}"
-
-
-def _data(found: Endurance) -> dict[str, Any]:
-    data: dict[str, Any] = {
-        "format": FORMAT,
-        "schema_version": 1,
-        "kind": "simulated",
-        "ppafo": __version__,
-        "result": _course_data(found.discharge) | {"strides_when_warm": found.strides_when_warm},
-        "draw": asdict(found.draw) | {"mean_flow": found.draw.mean_flow},
-        "schedule": found.schedule._asdict(),
-        "bottle": _bottle_data(found),
-    }
-    return data
-
-
-def _course_data(course: Discharge) -> dict[str, Any]:
-    recording = course.recording
-    return {
-        "walking_time": course.walking_time,
-        "total_time": course.total_time,
-        "strides": course.strides,
-        "ending": asdict(course.ending),
-        "coldest_temperature": float(np.min(recording["bottle_temperature"])),
-        "at_end": {name: float(recording[name][-1]) for name in recording.names},
-        "balance": course.balance._asdict(),
-    }
-
-
-def _bottle_data(found: Endurance) -> dict[str, Any]:
-    bottle = found.bottle
-    return {
-        "name": bottle.name,
-        "title": bottle.title,
-        "fluid": bottle.fluid.name,
-        "properties": bottle.fluid.source,
-        "gas_mass": bottle.mass,
-        "volume": bottle.volume,
-        "values": {path: entry.model_dump() for path, entry in bottle.entries.items()},
-    }
-
-
-def _gas(mass: float) -> str:
-    return quantity_text(mass, "gas mass")
+    return f"{heat * found.draw.mean_flow:.3g} W, {heat / 1000.0:.3g} kJ/kg, at the start"

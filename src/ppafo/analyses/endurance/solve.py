@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ppafo.analyses.endurance.answer import Endurance, Endurances
+from ppafo.analyses.endurance.answer import Endurance, Endurances, finding_of, finding_of_several
 from ppafo.analyses.endurance.discharge import check_schedule, discharge, discharge_of_life, smallest_mass_when_warm
 from ppafo.analyses.endurance.draw import (
     Draw,
@@ -18,7 +18,8 @@ from ppafo.analyses.endurance.draw import (
 )
 from ppafo.errors import DataError, ParameterError
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, Bottle, load_bottle
-from ppafo.report.display_units import quantity_text
+from ppafo.report.finding import Finding
+from ppafo.report.kind import Kind
 from ppafo.signals import Recording
 from ppafo.simulation.scenario import Scenario
 from ppafo.storage.result_folder import read_recording
@@ -46,7 +47,7 @@ def endurance(
     rest: float | None = None,
     longest: float = _LONGEST,
     overrides: Iterable[str] = (),
-) -> Endurance | Endurances:
+) -> Finding[Endurance] | Finding[Endurances]:
     """Return how long a full bottle lasts for a gas use that continues; ``Endurances`` for several recordings.
 
     A walk, its result or its folder, walks on the bottle until that ends it; ``bottle`` is its own, or the paper's,
@@ -64,7 +65,7 @@ def endurance(
     chosen = _Bottle(bottle, tuple(overrides))
     if gas_per_stride is not None:
         draw = draw_of_numbers(gas_per_stride, _STRIDE_TIME if stride_time is None else stride_time, peak_flow)
-        return follow_bottle(chosen.load(), draw, schedule)
+        return finding_of(follow_bottle(chosen.load(), draw, schedule))
     if peak_flow is not None:
         raise ParameterError("--peak-flow belongs to --gas-per-stride; a recording has its own largest flow")
     names = [_name(use) for use in given]
@@ -73,7 +74,7 @@ def endurance(
     found = {
         name: _endurance_of_use(use, stride_time, chosen, schedule) for name, use in zip(names, given, strict=True)
     }
-    return found[names[0]] if len(found) == 1 else Endurances(found)
+    return finding_of(found[names[0]]) if len(found) == 1 else finding_of_several(Endurances(found))
 
 
 def endurance_of_walk(result: WalkResult, bottle: str | Path | None = None) -> Endurance | None:
@@ -111,7 +112,7 @@ def _walked_to_its_end(carried: Scenario, at_set_pressure: Draw, schedule: Sched
     strides = max(life.repeats, 1.0e-9)
     stride_time = life.walked / strides
     mass = life.course.regulated / strides
-    of_walk = quantity_text(at_set_pressure.mass_per_stride, "gas mass")
+    of_walk = Kind("", "kg", "gas mass", ".3g").text(at_set_pressure.mass_per_stride)
     origin = f"{at_set_pressure.origin} on the bottle, mean over its strides ({of_walk} before, at the set pressure)"
     taken = Draw(mass, stride_time, max(at_set_pressure.peak_flow, mass / stride_time), origin)
     usable = supply.mass - smallest_mass_when_warm(supply.bottle, taken)

@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 from ppafo.errors import ScenarioError, StudyError, UnitError, one_line, refused_as
 from ppafo.loading import scenario_or_load
 from ppafo.progress import Report
+from ppafo.report.finding import Column, Finding, Part
+from ppafo.report.kind import of_metric, of_path
+from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import BLACK, GREEN, VERMILION
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import Floats
@@ -18,9 +21,6 @@ from ppafo.studies.draws import Uncertainty, atmosphere_of, check_metrics, level
 from ppafo.studies.sampling import NOISE, with_noise
 from ppafo.studies.study import with_overrides
 from ppafo.studies.varying import VariedPath, varied_path
-from ppafo.study.finding import Column, Finding, Part
-from ppafo.study.kind import of_metric, of_path
-from ppafo.study.panels import Mark, Panel
 from ppafo.study.runs import Runs, Tally, settled, with_companions
 from ppafo.units import split_quantity
 

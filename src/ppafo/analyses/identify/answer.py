@@ -1,14 +1,15 @@
-"""The answer of an identification: estimates and checks in the units of the set, the new set, the figures."""
+"""An identification: estimates and checks in the units of the set, the new set, the figures."""
 
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ppafo.constants import PASCALS_PER_PSI, STANDARD_ATMOSPHERE
+from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.documents.json_text import plain
 from ppafo.errors import DataError
 from ppafo.identification.bench.result import BenchResult, count_of, figure_3, procedure_figure
 from ppafo.identification.estimate import Estimate
@@ -20,28 +21,19 @@ from ppafo.identification.trajectory.section import TrajectoryOutcome
 from ppafo.identification.wording import in_shown_unit, with_error
 from ppafo.parameters.loading import parameter_set_toml
 from ppafo.parameters.parameter_set import ParameterSet
-from ppafo.report import Answer, Figure, Section, Table
-from ppafo.report.solved import Solved
-from ppafo.report.style import (
-    ACTUAL,
-    BLACK,
-    CHAMBER_1,
-    CHAMBER_2,
-    GREY,
-    house_style,
-    mark_kind,
-)
+from ppafo.report.finding import Finding, Part, columns_of
+from ppafo.report.kind import TIME, Kind
+from ppafo.report.panels import Mark, Panel
+from ppafo.report.style import ACTUAL, BLACK, CHAMBER_1, CHAMBER_2, GREY
 from ppafo.signals import Recording, RecordingKind
-from ppafo.simulation.scenario import plain
 from ppafo.units import percentage
 
 if TYPE_CHECKING:
-    import matplotlib.figure
     from matplotlib.axes import Axes
 
 
-@dataclass(frozen=True, slots=True, repr=False)
-class Identification(Solved):
+@dataclass(frozen=True, slots=True)
+class Identification:
     """The outcome of a problem: what could be had, results in the order of making, the set before and after."""
 
     name: str
@@ -68,76 +60,73 @@ class Identification(Solved):
         kinds = [result.kind for result in self.results]
         return kind_of([*kinds, *(() if self.trajectory is None else (kind_of_fit(self.trajectory.fit),))])
 
+    def json_document(self) -> dict[str, Any]:
+        """Return estimates, checks and the new set as plain data in SI."""
+        return {
+            "problem": self.name,
+            "started_from": self.before.name,
+            "is_good": self.is_good,
+            "procedures": [_procedure_data(result) for result in self.results],
+            **_trajectory_data(self.trajectory),
+            "new_set": {
+                "file": f"{self.name}.toml",
+                "identified": list(self.new_set.written),
+                "fitted": list(self.new_set.fitted),
+                "problem": self.new_set.problem,
+            },
+        }
 
-_TRAJECTORY_WIDTH, _VALUES, _LEFT_OVER = 7.2, 1.9, 1.0
-"""Inches, of the figure and of the panels of one channel."""
-_DOT, _SAMPLE = 1.6, 3.6
+
 _MAXIMUM_DOTS = 90
 """Samples shown beside the line; what is left is shown of all."""
 _KIND_WORDS = {"measured": "measured", "simulated": "simulated samples", "synthetic": "synthetic measurement"}
-
-
 _CHANNELS = {
-    "angle": ("Vane angle", "deg", "deg", 180.0 / math.pi, ACTUAL.colour),
-    "pressure_1": ("Pressure in chamber 1", "psig", "psi", 1.0 / PASCALS_PER_PSI, CHAMBER_1.colour),
-    "pressure_2": ("Pressure in chamber 2", "psig", "psi", 1.0 / PASCALS_PER_PSI, CHAMBER_2.colour),
+    "angle": (Kind("Vane angle", "rad", "angle"), ACTUAL),
+    "pressure_1": (Kind("Pressure in chamber 1", "Pa_a", "pressure"), CHAMBER_1),
+    "pressure_2": (Kind("Pressure in chamber 2", "Pa_a", "pressure"), CHAMBER_2),
 }
-"""Title, unit, unit of a difference, values per SI unit and colour of each channel."""
 
 
-def trajectory_fit_figure(
-    measurement: Recording, model: Recording, atmosphere: float = STANDARD_ATMOSPHERE
-) -> "matplotlib.figure.Figure":
+def trajectory_panels(measurement: Recording, model: Recording, atmosphere: float = STANDARD_ATMOSPHERE) -> list[Panel]:
     """Return samples, model and residuals of one experiment over time, two panels for each channel that was fitted.
 
     Both recordings have the same times. Gauge pressure counts from ``atmosphere`` [Pa absolute].
     """
     if not np.array_equal(measurement.time, model.time):
         raise DataError(f"{model.label}: is not at the times of {measurement.label}")
-    from matplotlib.figure import Figure as Drawing
+    panels: list[Panel] = []
+    times, some = measurement.time, slice(None, None, -(-measurement.time.size // _MAXIMUM_DOTS))
+    circles = {"linestyle": "", "marker": "o", "markersize": 3.6, "markerfacecolor": "none", "markeredgewidth": 0.7}
+    for name in (name for name in _CHANNELS if name in measurement):
+        kind, look = _CHANNELS[name]
+        above = 0.0 if name == "angle" else atmosphere - STANDARD_ATMOSPHERE
+        samples, fitted = (each[name] - above for each in (measurement, model))
+        marks = [
+            Mark("line", times[some], samples[some], (), _KIND_WORDS[measurement.kind], BLACK, circles),
+            Mark("line", times, fitted, (), "model", look.colour, {"linewidth": 1.2}),
+        ]
+        legend = "" if panels else "above"
+        panels.append(Panel(TIME, kind, marks, legend=legend, then=_set_time(measurement), shares_x=True))
+        left = [
+            Mark("line", times, fitted - samples, colour=look.colour, style=_DOTS),
+            Mark("level", (), 0.0, colour=GREY, style={"linewidth": 0.8}),
+        ]
+        unit = Kind("model minus sample", quantity="angle" if name == "angle" else "pressure change")
+        panels.append(Panel(TIME, unit, left, then=_centre, tall=0.5, shares_x=True))
+    return panels
 
-    shown = [name for name in _CHANNELS if name in measurement]
-    with house_style():
-        heights = [_VALUES, _LEFT_OVER] * len(shown)
-        figure = Drawing(figsize=(_TRAJECTORY_WIDTH, sum(heights)), layout="constrained")
-        panels = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
-        for name, values, left in zip(shown, panels[::2], panels[1::2], strict=True):
-            zero = 0.0 if name == "angle" else atmosphere
-            _draw_trajectory(name, zero, (values, left), measurement, model)
-        panels[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.1, handlelength=1.6)
-        panels[-1].set_xlabel("Time (s)")
-        panels[-1].set_xlim(measurement.time[0], measurement.time[-1])
-        figure.suptitle(measurement.label, x=0.01, ha="left", fontsize=10, fontweight="bold")
-        mark_kind(figure, measurement.kind)
-        return figure
+
+_DOTS = {"linestyle": "", "marker": ".", "markersize": 1.6}
 
 
-def _draw_trajectory(
-    name: str, zero: float, panels: "tuple[Axes, Axes]", measurement: Recording, model: Recording
-) -> None:
-    values, left = panels
-    title, unit, unit_of_difference, factor, colour = _CHANNELS[name]
-    samples, fitted = (factor * (recording[name] - zero) for recording in (measurement, model))
-    some = slice(None, None, -(-measurement.time.size // _MAXIMUM_DOTS))
-    times, word = measurement.time[some], _KIND_WORDS[measurement.kind]
-    values.plot(
-        times,
-        samples[some],
-        "o",
-        color=BLACK,
-        markersize=_SAMPLE,
-        markerfacecolor="none",
-        markeredgewidth=0.7,
-        label=word,
-    )
-    values.plot(measurement.time, fitted, color=colour, linewidth=1.2, label="model")
-    values.set_title(f"{title} ({unit})")
-    left.plot(measurement.time, fitted - samples, ".", color=colour, markersize=_DOT)
-    left.axhline(0.0, color=GREY, linewidth=0.8)
-    largest = 1.1 * float(np.max(np.abs(fitted - samples))) or 1.0
-    left.set_ylim(-largest, largest)
-    left.set_title(f"model minus sample ({unit_of_difference})", fontsize=9)
-    left.locator_params(axis="y", nbins=3)
+def _set_time(measurement: Recording) -> "Callable[[Axes], object]":
+    return lambda axes: axes.set_xlim(measurement.time[0], measurement.time[-1])
+
+
+def _centre(axes: "Axes") -> None:
+    largest = max(map(abs, axes.dataLim.intervaly)) * 1.1 or 1.0
+    axes.set_ylim(-largest, largest)
+    axes.locator_params(axis="y", nbins=3)
 
 
 _FAR, _SHOWN = 2.0, 0.05
@@ -145,38 +134,25 @@ _FAR, _SHOWN = 2.0, 0.05
 _MINIMUM_DIGITS, _MAXIMUM_DIGITS = 4, 9
 
 
-def answer_of(identification: Identification) -> Answer:
-    """Return the answer; it has passed where recordings agree and the new set makes a device."""
+def finding_of(identification: Identification) -> Finding[Identification]:
+    """Return what was identified in words and tables; passed where recordings agree and the set makes a device."""
     name, new_set, fitted = identification.name, identification.new_set, identification.trajectory
     problem = (f"it makes no device yet: {new_set.problem}",) if new_set.problem else ()
-    files = {f"{name}.toml": lambda: parameter_set_toml(new_set.parameter_set).encode()}
-    return Answer(
+    return Finding(
         name="identify",
         kicker="Identification",
         title=f"The parameter set {name}",
-        lead=(),
-        sections=(
-            *(_procedure_section(result, identification.before) for result in identification.results),
-            *((_trajectory_section(fitted, identification.before),) if fitted else ()),
-            Section(paragraphs=(f"new set '{name}': {_count_sentence(identification)}", *problem)),
-            *(Section(figure=figure, is_detail=True) for figure in _figures(identification)),
+        said=(),
+        parts=(
+            *(_procedure_part(result, identification.before) for result in identification.results),
+            *((_trajectory_part(fitted, identification.before),) if fitted else ()),
+            Part(said=(f"new set '{name}': {_count_sentence(identification)}", *problem)),
+            *_figures(identification),
         ),
-        data={
-            "problem": identification.name,
-            "started_from": identification.before.name,
-            "is_good": identification.is_good,
-            "procedures": [_procedure_data(result) for result in identification.results],
-            **_trajectory_data(identification.trajectory),
-            "new_set": {
-                "file": f"{identification.name}.toml",
-                "identified": list(identification.new_set.written),
-                "fitted": list(identification.new_set.fitted),
-                "problem": identification.new_set.problem,
-            },
-        },
+        found=identification,
         passed=identification.is_good,
         kind=identification.kind,
-        files=files,
+        files={f"{name}.toml": lambda: parameter_set_toml(new_set.parameter_set).encode()},
     )
 
 
@@ -188,11 +164,11 @@ def _count_sentence(identification: Identification) -> str:
     return f"{found}{rest}"
 
 
-def _procedure_section(result: BenchResult, before: ParameterSet) -> Section:
+def _procedure_part(result: BenchResult, before: ParameterSet) -> Part:
     kind = "" if result.kind == "measured" else f" ({result.kind})"
-    return Section(
+    return Part(
         f"{result.procedure}{kind}: {result.summary}",
-        table=Table((), tuple(estimate_row(item, before) for item in result.estimates)),
+        columns_of(_BLANK, (estimate_row(item, before) for item in result.estimates)),
         remarks=(
             *((f"holds for this model only: {result.conflict}",) if result.conflict else ()),
             *(f"{item.path}: {item.explanation}" for item in result.estimates),
@@ -201,15 +177,15 @@ def _procedure_section(result: BenchResult, before: ParameterSet) -> Section:
     )
 
 
-def _trajectory_section(outcome: TrajectoryOutcome, before: ParameterSet) -> Section:
+def _trajectory_part(outcome: TrajectoryOutcome, before: ParameterSet) -> Part:
     """Return estimates, each with its sentence, then tolerances that matter, what is left, and candidates."""
     kind, fit = kind_of_fit(outcome.fit), outcome.fit
     origin = "" if kind == "measured" else f" ({kind})"
     candidates = enumerate(outcome.expected, start=1)
-    return Section(
+    return Part(
         f"trajectory{origin}: {count_of(len(fit.estimates), 'number')} fitted to "
         f"{count_of(len(fit.measurements), 'recording')}, {count_of(len(fit.known), 'tolerance')}",
-        table=Table((), tuple(estimate_row(item, before) for item in fit.estimates)),
+        columns_of(_BLANK, (estimate_row(item, before) for item in fit.estimates)),
         remarks=(
             *((f"holds for this model only: {fit.conflict}",) if fit.conflict else ()),
             *(f"{item.path}: {item.explanation}" for item in fit.estimates if item.explanation != fit.conflict),
@@ -247,6 +223,9 @@ def _shown(number: float, path: str, unit: str, before: ParameterSet) -> tuple[f
     return in_shown_unit(number, unit) if own == unit else (found, own)
 
 
+_BLANK = ("",) * 4
+
+
 def estimate_row(item: Estimate, before: ParameterSet) -> tuple[str, ...]:
     """Return path, value, interval and verdict of an estimate in the unit of the set, digits that tell its ends."""
     if math.isnan(item.value):
@@ -274,27 +253,27 @@ def _digits(value: float, half_width: float) -> int:
     return min(max(needed, _MINIMUM_DIGITS), _MAXIMUM_DIGITS)
 
 
-def _figures(identification: Identification) -> list[Figure]:
+def _figures(identification: Identification) -> list[Part]:
     """Return a figure for each procedure and recording, figure 3 where both of its panels are there."""
-    figures = []
+    found = []
     counts: dict[str, int] = {}
     for result in identification.results:
         counts[result.procedure] = counts.get(result.procedure, 0) + 1
         number = counts[result.procedure]
         name = result.procedure if number == 1 else f"{result.procedure}-{number}"
-        figures.append(Figure(name, result.summary, partial(procedure_figure, result)))
-    if identification.trajectory is not None:
-        figures += _trajectory_figures(identification.trajectory)
+        found.append(_figure(name, result.summary, draw=partial(procedure_figure, result)))
+    fit = None if identification.trajectory is None else identification.trajectory.fit
+    for measurement, model, scenario in zip(fit.measurements, fit.models, fit.scenarios, strict=True) if fit else ():
+        label, atmosphere = measurement.label, scenario.device.supply.atmospheric_pressure
+        panels = partial(trajectory_panels, measurement, model, atmosphere)
+        part = _figure(f"trajectory-fit-{label}", f"{label} and the fit.", panels=panels)
+        found.append(replace(part, title=label, size=(7.0, 2.0)))
     both = figure_3(identification.results)
-    return figures if both is None else [*figures, Figure("figure-3", "Like figure 3 of the paper.", lambda: both)]
+    return found if both is None else [*found, _figure("figure-3", "Like figure 3 of the paper.", draw=lambda: both)]
 
 
-def _trajectory_figures(outcome: TrajectoryOutcome) -> list[Figure]:
-    figures, fit = [], outcome.fit
-    for measurement, model, scenario in zip(fit.measurements, fit.models, fit.scenarios, strict=True):
-        draw = partial(trajectory_fit_figure, measurement, model, scenario.device.supply.atmospheric_pressure)
-        figures.append(Figure(f"trajectory-fit-{measurement.label}", f"{measurement.label} and the fit.", draw))
-    return figures
+def _figure(name: str, caption: str, **drawn: Any) -> Part:
+    return Part(name=name, caption=caption, is_detail=True, **drawn)
 
 
 def kind_of_fit(fit: TrajectoryFit) -> RecordingKind:

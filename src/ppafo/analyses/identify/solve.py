@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ppafo.analyses.identify.answer import Identification, bench_estimates
+from ppafo.analyses.identify.answer import Identification, bench_estimates, finding_of
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.result import BenchResult
 from ppafo.identification.new_set import with_estimates
@@ -24,11 +24,12 @@ from ppafo.parameters.loading import list_sets, load_parameter_set
 from ppafo.parameters.overrides import check_valve
 from ppafo.parameters.parameter_set import ParameterSet, apply_overrides, atmospheric_pressure, chosen_valve
 from ppafo.progress import Report, report_nothing
+from ppafo.report.finding import Finding
 from ppafo.storage.foreign import read_foreign
 from ppafo.storage.result_folder import read_recording
 
 
-def identify(problem: str | Path, progress: Report = report_nothing) -> Identification:
+def identify(problem: str | Path, progress: Report = report_nothing) -> Finding[Identification]:
     """Return what the procedures of a problem file make of its recordings, in the recommended order.
 
     The trajectory fit comes last and starts from what they found. ``progress`` hears what is being done. Estimates are
@@ -36,7 +37,7 @@ def identify(problem: str | Path, progress: Report = report_nothing) -> Identifi
     DataError for a recording that cannot be read; each in one line that begins with the file.
     """
     path = Path(problem)
-    return solve_problem(load_problem(path), path.parent, path.name, progress)
+    return finding_of(solve_problem(load_problem(path), path.parent, path.name, progress))
 
 
 def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Report = report_nothing) -> Identification:

@@ -1,8 +1,8 @@
-"""The answer about a linear model: the point, the poles, the matrices, which sides were taken, how far it holds."""
+"""A linear model and what is said of it: the point, the poles, the matrices, the sides taken, how far it holds."""
 
 import io
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
@@ -12,27 +12,18 @@ from ppafo.engine.lanes import Floats, StepInputs, replay
 from ppafo.engine.run import batch_of
 from ppafo.errors import ScenarioError, nearest_name, one_line
 from ppafo.model.plant import chamber_pressures
-from ppafo.report import Answer, Column, Figure, Section, Table
-from ppafo.report.display_units import QUANTITIES, quantity_of_unit, quantity_text
-from ppafo.report.solved import Solved
-from ppafo.report.style import (
-    BLACK,
-    BLUE,
-    GREY,
-    VERMILION,
-    Margins,
-    figure_of_free_panels,
-    figure_of_panels,
-    house_style,
-    mark_kind,
-)
+from ppafo.report.display_units import quantity_of_unit
+from ppafo.report.finding import Column, Finding, Part, columns_of, facts
+from ppafo.report.kind import TIME, Kind
+from ppafo.report.panels import Mark, Panel
+from ppafo.report.style import BLACK, BLUE, GREY, VERMILION
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.sampled import state_row_numbers
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, Initial, PrescribedMotion, Scenario
 from ppafo.version import __version__
 
 if TYPE_CHECKING:
-    import matplotlib.figure
+    from matplotlib.axes import Axes
 
 MISSING_CONTROL = "a system for python-control needs the package control: pip install ppafo[control]"
 ON_THE_EDGE = 1.0e-6
@@ -68,8 +59,8 @@ class Delays:
     period: float
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
-class LinearModel(Solved):
+@dataclass(frozen=True, slots=True, eq=False)
+class LinearModel:
     """The plant of a scenario near one point, x' = A x + B u, y = C x + D u, for differences from the point in SI.
 
     ``a`` (states, states), ``b`` (states, inputs), ``c`` (outputs, states), ``d`` (outputs, inputs); ``rates``
@@ -121,6 +112,33 @@ class LinearModel(Solved):
                 )
             found.append(self.c[row] @ np.linalg.solve(matrix, self.b[:, column]) + self.d[row, column])
         return np.array(found)
+
+    def json_document(self) -> dict[str, Any]:
+        """Return point, matrices, poles and sides as plain data in SI."""
+        rates = self.rates.tolist()
+        return {
+            "format": "ppafo linear model",
+            "schema_version": 1,
+            "ppafo": __version__,
+            "scenario": self.scenario.name,
+            "overrides": list(self.scenario.origin.overrides),
+            "at": "equilibrium" if self.time is None else self.time,
+            "states": [{**asdict(item), "rate": rate} for item, rate in zip(self.states, rates, strict=True)],
+            "inputs": [asdict(item) for item in self.inputs],
+            "outputs": [asdict(item) for item in self.outputs],
+            "A": self.a.tolist(),
+            "B": self.b.tolist(),
+            "C": self.c.tolist(),
+            "D": self.d.tolist(),
+            "poles": [{"real": pole.real, "imaginary": pole.imag} for pole in self.poles.tolist()],
+            "sides": dict(self.sides),
+            "edges": [asdict(edge) for edge in self.edges],
+            "left_out": {
+                "command_delay": self.delays.command,
+                "signal_delay": self.delays.signals,
+                "sample_period": self.delays.period,
+            },
+        }
 
     def to_control(self) -> Any:
         """Return the model as a ``control.StateSpace`` with its names; ScenarioError without the extra ``control``."""
@@ -231,64 +249,84 @@ _SHOWN = (-5, -1)
 """Which of the steps are drawn over time: one in the middle of the three decades, and the largest."""
 
 
-def frequency_figure(model: LinearModel) -> "matplotlib.figure.Figure":
+def frequency_panels(model: LinearModel) -> list[Panel]:
     """Return the response of the torque to the command: size and phase, and the phase with what is left out."""
-    from matplotlib.ticker import MultipleLocator
-
     poles = np.abs(model.poles) / (2.0 * np.pi)
     lowest = min(float(np.min(poles[poles > 0.0], initial=1.0)), 1.0)
     frequencies = np.geomspace(_DECADES[0] * lowest, _FASTEST, _POINTS)
     response = model.response(frequencies)
     late = model.delays.command + model.delays.signals + 0.5 * model.delays.period
     phase = np.degrees(np.unwrap(np.angle(response)))
-    with house_style():
-        margins = Margins(left=0.9, right=0.25, top=0.4, bottom=0.55, row_gap=0.25, label=0.6)
-        figure, panels = figure_of_panels((7.0, 5.0), margins, 2)
-        size, angle = panels[0][0], panels[1][0]
-        size.loglog(frequencies, np.abs(response), color=BLUE)
-        size.set_ylabel("torque per command (N m)")
-        angle.semilogx(frequencies, phase, color=BLUE, label="plant")
-        angle.semilogx(
-            frequencies,
-            phase - 360.0 * frequencies * late,
-            color=VERMILION,
-            linestyle="--",
-            label=f"with {1.0e3 * late:.3g} ms of dead time, late measurements and half a sample",
-        )
-        angle.set_ylim(max(-360.0, float(np.min(phase)) - 90.0), float(np.max(phase)) + 20.0)
-        angle.set_ylabel("phase (deg)")
-        angle.yaxis.set_major_locator(MultipleLocator(45.0))
-        angle.set_xlabel("frequency (Hz)")
-        angle.legend(loc="lower left")
-        mark_kind(figure, "simulated")
-        return figure
+    delayed = f"with {1.0e3 * late:.3g} ms of dead time, late measurements and half a sample"
+
+    def set_phase(axes: "Axes") -> None:
+        from matplotlib.ticker import MultipleLocator
+
+        axes.set(xscale="log", ylim=(max(-360.0, float(np.min(phase)) - 90.0), float(np.max(phase)) + 20.0))
+        axes.yaxis.set_major_locator(MultipleLocator(45.0))
+
+    return [
+        Panel(
+            _FREQUENCY,
+            Kind("torque per command", "N m"),
+            [Mark("line", frequencies, np.abs(response))],
+            then=lambda axes: axes.set(xscale="log", yscale="log"),
+            shares_x=True,
+        ),
+        Panel(
+            _FREQUENCY,
+            Kind("phase", "deg"),
+            [
+                Mark("line", frequencies, phase, label="plant"),
+                Mark("line", frequencies, phase - 360.0 * frequencies * late, (), delayed, VERMILION, _DASHED),
+            ],
+            legend="inside",
+            then=set_phase,
+            shares_x=True,
+        ),
+    ]
 
 
-def steps_figure(model: LinearModel) -> "matplotlib.figure.Figure":
+def steps_panels(model: LinearModel) -> list[Panel]:
     """Return steps of the command on the runs and of the linear model, and their difference over the amplitude."""
     steps = steps_of(model)
-    with house_style():
-        margins = Margins(left=0.9, right=0.25, top=0.4, bottom=0.55, row_gap=0.0, column_gap=1.0)
-        figure, panels = figure_of_free_panels((9.0, 3.8), margins, 1, 2)
-        over_time, over_amplitude = panels[0]
-        for number, colour in zip(_SHOWN, (BLUE, VERMILION), strict=True):
-            share = steps.amplitudes[number] / steps.amplitudes[-1] * 0.3
-            label = f"command {100.0 * share:+.3g} %"
-            over_time.plot(steps.times, steps.runs[number] / steps.amplitudes[number], color=colour, label=label)
-        over_time.plot(steps.times, steps.linear[-1] / steps.amplitudes[-1], "--", color=BLACK, label="linear")
-        over_time.set_xlabel("time after the step (s)")
-        over_time.set_ylabel("change of torque per command (N m)")
-        over_time.legend(loc="lower right")
-        over_amplitude.loglog(steps.sizes, steps.errors, "o", color=BLUE, markersize=4, label="largest difference")
-        square = steps.errors[0] * (steps.sizes / steps.sizes[0]) ** 2
-        over_amplitude.loglog(steps.sizes, square, "--", color=GREY, label="square of the amplitude")
-        over_amplitude.set_xlabel("largest change of torque in a step (N m)")
-        over_amplitude.set_ylabel("runs less linear model (N m)")
-        over_amplitude.legend(loc="upper left")
-        mark_kind(figure, "simulated")
-        return figure
+    shares = 0.3 * steps.amplitudes / steps.amplitudes[-1]
+    over_time = [
+        Mark(
+            "line",
+            steps.times,
+            steps.runs[at] / steps.amplitudes[at],
+            (),
+            f"command {100.0 * shares[at]:+.3g} %",
+            colour,
+        )
+        for at, colour in zip(_SHOWN, (BLUE, VERMILION), strict=True)
+    ]
+    linear = Mark("line", steps.times, steps.linear[-1] / steps.amplitudes[-1], (), "linear", BLACK, _DASHED)
+    square = steps.errors[0] * (steps.sizes / steps.sizes[0]) ** 2
+    dots = {"linestyle": "", "marker": "o", "markersize": 4}
+    return [
+        Panel(
+            replace(TIME, words="time after the step"),
+            Kind("change of torque per command", "N m"),
+            [*over_time, linear],
+            legend="inside",
+        ),
+        Panel(
+            Kind("largest change of torque in a step", "N m"),
+            Kind("runs less linear model", "N m"),
+            [
+                Mark("line", steps.sizes, steps.errors, label="largest difference", style=dots),
+                Mark("line", steps.sizes, square, (), "square of the amplitude", GREY, _DASHED),
+            ],
+            legend="inside",
+            then=lambda axes: axes.set(xscale="log", yscale="log"),
+        ),
+    ]
 
 
+_FREQUENCY = Kind("frequency", "Hz")
+_DASHED = {"linestyle": "--"}
 _FREQUENCY_CAPTION = (
     "The torque for a small sine of the command; dashed: with the dead time, the age of the measurements and half a "
     "sample period, which are not in the model."
@@ -301,16 +339,27 @@ _SEVERAL = 1.0e-6
 """Imaginary part of a pole, over its size, below which it is real."""
 
 
-def answer_of(model: LinearModel) -> Answer:
-    """Return the answer of a linear model."""
-    answers = bool(np.any(model.b[:, 0]) or np.any(model.d[:, 0]))
-    frequency = Figure("frequency-response", _FREQUENCY_CAPTION, lambda: frequency_figure(model)) if answers else None
-    sections = [
-        Section("The point", table=_point_table(model)),
-        Section("Which side was taken", table=Table((), tuple(model.sides.items())), remarks=_edges(model)),
-        Section("Poles", table=_pole_table(model), figure=frequency),
+def finding_of(model: LinearModel) -> Finding[LinearModel]:
+    """Return a linear model in words, tables and panels."""
+    responds = bool(np.any(model.b[:, 0]) or np.any(model.d[:, 0]))
+    states = {item.name for item in model.states}
+    kinds = (("state", model.states), ("input", model.inputs), ("output", model.outputs))
+    # An output that is a state is in the table once.
+    shown = [(kind, item) for kind, items in kinds for item in items if kind != "output" or item.name not in states]
+    point = [(kind, item.name, item.unit, _value_text(item)) for kind, item in shown]
+    parts = [
+        Part("The point", columns_of(("", "name", "unit in the model", "at the point"), point), left=3),
+        Part("Which side was taken", facts(model.sides.items()), remarks=_edges(model)),
+        Part(
+            "Poles",
+            _poles(model),
+            panels=lambda: frequency_panels(model),
+            name="frequency-response" if responds else "",
+            caption=_FREQUENCY_CAPTION,
+            size=(7.0, 2.4),
+        ),
         *[
-            Section(f"Matrix {name} (SI)", table=_matrix(values, rows, columns), is_detail=name in "CD")
+            Part(f"Matrix {name} (SI)", _matrix(values, rows, columns), is_detail=name in "CD")
             for name, values, rows, columns in (
                 ("A", model.a, model.states, model.states),
                 ("B", model.b, model.states, model.inputs),
@@ -324,8 +373,8 @@ def answer_of(model: LinearModel) -> Answer:
     is_locked = isinstance(motion, PrescribedMotion) and motion.profile.kind == "constant"
     is_gas_alone = all(item.name.startswith("pressure") for item in model.states)
     if model.is_steady and is_locked and is_gas_alone and 0.0 < abs(_value(model, "command")) < 0.7:
-        drawn = Figure("steps", _STEPS_CAPTION, lambda: steps_figure(model))
-        sections.append(Section("How far it holds", figure=drawn))
+        steps = Part("How far it holds", panels=lambda: steps_panels(model), name="steps", caption=_STEPS_CAPTION)
+        parts.append(replace(steps, across=2, size=(4.4, 3.4)))
     size = f"{len(model.states)} states, {len(model.inputs)} inputs, {len(model.outputs)} outputs"
     said = [f"the plant without controller and sensors: {size}; differences from the point, SI units"]
     if model.time is not None:
@@ -339,47 +388,32 @@ def answer_of(model: LinearModel) -> Answer:
         ("sample period", model.delays.period),
     )
     left_out = ", ".join(f"{name} {1.0e3 * value:g} ms" for name, value in late if value > 0.0)
-    return Answer(
+    when = "in its steady state" if model.time is None else f"at {model.time:g} s"
+    return Finding(
         name="linearise",
         kicker="Linear model",
-        title=f"Linear model of {model.scenario.name}, {_when(model)}",
-        lead=(*said, f"not in the model: {left_out}, noise, resolution and bandwidth of sensors"),
-        sections=tuple(sections),
-        data=_data(model),
+        title=f"Linear model of {model.scenario.name}, {when}",
+        said=(*said, f"not in the model: {left_out}, noise, resolution and bandwidth of sensors"),
+        parts=parts,
+        found=model,
         files={"linearise.npz": lambda: _arrays(model)},
     )
 
 
-def _when(model: LinearModel) -> str:
-    return "in its steady state" if model.time is None else f"at {model.time:g} s"
+def _value_text(item: Variable) -> str:
+    return Kind("", "" if item.unit == "1" else item.unit, quantity_of_unit(item.unit), ".5g").text(item.value)
 
 
-def _shown(item: Variable) -> str:
-    """A value in the unit in which a person is shown it."""
-    quantity = quantity_of_unit(item.unit)
-    if quantity in QUANTITIES:
-        return quantity_text(item.value, quantity, ".5g")
-    return f"{item.value:.5g} {'' if item.unit == '1' else item.unit}".rstrip()
-
-
-def _point_table(model: LinearModel) -> Table:
-    states = {item.name for item in model.states}
-    kinds = (("state", model.states), ("input", model.inputs))
-    rows = [(kind, item.name, item.unit, _shown(item)) for kind, items in kinds for item in items]
-    rows += [("output", item.name, item.unit, _shown(item)) for item in model.outputs if item.name not in states]
-    return Table((Column(""), Column("name"), Column("unit in the model"), Column("at the point")), tuple(rows), left=3)
-
-
-def _edges(model: LinearModel) -> tuple[str, ...]:
+def _edges(model: LinearModel) -> list[str]:
     """Where the point lies on an edge of the plant, and what was taken to hold."""
-    return tuple(
+    return [
         f"the point lies on an edge, with another linear model beyond: `{edge.place.partition(': ')[2]}` in "
         f"{edge.place.partition(': ')[0]} was taken to be {'true' if edge.is_true else 'false'}"
         for edge in model.edges
-    )
+    ]
 
 
-def _pole_table(model: LinearModel) -> Table:
+def _poles(model: LinearModel) -> list[Column]:
     """Poles with their time constants; a pair of complex ones is one row with its frequency and damping."""
     rows: list[tuple[str | float | None, ...]] = []
     for pole in model.poles.tolist():
@@ -389,49 +423,15 @@ def _pole_table(model: LinearModel) -> Table:
         elif pole.imag > 0.0:
             pair = f"{pole.real:.5g} ± {pole.imag:.5g}i"
             rows.append((pair, None, size / (2.0 * np.pi), -pole.real / size))
-    head = (
-        Column("pole (1/s)"),
-        Column("time constant", "time", ".4g"),
-        Column("frequency", "frequency", ".4g"),
-        Column("damping ratio", "", ".3f"),
-    )
-    return Table(head, tuple(rows))
+    constant, frequency = (Kind(quantity=quantity) for quantity in ("time", "frequency"))
+    ratio = ("damping ratio", Kind(form=".3f"))
+    return columns_of(("pole (1/s)", ("time constant", constant), ("frequency", frequency), ratio), rows)
 
 
-def _matrix(values: Floats, rows: Sequence[Variable], columns: Sequence[Variable]) -> Table:
-    head = (Column(""), *(Column(item.name, "", ".5g") for item in columns))
-    return Table(head, tuple((item.name, *row) for item, row in zip(rows, values.tolist(), strict=True)))
-
-
-def _data(model: LinearModel) -> dict[str, Any]:
-    rates = model.rates.tolist()
-    return {
-        "format": "ppafo linear model",
-        "schema_version": 1,
-        "ppafo": __version__,
-        "scenario": model.scenario.name,
-        "overrides": list(model.scenario.origin.overrides),
-        "at": "equilibrium" if model.time is None else model.time,
-        "states": [{**_variable(item), "rate": rate} for item, rate in zip(model.states, rates, strict=True)],
-        "inputs": [_variable(item) for item in model.inputs],
-        "outputs": [_variable(item) for item in model.outputs],
-        "A": model.a.tolist(),
-        "B": model.b.tolist(),
-        "C": model.c.tolist(),
-        "D": model.d.tolist(),
-        "poles": [{"real": pole.real, "imaginary": pole.imag} for pole in model.poles.tolist()],
-        "sides": dict(model.sides),
-        "edges": [{"place": edge.place, "is_true": edge.is_true} for edge in model.edges],
-        "left_out": {
-            "command_delay": model.delays.command,
-            "signal_delay": model.delays.signals,
-            "sample_period": model.delays.period,
-        },
-    }
-
-
-def _variable(item: Variable) -> dict[str, str | float]:
-    return {"name": item.name, "unit": item.unit, "value": item.value}
+def _matrix(values: Floats, rows: Sequence[Variable], columns: Sequence[Variable]) -> list[Column]:
+    plain = Kind(form=".5g")
+    own = [Column(item.name, cells, plain) for item, cells in zip(columns, values.T.tolist(), strict=True)]
+    return [Column("", [item.name for item in rows]), *own]
 
 
 def _arrays(model: LinearModel) -> bytes:

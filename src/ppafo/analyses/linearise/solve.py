@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.analyses.linearise.answer import ON_THE_EDGE, Delays, Edge, LinearModel, Variable
+from ppafo.analyses.linearise.answer import ON_THE_EDGE, Delays, Edge, LinearModel, Variable, finding_of
 from ppafo.control.profiles import CONSTANT
 from ppafo.engine.continuous_time import mode_at_rest, torque_on_vane
 from ppafo.engine.lanes import Floats, run_batch
@@ -31,6 +31,7 @@ from ppafo.model.plant import (
 )
 from ppafo.model.ports import at_valve, friction_at_rest
 from ppafo.model.valves.proportional import NO_SLEW_LIMIT
+from ppafo.report.finding import Finding
 from ppafo.simulation.loading import scenario_or_load
 from ppafo.simulation.plan import plan_run, profile_values
 from ppafo.simulation.sampled import run_sampled, state_row_numbers
@@ -398,7 +399,7 @@ DEAF = "no small change of the command changes it (dead band, slew limit, beyond
 
 def linearise(
     scenario: Scenario | str | Path, at: float | str = EQUILIBRIUM, overrides: Sequence[str] = ()
-) -> LinearModel:
+) -> Finding[LinearModel]:
     """Return the linear model of a scenario's plant, without controller and sensors, at a time or ``equilibrium``.
 
     A time is a number [s] or a text such as ``0.5 s``.
@@ -430,7 +431,7 @@ def linearise(
         with refused_as(ScenarioError, f"{chosen.name}: --at '{at}' is neither a time nor '{EQUILIBRIUM}'", UnitError):
             at = parse_quantity(str(at), "s")
     point = equilibrium(chosen) if isinstance(at, str) else point_at(chosen, at)
-    return _model(chosen, run, point)
+    return finding_of(_model(chosen, run, point))
 
 
 class _Sides:

@@ -1,7 +1,7 @@
-"""Real parts of a catalogue, listed with the origin of every figure; what other answers say of doubtful figures."""
+"""Real parts of a catalogue, listed with the origin of every figure; what other analyses say of doubtful figures."""
 
 import textwrap
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -9,19 +9,29 @@ from typing import Any
 from ppafo.errors import ParameterError, nearest_name
 from ppafo.parameters.parts import Catalogue, Part, load_catalogue
 from ppafo.parameters.parts.catalogue import DEFAULT
-from ppafo.report import Answer, Column, Section, Table
-from ppafo.report.solved import Solved
+from ppafo.report.finding import Finding, columns_of, facts
+from ppafo.report.finding import Part as Section
+from ppafo.report.kind import Kind
 
 
-@dataclass(frozen=True, slots=True, repr=False)
-class Parts(Solved):
+@dataclass(frozen=True, slots=True)
+class Parts:
     """Parts of a catalogue: one, or all where ``part`` is None."""
 
     catalogue: Catalogue
     part: Part | None
 
+    def json_document(self) -> dict[str, Any]:
+        """Return every figure of the parts, with its origin and source, as plain data."""
+        chosen = self.catalogue.parts if self.part is None else (self.part,)
+        return {"catalogue": self.catalogue.name, "parts": [_part_data(item) for item in chosen]}
 
-def parts(part: str | None = None, catalogue: str | Path = DEFAULT) -> Parts:
+
+_WIDTH = 110
+_HEAD = ("part", "maker and model", ("mass", Kind(quantity="part mass")), "figures to check", "not known")
+
+
+def parts(part: str | None = None, catalogue: str | Path = DEFAULT) -> Finding[Parts]:
     """Return one part by name, or all parts, of a catalogue: one of the package by name, or a TOML file.
 
     ParameterError for bad input.
@@ -32,52 +42,44 @@ def parts(part: str | None = None, catalogue: str | Path = DEFAULT) -> Parts:
         raise ParameterError(
             f"{loaded.file}: there is no part '{part}'{nearest_name(part, named)}; available: {', '.join(named)}"
         )
-    return Parts(loaded, None if part is None else named[part])
-
-
-_WIDTH = 110
-_HEAD = (
-    Column("part"),
-    Column("maker and model"),
-    Column("mass", "part mass"),
-    Column("figures to check"),
-    Column("not known"),
-)
-_FIGURE_HEAD = tuple(map(Column, ("figure", "value", "origin", "source")))
-
-
-def answer_of(found: Parts) -> Answer:
-    """Return the answer about one part or a whole catalogue."""
-    catalogue, part = found.catalogue, found.part
-    chosen = catalogue.parts if part is None else (part,)
-    notes = "\n".join(textwrap.wrap(" ".join(catalogue.notes.split()), _WIDTH))
-    return Answer(
+    chosen = None if part is None else named[part]
+    if chosen is None:
+        notes = "\n".join(textwrap.wrap(" ".join(loaded.notes.split()), _WIDTH))
+        said = [f"{loaded.name}: {loaded.title}", *([notes] if notes else [])]
+        sections = [
+            Section(group.capitalize(), columns_of(_HEAD, map(_row, parts.values())), left=len(_HEAD))
+            for group, parts in loaded.groups.items()
+        ]
+    else:
+        kind = f", {chosen.kind}" if chosen.kind else ""
+        said = [f"{chosen.name}: {chosen.title} ({chosen.group}{kind})", *filter(None, (chosen.document, chosen.note))]
+        sections = [_figures(chosen)]
+    return Finding(
         name="parts",
         kicker="Parts",
-        title=catalogue.title if part is None else part.title,
-        lead=(f"{catalogue.name}: {catalogue.title}", *([notes] if notes else [])) if part is None else _lead(part),
-        sections=_groups(catalogue.groups) if part is None else (_figures(part),),
-        data={"catalogue": catalogue.name, "parts": [_part_data(item) for item in chosen]},
+        title=loaded.title if chosen is None else chosen.title,
+        said=said,
+        parts=sections,
+        found=Parts(loaded, chosen),
         kind="measured",
     )
 
 
-def doubts_sections(doubtful: Iterable[tuple[Part, str]]) -> tuple[Section, ...]:
+def doubts_sections(doubtful: Iterable[tuple[Part, str]]) -> list[Section]:
     """Return which figures of parts are quoted or assumed, a row for each part; the page has the reasons too."""
     pairs = tuple(doubtful)
     if not pairs:
-        return ()
+        return []
     by_part: dict[str, list[str]] = {}
     for part, name in pairs:
         by_part.setdefault(part.name, []).append(f"{name.replace('_', ' ')} ({part.figures[name].origin})")
     where = (
         "quoted from a document that was not itself consulted, or assumed; 'ppafo sets parts PART' gives the reasons"
     )
-    rows = tuple((name, ", ".join(figures)) for name, figures in by_part.items())
-    return (
-        Section("Check before buying", (where,), Table((), rows)),
-        Section("Why these figures are uncertain", remarks=tuple(_reason(*pair) for pair in pairs), is_detail=True),
-    )
+    return [
+        Section("Check before buying", facts((name, ", ".join(each)) for name, each in by_part.items()), [where]),
+        Section("Why these figures are uncertain", remarks=[_reason(*pair) for pair in pairs], is_detail=True),
+    ]
 
 
 def doubts_data(doubtful: Iterable[tuple[Part, str]]) -> list[dict[str, Any]]:
@@ -87,8 +89,7 @@ def doubts_data(doubtful: Iterable[tuple[Part, str]]) -> list[dict[str, Any]]:
 
 def titles_section(parts: Iterable[Part]) -> Section:
     """Return maker and model of parts, each once, for the page."""
-    rows = {part.name: part.title for part in parts}
-    return Section("Parts", table=Table((), tuple(rows.items())), is_detail=True)
+    return Section("Parts", facts({part.name: part.title for part in parts}.items()), is_detail=True)
 
 
 def _reason(part: Part, name: str) -> str:
@@ -97,31 +98,18 @@ def _reason(part: Part, name: str) -> str:
     return f"{part.name}: {name.replace('_', ' ')} {value} is {figure.origin}: {figure.note or figure.source}"
 
 
-def _groups(groups: Mapping[str, Mapping[str, Part]]) -> tuple[Section, ...]:
-    return tuple(
-        Section(group.capitalize(), table=Table(_HEAD, tuple(map(_row, parts.values())), left=len(_HEAD)))
-        for group, parts in groups.items()
-        if parts
-    )
-
-
 def _row(part: Part) -> tuple[str | float, ...]:
     return part.name, part.title, part.full_mass, ", ".join(part.doubtful) or "-", ", ".join(part.unknown) or "-"
 
 
-def _lead(part: Part) -> tuple[str, ...]:
-    kind = f", {part.kind}" if part.kind else ""
-    return (f"{part.name}: {part.title} ({part.group}{kind})", *filter(None, (part.document, part.note)))
-
-
 def _figures(part: Part) -> Section:
-    rows = tuple(
+    rows = [
         (name, f"{figure.value:.4g} {figure.unit}".rstrip(), figure.origin, figure.source)
         for name, figure in part.figures.items()
-    )
+    ]
     notes = [f"{name}: {figure.note}" for name, figure in part.figures.items() if figure.note]
     notes += [f"not known: {', '.join(part.unknown)}"] if part.unknown else []
-    return Section(table=Table(_FIGURE_HEAD, rows, left=4), remarks=tuple(notes))
+    return Section(columns=columns_of(("figure", "value", "origin", "source"), rows), remarks=notes, left=4)
 
 
 def _part_data(part: Part) -> dict[str, Any]:

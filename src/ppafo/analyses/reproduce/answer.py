@@ -1,7 +1,7 @@
-"""The answer of the reproduction: every claim with its verdict, figures, recordings, and the one bespoke page."""
+"""The reproduction: every claim with its verdict, figures, recordings, and the one bespoke page."""
 
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -34,12 +34,11 @@ from ppafo.analyses.reproduce.torque_task import WITHIN_REACH, InterpretationOfU
 from ppafo.identification.bench.result import synthetic_figure_3
 from ppafo.metrics import Metric
 from ppafo.parameters import load_parameter_set
-from ppafo.parameters.audit import Finding
+from ppafo.parameters.audit import Finding as AuditFinding
 from ppafo.parameters.publications.publication import paper_entries
-from ppafo.report import Answer, Column, Figure, Section, Table
 from ppafo.report.display_units import metric_level
+from ppafo.report.finding import Cell, Finding, Part, columns_of
 from ppafo.report.live_parts import live_part
-from ppafo.report.solved import Solved
 from ppafo.report.writing import inline_figure, quantity, render_page, sentence
 from ppafo.simulation.simulate import Result
 from ppafo.storage.comma_separated import marked_csv_bytes
@@ -53,8 +52,8 @@ SOLENOID = "torque-task-solenoid"
 PROPORTIONAL = "torque-task-proportional"
 
 
-@dataclass(frozen=True, slots=True, repr=False)
-class Reproduction(Solved):
+@dataclass(frozen=True, slots=True)
+class Reproduction:
     """What came of it: claims in the order of the paper, what the text tells, runs, assumptions and audit findings."""
 
     claims: tuple[Claim, ...]
@@ -68,9 +67,9 @@ class Reproduction(Solved):
     synthetic: SyntheticEvidence | NoEvidence
     assumed: tuple[AssumedValue, ...]
     printed_set: str
-    printed_findings: tuple[Finding, ...]
+    printed_findings: tuple[AuditFinding, ...]
     completed_set: str
-    completed_findings: tuple[Finding, ...]
+    completed_findings: tuple[AuditFinding, ...]
     overrides: tuple[str, ...]
 
     @property
@@ -78,13 +77,42 @@ class Reproduction(Solved):
         """Claims whose number is outside the window that it has to meet."""
         return tuple(claim for claim in self.claims if claim.is_missed)
 
+    def json_document(self) -> dict[str, Any]:
+        """Return claims with their verdicts, and how many there are of each, as plain data in SI."""
+        return {
+            "counts": verdict_counts(self.claims),
+            "claims": [claim.document() for claim in self.claims],
+            "readings_of_u": [asdict(row) for row in self.readings_of_u],
+            "overrides": list(self.overrides),
+            "versions": dict(self.step.versions),
+        }
 
-@dataclass(frozen=True, slots=True, repr=False)
-class Studies(Solved):
+
+@dataclass(frozen=True, slots=True)
+class Studies:
     """Some publications with their judged claims, and the reproduction of the paper where it is among them."""
 
     studies: tuple[Study, ...]
     reproduction: Reproduction | None = None
+
+    @property
+    def verdicts(self) -> list[Verdict]:
+        """The verdicts of all claims, those of the paper first."""
+        own = [] if self.reproduction is None else [claim.verdict for claim in self.reproduction.claims]
+        return own + [item.verdict for study in self.studies for item in study.claims]
+
+    def json_document(self) -> dict[str, Any]:
+        """Return claims with their verdicts, and how many there are of each, as plain data in SI."""
+        own = () if self.reproduction is None else self.reproduction.claims
+        return {
+            "study": self.studies[0].publication.name if self.reproduction is None else ALL,
+            "counts": {verdict: self.verdicts.count(verdict) for verdict in VERDICTS},
+            "claims": [
+                *({"study": SEED, **claim.document()} for claim in own),
+                *(item.document(study.publication.name) for study in self.studies for item in study.claims),
+            ],
+            "versions": {"ppafo": __version__},
+        }
 
 
 TEMPLATE = "reproduction.html.jinja"
@@ -194,7 +222,7 @@ def _reading_texts(row: InterpretationOfU) -> tuple[str, str, str]:
     return f"{row.error:.0f} %", f"{row.gas:.0f} %", f"{row.error_within_reach:.0f} %"
 
 
-def _of_severity(findings: Sequence[Finding], severity: str) -> list[Finding]:
+def _of_severity(findings: Sequence[AuditFinding], severity: str) -> list[AuditFinding]:
     return [finding for finding in findings if finding.severity == severity]
 
 
@@ -261,70 +289,48 @@ NOT_READ = (
 )
 
 
-def answer_of(solved: Reproduction | Studies) -> Answer:
-    """Return the answer of the paper's experiments, or of other publications."""
-    return _studies_answer(solved) if isinstance(solved, Studies) else _paper_answer(solved)
-
-
-def _studies_answer(solved: Studies) -> Answer:
+def finding_of_studies(solved: Studies) -> Finding[Studies]:
     """Return the table of studies; a claim of another publication that is not met is a result, no failure."""
-    rows, claims, verdicts = _paper_part(solved.reproduction)
+    reproduction = solved.reproduction
+    rows: list[Sequence[Cell]] = [] if reproduction is None else [(SEED, *row) for row in _paper_rows(reproduction)]
     for study in solved.studies:
-        name = study.publication.name
         rows += [
             (
-                name,
+                study.publication.name,
                 item.claim.entry.id,
-                item.published or _own_sum(item.claim.entry.own),
+                # A number that only own arithmetic on published ones gives.
+                item.published or (f"{item.claim.entry.own} (own sum)" if item.claim.entry.own else None),
                 item.ours,
                 VERDICTS[item.verdict],
             )
             for item in study.claims
         ]
-        claims += [item.document(name) for item in study.claims]
-        verdicts += [item.verdict for item in study.claims]
-    table = Table(tuple(map(Column, _STUDIES_HEAD)), tuple(rows), left=len(_STUDIES_HEAD))
-    only = solved.studies[0].publication.name
-    is_all = solved.reproduction is not None
-    return Answer(
+    name = solved.studies[0].publication.name
+    return Finding(
         name="claims",
         kicker="Reproduction",
-        title="Published studies, run again" if is_all else f"{only}, run again",
-        lead=(),
-        sections=(
-            Section(table=table, remarks=("", count_words(verdicts))),
-            Section("How to read it", (_RULE,), is_detail=True),
-            *((Section(f"{SEED}: the paper", (_PAPER,), is_detail=True),) if is_all else ()),
-            *(_study_section(study) for study in solved.studies),
+        title=f"{name}, run again" if reproduction is None else "Published studies, run again",
+        said=(),
+        parts=(
+            Part(
+                columns=columns_of(_STUDIES_HEAD, rows),
+                remarks=("", count_words(solved.verdicts)),
+                left=len(_STUDIES_HEAD),
+            ),
+            Part("How to read it", said=(_RULE,), is_detail=True),
+            *([] if reproduction is None else [Part(f"{SEED}: the paper", said=(_PAPER,), is_detail=True)]),
+            *(_study_part(study) for study in solved.studies),
         ),
-        data={
-            "study": ALL if is_all else only,
-            "counts": {verdict: verdicts.count(verdict) for verdict in VERDICTS},
-            "claims": claims,
-            "versions": {"ppafo": __version__},
-        },
-        passed=solved.reproduction is None or not solved.reproduction.missed,
+        found=solved,
+        passed=reproduction is None or not reproduction.missed,
         command="reproduce",
     )
 
 
-def _paper_part(
-    reproduction: Reproduction | None,
-) -> tuple[list[tuple[str | None, ...]], list[dict[str, Any]], list[Verdict]]:
-    """Return rows, plain data and verdicts of the paper's own claims; none without them."""
-    if reproduction is None:
-        return [], [], []
-    return (
-        [(SEED, *row) for row in _paper_rows(reproduction)],
-        [{"study": SEED, **claim.document()} for claim in reproduction.claims],
-        [claim.verdict for claim in reproduction.claims],
-    )
-
-
-def _study_section(study: Study) -> Section:
+def _study_part(study: Study) -> Part:
     """Return what each claim of a publication says, where it stands, what it rests on, and why its verdict."""
-    head = (Column("claim"), Column("statement and source"), Column("agrees"), Column("rests on"), Column("note"))
-    rows = tuple(
+    head = ("claim", "statement and source", "agrees", "rests on", "note")
+    rows = [
         (
             item.claim.entry.id,
             f"{item.claim.entry.statement} ({item.claim.source})",
@@ -333,9 +339,9 @@ def _study_section(study: Study) -> Section:
             item.note or None,
         )
         for item in study.claims
-    )
+    ]
     heading = f"{study.publication.name}: {study.publication.title}"
-    return Section(heading, (study.publication.citation,), table=Table(head, rows, left=len(head)), is_detail=True)
+    return Part(heading, columns_of(head, rows), (study.publication.citation,), left=len(head), is_detail=True)
 
 
 def _agrees(low: float | None, high: float | None, unit: str) -> str | None:
@@ -347,20 +353,15 @@ def _agrees(low: float | None, high: float | None, unit: str) -> str | None:
     return f"at least {low:g} {unit}".rstrip() if high is None else f"at most {high:g} {unit}".rstrip()
 
 
-def _own_sum(own: str) -> str | None:
-    """Return a number that only own arithmetic on published ones gives, as it stands in a table."""
-    return f"{own} (own sum)" if own else None
-
-
 def _paper_rows(reproduction: Reproduction) -> tuple[tuple[str | None, ...], ...]:
     return tuple((claim.id, claim.published, claim.ours, VERDICTS[claim.verdict]) for claim in reproduction.claims)
 
 
-def _readings_table(rows: Sequence[InterpretationOfU]) -> Section:
+def _readings_part(rows: Sequence[InterpretationOfU]) -> Part:
     """Return what each meaning of U makes of the comparison."""
     head = ("U is", "RMS error less by", "CO2 less by", f"error less by at {WITHIN_REACH:g} N m")
-    cells = tuple((row.name, *_reading_texts(row)) for row in rows)
-    return Section(table=Table(tuple(map(Column, head)), cells, left=1), remarks=("", *result_on_u(rows)))
+    cells = [(row.name, *_reading_texts(row)) for row in rows]
+    return Part(columns=columns_of(head, cells), remarks=("", *result_on_u(rows)))
 
 
 def result_on_u(rows: Sequence[InterpretationOfU]) -> tuple[str, ...]:
@@ -376,37 +377,27 @@ def result_on_u(rows: Sequence[InterpretationOfU]) -> tuple[str, ...]:
     return ("15 % needs 'U is the opening' and a level beyond the supply's reach; the saving needs neither.",)
 
 
-def _paper_answer(reproduction: Reproduction) -> Answer:
-    """Return the answer; it has not passed where a number misses its window, unless values were changed.
+def finding_of(reproduction: Reproduction) -> Finding[Reproduction]:
+    """Return the paper's claims; it has not passed where a number misses its window, unless values were changed.
 
     Without the simulated test bench there is no figure 3.
     """
-    table = Table(tuple(map(Column, _HEAD)), _paper_rows(reproduction), left=len(_HEAD))
     runs = (reproduction.step, reproduction.solenoid, reproduction.proportional)
-    return Answer(
+    return Finding(
         name="claims",
         kicker="Reproduction",
         title="The paper's claims",
-        lead=(NOTHING_CONFIRMED, *_override_remarks(reproduction.overrides)),
-        sections=(
-            Section(
-                table=table,
-                remarks=(
-                    "",
-                    count_sentence(reproduction.claims),
-                    *_missed_claims(reproduction),
-                ),
+        said=(NOTHING_CONFIRMED, *_override_remarks(reproduction.overrides)),
+        parts=(
+            Part(
+                columns=columns_of(_HEAD, _paper_rows(reproduction)),
+                remarks=("", count_sentence(reproduction.claims), *_missed_claims(reproduction)),
+                left=len(_HEAD),
             ),
-            *((_readings_table(reproduction.readings_of_u),) if reproduction.readings_of_u else ()),
-            *(Section(figure=figure, is_detail=True) for figure in _figures(reproduction)),
+            *([_readings_part(reproduction.readings_of_u)] if reproduction.readings_of_u else []),
+            *_figures(reproduction),
         ),
-        data={
-            "counts": verdict_counts(reproduction.claims),
-            "claims": [claim.document() for claim in reproduction.claims],
-            "readings_of_u": [asdict(row) for row in reproduction.readings_of_u],
-            "overrides": list(reproduction.overrides),
-            "versions": dict(reproduction.step.versions),
-        },
+        found=reproduction,
         passed=not reproduction.missed or bool(reproduction.overrides),
         files={f"{run.scenario.name}.csv": partial(marked_csv_bytes, run.recording) for run in runs},
         command="reproduce",
@@ -430,17 +421,16 @@ def _missed_claims(reproduction: Reproduction) -> list[str]:
     ]
 
 
-def _figures(reproduction: Reproduction) -> list[Figure]:
-    figures = [
-        Figure(DEVICE_FIGURE, "", device_figure),
-        Figure(STEP_FIGURE, "", partial(_step_figure, reproduction)),
-        Figure(TORQUE_FIGURE, "", partial(_torque_figure, reproduction)),
-    ]
+def _figures(reproduction: Reproduction) -> list[Part]:
+    drawn: dict[str, Callable[[], Drawing]] = {
+        DEVICE_FIGURE: device_figure,
+        STEP_FIGURE: partial(_step_figure, reproduction),
+        TORQUE_FIGURE: partial(_torque_figure, reproduction),
+    }
     evidence = reproduction.synthetic
     if not isinstance(evidence, NoEvidence):
-        figure = partial(synthetic_figure_3, evidence.torque, evidence.decay)
-        figures.append(Figure(IDENTIFICATION_FIGURE, "", figure))
-    return figures
+        drawn[IDENTIFICATION_FIGURE] = partial(synthetic_figure_3, evidence.torque, evidence.decay)
+    return [Part(name=name, draw=draw, is_detail=True) for name, draw in drawn.items()]
 
 
 def _step_figure(reproduction: Reproduction) -> "Drawing":

@@ -1,9 +1,17 @@
 """Runs the paper's experiments and judges what the paper claims of them."""
 
 from collections.abc import Sequence
-from typing import Any, Literal, overload
+from typing import Any
 
-from ppafo.analyses.reproduce.answer import PROPORTIONAL, SOLENOID, STEP, Reproduction, Studies
+from ppafo.analyses.reproduce.answer import (
+    PROPORTIONAL,
+    SOLENOID,
+    STEP,
+    Reproduction,
+    Studies,
+    finding_of,
+    finding_of_studies,
+)
 from ppafo.analyses.reproduce.bench import assumed_values, synthetic_evidence, values_used_by
 from ppafo.analyses.reproduce.claim import arithmetic_claims, load_reported, not_published_claim, told_claim
 from ppafo.analyses.reproduce.publication import ALL, SEED, check_study, run_studies
@@ -20,6 +28,7 @@ from ppafo.parameters import load_parameter_set
 from ppafo.parameters.audit import audit
 from ppafo.parameters.overrides import override_set
 from ppafo.progress import Progress, Report, report_nothing
+from ppafo.report.finding import Finding
 from ppafo.simulation.declaration import value_at
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.overrides import apply_overrides, chosen_by, is_of_device, scenario_paths, unknown_value
@@ -49,27 +58,11 @@ ORDER = (
 """Every claim: what the reported numbers decide, what is simulated, what is left."""
 
 
-@overload
-def reproduce(
-    overrides: Sequence[str] = (),
-    progress: Report | None = None,
-    study: Literal["ppafo-2011"] = "ppafo-2011",
-) -> Reproduction: ...
-
-
-@overload
 def reproduce(
     overrides: Sequence[str] = (),
     progress: Report | None = None,
     study: str = SEED,
-) -> Reproduction | Studies: ...
-
-
-def reproduce(
-    overrides: Sequence[str] = (),
-    progress: Report | None = None,
-    study: str = SEED,
-) -> Reproduction | Studies:
+) -> Finding[Reproduction] | Finding[Studies]:
     """Run the paper's experiments with the shipped scenarios and judge every claim, or those of other publications.
 
     ``overrides`` change the experiments (not the paper's reported numbers): a path of a scenario reaches those that
@@ -80,12 +73,12 @@ def reproduce(
     report = progress or report_nothing
     check_study(study, overrides)
     if study == SEED:
-        return _reproduce_paper(overrides, report)
-    seed = _reproduce_paper((), report) if study == ALL else None
-    return Studies(run_studies(study, report), seed)
+        return finding_of(reproduce_paper(overrides, report))
+    seed = reproduce_paper((), report) if study == ALL else None
+    return finding_of_studies(Studies(run_studies(study, report), seed))
 
 
-def _reproduce_paper(overrides: Sequence[str], report: Report) -> Reproduction:
+def reproduce_paper(overrides: Sequence[str] = (), report: Report = report_nothing) -> Reproduction:
     """Return what came of the paper's own experiments."""
     scenarios = _scenarios(overrides)
     runs = {name: _run(scenario, report) for name, scenario in scenarios.items()}

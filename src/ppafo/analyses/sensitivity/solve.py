@@ -18,6 +18,9 @@ from numpy.typing import NDArray
 from ppafo.analyses.sensitivity.methods import METHODS, Evaluated, Indices, Method, changes
 from ppafo.errors import StudyError, nearest_name
 from ppafo.progress import Report
+from ppafo.report.finding import Column, Finding, Part
+from ppafo.report.kind import Kind, of_metric
+from ppafo.report.panels import Mark, Panel
 from ppafo.report.setting_names import label_of
 from ppafo.report.style import BLUE, COLOURS, ORANGE
 from ppafo.studies.distributions import Floats
@@ -31,9 +34,6 @@ from ppafo.studies.draws import (
 )
 from ppafo.studies.sampling import NOISE
 from ppafo.studies.study import Study
-from ppafo.study.finding import Column, Finding, Part
-from ppafo.study.kind import Kind, of_metric
-from ppafo.study.panels import Mark, Panel
 from ppafo.study.runs import Rows, Runs, Tally
 
 if TYPE_CHECKING:

@@ -11,6 +11,9 @@ from pydantic import BaseModel
 
 from ppafo.analyses.sweep.results import SUMMARY, StudyResults
 from ppafo.errors import DataError
+from ppafo.report.finding import Column, Finding, Part
+from ppafo.report.kind import TIME, Kind, of_channel, of_metric, of_path
+from ppafo.report.panels import Mark, Panel
 from ppafo.report.setting_names import label_of
 from ppafo.report.style import BLUE, GREEN, GREY, ORANGE, VERMILION
 from ppafo.report.writing import files_of
@@ -18,10 +21,7 @@ from ppafo.signals.recording import CHANNELS
 from ppafo.storage.places import place_at, read_document
 from ppafo.studies.distributions import Floats
 from ppafo.studies.sampling import NOISE
-from ppafo.study.finding import Column, Finding, Part
-from ppafo.study.kind import TIME, Kind, of_channel, of_metric, of_path
 from ppafo.study.manifest import read_manifest
-from ppafo.study.panels import Mark, Panel
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -87,8 +87,9 @@ def write_report(results: StudyResults) -> None:
 
     No file names the place: the same study makes the same bytes anywhere.
     """
-    answer = replace(finding_of(results).answer(), name=Path(SUMMARY).stem, data=results.summary)
-    for name, content in files_of(answer).items():
+    finding: Finding[Any] = finding_of(results)
+    finding = replace(finding, name=Path(SUMMARY).stem, found=results.summary)
+    for name, content in files_of(finding).items():
         results.place.write(name, content)
 
 

@@ -28,6 +28,7 @@ from ppafo.documents.json_text import json_text
 from ppafo.errors import StudyError
 from ppafo.metrics import METRICS
 from ppafo.progress import Progress, Report
+from ppafo.report.finding import Finding
 from ppafo.signals.recording import CHANNELS
 from ppafo.storage.parquet import TableColumn, encode_texts, matrix_of, parquet_bytes, table_of
 from ppafo.storage.places import place_at
@@ -37,7 +38,6 @@ from ppafo.studies.draws import study_of
 from ppafo.studies.loading import list_studies, load_study
 from ppafo.studies.study import Study
 from ppafo.study.blocks import chunk_count, samples_of
-from ppafo.study.finding import Finding
 from ppafo.study.manifest import read_manifest
 from ppafo.study.store import (
     STATUSES,

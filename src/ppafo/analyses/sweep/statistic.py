@@ -18,15 +18,17 @@ from typing import Any
 
 import numpy as np
 
+from ppafo.documents.json_text import plain
 from ppafo.errors import StudyError, UnitError, refused_as
 from ppafo.metrics import METRICS
 from ppafo.progress import Report
+from ppafo.report.finding import Column, Finding, Part
+from ppafo.report.kind import Interval, Kind, of_metric
+from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import GREY, VERMILION
-from ppafo.simulation.scenario import plain
 from ppafo.studies.distributions import (
     FEWEST_EFFECTIVE,
     Floats,
-    Interval,
     effective_sample_size,
     floored_interval,
     fraction_interval,
@@ -51,9 +53,6 @@ from ppafo.studies.draws import (
     with_new_noise,
 )
 from ppafo.studies.study import Study
-from ppafo.study.finding import Column, Finding, Part
-from ppafo.study.kind import Kind, of_metric
-from ppafo.study.panels import Mark, Panel
 from ppafo.study.runs import Rows, Runs, Tally
 from ppafo.units import number_text, parse_quantity
 

@@ -10,14 +10,14 @@ import numpy as np
 from ppafo.analyses.tune.problem import Gains, Limit, Problem, Term
 from ppafo.metrics import Metric
 from ppafo.parameters.overrides import over
+from ppafo.report.finding import Column, Finding, Part
+from ppafo.report.kind import TIME, Interval, Kind, of_metric
+from ppafo.report.panels import Mark, Panel
 from ppafo.report.setting_names import label_of
 from ppafo.report.style import BLACK, BLUE, COLOURS, GREY, VERMILION
 from ppafo.simulation.scenario import worn_kind
 from ppafo.simulation.simulate import Result
-from ppafo.studies.distributions import Interval, fraction_text
-from ppafo.study.finding import Column, Finding, Part
-from ppafo.study.kind import TIME, Kind, of_metric
-from ppafo.study.panels import Mark, Panel
+from ppafo.studies.distributions import fraction_text
 from ppafo.units import percentage
 
 if TYPE_CHECKING:

@@ -27,14 +27,15 @@ from ppafo.errors import StudyError
 from ppafo.metrics import METRICS
 from ppafo.parameters.device import VANE
 from ppafo.progress import Report
+from ppafo.report.finding import Finding
+from ppafo.report.kind import Interval
 from ppafo.simulation.numbers import TIMES, absolute, with_numbers
 from ppafo.simulation.plan import profile_bounds
 from ppafo.simulation.scenario import Scenario, worn_kind
 from ppafo.simulation.simulate import OPEN_LOOP, simulate
-from ppafo.studies.distributions import Floats, Interval, noise_interval
+from ppafo.studies.distributions import Floats, noise_interval
 from ppafo.studies.draws import with_new_noise
 from ppafo.studies.study import with_overrides
-from ppafo.study.finding import Finding
 from ppafo.study.runs import FAILED, Runs, Tally, settled, with_companions
 
 UNUSABLE = 1.0e12

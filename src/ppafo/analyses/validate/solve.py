@@ -1,40 +1,24 @@
-"""A parameter set compared with recordings, channel by channel, and the answer."""
+"""A parameter set compared with recordings, channel by channel."""
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import DataError, nearest_name, one_line
 from ppafo.parameters import load_device
 from ppafo.parameters.device import Device
 from ppafo.progress import Progress, Report, report_nothing
-from ppafo.report import Answer, Column, Figure, Section, Table
-from ppafo.report.display_units import (
-    axis_unit,
-    display_unit,
-    display_value,
-    display_values,
-    quantity_of_unit,
-    quantity_text,
-)
-from ppafo.report.solved import Solved
-from ppafo.report.style import (
-    ACTUAL,
-    BLACK,
-    CHAMBER_1,
-    CHAMBER_2,
-    GREY,
-    Margins,
-    figure_of_panels,
-    house_style,
-    mark_kind,
-)
-from ppafo.signals.recording import Floats
+from ppafo.report.display_units import display_value, quantity_of_unit
+from ppafo.report.finding import Finding, Part, columns_of, facts
+from ppafo.report.kind import TIME, Kind
+from ppafo.report.panels import Mark, Panel
+from ppafo.report.style import ACTUAL, BLACK, CHAMBER_1, CHAMBER_2, GREY
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.foreign import ColumnMap, load_column_map
 from ppafo.validation import ChannelAgreement
@@ -57,16 +41,12 @@ from ppafo.validation.measured import (
 from ppafo.validation.replay import MOTIONS, Motion, parse_initial
 from ppafo.version import __version__
 
-if TYPE_CHECKING:
-    import matplotlib.figure
-    from matplotlib.axes import Axes
-
 LARGEST_DELAY = 1.0
 """Seconds; a recording that is later than this was not recorded with its command."""
 
 
-@dataclass(frozen=True, slots=True, repr=False)
-class Validation(Solved):
+@dataclass(frozen=True, slots=True)
+class Validation:
     """A parameter set and what each recording reports of it."""
 
     parameter_set: str
@@ -84,6 +64,27 @@ class Validation(Solved):
         found = self.causes.found
         return within and (self.has_limits or found is None or found.is_usual)
 
+    def json_document(self) -> dict[str, Any]:
+        """Return errors, causes and recordings as plain data in SI."""
+        return {
+            "format": "ppafo agreement",
+            "schema_version": 1,
+            "parameter_set": self.parameter_set,
+            "device": self.device.name,
+            "valve": self.device.valve_name,
+            "overrides": list(self.overrides),
+            "longest_delay": self.settings.longest_delay,
+            "passes": self.passes,
+            "summary": verdict(self),
+            "causes": {
+                "tried": self.causes.tried,
+                "found": _cause_data(self.causes.found),
+                "nearest": _cause_data(self.causes.nearest),
+            },
+            "recordings": [_recording_data(agreement) for agreement in self.recordings],
+            "versions": {"ppafo": __version__},
+        }
+
 
 def validate(
     parameter_set: str | Path,
@@ -97,7 +98,7 @@ def validate(
     longest_delay: float = DEFAULT_LIMIT,
     columns: ColumnMap | str | Path | None = None,
     progress: Report | None = None,
-) -> Validation:
+) -> Finding[Validation]:
     """Return the errors (model less measured) of the model with a parameter set against each recording.
 
     ``recordings`` are CSV or NetCDF files or result folders. The model is run on the recorded command, supply pressure
@@ -110,7 +111,7 @@ def validate(
     most 1 s, limits the delay of the measurement that is taken out. ``columns`` is a column map or
     ``FILE.toml[:NAME]``.
 
-    The result has ``passes`` and, in ``recordings``, one ``RecordingAgreement`` each: ``measured`` and ``model`` are
+    What is found has ``passes`` and, in ``recordings``, one ``RecordingAgreement`` each: ``measured`` and ``model`` are
     recordings, their channels of shape (samples,) in SI; ``channels`` has RMS error, bias, largest error and delay [s]
     of each channel in its SI unit (rad, Pa, N m). ``to_dict``, ``plot`` and ``save`` give JSON, figure and page.
 
@@ -139,7 +140,7 @@ def validate(
     for measured in read:
         report(Progress(f"replaying {measured.file}"))
         agreements.append(compare_recording(measured, device, settings))
-    return Validation(
+    validation = Validation(
         parameter_set=str(parameter_set),
         device=device,
         overrides=tuple(overrides),
@@ -148,6 +149,7 @@ def validate(
         causes=causes_of(read, agreements, device, settings, report),
         has_limits=bool(thresholds),
     )
+    return finding_of(validation)
 
 
 def _check_distinct(read: Sequence[Measured]) -> None:
@@ -174,11 +176,6 @@ def _column_map(text: str) -> ColumnMap:
 
 KIND_WORDS = {"measured": "measured", "synthetic": "synthetic measurement", "simulated": "simulated, not measured"}
 """What the recording is called beside the model: nobody may take a model's output for a measurement."""
-_WIDTH = 7.6
-_ROW_HEIGHT = 2.9
-_MARGINS = Margins(left=0.68, right=0.15, top=0.72, bottom=0.52, row_gap=0.44, column_gap=0.78)
-"""Inches."""
-_HEIGHTS = (2.4, 1.0)
 _LOOKS = {PRESSURE_1: CHAMBER_1, PRESSURE_2: CHAMBER_2}
 _MAXIMUM_DOTS = 400
 _NEAR_LIMIT = 0.25
@@ -186,147 +183,94 @@ _SHORT = 3.0
 """Recordings shorter than this [s] have an axis in milliseconds."""
 
 
-def agreement_figure(agreement: RecordingAgreement, atmosphere: float) -> "matplotlib.figure.Figure":
-    """Return the figure of one recording: two panels a channel, gauge pressures from ``atmosphere`` [Pa absolute]."""
-    channels = agreement.channels
-    columns = 1 if len(channels) == 1 else 2
-    rows = -(-len(channels) // columns)
-    with house_style():
-        size = (_WIDTH, _MARGINS.top + _MARGINS.bottom + rows * _ROW_HEIGHT)
-        figure, grid = figure_of_panels(size, _MARGINS, 2 * rows, columns, _HEIGHTS * rows)
-        scale, unit = (1.0e3, "ms") if agreement.measured.duration < _SHORT else (1.0, "s")
-        for number in range(rows * columns):
-            row, column = divmod(number, columns)
-            upper, lower = grid[2 * row][column], grid[2 * row + 1][column]
-            if number >= len(channels):
-                upper.set_visible(False)
-                lower.set_visible(False)
-                continue
-            _draw_channel(upper, lower, agreement, channels[number], scale, atmosphere)
-        for axes in grid[-1]:
-            axes.set_xlabel(f"Time ({unit})")
-        _label(figure, grid[0][0], agreement)
-        return figure
+def agreement_panels(agreement: RecordingAgreement, atmosphere: float) -> list[Panel]:
+    """Return two panels for each channel of a recording; gauge pressures count from ``atmosphere`` [Pa absolute]."""
+    pairs = [_channel_panels(agreement, channel, atmosphere) for channel in agreement.channels]
+    across = _across(agreement)
+    rows = [pairs[first : first + across] for first in range(0, len(pairs), across)]
+    empty = (Panel(TIME, TIME, ()), Panel(TIME, TIME, (), tall=0.5))
+    filled = [[*row, *[empty] * (across - len(row))] for row in rows]
+    return [panel for row in filled for line in zip(*row, strict=True) for panel in line]
 
 
-def _draw_channel(
-    upper: "Axes",
-    lower: "Axes",
-    agreement: RecordingAgreement,
-    channel: ChannelAgreement,
-    scale: float,
-    atmosphere: float,
-) -> None:
+def _across(agreement: RecordingAgreement) -> int:
+    return 1 if len(agreement.channels) == 1 else 2
+
+
+def _channel_panels(agreement: RecordingAgreement, channel: ChannelAgreement, atmosphere: float) -> tuple[Panel, Panel]:
+    """Return samples and model over time, and below them model less measured."""
     name, measured, model = channel.channel, agreement.measured, agreement.model
-    quantity = COMPARED[name].quantity
-    times = measured.time
     given = measured_values(measured, name)
-    if given is None:
-        return
-    colour = _LOOKS.get(name, ACTUAL).colour
-    line = np.interp(times - agreement.delay.correction, model.time, model[name])
-    every = -(-times.size // _MAXIMUM_DOTS)
-    upper.plot(
-        scale * times[::every],
-        _level_in_display_unit(given, name, atmosphere)[::every],
-        ".",
-        color=BLACK,
-        markersize=2.6,
-        zorder=2,
+    assert given is not None, "a channel that is compared was measured"
+    line = np.interp(measured.time - agreement.delay.correction, model.time, model[name])
+    is_short, is_chamber = measured.duration < _SHORT, name in (PRESSURE_1, PRESSURE_2)
+    time, scale = (Kind("Time", "ms"), _MILLISECONDS) if is_short else (TIME, 1.0)
+    times, above = scale * measured.time, atmosphere - STANDARD_ATMOSPHERE if is_chamber else 0.0
+    change = Kind("", "", COMPARED[name].quantity)
+    level = Kind(quantity="pressure") if is_chamber else change
+    colour, every = _LOOKS.get(name, ACTUAL).colour, -(-times.size // _MAXIMUM_DOTS)
+    is_first = channel is agreement.channels[0]
+    dots, model_line = (KIND_WORDS[measured.kind], "model on the recorded inputs") if is_first else ("", "")
+    residual, limit = line - given, channel.limit * channel.full_range
+    marks = [
+        Mark("line", times, residual, colour=colour, style={"linewidth": 0.9}),
+        Mark("level", (), 0.0, colour=GREY, style={"linewidth": 0.8}),
+    ]
+    # Where the residual is far from the limit of its RMS value, that would only press it flat.
+    if float(np.abs(residual).max()) >= _NEAR_LIMIT * limit:
+        dashed = {"linewidth": 0.8, "linestyle": (0, (4, 3))}
+        marks += [Mark("level", (), level, colour=GREY, style=dashed) for level in (-limit, limit)]
+    upper = Panel(
+        time,
+        replace(level, words=COMPARED[name].title),
+        [
+            Mark(
+                "line",
+                times[::every],
+                (given - above)[::every],
+                (),
+                dots,
+                BLACK,
+                {"linestyle": "", "marker": ".", "markersize": 2.6},
+            ),
+            Mark("line", times, line - above, (), model_line, colour, {"linewidth": 1.3}),
+        ],
+        f"{COMPARED[name].title}: RMS {100 * channel.fraction:.2g} %",
+        legend="figure" if is_first else "",
+        shares_x=True,
     )
-    upper.plot(scale * times, _level_in_display_unit(line, name, atmosphere), color=colour, linewidth=1.3, zorder=3)
-    upper.set_title(f"{COMPARED[name].title}: RMS {100 * channel.fraction:.2g} %", color=BLACK)
-    upper.set_ylabel(axis_unit("pressure" if name in (PRESSURE_1, PRESSURE_2) else COMPARED[name].quantity))
-    upper.margins(y=0.06)
-    residual = display_values(line - given, quantity)
-    limit = display_value(channel.limit * channel.full_range, quantity)
-    lower.plot(scale * times, residual, color=colour, linewidth=0.9)
-    lower.axhline(0.0, color=GREY, linewidth=0.8)
-    _mark_limit(lower, limit, float(np.abs(residual).max()))
-    lower.set_ylabel(axis_unit(quantity))
-
-
-def _mark_limit(axes: "Axes", limit: float, largest: float) -> None:
-    """Mark the limit of the RMS error where the residual comes near it; else it would only press the residual flat."""
-    if largest < _NEAR_LIMIT * limit:
-        return
-    for level in (-limit, limit):
-        axes.axhline(level, color=GREY, linewidth=0.8, linestyle=(0, (4, 3)))
-
-
-def _label(figure: "matplotlib.figure.Figure", axes: "Axes", agreement: RecordingAgreement) -> None:
-    """Name dots and lines once for the whole figure, and say what the recording is."""
-    dots, line = axes.lines[0], axes.lines[1]
-    inch = 1.0 / figure.get_figheight()
-    figure.legend(
-        [dots, line],
-        [KIND_WORDS[agreement.measured.kind], "model on the recorded inputs"],
-        loc="upper left",
-        bbox_to_anchor=(0.05, 1.0 - 0.02 * inch),
-        ncols=2,
-        handlelength=1.6,
-        markerscale=2.5,
-    )
-    mark_kind(figure, agreement.measured.kind)
-
-
-def _level_in_display_unit(values: Floats, name: str, atmosphere: float) -> Floats:
-    """Return the values of a channel as they are drawn; a chamber's gauge pressure counts from the atmosphere there."""
-    above = atmosphere if name in (PRESSURE_1, PRESSURE_2) else 0.0
-    return display_values(values - above, COMPARED[name].quantity)
+    return upper, Panel(time, replace(change, words="Model less measured"), marks, tall=0.5, shares_x=True)
 
 
 _MILLISECONDS = 1.0e3
-_HEAD = tuple(
-    map(
-        Column,
-        (
-            *("channel", "RMS error", "in noise", "variation", "of range", "limit", "bias", "largest", "at"),
-            "verdict",
-        ),
-    )
-)
+_HEAD = ("channel", "RMS error", "in noise", "variation", "of range", "limit", "bias", "largest", "at", "verdict")
 _UNUSUAL = re.compile(r"[^A-Za-z0-9_.-]+")
 
 
-def answer_of(validation: Validation) -> Answer:
-    """Return the answer of a validation; it has passed where every error is within its limit."""
+def finding_of(validation: Validation) -> Finding[Validation]:
+    """Return a validation in words, tables and panels; it has passed where every error is within its limit."""
     count = len(validation.recordings)
     names = recording_names([agreement.file for agreement in validation.recordings])
     kinds = {agreement.measured.kind for agreement in validation.recordings}
     pairs = list(zip(names, validation.recordings, strict=True))
-    rows = tuple((item.file, f"sha256 {item.sha256}") for item in validation.recordings if item.sha256)
-    return Answer(
+    hashes = [(item.file, f"sha256 {item.sha256}") for item in validation.recordings if item.sha256]
+    method = (
+        f"The model with the valve '{validation.device.valve_name}' was run with the inputs of each recording, from "
+        "the state of its first samples. An error is model less measured. Percentages are of the full range: the "
+        "angle between the stops, the gauge pressure of the supply, and twice that for the pressure difference. One "
+        "common delay was removed before the errors were computed."
+    )
+    return Finding(
         name="validate",
         kicker="Validation of a parameter set",
         title=f"{validation.device.name} against {count} recording{'' if count == 1 else 's'}",
-        lead=(
-            verdict(validation),
-            *_departures(validation, sorted(kinds - {"measured"})),
+        said=(verdict(validation), *_departures(validation, sorted(kinds - {"measured"}))),
+        parts=(
+            Part(said=[method], is_detail=True),
+            *(_part(validation, name, agreement) for name, agreement in pairs),
+            Part("Files" if hashes else "", facts(hashes), is_detail=True),
         ),
-        sections=(
-            Section(paragraphs=(_method(validation),), is_detail=True),
-            *(_section(validation, name, agreement) for name, agreement in pairs),
-            (Section("Files", table=Table((), rows), is_detail=True) if rows else Section()),
-        ),
-        data={
-            "format": "ppafo agreement",
-            "schema_version": 1,
-            "parameter_set": validation.parameter_set,
-            "device": validation.device.name,
-            "valve": validation.device.valve_name,
-            "overrides": list(validation.overrides),
-            "longest_delay": validation.settings.longest_delay,
-            "passes": validation.passes,
-            "summary": verdict(validation),
-            "causes": {
-                "tried": validation.causes.tried,
-                "found": _cause_data(validation.causes.found),
-                "nearest": _cause_data(validation.causes.nearest),
-            },
-            "recordings": [_recording_data(agreement) for agreement in validation.recordings],
-            "versions": {"ppafo": __version__},
-        },
+        found=validation,
         passed=validation.passes,
         kind=next(iter(kinds)) if len(kinds) == 1 else "measured",
         files={f"{name}-replayed.csv": partial(_replay_csv, agreement) for name, agreement in pairs},
@@ -382,8 +326,8 @@ def in_words(one: Cause) -> str:
     ((value, unit),) = one.numbers.values()
     # An atmosphere in gauge pressure says nothing.
     absolute, quantity = unit == "Pa_a", quantity_of_unit(unit)
-    shown = f"{1e-3 * value:.4g} kPa" if absolute else quantity_text(value, quantity, ".4g")
-    return f"{one.in_words} ({shown if absolute or quantity else f'{shown} {unit}'.removesuffix(' -')})"
+    shown = f"{1e-3 * value:.4g} kPa" if absolute else Kind("", "" if unit == "-" else unit, quantity).text(value)
+    return f"{one.in_words} ({shown})"
 
 
 def _cause_data(one: Cause | None) -> dict[str, Any] | None:
@@ -413,29 +357,19 @@ def _departures(validation: Validation, kinds: Sequence[str]) -> list[str]:
     return said
 
 
-def _method(validation: Validation) -> str:
-    return (
-        f"The model with the valve '{validation.device.valve_name}' was run with the inputs of each recording, from "
-        "the state of its first samples. An error is model less measured. Percentages are of the full range: the "
-        "angle between the stops, the gauge pressure of the supply, and twice that for the pressure difference. One "
-        "common delay was removed before the errors were computed."
-    )
-
-
-def _section(validation: Validation, name: str, agreement: RecordingAgreement) -> Section:
+def _part(validation: Validation, name: str, agreement: RecordingAgreement) -> Part:
     kind = KIND_WORDS[agreement.measured.kind]
-    atmosphere = validation.device.supply.atmospheric_pressure
-    return Section(
-        heading=f"{agreement.file} ({kind})",
-        paragraphs=(replay_sentence(agreement),),
-        table=Table(_HEAD, tuple(channel_cells(channel) for channel in agreement.channels)),
-        remarks=tuple(f"note: {remark}" for remark in agreement.remarks),
-        figure=Figure(
-            f"{name}-agreement",
-            f"Dots: {kind}. Lines: the model on the recorded inputs. Below each: model less measured, the limit of "
-            "its RMS value dashed where it is in range.",
-            lambda: agreement_figure(agreement, atmosphere),
-        ),
+    return Part(
+        f"{agreement.file} ({kind})",
+        columns_of(_HEAD, map(channel_cells, agreement.channels)),
+        [replay_sentence(agreement)],
+        remarks=[f"note: {remark}" for remark in agreement.remarks],
+        panels=partial(agreement_panels, agreement, validation.device.supply.atmospheric_pressure),
+        name=f"{name}-agreement",
+        caption=f"Dots: {kind}. Lines: the model on the recorded inputs. Below each: model less measured, the limit of "
+        "its RMS value dashed where it is in range.",
+        across=_across(agreement),
+        size=(7.6 / _across(agreement), 2.1),
     )
 
 
@@ -470,8 +404,8 @@ def channel_cells(channel: ChannelAgreement) -> tuple[str, ...]:
 
 
 def _error(channel: ChannelAgreement, value: float) -> str:
-    quantity = COMPARED[channel.channel].quantity
-    return f"{_number(display_value(value, quantity))} {display_unit(quantity)}"
+    kind = Kind("", "", COMPARED[channel.channel].quantity)
+    return f"{_number(display_value(value, kind.quantity))} {kind.shown_unit}"
 
 
 def _number(value: float) -> str:
@@ -499,7 +433,7 @@ def _recording_data(agreement: RecordingAgreement) -> dict[str, Any]:
 
 
 def _channel_data(channel: ChannelAgreement) -> dict[str, Any]:
-    quantity = COMPARED[channel.channel].quantity
+    kind = Kind("", "", COMPARED[channel.channel].quantity)
     return {
         "unit": channel.unit,
         "rms": channel.rms,
@@ -513,5 +447,5 @@ def _channel_data(channel: ChannelAgreement) -> dict[str, Any]:
         "bias": channel.bias,
         "largest": channel.largest,
         "largest_time": channel.largest_time,
-        "shown": {"unit": display_unit(quantity), "rms": display_value(channel.rms, quantity)},
+        "shown": {"unit": kind.shown_unit, "rms": display_value(channel.rms, kind.quantity)},
     }

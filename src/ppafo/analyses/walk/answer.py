@@ -1,7 +1,8 @@
-"""A walk and its answer, of one wearer with and without the device, or of many wearers."""
+"""A walk of one wearer with and without the device, or of many wearers, in words, tables and figures."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,27 +12,27 @@ from ppafo.analyses.walk.course import (
     WOULD_DRAG,
     bottle_data,
     bottle_files,
+    bottle_parts,
     bottle_remark,
-    bottle_sections,
     course_data,
     course_files,
+    course_parts,
     course_pictures,
-    course_sections,
     trust_remark,
 )
 from ppafo.analyses.walk.document import versions, walk_data, walk_document
-from ppafo.analyses.walk.safety import over_time_sections, safety_remarks
+from ppafo.analyses.walk.safety import over_time_parts, safety_remarks
+from ppafo.documents.json_text import plain
 from ppafo.kinds import kind_at
 from ppafo.metrics import Metric
 from ppafo.metrics.strides import PER_STRIDE
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE
 from ppafo.progress import Progress, Report, report_nothing
-from ppafo.report import Answer, Column, Figure, Section, Table
 from ppafo.report.display_units import rounded_text, title_with_unit
+from ppafo.report.finding import Cell, Column, Finding, Part, columns_of
 from ppafo.report.live_parts import live_part
-from ppafo.report.solved import Solved
 from ppafo.signals.recording import Floats
-from ppafo.simulation.scenario import UNITS, Scenario, plain
+from ppafo.simulation.scenario import UNITS, Scenario
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.walking import course as courses
@@ -65,16 +66,50 @@ _WEARERS_CAPTION = (
 )
 
 
-def wearers_answer(population: Population) -> Answer:
-    """Return the answer of many wearers; no figure where every walk diverged."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Wearers:
+    """What many wearers get."""
+
+    population: Population
+
+    def json_document(self) -> dict[str, Any]:
+        """Return the quantiles over the wearers, and who they are, as plain data in SI."""
+        population = self.population
+        return {
+            "format": WEARERS_FORMAT,
+            "schema_version": WEARERS_SCHEMA_VERSION,
+            "units": UNITS,
+            "status": {"kind": "diverged" if population.diverged else "completed", "message": population.message},
+            "wearers": population.count,
+            "diverged": population.diverged,
+            "vented": population.vented,
+            "paused": population.paused,
+            "minutes": population.minutes,
+            "seed": population.seed,
+            "varied": {
+                "body_mass": MASS_VARIATION,
+                "stature": STATURE_VARIATION,
+                "correlation": CORRELATION,
+                "thresholds": THRESHOLD_VARIATION,
+                "push_off_start": START_VARIATION,
+                "gait": "stride time, stance share and series coefficients by the deviations of the gait",
+                "most_deviations": MAXIMUM_DEVIATIONS,
+            },
+            "outcomes": quantiles(population.outcomes, OUTCOMES),
+            "traits": quantiles(population.traits, TRAITS),
+            "versions": versions(),
+            "configuration": walk_document(population.scenario),
+        }
+
+
+def wearers_finding(population: Population) -> Finding[Wearers]:
+    """Return what many wearers get; no figure where every walk diverged."""
     configuration = population.scenario
     tables = {**population.outcomes, **population.traits}
-    head = (Column(""), *(Column(f"{100.0 * fraction:.0f} %") for fraction in QUANTILES))
-    rows = [
-        (title_with_unit(title, quantity), *_cells(tables[name], quantity, digits))
-        for name, (title, quantity, digits) in SHOWN.items()
-    ]
-    figure = Figure("wearers", _WEARERS_CAPTION, lambda: population_figure(population))
+    rows = []
+    for name, (title, quantity, digits) in SHOWN.items():
+        cells: list[Cell] = [rounded_text(value, quantity, digits) for value in _values(tables[name]).tolist()]
+        rows.append((title_with_unit(title, quantity), *(cells or [None] * len(QUANTILES))))
     stopped = f"safe state: the controllers of {population.vented} wearers vented both chambers permanently"
     paused = (
         f"less help: the controllers of {population.paused} wearers lifted the foot only, or paused, for some strides"
@@ -83,55 +118,24 @@ def wearers_answer(population: Population) -> Answer:
         *person_remarks(configuration),
         *[stopped] * bool(population.vented),
         *[paused] * bool(population.paused),
+        *[population.message] * bool(population.diverged),
     ]
-    remarks += [population.message] * bool(population.diverged)
-    return Answer(
+    draw = partial(population_figure, population)
+    figure = Part("The wearers", name="wearers", caption=_WEARERS_CAPTION, draw=draw, is_detail=True)
+    return Finding(
         name="wearers",
         kicker="Walks of many wearers",
         title=f"{population.count} wearers with {configuration.name}",
-        lead=(f"{configuration.name}: {population.count} wearers, {population.minutes:.3g} min each",),
-        sections=(
-            Section(table=Table(head, tuple(rows)), remarks=tuple(remarks)),
-            *((Section("The wearers", figure=figure, is_detail=True),) if population.count else ()),
+        said=(f"{configuration.name}: {population.count} wearers, {population.minutes:.3g} min each",),
+        parts=(
+            Part(columns=columns_of(("", *(f"{100.0 * share:.0f} %" for share in QUANTILES)), rows), remarks=remarks),
+            *([figure] if population.count else []),
         ),
-        data=_wearers_data(population),
+        found=Wearers(population),
         passed=not population.diverged,
         files={"wearers.csv": lambda: wearers_csv(population)},
         command="walk",
     )
-
-
-def _cells(values: Floats, quantity: str, digits: int) -> list[str | None]:
-    texts: list[str | None] = [rounded_text(value, quantity, digits) for value in _values(values).tolist()]
-    return texts or [None] * len(QUANTILES)
-
-
-def _wearers_data(population: Population) -> dict[str, Any]:
-    return {
-        "format": WEARERS_FORMAT,
-        "schema_version": WEARERS_SCHEMA_VERSION,
-        "units": UNITS,
-        "status": {"kind": "diverged" if population.diverged else "completed", "message": population.message},
-        "wearers": population.count,
-        "diverged": population.diverged,
-        "vented": population.vented,
-        "paused": population.paused,
-        "minutes": population.minutes,
-        "seed": population.seed,
-        "varied": {
-            "body_mass": MASS_VARIATION,
-            "stature": STATURE_VARIATION,
-            "correlation": CORRELATION,
-            "thresholds": THRESHOLD_VARIATION,
-            "push_off_start": START_VARIATION,
-            "gait": "stride time, stance share and series coefficients by the deviations of the gait",
-            "most_deviations": MAXIMUM_DEVIATIONS,
-        },
-        "outcomes": quantiles(population.outcomes, OUTCOMES),
-        "traits": quantiles(population.traits, TRAITS),
-        "versions": versions(),
-        "configuration": walk_document(population.scenario),
-    }
 
 
 def wearers_csv(population: Population) -> bytes:
@@ -158,18 +162,23 @@ def _values(values: Floats) -> Floats:
     return np.quantile(values, QUANTILES) if values.size else np.zeros(0)
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
-class WalkPair(Solved):
+@dataclass(frozen=True, slots=True, eq=False)
+class WalkPair:
     """A walk with the device and without it."""
 
     comparison: Comparison
 
-
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Wearers(Solved):
-    """What many wearers get."""
-
-    population: Population
+    def json_document(self) -> dict[str, Any]:
+        """Return metrics with the device, without it and of a healthy ankle, and events, as plain data in SI."""
+        worn = self.comparison.with_device
+        return {
+            **walk_data(WALK_FORMAT, SCHEMA_VERSION, self.comparison),
+            "minutes": float(worn.recording.time[-1]) / 60.0,
+            **course_data(self.comparison),
+            **bottle_data(worn),
+            "metrics_vented": plain(dict(worn.vented_metrics)),
+            "healthy": plain(dict(self.comparison.healthy)),
+        }
 
 
 SCHEMA_VERSION = 1
@@ -212,42 +221,31 @@ _LIMITS = (
 )
 
 
-def answer_of(solved: WalkPair | Wearers) -> Answer:
-    """Return the answer of one wearer's walks, or of many wearers."""
-    if isinstance(solved, Wearers):
-        return wearers_answer(solved.population)
-    made: Answer = kind_at(walk_of(solved.comparison.with_device.scenario).who.answer)(solved.comparison)
-    return made
-
-
-def pair_answer(comparison: Comparison) -> Answer:
-    """Return the answer of a walk; one that diverged has numbers and no pictures, and has not passed."""
+def finding_of(comparison: Comparison) -> Finding[WalkPair]:
+    """Return a walk with and without the device; one that diverged has numbers, no pictures, and has not passed."""
     worn, bare = comparison.with_device, comparison.without_device
     configuration, walked = worn.scenario, walk_of(worn.scenario)
     strides = f"{worn.metrics['strides'].value:.0f} strides" if "strides" in worn.metrics else "no strides"
-    remarks = [
-        *person_remarks(configuration),
-        _bottle(comparison),
-        *safety_remarks(worn),
-        trust_remark(configuration),
-    ]
+    along = "" if walked.course is None else f", course {walked.course.name}"
+    remarks = [*person_remarks(configuration), _bottle(worn), *safety_remarks(worn), trust_remark(configuration)]
     remarks += [f"{item.scenario.name}: {item.status.message}" for item in (worn, bare) if not item.status.is_completed]
-    return Answer(
+    assumed = [(item.path, item.note) for item in configuration.assumptions]
+    return Finding(
         name="walk",
         kicker=f"A walk of {float(worn.recording.time[-1]) / 60.0:.3g} min",
         title=f"Walking with {configuration.name}",
-        lead=(f"{configuration.name}: {worn.status.kind}, {strides} of {walked.gait.name}{_along(configuration)}",),
-        sections=(
-            Section(paragraphs=_set_up(comparison), is_detail=True),
-            *course_sections(comparison),
-            Section(table=comparison_table(comparison), remarks=tuple(text for text in remarks if text)),
-            *bottle_sections(worn),
-            Section("How to read it", (_EXPLAINED, _LIMITS), is_detail=True),
-            *(over_time_sections(worn) if walked.course is None else ()),
+        said=(f"{configuration.name}: {worn.status.kind}, {strides} of {walked.gait.name}{along}",),
+        parts=(
+            Part(said=_set_up(comparison), is_detail=True),
+            *course_parts(comparison),
+            Part(columns=comparison_table(comparison), remarks=[text for text in remarks if text]),
+            *bottle_parts(worn),
+            Part("How to read it", said=(_EXPLAINED, _LIMITS), is_detail=True),
+            *(over_time_parts(worn) if walked.course is None else ()),
             *(course_pictures(comparison) if walked.course is not None else _pictures(comparison)),
-            *_assumptions_section({item.path: item.note for item in configuration.assumptions}),
+            Part("What is assumed" if assumed else "", columns_of(("value", "why"), assumed), left=2, is_detail=True),
         ),
-        data=_data(comparison),
+        found=WalkPair(comparison),
         passed=comparison.is_completed and worn.is_helped,
         files={
             "recording.nc": lambda: netcdf_bytes(worn.recording, None),
@@ -276,7 +274,7 @@ def _set_up(comparison: Comparison) -> tuple[str, ...]:
     return tuple(text for text in (configuration.description, worn, law_of(configuration).summary, changed) if text)
 
 
-def comparison_table(comparison: Comparison) -> Table:
+def comparison_table(comparison: Comparison) -> list[Column]:
     """Return a row for each number: with the device, without it, and of a healthy ankle.
 
     Strides with less help have a column of their own, where there are any.
@@ -304,57 +302,33 @@ def comparison_table(comparison: Comparison) -> Table:
         for name, title, quantity, digits in _ROWS
         if any(name in metrics for metrics in columns)
     ]
-    return Table(tuple(map(Column, head)), tuple(rows))
+    return columns_of(head, rows)
 
 
-def _along(configuration: Scenario) -> str:
-    course = walk_of(configuration).course
-    return "" if course is None else f", course {course.name}"
-
-
-def _pictures(comparison: Comparison) -> tuple[Section, ...]:
-    if not (comparison.with_device.averages and comparison.without_device.averages):
-        return ()
-    legs = Figure("legs", _LEGS, lambda: frames_figure(comparison))
-    moving = Figure("legs-moving", _MOVING, lambda: animation(comparison))
-    phases = Figure("gait-phases", _PHASES, lambda: strip_figure(comparison.with_device))
-    walks = {"with the device": comparison.with_device, "without": comparison.without_device}
-    mean = Figure("mean-stride", _MEAN, lambda: walk_figure(walks))
-    return (
-        Section("The leg", figure=legs, is_detail=True),
-        Section(figure=moving, is_detail=True),
-        Section("What the device does in each phase", figure=phases, is_detail=True),
-        Section("The mean stride", figure=mean, is_detail=True),
+def _pictures(comparison: Comparison) -> list[Part]:
+    worn, bare = comparison.with_device, comparison.without_device
+    if not (worn.averages and bare.averages):
+        return []
+    walks = {"with the device": worn, "without": bare}
+    shown = (
+        ("The leg", "legs", _LEGS, partial(frames_figure, comparison)),
+        ("", "legs-moving", _MOVING, partial(animation, comparison)),
+        ("What the device does in each phase", "gait-phases", _PHASES, partial(strip_figure, worn)),
+        ("The mean stride", "mean-stride", _MEAN, partial(walk_figure, walks)),
     )
+    return [
+        Part(heading, name=name, caption=caption, draw=draw, is_detail=True) for heading, name, caption, draw in shown
+    ]
 
 
-def _assumptions_section(assumed: Mapping[str, str]) -> tuple[Section, ...]:
-    if not assumed:
-        return ()
-    table = Table((Column("value"), Column("why")), tuple(assumed.items()), left=2)
-    return (Section("What is assumed", table=table, is_detail=True),)
-
-
-def _bottle(comparison: Comparison) -> str:
+def _bottle(worn: WalkResult) -> str:
     """Return how long the bottle of the walk lasts and what ended it, or how to see that; empty without gas."""
-    worn = comparison.with_device
     if worn.supply is not None:
         return bottle_remark(worn)
     gas = worn.metrics.get("gas")
     if gas is None or gas.value <= 0.0:
         return ""
     return f"how long a bottle lasts: walk on it, --bottle {PAPER_BOTTLE}; here its supply pressure stays as it is set"
-
-
-def _data(comparison: Comparison) -> dict[str, Any]:
-    worn = comparison.with_device
-    return walk_data(WALK_FORMAT, SCHEMA_VERSION, comparison) | {
-        "minutes": float(worn.recording.time[-1]) / 60.0,
-        **course_data(comparison),
-        **bottle_data(worn),
-        "metrics_vented": plain(dict(worn.vented_metrics)),
-        "healthy": plain(dict(comparison.healthy)),
-    }
 
 
 def strides_csv(result: WalkResult) -> bytes:
@@ -395,13 +369,13 @@ def walk_with_and_without(
     seed: int = 1,
     overrides: Sequence[str] = (),
     progress: Report | None = None,
-) -> WalkPair | Wearers:
+) -> Finding[Any]:
     """Walk with the device, without it, and beside the healthy gait; or let many wearers walk with it.
 
     ``configuration`` is a walk file, its name or a loaded one; ``minutes`` the length of the walk [min], one or
     that of its course unless given; ``gait``, ``course`` and ``bottle`` stand in place of those of the configuration;
     ``wearers`` the number of different wearers, drawn with ``seed``. ScenarioError
-    for bad input; a walk that diverges is an answer that has not passed.
+    for bad input; a walk that diverges is a finding that has not passed.
     """
     chosen = configuration
     if not isinstance(chosen, Scenario):
@@ -410,8 +384,10 @@ def walk_with_and_without(
     report = progress or report_nothing
     if wearers is not None:
         advance = _reporter(report, "walking", "wearers", 0.0)
-        return Wearers(walk_population(chosen, minutes, wearers, seed, advance))
-    return WalkPair(compare_walks(chosen, minutes, _reporter(report, "walking", "min", _LONG)))
+        return wearers_finding(walk_population(chosen, minutes, wearers, seed, advance))
+    comparison = compare_walks(chosen, minutes, _reporter(report, "walking", "min", _LONG))
+    found: Finding[Any] = kind_at(walk_of(comparison.with_device.scenario).who.finding)(comparison)
+    return found
 
 
 def list_files() -> list[dict[str, Any]]:

@@ -1,15 +1,17 @@
-"""What a walk on a course or on its bottle adds to the answer: tables, remarks, data, files, pictures."""
+"""What a walk on a course or on its bottle adds: tables, remarks, data, files, pictures."""
 
 from collections.abc import Callable
 from dataclasses import asdict, fields
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ppafo.errors import DataError
 from ppafo.gait.gait import speed_range
-from ppafo.report import Column, Figure, Section, Table
-from ppafo.report.display_units import display_value, quantity_text
+from ppafo.report.display_units import rounded_text
+from ppafo.report.finding import Part, columns_of, facts
+from ppafo.report.kind import Kind
 from ppafo.simulation.scenario import Scenario
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.walking.bottle import SupplyCourse, lasted, minutes_text, strides_text
@@ -34,16 +36,16 @@ _BOTTLE_EXPLAINED = (
 )
 
 
-def bottle_sections(worn: WalkResult) -> tuple[Section, ...]:
+def bottle_parts(worn: WalkResult) -> tuple[Part, ...]:
     """Return the facts of the bottle of a walk, its figure and how to read them; nothing without a bottle."""
     supply = worn.supply
     if supply is None:
         return ()
-    figure = Figure("bottle", _BOTTLE_CAPTION, lambda: bottle_figure(worn))
+    draw, caption = partial(bottle_figure, worn), _BOTTLE_CAPTION
     return (
-        Section("On the bottle", table=Table((), tuple(_facts(worn, supply)))),
-        Section("The bottle over the walk", figure=figure, is_detail=True),
-        Section("How to read the bottle", _BOTTLE_EXPLAINED, is_detail=True),
+        Part("On the bottle", facts(_facts(worn, supply))),
+        Part("The bottle over the walk", name="bottle", caption=caption, draw=draw, is_detail=True),
+        Part("How to read the bottle", said=_BOTTLE_EXPLAINED, is_detail=True),
     )
 
 
@@ -68,20 +70,22 @@ def _walked(worn: WalkResult, seconds: float) -> str:
 
 def _facts(worn: WalkResult, supply: SupplyCourse) -> list[tuple[str, str]]:
     values, peaks = supply.values, peak_torques(worn)
-    bottle = supply.supply.bottle
-    liquid = f", {_gas(float(values['liquid_mass'][-1]))} of it liquid" if "liquid_mass" in values else ""
+    bottle, balance = supply.supply.bottle, supply.balance
+    end = {name: float(series[-1]) for name, series in values.items()}
+    liquid = f", {_GAS.text(end['liquid_mass'])} of it liquid" if "liquid_mass" in values else ""
+    full = _GAS.text(supply.supply.mass)
     rows = [
-        ("bottle", f"{bottle.title}, with {_gas(supply.supply.mass)} at {_warmth(supply.supply.temperature)}"),
+        ("bottle", f"{bottle.title}, with {full} at {_WARMTH.text(supply.supply.temperature)}"),
         ("what ended it", supply.ending.message),
-        ("when", f"{quantity_text(supply.ending.time, 'duration')}, {_walked(worn, supply.ending.time)}"),
-        ("gas used", f"{_gas(supply.balance.left_bottle)}, left {_gas(float(values['bottle_mass'][-1]))}{liquid}"),
-        ("bottle at the end", f"{_warmth(float(values['bottle_temperature'][-1]))}, {_pressure(supply)}"),
-        ("coldest gas behind the regulator", _warmth(float(values["outlet_temperature"].min()))),
-        ("coldest gas at the device", _warmth(float(values["gas_temperature"].min()))),
-        ("seat free of ice, at least", quantity_text(float(values["seat_open"].min()), "fraction", ".0f")),
+        ("when", f"{_DURATION.text(supply.ending.time)}, {_walked(worn, supply.ending.time)}"),
+        ("gas used", f"{_GAS.text(balance.left_bottle)}, left {_GAS.text(end['bottle_mass'])}{liquid}"),
+        ("bottle at the end", f"{_WARMTH.text(end['bottle_temperature'])}, {_PRESSURE.text(end['bottle_pressure'])}"),
+        ("coldest gas behind the regulator", _WARMTH.text(float(values["outlet_temperature"].min()))),
+        ("coldest gas at the device", _WARMTH.text(float(values["gas_temperature"].min()))),
+        ("seat free of ice, at least", _SHARE.text(float(values["seat_open"].min()))),
     ]
     if peaks.size > 3:
-        third, last = (quantity_text(float(peak), "torque") for peak in (peaks[2], peaks[-1]))
+        third, last = (_TORQUE.text(float(peak)) for peak in (peaks[2], peaks[-1]))
         rows.append(("peak torque of a stride", f"{third} in the third, {last} in the last"))
     return rows
 
@@ -108,30 +112,20 @@ def bottle_files(worn: WalkResult) -> dict[str, Callable[[], bytes]]:
     return {} if supply is None else {"bottle.csv": lambda: marked_csv_bytes(supply.recording)}
 
 
-def _gas(mass: float) -> str:
-    return quantity_text(mass, "gas mass")
-
-
-def _warmth(temperature: float) -> str:
-    return quantity_text(temperature, "temperature", ".0f")
-
-
-def _pressure(supply: SupplyCourse) -> str:
-    return quantity_text(float(supply.values["bottle_pressure"][-1]), "pressure", ".0f")
-
-
+_DURATION, _TORQUE, _GAS = (Kind(quantity=name, form=".3g") for name in ("duration", "torque", "gas mass"))
+_SHARE, _WARMTH, _PRESSURE = (Kind(quantity=name, form=".0f") for name in ("fraction", "temperature", "pressure"))
 _HEAD = (
-    Column("Segment"),
-    Column("from (s)"),
-    Column("to (s)"),
-    Column("strides"),
-    Column("helped"),
-    Column("gas (g)"),
-    Column("work (J)"),
-    Column("lowest toes (cm)"),
-    Column("... without (cm)"),
-    Column("push, heel loaded (N m)"),
-    Column("less help at (s)"),
+    "Segment",
+    "from (s)",
+    "to (s)",
+    "strides",
+    "helped",
+    "gas (g)",
+    "work (J)",
+    "lowest toes (cm)",
+    "... without (cm)",
+    "push, heel loaded (N m)",
+    "less help at (s)",
 )
 WOULD_DRAG = "would drag"
 """What is said of toes that would be in the ground."""
@@ -152,22 +146,22 @@ _MEAN = (
 )
 
 
-def course_sections(comparison: Comparison) -> tuple[Section, ...]:
+def course_parts(comparison: Comparison) -> tuple[Part, ...]:
     """Return the table of the segments, and how to read it; nothing for a walk without a course."""
     worn, bare = comparison.with_device, comparison.without_device
     if walk_of(worn.scenario).course is None:
         return ()
     without = {segment.start: segment for segment in bare.segments}
     rows = [_row(segment, without.get(segment.start)) for segment in worn.segments]
-    table = Table(_HEAD, (*rows, _whole(comparison)), marked=(len(rows),))
+    table = columns_of(_HEAD, (*rows, _whole(comparison)))
     means = (
         f"The numbers below are means over the {worn.metrics['steady_strides'].value:.0f} of "
         f"{worn.metrics['course_strides'].value:.0f} strides that are at an even speed on level ground."
     )
     return (
-        Section(table=table),
-        Section("How to read the course", _EXPLAINED, is_detail=True),
-        Section(paragraphs=(means,)),
+        Part(columns=table, marked=(len(rows),)),
+        Part("How to read the course", said=_EXPLAINED, is_detail=True),
+        Part(said=(means,)),
     )
 
 
@@ -214,23 +208,18 @@ def _toes(height: float | None) -> str | None:
 
 def _text(value: float | None, quantity: str, digits: int) -> str | None:
     """Return a cell, without the sign of a number that is rounded to zero."""
-    if value is None:
-        return None
-    text = f"{display_value(value, quantity):.{digits}f}"
-    return text.removeprefix("-") if float(text) == 0.0 else text
+    return None if value is None else rounded_text(value, quantity, digits)
 
 
-def course_pictures(comparison: Comparison) -> tuple[Section, ...]:
+def course_pictures(comparison: Comparison) -> tuple[Part, ...]:
     """Return the course over time, and the mean of its even strides where there are any."""
     worn, bare = comparison.with_device, comparison.without_device
-    over_time = Figure("course", _COURSE, lambda: course_figure(worn, bare))
-    walks = {"with the device": worn, "without": bare}
-    mean = Figure("mean-stride", _MEAN, lambda: walk_figure(walks))
-    has_mean = worn.averages and bare.averages
-    return (
-        Section("The course", figure=over_time, is_detail=True),
-        *((Section("The mean stride", figure=mean, is_detail=True),) if has_mean else ()),
-    )
+    over_time = partial(course_figure, worn, bare)
+    mean = partial(walk_figure, {"with the device": worn, "without": bare})
+    course = Part("The course", name="course", caption=_COURSE, draw=over_time, is_detail=True)
+    if not (worn.averages and bare.averages):
+        return (course,)
+    return course, Part("The mean stride", name="mean-stride", caption=_MEAN, draw=mean, is_detail=True)
 
 
 def course_files(comparison: Comparison) -> dict[str, Callable[[], bytes]]:

@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.simulation.scenario import UNITS, Scenario, plain
+from ppafo.documents.json_text import plain
+from ppafo.simulation.scenario import UNITS, Scenario
 from ppafo.version import __version__
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import sensor_settings

@@ -1,10 +1,12 @@
-"""What the answer of a walk says of safety: what is fitted, pressures far above the supply, less help over time."""
+"""What is said of a walk's safety: what is fitted, pressures far above the supply, less help over time."""
 
 import math
+from functools import partial
 
 from ppafo.control.walking.assistance import PEAKS
-from ppafo.report import Figure, Section
-from ppafo.report.display_units import display_value, quantity_text
+from ppafo.report.display_units import display_value
+from ppafo.report.finding import Part
+from ppafo.report.kind import Kind
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.events import event_lines
 from ppafo.walking.figures.over_time import failures, over_time_figure
@@ -15,6 +17,7 @@ _OVER_TIME = (
     "Gas, toes and phases over the whole walk. The strip at the bottom shows where the controller helps, only lifts "
     "the foot, pauses or has stopped. A red line is where there is less help, a dashed one where something fails."
 )
+_TORQUE = Kind("", "N m", "torque", ".3g")
 _FAR_ABOVE = 2.0
 """Largest pressure in a chamber over its supply, both absolute, above which it is said; healthy wearers stay below."""
 
@@ -44,14 +47,10 @@ def _limit_line(scenario: Scenario) -> list[str]:
     """Return which peaks of the desired torque are above the limit of the controller, which requests no more."""
     settings = scenario.controller.settings
     limit = settings.get("largest_torque", math.inf)
-    cut = [
-        f"controller.{name} = {quantity_text(settings[name], 'torque')}"
-        for name in PEAKS
-        if settings.get(name, 0.0) > limit
-    ]
+    cut = [f"controller.{name} = {_TORQUE.text(settings[name])}" for name in PEAKS if settings.get(name, 0.0) > limit]
     if not cut:
         return []
-    shown = quantity_text(limit, "torque")
+    shown = _TORQUE.text(limit)
     return [f"{', '.join(cut)}: no more than controller.largest_torque = {shown} is requested; set that higher too"]
 
 
@@ -74,9 +73,9 @@ def _pressure_lines(worn: WalkResult) -> list[str]:
     return lines
 
 
-def over_time_sections(worn: WalkResult) -> tuple[Section, ...]:
+def over_time_parts(worn: WalkResult) -> tuple[Part, ...]:
     """Return the walk over time, where something happened in it."""
     if not worn.events and not failures(worn.scenario):
         return ()
-    figure = Figure("over-time", _OVER_TIME, lambda: over_time_figure(worn))
-    return (Section("The walk over time", figure=figure, is_detail=True),)
+    draw = partial(over_time_figure, worn)
+    return (Part("The walk over time", name="over-time", caption=_OVER_TIME, draw=draw, is_detail=True),)

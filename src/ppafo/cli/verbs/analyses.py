@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, overload
+from typing import TYPE_CHECKING, Annotated, Any
 
 from ppafo.cli.arguments import (
     Confidence,
@@ -47,9 +47,9 @@ if TYPE_CHECKING:
     from ppafo.analyses.tune.answer import Tuned
     from ppafo.analyses.tune.problem import Problem
     from ppafo.progress import Report
+    from ppafo.report.finding import Finding
     from ppafo.simulation.scenario import Scenario
     from ppafo.studies.study import Configurations, Study
-    from ppafo.study.finding import Finding
 
 StudyLike = Annotated["Study | str | Path | Mapping[str, Any]", Word("STUDY")]
 DistributedStudy = Annotated[
@@ -81,21 +81,9 @@ Agreed = Annotated[bool, Word(option="--yes")]
 GasUseLike = Annotated["GasUse | Sequence[GasUse]", Word("RECORDING", Path, is_repeated=True)]
 
 
-@overload
-def reproduce(
-    *, study: Literal["ppafo-2011"] = ..., overrides: Overrides = ..., progress: Report | None = ...
-) -> Reproduction: ...
-
-
-@overload
-def reproduce(
-    *, study: str = ..., overrides: Overrides = ..., progress: Report | None = ...
-) -> Reproduction | Studies: ...
-
-
 def reproduce(
     *, study: Name = "ppafo-2011", overrides: Overrides = (), progress: Report | None = None
-) -> Reproduction | Studies:
+) -> Finding[Reproduction] | Finding[Studies]:
     """Reproduce the paper's experiments and check its claims.
 
     ``overrides`` change the experiments (not the paper's reported numbers): a path of a scenario reaches those that
@@ -304,7 +292,7 @@ def linearise(
     *,
     at: Point = "equilibrium",
     overrides: Overrides = (),
-) -> LinearModel:
+) -> Finding[LinearModel]:
     """Make a linear model of the plant near one point, for control design.
 
     The equilibrium is the steady state whose torque is the last value of the reference, or, where the controller is a
@@ -330,7 +318,7 @@ def design(
     pressure: Pressure | None = None,
     minutes: Minutes | None = None,
     progress: Report | None = None,
-) -> Design | Sizing | WearerSizing:
+) -> Finding[Design] | Finding[Sizing] | Finding[WearerSizing]:
     """Find a device: for a wearer, for a torque profile, or Pareto-optimal in error, gas and mass.
 
     A wearer has a body mass and may have a stature; torque, pressure and minutes of walking are what the device is for.
@@ -359,7 +347,7 @@ def bottle(
     rest: Time | None = None,
     longest: Time = 86400.0,
     overrides: Overrides = (),
-) -> Endurance | Endurances:
+) -> Finding[Endurance] | Finding[Endurances]:
     """Compute how long a bottle of gas lasts, and why it ends.
 
     A walk, its result or its folder, walks on the bottle until that ends it. Any other gas use is in

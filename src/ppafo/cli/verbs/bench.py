@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from ppafo.analyses.identify.answer import Identification
     from ppafo.analyses.validate.solve import Validation
     from ppafo.cli.output import Said
+    from ppafo.report.finding import Finding
     from ppafo.storage.foreign import ColumnMap
 
 Problem = Annotated["str | Path", Word("PROBLEM", Path)]
@@ -113,7 +114,7 @@ def identify(
     problem: Problem,
     *,
     progress: Report = report_nothing,
-) -> Identification:
+) -> Finding[Identification]:
     """Identify a parameter set, with uncertainty, from bench recordings.
 
     The procedures of the problem file run in the recommended order; the trajectory fit comes last and starts from what
@@ -140,15 +141,16 @@ def validate(
     longest_delay: Time = 0.02,
     columns: Columns | None = None,
     progress: Report | None = None,
-) -> Validation:
+) -> Finding[Validation]:
     """Compare a parameter set with recordings, channel by channel.
 
     The model is run on the recorded command, supply pressure and external torque; errors are model less measured. With
     no threshold it is 10 % of full range, at least half of the variance of a signal beside its noise is explained, and
     no single change of record, set or model may explain the recordings better than noise of the sensors could. The
-    result has ``passes`` and, in ``recordings``, one ``RecordingAgreement`` each: ``measured`` and ``model`` are
-    recordings, their channels of shape (samples,) in SI; ``channels`` has RMS error, bias, largest error and delay [s]
-    of each channel in its SI unit (rad, Pa, N m). DataError, ParameterError or SimulationError for bad input.
+    result's ``found`` has ``passes`` and, in ``recordings``, one ``RecordingAgreement`` each: ``measured`` and
+    ``model`` are recordings, their channels of shape (samples,) in SI; ``channels`` has RMS error, bias, largest error
+    and delay [s] of each channel in its SI unit (rad, Pa, N m). DataError, ParameterError or SimulationError for bad
+    input.
 
     parameter_set: name of a parameter set, or a .toml file
     recordings: a .csv or .nc file, or a result folder; several may be given

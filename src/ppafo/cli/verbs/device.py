@@ -11,6 +11,7 @@ from ppafo.cli.arguments import Overrides, SetName, Word
 if TYPE_CHECKING:
     from ppafo.analyses.parts.solve import Parts
     from ppafo.cli.output import Said
+    from ppafo.report.finding import Finding
 
 
 def sets_list() -> Said:
@@ -53,7 +54,7 @@ def sets_audit(
 
 def sets_parts(
     part: Annotated[str, Word("PART")] | None = None, *, catalogue: Annotated[str | Path, Word("FILE")] = "parts"
-) -> Parts:
+) -> Finding[Parts]:
     """List real parts with the origin of every figure.
 
     part: name of a part, for all its figures and their sources

@@ -24,10 +24,12 @@ from ppafo.cli.arguments import (
 )
 
 if TYPE_CHECKING:
-    from ppafo.analyses.walk.answer import WalkPair, Wearers
+    from typing import Any
+
     from ppafo.cli.output import Said
+    from ppafo.gait.finding import GaitFound
     from ppafo.progress import Report
-    from ppafo.report import Answer
+    from ppafo.report.finding import Finding
     from ppafo.simulation.scenario import Scenario
 
 Walk = Annotated["Scenario | str | Path", Word("WALK")]
@@ -44,7 +46,7 @@ def walk(
     seed: Whole = 1,
     overrides: Overrides = (),
     progress: Report | None = None,
-) -> WalkPair | Wearers:
+) -> Finding[Any]:
     """Simulate walking with the device, without it, and healthy.
 
     configuration: name of a walk configuration, or a .toml file; default solenoid
@@ -68,15 +70,15 @@ def gait_list() -> Said:
     return listing("gait", [{"name": name, "title": load_gait(name).title} for name in list_gaits()])
 
 
-def gait_show(gait: Gait, *, speed: Speed | None = None) -> Answer:
+def gait_show(gait: Gait, *, speed: Speed | None = None) -> Finding[GaitFound]:
     """Show and draw a gait.
 
     speed: walking speed to scale to, such as '1.2 m/s'
     """
     from ppafo.gait import at_speed, load_gait
-    from ppafo.gait.answer import gait_answer
+    from ppafo.gait.finding import gait_finding
 
-    return gait_answer(load_gait(gait) if speed is None else at_speed(load_gait(gait), speed))
+    return gait_finding(load_gait(gait) if speed is None else at_speed(load_gait(gait), speed))
 
 
 def gait_import(
@@ -96,7 +98,7 @@ def gait_import(
     ankle_neutral: Angle | None = None,
     name: Name = "imported-gait",
     title: str = "",
-) -> Answer:
+) -> Finding[GaitFound]:
     """Make a gait from recorded files (.mot, .sto, .csv, .c3d, .trc).
 
     files: files of one walk, on one clock
@@ -115,7 +117,7 @@ def gait_import(
     name: name of the gait and of its file
     title: one line: who walks, and how
     """
-    from ppafo.gait.answer import gait_answer
+    from ppafo.gait.finding import gait_finding
     from ppafo.gait.recorded import ImportSettings, import_gait
     from ppafo.gait.recorded.mapping import load_map
 
@@ -136,7 +138,7 @@ def gait_import(
         ankle_neutral=ankle_neutral,
     )
     imported = import_gait(files, settings)
-    return gait_answer(imported.gait, imported)
+    return gait_finding(imported.gait, imported)
 
 
 def gait_record(gait: Gait, *, strides: Count = 10, out: File) -> Said:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
-from ppafo.documents.json_text import json_text
+from ppafo.documents.json_text import json_text, plain
 from ppafo.engine.lanes import load_program
 from ppafo.engine.loading import chosen_compiler
 from ppafo.engine.run import Run, batch_of
@@ -30,7 +30,7 @@ from ppafo.report.recording_figure import recording_figure
 from ppafo.report.style import ACTUAL, VERMILION, Margins, figure_of_free_panels, house_style, render_figure
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.sampled import SampledRun
-from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, Scenario, plain
+from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, Scenario
 from ppafo.simulation.simulate import Result, result_of
 from ppafo.storage.comma_separated import marked_csv_bytes
 

@@ -155,8 +155,8 @@ def test_recordings_that_say_nothing_of_a_gas_use_are_refused(
 
 def test_the_verb_takes_numbers_as_the_command_takes_texts() -> None:
     found = endurance(gas_per_stride=1e-3, stride_time=1.1, overrides=["bottle.gas_mass=100 g"])
-    assert isinstance(found, Endurance)
-    assert found.draw.mean_flow == pytest.approx(1e-3 / 1.1)
+    assert isinstance(found.found, Endurance)
+    assert found.found.draw.mean_flow == pytest.approx(1e-3 / 1.1)
     assert found.to_dict()["bottle"]["gas_mass"] == pytest.approx(0.1)
     labels = [axes.get_title(loc="left") for axes in found.plot().axes]
     assert labels == ["Temperature of the bottle (°C)", "Pressure in the bottle (psig)", "Left in the bottle (g)"]
@@ -165,9 +165,9 @@ def test_the_verb_takes_numbers_as_the_command_takes_texts() -> None:
 def test_the_verb_takes_recordings_one_or_several() -> None:
     one, two = staircase(1e-3, 1.0, 0.2), staircase(2e-3, 1.0, 0.2)
     alone = endurance(one)
-    assert isinstance(alone, Endurance)
+    assert isinstance(alone.found, Endurance)
     several = endurance([one, replace(two, label="other")], rest=60.0)
-    assert isinstance(several, Endurances)
-    assert [use.draw.mass_per_stride for use in several.uses.values()] == pytest.approx([1e-3, 2e-3])
+    assert isinstance(several.found, Endurances)
+    assert [use.draw.mass_per_stride for use in several.found.uses.values()] == pytest.approx([1e-3, 2e-3])
     with pytest.raises(ParameterError, match="the same recording is given twice"):
         endurance([one, one])

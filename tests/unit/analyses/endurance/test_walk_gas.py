@@ -134,7 +134,7 @@ def test_a_walk_lasts_the_same_with_and_without_its_folder(tmp_path: Path, capsy
     folder = folder_of(walk_gas(solenoid()), tmp_path / "walk")
     assert main(["bottle", str(folder), "--json", "--longest", "5 s"]) == 0
     document = json.loads(capsys.readouterr().out)
-    made = endurance(solenoid(), longest=5.0)
+    made = endurance(solenoid(), longest=5.0).found
     assert isinstance(made, Endurance)
     assert document["result"]["strides"] == pytest.approx(made.discharge.strides, rel=1e-6)
 
@@ -223,7 +223,7 @@ def test_a_time_between_rests_without_a_rest_is_refused() -> None:
 
 
 def test_rests_warm_the_bottle_that_is_walked_on() -> None:
-    without, rested = (endurance(solenoid(), overrides=SMALL, walk=10.0, rest=rest) for rest in (0.0, 120.0))
+    without, rested = (endurance(solenoid(), overrides=SMALL, walk=10.0, rest=rest).found for rest in (0.0, 120.0))
     assert isinstance(without, Endurance)
     assert isinstance(rested, Endurance)
     assert rested.discharge.walking_time > without.discharge.walking_time
@@ -238,7 +238,7 @@ def test_rests_warm_the_bottle_that_is_walked_on() -> None:
 
 def test_a_device_that_a_fault_stops_is_asked_about_without_the_fault() -> None:
     stopped = walk("solenoid", 0.2, overrides=["faults.toe.kind=stuck", "faults.toe.time=4 s"])
-    made, sound = (endurance(one, overrides=SMALL) for one in (stopped, walk("solenoid", 0.2)))
+    made, sound = (endurance(one, overrides=SMALL).found for one in (stopped, walk("solenoid", 0.2)))
     assert isinstance(made, Endurance)
     assert isinstance(sound, Endurance)
     assert made.discharge.walking_time == sound.discharge.walking_time

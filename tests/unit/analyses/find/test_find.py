@@ -14,7 +14,7 @@ from ppafo.analyses.find.solve import ACCURACY, Threshold, find
 from ppafo.cli.main import main
 from ppafo.errors import StudyError
 from ppafo.progress import Progress
-from ppafo.study.finding import Finding
+from ppafo.report.finding import Finding
 from ppafo.study.runs import Runs
 
 Floats = NDArray[np.float64]

@@ -3,7 +3,7 @@
 import io
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import ppafo
-from ppafo.analyses.linearise.answer import LinearModel, steps_of
+from ppafo.analyses.linearise.answer import LinearModel, finding_of, steps_of
 from ppafo.analyses.linearise.solve import linearise
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.engine.lanes import Floats
@@ -21,7 +21,7 @@ from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, Th
 from ppafo.model.valves.proportional import openings_of, spool_acceleration
 from ppafo.report.writing import text_of
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.scenario import RegulatedLine, SupplyLine
+from ppafo.simulation.scenario import RegulatedLine, Scenario, SupplyLine
 from ppafo.translation.plant_rates import gas_flows, thermal_gas_flows
 
 pytest.importorskip("casadi", reason="linear models need the extra 'control'")
@@ -44,10 +44,15 @@ POINTS: dict[str, tuple[str, str | float, tuple[str, ...]]] = {
 }
 
 
+def linear(scenario: str | Scenario, at: float | str = "equilibrium", overrides: Sequence[str] = ()) -> LinearModel:
+    """A linear model, without what is said of it."""
+    return linearise(scenario, at, overrides).found
+
+
 @pytest.fixture(scope="module")
 def steady() -> LinearModel:
     """The torque task where it holds 3 N m."""
-    return linearise(TASK, overrides=HOLD)
+    return linear(TASK, overrides=HOLD)
 
 
 def of_the_textbook(run: Run, way: float | None, at: Mapping[str, float]) -> dict[str, float]:
@@ -107,7 +112,7 @@ def central_difference(function: Callable[[float], Floats], at: float, size: flo
 @pytest.mark.parametrize("name", POINTS)
 def test_the_jacobians_are_those_of_central_differences(name: str) -> None:
     scenario, time, overrides = POINTS[name]
-    model = linearise(scenario, time, overrides)
+    model = linear(scenario, time, overrides)
     run = plan_run(model.scenario)
     at = {item.name: item.value for item in (*model.outputs, *model.states, *model.inputs)}
     at = {"external_torque": 0.0, "angular_velocity": 0.0, **at}
@@ -164,32 +169,30 @@ def test_which_side_was_taken_is_said(steady: LinearModel) -> None:
     assert steady.sides["source to chamber 1"].startswith("below choking")
     assert steady.sides["source to chamber 2"] == "closed"
     assert steady.edges == ()
-    at_stop = linearise("step-response")
+    at_stop = linear("step-response")
     assert at_stop.sides["ankle"] == "against a stop"
     assert "straight line" in at_stop.sides["source to chamber 1"]
     edges = {edge.place: edge.is_true for edge in at_stop.edges}
     assert edges["model.valves.proportional.opening_of_command: 1.0 <= abs(command)"] is False
     assert at_stop.b[:, 0].any(), "of a valve that is fully open the side is taken on which it closes"
-    deaf = linearise(TASK, 0.1, ["valve.dead_band=0.5"])
+    deaf = linear(TASK, 0.1, ["valve.dead_band=0.5"])
     assert "the command's column is 0" in deaf.sides["valve"]
     assert not deaf.b[:, 0].any()
-    assert deaf.answer().figures == ()
-    stuck = linearise(
-        "step-response", 0.0, ["motion.kind=free", "initial.pressure_2=atmosphere", "motion.angle=60 deg"]
-    )
+    assert not finding_of(deaf).figures
+    stuck = linear("step-response", 0.0, ["motion.kind=free", "initial.pressure_2=atmosphere", "motion.angle=60 deg"])
     assert stuck.sides["ankle"] == "sticks: friction holds it"
     assert [item.name for item in stuck.states] == ["pressure_1", "pressure_2"]
-    assert linearise("step-response", 0.1).sides["ankle"] == "slides in plantarflexion"
+    assert linear("step-response", 0.1).sides["ankle"] == "slides in plantarflexion"
 
 
 def test_a_valve_at_its_slew_limit_does_not_answer_and_one_that_has_arrived_does() -> None:
     slow = ("valve.slew_limit=0.05 1/s", *HOLD)
-    moving, steady = linearise(TASK, 0.3, slow), linearise(TASK, overrides=slow)
+    moving, steady = linear(TASK, 0.3, slow), linear(TASK, overrides=slow)
     assert "slew limit" in moving.sides["valve"]
     assert [item.name for item in moving.states][-1] == "valve_opening"
     assert moving.rates[-1] == 0.05
     assert [item.name for item in steady.states] == ["pressure_1", "pressure_2"]
-    assert steady.b == pytest.approx(linearise(TASK, overrides=HOLD).b, rel=1e-9, abs=1e-3)
+    assert steady.b == pytest.approx(linear(TASK, overrides=HOLD).b, rel=1e-9, abs=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -198,7 +201,7 @@ def test_a_valve_at_its_slew_limit_does_not_answer_and_one_that_has_arrived_does
 def test_at_a_closed_valve_the_model_is_that_of_an_opening_to_chamber_1(
     time: float, overrides: tuple[str, ...]
 ) -> None:
-    model = linearise(TASK, time, overrides)
+    model = linear(TASK, time, overrides)
     run = plan_run(model.scenario)
     assert any("command >= 0.0" in edge.place and edge.is_true for edge in model.edges)
     at = {item.name: item.value for item in (*model.outputs, *model.states, *model.inputs)} | {"external_torque": 0.0}
@@ -208,7 +211,7 @@ def test_at_a_closed_valve_the_model_is_that_of_an_opening_to_chamber_1(
 
 
 def test_a_closed_spool_is_taken_to_open_to_chamber_1_too() -> None:
-    model = linearise("torque-task-slow-valve", 0.0)
+    model = linear("torque-task-slow-valve", 0.0)
     run = plan_run(model.scenario)
     column = [item.name for item in model.states].index("valve_opening")
     at = {item.name: item.value for item in (*model.outputs, *model.states, *model.inputs)} | {"external_torque": 0.0}
@@ -220,7 +223,7 @@ def test_a_closed_spool_is_taken_to_open_to_chamber_1_too() -> None:
 
 def test_a_time_is_taken_to_the_nearest_step_before_the_first_one_too() -> None:
     times = (1e-9, 4e-4, 6e-4, 3.0, "0.5 s", "600 ms")
-    assert [linearise(TASK, at).time for at in times] == [0.0, 0.0, 1e-3, 3.0, 0.5, 0.6]
+    assert [linear(TASK, at).time for at in times] == [0.0, 0.0, 1e-3, 3.0, 0.5, 0.6]
 
 
 def test_what_python_hands_over_wrongly_is_refused_in_one_line(steady: LinearModel) -> None:
@@ -230,14 +233,14 @@ def test_what_python_hands_over_wrongly_is_refused_in_one_line(steady: LinearMod
     with pytest.raises(ScenarioError, match="no input 'reference'; there are: command"):
         steady.response(np.array([1.0]), source="reference")
     with pytest.raises(ScenarioError, match="--at 'None' is neither a time nor 'equilibrium'"):
-        linearise(TASK, None)  # type: ignore[arg-type]
+        linear(TASK, None)  # type: ignore[arg-type]
     for answer in (linearise, ppafo.simulate):
         with pytest.raises(ScenarioError, match="overrides are for the name or file of a scenario"):
             answer(steady.scenario, overrides=["run.duration=1 s"])
 
 
 def test_without_a_leak_a_closed_valve_is_steady_and_its_sides_are_told_apart() -> None:
-    model = linearise(TASK, overrides=(*HOLD, "actuator.leak.area=0 mm^2"))
+    model = linear(TASK, overrides=(*HOLD, "actuator.leak.area=0 mm^2"))
     assert model.sides["valve"] == "closed"
     assert model.inputs[0].value == 0.0
     assert model.outputs[0].value == pytest.approx(3.0, rel=1e-9)
@@ -256,25 +259,25 @@ def test_what_has_no_linear_model_is_refused_in_one_line() -> None:
         ("torque-task-solenoid", 1.0, (), "valve 'solenoid' is on or off"),
     ):
         with pytest.raises(ppafo.PpafoError, match=line) as refused:
-            linearise(scenario, at, overrides)
+            linear(scenario, at, overrides)
         assert "\n" not in str(refused.value)
     line = RegulatedLine(1e9, 1e-2, 1e-5)
     fed = replace(ppafo.load_scenario(TASK), supply_line=SupplyLine(line, line))
     with pytest.raises(ScenarioError, match="constant supplies; omit"):
-        linearise(fed, 1.0)
+        linear(fed, 1.0)
 
 
 def test_an_energy_balance_slows_what_isothermal_gas_does_at_once() -> None:
     """With walls that take all heat at once the warm model has the poles of the isothermal one, and two fast ones."""
-    cold = linearise(TASK, overrides=HOLD)
+    cold = linear(TASK, overrides=HOLD)
     walls = ("gas_model.kind=thermal", "gas_model.heat_transfer_coefficient=1e6 W/(m^2 K)", WARM[2])
-    warm = linearise(TASK, overrides=(*HOLD, *walls))
+    warm = linear(TASK, overrides=(*HOLD, *walls))
     assert warm.poles[:2] == pytest.approx(cold.poles, rel=1e-3)
     assert abs(warm.poles[2]) > 1e3 * abs(cold.poles[1])
 
 
 def test_the_folder_has_names_units_and_matrices(steady: LinearModel, tmp_path: Path) -> None:
-    steady.save(tmp_path / "out")
+    finding_of(steady).save(tmp_path / "out")
     data = json.loads((tmp_path / "out/linearise.json").read_text(encoding="utf-8"))
     assert data["inputs"][0]["name"] == "command"
     assert {item["name"]: item["unit"] for item in data["outputs"]}["torque"] == "N m"
@@ -285,7 +288,7 @@ def test_the_folder_has_names_units_and_matrices(steady: LinearModel, tmp_path: 
     assert arrays["states"].tolist() == ["pressure_1", "pressure_2"]
     assert arrays["inputs_units"].tolist()[0] == "1"
     assert (tmp_path / "out/steps.png").stat().st_size > 10_000
-    assert "Matrix A" in text_of(steady.answer())
+    assert "Matrix A" in text_of(finding_of(steady))
 
 
 def test_the_system_for_python_control_has_the_same_response(steady: LinearModel) -> None:

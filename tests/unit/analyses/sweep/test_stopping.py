@@ -251,4 +251,4 @@ def test_further_metrics_are_means_over_the_same_draws_that_have_a_value() -> No
     truth = 2.0 * MEAN * NORMAL.cdf(SIGMA**2) / 0.5
     assert mean.low < truth < mean.high
     assert finding.to_dict()["also"]["final_error"]["draws"] == mean.draws
-    assert "Further metrics" in [section.heading for section in finding.answer().sections]
+    assert "Further metrics" in [part.heading for part in finding.parts]

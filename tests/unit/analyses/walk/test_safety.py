@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from ppafo.analyses.walk.reacting import reacting_finding
 
 from ppafo.analyses.walk.safety import safety_remarks
 from ppafo.constants import PASCALS_PER_PSI
@@ -12,7 +13,6 @@ from ppafo.model.helping import LIFTS
 from ppafo.signals import Channel
 from ppafo.walking import compare_walks, load_walk, walk
 from ppafo.walking.events import SafetyEvent
-from ppafo.wearer.answer import reacting_answer
 
 
 def test_a_peak_torque_above_the_limit_of_the_controller_is_said() -> None:
@@ -27,20 +27,20 @@ def test_a_peak_torque_above_the_limit_of_the_controller_is_said() -> None:
 @pytest.mark.long
 def test_the_answer_of_a_wearer_who_reacts_says_and_shows_where_help_was_less() -> None:
     compared = compare_walks(load_walk("reacting"), 0.1)
-    assert "The walk over time" not in {section.heading for section in reacting_answer(compared).sections}
+    assert "The walk over time" not in {section.heading for section in reacting_finding(compared).parts}
     flag = FAULT_FLAGS[NOT_FLAT]
     event = SafetyEvent(2.0, LIFTS, flag, {"heel_force": 6e-33, "toe_force": 319.4})
     worn = compared.with_device
     helped = np.arange(worn.helped.size) < 1
-    answer = reacting_answer(replace(compared, with_device=replace(worn, events=(event,), helped=helped)))
-    assert "The walk over time" in {section.heading for section in answer.sections}
-    first, second = answer.sections[0].remarks[-2:]
+    answer = reacting_finding(replace(compared, with_device=replace(worn, events=(event,), helped=helped)))
+    assert "The walk over time" in {section.heading for section in answer.parts}
+    first, second = answer.parts[0].remarks[-2:]
     assert first.startswith("lift-only (no push-off) from 2.00 s: ")
     assert first.endswith("; heel 0 N, toe 319 N")
     assert second == f"help in 1 of {helped.size} strides: fewer than half"
-    ends = {name for name, *_ in answer.sections[0].table.rows}  # type: ignore[union-attr]
+    ends = {name for name, *_ in answer.parts[0].rows}
     assert "Strides with help, of gas and push-off" in ends
-    (written,) = answer.data["events"]
+    (written,) = answer.to_dict()["events"]
     assert (written["time"], written["fault_flag"]) == (2.0, flag.name)
 
 

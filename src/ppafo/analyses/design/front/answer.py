@@ -1,33 +1,36 @@
-"""The answer of a design study: designs that stand for the front, the suggestion, how it was found, the doubts."""
+"""A design study: designs that stand for the front, the suggestion, how it was found, the doubts."""
 
 import csv
 import io
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ppafo.analyses.design.front.problem import GAS, SEARCHED_STREAMS, DesignProblem, Variable
+from ppafo.analyses.design.front.problem import GAS, SEARCHED_STREAMS, DesignProblem
 from ppafo.analyses.design.front.search import PATIENCE, Floats
 from ppafo.analyses.parts.solve import doubts_data, doubts_sections, titles_section
 from ppafo.parameters.parts import Part
-from ppafo.report import Answer, Column, Figure, Section, Table
-from ppafo.report.display_units import display_values, quantity_of_unit, quantity_text, title_with_unit
-from ppafo.report.solved import Solved
-from ppafo.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILION, house_style, mark_kind
+from ppafo.report.display_units import quantity_of_unit
+from ppafo.report.finding import Column, Finding, columns_of
+from ppafo.report.finding import Part as Section
+from ppafo.report.kind import Kind
+from ppafo.report.panels import Mark, Panel
+from ppafo.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILION
 from ppafo.simulation.simulate import Result
 from ppafo.version import __version__
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    import matplotlib.figure
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
 
-SHOWN_OBJECTIVES = {"error": "torque", "gas": "gas mass", "mass": "part mass"}
-"""What a design is judged by, with the kind of quantity as which a person is shown it."""
+OBJECTIVES_SHOWN = {
+    "error": Kind("Error", "N m", "torque", ".3g"),
+    "gas": Kind("Gas per task", "kg", "gas mass", ".3g"),
+    "mass": Kind("Mass", "kg", "part mass", ".4g"),
+}
+"""What a design is judged by, as a person is shown it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,8 +65,8 @@ class Rerun:
     result: Result
 
 
-@dataclass(frozen=True, slots=True, repr=False)
-class Design(Solved):
+@dataclass(frozen=True, slots=True)
+class Design:
     """The result of a design study.
 
     ``front`` is in order of error. ``shown`` are places in it that stand for all of it in a table, ``knee`` is the
@@ -96,83 +99,102 @@ class Design(Solved):
         used |= {part.name for part in self.problem.carried}
         return tuple((part, name) for part in self.problem.parts if part.name in used for name in part.doubtful)
 
+    def json_document(self) -> dict[str, Any]:
+        """Return the front and how it was found as plain data in SI."""
+        problem = self.problem
+        return {
+            "format": "ppafo design",
+            "schema_version": 1,
+            "name": problem.name,
+            "description": problem.description,
+            "file": problem.file,
+            "units": "SI; pressures absolute, error in N m, gas per task and mass in kg",
+            "tasks": [
+                {
+                    "name": task.name,
+                    "weight": task.weight,
+                    "scenarios": {kind: scenario.name for kind, scenario in task.scenarios.items()},
+                }
+                for task in problem.tasks
+            ],
+            "suggested": self.knee,
+            "reason": self.reason,
+            "shown": list(self.shown),
+            "noise_streams": self.streams,
+            "front": [_point_data(point) for point in self.front],
+            "search": {
+                "designs": self.designs,
+                "runs": self.runs,
+                "failed_runs": self.failed,
+                "failures": [{"reason": reason, "task": task} for reason, task in self.failures.items()],
+                "seed": problem.search.seed,
+                "settled": self.settled,
+                "hypervolume": [{"designs": count, "share": fraction} for count, fraction in self.growth],
+            },
+            "doubtful": doubts_data(self.doubtful),
+            "versions": {"ppafo": __version__},
+        }
+
 
 def objective_table(front: tuple[DesignPoint, ...]) -> Floats:
     """Return the objectives of designs, (designs, 3)."""
     return np.array([point.objectives for point in front]).reshape(-1, 3)
 
 
-_SIZE = (9.0, 7.4)
 _COLOURS = (BLUE, VERMILION, GREEN, ORANGE, "#CC79A7", "#56B4E9", BLACK, GREY)
 _MARKERS = ("o", "^", "s", "D", "v", "P")
 _LOGARITHMIC_FROM = 10.0
-_AXES = tuple(zip(("Error", "Gas per task", "Mass"), SHOWN_OBJECTIVES.values(), strict=True))
-_PANELS = (
-    ("A", "Error against gas per task", 0, 1),
-    ("B", "Error against mass", 0, 2),
-    ("C", "Gas per task against mass", 1, 2),
+_VIEWS = (
+    ("A   Error against gas per task", "error", "gas"),
+    ("B   Error against mass", "error", "mass"),
+    ("C   Gas per task against mass", "gas", "mass"),
 )
 _MAXIMUM_TICKS_OF_ONE_DECADE = 1.5
 """Decades above which a logarithmic axis has ticks at powers of ten only."""
 
 
-def design_figure(design: Design) -> "matplotlib.figure.Figure":
+def design_panels(design: Design) -> list[Panel]:
     """Return three views of the front, coloured by valve and shaped by actuator, and the growth of the hypervolume."""
-    import matplotlib.figure
-
-    with house_style():
-        figure = matplotlib.figure.Figure(figsize=_SIZE)
-        names = _names(design)
-        figure.subplots_adjust(left=0.08, right=0.97, bottom=0.075, top=0.83, wspace=0.25, hspace=0.36)
-        panels = figure.subplots(2, 2).ravel()
-        columns = zip(objective_table(design.front).T, SHOWN_OBJECTIVES.values(), strict=True)
-        table = np.stack([display_values(values, quantity) for values, quantity in columns], axis=1)
-        for axes, (letter, title, x, y) in zip(panels, _PANELS, strict=False):
-            _view(axes, design, table, x, y)
-            axes.set_title(f"$\\bf{{{letter}}}$   {title}", pad=8)
-        _growth(panels[3], design)
-        titles = {part.name: part.title for point in design.front for part in (point.valve, point.actuator)}
-        valves, actuators = ([titles[name] for name in group] for group in names)
-        _legend(figure, valves, actuators, panels[0])
-        mark_kind(figure, "simulated")
-    return figure
+    count, fraction = np.array(design.growth).reshape(-1, 2).T
+    growth = Mark("line", count / 1000.0, fraction, style={"marker": "o", "markersize": 3})
+    views = [_view(design, *view, legend="figure" if number == 0 else "") for number, view in enumerate(_VIEWS)]
+    title = "D   Hypervolume of the front"
+    return [*views, Panel(Kind("Designs tried (thousands)"), Kind("Fraction of the box"), [growth], title)]
 
 
-def _names(design: Design) -> tuple[list[str], list[str]]:
-    """Return the valves and the actuators on the front, in the order of the problem."""
-    valves = [item.valve.name for item in design.problem.combinations]
-    actuators = [item.actuator.name for item in design.problem.combinations]
-    used = {point.valve.name for point in design.front} | {point.actuator.name for point in design.front}
-    return [name for name in dict.fromkeys(valves) if name in used], [
-        name for name in dict.fromkeys(actuators) if name in used
-    ]
+def _view(design: Design, title: str, x: str, y: str, legend: str) -> Panel:
+    places = np.array([[getattr(point, name) for name in (x, y)] for point in design.front])
+    pairs = [(point.valve, point.actuator) for point in design.front]
+    # Every valve and every actuator on the front, in the order of the problem.
+    groups = [(item.valve, item.actuator) for item in design.problem.combinations]
+    valves, actuators = (
+        list({group[side].name: group[side].title for group in groups if group[side] in used})
+        for side, used in enumerate(zip(*pairs, strict=True))
+    )
+    looks = {name: _COLOURS[number % len(_COLOURS)] for number, name in enumerate(valves)}
+    shapes = {name: _MARKERS[number % len(_MARKERS)] for number, name in enumerate(actuators)}
+    titles = {part.name: part.title for pair in pairs for part in pair}
+    marks = []
+    for valve in valves:
+        for actuator in actuators:
+            here = [place for place, pair in enumerate(pairs) if [part.name for part in pair] == [valve, actuator]]
+            dots = {"marker": shapes[actuator], "markersize": 3.2, "markeredgewidth": 0.0, "alpha": 0.75, **_NO_LINE}
+            marks.append(Mark("line", places[here, 0], places[here, 1], (), "", looks[valve], dots))
+    squares, shaped = {"marker": "s", "markersize": 7, **_NO_LINE}, {"markersize": 6, **_NO_LINE}
+    marks += [Mark("line", [], [], (), titles[name], look, squares) for name, look in looks.items()]
+    marks += [Mark("line", [], [], (), titles[name], GREY, {"marker": look, **shaped}) for name, look in shapes.items()]
+    ring = {"marker": "o", "markersize": 13, "markerfacecolor": "none", "markeredgewidth": 1.4, **_NO_LINE}
+    x_knee, y_knee = places[design.knee].tolist()
+    marks.append(Mark("line", x_knee, y_knee, (), "suggested", BLACK, ring))
+
+    def scale(axes: "Axes") -> None:
+        _scale(axes.set_xscale, axes.xaxis, places[:, 0])
+        _scale(axes.set_yscale, axes.yaxis, places[:, 1])
+
+    return Panel(OBJECTIVES_SHOWN[x], OBJECTIVES_SHOWN[y], marks, title, legend=legend, then=scale)
 
 
-def _view(axes: "Axes", design: Design, table: Floats, x: int, y: int) -> None:
-    valves, actuators = _names(design)
-    for number, valve in enumerate(valves):
-        for other, actuator in enumerate(actuators):
-            members = [
-                place
-                for place, point in enumerate(design.front)
-                if point.valve.name == valve and point.actuator.name == actuator
-            ]
-            axes.plot(
-                table[members, x],
-                table[members, y],
-                linestyle="none",
-                marker=_MARKERS[other % len(_MARKERS)],
-                markersize=3.2,
-                markeredgewidth=0.0,
-                color=_COLOURS[number % len(_COLOURS)],
-                alpha=0.75,
-            )
-    knee = table[design.knee]
-    axes.plot(knee[x], knee[y], marker="o", markersize=13, markerfacecolor="none", color=BLACK, markeredgewidth=1.4)
-    axes.set_xlabel(title_with_unit(*_AXES[x]))
-    axes.set_ylabel(title_with_unit(*_AXES[y]))
-    _scale(axes.set_xscale, axes.xaxis, table[:, x])
-    _scale(axes.set_yscale, axes.yaxis, table[:, y])
+_NO_LINE = {"linestyle": "none"}
 
 
 def _scale(set_scale: "Callable[[str], None]", axis: "Axis", values: Floats) -> None:
@@ -188,36 +210,6 @@ def _scale(set_scale: "Callable[[str], None]", axis: "Axis", values: Floats) -> 
     axis.set_minor_formatter(NullFormatter())
 
 
-def _growth(axes: "Axes", design: Design) -> None:
-    designs = [count / 1000.0 for count, _ in design.growth]
-    fractions = [fraction for _, fraction in design.growth]
-    axes.plot(designs, fractions, color=BLUE, marker="o", markersize=3)
-    axes.set_title("$\\bf{D}$   Hypervolume of the front", pad=8)
-    axes.set_xlabel("Designs tried (thousands)")
-    axes.set_ylabel("Fraction of the box")
-    axes.locator_params(axis="x", nbins=5)
-
-
-def _legend(figure: "matplotlib.figure.Figure", valves: list[str], actuators: list[str], axes: "Axes") -> None:
-    from matplotlib.lines import Line2D
-
-    handles = [
-        Line2D([], [], linestyle="none", marker="s", markersize=7, color=_COLOURS[number % len(_COLOURS)], label=name)
-        for number, name in enumerate(valves)
-    ]
-    handles += [
-        Line2D([], [], linestyle="none", marker=_MARKERS[number % len(_MARKERS)], markersize=6, color=GREY, label=name)
-        for number, name in enumerate(actuators)
-    ]
-    handles.append(
-        Line2D(
-            [], [], linestyle="none", marker="o", markersize=11, markerfacecolor="none", color=BLACK, label="suggested"
-        )
-    )
-    left = axes.get_position().x0
-    figure.legend(handles=handles, loc="upper left", bbox_to_anchor=(left - 0.01, 0.975), ncols=3, columnspacing=1.4)
-
-
 _CAPTION = (
     "A to C: the front, each dot a design. D: the fraction of the box between the best and the worst values of the "
     "first, evenly spread designs that the front dominates, over the number of designs tried."
@@ -229,49 +221,74 @@ _MEANS = (
 )
 
 
-def answer_of(design: Design) -> Answer:
-    """Return the answer of a design study."""
+def finding_of(design: Design) -> Finding[Design]:
+    """Return a design study in words, tables and panels."""
     problem, points = design.problem, [design.front[place] for place in design.shown]
-    marked = tuple(row for row, place in enumerate(design.shown) if place == design.knee)
-    rows = tuple(_row(design, point) for point in points)
-    figure = Figure("front", _CAPTION, lambda: design_figure(design))
-    return Answer(
+    carried = ", ".join(part.title for part in problem.carried)
+    front = (
+        "No other design found beats one below in tracking error, gas per task and mass together: less of one of the "
+        "three costs more of "
+        f"another.{f' Every design carries {carried}; their mass is in the table.' if carried else ''}"
+    )
+    tasks = [
+        (task.name, task.weight, ", ".join(f"{scenario.name} ({kind})" for kind, scenario in task.scenarios.items()))
+        for task in problem.tasks
+    ]
+    titles = ("task", ("weight", Kind(quantity="fraction", form=".0f")), "scenario for each kind of valve")
+    again = f"Random seed {problem.search.seed} reproduces these designs. Made with: ppafo design {problem.file}"
+    return Finding(
         name="design",
         kicker="Design study",
         title=problem.name,
-        lead=(problem.description,) if problem.description else (),
-        sections=(
-            Section("The front", (_front_sentence(design),), is_detail=True),
-            Section("Designs", table=Table(_head(design), rows, marked, left=2)),
+        said=(problem.description,) if problem.description else (),
+        parts=(
+            Section("The front", said=[front], is_detail=True),
+            Section(
+                "Designs",
+                _columns(design, points),
+                marked=[row for row, place in enumerate(design.shown) if place == design.knee],
+                left=2,
+            ),
             Section(
                 remarks=(f"suggested: {design.reason}", _search_sentence(design), *_noise(design), *_failures(design))
             ),
-            Section("Error, gas and mass", figure=figure, is_detail=True),
+            Section(
+                "Error, gas and mass",
+                panels=lambda: design_panels(design),
+                name="front",
+                caption=_CAPTION,
+                across=2,
+                size=(4.5, 3.5),
+                is_detail=True,
+            ),
             *_suggestion(design),
-            _method_section(design),
+            Section("Method", columns_of(titles, tasks), remarks=(_MEANS, again), is_detail=True),
             *doubts_sections(design.doubtful),
             titles_section(part for point in points for part in (point.valve, point.actuator)),
         ),
-        data=_data(design),
+        found=design,
         files={"front.csv": lambda: front_table(design).encode()},
     )
 
 
 def _suggestion(design: Design) -> Iterator[Section]:
     """Yield the suggestion as it ran once more in each task, with its figure and the command that repeats it."""
-    error = design.problem.error
     for number, rerun in enumerate(design.suggested, 1):
         found = rerun.result.metrics
-        gas = quantity_text(found[GAS].value, "gas mass")
-        numbers = f"error {quantity_text(found[error].value, 'torque')}, gas {gas}"
-        stem = "suggested" if number == 1 else f"suggested-{number}"
+        error = OBJECTIVES_SHOWN["error"].text(found[design.problem.error].value)
+        gas = OBJECTIVES_SHOWN["gas"].text(found[GAS].value)
         yield Section(
             "The suggestion, run once more" if number == 1 else "",
-            remarks=(f"in '{rerun.task}': {numbers}; this command repeats the run",),
+            remarks=[f"in '{rerun.task}': error {error}, gas {gas}; this command repeats the run"],
             code=rerun.command,
         )
-        caption = f"The suggestion in the task '{rerun.task}'."
-        yield Section(f"The run in '{rerun.task}'", figure=Figure(stem, caption, rerun.result.plot), is_detail=True)
+        yield Section(
+            f"The run in '{rerun.task}'",
+            name="suggested" if number == 1 else f"suggested-{number}",
+            caption=f"The suggestion in the task '{rerun.task}'.",
+            draw=rerun.result.plot,
+            is_detail=True,
+        )
 
 
 def front_table(design: Design) -> str:
@@ -287,34 +304,23 @@ def front_table(design: Design) -> str:
     return buffer.getvalue()
 
 
-def _head(design: Design) -> tuple[Column, ...]:
-    titles = zip(("error", "gas per task", "mass"), SHOWN_OBJECTIVES.values(), (".3g", ".3g", ".4g"), strict=True)
-    objectives = [Column(*title) for title in titles]
-    spread = [Column("error from noise", SHOWN_OBJECTIVES["error"], ".2g")] if design.streams else []
-    return Column("valve"), Column("actuator"), *objectives, *spread, *map(_variable_column, design.problem.variables)
-
-
-def _variable_column(variable: Variable) -> Column:
-    """Return the column of a chosen number: its path without the section, with its unit."""
-    words, quantity = variable.path.partition(".")[2].replace("_", " "), quantity_of_unit(variable.unit)
-    has_own_unit = not quantity and variable.unit not in ("", "1")
-    return Column(f"{words} ({variable.unit})" if has_own_unit else words, quantity)
-
-
-def _row(design: Design, point: DesignPoint) -> tuple[str | float | None, ...]:
+def _columns(design: Design, points: list[DesignPoint]) -> list[Column]:
     """Return parts, objectives and chosen numbers; None where a number means nothing for the valve."""
-    numbers = [point.numbers.get(item.path) for item in design.problem.variables]
-    spread = [] if point.spread is None else [point.spread[0]]
-    return point.valve.name, point.actuator.name, *point.objectives, *spread, *numbers
-
-
-def _front_sentence(design: Design) -> str:
-    carried = ", ".join(part.title for part in design.problem.carried)
-    return (
-        "No other design found beats one below in tracking error, gas per task and mass together: less of one of the "
-        "three costs more of "
-        f"another.{f' Every design carries {carried}; their mass is in the table.' if carried else ''}"
-    )
+    error = OBJECTIVES_SHOWN["error"]
+    columns = [Column("valve", [point.valve.name for point in points])]
+    columns.append(Column("actuator", [point.actuator.name for point in points]))
+    for name, kind in OBJECTIVES_SHOWN.items():
+        columns.append(Column(kind.words.lower(), [getattr(point, name) for point in points], kind))
+    if design.streams:
+        spread = [None if point.spread is None else point.spread[0] for point in points]
+        columns.append(Column("error from noise", spread, replace(error, form=".2g")))
+    for item in design.problem.variables:
+        # Its path without the section, with its unit.
+        words, quantity = item.path.partition(".")[2].replace("_", " "), quantity_of_unit(item.unit)
+        own_unit = "" if quantity or item.unit in ("", "1") else f" ({item.unit})"
+        values = [point.numbers.get(item.path) for point in points]
+        columns.append(Column(f"{words}{own_unit}", values, Kind(quantity=quantity)))
+    return columns
 
 
 def _search_sentence(design: Design) -> str:
@@ -351,53 +357,6 @@ def _failures(design: Design) -> list[str]:
         f"{design.failed:,} of {design.runs:,} runs failed and their designs were left out; the first "
         f"({task}): {reason}"
     ]
-
-
-def _method_section(design: Design) -> Section:
-    problem = design.problem
-    head = (Column("task"), Column("weight", "fraction", ".0f"), Column("scenario for each kind of valve"))
-    rows = tuple(
-        (task.name, task.weight, ", ".join(f"{scenario.name} ({kind})" for kind, scenario in task.scenarios.items()))
-        for task in problem.tasks
-    )
-    again = f"Random seed {problem.search.seed} reproduces these designs. Made with: ppafo design {problem.file}"
-    return Section("Method", table=Table(head, rows), remarks=(_MEANS, again), is_detail=True)
-
-
-def _data(design: Design) -> dict[str, Any]:
-    problem = design.problem
-    return {
-        "format": "ppafo design",
-        "schema_version": 1,
-        "name": problem.name,
-        "description": problem.description,
-        "file": problem.file,
-        "units": "SI; pressures absolute, error in N m, gas per task and mass in kg",
-        "tasks": [
-            {
-                "name": task.name,
-                "weight": task.weight,
-                "scenarios": {kind: scenario.name for kind, scenario in task.scenarios.items()},
-            }
-            for task in problem.tasks
-        ],
-        "suggested": design.knee,
-        "reason": design.reason,
-        "shown": list(design.shown),
-        "noise_streams": design.streams,
-        "front": [_point_data(point) for point in design.front],
-        "search": {
-            "designs": design.designs,
-            "runs": design.runs,
-            "failed_runs": design.failed,
-            "failures": [{"reason": reason, "task": task} for reason, task in design.failures.items()],
-            "seed": problem.search.seed,
-            "settled": design.settled,
-            "hypervolume": [{"designs": count, "share": fraction} for count, fraction in design.growth],
-        },
-        "doubtful": doubts_data(design.doubtful),
-        "versions": {"ppafo": __version__},
-    }
 
 
 def _point_data(point: DesignPoint) -> dict[str, Any]:

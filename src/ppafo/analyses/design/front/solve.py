@@ -9,7 +9,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.analyses.design.front.answer import SHOWN_OBJECTIVES, Design, DesignPoint, Rerun, objective_table
+from ppafo.analyses.design.front.answer import OBJECTIVES_SHOWN, Design, DesignPoint, Rerun, objective_table
 from ppafo.analyses.design.front.problem import (
     DEAD_VOLUME,
     FRESH_STREAMS,
@@ -36,7 +36,6 @@ from ppafo.parameters.graph import ATMOSPHERE_PATH, PRESSURE_PATH, SECOND_PRESSU
 from ppafo.parameters.overrides import over
 from ppafo.parameters.parts import Part
 from ppafo.progress import Report, report_nothing
-from ppafo.report.display_units import change_text
 from ppafo.running import simulate
 from ppafo.simulation.declaration import PLAIN
 from ppafo.simulation.ensemble import COMPLETED, run_ensemble
@@ -342,10 +341,10 @@ def _loss(chosen: DesignPoint, other: DesignPoint, index: int) -> float:
 
 
 def _cost(chosen: DesignPoint, other: DesignPoint, index: int) -> str:
-    pairs = zip(SHOWN_OBJECTIVES.items(), other.objectives, chosen.objectives, strict=True)
+    pairs = zip(OBJECTIVES_SHOWN.items(), other.objectives, chosen.objectives, strict=True)
     costs = [
-        f"{change_text(new - old, quantity)} more {name}"
-        for place, ((name, quantity), new, old) in enumerate(pairs)
+        f"{kind.change(new - old)} more {name}"
+        for place, ((name, kind), new, old) in enumerate(pairs)
         if place != index and new > old * (1.0 + 1.0e-3)
     ]
     return " and ".join(costs) or "almost nothing"

@@ -1,8 +1,8 @@
-"""A sizing study and its answer: the valves with pressure and bottle, their margins, the suggestion, the doubts."""
+"""A sizing study: the valves with pressure and bottle, their margins, the suggestion, the doubts."""
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,10 +29,11 @@ from ppafo.errors import ParameterError
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle, scaled_entries
 from ppafo.parameters.parts import Part
 from ppafo.progress import Progress, Report, report_nothing
-from ppafo.report import Answer, Column, Figure, Section, Table
-from ppafo.report.display_units import axis_unit, display_value, display_values, quantity_text
-from ppafo.report.solved import Solved
-from ppafo.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, REFERENCE, VERMILION, house_style, mark_kind
+from ppafo.report.finding import Finding, columns_of
+from ppafo.report.finding import Part as Section
+from ppafo.report.kind import TIME, Kind
+from ppafo.report.panels import Mark, Panel
+from ppafo.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, REFERENCE, VERMILION
 from ppafo.signals import Recording
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.simulate import simulate
@@ -41,7 +42,6 @@ from ppafo.version import __version__
 from ppafo.walking.bottle import Schedule
 
 if TYPE_CHECKING:
-    import matplotlib.figure
     from matplotlib.axes import Axes
 
 
@@ -88,8 +88,8 @@ class SizedValve:
     curve: tuple[Floats, Floats, Floats]
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Sizing(Solved):
+@dataclass(frozen=True, slots=True, eq=False)
+class Sizing:
     """The result of a sizing study: every valve, and the place of the lightest that works with a bottle, if any.
 
     ``recording`` is the suggestion on the profile, None without one. ``failures`` maps reasons of failed runs to how
@@ -120,118 +120,113 @@ class Sizing(Solved):
         once = {(part.group, part.name): part for part in parts}.values()
         return tuple((part, name) for part in once for name in part.doubtful)
 
+    def json_document(self) -> dict[str, Any]:
+        """Return the valves and the suggestion as plain data in SI."""
+        problem = self.problem
+        return {
+            "format": "ppafo sizing",
+            "schema_version": 1,
+            "name": problem.name,
+            "description": problem.description,
+            "file": problem.file,
+            "units": "SI; pressures absolute, errors in N m, gas and mass in kg, margins as fractions",
+            "scenario": problem.scenario.name,
+            "profile": {
+                "kind": problem.profile.kind,
+                "period": problem.profile.period,
+                "largest": problem.profile.largest,
+                "table_error": problem.profile.table_error,
+                "times": problem.profile.knot_times.tolist(),
+                "torques": problem.profile.knot_values.tolist(),
+            },
+            "repetitions": problem.repetitions,
+            "hours": problem.hours,
+            "reserve": problem.reserve,
+            "largest_error": problem.largest_error,
+            "suggested": None if self.choice is None else self.choice.valve.name,
+            "summary": suggestion_sentence(self),
+            "valves": [_valve_data(item) for item in self.valves],
+            "noise_streams": self.streams,
+            "runs": self.runs,
+            "failures": [{"reason": reason, "runs": count} for reason, count in self.failures.items()],
+            "doubtful": doubts_data(self.doubtful),
+            "versions": {"ppafo": __version__},
+        }
 
-_SIZE = (9.0, 6.6)
+
+_PRESSURE = Kind("Supply pressure", "Pa_a", "pressure", ".3g")
+_TORQUE = Kind("Torque", "N m", "torque", ".3g")
+_GAS = Kind("Gas per repetition", "kg", "gas mass", ".3g")
+_MASS = Kind("Mass", "kg", "part mass")
 _COLOURS = (BLUE, VERMILION, GREEN, ORANGE, "#CC79A7", "#56B4E9")
 _MAXIMUM_OF_LIMIT = 4.0
+_DOTTED = {"marker": ".", "markersize": 4}
 
 
-def sizing_figure(sizing: Sizing) -> "matplotlib.figure.Figure":
-    """Return the torque over time above, error and gas over supply pressure below."""
-    import matplotlib.figure
-
-    with house_style():
-        figure = matplotlib.figure.Figure(figsize=_SIZE)
-        figure.subplots_adjust(left=0.08, right=0.98, bottom=0.085, top=0.92, wspace=0.22, hspace=0.52)
-        grid = figure.add_gridspec(2, 2)
-        axes = figure.add_subplot(grid[0, :])
-        problem = sizing.problem
-        time = np.linspace(0.0, problem.scenario.run.duration, 3001)
-        axes.plot(
-            time,
-            problem.profile.at(time),
-            color=REFERENCE.colour,
-            linestyle=REFERENCE.line,
-            linewidth=1.2,
-            label="prescribed",
-        )
-        title = "Torque (N m)"
-        if sizing.recording is not None and sizing.choice is not None:
-            pressure = display_value(sizing.choice.pressure, "pressure")
-            axes.plot(
-                sizing.recording.time,
-                sizing.recording["torque"],
-                color=_COLOURS[sizing.valves.index(sizing.choice) % len(_COLOURS)],
-                label=f"{sizing.choice.valve.title} at {pressure:.1f} {axis_unit('pressure')}",
-            )
-        axes.set_title(f"$\\bf{{A}}$   {title}", pad=18)
-        axes.set_xlabel("Time (s)")
-        axes.margins(x=0.0)
-        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.1, handlelength=1.6)
-        errors = figure.add_subplot(grid[1, 0])
-        _errors(errors, sizing)
-        _gas(figure.add_subplot(grid[1, 1], sharex=errors), sizing)
-        mark_kind(figure, "simulated")
-    return figure
+def torque_panel(sizing: Sizing) -> Panel:
+    """Return the prescribed torque over time, and that of the suggestion."""
+    times = np.linspace(0.0, sizing.problem.scenario.run.duration, 3001)
+    prescribed = {"linestyle": REFERENCE.line, "linewidth": 1.2}
+    profile = sizing.problem.profile.at(times)
+    marks = [Mark("line", times, profile, (), "prescribed", REFERENCE.colour, prescribed)]
+    recording, choice = sizing.recording, sizing.choice
+    if recording is not None and choice is not None:
+        label = f"{choice.valve.title} at {_PRESSURE.number(choice.pressure, '.1f')} psig"
+        colour = _COLOURS[sizing.valves.index(choice) % len(_COLOURS)]
+        marks.append(Mark("line", recording.time, recording["torque"], label=label, colour=colour))
+    return Panel(TIME, _TORQUE, marks, then=lambda axes: axes.margins(x=0.0))
 
 
-def _errors(axes: "Axes", sizing: Sizing) -> None:
+def pressure_panels(sizing: Sizing) -> list[Panel]:
+    """Return error and gas over supply pressure, with a ring at the pressure that was chosen for each valve."""
     limit = sizing.problem.largest_error
-    for number, item in enumerate(sizing.valves):
-        pressure, error, _ = item.curve
-        colour = _COLOURS[number % len(_COLOURS)]
-        axes.plot(
-            display_values(pressure, "pressure"), error, color=colour, marker=".", markersize=4, label=item.valve.title
-        )
-        _mark(axes, item, item.error, colour)
-    axes.axhline(limit, color=BLACK, linewidth=1.0, linestyle="--")
-    axes.set_ylim(0.0, _MAXIMUM_OF_LIMIT * limit)
-    axes.set_title("$\\bf{B}$   RMS error (N m), limit dashed", pad=8)
-    axes.set_xlabel(f"Supply pressure ({axis_unit('pressure')})")
-    axes.legend(loc="upper right", fontsize=8)
-
-
-def _gas(axes: "Axes", sizing: Sizing) -> None:
+    ring = {"linestyle": "", "marker": "o", "markersize": 9, "markerfacecolor": "none", "markeredgewidth": 1.4}
+    errors, gases = [Mark("level", (), limit, colour=BLACK, style={"linewidth": 1.0, "linestyle": "--"})], []
     for number, item in enumerate(sizing.valves):
         pressure, error, gas = item.curve
-        keeps = error <= sizing.problem.largest_error
-        colour = _COLOURS[number % len(_COLOURS)]
-        axes.plot(
-            display_values(pressure[keeps], "pressure"),
-            display_values(gas[keeps], "gas mass"),
-            color=colour,
-            marker=".",
-            markersize=4,
-        )
-        _mark(axes, item, display_value(item.gas, "gas mass"), colour)
-    # Valves differ by some per cent: an axis from 0 would lay their curves on each other.
-    axes.margins(y=0.15)
-    axes.set_title("$\\bf{C}$   Gas per repetition (g) within the limit", pad=8)
-    axes.set_xlabel(f"Supply pressure ({axis_unit('pressure')})")
-    if not any(item.works for item in sizing.valves):
-        axes.text(0.5, 0.5, "no valve keeps the limit", transform=axes.transAxes, ha="center", color=GREY)
+        keeps, colour = error <= limit, _COLOURS[number % len(_COLOURS)]
+        errors.append(Mark("line", pressure, error, (), item.valve.title, colour, _DOTTED))
+        gases.append(Mark("line", pressure[keeps], gas[keeps], colour=colour, style=_DOTTED))
+        if item.works:
+            errors.append(Mark("line", [item.pressure], [item.error], colour=colour, style=ring))
+            gases.append(Mark("line", [item.pressure], [item.gas], colour=colour, style=ring))
 
+    def set_gas(axes: "Axes") -> None:
+        # Valves differ by some per cent: an axis from 0 would lay their curves on each other.
+        axes.margins(y=0.15)
+        if not any(item.works for item in sizing.valves):
+            axes.text(0.5, 0.5, "no valve keeps the limit", transform=axes.transAxes, ha="center", color=GREY)
 
-def _mark(axes: "Axes", item: SizedValve, value: float, colour: str) -> None:
-    """Ring the pressure that was chosen for a valve."""
-    if item.works:
-        axes.plot(
-            display_value(item.pressure, "pressure"),
-            value,
-            marker="o",
-            markersize=9,
-            markerfacecolor="none",
-            color=colour,
-            markeredgewidth=1.4,
-        )
+    return [
+        Panel(
+            _PRESSURE,
+            replace(_TORQUE, words="RMS error"),
+            errors,
+            "RMS error, limit dashed",
+            legend="inside",
+            then=lambda axes: axes.set_ylim(0.0, _MAXIMUM_OF_LIMIT * limit),
+        ),
+        Panel(_PRESSURE, _GAS, gases, "Gas per repetition within the limit", then=set_gas),
+    ]
 
 
 _HEAD = (
-    Column("valve"),
-    Column("pressure", "pressure", ".3g"),
-    Column("lowest", "pressure", ".3g"),
-    Column("RMS error", "torque", ".3g"),
-    Column("gas per repetition", "gas mass", ".3g"),
-    Column("total gas", "gas mass", ".3g"),
-    Column("bottle"),
-    Column("mass", "part mass"),
-    Column("limited by"),
+    "valve",
+    ("pressure", _PRESSURE),
+    ("lowest", _PRESSURE),
+    ("RMS error", _TORQUE),
+    ("gas per repetition", _GAS),
+    ("total gas", _GAS),
+    "bottle",
+    ("mass", _MASS),
+    "limited by",
 )
 _MARGINS = ("error", "torque", "flow", "gas")
-_MARGIN_HEAD = (
-    Column("valve"),
-    *(Column(f"{name} margin", "fraction", ".0f") for name in _MARGINS),
-    Column("gains"),
+_MARGIN = Kind("", "", "fraction", ".0f")
+_MARGIN_HEAD: tuple[str | tuple[str, Kind], ...] = (
+    "valve",
+    *((f"{name} margin", _MARGIN) for name in _MARGINS),
+    "gains",
 )
 _ORIGINS = {
     "typed": "typed, not measured",
@@ -240,8 +235,8 @@ _ORIGINS = {
     "synthetic": "synthetic, not measured",
 }
 _CAPTION = (
-    "A: the prescribed torque and the suggestion's. B, C: every valve over supply pressure, each dot with the "
-    "gains that use least gas within the limit; rings are the chosen pressures."
+    "Every valve over supply pressure, each dot with the gains that use least gas within the limit; rings are the "
+    "chosen pressures."
 )
 _READING = (
     "The pressure is the one with the lightest bottle, of these the lowest; the lowest pressure that keeps the "
@@ -253,35 +248,47 @@ _READING = (
 )
 
 
-def answer_of(sizing: Sizing) -> Answer:
-    """Return the answer of a sizing study; it has not passed where nothing can be suggested."""
+def finding_of(sizing: Sizing) -> Finding[Sizing]:
+    """Return a sizing study in words, tables and panels; it has not passed where nothing can be suggested."""
     problem, recording = sizing.problem, sizing.recording
-    suggestion = suggestion_sentence(sizing)
     marked = () if sizing.suggested is None else (sizing.suggested,)
     working = [place for place, item in enumerate(sizing.valves) if item.works]
-    margins = tuple(_margin_row(sizing.problem, sizing.valves[place]) for place in working)
-    sections = [Section("Valves", table=Table(_HEAD, tuple(map(_row, sizing.valves)), marked))]
-    if margins:
-        places = tuple(working.index(place) for place in marked)
-        sections.append(Section("Margins", table=Table(_MARGIN_HEAD, margins, places)))
-    return Answer(
+    margins = [_margin_row(problem, sizing.valves[place]) for place in working]
+    return Finding(
         name="design",
         kicker="Sizing study",
         title=problem.name,
-        lead=(*([problem.description] if problem.description else []), _profile_sentence(problem)),
-        sections=(
-            *sections,
-            Section(remarks=(suggestion, *_remarks(sizing))),
+        said=(*([problem.description] if problem.description else []), _profile_sentence(problem)),
+        parts=(
+            Section("Valves", columns_of(_HEAD, map(_row, sizing.valves)), marked=marked),
+            Section(
+                "Margins" if margins else "",
+                columns_of(_MARGIN_HEAD, margins),
+                marked=[working.index(place) for place in marked],
+            ),
+            Section(remarks=(suggestion_sentence(sizing), *_remarks(sizing))),
             Section(
                 "Error and gas over pressure",
-                figure=Figure("profile", _CAPTION, lambda: sizing_figure(sizing)),
+                panels=lambda: pressure_panels(sizing),
+                name="profile",
+                caption=_CAPTION,
+                across=2,
+                size=(4.5, 3.3),
+                is_detail=True,
+            ),
+            Section(
+                "The torque",
+                panels=lambda: [torque_panel(sizing)],
+                name="torque",
+                caption="The prescribed torque and that of the suggestion.",
+                size=(9.0, 3.0),
                 is_detail=True,
             ),
             *doubts_sections(sizing.doubtful),
-            Section("How to read it", (*_READING, *_method(sizing)), is_detail=True),
+            Section("How to read it", said=(*_READING, *_method(sizing)), is_detail=True),
             titles_section([item.valve for item in sizing.valves]),
         ),
-        data=_data(sizing, suggestion),
+        found=sizing,
         passed=sizing.choice is not None,
         files={} if recording is None else {"suggested.csv": lambda: marked_csv_bytes(recording)},
     )
@@ -289,22 +296,19 @@ def answer_of(sizing: Sizing) -> Answer:
 
 def _profile_sentence(problem: SizingProblem) -> str:
     profile = problem.profile
-    near = (
-        f", {profile.knot_times.size} knots, to {quantity_text(profile.table_error, 'torque')}"
-        if profile.table_error
-        else ""
-    )
+    error = profile.table_error
+    near = f", {profile.knot_times.size} knots, to {_TORQUE.text(error)}" if error else ""
     return (
-        f"profile of {quantity_text(profile.period, 'time')} with up to {quantity_text(profile.largest, 'torque')} "
+        f"profile of {TIME.text(profile.period, '.3g')} with up to {_TORQUE.text(profile.largest)} "
         f"({_ORIGINS[profile.kind]}{near}); {problem.repetitions:.0f} repetitions ({problem.hours:.2g} h), RMS error "
-        f"at most {quantity_text(problem.largest_error, 'torque')}, {100 * problem.reserve:.0f} % of the gas as "
+        f"at most {_TORQUE.text(problem.largest_error)}, {100 * problem.reserve:.0f} % of the gas as "
         "reserve"
     )
 
 
 def _row(item: SizedValve) -> tuple[str | float | None, ...]:
     if not item.works:
-        error = f"{display_value(item.error, 'torque'):.3g} at best"
+        error = f"{_TORQUE.number(item.error)} at best"
         return item.valve.name, None, None, error, None, None, None, None, item.limit
     bottle = "none" if item.bottle is None else item.bottle.name
     lowest = item.lowest_pressure or item.pressure
@@ -332,8 +336,8 @@ def suggestion_sentence(sizing: Sizing) -> str:
     cut = 0.0 if item.margins is None else -item.margins.torque
     peak = f", with {100.0 * cut:.0f} % of the peak cut off" if cut > 0.0 else ""
     return (
-        f"suggested: {item.valve.name} at {quantity_text(item.pressure, 'pressure')}{bottle}, the lightest that lasts "
-        f"and keeps the error limit{peak}, {quantity_text(item.mass or 0.0, 'part mass', '.0f')}; a lower pressure is "
+        f"suggested: {item.valve.name} at {_PRESSURE.text(item.pressure)}{bottle}, the lightest that lasts "
+        f"and keeps the error limit{peak}, {_MASS.text(item.mass or 0.0, '.0f')}; a lower pressure is "
         f"prevented by {LIMITS[item.limit]}"
     )
 
@@ -361,39 +365,6 @@ def _method(sizing: Sizing) -> list[str]:
         "and sensors are the scenario's; what the data sheet of a valve does not state is taken as ideal.",
         f"Made with: ppafo design {problem.file}",
     ]
-
-
-def _data(sizing: Sizing, suggestion: str) -> dict[str, Any]:
-    problem = sizing.problem
-    return {
-        "format": "ppafo sizing",
-        "schema_version": 1,
-        "name": problem.name,
-        "description": problem.description,
-        "file": problem.file,
-        "units": "SI; pressures absolute, errors in N m, gas and mass in kg, margins as fractions",
-        "scenario": problem.scenario.name,
-        "profile": {
-            "kind": problem.profile.kind,
-            "period": problem.profile.period,
-            "largest": problem.profile.largest,
-            "table_error": problem.profile.table_error,
-            "times": problem.profile.knot_times.tolist(),
-            "torques": problem.profile.knot_values.tolist(),
-        },
-        "repetitions": problem.repetitions,
-        "hours": problem.hours,
-        "reserve": problem.reserve,
-        "largest_error": problem.largest_error,
-        "suggested": None if sizing.choice is None else sizing.choice.valve.name,
-        "summary": suggestion,
-        "valves": [_valve_data(item) for item in sizing.valves],
-        "noise_streams": sizing.streams,
-        "runs": sizing.runs,
-        "failures": [{"reason": reason, "runs": count} for reason, count in sizing.failures.items()],
-        "doubtful": doubts_data(sizing.doubtful),
-        "versions": {"ppafo": __version__},
-    }
 
 
 def _valve_data(item: SizedValve) -> dict[str, Any]:
@@ -457,9 +428,9 @@ def _size_valve(trials: Trials, valve: Part) -> SizedValve:
     bottle, is_cold = _lasting_bottle(problem, gas, pressure) if works else (None, False)
     said = []
     if tried.fails_above is not None:
-        said.append(f"at {quantity_text(tried.fails_above, 'pressure')} the error limit is exceeded again")
+        said.append(f"at {_PRESSURE.text(tried.fails_above)} the error limit is exceeded again")
     if highest_pressure(problem, valve) < problem.highest_pressure and tried.first is None:
-        highest = quantity_text(highest_pressure(problem, valve), "pressure")
+        highest = _PRESSURE.text(highest_pressure(problem, valve))
         said.append(f"not tried above {highest}, the rated pressure of its parts")
     if is_cold:
         said.append("a lighter bottle has gas enough and ends before, as it is too cold")

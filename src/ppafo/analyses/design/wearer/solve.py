@@ -8,6 +8,7 @@ import itertools
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -24,9 +25,9 @@ from ppafo.model.plant_faults import SHUT_OFF
 from ppafo.parameters.declaration import ACTUATOR, ORIFICE
 from ppafo.parameters.parts import Catalogue, Part, load_catalogue
 from ppafo.progress import Progress, Report
-from ppafo.report import Answer, Column, Figure, Section, Table
-from ppafo.report.display_units import quantity_text
-from ppafo.report.solved import Solved
+from ppafo.report.finding import Finding, columns_of, facts
+from ppafo.report.finding import Part as Section
+from ppafo.report.kind import Kind
 from ppafo.version import __version__
 from ppafo.walking.bottle import WALKED, minutes_text
 from ppafo.walking.figures.over_time import bottle_figure, peak_torques
@@ -116,14 +117,71 @@ class Device:
         return f"ppafo walk {WALKS[self.tried.valve.kind]} --bottle {self.bottle.name} --minutes {minutes:.4g} {sets}"
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
-class WearerSizing(Solved):
+@dataclass(frozen=True, slots=True, eq=False)
+class WearerSizing:
     """What was wanted and all that was tried; ``device`` is None where none has it, and ``instead`` what would do."""
 
     wish: Wish
     tried: tuple[Tried, ...]
     device: Device | None
     instead: tuple[str, ...]
+
+    @property
+    def parts(self) -> list[Part]:
+        """The parts that the device is made of, of those with figures to check."""
+        device = self.device
+        if device is None:
+            return []
+        return [device.tried.valve, device.tried.actuator, device.bottle, device.electrical.cell]
+
+    @property
+    def doubtful(self) -> list[tuple[Part, str]]:
+        """Figures of these parts that are quoted or assumed."""
+        return [(part, name) for part in self.parts for name in part.doubtful]
+
+    def json_document(self) -> dict[str, Any]:
+        """Return the device and all that was tried as plain data in SI."""
+        wish, device = self.wish, self.device
+        return {
+            "format": "ppafo wearer sizing",
+            "schema_version": 1,
+            "kind": "simulated",
+            "ppafo": __version__,
+            "wish": {
+                "body_mass": wish.mass,
+                "stature": wish.stature,
+                "torque": wish.torque,
+                "pressure": wish.pressure,
+                "time": wish.seconds,
+            },
+            "device": None
+            if device is None
+            else {
+                "valve": device.tried.valve.name,
+                "actuator": device.tried.actuator.name,
+                "bottle": device.bottle.name,
+                "controller": device.walked.scenario.controller.kind,
+                "walk": WALKS[device.tried.valve.kind],
+                "overrides": list(device.tried.overrides),
+                "lasts": device.life.discharge.walking_time,
+                "torque": device.torque,
+                "masses": dict(device.masses),
+                "electrical_power": dict(device.electrical.powers),
+                "battery": {
+                    "cell": device.electrical.cell.name,
+                    "cells": device.electrical.cells,
+                    "mass": device.electrical.mass,
+                    "lasts": device.electrical.lasts,
+                },
+                "command": device.command,
+            },
+            "instead": list(self.instead),
+            "tried": [
+                {"valve": one.valve.name, "actuator": one.actuator.name, "torque": one.torque, "flow": one.flow}
+                for one in self.tried
+            ],
+            "check_before_buying": doubts_data(self.doubtful),
+        }
 
 
 def size_for_wearer(wish: Wish, report: Report) -> WearerSizing:
@@ -343,8 +401,8 @@ def _offer_text(wish: Wish, asked: Wish, one: Tried, bottle: Part) -> str:
 
 
 def _wished(wish: Wish) -> str:
-    pressure = quantity_text(wish.pressure, "pressure", ".4g")
-    return f"{quantity_text(wish.torque, 'torque')} at {pressure} for {wish.seconds / 60.0:.4g} min"
+    pressure = Kind("", "Pa_a", "pressure").text(wish.pressure)
+    return f"{_TORQUE.text(wish.torque)} at {pressure} for {wish.seconds / 60.0:.4g} min"
 
 
 def _at_gauge(wish: Wish, share: float) -> Wish:
@@ -381,12 +439,13 @@ def _at_more_pressure(wish: Wish, tried: list[Tried]) -> Iterator[tuple[Wish, Tr
                     yield asked, again
 
 
+_TORQUE, _MASS = Kind("", "N m", "torque", ".3g"), Kind("", "kg", "part mass")
 _HEAD = (
-    Column("valve"),
-    Column("actuator"),
-    Column("peak torque", "torque", ".3g"),
-    Column("gas", "mass flow", ".3g"),
-    Column("mass of both", "part mass"),
+    "valve",
+    "actuator",
+    ("peak torque", _TORQUE),
+    ("gas", Kind("", "kg/s", "mass flow", ".3g")),
+    ("mass of both", _MASS),
 )
 _CAPTION = "The walk of the suggestion on its bottle for the requested {wished}; the bottle lasts {lasts}."
 _READING = (
@@ -398,30 +457,27 @@ _READING = (
 )
 
 
-def answer_of(sizing: WearerSizing) -> Answer:
-    """Return the answer: the device with its walk, or what to give up; it has not passed without a device."""
+def finding_of(sizing: WearerSizing) -> Finding[WearerSizing]:
+    """Return the device with its walk, or what to give up; it has not passed without a device."""
     wish, device = sizing.wish, sizing.device
-    rows = tuple(
+    rows = [
         (one.valve.name, one.actuator.name, one.torque, one.flow, one.mass)
         for one in sorted(sizing.tried, key=lambda one: -one.torque)
-    )
-    tried = Section("What was walked with", table=Table(_HEAD, rows, left=2), is_detail=device is not None)
+    ]
+    tried = Section("What was walked with", columns_of(_HEAD, rows), left=2, is_detail=device is not None)
     stature = f"{_stature(wish):.4g} m{' (assumed: give --stature)' if wish.stature is None else ''}"
-    lead = f"a wearer of {wish.mass:.4g} kg and {stature}; {_wished(wish)}"
-    parts = [] if device is None else [device.tried.valve, device.tried.actuator, device.bottle, device.electrical.cell]
-    doubtful = [(part, name) for part in parts for name in part.doubtful]
     sections = (
         (Section(remarks=("no device of the catalogue has this; give up one of:", *sizing.instead)), tried)
         if device is None
-        else (*_sections(wish, device), tried, *doubts_sections(doubtful), titles_section(parts))
+        else (*_sections(wish, device), tried, *doubts_sections(sizing.doubtful), titles_section(sizing.parts))
     )
-    return Answer(
+    return Finding(
         name="design",
         kicker="From a wearer to a device",
         title="The device",
-        lead=(lead,),
-        sections=(*sections, Section("How to read it", _READING, is_detail=True)),
-        data=_data(sizing, doubtful),
+        said=(f"a wearer of {wish.mass:.4g} kg and {stature}; {_wished(wish)}",),
+        parts=(*sections, Section("How to read it", said=_READING, is_detail=True)),
+        found=sizing,
         passed=device is not None,
     )
 
@@ -437,14 +493,14 @@ def _sections(wish: Wish, device: Device) -> tuple[Section, ...]:
     assert supply is not None, "it walked on a bottle"
     peaks = peak_torques(walked)
     low, high = (share * walk_of(walked.scenario).gait.body_mass for share in SCALED_MASS)
-    facts = (
+    rows = (
         ("controller", f"{walked.scenario.controller.kind}, walk '{WALKS[device.tried.valve.kind]}'"),
         ("lasts", f"{minutes_text(device.life.discharge.walking_time)}, of {wish.seconds / 60.0:.4g} min"),
         ("then", device.life.discharge.ending.message),
-        ("peak torque", f"{quantity_text(device.torque, 'torque')} in the mean stride{_short(wish, device)}, "
-         f"{quantity_text(float(peaks[-1]), 'torque')} in the last"),
-        ("gas", f"{quantity_text(walked.metrics['gas'].value, 'gas mass')} a stride"),
-        ("mass", quantity_text(sum(device.masses.values()), "part mass", ".0f")),
+        ("peak torque", f"{_TORQUE.text(device.torque)} in the mean stride{_short(wish, device)}, "
+         f"{_TORQUE.text(float(peaks[-1]))} in the last"),
+        ("gas", f"{Kind('', 'kg', 'gas mass', '.3g').text(walked.metrics['gas'].value)} a stride"),
+        ("mass", _MASS.text(sum(device.masses.values()), ".0f")),
     )  # fmt: skip
     remarks = [
         *electrical_sentences(device.electrical),
@@ -454,54 +510,10 @@ def _sections(wish: Wish, device: Device) -> tuple[Section, ...]:
         remarks.append(f"the gait is known of {low:.0f} to {high:.0f} kg: beyond, torque and gas are a guess")
     lasts = device.life.discharge.walking_time
     caption = _CAPTION.format(wished=f"{wish.seconds / 60.0:.4g} min", lasts=minutes_text(lasts))
-    figure = Figure("bottle", caption, lambda: bottle_figure(walked))
-    masses = tuple((name, quantity_text(mass, "part mass", ".0f")) for name, mass in device.masses.items())
+    masses = ((name, _MASS.text(mass, ".0f")) for name, mass in device.masses.items())
+    draw = partial(bottle_figure, walked)
     return (
-        Section("The walk on its bottle", table=Table((), facts), remarks=tuple(remarks), code=device.command),
-        Section("What it weighs", table=Table((), masses)),
-        Section("The bottle over the walk", figure=figure, is_detail=True),
+        Section("The walk on its bottle", facts(rows), remarks=remarks, code=device.command),
+        Section("What it weighs", facts(masses)),
+        Section("The bottle over the walk", name="bottle", caption=caption, draw=draw, is_detail=True),
     )
-
-
-def _data(sizing: WearerSizing, doubtful: list[tuple[Part, str]]) -> dict[str, Any]:
-    wish, device = sizing.wish, sizing.device
-    return {
-        "format": "ppafo wearer sizing",
-        "schema_version": 1,
-        "kind": "simulated",
-        "ppafo": __version__,
-        "wish": {
-            "body_mass": wish.mass,
-            "stature": wish.stature,
-            "torque": wish.torque,
-            "pressure": wish.pressure,
-            "time": wish.seconds,
-        },
-        "device": None
-        if device is None
-        else {
-            "valve": device.tried.valve.name,
-            "actuator": device.tried.actuator.name,
-            "bottle": device.bottle.name,
-            "controller": device.walked.scenario.controller.kind,
-            "walk": WALKS[device.tried.valve.kind],
-            "overrides": list(device.tried.overrides),
-            "lasts": device.life.discharge.walking_time,
-            "torque": device.torque,
-            "masses": dict(device.masses),
-            "electrical_power": dict(device.electrical.powers),
-            "battery": {
-                "cell": device.electrical.cell.name,
-                "cells": device.electrical.cells,
-                "mass": device.electrical.mass,
-                "lasts": device.electrical.lasts,
-            },
-            "command": device.command,
-        },
-        "instead": list(sizing.instead),
-        "tried": [
-            {"valve": one.valve.name, "actuator": one.actuator.name, "torque": one.torque, "flow": one.flow}
-            for one in sizing.tried
-        ],
-        "check_before_buying": doubts_data(doubtful),
-    }

@@ -8,7 +8,7 @@ import jsonschema
 import numpy as np
 import pytest
 
-from ppafo.analyses.design.front.answer import Design, answer_of, front_table
+from ppafo.analyses.design.front.answer import Design, finding_of, front_table
 from ppafo.analyses.design.front.search import Candidates
 from ppafo.analyses.design.front.solve import Evaluation, design_columns, noise_streams
 from ppafo.analyses.design.loading import json_schema, load_design
@@ -77,7 +77,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def study(folder: Path) -> Design:
-    return design(folder / "small.toml")
+    return design(folder / "small.toml").found
 
 
 def test_the_shipped_design_keeps_its_published_schema_and_loads() -> None:
@@ -122,7 +122,7 @@ def test_the_suggestion_is_run_once_more_in_each_task_and_comes_to_what_the_fron
         error, gas = point.tasks[rerun.task]
         assert rerun.result.metrics["rms_error"].value == pytest.approx(error, rel=1e-4)
         assert rerun.result.metrics["gas_supplied"].value == pytest.approx(gas, rel=1e-4)
-        assert rerun.command in text_of(answer_of(study))
+        assert rerun.command in text_of(finding_of(study))
 
 
 def load_design_scenario(task: str, rate: str):  # type: ignore[no-untyped-def]
@@ -141,7 +141,7 @@ def test_no_design_of_the_front_beats_another_and_all_keep_the_constraint(study:
 
 
 def test_the_same_seed_gives_the_same_designs(study: Design, folder: Path) -> None:
-    again = design(load_design(folder / "small.toml"), threads=1)
+    again = design(load_design(folder / "small.toml"), threads=1).found
     assert [point.objectives for point in again.front] == [point.objectives for point in study.front]
     assert study.designs == 64 + 2 * 16
 
@@ -156,7 +156,7 @@ NOISY = (
 def test_a_noisy_design_is_worth_its_mean_over_noise_that_the_search_never_met(folder: Path) -> None:
     (folder / "noisy.toml").write_text(NOISY)
     (folder / "seed.toml").write_text(NOISY.replace("1 kPa_d", '1 kPa_d", "sensors.seed=9'))
-    study, other = design(folder / "noisy.toml"), design(folder / "seed.toml")
+    study, other = design(folder / "noisy.toml").found, design(folder / "seed.toml").found
     # The seed of the scenario is one realisation of many: it decides nothing.
     assert [point.objectives for point in other.front] == [point.objectives for point in study.front]
     point, fresh = study.front[0], noise_streams(study.problem, 16, 64)
@@ -181,7 +181,7 @@ def test_a_noisy_design_is_worth_its_mean_over_noise_that_the_search_never_met(f
     assert study.streams == 64
     text = front_table(study).splitlines()[0]
     assert "error from noise [N m]" in text
-    assert any("noise streams" in remark for remark in answer_of(study).sections[2].remarks)
+    assert any("noise streams" in remark for remark in finding_of(study).parts[2].remarks)
 
 
 def test_without_noise_there_is_one_run_of_each_design_and_no_word_of_noise(study: Design) -> None:
@@ -225,7 +225,7 @@ def test_pressures_above_what_parts_are_made_for_break_a_constraint(folder: Path
 def test_a_failed_run_is_counted_and_is_no_design(folder: Path) -> None:
     late = '[variables."sensors.delay"]\nvalues = ["0 s", "0.3 s"]\n\n'
     (folder / "failing.toml").write_text(FILE.replace("[constraints", late + "[constraints", 1))
-    found = design(folder / "failing.toml")
+    found = design(folder / "failing.toml").found
     assert 0 < found.failed < found.runs
     assert any("sensors.delay" in reason for reason in found.failures)
     assert {point.numbers["sensors.delay"] for point in found.front} == {0.0}
@@ -306,13 +306,13 @@ def test_a_file_without_a_profile_and_without_tasks_says_what_to_write(tmp_path:
 
 
 def test_a_design_is_drawn_and_told_as_data_like_any_answer(study: Design) -> None:
-    figure = study.plot()
+    figure = finding_of(study).plot()
     labels = [(axes.get_xlabel(), axes.get_ylabel()) for axes in figure.axes]
     parts = {part.title for point in study.front for part in (point.valve, point.actuator)}
     assert {text.get_text() for text in figure.legends[0].get_texts()} == {*parts, "suggested"}
     assert labels[0] == ("Error (N m)", "Gas per task (g)")
     assert labels[1] == ("Error (N m)", "Mass (g)")
-    assert study.to_dict()["suggested"] == study.knee
+    assert finding_of(study).to_dict()["suggested"] == study.knee
 
 
 def test_a_seed_stands_in_for_that_of_the_file(folder: Path) -> None:

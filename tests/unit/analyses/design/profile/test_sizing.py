@@ -12,7 +12,13 @@ import pytest
 
 from ppafo.analyses.design.loading import json_schema, load_design
 from ppafo.analyses.design.profile import search
-from ppafo.analyses.design.profile.answer import Sizing, _lasting_bottle, smallest_bottle, suggestion_sentence
+from ppafo.analyses.design.profile.answer import (
+    Sizing,
+    _lasting_bottle,
+    finding_of,
+    smallest_bottle,
+    suggestion_sentence,
+)
 from ppafo.analyses.design.profile.problem import choose_knots
 from ppafo.analyses.design.profile.search import Floats, Trials, ceiling, ceiling_pressure, cut_error
 from ppafo.analyses.design.solve import design
@@ -58,7 +64,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def sizing(folder: Path) -> Sizing:
-    return design(folder / "trapezium.toml")
+    return design(folder / "trapezium.toml").found
 
 
 def test_the_shipped_sizing_keeps_its_published_schema_and_loads() -> None:
@@ -90,12 +96,12 @@ def test_the_lowest_pressure_is_just_above_the_torque_ceiling_and_is_said_to_be_
 
 
 def test_a_sizing_is_drawn_and_told_as_data_like_any_answer(sizing: Sizing) -> None:
-    panels = sizing.plot().axes
-    assert [axes.get_xlabel() for axes in panels] == ["Time (s)", *["Supply pressure (psig)"] * 2]
-    legend = panels[1].get_legend()
+    panels = finding_of(sizing).plot().axes
+    assert [axes.get_xlabel() for axes in panels] == ["Supply pressure (psig)"] * 2
+    legend = panels[0].get_legend()
     assert legend is not None
     assert [text.get_text() for text in legend.get_texts()] == ["Enfield Technologies LS-V05s"]
-    assert sizing.to_dict()["suggested"] == "enfield-ls-v05s"
+    assert finding_of(sizing).to_dict()["suggested"] == "enfield-ls-v05s"
 
 
 def test_a_tenth_of_a_psi_less_is_not_enough(sizing: Sizing) -> None:
@@ -123,7 +129,7 @@ def test_a_valve_that_is_too_small_is_limited_by_its_flow(folder: Path) -> None:
     catalogue = load_text_of_catalogue().replace("value = 31.6", "value = 2.6", 1)
     (folder / "small.toml").write_text(catalogue)
     (folder / "flow.toml").write_text(FILE.replace('name = "trap', 'catalogue = "./small.toml"\nname = "trap'))
-    item = design(folder / "flow.toml").valves[0]
+    item = design(folder / "flow.toml").found.valves[0]
     assert item.limit == "flow"
     assert not item.works or item.pressure > 1.2 * ceiling_pressure(load_design(folder / "flow.toml"))
 
@@ -135,14 +141,14 @@ def load_text_of_catalogue() -> str:
 
 def test_a_controller_without_gains_is_limited_by_the_control(folder: Path) -> None:
     (folder / "idle.toml").write_text(FILE.replace("[1.0, 4.0]", "[0.0]"))
-    sized = design(folder / "idle.toml")
+    sized = design(folder / "idle.toml").found
     assert (sized.valves[0].works, sized.valves[0].limit, sized.choice) == (False, "control", None)
     assert sized.recording is None
 
 
 def test_use_that_no_bottle_lasts_for_is_no_suggestion(folder: Path) -> None:
     (folder / "long.toml").write_text(FILE.replace("repetitions = 100", "hours = 24"))
-    sized = design(folder / "long.toml")
+    sized = design(folder / "long.toml").found
     assert sized.choice is None
     assert sized.valves[0].works
     assert "no bottle is large enough: pipeline-jacpac-9oz lasts for" in sized.valves[0].remark
@@ -281,7 +287,7 @@ def test_a_pressure_that_cuts_half_of_the_peak_is_not_suggested(tmp_path: Path) 
         '[use]\nrepetitions = 10\n[limits]\nrms_error = "1.5 N m"\n[parts]\nvalves = ["festo-mpye-5-1-8-hf-010-b"]\n'
         'bottles = ["pipeline-jacpac-9oz"]\n[pressure]\nlowest = "15 psi_g"\nhighest = "100 psi_g"\n'
     )
-    sizing = design(tmp_path / "brief.toml")
+    sizing = design(tmp_path / "brief.toml").found
     assert isinstance(sizing, Sizing)
     assert sizing.choice is not None
     assert sizing.choice.margins is not None

@@ -11,7 +11,7 @@ import pytest
 import ppafo
 from ppafo.analyses.design.wearer import solve as wearer
 from ppafo.analyses.design.wearer.electrical import electrical_of, valve_power
-from ppafo.analyses.design.wearer.solve import WearerSizing
+from ppafo.analyses.design.wearer.solve import WearerSizing, finding_of
 from ppafo.cli.main import main
 from ppafo.errors import StudyError
 from ppafo.parameters.parts import load_catalogue
@@ -46,7 +46,7 @@ def little(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def sized(torque: float, minutes: float, pressure: float = 50.0) -> WearerSizing:
     supply = 101325.0 + pressure * PSI
-    found = ppafo.design(mass=72.5, stature=1.75, torque=torque, pressure=supply, minutes=minutes)
+    found = ppafo.design(mass=72.5, stature=1.75, torque=torque, pressure=supply, minutes=minutes).found
     assert isinstance(found, WearerSizing)
     return found
 
@@ -59,7 +59,7 @@ def test_what_is_suggested_is_the_walk_that_is_shown(tmp_path: Path, capsys: pyt
     assert device.torque >= 0.9 * 2.5
     assert device.life.discharge.walking_time >= 60.0
     assert device.bottle.name == "co2-3_5oz", "the lightest bottle that lasts"
-    said = text_of(found.answer())
+    said = text_of(finding_of(found))
     assert device.command in said.splitlines()
     # The printed command walks the same walk, with the same torque.
     words = shlex.split(device.command)[1:]
@@ -80,7 +80,7 @@ def test_where_nothing_does_it_what_is_offered_is_granted_when_it_is_asked_for()
     too_strong, too_long = sized(5.0, 8.0), sized(2.5, 30.0)
     for found in (too_strong, too_long):
         assert found.device is None
-        assert not found.answer().passed
+        assert not finding_of(found).passed
     changes = [line.partition(":")[0] for line in (*too_strong.instead, *too_long.instead)]
     assert changes == [
         "less torque, fewer minutes",
@@ -124,7 +124,7 @@ def test_the_limit_of_the_controller_follows_the_wish_and_a_stature_that_is_assu
     wish = wearer.Wish(60.0, None, 5.0, 101325.0 + 60.0 * PSI, 60.0)
     found = wearer._few_strides(wish, valve, actuator)
     assert found[0].torque >= 5.0
-    assert "(assumed: give --stature)" in text_of(WearerSizing(wish, tuple(found), None, ()).answer())
+    assert "(assumed: give --stature)" in text_of(finding_of(WearerSizing(wish, tuple(found), None, ())))
 
 
 @pytest.mark.parametrize(

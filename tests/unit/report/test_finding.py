@@ -5,10 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from ppafo.studies.distributions import Interval
-from ppafo.study.finding import Column, Finding, Part
-from ppafo.study.kind import TIME, Kind, of_metric, of_path
-from ppafo.study.panels import SHAPES, Mark, Panel
+from ppafo.report.finding import Column, Finding, Part
+from ppafo.report.kind import TIME, Interval, Kind, of_metric, of_path
+from ppafo.report.panels import SHAPES, Mark, Panel
 
 
 @dataclass(frozen=True)

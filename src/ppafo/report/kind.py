@@ -18,7 +18,21 @@ from ppafo.report.display_units import (
     quantity_of_unit,
 )
 from ppafo.report.setting_names import label_of
-from ppafo.studies.distributions import Floats, Interval
+from ppafo.signals.recording import Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """An estimate and the ends of its confidence interval, all in one unit; an end may be infinite."""
+
+    value: float
+    low: float
+    high: float
+
+    @property
+    def width(self) -> float:
+        """Distance of the two ends."""
+        return self.high - self.low
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +50,11 @@ class Kind:
         return display_unit(self.quantity) if self.quantity else self.unit.removeprefix("-")
 
     @property
+    def shown_change_unit(self) -> str:
+        """The unit in which a difference of two values is shown."""
+        return "psi" if self.quantity == "pressure" else self.shown_unit
+
+    @property
     def title(self) -> str:
         """Words and unit for a table."""
         return f"{self.words} ({self.shown_unit})" if self.shown_unit else self.words
@@ -43,8 +62,13 @@ class Kind:
     @property
     def axis(self) -> str:
         """Words and unit for an axis."""
+        return f"{self.words} ({self.axis_unit})" if self.axis_unit else self.words
+
+    @property
+    def axis_unit(self) -> str:
+        """The unit for an axis, empty for a plain number."""
         unit = axis_unit(self.quantity) if self.quantity else self.shown_unit
-        return self.words if unit in ("", "1") else f"{self.words} ({unit})"
+        return "" if unit == "1" else unit
 
     def values(self, values: ArrayLike) -> Floats:
         """Return values in SI in the unit in which they are shown."""

@@ -1,5 +1,6 @@
 """Panels of a figure, as data, and drawn: what the shapes of marks look like; Matplotlib lays them out itself."""
 
+import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
@@ -7,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ppafo.report.style import BLUE, house_style, label_lines, mark_kind
-from ppafo.study.kind import Kind
+from ppafo.report.kind import Kind
+from ppafo.report.style import BLUE, VERMILION, house_style, label_lines, mark_kind
+from ppafo.signals import RecordingKind
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,7 +35,9 @@ class Panel:
     """A panel of a figure: what its axes are, and the marks on them.
 
     ``scale`` is what the colours of a map or of points stand for; panels that follow each other with one scale share
-    its bar. ``legend`` is "above", "inside" or empty. ``then`` has the last word on the axes.
+    its bar. ``legend`` is "above", "inside", "figure" (above all panels) or empty. ``then`` has the last word on the
+    axes. ``tall`` is its height over that of others. Two below each other that ``shares_x`` have one horizontal axis,
+    and say above them what the vertical one is. Where one has no marks, its place stays empty.
     """
 
     x: Kind
@@ -43,10 +47,14 @@ class Panel:
     scale: Kind | None = None
     legend: str = "above"
     then: "Callable[[Axes], object] | None" = None
+    tall: float = 1.0
+    shares_x: bool = False
 
 
 _TOP = 0.28
 """Inches above the panels, in which the figure says that it is simulated."""
+_LINE = 0.17
+"""Inches of a line of the note."""
 _AREA = {"alpha": 0.15, "linewidth": 0}
 
 
@@ -95,40 +103,67 @@ or upright), ``map`` and ``points`` (coloured by ``to``).
 
 
 def draw_panels(
-    panels: Sequence[Panel], across: int = 1, size: tuple[float, float] = (6.6, 2.9), title: str = ""
-) -> Any:
-    """Return the figure of some panels, ``across`` of them side by side, each of a size [inches]."""
+    panels: Sequence[Panel],
+    across: int = 1,
+    size: tuple[float, float] = (6.6, 2.9),
+    title: str = "",
+    note: str = "",
+    kind: RecordingKind = "simulated",
+) -> "Figure":
+    """Return the figure of some panels, ``across`` of them side by side, each of a size [inches].
+
+    ``note`` stands below all of them.
+    """
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
     rows = max(1, -(-len(panels) // across))
-    width, height = size[0] * across + 0.3, size[1] * rows + 0.4
+    heights = [max((panel.tall for panel in panels[across * row :][:across]), default=1.0) for row in range(rows)]
+    notes = textwrap.wrap(note, round(15.0 * size[0] * across))
+    below = _LINE * len(notes)
+    width, height = size[0] * across + 0.3, size[1] * sum(heights) + 0.4 + below
     with house_style():
-        layout = ConstrainedLayoutEngine(w_pad=0.1, h_pad=0.08, rect=(0.0, 0.0, 1.0, 1.0 - _TOP / height))
-        figure = Figure(figsize=(width, height), layout=layout)
-        grid = list(figure.subplots(rows, across, squeeze=False).flat)
+        above = 0.0 if any(panel.legend == "figure" for panel in panels) else _TOP
+        rect = (0.0, below / height, 1.0, 1.0 - (above + below) / height)
+        figure = Figure(figsize=(width, height), layout=ConstrainedLayoutEngine(w_pad=0.1, h_pad=0.08, rect=rect))
+        grid = list(figure.subplots(rows, across, squeeze=False, height_ratios=heights).flat)
         drawn = [_draw(axes, panel) for axes, panel in zip(grid, panels, strict=False)]
         for axes in grid[len(panels) :]:
             axes.set_axis_off()
+        for upper, lower, panel, other in zip(grid, grid[across:], panels, panels[across:], strict=False):
+            if panel.shares_x and other.shares_x and other.marks:
+                upper.sharex(lower)
+                upper.tick_params(labelbottom=False)
+                upper.set_xlabel("")
         _share_scales(figure, [(axes, panel, each) for axes, panel, each in zip(grid, panels, drawn, strict=False)])
         if title:
-            figure.suptitle(title, x=0.01, ha="left", fontsize=11, wrap=True)
-        mark_kind(figure, "simulated")
+            figure.suptitle(title, x=0.01, ha="left", fontsize=11, wrap=True, parse_math=False)
+        if notes:
+            figure.text(
+                0.012, 0.06 / height, "\n".join(notes), va="bottom", fontsize=9, color=VERMILION, parse_math=False
+            )
+        mark_kind(figure, kind)
         return figure
 
 
 def _draw(axes: "Axes", panel: Panel) -> Any:
     """Draw a panel, and return what has colours that stand for numbers."""
+    if not panel.marks:
+        axes.set_axis_off()
+        return None
     mapped = None
     for mark in panel.marks:
         shown = SHAPES[mark.shape](axes, mark, panel.x.values(mark.x), panel.y.values(mark.y))
         mapped = shown if mark.shape in ("map", "points") else mapped
     axes.set_xlabel(panel.x.axis)
-    axes.set_ylabel(panel.y.axis)
-    axes.set_title(panel.title)
+    axes.set_ylabel(panel.y.axis if not panel.shares_x else panel.y.axis_unit if panel.title else "")
+    axes.set_title(panel.title or (panel.y.axis if panel.shares_x else ""))
     if panel.legend and any(mark.label for mark in panel.marks):
         if panel.legend == "above":
             label_lines(axes)
+        elif panel.legend == "figure":
+            names = axes.get_legend_handles_labels()
+            axes.figure.legend(*names, loc="outside upper left", ncols=3, columnspacing=1.4, handlelength=1.4)
         else:
             axes.legend(loc="best", frameon=True, framealpha=0.85, edgecolor="none", handlelength=1.2)
     if panel.then is not None:

@@ -1,0 +1,217 @@
+"""A gait as a finding: its numbers, its curves, and for an imported one what was made of the recording.
+
+The figure has the curves over the stride, in the units of the field, with band, events and single strides.
+"""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ppafo.gait.document import gait_toml
+from ppafo.gait.gait import CURVES, Gait, clinical_angle, plain_unit
+from ppafo.gait.recorded.footfalls import Stride
+from ppafo.gait.recorded.importing import ImportedGait, phases
+from ppafo.report.display_units import display_unit, display_value, display_values, quantity_of_unit
+from ppafo.report.finding import Finding, Part, columns_of, facts
+from ppafo.report.kind import Kind
+from ppafo.report.panels import Mark, Panel
+from ppafo.report.style import BLACK, GREY, ORANGE
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_PLAIN = (
+    "name",
+    "title",
+    "origin",
+    "source",
+    "notes",
+    "body_mass",
+    "stature",
+    "walking_speed",
+    "recorded_speed",
+    "stride_time",
+    "stride_time_deviation",
+    "stance_share",
+    "stance_share_deviation",
+    "strides",
+)
+"""Fields of a gait that are plain data as they stand."""
+
+_NOISE = 1e-9
+_CAPTION = "The curves over the stride: mean, standard deviation between strides as a band, toe-off dashed."
+
+
+@dataclass(frozen=True, slots=True)
+class GaitFound:
+    """A gait, and for an imported one what was made of the recording."""
+
+    gait: Gait
+    imported: ImportedGait | None = None
+
+    def json_document(self) -> dict[str, Any]:
+        """Return numbers and curves, and the strides of an import, as plain data in SI."""
+        return _data(self.gait, self.imported)
+
+
+_HEAD = ("curve", "lowest", "highest", "unit", "between strides", "series error (RMS)")
+
+
+def gait_finding(gait: Gait, imported: ImportedGait | None = None) -> Finding[GaitFound]:
+    """Return what ``ppafo gait`` says of a gait; the gait file is among its files."""
+    speed = f", {gait.walking_speed:.3g} m/s" if gait.walking_speed is not None else ""
+    stance = f"{100.0 * gait.stance_share:.1f} %{_plus_minus(100.0 * gait.stance_share_deviation)}"
+    return Finding(
+        name="gait",
+        kicker="Gait",
+        title=gait.title or gait.name,
+        said=(f"{gait.name}: {gait.title} ({gait.origin})",),
+        parts=(
+            Part(
+                columns=facts(
+                    (
+                        ("source", gait.source),
+                        ("body mass", f"{gait.body_mass:.4g} kg"),
+                        ("stature", "not known" if gait.stature is None else f"{gait.stature:.4g} m"),
+                        ("speed", speed.removeprefix(", ") or "not known"),
+                        ("stride time", f"{gait.stride_time:.4g} s{_plus_minus(gait.stride_time_deviation)}"),
+                        ("stance", stance),
+                        ("strides", str(gait.strides or "not known")),
+                    )
+                )
+            ),
+            Part("Curves", columns_of(_HEAD, (_row(gait, name, imported) for name in gait.curves))),
+            Part(remarks=[f"remark: {text}" for text in imported.remarks] if imported else ()),
+            Part(
+                "Stride",
+                panels=lambda: gait_panels(gait, imported),
+                name="gait",
+                caption=_CAPTION,
+                size=(7.0, 1.7),
+                title=f"{gait.name}: {gait.body_mass:.4g} kg{speed}, stride {gait.stride_time:.3g} s",
+                is_detail=True,
+            ),
+        ),
+        found=GaitFound(gait, imported),
+        kind=gait.origin,
+        files={f"{gait.name}.toml": lambda: gait_toml(gait).encode()},
+    )
+
+
+def _plus_minus(deviation: float) -> str:
+    return f" +- {deviation:.2g}" if deviation > _NOISE else ""
+
+
+def _row(gait: Gait, name: str, imported: ImportedGait | None) -> tuple[str | None, ...]:
+    quantity = quantity_of_unit(CURVES[name])
+    curve = gait.curves[name]
+    is_ankle = name == "ankle_angle"
+    series = curve.values_at(phases())
+    values = display_values(clinical_angle(series) if is_ankle else series, quantity)
+    left = 0.0 if imported is None else display_value(imported.fit_errors[name].root_mean_square, quantity)
+    return (
+        f"{name} (0 neutral, dorsiflexion positive)" if is_ankle else name,
+        f"{values.min():.3g}",
+        f"{values.max():.3g}",
+        display_unit(quantity) or plain_unit(CURVES[name]),
+        f"{display_value(curve.deviation, quantity):.2g}" if curve.deviation else None,
+        f"{left:.2g}" if left > _NOISE else None,
+    )
+
+
+def _data(gait: Gait, imported: ImportedGait | None) -> dict[str, Any]:
+    document: dict[str, Any] = {
+        **{name: getattr(gait, name) for name in _PLAIN},
+        "phases": phases().tolist(),
+        "curves": {
+            name: {
+                "unit": CURVES[name],
+                "harmonics": curve.harmonics,
+                "deviation": curve.deviation,
+                "series": curve.values_at(phases()).tolist(),
+            }
+            for name, curve in gait.curves.items()
+        },
+    }
+    if imported is None:
+        return document
+    return document | {
+        "imported": {
+            "files": list(imported.files),
+            "events": imported.events,
+            "strides": [_stride(item) for item in imported.strides],
+            "left_out": [_stride(item) for item in imported.left_out],
+            "remarks": list(imported.remarks),
+            "curves": {
+                name: {
+                    "strides": len(item.strides),
+                    "mean": item.mean.tolist(),
+                    "deviation": item.deviation.tolist(),
+                    "fit_root_mean_square": imported.fit_errors[name].root_mean_square,
+                    "fit_largest": imported.fit_errors[name].largest,
+                }
+                for name, item in imported.curves.items()
+            },
+        }
+    }
+
+
+def _stride(stride: Stride) -> dict[str, float]:
+    return {"start": stride.start, "toe_off": stride.toe_off, "end": stride.end, "stance_share": stride.stance_share}
+
+
+_STANCE = "#dddddd"
+_STRIDE = Kind("Stride", "%")
+_PANELS: dict[str, Kind] = {
+    "shank_angle": Kind("Shank angle (above 0: ankle in front of the knee)", "rad", "angle"),
+    "ankle_angle": Kind("Ankle angle (0 neutral, dorsiflexion positive)", "rad", "angle"),
+    "ankle_moment": Kind("Ankle moment (above 0: plantarflexion)", "N m/kg"),
+    "vertical_force": Kind("Vertical ground reaction (body weights)"),
+    "centre_of_pressure": Kind("Centre of pressure in front of the ankle", "m", "body length"),
+    "knee_forward": Kind("Acceleration of the knee forward", "m/s^2", "acceleration"),
+    "knee_up": Kind("Acceleration of the knee upwards (without gravity)", "m/s^2", "acceleration"),
+}
+
+
+def gait_panels(gait: Gait, imported: ImportedGait | None = None) -> list[Panel]:
+    """Return the curves of a gait over the stride; with the strides behind it where it was just imported."""
+    return [_panel(gait, name, imported, number == 0) for number, name in enumerate(gait.curves)]
+
+
+def _panel(gait: Gait, name: str, imported: ImportedGait | None, is_first: bool) -> Panel:
+    sign = clinical_angle if name == "ankle_angle" else np.asarray
+    curve, percent, toe_off = gait.curves[name], 100.0 * phases(), 100.0 * gait.stance_share
+    series = sign(curve.values_at(phases()))
+    marks = [
+        Mark("span", (0.0, toe_off), colour=_STANCE, style={"alpha": 0.5}),
+        Mark("level", (), 0.0, colour=GREY, style={"linewidth": 0.8}),
+        Mark("at", toe_off, colour=ORANGE, style={"linewidth": 1.0}),
+    ]
+    if imported is None:
+        mean, band = series, np.full(series.size, curve.deviation)
+        label = "standard deviation, mean over the stride"
+    else:
+        found = imported.curves[name]
+        mean, band, label = sign(found.mean), found.deviation, "standard deviation"
+        marks.append(Mark("line", percent, sign(found.curves).T, colour=GREY, style={"linewidth": 0.6, "alpha": 0.5}))
+    named = "series" if imported is None else "mean of the strides"
+    marks += [
+        Mark("band", percent, (mean - band, mean + band), label=label, style={"alpha": 0.2}),
+        Mark("line", percent, mean, label=named),
+    ]
+    if imported is not None:
+        dashed = {"linewidth": 1.0, "linestyle": (0, (4, 2))}
+        marks.append(Mark("line", percent, series, label="series", colour=BLACK, style=dashed))
+
+    def name_events(axes: "Axes") -> None:
+        """Write where the shank's curve is not: low at heel strike, high at toe-off."""
+        axes.set_xlim(0.0, 100.0)
+        for at, height, text in ((0.0, 0.05, "heel strike"), (toe_off, 0.85, "toe-off")) if is_first else ():
+            place, offset = ("data", "axes fraction"), "offset points"
+            axes.annotate(
+                text, (at, height), xycoords=place, xytext=(3, 0), textcoords=offset, color=GREY, fontsize=8.5
+            )
+
+    legend = "inside" if is_first else ""
+    return Panel(_STRIDE, _PANELS[name], marks, legend=legend, then=name_events, shares_x=True)

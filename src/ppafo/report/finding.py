@@ -1,0 +1,193 @@
+"""What an analysis found, as values: sentences, tables of columns, panels. SI until it is text.
+
+A ``Finding`` is all that an analysis returns. ``writing`` makes text, JSON, page, figures and folder of it.
+"""
+
+import math
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+from ppafo.documents.json_text import plain
+from ppafo.report.kind import PLAIN, Interval, Kind
+from ppafo.report.panels import Panel, draw_panels
+from ppafo.signals import RecordingKind
+
+if TYPE_CHECKING:
+    import matplotlib.figure
+
+T_co = TypeVar("T_co", covariant=True)
+Cell = str | float | Interval | None
+"""A number in SI, an estimate with its interval, a text, or None where there is nothing to say."""
+NOTHING = "-"
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """A column of a table: title, kind of its numbers, and the cells in SI; ``is_change`` for differences of levels."""
+
+    title: str
+    values: Sequence[Cell]
+    kind: Kind = PLAIN
+    is_change: bool = False
+
+    @property
+    def head(self) -> str:
+        """The title with the unit in which its numbers are shown."""
+        unit = self.kind.shown_change_unit if self.is_change else self.kind.shown_unit
+        return f"{self.title} ({unit})" if unit and self.kind.quantity else self.title
+
+    @property
+    def texts(self) -> list[str]:
+        """The cells as text: numbers in the shown unit and form, whole plain ones with commas, a dash for nothing."""
+        return [self._text(value) for value in self.values]
+
+    def _text(self, value: Cell) -> str:
+        if isinstance(value, str):
+            return value
+        if value is None or (isinstance(value, float) and math.isnan(value)):
+            return NOTHING
+        if isinstance(value, Interval):
+            return self.kind.change_interval(value) if self.is_change else self.kind.interval(value)
+        if isinstance(value, int) and not self.kind.quantity:
+            return f"{value:,}"
+        return self.kind.change_number(value, self.kind.form) if self.is_change else self.kind.number(value)
+
+
+def columns_of(titles: Sequence[str | tuple[str, Kind]], rows: Iterable[Sequence[Cell]]) -> list[Column]:
+    """Return the columns of some rows, each with a title, or with a title and the kind of its numbers."""
+    pairs = [(title, PLAIN) if isinstance(title, str) else title for title in titles]
+    cells = list(zip(*rows, strict=True)) or [()] * len(pairs)
+    return [Column(title, values, kind) for (title, kind), values in zip(pairs, cells, strict=True)]
+
+
+def facts(rows: Iterable[Sequence[Cell]]) -> list[Column]:
+    """Return a list of facts, name and value: columns without a title."""
+    return columns_of(("", ""), rows)
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A part of a finding: what is said, a table, remarks below it, a figure, a text to copy.
+
+    A table whose columns have no title is a list of facts; its first ``left`` columns are names, set to the left, and
+    ``marked`` are the numbers of its rows that stand out. ``name`` is that of the files of the figure: of ``panels``,
+    ``across`` of them side by side, each of a ``size`` [inches], or of what ``draw`` returns, which may be the bytes of
+    an animation (GIF). ``panels`` may be a function, called where the figure is wanted. A part that ``is_detail`` is on
+    the page only.
+    """
+
+    heading: str = ""
+    columns: Sequence[Column] = ()
+    said: Sequence[str] = ()
+    remarks: Sequence[str] = ()
+    panels: Sequence[Panel] | Callable[[], Sequence[Panel]] = ()
+    name: str = ""
+    caption: str = ""
+    across: int = 1
+    size: tuple[float, float] = (6.6, 2.9)
+    title: str = ""
+    note: str = ""
+    code: str = ""
+    left: int = 1
+    marked: Collection[int] = ()
+    is_detail: bool = False
+    draw: "Callable[[], matplotlib.figure.Figure | bytes] | None" = None
+
+    @property
+    def has_head(self) -> bool:
+        """Whether the columns have titles."""
+        return any(column.title for column in self.columns)
+
+    @property
+    def rows(self) -> list[tuple[str, ...]]:
+        """The table as text, without its head."""
+        return list(zip(*(column.texts for column in self.columns), strict=True))
+
+    def drawn(self, kind: RecordingKind) -> "matplotlib.figure.Figure | bytes":
+        """Return the figure, of which panels say what kind of numbers they show."""
+        if self.draw is not None:
+            return self.draw()
+        panels = self.panels() if callable(self.panels) else self.panels
+        return draw_panels(panels, self.across, self.size, self.title, self.note, kind)
+
+
+@dataclass(frozen=True, slots=True)
+class LivePart:
+    """A part of a page that simulates: HTML with its own script, and the policy that allows that script alone.
+
+    ``remark`` is a sentence on how its runs begin otherwise than the page's, empty where they do not; without
+    ``html`` it says why nothing simulates.
+    """
+
+    policy: str = ""
+    html: str = ""
+    remark: str = ""
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Finding(Generic[T_co]):
+    """What an analysis found: ``found`` are the numbers in SI, which are also its JSON; the rest says and shows them.
+
+    A ``found`` that is more than its numbers says its JSON itself, as ``json_document()``. ``name`` is the stem of its
+    files and its command, unless ``command`` says another; ``kicker`` says above the title what kind of page this is.
+    ``passed`` is false where a check failed. ``kind`` says where the numbers come from. ``files`` are further files by
+    name. ``page`` makes a page of its own from the drawn figures. ``live`` makes the part of the page that simulates,
+    None where there can be none.
+    """
+
+    name: str
+    kicker: str
+    title: str
+    said: Sequence[str]
+    parts: Sequence[Part]
+    found: T_co
+    passed: bool = True
+    files: Mapping[str, Callable[[], bytes]] = field(default_factory=dict)
+    command: str = ""
+    live: Callable[[], LivePart | None] | None = None
+    kind: RecordingKind = "simulated"
+    page: Callable[[Mapping[str, bytes]], bytes] | None = None
+
+    @property
+    def figures(self) -> dict[str, Part]:
+        """The parts that have a figure, by the stem of its files."""
+        return {part.name: part for part in self.parts if part.name}
+
+    def __str__(self) -> str:
+        """Return what the command prints."""
+        from ppafo.report.writing import text_of
+
+        return text_of(self)
+
+    def __repr__(self) -> str:
+        """Return what was found, and of what."""
+        return f"<{self.kicker}: {self.title}>"
+
+    def _repr_html_(self) -> str:
+        """Return the page, which a notebook shows."""
+        from ppafo.report.writing import notebook_of
+
+        return notebook_of(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what ``--json`` prints, as plain data in SI."""
+        document = getattr(self.found, "json_document", None)
+        return dict(plain(self.found) if document is None else document())
+
+    def plot(self, name: str | None = None) -> "matplotlib.figure.Figure":
+        """Return a figure of the result, the first unless named; LookupError where it has none of that name."""
+        figures = self.figures
+        chosen = figures.get(name or next(iter(figures), ""))
+        drawn = None if chosen is None else chosen.drawn(self.kind)
+        if drawn is None or isinstance(drawn, bytes):
+            raise LookupError(f"there is no figure '{name or ''}'; available: {', '.join(figures) or 'none'}")
+        return drawn
+
+    def save(self, folder: str | Path) -> None:
+        """Write text, JSON, page and figures into a folder: absent, empty or an earlier result, else DataError."""
+        from ppafo.report.writing import files_of
+        from ppafo.storage.result_folder import write_marked_folder
+
+        write_marked_folder(Path(folder), files_of(self), self.command or self.name)
