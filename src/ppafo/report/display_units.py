@@ -110,12 +110,6 @@ def quantity_text(value: float, quantity: str, form: str = ".3g") -> str:
     return f"{display_value(value, quantity):{form}} {display_unit(quantity)}".rstrip()
 
 
-def change_text(value: float, quantity: str, form: str = ".3g") -> str:
-    """Return a difference of two values in SI as text with the unit in which it is shown."""
-    unit = "psi" if quantity == "pressure" else display_unit(quantity)
-    return f"{display_difference(value, quantity):{form}} {unit}".rstrip()
-
-
 _OF_GAS = {"kg": "gas mass", "kg/J": "gas mass per energy"}
 """Masses among the metrics are those of gas."""
 

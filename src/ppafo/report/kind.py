@@ -8,7 +8,6 @@ from numpy.typing import ArrayLike
 from ppafo.metrics import METRICS
 from ppafo.report.display_units import (
     axis_unit,
-    change_text,
     display_difference,
     display_unit,
     display_value,
@@ -84,7 +83,7 @@ class Kind:
 
     def change(self, value: float, form: str = ".3g") -> str:
         """Return a difference of two values in SI as text with the unit in which it is shown."""
-        return change_text(value, self.quantity, form) if self.quantity else self.text(value, form)
+        return f"{self.change_number(value, form)} {self.shown_change_unit}".rstrip()
 
     def change_number(self, value: float, form: str = ".3g") -> str:
         """Return a difference of two values in SI as text in the unit in which it is shown, without that unit."""

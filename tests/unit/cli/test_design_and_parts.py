@@ -100,6 +100,7 @@ def test_a_sizing_is_printed_and_written(folder: Path, capsys: pytest.CaptureFix
     assert "\n*  enfield-ls-v05s " in printed
     assert "suggested: enfield-ls-v05s at " in printed
     names = ["design.json", "design.txt", "ppafo.json", "profile.png", "profile.svg", "report.html", "suggested.csv"]
+    names += ["torque.png", "torque.svg"]
     assert sorted(path.name for path in out.iterdir()) == names
     document = json.loads((out / "design.json").read_text())
     assert document["suggested"] == "enfield-ls-v05s"

@@ -43,13 +43,14 @@ def test_the_audit_takes_overrides_and_prints_json(capsys: pytest.CaptureFixture
     assert [finding["id"] for finding in document["findings"] if finding["severity"] == "error"] == ["torque-ceiling"]
 
 
-def test_out_writes_text_and_json_and_leaves_nothing_else(tmp_path: Path) -> None:
+def test_out_writes_text_json_and_page_and_leaves_nothing_else(tmp_path: Path) -> None:
     folder = tmp_path / "new" / "folder"
     main(["sets", "audit", "ppafo2011", "--out", str(folder)])
     assert sorted(item.name for item in folder.iterdir()) == [
         "audit-ppafo2011.json",
         "audit-ppafo2011.txt",
         "ppafo.json",
+        "report.html",
     ]
 
 

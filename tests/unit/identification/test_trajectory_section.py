@@ -150,7 +150,7 @@ def test_the_new_set_says_where_its_values_come_from_and_reads_back(both: Identi
 
 
 def test_the_document_has_all_that_the_fit_says(both: Identification) -> None:
-    document = json.loads(json.dumps(both.to_dict()))["trajectory"]
+    document = json.loads(json.dumps(both.json_document()))["trajectory"]
     assert document["recordings_are"] == "synthetic"
     assert [item["inputs"] for item in document["recordings"]] == [[], ["command", "supply_pressure"]]
     assert np.array(document["covariance"]).shape == np.array(document["correlation"]).shape == (2, 2)

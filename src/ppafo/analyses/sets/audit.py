@@ -2,50 +2,46 @@
 
 import textwrap
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any
 
 from ppafo.errors import ParameterError, refused_as
 from ppafo.parameters import ParameterSet, apply_overrides, load_parameter_set
 from ppafo.parameters.audit import Finding, audit, changed_paths
 from ppafo.parameters.audit.changes import changes
-from ppafo.report.writing import align_columns
+from ppafo.report.finding import Finding as Report
+from ppafo.report.finding import Part, columns_of
 
 _WIDTH = 100
 _INDENT = "    "
 _SEVERITIES = ("error", "warning", "note")
 
 
-@dataclass(frozen=True, slots=True)
-class Audited:
-    """The audit of one set, or of several: text, document, name of its files, and whether no finding is an error."""
-
-    text: str
-    document: dict[str, Any]
-    name: str
-    passed: bool
-
-
-def audited(names: Sequence[str], parent: str | None, is_whole: bool, overrides: Sequence[str]) -> Audited:
-    """Return changes and findings of one set, or a table of several.
+def audited(
+    names: Sequence[str], parent: str | None, is_whole: bool, overrides: Sequence[str]
+) -> Report[dict[str, Any]]:
+    """Return changes and findings of one set, or a table of several; it has not passed where one is an error.
 
     Where ``is_whole`` is false, findings that concern no changed value of a set with a parent or overrides are counted.
     """
     sets = [apply_overrides(load_parameter_set(name), overrides) for name in names]
     parents = [_parent(parameter_set, parent) for parameter_set in sets]
     found = [(one, audit(one, other)) for one, other in zip(sets, parents, strict=True)]
-    documents = [
-        _document(*one, overrides) | _changes_document(one[0], other) for one, other in zip(found, parents, strict=True)
-    ]
-    passed = not any(_counts(findings)["error"] for _, findings in found)
-    if len(found) > 1:
-        return Audited(_table(found), {"sets": documents}, "audit", passed)
+    documents = [_document(*one, other, overrides) for one, other in zip(found, parents, strict=True)]
     compares = parents[0] is not None or bool(overrides)
-    changed = changed_paths(sets[0], parents[0]) if compares and not is_whole else None
-    text = _text(*found[0], changed)
-    if documents[0]["parent"] is not None:
-        text = f"{_changes_text(documents[0])}\n\n{text}"
-    return Audited(text, documents[0], f"audit-{sets[0].name}", passed)
+    is_one = len(found) == 1
+    changed = changed_paths(sets[0], parents[0]) if is_one and compares and not is_whole else None
+    return Report(
+        name=f"audit-{sets[0].name}" if is_one else "audit",
+        kicker="Audit",
+        title=", ".join(one.name for one in sets),
+        said=(),
+        parts=[_changes_part(documents[0]), *_parts(*found[0], changed)] if is_one else [_table(found)],
+        found=documents[0] if is_one else {"sets": documents},
+        passed=not any(_counts(findings)["error"] for _, findings in found),
+        kind="measured",
+        command="sets audit",
+    )
 
 
 def _parent(parameter_set: ParameterSet, given: str | None) -> ParameterSet | None:
@@ -57,25 +53,26 @@ def _parent(parameter_set: ParameterSet, given: str | None) -> ParameterSet | No
         return load_parameter_set(name)
 
 
-def _changes_document(parameter_set: ParameterSet, parent: ParameterSet | None) -> dict[str, Any]:
-    changed = [] if parent is None else [asdict(change) for change in changes(parameter_set, parent)]
-    return {"parent": None if parent is None else parent.name, "changes": changed}
-
-
-def _changes_text(document: dict[str, Any]) -> str:
+def _changes_part(document: dict[str, Any]) -> Part:
     name, parent, changed = document["set"], document["parent"], document["changes"]
+    if parent is None:
+        return Part()
     count = f"{len(changed)} value{'' if len(changed) == 1 else 's'}" if changed else "nothing"
-    rows = [(one["path"], one["before"] or "-", one["after"] or "-", one["origin"]) for one in changed]
-    table = align_columns([("value", parent, name, "origin"), *rows], 4) if changed else []
-    return "\n".join([f"{name} changes {count} of its parent {parent}", *(_INDENT + line for line in table)])
+    rows = [(one["path"], one["before"] or None, one["after"] or None, one["origin"]) for one in changed]
+    heads = ("value", parent, name, "origin")
+    return Part(said=[f"{name} changes {count} of its parent {parent}"], columns=columns_of(heads, rows), left=4)
 
 
-def _document(parameter_set: ParameterSet, findings: list[Finding], overrides: Sequence[str]) -> dict[str, Any]:
+def _document(
+    parameter_set: ParameterSet, findings: list[Finding], parent: ParameterSet | None, overrides: Sequence[str]
+) -> dict[str, Any]:
     return {
         "set": parameter_set.name,
         "overrides": list(overrides),
         "counts": _counts(findings),
         "findings": [finding.document() for finding in findings],
+        "parent": None if parent is None else parent.name,
+        "changes": [] if parent is None else [asdict(change) for change in changes(parameter_set, parent)],
     }
 
 
@@ -83,26 +80,25 @@ def _counts(findings: list[Finding]) -> dict[str, int]:
     return {severity: sum(finding.severity == severity for finding in findings) for severity in _SEVERITIES}
 
 
-def _table(found: list[tuple[ParameterSet, list[Finding]]]) -> str:
+def _table(found: list[tuple[ParameterSet, list[Finding]]]) -> Part:
     """Return a row for each finding and a column for each set, with how serious it is there."""
     columns = [{finding.id: _verdict(finding) for finding in findings} for _, findings in found]
     names = dict.fromkeys(name for column in columns for name in column)
     head = ["finding", *(parameter_set.name for parameter_set, _ in found)]
-    return "\n".join(align_columns([head, *([name, *(column.get(name, "-") for column in columns)] for name in names)]))
+    return Part(columns=columns_of(head, ([name, *(column.get(name) for column in columns)] for name in names)))
 
 
 def _verdict(finding: Finding) -> str:
     return "accepted" if finding.accepted else finding.severity
 
 
-def _text(parameter_set: ParameterSet, findings: list[Finding], changed: frozenset[str] | None) -> str:
+def _parts(parameter_set: ParameterSet, findings: list[Finding], changed: frozenset[str] | None) -> list[Part]:
     """Return the errors and what concerns a ``changed`` value, all findings for None, then how many there are."""
     shown = [one for one in findings if one.severity == "error" or _concerns(one, changed)]
-    counts = _counts(findings)
-    summary = ", ".join(f"{count} {severity}{'' if count == 1 else 's'}" for severity, count in counts.items())
+    summary = ", ".join(f"{n} {severity}{'' if n == 1 else 's'}" for severity, n in _counts(findings).items())
     left = len(findings) - len(shown)
     rest = f"; {left} of them concern{'s' if left == 1 else ''} no changed value: --all" if left else ""
-    return "\n\n".join([*("\n".join(_lines(one)) for one in shown), f"{parameter_set.name}: {summary}{rest}"])
+    return [*(Part(said=_lines(one)) for one in shown), Part(said=[f"{parameter_set.name}: {summary}{rest}"])]
 
 
 def _concerns(finding: Finding, changed: frozenset[str] | None) -> bool:

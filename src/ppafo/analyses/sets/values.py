@@ -4,6 +4,7 @@ import textwrap
 from typing import Any
 
 from ppafo.parameters import ParameterSet
+from ppafo.report.finding import Finding, Part, columns_of
 
 _WIDTH = 110
 _SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow", "effects", "valves", "reported")
@@ -34,18 +35,38 @@ def _section_order(item: tuple[str, object]) -> int:
     return _SECTIONS.index(item[0].partition(".")[0])
 
 
-def values_text(document: dict[str, Any]) -> str:
-    """Return the table of ``values_document``."""
-    lines = [f"{document['name']}: {document['title']}"]
-    lines += textwrap.wrap(document["notes"], _WIDTH)
-    if document["citation"] is not None:
-        lines += ["", *textwrap.wrap(_citation(document["citation"]), _WIDTH)]
+def shown_values(parameter_set: ParameterSet) -> Finding[dict[str, Any]]:
+    """Return every value of a set with its source, in words and one table."""
+    document = values_document(parameter_set)
+    notes, citation = document["notes"], document["citation"]
     valves = ", ".join(f"{name} ({kind})" for name, kind in document["valves"].items())
-    lines += ["", f"valves: {valves}; default {document['default_valve']}; actuator: {document['actuator']}", ""]
-    lines += _table(document["values"])
-    for finding, reason in document["accepted"].items():
-        lines += ["", *textwrap.wrap(f"accepted: {finding}: {reason}", _WIDTH, subsequent_indent="    ")]
-    return "\n".join(lines)
+    return Finding(
+        name=document["name"],
+        kicker="Parameter set",
+        title=document["title"],
+        said=[f"{document['name']}: {document['title']}", *_wrapped(notes)],
+        parts=[
+            Part(said=[] if citation is None else _wrapped(_citation(citation))),
+            Part(said=[f"valves: {valves}; default {document['default_valve']}; actuator: {document['actuator']}"]),
+            Part(
+                columns=columns_of(_COLUMNS, map(_cells, document["values"])),
+                remarks=[text for value in document["values"] for text in _wrapped(_note(value))],
+                left=len(_COLUMNS),
+            ),
+            *(Part(said=_wrapped(f"accepted: {name}: {why}")) for name, why in document["accepted"].items()),
+        ],
+        found=document,
+        kind="measured",
+        command="sets show",
+    )
+
+
+def _wrapped(text: str) -> list[str]:
+    return textwrap.wrap(text, _WIDTH)
+
+
+def _note(value: dict[str, Any]) -> str:
+    return f"{value['path']}: {value['note']}" if value["note"] else ""
 
 
 def _citation(citation: dict[str, Any]) -> str:
@@ -55,17 +76,6 @@ def _citation(citation: dict[str, Any]) -> str:
     return f"{authors}{': ' if authors else ''}{citation['title']}{year}.{doi} {citation['note']}".strip()
 
 
-def _table(values: list[dict[str, Any]]) -> list[str]:
-    """Return aligned rows, each followed by its note."""
-    rows = [_cells(value) for value in values]
-    widths = [max(len(row[column]) for row in (_COLUMNS, *rows)) for column in range(len(_COLUMNS))]
-    lines = [_row(_COLUMNS, widths), _row(tuple("-" * width for width in widths), widths)]
-    for value, row in zip(values, rows, strict=True):
-        lines.append(_row(row, widths))
-        lines += textwrap.wrap(value["note"], _WIDTH, initial_indent="    ", subsequent_indent="    ")
-    return lines
-
-
 def _cells(value: dict[str, Any]) -> tuple[str, ...]:
     number = value["value"]
     is_number = not isinstance(number, str | bool)
@@ -73,7 +83,3 @@ def _cells(value: dict[str, Any]) -> tuple[str, ...]:
     if value.get("uncertainty") is not None:
         written += f" +- {value['uncertainty']:.3g}"
     return (value["path"], written, value.get("unit", ""), value["origin"], value["source"])
-
-
-def _row(cells: tuple[str, ...], widths: list[int]) -> str:
-    return "  ".join(f"{cell:<{width}}" for cell, width in zip(cells, widths, strict=True)).rstrip()

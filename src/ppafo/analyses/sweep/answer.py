@@ -11,7 +11,7 @@ from pydantic import BaseModel
 
 from ppafo.analyses.sweep.results import SUMMARY, StudyResults
 from ppafo.errors import DataError
-from ppafo.report.finding import Column, Finding, Part
+from ppafo.report.finding import Finding, Part, columns_of, facts
 from ppafo.report.kind import TIME, Kind, of_channel, of_metric, of_path
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.setting_names import label_of
@@ -57,11 +57,12 @@ def finding_of(results: StudyResults) -> Finding[StudyResults]:
     if sample:
         method, seed = sample["method"].replace("_", " "), sample.get("seed", 1)
         said.append(f"Sampled by {method}: {sample['runs']} draws, seed {seed}.")
-    facts = (
+    files = (
         ("rows of all runs", "runs/*.parquet"),
         ("summary", SUMMARY),
         ("study", f"study.json, sha256 {results.document['sha256'][:16]}"),
     )
+    varied = [_varied_row(item) for item in study.get("vary", ())]
     quantile = f"Quantile: {summary['quantile_definition']}. Only completed runs that have the metric are counted."
     return Finding(
         name="sweep",
@@ -72,10 +73,10 @@ def finding_of(results: StudyResults) -> Finding[StudyResults]:
             _figure(results, [described] if described else [], failed),
             *(_metrics(results, name, metrics) for name, metrics in results.metrics.items()),
             Part("How to read it", said=[quantile], is_detail=True),
-            _detail("What varied", ("path", "kind", ""), [_varied_row(item) for item in study.get("vary", ())]),
+            Part("What varied" if varied else "", columns_of(("path", "kind", ""), varied), left=3, is_detail=True),
             Part(said=said, is_detail=True),
             _assumptions_section(results),
-            Part("Files", [Column("", cells) for cells in zip(*facts, strict=True)], is_detail=True),
+            Part("Files", facts(files), is_detail=True),
         ),
         found=results,
         passed=summary["completed"] > 0,
@@ -148,9 +149,8 @@ def _metrics(results: StudyResults, name: str, metrics: Mapping[str, Mapping[str
     fractions = list(described[0]["quantiles"]) if described else []
     head = ("metric", "unit", "runs", "mean", "sd", *(f"{100 * float(fraction):g} %" for fraction in fractions))
     rows = [_cells(metric, item, len(head)) for metric, item in metrics.items()]
-    columns = [Column(title, [row[place] for row in rows]) for place, title in enumerate(head)]
     completed = f"{name}: {results.summary['completed_by_configuration'][name]:,} runs completed"
-    return Part(columns=columns, said=[completed], left=2)
+    return Part(columns=columns_of(head, rows), said=[completed], left=2)
 
 
 def _varied_row(item: Mapping[str, Any]) -> tuple[str, str, str]:
@@ -165,14 +165,8 @@ def _assumptions_section(results: StudyResults) -> Part:
         for item in scenario["assumptions"]:
             names.setdefault((item["path"], item["value"], item["note"]), []).append(name)
     rows = [(*assumption, ", ".join(own)) for assumption, own in names.items()]
-    return _detail("What the base scenarios assume", ("value", "", "why", "in"), rows)
-
-
-def _detail(heading: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> Part:
-    if not rows:
-        return Part()
-    columns = [Column(title, cells) for title, cells in zip(head, zip(*rows, strict=True), strict=True)]
-    return Part(heading, columns, left=len(head), is_detail=True)
+    heading = "What the base scenarios assume" if rows else ""
+    return Part(heading, columns_of(("value", "", "why", "in"), rows), left=4, is_detail=True)
 
 
 def _figure(results: StudyResults, said: Sequence[str], remarks: Sequence[str]) -> Part:

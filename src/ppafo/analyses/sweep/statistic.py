@@ -22,7 +22,7 @@ from ppafo.documents.json_text import plain
 from ppafo.errors import StudyError, UnitError, refused_as
 from ppafo.metrics import METRICS
 from ppafo.progress import Report
-from ppafo.report.finding import Column, Finding, Part
+from ppafo.report.finding import Finding, Part, columns_of
 from ppafo.report.kind import Interval, Kind, of_metric
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import GREY, VERMILION
@@ -426,7 +426,6 @@ _CAPTION = "Left: estimate and interval at each look; grey: the target width. Ri
 def _finding(found: Estimate, statistic: Statistic, rule: StoppingRule) -> Finding[Estimate]:
     """Return an estimate in words, its looks as a table, the trace and the histogram of the values."""
     kind, of_values, looks = _kind(found.metric, statistic), of_metric(found.metric), found.looks
-    intervals = np.array([(look.interval.value, look.interval.low, look.interval.high) for look in looks])
     unit = kind.shown_unit if kind.quantity else ""
     ending = "" if rule.is_narrow(found.interval) else "; the target width was not reached with the maximum of "
     ending += f"{rule.maximum:,} draws" if ending else ""
@@ -440,9 +439,15 @@ def _finding(found: Estimate, statistic: Statistic, rule: StoppingRule) -> Findi
         f"{100.0 * rule.confidence_of_look:.4g} % confidence (Bonferroni), so that all of them hold simultaneously; "
         f"{looks[-1].missing:,} draws have no value and are left out"
     )
-    levels = [
-        Column(title, [kind.number(value) for value in column])
-        for title, column in zip(("estimate", "low", "high"), intervals.T, strict=True)
+    rows = [
+        (
+            f"{look.draws:,}",
+            f"{look.missing:,}",
+            *_ends(kind, look.interval),
+            _difference(kind, look.interval.width),
+            met,
+        )
+        for look, met in ((look, _met(look, rule)) for look in looks)
     ]
     title = f"{found.statistic} of {found.metric}"
     return Finding(
@@ -455,13 +460,7 @@ def _finding(found: Estimate, statistic: Statistic, rule: StoppingRule) -> Findi
             *_further(found, rule),
             Part(
                 "Trace",
-                [
-                    Column("draws", [f"{look.draws:,}" for look in looks]),
-                    Column("without value", [f"{look.missing:,}" for look in looks]),
-                    *levels,
-                    Column("width", [_difference(kind, look.interval.width) for look in looks]),
-                    Column("", [_met(look, rule) for look in looks]),
-                ],
+                columns_of(("draws", "without value", *_ENDS, "width", ""), rows),
                 said=[policy],
                 panels=lambda: [_trace(found, kind, rule), _histogram(found, statistic, of_values)],
                 name="trace",
@@ -475,6 +474,13 @@ def _finding(found: Estimate, statistic: Statistic, rule: StoppingRule) -> Findi
     )
 
 
+_ENDS = ("estimate", "low", "high")
+
+
+def _ends(kind: Kind, found: Interval) -> list[str]:
+    return [kind.number(value) for value in (found.value, found.low, found.high)]
+
+
 def _difference(kind: Kind, value: float) -> str:
     return kind.change(value) if math.isfinite(value) else f"{value:.3g}"
 
@@ -486,20 +492,13 @@ def _met(look: Look, rule: StoppingRule) -> str:
 
 def _further(found: Estimate, rule: StoppingRule) -> list[Part]:
     """Return the means of further metrics, where some were requested."""
-    kinds = [of_metric(name) for name in found.also]
-    means = list(found.also.values())
-    head = ("estimate", "low", "high")
-    numbers = [[getattr(mean, key) for mean in means] for key in ("value", "low", "high")]
-    columns = [
-        Column("mean over the same draws", [kind.title for kind in kinds]),
-        Column("with a value", [f"{mean.draws:,}" for mean in means]),
-        *(
-            Column(title, [kind.number(value) for kind, value in zip(kinds, values, strict=True)])
-            for title, values in zip(head, numbers, strict=True)
-        ),
+    rows = [
+        (of_metric(name).title, f"{mean.draws:,}", *map(of_metric(name).number, (mean.value, mean.low, mean.high)))
+        for name, mean in found.also.items()
     ]
+    columns = columns_of(("mean over the same draws", "with a value", *_ENDS), rows)
     said = f"Each with {100.0 * rule.confidence_of_look:.4g} % confidence, of the draws that have a value."
-    return [Part("Further metrics", columns, said=[said])] * bool(means)
+    return [Part("Further metrics", columns, said=[said])] * bool(rows)
 
 
 def _trace(found: Estimate, kind: Kind, rule: StoppingRule) -> Panel:

@@ -10,7 +10,7 @@ import numpy as np
 from ppafo.analyses.tune.problem import Gains, Limit, Problem, Term
 from ppafo.metrics import Metric
 from ppafo.parameters.overrides import over
-from ppafo.report.finding import Column, Finding, Part
+from ppafo.report.finding import Column, Finding, Part, columns_of
 from ppafo.report.kind import TIME, Interval, Kind, of_metric
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.setting_names import label_of
@@ -247,21 +247,12 @@ def _by_ceiling(problem: Problem, after: Setting) -> str:
 
 def _gains(problem: Problem, after: Setting, reached: Mapping[str, str]) -> list[Column]:
     """Return a row for each searched number: before, after, bounds, and whether it ended at one."""
-    searched = problem.searched
-    numbers = {
-        "before": [item.before for item in searched],
-        "after": [after.gains[item.path] for item in searched],
-        "minimum": [item.minimum for item in searched],
-        "maximum": [item.maximum for item in searched],
-    }
-    return [
-        Column("gain", [item.path for item in searched]),
-        *(
-            Column(title, [item.place.quote(value) for item, value in zip(searched, values, strict=True)])
-            for title, values in numbers.items()
-        ),
-        Column("", [f"at its {reached[item.path]}" if item.path in reached else "" for item in searched]),
-    ]
+    rows = []
+    for item in problem.searched:
+        numbers = (item.before, after.gains[item.path], item.minimum, item.maximum)
+        end = f"at its {reached[item.path]}" if item.path in reached else ""
+        rows.append((item.path, *map(item.place.quote, numbers), end))
+    return columns_of(("gain", "before", "after", "minimum", "maximum", ""), rows)
 
 
 def _metrics(problem: Problem, before: Setting, after: Setting) -> list[Column]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from ppafo.cli.arguments import Overrides, SetName, Word
 
@@ -24,19 +24,17 @@ def sets_list() -> Said:
     return listing("set", rows, ("name", "title"))
 
 
-def sets_show(name: SetName, *, overrides: Overrides = ()) -> Said:
+def sets_show(name: SetName, *, overrides: Overrides = ()) -> Finding[dict[str, Any]]:
     """Show every value of a parameter set with its source."""
-    from ppafo.analyses.sets.values import values_document, values_text
-    from ppafo.cli.output import Said
+    from ppafo.analyses.sets.values import shown_values
     from ppafo.parameters import apply_overrides, load_parameter_set
 
-    document = values_document(apply_overrides(load_parameter_set(name), overrides))
-    return Said(values_text(document), document, document["name"])
+    return shown_values(apply_overrides(load_parameter_set(name), overrides))
 
 
 def sets_audit(
     names: Sequence[SetName], *, parent: SetName | None = None, all_: bool = False, overrides: Overrides = ()
-) -> Said:
+) -> Finding[dict[str, Any]]:
     """Check a parameter set for contradictions.
 
     Changes and findings of one set, or a table of several; exit code 1 where a finding is an error.
@@ -46,10 +44,8 @@ def sets_audit(
     all_: print what concerns no changed value too, of a set with a parent or --set
     """
     from ppafo.analyses.sets.audit import audited
-    from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, Said
 
-    found = audited(names, parent, all_, overrides)
-    return Said(found.text, found.document, found.name, EXIT_GOOD if found.passed else EXIT_CHECK_FAILED)
+    return audited(names, parent, all_, overrides)
 
 
 def sets_parts(
