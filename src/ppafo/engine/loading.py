@@ -185,6 +185,7 @@ def _load_by(source: str, compilers: tuple[Compiler, ...]) -> ModuleType:
             raise ProgramError(f"{refused}; {BACKEND_VARIABLE}={NUMBA} may compile it") from refused
         # A model that has no C, for instance because a law calls ``math.sin``.
         numba = compilers[-1]
+        # Said once for a program: from the next start on it is found compiled.
         was_kept = is_kept(source, numba)
         module = load_generated(source, numba)
         if not was_kept:

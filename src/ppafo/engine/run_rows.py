@@ -123,6 +123,7 @@ class _Renaming(ast.NodeTransformer):
         return ast.Assign([self.on_the_left(target)], value, lineno=0)
 
     def visit_AugAssign(self, node: ast.AugAssign) -> ast.stmt:
+        # Written out: the name on the left may be another one than that on the right.
         sum_of_both = ast.BinOp(ast.parse(ast.unparse(node.target), mode="eval").body, node.op, node.value)
         return ast.Assign([self.on_the_left(node.target)], self.visit(sum_of_both), lineno=0)
 

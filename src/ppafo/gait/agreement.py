@@ -89,6 +89,7 @@ def _smooth(values: Floats, name: str) -> Floats:
 def delays(walk: MeanStride) -> dict[str, float]:
     """Return how far [s] each curve is behind the vertical force, or behind the shank where there is no force."""
     share = walk.stance_share
+    # Of the shank the largest lean backwards, which is its minimum.
     shank = _peak(-_smooth(walk.curves["shank_angle"], "shank_angle"), share) - _USUALLY["shank_angle"]
     ankle = _peak(_smooth(walk.curves["ankle_angle"], "ankle_angle"), share) - _USUALLY["ankle_angle"]
     has_force = "vertical_force" in walk.curves
@@ -102,6 +103,7 @@ def delays(walk: MeanStride) -> dict[str, float]:
 
 def _peak(values: Floats, share: float) -> float:
     """Return the strides from toe-off to the largest of 1000 values about it."""
+    # Phases are periodic: counted from toe-off, from the lower limit on.
     low, high = _ABOUT_TOE_OFF
     after = (_FINE - share - low) % 1.0 + low
     return float(after[np.argmax(np.where(after < high, values, -np.inf))])

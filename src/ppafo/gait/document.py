@@ -80,6 +80,7 @@ def gait_file() -> type[BaseModel]:
 
 
 def _curve_table(name: str, unit: str) -> type[BaseModel]:
+    # Only angles have two units; every other curve has the one of its SI quantity.
     units: Any = Literal["deg", "rad"] if unit == "rad" else Literal[unit]
     number = Annotated[float, Field(allow_inf_nan=False)]
     series = Annotated[list[number], Field(min_length=1, max_length=_MAXIMUM_HARMONICS)]

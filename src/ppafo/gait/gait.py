@@ -173,6 +173,7 @@ def series_of(gait: Gait, name: str) -> Series:
     if curve is None:
         return Series(mean=0.0, harmonics=(Harmonic(0.0, 0.0),) * ENGINE_HARMONICS)
     count = ENGINE_HARMONICS
+    # A series with fewer harmonics than the engine takes is continued with zeros.
     missing = (0.0,) * count
     pairs = zip((*curve.cosines, *missing)[:count], (*curve.sines, *missing)[:count], strict=True)
     return Series(mean=curve.mean, harmonics=tuple(Harmonic(cosine, sine) for cosine, sine in pairs))
@@ -205,6 +206,7 @@ def fit_curve(values: Floats, harmonics: int, deviation: float = 0.0) -> tuple[C
     """
     if values.size < 2 * harmonics + 2:
         raise DataError(f"{values.size} samples are too few for {harmonics} harmonics")
+    # Both ends are the same phase: a series through both weighs it twice, as the recording has it.
     turns = 2.0 * np.pi * np.linspace(0.0, 1.0, values.size)
     orders = np.arange(1, harmonics + 1)
     terms = [np.ones((values.size, 1)), np.cos(np.outer(turns, orders)), np.sin(np.outer(turns, orders))]
@@ -284,6 +286,7 @@ def walk_recording(gait: Gait, strides: int, rate: float = _RATE) -> Recording:
     # A whole number of samples a stride: all strides are then equal to the last bit.
     per_stride = max(10, round(rate * gait.stride_time))
     phase = np.arange(strides * per_stride + 1) / per_stride
+    # One stride is evaluated and repeated, so that all are equal to the last bit.
     one = np.arange(per_stride) / per_stride
     channels = {
         name: Channel(np.append(np.tile(curve.values_at(one), strides), curve.value(0.0)), CURVES[name])

@@ -182,6 +182,7 @@ def standing_tilt(shank: Floats, ankle: Floats) -> float:
 
     ``shank`` and ``ankle`` are curves [rad] of 101 samples in the signs of the package.
     """
+    # On level ground the ankle is 90 deg plus the shank angle while the foot is flat.
     foot = np.degrees(ankle - shank)[MIDSTANCE] - 90.0
     return float(np.mean(foot))
 
@@ -191,6 +192,8 @@ def standing_turns(shank: Floats, ankle: Floats) -> tuple[float, float]:
 
     ``shank`` and ``ankle`` are curves [rad] of 101 samples in the signs of the package; a foot that stands turns by 0.
     """
+    # A flat foot stands still while the shank leans: the ankle then follows the shank, with the sign as it is or
+    # reversed.
     lean, stand = np.degrees(shank)[MIDSTANCE], np.degrees(ankle)[MIDSTANCE]
     return float(np.std(stand - lean)), float(np.std(stand + lean))
 
@@ -270,6 +273,7 @@ def check_force_scale(file: str, force: Floats, signs_from: SignSource) -> None:
     """Raise DataError for a vertical force [body weights] whose unit or sign leaves no heel strike to find."""
     # One contact in a long record is less than 2 % of it.
     loaded = force[np.abs(force) > _ON_GROUND]
+    # Percentiles, since a single spike has no sign to judge.
     lowest, highest = np.percentile(loaded if loaded.size else force, (2.0, 98.0)).tolist()
     low, high = FORCE_PEAK
     if -lowest > _CLEARLY_BETTER * highest:
@@ -359,6 +363,7 @@ def check_force(walk: MeanStride) -> None:
 
 def force_remarks(force: Floats) -> list[str]:
     """Return what is unusual about the mean of a vertical force [body weights] over a stride, both ends counted."""
+    # Both ends are one phase, which must not count twice.
     mean, (low, high) = float(np.mean(force[:-1])), USUAL_FORCE_MEAN
     if low <= mean <= high:
         return []

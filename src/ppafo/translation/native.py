@@ -58,6 +58,7 @@ def asked(
     ``scratch`` is where it has its temporary files, which it leaves there when it is killed. CompilerError if it does
     not end within ``limit`` [s], ``LONGEST_COMPILING`` unless given; it is ended then, with what it has started.
     """
+    # A compiler that is killed leaves its files here, where the whole folder goes away.
     temporary = {} if scratch is None else dict.fromkeys(("TMPDIR", "TMP", "TEMP"), str(scratch))
     seconds = LONGEST_COMPILING if limit is None else limit
     try:
@@ -107,6 +108,7 @@ def _home() -> dict[str, str]:
 
 def complaint(done: "subprocess.CompletedProcess[str]") -> str:
     """The line in which a compiler says what is wrong; how it ended where it says nothing."""
+    # gcc and clang say it on stderr, some wrappers on stdout.
     lines = [*done.stderr.splitlines(), *done.stdout.splitlines(), f"it ended with {done.returncode}"]
     return one_line(next((text for text in lines if "error" in text), next(filter(str.strip, lines))))
 
@@ -210,6 +212,7 @@ def load_entries(library: Path, entries: Entries) -> dict[str, NativeEntry]:
 
 
 def _entry(function: Any, types: Sequence[Type]) -> NativeEntry:
+    # An array is a pointer and its extents; the rest of three extents is padding.
     dimensions = tuple(kind.dimensions for kind in types if isinstance(kind, Array))
     function.restype = None
     function.argtypes = [ctypes.c_void_p, *(_NUMBERS[kind] for kind in types if isinstance(kind, Scalar))]
@@ -312,6 +315,7 @@ def _command(name: str) -> tuple[str, ...]:
     if name != "zig":
         found = which(name)
         return (found,) if found else ()
+    # The package brings a compiler of one version; a zig on the path is whatever the user has.
     package = importlib.util.find_spec("ziglang")
     if package is not None and package.origin is not None:
         return (str(Path(package.origin).with_name("zig.exe" if sys.platform == "win32" else "zig")), "cc")

@@ -104,6 +104,7 @@ def gas_rates(
     """
     flows = symbolic(gas_flows, PlantParameters, Openings, float, float, compare=compare, acting=acting)
     found = flows(plant, openings, *pressures)
+    # Flows are true masses; where the gas is not ideal its content grows by another amount.
     gained = found.mass_1, found.mass_2
     if any(gas_density in effect.laws for effect in acting or ()):
         types = (PlantParameters, float, float, float, float, float, float)

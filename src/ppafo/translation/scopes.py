@@ -41,6 +41,7 @@ class Scopes:
             own = set(terms) | ({made[0]} if made else set())
             within = set(own)
             if made:
+                # Types were joined in the walk: each assignment of a name has the same one.
                 self.types[made[0]] = made[1]
                 changes[made[0]] = changes.get(made[0], 0) + 1
             for name in _set_in(statement):

@@ -267,6 +267,7 @@ def field_of(term: Term, name: str) -> Term:
     """A field of a row."""
     row = term.type.row if isinstance(term.type, Shared) else term.type
     assert isinstance(row, Row)
+    # A field of a struct that is just made is the value it was made of: no struct need exist.
     place = [own for own, _ in row.fields].index(name)
     return term.parts[place] if term.kind == "build" else Term("field", row.fields[place][1], (term,), name)
 

@@ -92,6 +92,7 @@ def torque_rates(
     volume_1, volume_2 = max(volume_1, least), max(volume_2, least)
     ratio, valve = nominal.critical_ratio, nominal.valve_conductance
     leak = ellipse_flow(pressure_1, pressure_2, nominal.leak_conductance, ratio)
+    # A check valve: gas does not go back into a supply that has less.
     feed_1 = max(ellipse_flow(nominal.supply_pressure, pressure_1, valve, ratio), 0.0)
     vent_2 = ellipse_flow(pressure_2, nominal.atmospheric_pressure, valve, ratio)
     feed_2 = max(ellipse_flow(nominal.dorsiflexion_pressure, pressure_2, valve, ratio), 0.0)
@@ -210,6 +211,7 @@ def linearising_update(
     reference_rate = (reference - state.reference) / period * state.started
     turned = (measurement.angle - state.angle) * state.started
     velocity = state.angular_velocity
+    # Implicit first-order filter of the angle's difference.
     velocity = velocity + (turned - period * velocity) / (period + parameters.rate_filter)
     rates = torque_rates(
         parameters.nominal, measurement.angle, velocity, measurement.pressure_1, measurement.pressure_2

@@ -105,6 +105,7 @@ def learn(
     """
     # A sample counts by its share of the time that the stride spends on a knot.
     knot_time = (profile.rise_time + profile.fall_time) * stride_time / (KNOTS - 1.0)
+    # Learnt where the error was made, a lead before: the torque follows the command late.
     place = place_in_table(profile, since_strike - rules.lead, stride_time)
     return next_table(table, place, duration / knot_time, rules.learning_gain * error, rules.forgetting)
 

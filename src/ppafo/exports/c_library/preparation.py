@@ -79,6 +79,7 @@ def following_text(settings: Sequence[Setting], links: Graph, collector: Collect
         for link in reversed(found):
             number = " + ".join([*(_term(term, rows, collector) for term in link.terms), repr(link.gap)])
             source = link.sources[0]
+            # Compared with the default to the bit: a value that was written again counts as not set.
             is_set = f"{cell('settings', source)} != {settings[places[source]].value!r}"
             text = f"(({number}) if {is_set} else {text})" if link.when_set else f"({number})"
         lines.append(f"{name} = {text} if {own} == {settings[places[path]].value!r} else {own}")
@@ -210,6 +211,7 @@ class Writing:
             fields["actuator"] |= {"torque_constant": "0.0", "volume_per_angle": "0.0"}
         constant = f"{add(specific_gas_constant)}({UNIVERSAL_GAS_CONSTANT!r}, gas_molar_mass)"
         fields["gas"] = fields["gas"] | {"specific_gas_constant": constant}
+        # Lines have a check valve of their own, so that the valve may push gas back into them.
         is_relieving = self.device.supply.relieving or self.lines is not None
         fields["supply"] = fields["supply"] | {"relieving": repr(float(is_relieving))}
         for section, inner in fields.items():
@@ -233,6 +235,7 @@ class Writing:
         """Lines that make a plant from a vane's and the actuator's shape; what came from a file is constant."""
         add, actuator, model = self.add, self.device.actuator, self.program.actuator
         settings = self.section("actuator", list(actuator.settings))
+        # A file that the set names is read here, not by the library.
         measured = "" if actuator.table is None else f", {self.constant(actuator.table, 'table')}"
         yield f"stops = {add(Range)}({', '.join(self.section('actuator', Range._fields).values())})"
         yield f"shape = {add(model.prepare)}({self.row('ActuatorSettings', settings)}, stops{measured})"

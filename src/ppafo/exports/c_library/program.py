@@ -239,6 +239,7 @@ def _short(collector: SourceCollector) -> dict[str, str]:
     from ppafo.translation.c99 import is_free
 
     own = {name: name_of(item) for name, item in collector.owners.items()}
+    # A short name is taken only where it is unambiguous; all others keep their module's path.
     counts = Counter(own.values())
     taken = _names_around()
     return {name: short for name, short in own.items() if counts[short] == 1 and short not in taken and is_free(short)}
@@ -355,6 +356,7 @@ def metrics_entry(item: ExportedProgram, collector: Collector, boundary: Boundar
     kind: Any = ThermalTotals if program.is_thermal else Totals
     make: Callable[..., Any] = thermal_totals if program.is_thermal else totals
     if program.has_true_masses and not program.is_thermal:
+        # Totals of a gas that is not ideal count true masses.
         make = real_totals
     further = ", plant, thermal" if program.is_thermal else ""
     parameters = program.parameter_rows()
@@ -366,6 +368,7 @@ def metrics_entry(item: ExportedProgram, collector: Collector, boundary: Boundar
         state = boundary.taken(array, "state", groups, collector.add)
         masses = f", {boundary.taken(array, 'masses', groups, collector.add)}" if program.has_true_masses else ""
         lines.append(f"{array}_total = {add(make)}({state}{masses}{further})")
+    # What a run gained: metrics need differences, since a state may begin with gas in it.
     gains = ", ".join(f"{name}=states_total.{name} - first_total.{name}" for name in kind._fields)
     meters = ", ".join(
         f"{name}={boundary.taken('states', group, groups, collector.add)}"

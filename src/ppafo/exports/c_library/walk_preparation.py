@@ -184,6 +184,7 @@ def preparation_of_walk(configuration: Scenario, program: Program, collector: Co
 
 def _leg(configuration: Scenario, writing: Writing) -> Iterator[str]:
     """Lines that make the leg, the gait on it, and the plant with both."""
+    # The rocker is fitted to the gait here: a fit has no place in a library.
     add, fit = writing.add, fit_rocker(walk_of(configuration).gait)
     yield f"wearer = {writing.row('Wearer', writing.section('wearer', [item.name for item in WEARER]))}"
     fitted = ", ".join(map(repr, fit))
@@ -234,6 +235,7 @@ def _steps(configuration: Scenario, writing: Writing) -> Iterator[str]:
     if configuration.supply_lines is not None:
         volumes = (c_identifier(f"supply_line.{line}.volume") for line in SUPPLY_LINES)
         yield f"volume = min(volume, {', '.join(volumes)})"
+    # Adiabatic gas is stiffer by the heat capacity ratio, so its steps are shorter.
     stiffness = "1.0" if configuration.thermal is None else "gas_heat_capacity_ratio"
     given = "run_duration, run_step, run_output_interval, controller_period"
     yield f"counts_of_steps = {writing.add(walk_step_counts)}({given}, plant, volume, {stiffness})"

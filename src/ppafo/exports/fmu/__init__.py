@@ -84,6 +84,7 @@ def build_library(name: str, sources: Mapping[str, bytes], main: str, flags: Seq
         for file, content in sources.items():
             (Path(folder) / file).write_bytes(content)
         library = Path(folder) / f"unit{PLATFORMS[name].suffix}"
+        # Windows has the mathematics in its C library.
         mathematics = [] if name == "win64" else ["-lm"]
         done = asked([*command, main, "-o", library.name, *mathematics], _ANOTHER, folder)
         if done.returncode != 0:
@@ -136,7 +137,16 @@ _LOOP_TUNING = (
 
 def functional_unit(interface: Interface, fmi: int, platforms: Sequence[str]) -> dict[str, bytes]:
     """A unit by the name of its file. ProgramError for what cannot be translated or built."""
-    chosen = {name: _platform(name, fmi) for name in platforms}
+    # Before anything is built: a misspelt platform should not cost a compilation.
+    chosen = {}
+    for name in platforms:
+        found = PLATFORMS.get(name)
+        if found is None:
+            hint = nearest_name(name, PLATFORMS)
+            raise ScenarioError(f"platform '{name}' is not known{hint}; available: {', '.join(PLATFORMS)}")
+        if fmi == 2 and found.folder_2 is None:
+            raise ScenarioError(f"platform {name} has no name in FMI 2: take --fmi 3")
+        chosen[name] = found
     identifier = interface.library.name
     sources = _sources(interface, fmi)
     token = hashlib.sha256(b"".join(sources.values())).hexdigest()[:32]
@@ -177,16 +187,6 @@ def closed_loop(item: Scenario) -> Interface:
         inputs=(),
         words={},
     )
-
-
-def _platform(name: str, fmi: int) -> Platform:
-    found = PLATFORMS.get(name)
-    if found is None:
-        hint = nearest_name(name, PLATFORMS)
-        raise ScenarioError(f"platform '{name}' is not known{hint}; available: {', '.join(PLATFORMS)}")
-    if fmi == 2 and found.folder_2 is None:
-        raise ScenarioError(f"platform {name} has no name in FMI 2: take --fmi 3")
-    return found
 
 
 def _sources(interface: Interface, fmi: int) -> dict[str, bytes]:
@@ -245,6 +245,7 @@ def _archive(contents: Mapping[str, bytes]) -> bytes:
         for name, content in contents.items():
             item = zipfile.ZipInfo(name, _FIRST_DAY)
             item.compress_type = zipfile.ZIP_DEFLATED
+            # Permissions of Unix in the upper half; a library must be executable for some tools.
             item.external_attr = (0o755 if name.startswith("binaries/") else 0o644) << 16
             archive.writestr(item, content)
     return target.getvalue()

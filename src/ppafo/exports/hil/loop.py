@@ -338,6 +338,7 @@ class Bench:
         # Send the first sample until it is answered; false where it was not.
         self.judge.sent = 0
         self._show(wire.BEGIN)
+        # The first sample is repeated until somebody answers: a controller may be started later than the plant.
         first = wire.sample_bytes(self._shown)
         for _ in range(max(1, math.ceil(patience / _CALL_INTERVAL))):
             self.port.send(first)

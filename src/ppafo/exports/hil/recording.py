@@ -239,6 +239,7 @@ def kept_aside(target: Path) -> Iterator[Callable[[str], None]]:
     """
     aside = target.with_name(f"{target.stem}{ASIDE}{target.suffix}")
     try:
+        # Exclusive: two recordings with one target must not write into one file.
         file = os.open(aside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
     except FileExistsError:
         raise DataError(
@@ -262,6 +263,7 @@ def kept_aside(target: Path) -> Iterator[Callable[[str], None]]:
     try:
         yield keep
     except (DataError, KeyboardInterrupt) as error:
+        # An empty file says nothing and goes away.
         if os.fstat(file).st_size:
             left = f"; what came is in {aside}"
             raise type(error)(f"{str(error) or 'interrupted'}{left}") from error

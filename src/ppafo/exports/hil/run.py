@@ -298,6 +298,7 @@ def run_plant(
     # Not from a seed: packets of an earlier run that are still under way must have another number.
     number = random.SystemRandom().randint(0, _LARGEST_RUN) if run is None else run
     before = load_now()
+    # Built before the clock starts: arrays and programs take milliseconds.
     begun = plant.begin()
     with without_collections():
         exchange = Bench(begun, plant.period, port, pace(plant.period), number).run(patience, is_stopped)

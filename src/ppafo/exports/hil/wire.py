@@ -233,6 +233,7 @@ def _read(data: bytes) -> Packet | str:
         return answer if is_good else "content"
     (mask,) = _MASK.unpack_from(data, _HEADER.size)
     names = [channel.name for number, channel in enumerate(CHANNELS) if mask >> number & 1]
+    # Bits of channels that this version does not know, or a length that is not theirs.
     if mask >> len(CHANNELS) or len(data) != sample_length(len(names)):
         return "content"
     values = struct.unpack_from(f"<{len(names)}i", data, _HEADER.size + _MASK.size)
@@ -294,6 +295,7 @@ class UdpPort:
         self.strangers = 0
         self._socket = own
         self._other = other
+        # The plant's time must not stop in a full buffer.
         self._socket.setblocking(False)
 
     def send(self, data: bytes) -> None:

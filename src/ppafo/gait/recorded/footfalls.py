@@ -190,6 +190,7 @@ def _is_own(contact: Contact, plate: Signal, shank: Signal) -> bool:
     start, end = max(float(start), float(shank.time[0])), min(float(end), float(shank.time[-1]))
     if end <= start:
         return False
+    # Over its own contact the shank leans forward, so that its angle falls.
     before, after = np.interp([start, end], shank.time, shank.values)
     least = _LEAST_LEAN if None not in contact else _LEAST_LEAN_OF_PART
     return bool(before - after > least * np.ptp(shank.values))
@@ -220,6 +221,7 @@ def wrap_cycle(walk: Mapping[str, Signal]) -> Cycle | None:
     """Return a record of one cycle three times over, None where its start and end are not the same motion."""
     start = max(walk[name].time[0] for name in REQUIRED)
     end = min(walk[name].time[-1] for name in REQUIRED)
+    # One even clock for both curves, whatever the rates of their files.
     time = np.arange(start, end, 1.0 / _RATE)
     shortest = max(_SHORTEST, (end - start) / LONGEST)
     first = int(np.ceil(shortest * _RATE))
@@ -258,6 +260,7 @@ def _repeat(signal: Signal, span: tuple[float, float], period: float, is_load: b
     values, later = (np.interp(one + shift, signal.time, signal.values) for shift in (0.0, period))
     overlap = min(end, float(signal.time[-1])) - start - period
     inside = one <= start + max(overlap, 0.0)
+    # A position goes on by the distance walked in a cycle.
     way = float(np.mean((later - values)[inside])) if signal.is_position else 0.0
     weight = np.clip((one - start) / overlap, 0.0, 1.0) if overlap > 0.0 else np.ones(count)
     blend = weight * values + (1.0 - weight) * (later - way)
@@ -316,6 +319,7 @@ def find_footfalls(
     cycle = wrap_cycle(walk)
     if cycle is None:
         return found
+    # Three cycles in a row have one whole stride in the middle, wherever the record begins.
     again = _of_walk(cycle.walk, (), side, 1)
     whole = usable_strides(cycle.walk, again.strides)
     if not whole:
@@ -363,6 +367,7 @@ def _strides_of_file(tables: Sequence[MotionTable], side: Side) -> list[Stride]:
     strikes, offs = trials[0].strikes(side), trials[0].offs(side)
     strides = []
     for start, end in pairwise(strikes):
+        # Two toe-offs between two strikes are a missed strike: such a stride is none.
         between = [time for time in offs if start < time < end]
         if len(between) == 1:
             strides.append(Stride(start, between[0], end))

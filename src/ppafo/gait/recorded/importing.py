@@ -143,6 +143,7 @@ def of_usual_time(strides: Sequence[Stride], least: int) -> Strides:
     """Return strides without those whose time differs from the median by more than LARGEST_STRIDE_CHANGE of it."""
     if not strides:
         return Strides((), (), least)
+    # The median: one stop among ten strides would move a mean.
     median = float(np.median([item.time for item in strides]))
     kept = [item for item in strides if abs(item.time - median) <= LARGEST_STRIDE_CHANGE * median]
     why = "{:.3g} s long, the others are about " + f"{_mean([item.time for item in kept]):.3g} s"
@@ -455,6 +456,7 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
     source = read_source(files, settings, wrong)
     settings = source.settings
     walk: Mapping[str, Signal] = source.walk
+    # A force in a wrong unit is noted, and scaled to 1 so that its events are still found.
     force = walk.get(FORCE)
     if force is not None:
         try:
@@ -646,6 +648,7 @@ def _sampling_remarks(walk: Mapping[str, Signal], strides: Sequence[Stride]) -> 
     if force is None:
         return said
     spans = [(item.toe_off, item.end, _WITHIN_SWING * (item.end - item.toe_off)) for item in strides]
+    # Only the middle of the swing: at its ends the foot may still be on the plate.
     swings = [force.values[(force.time > off + slack) & (force.time < end - slack)] for off, end, slack in spans]
     scatter = max((float(np.std(values)) for values in swings if values.size > 1), default=0.0)
     if scatter > _NOISY_FORCE:

@@ -79,6 +79,7 @@ def find_convention(tables: Sequence[MotionTable], side: Side, body_mass: float)
         columns[name] = fitting[0] if fitting else choices[0]
     plates = tuple(dict.fromkeys(plate for item in found for plate in item.plates))
     remarks = tuple(dict.fromkeys(remark for item in found for remark in item.remarks))
+    # A force by the name of this foot is surer than contacts chosen by the lean of the shank.
     has_force = any(_is_there(columns["vertical_force"], table) for table in tables)
     return Convention(GaitMap(**columns), () if has_force else plates, remarks)
 

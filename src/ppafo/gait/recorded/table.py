@@ -70,6 +70,7 @@ def cut_table(
     high = float(table.time[-1] if end is None else end)
     steps = np.diff(table.time)
     median = float(np.median(steps))
+    # Gaps outside of what is used do not matter.
     seen = (table.time[:-1] >= low) & (table.time[1:] <= high)
     jumps = np.flatnonzero(seen & (steps > _LARGEST_JUMP * median)).tolist()
     for index in jumps:

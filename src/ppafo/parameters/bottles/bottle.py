@@ -94,6 +94,7 @@ def bottle_parts() -> Mapping[str, Part]:
 def scaled_entries(part: Part, paper: Mapping[str, Entry]) -> dict[str, Entry]:
     """Return the values of a bottle with the content [kg] and the empty mass [kg] of a part, from the ``paper``'s."""
     content, empty = part.values["content"], part.values["empty_mass"]
+    # The same density of filling: content over the paper's, and the volume with it.
     ratio = 1000.0 * content / paper["bottle.gas_mass"].value
     found = {
         "bottle.gas_mass": _entry(1000.0 * content, "g", f"catalogue of parts, {part.name}"),
@@ -274,6 +275,7 @@ def load_bottle(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Bott
     part = None if str(name_or_path) in FILE.names() else bottle_parts().get(str(name_or_path))
     _check_name(name_or_path)
     parsed, file = read_model(FILE, bottle_file(), name_or_path if part is None else PAPER_BOTTLE)
+    # A file without regulator and hose values has the paper's.
     found = _warming() | _given(parsed)
     if part is not None:
         parsed = parsed.model_copy(update={"name": part.name, "title": f"{part.maker}: {part.model}, with a regulator"})

@@ -150,6 +150,7 @@ def _part_table(title: str, group: str, quantities: tuple[Quantity, ...], extra:
 
 
 def _valve_table(kind: str) -> Any:
+    # Each kind of valve has a table of its own, so that a figure of another kind is refused by name.
     own = {"kind": (Literal[kind], Field(description=VALVES[kind].summary))}
     return _part_table(f"{kind.capitalize()}ValvePart", "valves", figures_of("valves", kind), own)
 
@@ -262,6 +263,7 @@ def _check_unknown(
 def _check_orifice(place: str, figures: Mapping[str, Figure]) -> None:
     """Refuse a valve that has not exactly one of the two forms of an orifice, whole."""
     given = [[item.name for item in form if item.name in figures] for form in (AREA_FORM, SONIC_FORM)]
+    # Half a form is as unusable as two forms at once.
     if sorted(map(len, given)) != [0, 2]:
         raise ParameterError(
             f"{place}: needs either area and discharge_coefficient or sonic_conductance and critical_ratio, "

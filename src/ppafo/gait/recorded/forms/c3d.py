@@ -112,6 +112,7 @@ def _bare(label: str) -> str:
 
 def _channels(group: Any, analogs: Floats, frames: int) -> Iterator[tuple[str, Floats, str]]:
     """Yield name, values at the times of the points and unit of each channel whose label is its own."""
+    # Analog samples are a whole multiple of the points' by the format.
     step = analogs.shape[1] // frames
     labels = [_bare(label) for label in _texts(group, "LABELS")][: analogs.shape[0]]
     stated = _texts(group, "UNITS")

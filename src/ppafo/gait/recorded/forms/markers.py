@@ -72,6 +72,7 @@ def _pair(labels: Sequence[str], foot: str) -> tuple[str, str]:
 
 def _label(labels: Sequence[str], pattern: str) -> str | None:
     """Return the shortest label that matches, whatever its case; points and lines in it do not count."""
+    # The shortest: model outputs often add a suffix to the plain name.
     matching = [label for label in labels if re.fullmatch(pattern, re.sub(r"[.\s_-]", "", label), re.IGNORECASE)]
     return min(matching, key=len, default=None)
 
@@ -147,6 +148,7 @@ def _axes(
             return "x" if up else "y", _UPWARDS[up], ()
         way = pointing
     elif pointing is not None and np.delete(pointing, up) @ np.delete(way, up) < 0.0:
+        # The ankle's travel says the axis, the foot the direction: on a treadmill both may differ.
         way = -way
     along = max((axis for axis in range(3) if axis != up), key=lambda axis: abs(float(way[axis])))
     # Indices of the axes are 0, 1 and 2, whose sum is 3.
