@@ -315,6 +315,7 @@ def _is_own(kept: Path, files: Collection[str]) -> bool:
             found.append(place.lstat())
     if not hasattr(os, "geteuid"):
         return stat.S_ISDIR(found[0].st_mode)
+    # Root may own a file: what root can do, no check prevents.
     is_whose = all(item.st_uid in (0, os.geteuid()) for item in found)
     used = [item for item in found if stat.S_ISDIR(item.st_mode)]
     is_folder = found[0] in used

@@ -182,6 +182,7 @@ def _run_block(module: ModuleType, batch: Batch, runs: slice, stop: threading.Ev
         if stop.is_set():
             break
         interrupts.check()
+        # An interrupt is seen between two calls only: compiled code cannot be stopped.
         block.advance(min(STEPS_PER_CALL, steps - done))
     return block.result()
 

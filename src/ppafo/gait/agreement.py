@@ -29,6 +29,7 @@ _PUSH_OFF_FROM = 0.35
 _FORCE_ENDS = -0.06
 """Strides from toe-off to half the largest force of the push-off (-0.060): for a moment without a force."""
 
+# Far from 0 and nearer to the half stride at which the other foot lies.
 _OTHER_FOOT = 0.3
 """Strides between ankle and shank from which the ankle is of the other foot, which is half a stride away."""
 _ALIKE, _UNLIKE = 0.65, 0.4
@@ -120,6 +121,7 @@ def delay_remarks(walk: MeanStride) -> list[str]:
     """Return which curves of a mean stride are on another clock than the force, or the shank, and by how much."""
     other = "vertical_force" if "vertical_force" in walk.curves else "shank_angle"
     late = {name: seconds for name, seconds in delays(walk).items() if abs(seconds) > LARGEST_DELAY}
+    # Curves that are late by the same time are on one other clock, and are named together.
     together = max(late.values(), default=0.0) - min(late.values(), default=0.0) < LARGEST_DELAY
     groups = [tuple(late)] if late and together else [(name,) for name in late]
     said = []

@@ -106,6 +106,7 @@ class Curve:
         """Return the values at many phases [strides]."""
         first_sine, first_cosine = sine_and_cosine(np.asarray(phases, dtype=np.float64))
         sine, cosine = first_sine, first_cosine
+        # The mean in the shape of the phases, a number or an array.
         values = self.mean + 0.0 * first_cosine
         for of_cosine, of_sine in zip(self.cosines, self.sines, strict=True):
             values = values + (of_cosine * cosine + of_sine * sine)
@@ -170,6 +171,7 @@ class Gait:
 def series_of(gait: Gait, name: str) -> Series:
     """The first harmonics of a curve [SI] as the engine has them; a curve that was not measured is 0."""
     curve = gait.curves.get(name)
+    # A curve that was not measured is 0: no moment, no force, a knee at rest.
     if curve is None:
         return Series(mean=0.0, harmonics=(Harmonic(0.0, 0.0),) * ENGINE_HARMONICS)
     count = ENGINE_HARMONICS
@@ -211,6 +213,7 @@ def fit_curve(values: Floats, harmonics: int, deviation: float = 0.0) -> tuple[C
     orders = np.arange(1, harmonics + 1)
     terms = [np.ones((values.size, 1)), np.cos(np.outer(turns, orders)), np.sin(np.outer(turns, orders))]
     design = np.hstack(terms)
+    # Least squares over all samples, not a transform: both ends belong to one phase, and samples may be few.
     solution = np.linalg.lstsq(design, values, rcond=None)[0]
     left = design @ solution - values
     cosines, sines = solution[1 : harmonics + 1].tolist(), solution[harmonics + 1 :].tolist()
@@ -258,6 +261,7 @@ def at_speed(gait: Gait, speed: float) -> Gait:
         gait,
         walking_speed=speed,
         recorded_speed=recorded,
+        # At a constant walk ratio step length and cadence each go with the root of the speed.
         stride_time=gait.stride_time * math.sqrt(current / speed),
         stride_time_deviation=gait.stride_time_deviation * math.sqrt(current / speed),
         knee_forward=gait.knee_forward and gait.knee_forward.scale(speed / current),

@@ -385,6 +385,7 @@ def _prelude_for(prelude: str, used: str) -> str:
 
 def _comment(text: str, further: Iterable[str] = ()) -> str:
     """A block comment."""
+    # A docstring may contain the end of a C comment.
     lines = [line.rstrip() for line in text.replace("*/", "* /").replace("/*", "/ *").strip().splitlines()] + list(
         further
     )
@@ -619,6 +620,7 @@ class _Body:
         sign = "<" if item.step > 0 else ">"
         start, stop = self.terms.term(item.start), self.terms.term(item.stop, 6)
         if item.name == LANE:
+            # Without the pragma gcc fears that lanes overlap, and takes them one by one.
             yield from self.line("PPAFO_SIDE_BY_SIDE", level)
         yield from self.line(
             f"for ({self.writer.type_name(item.start.type)} {counter} = {start}; {counter} {sign} {stop}; {change}) {{",

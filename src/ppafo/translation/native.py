@@ -203,6 +203,7 @@ def load_entries(library: Path, entries: Entries) -> dict[str, NativeEntry]:
     # (1 + 2^-30)(1 - 2^-30) - 1 rounds to 0 where the product is rounded by itself, and to -2^-60 where it is fused.
     small = 2.0**-30
     numbers = map(ctypes.c_double, (1.0 + small, 1.0 - small, -1.0, small * small))
+    # One product tells whether the compiler fuses or reorders, whatever its flags were.
     if not loaded.ppafo_rounds_as_written(*numbers):
         raise CompilerError(
             "the compiler joins or reorders sums and products, so that results would differ from other compilers' "
@@ -289,6 +290,7 @@ class CCompiler:
             self.run_text(source, path, module)
             return
         try:
+            # A loaded library may be removed on Unix; on Windows its file stays until the process ends.
             with tempfile.TemporaryDirectory(prefix="ppafo-", ignore_cleanup_errors=True) as folder:
                 _fill(module, self._build(translated, Path(folder)), entries_of(source))
         except OSError as error:
@@ -350,6 +352,7 @@ def described_processor() -> str:
 def translator_hash() -> str:
     """Hash of the translator: the same text may become other C in another version of it."""
     found = hashlib.sha256()
+    # Sorted: folders list their files in no order.
     for file in sorted(Path(__file__).parent.iterdir()):
         if file.suffix in (".py", ".h"):
             found.update(file.read_bytes())

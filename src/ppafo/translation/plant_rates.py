@@ -140,6 +140,7 @@ def thermal_gas_rates(
     )
     types = (PlantParameters, ThermalParameters, Openings, PlantState, ThermalState, float, float)
     flows = symbolic(thermal_gas_flows, *types, compare=compare, acting=acting)
+    # Totals do not act on rates: zeros stand for them.
     state = PlantState(
         angle=angle,
         angular_velocity=rate,

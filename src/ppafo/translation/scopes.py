@@ -116,6 +116,7 @@ def needed(body: Block, after: frozenset[str], leaving: frozenset[str] = frozens
     live = after
     # Backwards, so that what is read later is known.
     for statement in reversed(body):
+        # What nobody reads later needs no assignment: expressions have no other effect.
         if isinstance(statement, typed.Assign) and statement.name not in live:
             continue
         if isinstance(statement, typed.If):

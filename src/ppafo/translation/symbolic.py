@@ -316,6 +316,7 @@ class _Call:
 
         if isinstance(test, bool):
             return yes if test else no
+        # A struct is chosen number by number: CasADi knows only single expressions.
         if isinstance(yes, tuple):
             parts = [self.chosen(test, one, other) for one, other in zip(yes, no, strict=True)]
             return type(yes)(*parts) if hasattr(yes, "_fields") else tuple(parts)

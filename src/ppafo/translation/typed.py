@@ -220,6 +220,7 @@ def joined(one: Type, other: Type) -> Type | None:
         return one
     if isinstance(one, Scalar) and isinstance(other, Scalar):
         return max(one, other, key=_ORDER.index)
+    # Tuples of different lengths have no common type.
     if isinstance(one, Items) and isinstance(other, Items) and len(one.types) == len(other.types):
         types = [joined(*pair) for pair in zip(one.types, other.types, strict=True)]
         return None if None in types else Items(tuple(item for item in types if item is not None))

@@ -368,6 +368,7 @@ class Expressions:
 
     def joined_by(self, own: str, values: list[Term], node: ast.Call) -> Term:
         """The size or root of one number, or the smallest or largest of several of one type."""
+        # Python's min returns the number as it is, an int or a float: C has one type for both.
         if len({value.type for value in values}) > 1:
             raise self.refused(node, f"'{ast.unparse(node)}', a choice between a whole number and a float")
         kind = values[0].type
@@ -457,6 +458,7 @@ class _ModuleWalk:
             while own in self.names or (number > 1 and (own in self.definitions or own in self.rows)):
                 number += 1
                 own = f"{name}_{number}"
+            # The name is taken before the body is walked, in which the same function may be met for other types.
             self.names.add(own)
             self.done[key] = _FunctionWalk(self, definition).walked(own, types)
             self.module.functions.append(self.done[key])

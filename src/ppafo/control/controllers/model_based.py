@@ -151,6 +151,7 @@ def feedforward_update(
 ) -> tuple[float, PidFeedforwardState]:
     """Command from -1 to 1: PID of the torque error [N m], equation (13), and the opening for the reference's rate."""
     rate = (reference - state.reference) / period * state.feedback.started
+    # Along the reference, not at the measured state: the feed-forward must not see the noise.
     rates = rates_on_reference(parameters.nominal, reference, measurement.angle)
     ahead = parameters.feedforward * opening_for_rate(rates, rate)
     error = reference - measurement.torque

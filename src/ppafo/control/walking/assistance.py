@@ -238,6 +238,7 @@ def assess(
     rate = last.rate + (turned - period * last.rate) / (period + parameters.assistance.hold.rate_filter)
     torque = requested_torque(parameters.assistance, phase, time, measurement.angle, rate)
     # A foot that lands on its toes turns far, and gas left in the chamber would then push on a loaded heel.
+    # A stance that has been mid-stance since its strike began on the toes.
     on_toes = phase.phase == MID_STANCE and phase.in_phase >= phase.since_strike
     bends = on_toes and phase.since_strike < EASING_TIME and measurement.torque > EASED
     works = phases.lifts(phase.phase) or phase.phase == PUSH_OFF or bends

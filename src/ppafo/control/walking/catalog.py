@@ -124,6 +124,7 @@ def walking_law(law: ControllerKind, name: str, summary: str, gains: tuple[tuple
     ScenarioError where a setting of the law has the name of one of walking.
     """
     taken = shared_settings(law)
+    # Settings of law and frame stand in one section of a file, where a name can mean only one thing.
     if taken:
         raise ScenarioError(
             f"controller '{law.name}' cannot walk: its setting '{min(taken)}' has the name of one that every "

@@ -81,6 +81,7 @@ def command_at(table: LearntTable, place: float) -> float:
 
 def next_knot(knot: float, weight: float, step: float, forgetting: float) -> float:
     """Command [-] of a knot after a sample of some weight: forgotten a little, moved by a step, within -1 to 1."""
+    # No command is larger, and a knot beyond it would take strides to come back.
     return max(-1.0, min(1.0, knot + weight * (step - forgetting * knot)))
 
 

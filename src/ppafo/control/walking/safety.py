@@ -336,6 +336,7 @@ def monitor(
     good_strides = next_good_strides(state, before, phase, flag)
     # A flag of this sample outweighs what good strides would allow.
     level = max(level_after(rules, state, good_strides, now.stance.together), fault_flags.level_of(flag))
+    # Only a rise of the level vents; a lower level gives help back.
     vents = level > state.level
     return now._replace(
         level=level,

@@ -254,6 +254,7 @@ def begin_part(
     meets_stop = way != 0.0 and gets_there and impact <= longest
     length = impact if meets_stop else longest
     stop = plant.angle_max if way > 0.0 else plant.angle_min
+    # The path at the present acceleration: what it misses is in the error of the part.
     free_angle = clamp_angle(plant, state.angle + length * (velocity + 0.5 * length * acceleration))
     next_angle = stop if meets_stop else free_angle
     return FreePart(

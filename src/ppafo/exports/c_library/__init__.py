@@ -90,6 +90,7 @@ def scenario_library(scenario: Scenario) -> Library:
 
 def commanded(scenario: Scenario) -> Scenario:
     """The plant of a scenario alone, under a command that is handed in at every step of its engine."""
+    # The engine's own step: commands come once in each, and nothing lies between.
     step = step_counts(scenario.duration, scenario.time_step, scenario.output_interval, scenario.control.period).step
     return replace(
         scenario,
@@ -114,6 +115,7 @@ def walk_library(configuration: "Scenario") -> Library:
     )
     from ppafo.walking.planning import plan_walk
 
+    # Before anything is planned: what cannot be exported should be said at once.
     check_can_leave(configuration)
     program = exported(batch_of(plan_walk(configuration)).program)
     settings, links = settings_of_walk(configuration), links_of_walk(configuration)

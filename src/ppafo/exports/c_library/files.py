@@ -188,6 +188,7 @@ def library_files(library: Library) -> dict[str, bytes]:
         return "\n\n".join(add(collector, boundary) for add in written)
 
     settings = [item.name for item in library.settings]
+    # The interface is written around the functions, whose names must not hide its own.
     interface = "".join(filled(template("c_library", file), words) for file in ("interface.c", surface.source))
     functions = c_text_of_run(program, title, name, settings, further if written else None, interface)
     texts[f"{name}.c"] = f"{head}{functions}\n{interface}"
@@ -242,6 +243,7 @@ def _words(library: Library, name: str) -> dict[str, str]:
             f'        print_metric("{kind.name}", metrics.{kind.name}, "{kind.unit}", "{kind.summary}");'
             for kind in program.metrics
         ),
+        # Every scenario has a supply pressure, which is what a user would try first.
         "example": next(
             f"{item.name} = {item.value!r};" for item in library.settings if item.name == "supply_pressure"
         ),
@@ -481,6 +483,7 @@ def choosing(device: Device) -> list[str]:
     # A valve may look only at which settings are 0, so both cases of each tell what chooses.
     for pattern in itertools.product((0.0, 0.01), repeat=len(names)):
         model = kind.choose(dict(zip(names, pattern, strict=True)))
+        # The model and whether it has a dead time: both decide which program is composed.
         chosen[pattern] = model, model.command_delay(dict(zip(names, pattern, strict=True))) > 0.0
     return [
         name

@@ -99,6 +99,7 @@ def plant_of(item: Scenario) -> PlantAlone:
     first: tuple[tuple[str, str], ...] = ()
     lead: tuple[tuple[str, str], ...] = ()
     if isinstance(motion, PrescribedMotion):
+        # An angle and its rate at each step make a ramp, which the profile of the library already is.
         said, first, lead = LED, _FIRST_ANGLE, _LEAD_ANGLE
         angle = motion.profile.settings["start_level"]
         settings = {one.path: one for one in library.settings}

@@ -239,6 +239,7 @@ class Writing:
         measured = "" if actuator.table is None else f", {self.constant(actuator.table, 'table')}"
         yield f"stops = {add(Range)}({', '.join(self.section('actuator', Range._fields).values())})"
         yield f"shape = {add(model.prepare)}({self.row('ActuatorSettings', settings)}, stops{measured})"
+        # The mean growth is taken at the supply's pressure, at which most of the work is done.
         gauge = f"{vane}.supply_pressure - {vane}.atmospheric_pressure"
         yield f"growth = {add(mean_growth)}(shape, stops, {gauge}, {add(model.chambers)})"
         fields = [
@@ -249,6 +250,7 @@ class Writing:
 
     def _restriction(self, section: str, orifice: Any) -> str:
         """An orifice with the gas, in the form that it has."""
+        # Each form of an orifice has its own settings and its own way to a conductance.
         is_sonic = isinstance(orifice, SonicOrifice)
         names = ("sonic_conductance", "critical_ratio") if is_sonic else ("area", "discharge_coefficient")
         made = self.row("SonicOrifice" if is_sonic else "Orifice", self.section(section, names))
@@ -260,6 +262,7 @@ class Writing:
         names = [item.name for item in VALVES[self.device.valve.kind].quantities]
         yield f"valve_settings = {self.row('ValveSettings', self.section('valve', names))}"
         yield f"valve = {add(model.prepare)}(valve_settings)"
+        # The step that the counts found, not the one that was asked for.
         yield "step = counts_of_steps.step"
         yield f"command_delay = {add(model.command_delay)}(valve_settings)"
         yield f"command_steps, command_lag = {add(whole_and_rest)}(command_delay, step)"
@@ -279,6 +282,7 @@ class Writing:
             }
             yield f"thermal = {add(thermal_gas)}({self.row('Walls', walls)}, gas)"
         if self.lines is not None:
+            # Droop, largest flow and volume, line by line, as the struct of the lines has them.
             of_lines = [
                 c_identifier(f"{SUPPLY_LINE}.{line}.{name}")
                 for line in SUPPLY_LINES

@@ -60,6 +60,7 @@ class _ForOneRun(ast.NodeTransformer):
     def visit_Call(self, node: ast.Call) -> ast.expr:
         """A function over runs is called for this one."""
         self.generic_visit(node)
+        # For one run no number is a column, so the function itself is what is meant.
         if self.value_of(node.func) is not over_runs:
             return node
         return ast.copy_location(ast.Call(node.args[0], node.args[1:], node.keywords), node)
@@ -367,6 +368,7 @@ def metrics_entry(item: ExportedProgram, collector: Collector, boundary: Boundar
     for array in ("first", "states"):
         state = boundary.taken(array, "state", groups, collector.add)
         masses = f", {boundary.taken(array, 'masses', groups, collector.add)}" if program.has_true_masses else ""
+        # Before and after: metrics are what a run added to its totals.
         lines.append(f"{array}_total = {add(make)}({state}{masses}{further})")
     # What a run gained: metrics need differences, since a state may begin with gas in it.
     gains = ", ".join(f"{name}=states_total.{name} - first_total.{name}" for name in kind._fields)

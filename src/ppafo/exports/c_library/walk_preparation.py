@@ -1,4 +1,4 @@
-"""From the settings of a walk to the numbers of a run: one composed function, which calls those of the planning.
+"""From the settings of a walk to the numbers of a run: one composed function, which calls the functions of the planning.
 
 What a gait comes to (series, events, how its heel rolls) and a course in time are numbers written out, and so are the
 body of a wearer who reacts and the pose in which it begins.
@@ -220,8 +220,10 @@ def _plant_faults(configuration: Scenario, writing: Writing) -> Iterator[str]:
 def _fault(writing: Writing, kind: str, names: Mapping[str, str]) -> str:
     """A fault of a sensor from its settings, or none."""
     if not kind:
+        # A sensor without a fault has one that never begins, so that one program serves both.
         return f"{writing.add(fixed_fault)}({NEVER!r}, 0.0, 0.0, 0.0)"
     if kind != DISTORTED:
+        # A frozen sensor keeps its last value; the other kinds show a reading of their own.
         holds = 1.0 if kind == FROZEN else 0.0
         reading = names.get("reading", "0.0")
         return f"{writing.add(fixed_fault)}({names['time']}, {holds!r}, {reading}, {names['period']})"

@@ -79,6 +79,7 @@ def build(name: str, sources: Mapping[str, bytes], main: str) -> bytes:
 
 def build_library(name: str, sources: Mapping[str, bytes], main: str, flags: Sequence[str]) -> bytes:
     """A library of some sources for a platform; ProgramError as in ``build``."""
+    # No -march: a unit runs on processors that nobody here has seen.
     command = [*compiler_for(name), *FLAGS, *flags]
     with tempfile.TemporaryDirectory() as folder:
         for file, content in sources.items():
@@ -116,6 +117,7 @@ def compiler_for(name: str) -> Sequence[str]:
     raise ProgramError(f"platform {name} needs {needed} (pip install 'ppafo[native]')")
 
 
+# The earliest date of a zip file: a unit does not depend on the day on which it was made.
 _FIRST_DAY = (1980, 1, 1, 0, 0, 0)
 _HEADERS = {
     2: ("fmi2FunctionTypes.h", "fmi2Functions.h", "fmi2TypesPlatform.h"),
@@ -261,7 +263,7 @@ PLANT_TUNING = "They are taken at the next communication step."
 def plant_alone(item: Scenario) -> Interface:
     """The plant; an unconstrained vane takes an external torque, one with a prescribed angle takes angle and rate.
 
-    For a walk it is the device on its walking leg, which takes the command alone. It equals that of ``export c``.
+    For a walk it is the device on its walking leg, which takes the command alone. ``export c`` writes the same plant.
     """
     alone = surfaced(plant_of(item))
     library = alone.library

@@ -156,6 +156,7 @@ def description_of_fmi2(interface: Interface, identifier: str, token: str) -> by
         canNotUseMemoryManagementFunctions="true",
         canHandleVariableCommunicationStepSize=_truth(not interface.is_step_fixed),
     )
+    # One file that takes the others in: tools that build from source need no list.
     Xml.SubElement(Xml.SubElement(kind, "SourceFiles"), "File", name="fmi2.c")
     _units(root, variables)
     categories = Xml.SubElement(root, "LogCategories")

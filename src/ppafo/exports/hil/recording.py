@@ -108,12 +108,14 @@ class Collector:
             self.ignored["of another run"] += 1
             return False
         self.is_over = self.is_over or bool(packet.flags & wire.OVER)
+        # Columns of a file are fixed by its first sample.
         if packet.counts.keys() != first.counts.keys():
             self.ignored["with other channels"] += 1
             return False
         # Numbers of 32 bits wrap after 50 days at 1 kHz, time stamps after 71 minutes: both are taken as steps from the
         # newest.
         number = self._newest + _difference(packet.sequence, self._newest)
+        # UDP may double a packet, and a repeated sample would be a step of 0 s.
         if number in self._seen:
             self.ignored["doubled"] += 1
             return False

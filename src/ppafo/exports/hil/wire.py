@@ -172,6 +172,7 @@ class Reader:
                 break
             self._drop("stray bytes", at)
             waiting, at = waiting[at:], 0
+            # The head is checked before all bytes are there: a wrong length would wait for bytes that never come.
             why = _wrong_head(waiting)
             if why is None and (len(waiting) < _HEADER.size or len(waiting) < waiting[4]):
                 break
@@ -236,6 +237,7 @@ def _read(data: bytes) -> Packet | str:
     # Bits of channels that this version does not know, or a length that is not theirs.
     if mask >> len(CHANNELS) or len(data) != sample_length(len(names)):
         return "content"
+    # Little-endian and signed, as the protocol says, whatever this computer is.
     values = struct.unpack_from(f"<{len(names)}i", data, _HEADER.size + _MASK.size)
     counts = dict(zip(names, values, strict=True))
     return Sample(flags=flags, run=run, sequence=sequence, time=time, counts=counts)

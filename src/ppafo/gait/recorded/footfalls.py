@@ -171,6 +171,7 @@ def force_of_plates(
                 ends = [np.inf if end is None else end + step for _, end in own]
                 spans = zip(starts, ends, strict=True)
                 inside = np.any([(plate.time >= low) & (plate.time <= high) for low, high in spans], axis=0)
+                # Only over this foot's contacts: the same plate may carry the other foot before or after.
                 force = np.where(inside, plate.values, 0.0)
                 other = 0.0 if total is None else np.interp(plate.time, total.time, total.values)
                 total = Signal(table.file, table.time, force + other)
@@ -238,6 +239,7 @@ def wrap_cycle(walk: Mapping[str, Signal]) -> Cycle | None:
         [np.sqrt(np.mean((features[:, shift:] - features[:, : time.size - shift]) ** 2)) for shift in shifts]
     )
     best = int(np.argmin(misfits))
+    # Start and end are not the same motion: the record is no whole cycle, or the walk is not steady.
     if misfits[best] > _MISFIT:
         return None
     period = float(shifts[best]) / _RATE
@@ -362,6 +364,7 @@ def _of_walk(walk: Mapping[str, Signal], tables: Sequence[MotionTable], side: Si
 def _strides_of_file(tables: Sequence[MotionTable], side: Side) -> list[Stride]:
     """Return the strides between the events that a C3D file has of a foot; a stride needs its toe-off."""
     trials = [table.trial for table in tables if table.trial is not None]
+    # Events of two trials have two clocks.
     if len(trials) != 1:
         return []
     strikes, offs = trials[0].strikes(side), trials[0].offs(side)
@@ -385,6 +388,7 @@ def _by_contacts(strides: list[Stride], contacts: Sequence[Contact]) -> tuple[li
     ]
     if not early:
         return strides, "strides from the shank, which no plate corrects: heel strikes and toe-offs are less exact"
+    # Strikes and toe-offs of the shank are early or late by one time for a person, which the plates show.
     strike, off = (float(np.mean(values)) for values in zip(*early, strict=True))
     moved = [Stride(item.start + strike, item.toe_off + off, item.end + strike) for item in strides]
     return moved, (

@@ -113,6 +113,7 @@ def over_strides(name: str, curves: Floats, strides: Sequence[Stride]) -> CurveS
     if name == "centre_of_pressure":
         percent = phases()
         fraction = float(np.mean([item.stance_share for item in strides]))
+        # Without its ends: where hardly any force acts its place has no meaning.
         inside = (percent > _UNLOADED_FORCE) & (percent < fraction - _UNLOADED_FORCE)
         at, first = percent[inside], float(mean[inside][0])
         # The line over the swing goes on into the next stride, where the stance begins again.
@@ -230,6 +231,7 @@ def without_odd_shapes(curves: Mapping[str, CurveStatistics], strides: Strides) 
         if len(item.strides) < _FEWEST_TO_COMPARE or name == "centre_of_pressure":
             continue
         middle = np.median(item.curves, axis=0)
+        # From the median curve, which one odd stride does not move.
         away = np.abs(item.curves - middle)
         is_odd = np.zeros(len(item.strides), dtype=bool)
         for share, distances in ((ODD_SHAPE, np.sqrt(np.mean(away**2, axis=1))), (ODD_PHASE, np.max(away, axis=1))):
@@ -333,6 +335,7 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: li
     if len(tables) < len(files):
         raise_noted(wrong)
     if settings.columns is None:
+        # Only without a map: a user's map names the columns as the file has them.
         tables = [arranged(table) for table in tables]
     settings, said = _with_subject(settings, tables, wrong)
     # Without a body mass loads are looked at per kg of 1 kg, and scaled to 1 below.
@@ -348,6 +351,7 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: li
         columns = columns.model_copy(update={"ankle_angle": columns.ankle_angle.model_copy(update=neutral)})
     mapped = [getattr(columns, name) for name in GaitMap.model_fields if name != "schema_version"]
     names = [name.removeprefix("-") for item in mapped if item is not None for name in column_names(item)]
+    # Only the columns in use: a gap elsewhere needs no word.
     tables = [fill_gaps(table, names, settings.longest_gap) for table in tables]
     walk = walk_signals(tables, columns, person, settings.columns is None, wrong)
     if settings.body_mass is None:

@@ -36,6 +36,7 @@ def form_of(path: str | Path, name: str = "") -> GaitForm:
                 f"there is no gait form '{one_line(name)}'{nearest_name(name, FORMS)}; available: {', '.join(FORMS)}"
             )
         return form
+    # Any form may know the suffix: forms of other packages are loaded before it is refused.
     FORMS.load_all()
     # Forms of other packages are asked first: a user who installs one wants it for his files.
     forms = sorted(FORMS.loaded().values(), key=lambda item: FORMS.is_own(item.name))

@@ -230,6 +230,7 @@ def foot_markers_angle(found: CurveColumns, mapped: AngleMap, shank: Signal) -> 
     if time.size >= 3:
         # Flat: the foot hardly turns while the shank leans over it. The median of these samples is the zero.
         flat = (np.abs(np.gradient(values, time)) < _SLOW) & (np.gradient(lean, time) < 0.0)
+    # Less than a tenth of a second of flat foot may be a pause of the swing.
     if np.count_nonzero(flat) < _LEAST_FLAT * seen.rate:
         raise DataError(
             f"{found.table.file}: the line from {mapped.heel!r} to {mapped.toe!r} never stands still while the "
@@ -289,6 +290,7 @@ def knee_signals(
                 f"{-height:.2f} m with the other sign: its sign is reversed; correct it in the file, or change the "
                 "sign of knee.up in a gait map"
             )
+        # The file has the hip: the knee follows by the lean of the thigh.
         forward, up = knee_position(forward, up, lean, _thigh_length(mapped, stature))
     file, time = found.table.file, found.table.time
     columns = tuple(dict.fromkeys(name for _, name in found.terms))

@@ -136,6 +136,7 @@ def check_torque_ceiling(evidence: Evidence) -> Iterator[Finding]:
         return
     ceilings = {path: constant * (value - evidence.atmosphere()) for path, value in supplies.items()}
     severity, verdict = _verdict(evidence, max(ceilings.values()), constant)
+    # Torque constants are quoted per psi in the field.
     per_psi = constant * to_si(1.0, "psi", "Pa")
     pressures = {path: evidence.in_set_unit(path, value) for path, value in supplies.items()}
     held = (f"{ceilings[path]:#.3g} N m at {pressures[path]} ({path})" for path in supplies)

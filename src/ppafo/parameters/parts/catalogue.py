@@ -117,11 +117,13 @@ class Part:
     @property
     def full_mass(self) -> float:
         """Mass [kg] of the part as it is carried: of a bottle, with its gas."""
+        # Only a bottle has no mass of its own: it is empty mass and content.
         return self.values["mass"] if "mass" in self.values else self.values["empty_mass"] + self.values["content"]
 
     @property
     def model_numbers(self) -> dict[str, float]:
         """Numbers of a valve by path, in SI; what its maker does not state is ideal, by the defaults."""
+        # A figure that is not given is left at the model's default, which is the ideal valve.
         settings = {item.name: item.default for item in VALVES[self.kind].quantities if item.default is not None}
         orifice = {item.name: self.values[item.name] for item in ORIFICE if item.name in self.values}
         own = {name: self.values[name] for name in settings if name in self.values}
@@ -236,6 +238,7 @@ def parse_catalogue(content: bytes, file: str) -> Catalogue:
 
 
 def _part(file: str, group: str, name: str, parsed: Any) -> Part:
+    # Only valves come in kinds.
     kind = getattr(parsed, "kind", "")
     declared = {item.name: item for item in figures_of(group, kind)}
     figures = {key: figure for key in declared if isinstance(figure := getattr(parsed, key), Figure)}
@@ -272,6 +275,7 @@ def _check_orifice(place: str, figures: Mapping[str, Figure]) -> None:
 
 
 def _in_si(place: str, figure: Figure, quantity: Quantity) -> float:
+    # A guess without its reason cannot be checked by the next reader.
     if figure.origin in _NEEDS_A_REASON and not figure.note.strip():
         raise ParameterError(f"{place}.note is missing: a figure that is {figure.origin} needs its reason")
     with refused_as(ParameterError, f"{place} = {figure.value:g} {figure.unit}", UnitError):

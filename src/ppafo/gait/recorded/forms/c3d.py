@@ -77,6 +77,7 @@ def read_c3d(path: str | Path) -> MotionTable:
                 columns[name], units[name] = values, unit
     for name, values in _plates(content, frames):
         columns[name], units[name] = values, "N"
+    # A trial that was cut keeps its clock: events count from the beginning of the capture.
     first = max(0, int(content["header"]["points"].get("first_frame", 0)))
     trial = _trial(parameters)
     time = (first + np.arange(frames)) / rate

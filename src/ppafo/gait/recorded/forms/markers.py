@@ -86,6 +86,7 @@ def _ankle_map(labels: Sequence[str], foot: str, axes: tuple[Axis, Vertical]) ->
     """Return the ankle angle of the model, or from heel and toe where the file has only markers."""
     angles = _label(labels, foot + _ANGLES)
     heel, toe = (_first(labels, foot, names) for names in (_HEELS, _TOES))
+    # The model's own angle is preferred: its zero comes from a static trial.
     if angles is None and heel is not None and toe is not None:
         forward, vertical = axes
         said = f"ankle angle from the markers {heel} and {toe}; its zero is the foot that stands flat"
@@ -205,6 +206,7 @@ def load_unit(table: MotionTable, name: str, kind: str, body_mass: float) -> tup
     for unit, factor in _FACTORS[kind].items():
         per_mass = (1.0e-3 if unit == "N mm" else 1.0) / body_mass if factor is None else factor
         fitting += [unit] if low <= per_mass * peak <= high else []
+    # The stated unit is believed where it can be true, and where nothing else can.
     if stated in fitting or (not fitting and stated in _FACTORS[kind]):
         return stated, []
     if len(fitting) != 1:
