@@ -170,7 +170,7 @@ OF_PASSED = 0.375
 """Part of the gas that has passed which errors of area, volume, supply and heat explain."""
 
 OFFSET, OF_PRESSURE = 1.2e4, 1.0 / 16.0
-"""Error of a pressure [Pa] that offset, step and noise explain, and the fraction of it that two degrees of the angle explain."""
+"""Error of a pressure [Pa] that offset, step and noise explain; fraction of it that two degrees of angle explain."""
 
 ALARM_TIME, ALARM_SAMPLES = 5.0e-3, 5.0
 """Time [s], and samples, that a residual lasts before it counts."""

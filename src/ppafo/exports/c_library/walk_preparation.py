@@ -1,4 +1,4 @@
-"""From the settings of a walk to the numbers of a run: one composed function, which calls the functions of the planning.
+"""From the settings of a walk to the numbers of a run: one composed function that calls the planning.
 
 What a gait comes to (series, events, how its heel rolls) and a course in time are numbers written out, and so are the
 body of a wearer who reacts and the pose in which it begins.
