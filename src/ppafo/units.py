@@ -201,6 +201,7 @@ def _parse_unit(unit: str) -> tuple[ParsedUnit, str]:
     bare, kind = split_pressure_kind(unit)
     # The kept file first: pint's import takes longer than a run.
     parsed = known_units().get(bare) or unit_by_pint(unit)
+    # Only a pressure has a zero that may lie at the atmosphere.
     if kind and parsed.dimensions != known_units()["Pa"].dimensions:
         raise UnitError(f"'{unit}': {_KIND_BELONGS}")
     return parsed, kind
@@ -263,6 +264,7 @@ def _registry() -> "pint.UnitRegistry[Any]":
     """Build the registry of the units above: milliseconds, where pint's own list takes a tenth of a second."""
     import pint
 
+    # Decimals throughout, so that a unit's factor is what its definition says.
     registry: pint.UnitRegistry[Any] = pint.UnitRegistry(None, non_int_type=Decimal)
     registry.load_definitions([*_PREFIXES.values(), *_UNITS.values()])
     return registry

@@ -82,17 +82,17 @@ def test_the_torque_ceiling_is_5_newton_metres_at_50_psig_and_5_5_at_55() -> Non
     assert "0.100 N m/psi" in finding.paragraph
 
 
-def test_virtual_work_wants_torque_constant_and_volume_per_angle_equal() -> None:
+def test_virtual_work_demands_a_torque_constant_equal_to_the_displacement_per_radian() -> None:
     finding = FOUND["virtual-work"]
     assert finding.severity == "warning"
-    assert side(finding, "volume per angle") / side(finding, "torque constant") == pytest.approx(3.5, abs=0.02)
+    assert side(finding, "displacement per radian") / side(finding, "torque constant") == pytest.approx(3.5, abs=0.02)
 
 
 def test_the_gas_use_needs_more_than_the_torque_constant_sweeps_and_lines_have_a_part_of_it() -> None:
     finding = FOUND["virtual-work"]
     assert side(finding, "volume that the gas use needs") == pytest.approx(65e-6, abs=0.5e-6)
     assert "6.12 mg" in finding.paragraph
-    assert "lines and clearance hold a part of that gas" in finding.paragraph
+    assert "lines and clearance contain a part of that gas" in finding.paragraph
 
 
 def test_the_volume_of_chamber_2_is_negative_within_figure_7() -> None:

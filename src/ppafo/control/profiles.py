@@ -157,6 +157,7 @@ def segment_at(profile: Tabulated, place: float) -> Segment:
     for knot in profile.knots[1:]:
         segment = next_segment(segment, place, knot.time, knot.value)
     segment = next_segment(segment, place, profile.period, profile.value_01)
+    # An unused knot lies at or beyond the end of a repetition: the line then ends at the first knot of the next.
     is_last = segment.end >= profile.period
     return Segment(
         start=segment.start,
@@ -214,6 +215,7 @@ def repeated_knot(profile: Tabulated, before: Knot, knot: Knot) -> Knot:
     is_used = knot.time < profile.period
     is_first = before.time < profile.period
     second_is_used = profile.knots[0].time < profile.period
+    # Without a second knot the first one comes again a repetition later.
     second_time = profile.period + (profile.knots[0].time if second_is_used else profile.period)
     second_value = profile.knots[0].value if second_is_used else profile.value_01
     return Knot(
@@ -276,6 +278,7 @@ def smooth_bounds(profile: Tabulated) -> tuple[float, float]:
     for (start, _), (end, last) in zip(knots, [*knots[1:], (profile.period, profile.value_01)], strict=True):
         length = end - start
         value, rate, bend = smooth_value(profile, start)
+        # The cubic is fixed by its start, with rate and bend, and by its end.
         twist = (profile.level + last - value - length * (rate + 0.5 * length * bend)) / length**3
         # Extremes lie at knots or where the rate of a cubic is 0.
         for place in turning_places(rate, bend, 3.0 * twist):

@@ -208,6 +208,7 @@ def evict(folder: Path) -> None:
 
 def _import_program(wanted: _Wanted) -> ModuleType:
     folder = cache_folder()
+    # Loading runs what lies there, so the folder is looked at each time, not once for the process.
     why_not = refusal(folder)
     if folder is None or why_not:
         logger.warning("ppafo: compiled models are not kept: %s; %s names another folder", why_not, CACHE_VARIABLE)
@@ -314,6 +315,7 @@ def _is_own(kept: Path, files: Collection[str]) -> bool:
             found.append(place.lstat())
     if not hasattr(os, "geteuid"):
         return stat.S_ISDIR(found[0].st_mode)
+    # Root may own a file: what root can do, no check prevents.
     is_whose = all(item.st_uid in (0, os.geteuid()) for item in found)
     used = [item for item in found if stat.S_ISDIR(item.st_mode)]
     is_folder = found[0] in used
@@ -487,6 +489,7 @@ def announce(expected: float, where: str, models: int = 1) -> Iterator[None]:
         return
     what = "a model" if models == 1 else f"{models} models"
     text = f"ppafo: compiling {what} for this computer, about {time_text(max(expected, QUIET))} ..."
+    # A message only where it takes long: most programs are kept, and the rest compile in the quiet time.
     timer = threading.Timer(QUIET, logger.warning, (text,))
     # A program that ends while it compiles does not wait for the message.
     timer.daemon = True
@@ -510,6 +513,7 @@ def estimate_seconds(source: str, kept: Iterable[Path], usual: float) -> float:
     for folder in kept:
         with contextlib.suppress(OSError, ValueError, StopIteration):
             seconds = float((folder / SECONDS_FILE).read_text(encoding="ascii"))
+            # Seconds per byte of text: programs of one kind differ in length more than in difficulty.
             rates.append(seconds / next(folder.glob("*.py")).stat().st_size)
         if len(rates) == _MAXIMUM_ASKED:
             break
@@ -531,6 +535,7 @@ def kept_bytes(kind: str, made_from: str, make: Callable[[], bytes]) -> bytes:
     folder = cache_folder()
     if folder is None or refusal(folder):
         return make()
+    # The name is the hash of all that the content depends on, so that nothing kept is ever out of date.
     key = hashlib.sha256(made_from.encode("utf-8", "surrogatepass")).hexdigest()[:32]
     place = folder / FOLDER / f"{kind}-{key}"
     content = _read(place)

@@ -92,6 +92,7 @@ class LaneRows:
     def over_lanes(self, lines: list[str]) -> list[str]:
         """A loop over all lanes of the block, with the rows of effects where a function that is called needs them."""
         lines = composed_lines(lines, self.needs)
+        # Only the structs of effects that a line needs are loaded: each load costs time to compile.
         words = {word for line in lines for word in re.findall(r"\w+", line)}
         return over_lanes([*[self.load(row) for row in self.program.effect_rows if row in words], *lines])
 
@@ -104,6 +105,7 @@ class LaneRows:
         for phase in all_phases:
             if isinstance(phase, RarePhase):
                 loop = self.over_lanes([*prelude, *phase.lines])
+                # Most steps need no rare phase in any lane; a sum over lanes is cheaper than its code.
                 lines += [*count_lanes("wanting", f"{phase.cell} > 0.0"), "if wanting > 0:", *indent(loop)]
             else:
                 lines += self.over_lanes([*prelude, *phase])
@@ -217,6 +219,7 @@ class _Renaming(ast.NodeTransformer):
         return ast.Assign([self.on_the_left(target)], value, lineno=0)
 
     def visit_AugAssign(self, node: ast.AugAssign) -> ast.stmt:
+        # Written out: the name on the left may differ from the one on the right.
         sum_of_both = ast.BinOp(ast.parse(ast.unparse(node.target), mode="eval").body, node.op, node.value)
         return ast.Assign([self.on_the_left(node.target)], self.visit(sum_of_both), lineno=0)
 

@@ -103,6 +103,7 @@ def sampled_with_faults(rows: Rows, lines: list[str]) -> list[str]:
 def places(rows: Rows) -> list[str]:
     """Lines that find the number of the sample and where late signals lie, once for all lanes."""
     program = rows.program
+    # Histories are rings: the place is the step less the delay, modulo their length.
     late = ["late = (step_index - signal_delay) % signal_history.shape[1]"] if program.late_signals else []
     return [*late, *([] if program.ideal_sensors else ["sample_index = step_index // steps_per_sample"])]
 
@@ -116,6 +117,7 @@ def sense(rows: Rows) -> list[str]:
         signals = current_readings(rows)
     if not rows.program.ideal_sensors:
         seen = f"{add(measure)}(sensors, angle, pressure_1, pressure_2, plant.torque_constant, sample_index)"
+        # The sensors' torque follows from pressures by a constant, which another actuator does not have.
         shaped = [f"seen = {add(seen_with_torque)}(plant, seen)"] if rows.program.has_shape else []
         return [rows.load("sensors"), *signals, f"seen = {seen}", *shaped]
     return [
@@ -184,6 +186,7 @@ def late_readings(rows: Rows) -> list[str]:
     lines = ["slots = signal_history.shape[1]"]
     for row, (sensor, reading) in enumerate(READINGS.items()):
         age = f"{rows.add(samples_late)}(gait_sensors.{sensor}_fault, step_index * timing.step, sample_index)"
+        # Written before it is read, so that a sensor without a delay shows its present reading.
         lines.append(f"signal_history[{row}, sample_index % slots, lane] = seen.{reading}")
         lines.append(f"late_{reading} = signal_history[{row}, (sample_index - {age}) % slots, lane]")
     given = ", ".join(f"late_{reading}" for reading in READINGS.values())

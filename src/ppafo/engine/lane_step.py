@@ -80,12 +80,14 @@ def phases(rows: Rows) -> Phases:
     """Both stages of the gas over ``length`` [s] from ``time`` [s], what leads to them, and the state at the end."""
     program = rows.program
     is_free = program.angle is None
+    # The motion of a free vane needs what its first stage found; a prescribed one finds it again.
     kept = rows.keep("gas") if is_free else rows.keep("begun", "gas")
     begin = program.gas.begin if program.feed is None else program.feed.begin
     first = [rows.load("flowing"), *lead(rows), begin(rows), *kept]
     before = [*([] if program.leg is None else program.leg.lead(rows)), open_valve(rows), first, pass_gas(rows)]
     if not is_free:
         return [*before, [*feed(rows), *finish(rows)]]
+    # The error of the gas waits in a row of its own until the motion has its error too.
     error = [f"{rows.error} = gas_error"] if program.is_adaptive else []
     loaded = [rows.load("begun"), rows.load("change")]
     loaded += [f"gas_error = {rows.error}"] if program.is_adaptive else []
@@ -222,6 +224,7 @@ def finish(rows: Rows) -> list[str]:
     """The state at the end of a step or part, unless the part is refused; and the first time at which a run failed."""
     program, add = rows.program, rows.add
     fed = program.feed.stored.values() if program.feed is not None else ()
+    # Gas before motion: the vane ends under the pressures of the new gas.
     lines = [program.gas.add(rows), *end_motion(rows), *program.gas.work(rows), *advance_states(rows)]
     if not program.is_parted:
         return [*lines, *store_all(rows, ""), *judge(rows), *sense_end(rows)]
@@ -282,6 +285,7 @@ def advance_states(rows: Rows) -> list[str]:
     stated = rows.program.stated
     if not stated:
         return []
+    # Means over the step: a part without length must not divide by 0.
     mean = f"/ max(length, {pneumatics.SHORTEST!r})"
     lines = [
         f"supplied = (after.supplied_mass - state.supplied_mass) {mean}",
@@ -305,6 +309,7 @@ def state_errors(rows: Rows) -> list[str]:
         for (path, moved), allowed in zip(
             _with_slopes(name, kind) if kind.tolerances else (), kind.tolerances, strict=True
         ):
+            # The error of a state is what its exact step and a straight extrapolation differ by.
             after = path.replace(f"{name}_state", f"{name}_state_after", 1)
             found.append(f"abs({after} - ({path} + length * {moved})) / {allowed!r}")
     return found
@@ -390,6 +395,8 @@ def step_in_parts(rows: Rows) -> list[str]:
     """As many parts as the lane with the most of them needs; places of late commands are the same for all lanes."""
     places = []
     if rows.program.late_commands:
+        # The dead time in whole steps and a rest: the command of one step or the next acts, by the time within the
+        # step.
         places.append("place_before = (step_index - command_delay - 1) % command_history.shape[0]")
         places.append("place_after = (step_index - command_delay) % command_history.shape[0]")
     if rows.program.late_signals:
@@ -448,6 +455,7 @@ def measure(rows: Rows) -> list[str]:
             f"until = {add(motion.until_jump)}(jump - time, until)",
         ]
     if program.is_adaptive:
+        # A failed run takes its steps whole, so that it ends without holding up its block.
         hurries = "remaining == 0.0 or result.failure_time <= time"
         lines.append(f"until = remaining if {hurries} else {add(motion.part_length)}(pace, until)")
         if program.angle is None:

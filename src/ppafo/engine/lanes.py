@@ -107,6 +107,7 @@ def load_programs(programs: Iterable[Program]) -> None:
 def _current_source(program: Program) -> str:
     """The source of a program, written anew where it is out of date."""
     outline, source = write_source(program)
+    # The kept text may rest on a function that a notebook has defined anew since.
     if outline.is_current():
         return source
     write_source.cache_clear()
@@ -151,6 +152,7 @@ def run_blocks(batch: Batch, take: Callable[[slice, BatchResult], None], threads
                 block = slice(start, min(start + lanes, runs))
                 take(block, _run_block(module, batch, block, stop))
 
+    # One block needs no pool of threads, and an interrupt reaches it at once.
     if workers == 1:
         work()
         return
@@ -180,6 +182,7 @@ def _run_block(module: ModuleType, batch: Batch, runs: slice, stop: threading.Ev
         if stop.is_set():
             break
         interrupts.check()
+        # An interrupt is seen between two calls only: compiled code cannot be stopped.
         block.advance(min(STEPS_PER_CALL, steps - done))
     return block.result()
 

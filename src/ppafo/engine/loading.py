@@ -168,6 +168,7 @@ def _load_by(source: str, compilers: tuple[Compiler, ...]) -> ModuleType:
     except CompilerError as failure:
         # One reason, such as missing headers, often stops several compilers.
         failed = [item for item in compilers if item is compiler or item.name in failure.names]
+        # The next compiler that the same reason does not stop.
         left = tuple(item for item in others if item not in failed)
         if not left:
             remedy = HOW_TO_INSTALL if compiler.name == NUMBA else WITHOUT_C
@@ -185,6 +186,7 @@ def _load_by(source: str, compilers: tuple[Compiler, ...]) -> ModuleType:
             raise ProgramError(f"{refused}; {BACKEND_VARIABLE}={NUMBA} may compile it") from refused
         # A model that has no C, for instance because a law calls ``math.sin``.
         numba = compilers[-1]
+        # Said once for a program: from the next start on it is found compiled.
         was_kept = is_kept(source, numba)
         module = load_generated(source, numba)
         if not was_kept:

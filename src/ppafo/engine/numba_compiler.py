@@ -162,12 +162,14 @@ def _run_with_shared(source: str, path: str, module: ModuleType) -> None:
         first = min([node.lineno, *(item.lineno for item in getattr(node, "decorator_list", ()))])
         text = without_origins("\n".join(lines[first - 1 : node.end_lineno]))
         described = "\n".join([text, *(f"{item} {keys.get(item, '')}" for item in sorted(used))])
+        # Text and keys of all callees: equal only where the whole tree below a function is equal.
         key = hashlib.sha256(described.encode()).hexdigest()[:_LENGTH]
         if key not in _SHARED:
             scope = {"__name__": __name__, **used}
             exec(compile(ast.Module([node], []), path, "exec"), scope)
             made = scope[name]
             if isinstance(node, ast.FunctionDef):
+                # Numba names machine code by this: two functions of one name must not share a symbol.
                 made.py_func.__qualname__ = f"{name}_{key}"
             _SHARED[key] = made
         names[name], keys[name] = _SHARED[key], key

@@ -70,10 +70,12 @@ class Outline:
 
     def _described(self, value: Any, inside: Any = None) -> str:
         """What a value is in the text, read ``inside`` a function; what is described is numbered."""
+        # The cache around a function is no part of what is compiled.
         value = value.__wrapped__ if isinstance(value, functools._lru_cache_wrapper) else value
         if isinstance(value, FunctionType):
             value = self.links.get((inside, value), self.links.get(value, value))
         if isinstance(value, FunctionType) or is_row(value):
+            # Numbered before it is described: a function that calls itself ends here.
             if value not in self.numbers:
                 self.numbers[value] = len(self.numbers)
                 describe = self._function if isinstance(value, FunctionType) else self._row
@@ -123,6 +125,7 @@ class Outline:
             )
             for inner in codes
         ]
+        # The text carries lines of files for messages, so that a moved function is another text.
         place = code.co_filename, code.co_firstlineno, file_hash(code.co_filename)
         counts = code.co_argcount, code.co_kwonlyargcount
         further = self._declared(function), self.effects.get(function, ())
@@ -155,6 +158,7 @@ def file_hash(file: str) -> str:
     """Return the hash of the content of a file as it is now; empty where there is none, as of what was typed in."""
     try:
         found = Path(file).stat()
+        # Time and size tell whether a file has changed; only then is it read again.
         return _hash_of(file, found.st_mtime_ns, found.st_size)
     except (OSError, ValueError):
         return ""

@@ -178,6 +178,7 @@ class _Columns(ast.NodeTransformer):
         return _call("_chosen", test, _later(yes), _later(no))
 
     def visit_BoolOp(self, node: ast.BoolOp) -> ast.AST:
+        # Both sides are computed: columns have no short circuit.
         name = "_all" if isinstance(node.op, ast.And) else "_any"
         found: ast.expr
         found, *others = (self.visit(part) for part in node.values)
@@ -191,6 +192,7 @@ class _Columns(ast.NodeTransformer):
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
         left, right = self.visit(node.left), self.visit(node.right)
+        # np.divide gives inf over 0 where Python's quotient raises, as compiled code does.
         return _call("_quotient", left, right) if isinstance(node.op, ast.Div) else ast.BinOp(left, node.op, right)
 
     def visit_Call(self, node: ast.Call) -> ast.AST:

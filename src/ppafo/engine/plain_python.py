@@ -172,6 +172,7 @@ class _Flow:
         """Names that have a value after a loop, which may be gone through not once."""
         if isinstance(statement, ast.For):
             self.read(statement.iter, bound)
+            # The body may run not once, so that what it assigns does not count after the loop.
             self.end_of(statement.body, bound | _assigned_names(statement.target))
             return self.end_of(statement.orelse, bound)
         self.read(statement.test, bound)
@@ -248,6 +249,7 @@ def place_in(lines: list[str], number: int) -> Place | None:
                 return None
             continue
         at = [int(item) for item in origin["lines"].split()]
+        # Two lines stand before the first of a function: its decorator and its def.
         index = number - 1 - (start + 2)
         if not 0 <= index < len(at) - 1:
             return None
@@ -281,6 +283,7 @@ def _told_problem(report: Report) -> str:
         if problem:
             return problem
     lines = [line.strip() for line in report.said.splitlines() if line.strip()]
+    # Lines that every report of Numba has and that tell a user nothing.
     lines = [line for line in lines if not line.startswith(("Failed in nopython", "During:", "File ", "- Resolution"))]
     where = f"'{report.written}' cannot be compiled: " if report.written else ""
     return where + one_line(lines[0] if lines else "no reason given")[:_LONGEST]

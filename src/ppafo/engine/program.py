@@ -270,6 +270,7 @@ class Program:
 @cache
 def _shown_by(connect: Any) -> Any:
     """The class of what a valve shows beside its openings, from the function that connects it."""
+    # In the order of declaration: plant, what the valve shows, result.
     _, shown, _ = get_type_hints(connect).values()
     return shown
 
@@ -305,6 +306,7 @@ def link_effects(effects: Sequence[Effect], collector: Collector, own: Mapping[A
         collector.links[key] = (own or {}).get(stands, stands)
     for effect in effects:
         for law in effect.laws.values():
+            # By the names of its parameters: a law says itself which structs it needs.
             asked = law.__code__.co_varnames[: law.__code__.co_argcount]
             collector.effects[law] = tuple(row for row in effect.rows if row in asked)
 

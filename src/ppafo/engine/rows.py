@@ -78,6 +78,7 @@ def table(groups: Sequence[Any], runs: int) -> "np.ndarray[tuple[int, int], np.d
     flat = [value for group in groups for value in leaves(group)]
     rows = np.empty((len(flat), runs))
     for row, value in zip(rows, flat, strict=True):
+        # Broadcast: a float fills the row of all runs.
         row[:] = value
     return rows
 

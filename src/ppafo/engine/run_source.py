@@ -47,7 +47,12 @@ def run_loop(program: Program, collector: Collector, outputs: str, in_parts: Pro
     ]
     text = "\n".join(body)
     # C wants a struct to exist before one of its members is set.
-    first = [item.empty(group) for item in (rows, *others) for group in _stored_by_number(item, text)]
+    first = [
+        item.empty(group)
+        for item in (rows, *others)
+        for group in item.program.step_rows()
+        if re.search(rf"{KEPT}\.{group}\.[\w.]+(\[\d+\])? = ", text)
+    ]
     given = ["states", "parameters", "samples", *LOOP_ARRAYS, *LOOP_NUMBERS, *([NEEDS_PARTS] if others else [])]
     row = f"{outputs} = namedtuple({outputs!r}, {['time', *program.traced]!r})"
     whole = "\n".join([row, f"def advance({', '.join(given)}):", *indent([*dict.fromkeys(first), *body])])
@@ -88,9 +93,3 @@ def _chosen(whole: list[str], in_parts: list[list[str]]) -> list[str]:
     parted = [repr("A step of valve, gas and vane, in parts that its error allows."), *in_parts[0]]
     once = [repr("A step of valve, gas and vane as a whole."), *whole]
     return [f"if {NEEDS_PARTS} == 1:", *indent(parted), "else:", *indent(once)]
-
-
-def _stored_by_number(rows: RunRows, text: str) -> list[str]:
-    """Groups that a step hands on and that get their numbers one by one."""
-    groups = rows.program.step_rows()
-    return [name for name in groups if re.search(rf"{KEPT}\.{name}\.[\w.]+(\[\d+\])? = ", text)]

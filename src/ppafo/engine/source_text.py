@@ -533,6 +533,7 @@ def check_is_plain(function: Any) -> None:
             f"{place_of(function)}: '{name}' is wrapped by a decorator, which cannot be compiled; remove it"
         )
     if function.__closure__:
+        # A closure's value may change without a change of the function, and no text would show it.
         names = ", ".join(f"'{item}'" for item in function.__code__.co_freevars)
         raise ProgramError(
             f"{place_of(function)}: '{name}' uses {names} of the function around it, which cannot be compiled; "
@@ -566,6 +567,7 @@ def parse_definition(function: FunctionType, adapt: Adaptation = as_it_is) -> as
         raise refusal(file, code.co_firstlineno, f"'{name}' must be a plain function defined with 'def'")
     if tree.decorator_list:
         raise refusal(file, tree, f"'{name}' is decorated, which cannot be compiled; remove the decorator")
+    # A copy, since the tree is compared with what Python runs below.
     adapted = adapt(function, tree if adapt is as_it_is else deepcopy(tree))
     check_grammar(adapted, file)
     if _shape(code) not in (_shape(item) for item in _code_of(tree, function)):

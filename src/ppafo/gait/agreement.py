@@ -29,6 +29,7 @@ _PUSH_OFF_FROM = 0.35
 _FORCE_ENDS = -0.06
 """Strides from toe-off to half the largest force of the push-off (-0.060): for a moment without a force."""
 
+# Far from 0 and nearer to the half stride at which the other foot lies.
 _OTHER_FOOT = 0.3
 """Strides between ankle and shank from which the ankle is of the other foot, which is half a stride away."""
 _ALIKE, _UNLIKE = 0.65, 0.4
@@ -89,6 +90,7 @@ def _smooth(values: Floats, name: str) -> Floats:
 def delays(walk: MeanStride) -> dict[str, float]:
     """Return how far [s] each curve is behind the vertical force, or behind the shank where there is no force."""
     share = walk.stance_share
+    # Of the shank the largest lean backwards, which is its minimum.
     shank = _peak(-_smooth(walk.curves["shank_angle"], "shank_angle"), share) - _USUALLY["shank_angle"]
     ankle = _peak(_smooth(walk.curves["ankle_angle"], "ankle_angle"), share) - _USUALLY["ankle_angle"]
     has_force = "vertical_force" in walk.curves
@@ -102,6 +104,7 @@ def delays(walk: MeanStride) -> dict[str, float]:
 
 def _peak(values: Floats, share: float) -> float:
     """Return the strides from toe-off to the largest of 1000 values about it."""
+    # Phases are periodic: counted from toe-off, from the lower limit on.
     low, high = _ABOUT_TOE_OFF
     after = (_FINE - share - low) % 1.0 + low
     return float(after[np.argmax(np.where(after < high, values, -np.inf))])
@@ -118,6 +121,7 @@ def delay_remarks(walk: MeanStride) -> list[str]:
     """Return which curves of a mean stride are on another clock than the force, or the shank, and by how much."""
     other = "vertical_force" if "vertical_force" in walk.curves else "shank_angle"
     late = {name: seconds for name, seconds in delays(walk).items() if abs(seconds) > LARGEST_DELAY}
+    # Curves that are late by the same time are on one other clock, and are named together.
     together = max(late.values(), default=0.0) - min(late.values(), default=0.0) < LARGEST_DELAY
     groups = [tuple(late)] if late and together else [(name,) for name in late]
     said = []

@@ -80,6 +80,7 @@ def gait_file() -> type[BaseModel]:
 
 
 def _curve_table(name: str, unit: str) -> type[BaseModel]:
+    # Only angles have two units; every other curve has the one of its SI quantity.
     units: Any = Literal["deg", "rad"] if unit == "rad" else Literal[unit]
     number = Annotated[float, Field(allow_inf_nan=False)]
     series = Annotated[list[number], Field(min_length=1, max_length=_MAXIMUM_HARMONICS)]
@@ -150,6 +151,7 @@ def _number(document: dict[str, Any], path: str, file: str) -> float | None:
 
 
 def _curve(given: dict[str, Any], name: str, file: str) -> Curve:
+    # The schema checks each list by itself; that both agree is said here.
     if len(given["cosine"]) != len(given["sine"]):
         counts = f"{len(given['cosine'])} numbers in cosine and {len(given['sine'])} in sine"
         raise DataError(f"{file}: {name} has {counts}; a series has as many of both")
@@ -192,6 +194,7 @@ def load_gait(name_or_path: str | Path = NORMATIVE) -> Gait:
 def parse_gait(content: bytes, file: str) -> Gait:
     """Return the gait in the bytes of a gait file; ``file`` is its name in messages. DataError where unreadable."""
     gait = gait_of(_FILE.parse(content, label(file)), label(file))
+    # A file that is well formed may still have a reversed sign or a wrong zero.
     check_gait(gait, label(file))
     return gait
 
@@ -237,4 +240,5 @@ def _series(curve: Curve, si_unit: str) -> Iterator[str]:
 
 def _text(text: str) -> str:
     """Return a basic string of TOML; what JSON escapes is escaped in the same way there, but for DEL."""
+    # TOML forbids DEL in a string, which JSON allows.
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

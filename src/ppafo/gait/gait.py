@@ -106,6 +106,7 @@ class Curve:
         """Return the values at many phases [strides]."""
         first_sine, first_cosine = sine_and_cosine(np.asarray(phases, dtype=np.float64))
         sine, cosine = first_sine, first_cosine
+        # The mean in the shape of the phases, a number or an array.
         values = self.mean + 0.0 * first_cosine
         for of_cosine, of_sine in zip(self.cosines, self.sines, strict=True):
             values = values + (of_cosine * cosine + of_sine * sine)
@@ -170,9 +171,11 @@ class Gait:
 def series_of(gait: Gait, name: str) -> Series:
     """The first harmonics of a curve [SI] as the engine has them; a curve that was not measured is 0."""
     curve = gait.curves.get(name)
+    # A curve that was not measured is 0: no moment, no force, a knee at rest.
     if curve is None:
         return Series(mean=0.0, harmonics=(Harmonic(0.0, 0.0),) * ENGINE_HARMONICS)
     count = ENGINE_HARMONICS
+    # A series with fewer harmonics than the engine takes is continued with zeros.
     missing = (0.0,) * count
     pairs = zip((*curve.cosines, *missing)[:count], (*curve.sines, *missing)[:count], strict=True)
     return Series(mean=curve.mean, harmonics=tuple(Harmonic(cosine, sine) for cosine, sine in pairs))
@@ -205,10 +208,12 @@ def fit_curve(values: Floats, harmonics: int, deviation: float = 0.0) -> tuple[C
     """
     if values.size < 2 * harmonics + 2:
         raise DataError(f"{values.size} samples are too few for {harmonics} harmonics")
+    # Both ends are the same phase: a series through both weighs it twice, as the recording has it.
     turns = 2.0 * np.pi * np.linspace(0.0, 1.0, values.size)
     orders = np.arange(1, harmonics + 1)
     terms = [np.ones((values.size, 1)), np.cos(np.outer(turns, orders)), np.sin(np.outer(turns, orders))]
     design = np.hstack(terms)
+    # Least squares over all samples, not a transform: both ends belong to one phase, and samples may be few.
     solution = np.linalg.lstsq(design, values, rcond=None)[0]
     left = design @ solution - values
     cosines, sines = solution[1 : harmonics + 1].tolist(), solution[harmonics + 1 :].tolist()
@@ -256,6 +261,7 @@ def at_speed(gait: Gait, speed: float) -> Gait:
         gait,
         walking_speed=speed,
         recorded_speed=recorded,
+        # At a constant walk ratio step length and cadence each go with the root of the speed.
         stride_time=gait.stride_time * math.sqrt(current / speed),
         stride_time_deviation=gait.stride_time_deviation * math.sqrt(current / speed),
         knee_forward=gait.knee_forward and gait.knee_forward.scale(speed / current),
@@ -284,6 +290,7 @@ def walk_recording(gait: Gait, strides: int, rate: float = _RATE) -> Recording:
     # A whole number of samples a stride: all strides are then equal to the last bit.
     per_stride = max(10, round(rate * gait.stride_time))
     phase = np.arange(strides * per_stride + 1) / per_stride
+    # One stride is evaluated and repeated, so that all are equal to the last bit.
     one = np.arange(per_stride) / per_stride
     channels = {
         name: Channel(np.append(np.tile(curve.values_at(one), strides), curve.value(0.0)), CURVES[name])

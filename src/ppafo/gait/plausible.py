@@ -125,6 +125,7 @@ def check_shank(walk: MeanStride) -> None:
     """Raise DataError for a shank angle that no leg has."""
     phi = np.degrees(walk.curves["shank_angle"])
     place = f"{walk.file['shank_angle']}: shank_angle"
+    # The range is free of the zero, so that a wrong unit shows before a wrong zero.
     travel = float(np.ptp(phi))
     low, high = SHANK_RANGE
     if not low <= travel <= high:
@@ -182,6 +183,7 @@ def standing_tilt(shank: Floats, ankle: Floats) -> float:
 
     ``shank`` and ``ankle`` are curves [rad] of 101 samples in the signs of the package.
     """
+    # On level ground the ankle is 90 deg plus the shank angle while the foot is flat.
     foot = np.degrees(ankle - shank)[MIDSTANCE] - 90.0
     return float(np.mean(foot))
 
@@ -191,6 +193,8 @@ def standing_turns(shank: Floats, ankle: Floats) -> tuple[float, float]:
 
     ``shank`` and ``ankle`` are curves [rad] of 101 samples in the signs of the package; a foot that stands turns by 0.
     """
+    # A flat foot stands still while the shank leans: the ankle then follows the shank, with the sign as it is or
+    # reversed.
     lean, stand = np.degrees(shank)[MIDSTANCE], np.degrees(ankle)[MIDSTANCE]
     return float(np.std(stand - lean)), float(np.std(stand + lean))
 
@@ -270,7 +274,9 @@ def check_force_scale(file: str, force: Floats, signs_from: SignSource) -> None:
     """Raise DataError for a vertical force [body weights] whose unit or sign leaves no heel strike to find."""
     # One contact in a long record is less than 2 % of it.
     loaded = force[np.abs(force) > _ON_GROUND]
+    # Percentiles, since a single spike has no sign to judge.
     lowest, highest = np.percentile(loaded if loaded.size else force, (2.0, 98.0)).tolist()
+    # A reversed sign is looked for first: its peak would be refused as too small.
     low, high = FORCE_PEAK
     if -lowest > _CLEARLY_BETTER * highest:
         raise DataError(
@@ -359,6 +365,7 @@ def check_force(walk: MeanStride) -> None:
 
 def force_remarks(force: Floats) -> list[str]:
     """Return what is unusual about the mean of a vertical force [body weights] over a stride, both ends counted."""
+    # Both ends are one phase, which must not count twice.
     mean, (low, high) = float(np.mean(force[:-1])), USUAL_FORCE_MEAN
     if low <= mean <= high:
         return []
@@ -464,6 +471,7 @@ def turning_about_ankle(shank: Floats, stride_time: float) -> Floats:
     phi, rate, acceleration = (item.values_at(percent) for item in (curve, rates, rates.derivative(stride_time)))
     sine, cosine = np.sin(phi), np.cos(phi)
     forward = sine * rate**2 - cosine * acceleration
+    # Centripetal and tangential acceleration of a point that turns about the ankle.
     up = -cosine * rate**2 - sine * acceleration
     return np.stack([forward, up])
 
@@ -503,6 +511,7 @@ def check_knee(walk: MeanStride) -> None:
 
 def check_knee_means(walk: MeanStride) -> None:
     """Raise DataError for accelerations of the knee, where there are some, that do not average to 0 over a stride."""
+    # Without the last sample, which is the first phase again.
     means = {name: float(np.mean(walk.curves[name][:-1])) for name in KNEE if name in walk.curves}
     raise_noted(
         [

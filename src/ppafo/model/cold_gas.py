@@ -42,7 +42,8 @@ LARGEST_CHANGE = 0.2
 _LEAST_HEAT_CAPACITY = 2.5
 """Heat capacity of air, nitrogen or CO2 at constant volume over the gas constant [-], at least."""
 
-# First difference [K] of the secants, difference [K] that is none, and how many are tried before bisection.
+# First difference [K] of the secants, difference [K] that is none, and how many are tried before a search in the whole
+# table.
 _FIRST_SECANT, _SAME_TEMPERATURE, _MAXIMUM_SECANTS = 1.0e-3, 1.0e-9, 12
 
 
@@ -118,6 +119,8 @@ def isobar(table: FluidTable, pressure: float) -> Isobar:
     dry = [node for node in table.temperatures if fluid_pressure(table, node, densest_gas(table, node)) >= pressure]
     enthalpies = tuple(gas_enthalpy(table, node, pressure) for node in dry)
     lowest = table.temperatures[0]
+    # Liquid at the lowest temperature has more than the outlet's pressure: then the outlet lies below the triple point,
+    # and wet gas freezes.
     freezes = has_liquid(table) and fluid_pressure(table, lowest, densest_gas(table, lowest)) > pressure
     return Isobar(pressure=pressure, temperatures=tuple(dry), enthalpies=enthalpies, freezes=1.0 if freezes else 0.0)
 
@@ -196,6 +199,7 @@ def supply_now(
     regulator = supply.regulator
     # A bottle near its end gives what it has above the margin of its regulator.
     highest = min(regulator.set_pressure, max(content.pressure - regulator.pressure_margin, 0.0))
+    # The flow limit holds at what the regulator can deliver now, not at what it is set to.
     limit = regulator_flow_limit(
         regulator._replace(set_pressure=highest),
         content.pressure,
@@ -256,6 +260,7 @@ def advance_supply(
 
 def parts_of(table: FluidTable, line: Isobar, supply: ColdSupply, mass: float, flow: float, step: float) -> int:
     """Into how many parts a step [s] goes with at least a mass [kg] in the bottle, so that no temperature swings up."""
+    # Heun's rule is stable up to 2 over the fastest rate; a tenth of that keeps it accurate too.
     return max(1, math.ceil(step * max(following_rates(table, line, supply, mass, flow).values()) / LARGEST_CHANGE))
 
 
@@ -312,10 +317,12 @@ def _content(table: FluidTable, supply: ColdSupply, state: SupplyState, near: fl
 
 def _temperature_near(table: FluidTable, mass: float, volume: float, energy: float, near: float) -> float:
     """Temperature [K] of a content as ``content_temperature``, by secants from one that is ``near``."""
+    # A step changes the temperature by little: two or three secants find it without a search in the whole table.
     before, after = near, near + _FIRST_SECANT
     miss = content_energy(table, mass, volume, before) - energy
     for _ in range(_MAXIMUM_SECANTS):
         next_miss = content_energy(table, mass, volume, after) - energy
+        # Two equal misses have no secant: the search takes over.
         if next_miss == miss:
             break
         found = after - next_miss * (after - before) / (next_miss - miss)

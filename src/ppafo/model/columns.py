@@ -88,6 +88,7 @@ def first(number: Any) -> float:
 def _distinct(columns: Sequence[NDArray[np.float64]]) -> tuple[Iterable[Sequence[float]], NDArray[np.intp]]:
     """The combinations of values that occur, and which of them each run has."""
     if len(columns) == 1:
+        # One column is sorted as numbers, several as rows, which takes many times longer.
         values, places = np.unique(columns[0], return_inverse=True)
         return values[:, None].tolist(), places
     # Combinations are sorted only where there is a hope that some occur again.
@@ -99,12 +100,14 @@ def _distinct(columns: Sequence[NDArray[np.float64]]) -> tuple[Iterable[Sequence
 
 def _fill(arguments: Sequence[Any], values: Sequence[float]) -> list[Any]:
     given = iter(values)
+    # Arrays give way to the numbers of one combination, in their order; all else is handed on as it is.
     return [next(given) if isinstance(argument, np.ndarray) else argument for argument in arguments]
 
 
 def _gather(results: Sequence[Any], places: NDArray[np.intp]) -> Any:
     first = results[0]
     if not isinstance(first, tuple):
+        # Back from combinations to runs: each run gets the result of the combination that it has.
         return np.array(results, dtype=np.float64)[places]
     parts = [_gather([result[index] for result in results], places) for index in range(len(first))]
     return type(first)(*parts) if hasattr(first, "_fields") else tuple(parts)

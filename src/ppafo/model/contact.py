@@ -74,11 +74,13 @@ def landing(
 
     The foot of a wearer who keeps the gait (1) rolls its last degrees slowly, while its toes carry already.
     """
+    # The gait says when the foot is on the ground, the device's own motion only how it comes to lie flat.
     stance = now.phase < timing.toe_off
     strikes = contact == SWING and stance
     flat_angle = now.shank + QUARTER_TURN - timing.ground_angle
     touches_angle = flat_angle - (NEARLY_FLAT if keeps_gait > 0.5 else 0.0)
     falls_flat = contact == HEEL and angle >= touches_angle and now.phase < timing.heel_off
+    # Also from HEEL: a foot that the device kept up until heel-off never was flat.
     rises = contact > 0.5 and contact < 2.5 and now.phase >= timing.heel_off
     leaves = contact != SWING and not stance
     # Later lines win: a foot that falls flat and lifts its heel in one step ends on the toes, and toe-off ends them
@@ -131,6 +133,8 @@ def heel_torque(contact: float, now: GaitNow, leg: LegParameters, ground_angle: 
     """
     lever = ground_lever(leg, foot_angle(now.shank, angle) - ground_angle)
     healthy = ground_lever(leg, foot_angle(now.shank, now.ankle) - ground_angle)
+    # At least the ground force on the lever of a nearly flat heel: a moment measured in dorsiflexion would otherwise
+    # lift the foot.
     measured = now.healthy_torque + max(-now.moment, now.force * leg.flat_heel_lever)
     return measured + now.force * (lever - healthy) if contact == HEEL else 0.0
 

@@ -30,6 +30,7 @@ def exponential(exponent: float) -> float:
     # The negated comparison is true for NaN, for which every direct one is false.
     if not abs(exponent) >= 0.0:
         return exponent
+    # Beyond these exp leaves the range of floats; the loop below would go on for as long.
     inside = max(-_LARGEST_EXPONENT, min(exponent, _LARGEST_EXPONENT))
     # Cody and Waite: whole doublings times the upper part of ln 2 are exact, and the lower part mends the rest.
     doublings = int(inside / LOGARITHM_OF_2 + (0.5 if inside >= 0.0 else -0.5))
@@ -50,6 +51,7 @@ def logarithm(number: float) -> float:
     """Natural logarithm [-] of a positive, normal number [-], within 3e-16 of it or of 1e-16, whichever is more."""
     doublings = 0
     mantissa = number
+    # Halving is exact. The limit ends the loop for infinity, which no halving brings down.
     while mantissa >= 2.0 * _ROOT_OF_HALF and doublings < _MAXIMUM_DOUBLINGS:
         mantissa = mantissa * 0.5
         doublings = doublings + 1
@@ -77,9 +79,11 @@ def power(base: float, exponent: float) -> float:
 
 def sine_and_cosine(turns: Number) -> tuple[Number, Number]:
     """Sine and cosine [-] of a number of turns or of an array of them, within 2e-16 for turns that are exact."""
+    # To the nearest quarter turn, within which nine terms give all digits.
     quarters = np.rint(4.0 * turns)
     angle = 2.0 * math.pi * (turns - 0.25 * quarters)
     square = angle * angle
+    # Zeros of the shape of the argument, a float or an array.
     sine, cosine = 0.0 * square, 0.0 * square
     for order in range(_TERMS_OF_SINE, 0, -1):
         sine = (1.0 + sine) * -square / float(2 * order * (2 * order + 1))

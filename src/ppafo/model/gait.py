@@ -53,6 +53,7 @@ def harmonics(turns: float) -> tuple[Harmonic, ...]:
 def value_at(series: Series, at: tuple[Harmonic, ...]) -> float:
     """Value of a series, in its unit."""
     by = series.harmonics
+    # Two sums that do not wait for each other, each without a loop.
     low = term_value(by[0], at[0]) + term_value(by[1], at[1]) + term_value(by[2], at[2]) + term_value(by[3], at[3])
     high = term_value(by[4], at[4]) + term_value(by[5], at[5]) + term_value(by[6], at[6]) + term_value(by[7], at[7])
     return series.mean + low + high
@@ -199,13 +200,6 @@ class GaitNow(NamedTuple):
     healthy_torque: float
 
 
-def phase_at(timing: GaitTiming, time: float) -> float:
-    """Phase in turns since the last heel strike, 0 to 1, at a time [s] of 0 or more."""
-    # Times are 0 or more, so int() is the floor; math.floor is a call in vector code.
-    turns = timing.start + timing.frequency * time
-    return turns - float(int(turns))
-
-
 def gait_at(gait: GaitSeries, timing: GaitTiming, leg: LegParameters, time: float) -> GaitNow:
     """The gait of a person with this leg at a time [s]; body mass and gravity make newtons of body weights."""
     return gait_of(leg, measured_at(gait, timing, leg, place_at(timing, time)))
@@ -213,7 +207,9 @@ def gait_at(gait: GaitSeries, timing: GaitTiming, leg: LegParameters, time: floa
 
 def place_at(timing: GaitTiming, time: float) -> GaitPlace:
     """The place in the stride at a time [s]."""
-    phase = phase_at(timing, time)
+    # Times are 0 or more, so int() is the floor; math.floor is a call in vector code.
+    turns = timing.start + timing.frequency * time
+    phase = turns - float(int(turns))
     return GaitPlace(phase, harmonics(phase))
 
 
@@ -284,6 +280,7 @@ def gait_of(leg: LegParameters, now: GaitMeasured) -> GaitNow:
         now.knee_forward,
         now.knee_up,
     )
+    # What the measured motion itself takes, with the wearer's own damping.
     moving = foot_inertia_about_ankle(leg) * now.ankle_acceleration + leg.ankle_damping * now.ankle_rate
     return GaitNow(
         phase=now.phase,
@@ -519,6 +516,7 @@ def gait_on_course(
     ankle_angle = ankle.angle - slope.angle
     ankle_rate = ankle.rate - slope.rate
     ankle_acceleration = ankle.acceleration - slope.acceleration
+    # Accelerations go with the square of the cadence and with the stride.
     hurry = pace.frequency / timing.frequency
     forward = pace.stride * hurry * hurry * value_at(gait.knee_forward, at)
     up = pace.stride * hurry * hurry * value_at(gait.knee_up, at)

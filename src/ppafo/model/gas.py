@@ -108,6 +108,7 @@ def enthalpy_flow_ratio(root: float, heat_capacity_ratio: float) -> float:
 
     ``root`` is sqrt(T_up/T_ref) [-]: gas at four times the temperature flows half as much and is four times as rich.
     """
+    # Flow goes as 1/root, enthalpy per mass as root^2, so their product as the root.
     return heat_capacity_ratio * root
 
 

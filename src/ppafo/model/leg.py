@@ -94,6 +94,7 @@ def mass_matrix(leg: LegParameters, cosine_theta: float) -> MassMatrix:
     foot = foot_inertia_about_ankle(leg)
     product = link_product(leg) * cosine_theta
     shank = leg.shank_inertia + leg.shank_mass * leg.shank_mass_centre * leg.shank_mass_centre
+    # The foot's mass turns with the shank at the end of its length (parallel axes).
     shank += leg.foot_mass * leg.shank_length * leg.shank_length
     return MassMatrix(shank + foot - 2.0 * product, product - foot, foot)
 
@@ -120,6 +121,7 @@ def gravity_torques(
 
     phi is the shank angle, alpha the foot's angle over the horizontal.
     """
+    # A knee that accelerates upwards acts as more gravity.
     up = leg.gravity + knee_up
     shank = leg.shank_mass * leg.shank_mass_centre + leg.foot_mass * leg.shank_length
     foot = leg.foot_mass * leg.foot_mass_centre * (cosine_alpha * up - sine_alpha * knee_forward)

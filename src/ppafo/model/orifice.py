@@ -215,6 +215,7 @@ def _isentropic_coefficients(heat_capacity_ratio: float) -> Terms:
     """Coefficients of a gas, through the exact function of equation (7) at nodes in the subsonic region."""
     k = heat_capacity_ratio
     critical_gap = 1.0 - critical_pressure_ratio(k)
+    # Choked flow over the factor in front of the subsonic form: the curve is 1 where the flow is choked.
     choked = math.sqrt(0.5 * (k - 1.0) * power(2.0 / (k + 1.0), (k + 1.0) / (k - 1.0)))
     gaps, values = NODES, NODES
     for place in range(TERMS):
@@ -276,6 +277,7 @@ def _polynomial_through(places: Terms, values: Terms) -> Terms:
     for order in range(1, TERMS):
         for number in range(order, TERMS):
             index = TERMS - 1 + order - number
+            # Divided differences in place, from the end, so that each still finds its neighbour of the order before.
             rise = differences[index] - differences[index - 1]
             differences = _with_item(differences, index, rise / (places[index] - places[index - order]))
     # Tuples of fixed length, no lists: an exported library fits its curves itself, from this text in C.

@@ -119,6 +119,7 @@ def gravity_torque(angle: Number, largest_torque: float) -> Number:
     plantarflexion, so the value is negative. The cosine of the slope is a power series, good to 1e-8 within 0 to
     180 deg, because a call of a library cosine would keep the loop over runs from vector code.
     """
+    # Terms up to x^12 of the cosine, by Horner's rule from the last one.
     slope = angle - QUARTER_TURN
     square = slope * slope
     cosine = 1.0 / 479001600.0 * square - 1.0 / 3628800.0

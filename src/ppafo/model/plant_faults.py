@@ -221,22 +221,19 @@ SHUT_OFF = (
 """What a walk says of a shut-off valve; mass and power of a miniature 3/2 solenoid with a holding circuit, assumed."""
 
 
-def gone_share(faults: PlantFaults, time: float) -> float:
-    """Fraction of its pressure [-] that a bottle at its end still has at a time [s]."""
-    gone = max(time - faults.empty_time, 0.0) / faults.empty_lag
-    # 1 / (1 + x + x^2/2) stands for exp(-x), without a call, so in vector code.
-    return 1.0 / (1.0 + gone + 0.5 * gone * gone)
-
-
 def set_pressure(faults: PlantFaults, own: ChamberFaults, pressure: float, room: float, time: float) -> float:
     """Pressure of a faulty regulator at a time [s], never below the atmosphere ``room``; all [Pa]."""
     # First the regulator's own faults, then the bottle before it: an empty one takes any of them down with it.
     given = (own.pressure if time >= own.high_time else pressure) + own.rate * max(time - own.creep_time, 0.0)
-    return max(room + (given - room) * gone_share(faults, time), room)
+    gone = max(time - faults.empty_time, 0.0) / faults.empty_lag
+    # 1 / (1 + x + x^2/2) stands for exp(-x), without a call, so in vector code.
+    left = 1.0 / (1.0 + gone + 0.5 * gone * gone)
+    return max(room + (given - room) * left, room)
 
 
 def feed_conductance(shut_off: ShutOff, own: ChamberFaults, conductance: float, time: float) -> float:
     """Conductance [kg/(s Pa)] from a supply to a chamber at a time [s], through regulator, shut-off, valve and hose."""
+    # A frozen regulator and a kinked hose are in series; shares of both stand for their joint loss.
     share = (own.frozen_share if time >= own.frozen_time else 1.0) * hose_share(own, time)
     fitted = shut_off.conductance > 0.0
     # Both sides of a select are computed in vector code: without the valve the divisor is 1.
@@ -262,6 +259,7 @@ def failed_single_port(
 ) -> SinglePort:
     """A port with one open path as faults leave it at a time [s]; ``supply`` [Pa] feeds a stuck valve."""
     room, stuck = plant.atmospheric_pressure, time >= own.stuck_time
+    # A stuck valve feeds or vents by its own opening, whatever the command would do.
     fed = (own.opening > 0.0) if stuck else (port.source_fraction > 0.5)
     conductance = abs(own.opening) * plant.valve_conductance if stuck else port.conductance
     node = supply if stuck else port.node_pressure

@@ -61,6 +61,7 @@ def regulated_mass(
     steps = step * stiffness / droop
     # 1 / (1 + x + x^2/2) stands for exp(-x): of second order, between 0 and 1, and without a call, so in vector code.
     scale = 1.0 / (1.0 + steps + 0.5 * steps * steps)
+    # Integral of the regulator's flow over the step, linear in what lacks at its beginning and in what is lost in it.
     regained = lacking * steps * (1.0 + 0.5 * steps) + loss * 0.5 * steps * (1.0 + steps)
     largest = largest_flow * step
     return min(max(regained * scale / stiffness, -largest * relieving), largest)
@@ -95,6 +96,7 @@ def step_lines(
         lines.relieving,
         step,
     )
+    # What the second regulator passes leaves the first line.
     left = taken_1 + passed_2
     passed_1 = regulated_mass(
         set_1 - pressure_1,

@@ -223,6 +223,7 @@ def is_active(fault: Fault, time: float) -> bool:
 def distorted(fault: Fault, reading: float, other: float, last: float, time: float) -> float:
     """A reading at ``time`` [s] with gain, offset, drift, lag and some of the other sensor in it, in its unit."""
     mixed = reading + fault.crosstalk * (other - reading)
+    # The lag acts last, on what the distorted sensor tends to.
     target = fault.gain * mixed + fault.offset + fault.drift * (time - fault.time)
     return target + fault.memory * (last - target)
 
@@ -242,6 +243,7 @@ def faulty(fault: Fault, reading: float, other: float, last: float, time: float,
 def force_reading(sensors: GaitSensors, force: float, seed: int, sample: int, channel: int) -> float:
     """A force [N] with noise and steps, never below 0."""
     noisy = force + sensors.force_noise * standard_noise(seed, sample, channel)
+    # A force sensor under a foot does not pull.
     return max(quantise(noisy, sensors.force_resolution), 0.0)
 
 
@@ -273,6 +275,7 @@ def measure_gait(
     # A sensor has settled before the walk begins.
     angle_memory = gait_sensors.angle_memory if sample > 0 else 0.0
     pressure_memory = gait_sensors.pressure_memory if sample > 0 else 0.0
+    # Bandwidth before noise and rounding: what the amplifier adds is not filtered by the sensor.
     smooth_angle = angle + (last.smooth_angle - angle) * angle_memory
     smooth_1 = pressure_1 + (last.smooth_pressure_1 - pressure_1) * pressure_memory
     smooth_2 = pressure_2 + (last.smooth_pressure_2 - pressure_2) * pressure_memory
@@ -291,6 +294,7 @@ def measure_gait(
     kept_2 = hold_if_lost(was_2, seen.pressure_2, gait_sensors.pressure_lost_share, seed, sample, 9)
     kept_heel = hold_if_lost(was_heel, heel, gait_sensors.lost_share, seed, sample, 5)
     kept_toe = hold_if_lost(was_toe, toe, gait_sensors.lost_share, seed, sample, 6)
+    # One draw for all: sensors with a common cause lose the same samples.
     draw = unit_noise(seed, sample, 10)
     shown_angle = faulty(gait_sensors.angle_fault, kept_angle, kept_angle, was_angle, time, draw)
     shown_1 = faulty(gait_sensors.pressure_1_fault, kept_1, kept_2, was_1, time, draw)
@@ -312,6 +316,7 @@ def measure_gait(
 
 def samples_late(fault: Fault, time: float, sample: int) -> int:
     """How many samples ago a reading was made that arrives at ``time`` [s], the time of ``sample``."""
+    # No reading is older than the first one.
     late = int(fault.late_samples) if is_active(fault, time) else 0
     return min(late, sample)
 

@@ -166,6 +166,7 @@ class Regulator(NamedTuple):
 def bottle_content(table: FluidTable, mass: float, volume: float, temperature: float) -> BottleContent:
     """Content of a bottle of a volume [m^3] with ``mass`` [kg] at a temperature [K]."""
     density = mass / volume
+    # The gas that leaves is vapour as long as there is liquid, else all that is there.
     vapour = min(density, densest_gas(table, temperature))
     pressure = fluid_pressure(table, temperature, density)
     enthalpy = gas_specific_energy(table, temperature, density) + pressure / vapour
@@ -213,6 +214,7 @@ def content_temperature(table: FluidTable, mass: float, volume: float, energy: f
         return nodes[below]
     if miss_above <= 0.0:
         return nodes[above]
+    # The energy grows with temperature, so that halves of the table can be thrown away.
     while above - below > 1:
         middle = (below + above) // 2
         miss = content_energy(table, mass, volume, nodes[middle]) - energy
@@ -274,6 +276,7 @@ def regulator_flow_limit(
     gas_constant: float,
 ) -> float:
     """Largest flow [kg/s] that a regulator passes at its set pressure: its seat fully open. Equations (6), (7)."""
+    # A set pressure above the bottle's gives no flow, not an error: the bottle is nearly empty then.
     ratio = min(regulator.set_pressure / bottle_pressure, 1.0)
     choked = choked_flow_constant(heat_capacity_ratio, gas_constant, temperature)
     return regulator.seat_area * choked * bottle_pressure * isentropic_flow_function(ratio, heat_capacity_ratio)

@@ -128,6 +128,7 @@ class CTerms:
 
     def written(self, item: Term) -> tuple[str, int]:
         """A term as text, and how strongly it holds together."""
+        # An int of 32 bits would carry digits that the small processor does not have.
         if item.type == INT16 and item.kind in _WORKED_OUT:
             # Arithmetic on 16 bits gives an int in C, which has 16 or 32.
             return f"(int16_t)({self.worked_out(item)[0]})", _SIGN
@@ -160,6 +161,7 @@ class CTerms:
         given = ", ".join(self.term(part) for part in item.parts)
         if item.kind in ("min", "max") and item.type in (INT, INT16, INT32):
             first, second = (self.term(part, 6) for part in item.parts)
+            # The second operand first, as Python's min and max have it for equal numbers.
             sign = "<" if item.kind == "min" else ">"
             return f"({second} {sign} {first} ? {second} : {first})"
         return f"{_HELPERS[item.kind]}({given})"
@@ -172,8 +174,10 @@ class CTerms:
             text = f"INT32_C({abs(value)})" if item.type == INT32 else str(abs(value))
             return (text, _ATOM) if value >= 0 else (f"-{text}", _SIGN)
         if item.type == INT:
+            # Literals of 64 bits: a plain one is an int, which may have 32.
             return (f"INT64_C({value})" if value >= 0 else f"-INT64_C({-value})"), _ATOM if value >= 0 else _SIGN
         if math.isnan(value):
+            # NAN and INFINITY are floats in C: the cast keeps operations double.
             return "(double)NAN", _SIGN
         if math.isinf(value):
             return ("(double)INFINITY", _SIGN) if value > 0.0 else ("-(double)INFINITY", _SIGN)
@@ -205,6 +209,7 @@ class CTerms:
             return f"{name}[{self.place(owner, places[0])}]{further}", _ATOM
         index = self.place(owner, places[0], 9 if len(places) > 1 else 0)
         for number, place in enumerate(places[1:], 1):
+            # Arrays are one block of memory: the last index runs fastest, and extents are known only at run time.
             index = f"{index if number == 1 else f'({index})'} * {name}.extent[{number}] + {self.term(place, 9)}"
         return f"{name}.values[{index}]", _ATOM
 
@@ -378,6 +383,7 @@ def _prelude_for(prelude: str, used: str) -> str:
 
 def _comment(text: str, further: Iterable[str] = ()) -> str:
     """A block comment."""
+    # A docstring may contain the end of a C comment.
     lines = [line.rstrip() for line in text.replace("*/", "* /").replace("/*", "/ *").strip().splitlines()] + list(
         further
     )
@@ -520,6 +526,7 @@ class _Body:
         return self.written[name]
 
     def text(self) -> list[str]:
+        # An unused parameter is a warning, and warnings are errors where people read the export.
         unused = [name for name, _ in self.item.parameters if name not in self.scopes.read]
         return [*(f"    (void){self.name(name)};" for name in unused), *self.block(self.item.body, 1)]
 
@@ -543,6 +550,7 @@ class _Body:
         yield from _wrapped("    " * level + text, "    " * (level + 1))
 
     def write_assign(self, item: typed.Assign, level: int) -> Iterator[str]:
+        # What nobody reads is not written: a compiler would warn of it.
         if item.name in self.scopes.read and not is_empty(item.value.type):
             starts = self.scopes.first.get(id(item), "")
             declared = f"{starts}{self.writer.type_name(item.value.type)} " if starts else ""
@@ -559,6 +567,7 @@ class _Body:
 
     def write_store(self, item: typed.Store, level: int) -> Iterator[str]:
         value = item.value
+        # Member by member reads better, but only where no member is read on the right.
         is_read = self.writer.reading is not None and not value.reads & item.element.reads
         if is_read and value.kind == "build" and isinstance(value.type, Row):
             for (name, kind), part in zip(value.type.fields, value.parts, strict=True):
@@ -600,6 +609,7 @@ class _Body:
         """A loop that counts; a name that lives beyond it gets the number from a counter of its own."""
         name = self.name(item.name)
         is_own = id(item) in self.scopes.counted or item.name not in self.scopes.read
+        # A loop's name ends at its last value in Python, one further in C.
         counter = name if is_own else f"{name}_next"
         while not is_own and counter in {*map(self.name, self.kinds), *self.writer.outer}:
             counter += "_"
@@ -608,6 +618,7 @@ class _Body:
         sign = "<" if item.step > 0 else ">"
         start, stop = self.terms.term(item.start), self.terms.term(item.stop, 6)
         if item.name == LANE:
+            # Without the pragma gcc fears that lanes overlap, and takes them one by one.
             yield from self.line("PPAFO_SIDE_BY_SIDE", level)
         yield from self.line(
             f"for ({self.writer.type_name(item.start.type)} {counter} = {start}; {counter} {sign} {stop}; {change}) {{",

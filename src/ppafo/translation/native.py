@@ -56,6 +56,7 @@ def asked(
     ``scratch`` is where it has its temporary files, which it leaves there when it is killed. CompilerError if it does
     not end within ``limit`` [s], ``LONGEST_COMPILING`` unless given; it is ended then, with what it has started.
     """
+    # A compiler that is killed leaves its files here, where the whole folder goes away.
     temporary = {} if scratch is None else dict.fromkeys(("TMPDIR", "TMP", "TEMP"), str(scratch))
     seconds = LONGEST_COMPILING if limit is None else limit
     try:
@@ -105,6 +106,7 @@ def _home() -> dict[str, str]:
 
 def complaint(done: "subprocess.CompletedProcess[str]") -> str:
     """The line in which a compiler says what is wrong; how it ended where it says nothing."""
+    # gcc and clang say it on stderr, some wrappers on stdout.
     lines = [*done.stderr.splitlines(), *done.stdout.splitlines(), f"it ended with {done.returncode}"]
     return one_line(next((text for text in lines if "error" in text), next(filter(str.strip, lines))))
 
@@ -199,6 +201,7 @@ def load_entries(library: Path, entries: Entries) -> dict[str, NativeEntry]:
     # (1 + 2^-30)(1 - 2^-30) - 1 rounds to 0 where the product is rounded by itself, and to -2^-60 where it is fused.
     small = 2.0**-30
     numbers = map(ctypes.c_double, (1.0 + small, 1.0 - small, -1.0, small * small))
+    # One product tells whether the compiler fuses or reorders, whatever its flags were.
     if not loaded.ppafo_rounds_as_written(*numbers):
         raise CompilerError(
             "the compiler joins or reorders sums and products, so that results would differ from other compilers' "
@@ -208,6 +211,7 @@ def load_entries(library: Path, entries: Entries) -> dict[str, NativeEntry]:
 
 
 def _entry(function: Any, types: Sequence[Type]) -> NativeEntry:
+    # An array is a pointer and its extents; the rest of three extents is padding.
     dimensions = tuple(kind.dimensions for kind in types if isinstance(kind, Array))
     function.restype = None
     function.argtypes = [ctypes.c_void_p, *(_NUMBERS[kind] for kind in types if isinstance(kind, Scalar))]
@@ -284,6 +288,7 @@ class CCompiler:
             self.run_text(source, path, module)
             return
         try:
+            # A loaded library may be removed on Unix; on Windows its file stays until the process ends.
             with tempfile.TemporaryDirectory(prefix="ppafo-", ignore_cleanup_errors=True) as folder:
                 _fill(module, self._build(translated, Path(folder)), entries_of(source))
         except OSError as error:
@@ -310,6 +315,7 @@ def _command(name: str) -> tuple[str, ...]:
     if name != "zig":
         found = which(name)
         return (found,) if found else ()
+    # The package brings a compiler of one version; a zig on the path is whatever the user has.
     package = importlib.util.find_spec("ziglang")
     if package is not None and package.origin is not None:
         return (str(Path(package.origin).with_name("zig.exe" if sys.platform == "win32" else "zig")), "cc")
@@ -344,6 +350,7 @@ def described_processor() -> str:
 def translator_hash() -> str:
     """Hash of the translator: the same text may become other C in another version of it."""
     found = hashlib.sha256()
+    # Sorted: folders list their files in no order.
     for file in sorted(Path(__file__).parent.iterdir()):
         if file.suffix in (".py", ".h"):
             found.update(file.read_bytes())
@@ -378,7 +385,7 @@ def build(
 
 def _compiled(source: str, folder: Path, command: Sequence[str], flags: Sequence[str]) -> Path:
     """The library that a compiler makes of C, in a folder."""
-    if hasattr(os, "ST_NOEXEC") and bool(os.statvfs(folder).f_flag & os.ST_NOEXEC):
+    if _is_mounted_without_execution(folder):
         raise CompilerError(f"libraries in {folder.parent} cannot be loaded (it is mounted noexec)", *COMPILERS)
     written, library = folder / "program.c", folder / _LIBRARY_FILE
     written.write_text(source, encoding="utf-8")
@@ -394,6 +401,11 @@ def _compiled(source: str, folder: Path, command: Sequence[str], flags: Sequence
     if not library.is_file():
         raise CompilerError(f"{name} ended without an error, but made no library")
     return library
+
+
+def _is_mounted_without_execution(folder: Path) -> bool:
+    # Windows has no such mounts, nor the flag.
+    return hasattr(os, "ST_NOEXEC") and bool(os.statvfs(folder).f_flag & os.ST_NOEXEC)
 
 
 def _fill(module: ModuleType, library: Path, entries: Entries) -> None:

@@ -104,6 +104,7 @@ def gas_rates(
     """
     flows = symbolic(gas_flows, PlantParameters, Openings, float, float, compare=compare, acting=acting)
     found = flows(plant, openings, *pressures)
+    # Flows are true masses; where the gas is not ideal its content grows by another amount.
     gained = found.mass_1, found.mass_2
     if any(gas_density in effect.laws for effect in acting or ()):
         types = (PlantParameters, float, float, float, float, float, float)
@@ -139,6 +140,7 @@ def thermal_gas_rates(
     )
     types = (PlantParameters, ThermalParameters, Openings, PlantState, ThermalState, float, float)
     flows = symbolic(thermal_gas_flows, *types, compare=compare, acting=acting)
+    # Totals do not act on rates: zeros stand for them.
     state = PlantState(
         angle=angle,
         angular_velocity=rate,

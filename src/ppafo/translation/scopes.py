@@ -41,6 +41,7 @@ class Scopes:
             own = set(terms) | ({made[0]} if made else set())
             within = set(own)
             if made:
+                # Types were joined in the walk: each assignment of a name has the same one.
                 self.types[made[0]] = made[1]
                 changes[made[0]] = changes.get(made[0], 0) + 1
             for name in _set_in(statement):
@@ -115,6 +116,7 @@ def needed(body: Block, after: frozenset[str], leaving: frozenset[str] = frozens
     live = after
     # Backwards, so that what is read later is known.
     for statement in reversed(body):
+        # What nobody reads later needs no assignment: expressions have no other effect.
         if isinstance(statement, typed.Assign) and statement.name not in live:
             continue
         if isinstance(statement, typed.If):

@@ -69,6 +69,7 @@ class Symbolic:
 
     def __call__(self, *values: Any) -> Any:
         """The function's value, in its own units."""
+        # Structs of effects come first, as in every composed function.
         every = (*self.rows, *values)
         given = [value for value, is_given in zip(every, self.walked.is_given, strict=True) if is_given]
         return self.result(self.walked.functions[self.walked.name], given)
@@ -213,6 +214,7 @@ class _Call:
         start, stop = self.value(item.start, names), self.value(item.stop, names)
         if not isinstance(start, int) or not isinstance(stop, int) or _returns(item):
             raise self.refused(f"a loop over '{item.name}' whose end is not written out")
+        # CasADi has no loops that fit here: each turn becomes expressions of its own.
         for number in range(start, stop, item.step):
             names[item.name] = number
             self.block(item.body, names)
@@ -314,6 +316,7 @@ class _Call:
 
         if isinstance(test, bool):
             return yes if test else no
+        # A struct is chosen number by number: CasADi knows only single expressions.
         if isinstance(yes, tuple):
             parts = [self.chosen(test, one, other) for one, other in zip(yes, no, strict=True)]
             return type(yes)(*parts) if hasattr(yes, "_fields") else tuple(parts)

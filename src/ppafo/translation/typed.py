@@ -231,6 +231,7 @@ def joined(one: Type, other: Type) -> Type | None:
         return one
     if isinstance(one, Scalar) and isinstance(other, Scalar):
         return max(one, other, key=_ORDER.index)
+    # Tuples of different lengths have no common type.
     if isinstance(one, Items) and isinstance(other, Items) and len(one.types) == len(other.types):
         types = [joined(*pair) for pair in zip(one.types, other.types, strict=True)]
         return None if None in types else Items(tuple(item for item in types if item is not None))
@@ -278,6 +279,7 @@ def field_of(term: Term, name: str) -> Term:
     """A field of a row."""
     row = term.type.row if isinstance(term.type, Shared) else term.type
     assert isinstance(row, Row)
+    # A field of a struct that is just made is the value it was made of: no struct need exist.
     place = [own for own, _ in row.fields].index(name)
     return term.parts[place] if term.kind == "build" else Term("field", row.fields[place][1], (term,), name)
 

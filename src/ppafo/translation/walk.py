@@ -117,6 +117,7 @@ class Expressions:
     def _of_constant(self, node: ast.Constant) -> Term:
         kinds: dict[type, Type] = {bool: BOOL, int: INT, float: FLOAT}
         is_too_large = type(node.value) is int and node.value >= 2**63
+        # Beyond 63 bits C has no signed number.
         if type(node.value) not in kinds or is_too_large:
             raise self.refused(node, f"the constant {node.value!r}")
         return Term("number", kinds[type(node.value)], (), node.value)
@@ -260,6 +261,7 @@ class Expressions:
 
     def _of_compare(self, node: ast.Compare) -> Term:
         values = [self.scalar(item, INT) for item in (node.left, *node.comparators)]
+        # A chain of comparisons is joined by "and"; its terms are free of side effects, so each may stand twice.
         made: Term | None = None
         for sign, left, right in zip(node.ops, values, values[1:], strict=False):
             kind = joined(left.type, right.type)
@@ -329,6 +331,7 @@ class Expressions:
         defaults = dict(zip(placed[::-1], takes.defaults[::-1], strict=False))
         defaults |= {item.arg: value for item, value in zip(takes.kwonlyargs, takes.kw_defaults, strict=True) if value}
         given = {item: self.term(value) for item, value in defaults.items()}
+        # Defaults first, then arguments by place, then by name: the last one holds.
         given |= dict(zip(names, map(self.term, node.args), strict=False))
         given |= {str(item.arg): self.term(item.value) for item in node.keywords}
         if set(given) != set(names):
@@ -348,6 +351,7 @@ class Expressions:
             raise self.refused(node, f"'{name}' is a function of a library{_INSTEAD.get(own, '')}")
         if len(node.args) < 1 or (own in ("min", "max")) != (len(node.args) > 1):
             raise self.refused(node, f"'{ast.unparse(node)}' with {len(node.args)} arguments")
+        # Lengths of tuples are known: they become numbers.
         if own == "len":
             kind = self.term(node.args[0]).type
             if not isinstance(kind, Items | Row):
@@ -364,6 +368,7 @@ class Expressions:
 
     def joined_by(self, own: str, values: list[Term], node: ast.Call) -> Term:
         """The size or root of one number, or the smallest or largest of several of one type."""
+        # Python's min returns the number as it is, an int or a float: C has one type for both.
         if len({value.type for value in values}) > 1:
             raise self.refused(node, f"'{ast.unparse(node)}', a choice between a whole number and a float")
         kind = values[0].type
@@ -444,6 +449,7 @@ class _ModuleWalk:
             while own in self.names or (number > 1 and (own in self.definitions or own in self.rows)):
                 number += 1
                 own = f"{name}_{number}"
+            # The name is taken before the body is walked, in which the same function may be met for other types.
             self.names.add(own)
             self.done[key] = _FunctionWalk(self, definition).walked(own, types)
             self.module.functions.append(self.done[key])
@@ -493,6 +499,7 @@ class _FunctionWalk:
         names = [item.arg for item in (*given.posonlyargs, *given.args, *given.kwonlyargs)]
         self.types.update(zip(names, types, strict=True))
         # Types only grow, so this ends.
+        # A name that gets a wider type further down, as in a loop, had it from the beginning.
         self.has_widened = True
         while self.has_widened:
             self.has_widened, self.flags = False, 0

@@ -87,6 +87,7 @@ class _Ranges:
             self.keep(item, names, name, kind, value)
         found: list[Range] = []
         self.run(item, item.body, names, found)
+        # Every return may be the one that is taken.
         result = found[0]
         for other in found[1:]:
             result = hull(result, other)
@@ -117,6 +118,7 @@ class _Ranges:
                 found.append(self.value(item, statement.value, names))
             elif isinstance(statement, typed.If):
                 self.value(item, statement.test, names)
+                # Each branch goes on from what held before both.
                 other = dict(names)
                 self.run(item, statement.body, names, found)
                 self.run(item, statement.otherwise, other, found)
@@ -137,6 +139,7 @@ class _Ranges:
         for turn in range(start.low, stop.high):
             names[loop.name] = Interval(turn, turn)
             self.run(item, loop.body, names, found)
+            # From here on the loop may have ended.
             if turn + 1 >= stop.low:
                 if after is None:
                     after = dict(names)
@@ -148,6 +151,7 @@ class _Ranges:
         found = self.found(item, term, names)
         self.note(term.type, found)
         if isinstance(found, Interval):
+            # A term in a loop or in a function that is called twice is worked out for several ranges.
             known = self.terms.get(id(term), found)
             self.terms[id(term)] = whole = Interval(min(known.low, found.low), max(known.high, found.high))
             if term.type == INT and _width(whole) is None:
@@ -191,6 +195,7 @@ def _calculated(item: Function, term: Term, parts: list[Interval]) -> Interval:
         return Interval(-parts[0].high, -parts[0].low)
     if term.kind == "convert" and term.parts[0].type == BOOL:
         return parts[0]
+    # A mask of ones keeps what is below it, also of negative numbers in two's complement.
     if term.kind == "&" and parts[1].low == parts[1].high and parts[1].low >= 0:
         return Interval(0, parts[1].high)
     if term.kind == "*" and not any(part.low == part.high and part.low.bit_count() == 1 for part in parts):
@@ -303,6 +308,7 @@ class _Narrowing:
         whole = parts[1:] if term.kind == "choice" else parts
         if any(part.type in (INT16, INT32) for part in whole):
             kinds = {part.type for part in whole} | ({own} if term.type == INT else set())
+            # C would widen both sides to int; here it is said, and 16 bits stay where they suffice.
             widest: Type = INT32 if INT32 in kinds else INT16
             whole = tuple(converted(part, widest) for part in whole)
             own = widest if term.type == INT else own

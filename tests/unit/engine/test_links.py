@@ -137,8 +137,8 @@ def test_a_law_that_would_undo_another_is_refused() -> None:
     ("function", "said"),
     [
         (hands_it_over, "an effect acts inside 'between', so that it can only be called"),
-        (hides_it, "the local name 'first' hides the row of the effect 'first'; rename it"),
-        (calls_a_law, "'first_law' is the law of an effect: call its place instead"),
+        (hides_it, "the local name 'first' hides the parameters of the effect 'first'; rename it"),
+        (calls_a_law, "'first_law' is the law of an effect: call its port instead"),
     ],
 )
 def test_what_would_lose_a_row_is_refused(function: Any, said: str) -> None:

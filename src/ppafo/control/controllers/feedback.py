@@ -43,6 +43,7 @@ def pid_command(
     """
     # The first sample has none before it: no kick of the derivative.
     change = (error - state.error) * state.started
+    # Implicit filter: stable for any time constant, also 0, where it is the plain difference.
     slope = state.slope + (change - period * state.slope) / (period + parameters.derivative_filter)
     integral = state.integral + parameters.integral_gain * error * period
     unlimited = ahead + parameters.proportional_gain * error + integral + parameters.derivative_gain * slope
@@ -169,6 +170,7 @@ class DampedProportionalState(NamedTuple):
 def learnt_command(parameters: DampedProportionalParameters, elapsed: float) -> float:
     """Command [-] of the table at a time since the start [s]: straight between knots, the last one held."""
     position = min(elapsed / parameters.knot_spacing, KNOTS - 1.0)
+    # The last knot has no line after it: the line before it is used up to its end.
     before = min(int(position), KNOTS - 2)
     fraction = position - before
     first = parameters.knots[before]
@@ -186,6 +188,7 @@ def damped_command(
     the torque, not of the error, so that a step of the reference gives no kick.
     """
     change = (torque - course.torque) * course.started
+    # Implicit, as in the PID: a filter of 0 s is the plain difference.
     slope = course.slope + (change - period * course.slope) / (period + gains.damping_filter)
     feedback = gains.proportional_gain * (reference - torque) - gains.damping * slope
     return max(-1.0, min(1.0, feedback + ahead)), TorqueSlope(torque, slope, 1.0)

@@ -84,6 +84,7 @@ def torque_rates(
     volume_1, volume_2 = max(volume_1, least), max(volume_2, least)
     ratio, valve = nominal.critical_ratio, nominal.valve_conductance
     leak = ellipse_flow(pressure_1, pressure_2, nominal.leak_conductance, ratio)
+    # A check valve: gas does not go back into a supply that has less.
     feed_1 = max(ellipse_flow(nominal.supply_pressure, pressure_1, valve, ratio), 0.0)
     vent_2 = ellipse_flow(pressure_2, nominal.atmospheric_pressure, valve, ratio)
     feed_2 = max(ellipse_flow(nominal.dorsiflexion_pressure, pressure_2, valve, ratio), 0.0)
@@ -142,6 +143,7 @@ def feedforward_update(
 ) -> tuple[float, PidFeedforwardState]:
     """Command from -1 to 1: PID of the torque error [N m], equation (13), and the opening for the reference's rate."""
     rate = (reference - state.reference) / period * state.feedback.started
+    # Along the reference, not at the measured state: the feed-forward must not see the noise.
     rates = rates_on_reference(parameters.nominal, reference, measurement.angle)
     ahead = parameters.feedforward * opening_for_rate(rates, rate)
     error = reference - measurement.torque
@@ -202,6 +204,7 @@ def linearising_update(
     reference_rate = (reference - state.reference) / period * state.started
     turned = (measurement.angle - state.angle) * state.started
     velocity = state.angular_velocity
+    # Implicit first-order filter of the angle's difference.
     velocity = velocity + (turned - period * velocity) / (period + parameters.rate_filter)
     rates = torque_rates(
         parameters.nominal, measurement.angle, velocity, measurement.pressure_1, measurement.pressure_2

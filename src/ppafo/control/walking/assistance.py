@@ -197,6 +197,7 @@ def requested_torque(rules: Assistance, phase: PhaseState, time: GaitTime, angle
     held = hold.stiffness * (hold.swing_angle - angle) - hold.damping * rate
     landing, swing = profile_torque(rules.landing, fraction), profile_torque(rules.swing, fraction)
     lands = time.lands > 0.5
+    # Profiles of landing and swing are given as torques in dorsiflexion, hence the minus.
     lifted = held - (landing if lands else swing)
     # On the heel nothing presses the toes down, and in the air little: an angle that is read too low asks for it.
     lifted = min(lifted, 0.0 if lands else LARGEST_PRESS)
@@ -233,9 +234,11 @@ def assess(
     last = state.request
     # An angle of exactly 0 marks that there was no sample before.
     turned = measurement.angle - last.angle if last.angle > 0.0 else 0.0
+    # Implicit first-order filter of the angle's difference.
     rate = last.rate + (turned - period * last.rate) / (period + parameters.assistance.hold.rate_filter)
     torque = requested_torque(parameters.assistance, phase, time, measurement.angle, rate)
     # A foot that lands on its toes turns far, and gas left in the chamber would then push on a loaded heel.
+    # A stance that has been mid-stance since its strike began on the toes.
     on_toes = phase.phase == MID_STANCE and phase.in_phase >= phase.since_strike
     bends = on_toes and phase.since_strike < EASING_TIME and measurement.torque > EASED
     works = phases.lifts(phase.phase) or phase.phase == PUSH_OFF or bends

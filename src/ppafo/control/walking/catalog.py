@@ -80,6 +80,7 @@ def law_that_walks_update(
     """Command from -1 to 1, or ``VENT``; the reference is not used."""
     assessment = assess(parameters, state, measurement, period)
     requested = assessment.request.torque
+    # Before the update: what the law remembers of another task must not act on this one.
     law = law_restart(state.law, requested, assessment.continues)
     sample = assistance.torque_measurement(measurement)
     command, law = law_update(parameters.law, law, requested, sample, period)
@@ -97,6 +98,7 @@ def bind(frame: Callable[..., Any], name: str, components: Mapping[str, Any]) ->
     assert isinstance(frame, types.FunctionType), "a frame is a plain function"
     made = types.FunctionType(frame.__code__, {**frame.__globals__, **components}, name)
     made.__qualname__ = name
+    # The name and module decide the name in the composed text, where two laws must not share one.
     made.__module__ = frame.__module__
     made.__annotations__ = frame.__annotations__
     return made
@@ -122,6 +124,7 @@ def walking_law(law: ControllerKind, name: str, summary: str, gains: tuple[tuple
     ScenarioError where a setting of the law has the name of one of walking.
     """
     taken = shared_settings(law)
+    # Settings of law and frame stand in one section of a file, where a name can mean only one thing.
     if taken:
         raise ScenarioError(
             f"controller '{law.name}' cannot walk: its setting '{min(taken)}' has the name of one that every "

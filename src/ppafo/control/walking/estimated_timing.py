@@ -146,6 +146,7 @@ def estimated_shift(stride: LearntStride, window: Window, rules: EstimationRules
         # Small shifts first, and only a better one replaces the best: ties stay near the clock.
         for side in range(2):
             shift = distance if side == 0 else -distance
+            # The trust in the clock is a cost of shifts, so that a flat misfit moves nothing.
             found = misfit(stride, window, rules, shift) + rules.clock_trust * shift * shift / (3.0 * WINDOW)
             best = shift if found < least else best
             least = min(found, least)
@@ -176,20 +177,11 @@ def turned(stride: LearntStride, measurement: GaitMeasurement, weight: float) ->
     )
 
 
-def longer_window(window: Window, measurement: GaitMeasurement, moved: float) -> Window:
-    """The window with the readings of a knot, without its oldest ones; ``moved`` [turns] by estimates until then."""
-    return Window(
-        angle=(*window.angle[1:], measurement.angle),
-        heel_force=(*window.heel_force[1:], measurement.heel_force),
-        toe_force=(*window.toe_force[1:], measurement.toe_force),
-        moved=(*window.moved[1:], moved),
-    )
-
-
 def knots_passed(fraction: float, next_knot: float) -> float:
     """Knots by which a fraction of the stride [turns] is beyond the next one, from minus to plus half of them."""
     within = fraction - 1.0 if fraction >= 1.0 else fraction
     ahead = within * KNOTS - next_knot
+    # From minus to plus half a stride, across its end.
     ahead = ahead - KNOTS if ahead > 0.5 * KNOTS else ahead
     return ahead + KNOTS if ahead <= -0.5 * KNOTS else ahead
 
@@ -199,26 +191,19 @@ def is_learnt(rules: EstimationRules, clock: EstimatedClock) -> bool:
     return clock.learnt >= rules.learning_strides
 
 
-def next_learnt(rules: EstimationRules, clock: EstimatedClock, before: PhaseState, phase: PhaseState) -> float:
-    """Good strides in a row that were learnt from, after a sample: from one strike with the heel to the next.
-
-    A stride that is not good begins the learning anew, until it is done.
-    """
-    # In the stride before the time of a stride was known for the second time the clock may have waited.
-    ends = (before.strikes < phase.strikes) & (clock.clock.strides.counted > 1.5)
-    time = clock.clock.strides.mean_time
-    good = (abs(before.since_strike - time) < EVEN * time) & (phase.heel.loaded > 0.5)
-    counted = (clock.learnt + 1.0 if good else 0.0) if ends else clock.learnt
-    return clock.learnt if is_learnt(rules, clock) else counted
-
-
 def passed_knot(
     rules: EstimationRules, clock: EstimatedClock, at: GaitClock, learnt: float, measurement: GaitMeasurement
 ) -> EstimatedClock:
     """The clock where its fraction passes a knot: learning, or moved by a part of the estimated shift."""
     ready = is_learnt(rules, clock)
+    # The first strides are averaged evenly, later ones fade in.
     stride = turned(clock.stride, measurement, rules.relearning if ready else 1.0 / (clock.learnt + 1.0))
-    window = longer_window(clock.window, measurement, clock.moved)
+    window = Window(
+        angle=(*clock.window.angle[1:], measurement.angle),
+        heel_force=(*clock.window.heel_force[1:], measurement.heel_force),
+        toe_force=(*clock.window.toe_force[1:], measurement.toe_force),
+        moved=(*clock.window.moved[1:], clock.moved),
+    )
     # A clock that was set anew by more than a knot runs after it, and its window is not of one piece.
     together = knots_passed(at.fraction, clock.next_knot) < 1.0
     filled = clock.filled + 1.0 if together else 0.0
@@ -248,9 +233,16 @@ def follow(
 ) -> EstimatedClock:
     """The clock after a sample, taken every ``period`` [s]: fractional until a stride is learnt, then estimated."""
     ready = is_learnt(rules.estimation, clock) & (clock.filled >= WINDOW)
+    # Once estimated, single events no longer move the clock, and the strike only a little.
     weight, strike_weight = 0.0 if ready else rules.anchor_weight, KEEPS if ready else 1.0
     at = next_clock(rules.delays, phase_rules, clock.clock, before, phase, weight, strike_weight, period)
-    learnt = next_learnt(rules.estimation, clock, before, phase)
+    # A stride that is not good begins the learning anew, until it is done.
+    # In the stride before the time of a stride was known for the second time the clock may have waited.
+    ends = (before.strikes < phase.strikes) & (clock.clock.strides.counted > 1.5)
+    time = clock.clock.strides.mean_time
+    good = (abs(before.since_strike - time) < EVEN * time) & (phase.heel.loaded > 0.5)
+    counted = (clock.learnt + 1.0 if good else 0.0) if ends else clock.learnt
+    learnt = clock.learnt if is_learnt(rules.estimation, clock) else counted
     if knots_passed(at.fraction, clock.next_knot) >= 0.0:
         return passed_knot(rules.estimation, clock, at, learnt, measurement)
     return clock._replace(clock=at, learnt=learnt)

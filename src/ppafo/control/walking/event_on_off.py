@@ -57,6 +57,7 @@ def update(
     held = phases.lifts(phase.phase)
     command = -1.0 if lifting > 0.5 or time.lands > 0.5 else VENT
     command = command if held else VENT
+    # Vented before toe-off, so that the gas does not hold the foot down in the swing.
     in_time = time.since_strike < parameters.push_off_end * phase.stride_time
     command = 1.0 if phase.phase == PUSH_OFF and in_time else command
     command, watch = safety.safe_command(watch, phase.phase, command, period)

@@ -233,6 +233,7 @@ HALF = 0.5
 
 def time_unchanged(last: float, reading: float, since: float, moves: bool, period: float) -> float:
     """How long a reading has been the same to the last bit [s] while something else ``moves``."""
+    # Equal to the last bit: a live sensor has noise, or at least moves by a step.
     kept = since + period if moves else since
     return kept if reading == last else 0.0
 
@@ -254,6 +255,7 @@ def next_readings(
     """
     # An ankle at exactly 0 rad does not occur: 0 marks that nothing was read yet.
     is_first = last.angle == 0.0
+    # An angle that was the same before the strike belongs to the stride before.
     same_angle = min(last.angle_unchanged, before.since_strike)
     slow_heel = slow_reading(last.slow_heel, measurement.heel_force, is_first, period)
     slow_toe = slow_reading(last.slow_toe, measurement.toe_force, is_first, period)
@@ -295,6 +297,7 @@ def range_flag(rules: SafetyRules, measurement: GaitMeasurement, thin: float) ->
     force = max(measurement.heel_force, measurement.toe_force) > rules.largest_force
     force = force | (min(measurement.heel_force, measurement.toe_force) < rules.lowest_force)
     angle = (measurement.angle < rules.lowest_angle) | (measurement.angle > rules.highest_angle)
+    # A foot far in plantarflexion compresses a full chamber 2 to any pressure: no fault of the sensor.
     squeezed = measurement.angle > SQUEEZING_ANGLE
     pressure = min(measurement.pressure_1, measurement.pressure_2) < rules.lowest_pressure
     pressure = pressure | (thin > THIN_TIME) | (measurement.pressure_1 > rules.highest_pressure)
@@ -336,17 +339,6 @@ def still_flag(rules: SafetyRules, readings: LastReadings, before: PhaseState, p
     return FROZEN_HEEL if heel & (phase.toe.loaded != before.toe.loaded) else found
 
 
-def next_late_toes(rules: SafetyRules, last: float, angle: float, before: PhaseState, phase: PhaseState) -> float:
-    """Push-offs in a row that ended late, after a sample with an ankle angle [rad].
-
-    Toes that still carry hold the foot. In the air one that is pushed turns down until its stop, within 60 ms.
-    """
-    leaves = (before.phase == PUSH_OFF) & (phase.phase == SWING)
-    counted = last + 1.0 if angle > rules.highest_toe_off_angle else last
-    counted = 0.0 if angle < rules.highest_toe_off_angle - IN_TIME else counted
-    return counted if leaves else last
-
-
 def next_landing(
     rules: SafetyRules,
     last: Landing,
@@ -362,21 +354,28 @@ def next_landing(
     A foot that is lifted turns up in the air too, but down again on its heel.
     """
     angle, swings = readings.angle, phase.phase == SWING
+    # Lowest and highest begin anew with each swing and each stance.
     lower = (swings != (before.phase == SWING)) | (angle < last.lowest)
     highest = max(last.highest - FADES * period, angle) if swings else last.highest
     strikes = (before.phase == SWING) & (phase.phase == LANDING)
     # The slow angle remembers where the foot was a moment ago, even where the swing's highest has faded.
     turned_up = max(last.highest, readings.slow_angle) - angle > TURNED_UP
     in_doubt = (angle if turned_up & (steady > 0.5) else 0.0) if strikes else last.in_doubt
+    # Turning down after the strike clears the doubt, and so does turning up from a lower angle.
     lands = (angle > in_doubt + TURNS_DOWN) | ((phase.phase == LANDING) & (not lower) & (angle > last.lowest + IS_FLAT))
     is_late = (before.phase == LANDING) & (last.in_doubt - angle > IS_FLAT)
     flat = lifts(before.phase) & (phase.phase == MID_STANCE)
+    # Toes that still carry hold the foot; in the air one that is pushed turns down to its stop within 60 ms.
+    leaves = (before.phase == PUSH_OFF) & (phase.phase == SWING)
+    # Late by more than the limit counts, clearly in time resets, between both nothing is known.
+    counted = last.late_toes + 1.0 if angle > rules.highest_toe_off_angle else last.late_toes
+    counted = 0.0 if angle < rules.highest_toe_off_angle - IN_TIME else counted
     return Landing(
         lowest=angle if lower else last.lowest,
         highest=angle if lower else highest,
         in_doubt=0.0 if lands else in_doubt,
         late=(last.late + 1.0 if is_late else 0.0) if flat else last.late,
-        late_toes=next_late_toes(rules, last.late_toes, angle, before, phase),
+        late_toes=counted if leaves else last.late_toes,
     )
 
 
@@ -390,6 +389,7 @@ def holds_pressure(rules: SafetyRules, pressure: float, expected: float, slow: f
 
     The ankle compresses the gas of a vented chamber, which then shows that pressure for as long as it flows out.
     """
+    # The ankle may compress what is left: only pressure beyond the expected counts.
     above = pressure - pressure_above(rules.nominal, expected)
     return (above > rules.filled_pressure) & (slow <= (1.0 + FALLS) * pressure)
 

@@ -81,6 +81,7 @@ def command_at(table: LearntTable, place: float) -> float:
 
 def next_knot(knot: float, weight: float, step: float, forgetting: float) -> float:
     """Command [-] of a knot after a sample of some weight: forgotten a little, moved by a step, within -1 to 1."""
+    # No command is larger, and a knot beyond it would take strides to come back.
     return max(-1.0, min(1.0, knot + weight * (step - forgetting * knot)))
 
 
@@ -105,6 +106,7 @@ def learn(
     """
     # A sample counts by its share of the time that the stride spends on a knot.
     knot_time = (profile.rise_time + profile.fall_time) * stride_time / (KNOTS - 1.0)
+    # Learnt where the error was made, a lead before: the torque follows the command late.
     place = place_in_table(profile, since_strike - rules.lead, stride_time)
     return next_table(table, place, duration / knot_time, rules.learning_gain * error, rules.forgetting)
 

@@ -170,7 +170,7 @@ OF_PASSED = 0.375
 """Part of the gas that has passed which errors of area, volume, supply and heat explain."""
 
 OFFSET, OF_PRESSURE = 1.2e4, 1.0 / 16.0
-"""Error of a pressure [Pa] that offset, step and noise explain, and its part that two degrees of the angle explain."""
+"""Error of a pressure [Pa] that offset, step and noise explain; fraction of it that two degrees of angle explain."""
 
 ALARM_TIME, ALARM_SAMPLES = 5.0e-3, 5.0
 """Time [s], and samples, that a residual lasts before it counts."""
@@ -191,6 +191,7 @@ def flow_share(nominal: NominalDevice, ratio: float) -> float:
     psi(r) = sqrt(1 - ((r - b) / (1 - b))^2), 1 below b, and a straight line to 0 at r = 1 above ``LINEAR_RATIO``.
     """
     critical = nominal.nominal_critical_ratio
+    # Nearly equal pressures take the straight line, as the model's own flow does.
     place = (min(max(ratio, critical), LINEAR_RATIO) - critical) / (1.0 - critical)
     return math.sqrt(1.0 - place * place) * min((1.0 - ratio) / (1.0 - LINEAR_RATIO), 1.0)
 
@@ -211,6 +212,7 @@ def next_coil(nominal: NominalDevice, coil: Coil, wanted: float, period: float) 
     delay = nominal.nominal_opening_delay if wanted > 0.5 else nominal.nominal_closing_delay
     target = wanted if accepts else coil.target
     waits = delay if accepts else coil.waits
+    # Share of the sample before the change: the mean position is that far between both.
     before = min(waits, period) / period
     return Coil(
         position=target if waits <= period + SAME else coil.position,
@@ -281,6 +283,7 @@ def met_chamber(
     held = content / volume
     lag = nominal.nominal_sensor_lag
     expected = measured if blind else chamber.pressure + (held - chamber.pressure) * period / (period + lag)
+    # As gas content: what no movement of the ankle changes.
     residual = (measured - expected) * volume
     # Both limits add: one grows with the gas that has passed, the other with the pressure (12 kPa and a sixteenth of
     # it).
@@ -326,15 +329,27 @@ def next_observer(
     coil_2, on_2 = next_coil(nominal, state.coil_2, 1.0 if command < 0.0 else 0.0, period)
     spool, is_pair = next_spool(nominal, state.spool, command, period), nominal.nominal_pair > 0.5
     towards_1, towards_2 = max(spool, 0.0), max(-spool, 0.0)
+    # A pair feeds by its coils' mean positions, a spool by its opening to either side.
     source_1, source_2 = on_1 if is_pair else towards_1, on_2 if is_pair else towards_2
     vent_1 = 1.0 - on_1 if is_pair else (1.0 if vents else towards_2)
     vent_2 = 1.0 - on_2 if is_pair else (1.0 if vents else towards_1)
     fed_1, fed_2 = is_fed(nominal, state.coil_1, state.spool), is_fed(nominal, state.coil_2, -state.spool)
     left = max(state.joined - period, 0.0)
+    # The joining time counts from when the coil of chamber 1 lets go.
     joined = nominal.nominal_joining_time if coil_1.position > 0.5 else left
+    # The flow is reckoned in the volume before the sample, the reading in the volume after it.
     before_1, before_2 = volumes(nominal, last_angle)
     now_1, now_2 = volumes(nominal, angle)
-    lines = filled_lines(nominal) if begins else state.lines
+    # At the start the lines are at the set pressures of their regulators.
+    lines = (
+        LineState(
+            mass_1=nominal.nominal_supply_pressure * nominal.nominal_lines.volume_1,
+            mass_2=nominal.nominal_dorsiflexion_pressure * nominal.nominal_lines.volume_2,
+            regulated_mass=0.0,
+        )
+        if begins
+        else state.lines
+    )
     to_1, to_2 = supplied(nominal, lines)
     mean_1, mean_2 = volumes(nominal, 0.5 * (nominal.nominal_angle_min + nominal.nominal_angle_max))
     # While the chambers are joined, gas passes that no nominal flow describes.
@@ -354,15 +369,6 @@ def next_observer(
         spool=spool,
         joined=joined,
         lines=next_lines(nominal, lines, taken_1, taken_2, period),
-    )
-
-
-def filled_lines(nominal: NominalDevice) -> LineState:
-    """Lines at the set pressures of their regulators, in contents [J]."""
-    return LineState(
-        mass_1=nominal.nominal_supply_pressure * nominal.nominal_lines.volume_1,
-        mass_2=nominal.nominal_dorsiflexion_pressure * nominal.nominal_lines.volume_2,
-        regulated_mass=0.0,
     )
 
 
@@ -439,8 +445,10 @@ def cause_of(
     some = measured - room > SHOWS_GAS * (chamber.pressure - room)
     # Gas that comes to a vented chamber is a valve stuck open where the supply shows, else one stuck shut under a foot.
     into_vent = (measured > NEARLY_FULL * supply) | (measured * volume > chamber.least + 0.5 * OFFSET * volume)
+    # Fed: too much, too little, or nothing at all comes.
     in_fill = SUPPLY_HIGH if gains else (SUPPLY_LOW if some else SUPPLY_LOST)
     in_vent = (VALVE_OPEN if into_vent else VALVE_SHUT) if gains else LEAK
+    # Neither fed nor vented: what comes in passes a valve, what goes passes a leak.
     closed = VALVE_OPEN if gains else LEAK
     found = in_fill if fed else (in_vent if vented else closed)
     return found if alarm else NO_FLAG

@@ -62,6 +62,7 @@ def next_switch(rules: PhaseRules, switch: Switch, force: float, period: float) 
     # Between both thresholds the switch stays as it is.
     indicated = 0.0 if force < rules.unload_threshold else switch.loaded
     indicated = 1.0 if force > rules.load_threshold else indicated
+    # A change counts once it has lasted for the debounce time; until then the old state holds.
     against = switch.contradicted + period if indicated != switch.loaded else 0.0
     switches = against >= rules.debounce and indicated != switch.loaded
     return Switch(indicated if switches else switch.loaded, 0.0 if switches else against)

@@ -147,12 +147,14 @@ def next_stance(
     # A strike is known some samples late: what loads the foot before belongs to the next stance.
     swings = phase.phase == SWING
     strikes = (before.phase == SWING) & (not swings)
+    # In the swing the largest force of the last stance is kept: it scales what leaving the ground means.
     larger = last.largest if swings else max(heel_force, toe_force)
     largest = larger if strikes else max(last.largest, larger)
     rolls = (not swings) & (toe_force - heel_force > ROLLS * largest)
     heel, toe = phase.heel.loaded, phase.toe.loaded
     both = min(heel, toe) > 0.5
     one = (phase.phase != SWING) & (min(heel, toe) < 0.5)
+    # The angle while the heel carries is the reference from which the ankle turns.
     flat = ((phase.phase == MID_STANCE) & (heel > 0.5)) | (last.flat_angle <= 0.0)
     flat_angle = angle if flat else last.flat_angle
     turns = abs(angle - flat_angle) > RESTS
@@ -174,6 +176,7 @@ def gait_flag(rules: fault_checks.SafetyRules, before: PhaseState, phase: PhaseS
     endless = max(phase.in_phase if phase.phase == SWING else 0.0, stance.apart) > longest
     stays = (before.phase != SWING) & (phase.phase != SWING) & (before.since_strike > longest)
     returns = (phase.heel.loaded > before.heel.loaded) | (phase.toe.loaded > before.toe.loaded)
+    # Not at the first strike: a walk may begin with a lifted foot.
     skips_toes = (before.phase == LANDING) & (phase.phase == SWING) & (phase.strikes > 1.5)
     # Sitting down unloads both alike, and may turn the ankle then, but late; the first step may begin anywhere.
     leaves = (phase.phase == SWING) & (stance.turned > 0.5) & (stance.largest > CARRIES)
@@ -209,6 +212,7 @@ def valve_flag(
     Chamber 2 grows then: a pressure that is still seen in it comes late. So does one that rises once it is vented.
     """
     valve_times = now.valve_times
+    # Filled for longer than any device needs, and still no pressure.
     no_rise_1 = (valve_times.filling_1 > rules.fill_time) & (measurement.pressure_1 < rules.filled_pressure)
     no_rise_2 = (valve_times.filling_2 > rules.fill_time) & (measurement.pressure_2 < rules.filled_pressure)
     stands = (phase.phase == MID_STANCE) & (phase.heel.loaded > 0.5)
@@ -234,6 +238,7 @@ def next_good_strides(state: SafetyState, before: PhaseState, phase: PhaseState,
         before.since_strike < phase.stride_time / fault_checks.HALF
     )
     good = usual & (min(state.stance.heel_seen, state.stance.toe_seen) > 0.5)
+    # A stride is judged where the next one begins.
     counted = (state.good_strides + 1.0 if good else 0.0) if enters else state.good_strides
     return -1.0 if flag > fault_flags.NO_FLAG else counted
 
@@ -245,6 +250,7 @@ def level_after(rules: fault_checks.SafetyRules, state: SafetyState, good_stride
     """
     resting = (state.level == PAUSED) & (state.finding.fault_flag == fault_flags.ENDLESS_PHASE)
     resumes = (state.level < STOPPED) & (good_strides >= rules.resume_strides)
+    # Step by step: the foot is lifted again before it is pushed.
     lifted = LIFTS if (state.level == PAUSED) & (good_strides >= LIFT_STRIDES) else state.level
     return HELPS if resumes | (resting & (together > STANDS_UP)) else lifted
 
@@ -330,24 +336,20 @@ def monitor(
     good_strides = next_good_strides(state, before, phase, flag)
     # A flag of this sample outweighs what good strides would allow.
     level = max(level_after(rules, state, good_strides, now.stance.together), fault_flags.level_of(flag))
+    # Only a rise of the level vents; a lower level gives help back.
     vents = level > state.level
     return now._replace(
         level=level,
         good_strides=good_strides,
         ventings=state.ventings + (1.0 if vents else 0.0),
-        finding=later_finding(vents, flag, measurement, state.finding),
-    )
-
-
-def later_finding(vents: bool, flag: float, measurement: GaitMeasurement, last: Finding) -> Finding:
-    """The finding of this sample where it vents the chambers, else the last one."""
-    return Finding(
-        fault_flag=flag if vents else last.fault_flag,
-        heel_force=measurement.heel_force if vents else last.heel_force,
-        toe_force=measurement.toe_force if vents else last.toe_force,
-        angle=measurement.angle if vents else last.angle,
-        pressure_1=measurement.pressure_1 if vents else last.pressure_1,
-        pressure_2=measurement.pressure_2 if vents else last.pressure_2,
+        finding=Finding(
+            fault_flag=flag if vents else state.finding.fault_flag,
+            heel_force=measurement.heel_force if vents else state.finding.heel_force,
+            toe_force=measurement.toe_force if vents else state.finding.toe_force,
+            angle=measurement.angle if vents else state.finding.angle,
+            pressure_1=measurement.pressure_1 if vents else state.finding.pressure_1,
+            pressure_2=measurement.pressure_2 if vents else state.finding.pressure_2,
+        ),
     )
 
 
@@ -372,6 +374,7 @@ def safe_command(state: SafetyState, phase: float, command: float, period: float
     """The command to the valve [-], ``VENT`` where none is permitted, and the state that records it for a time [s]."""
     sent = command if permits(state, phase) else VENT
     vents = sent > VENTS_ABOVE
+    # How long a chamber has been fed counts by the opening: half open takes twice as long.
     opening = 0.0 if vents else max(-1.0, min(1.0, sent))
     valve_times = ValveTimes(
         feed_time(state.valve_times.filling_1, opening, period),

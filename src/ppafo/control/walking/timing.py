@@ -177,6 +177,7 @@ def seen_events(before: PhaseState, phase: PhaseState) -> Events:
     """1 for each event that is detected at this sample, else 0; heel and toes only where they can be that event."""
     enters = (before.phase == SWING) & (phase.phase != SWING)
     toes_on = (before.toe.loaded < 0.5) & (phase.toe.loaded > 0.5) & (before.phase == LANDING)
+    # Only with loaded toes: a heel that unloads alone is a foot that leaves the ground.
     heel_off = (before.heel.loaded > 0.5) & (phase.heel.loaded < 0.5) & (phase.toe.loaded > 0.5)
     leaves = (before.phase != SWING) & (phase.phase == SWING)
     return Events(
@@ -210,6 +211,7 @@ def latest_fraction(phase: PhaseState, come: Events, predicts: bool) -> float:
     """
     on_ground = come.toes_off if phase.heel.loaded < 0.5 else come.heel_off
     on_ground = come.toes_on if phase.phase == LANDING else on_ground
+    # An event that was never seen is awaited at the end of the stride.
     awaited = on_ground if on_ground > 0.0 else 1.0
     strike = 1.0 + WAITS if predicts else 1.0 - WAITS
     return strike if phase.phase == SWING else awaited + WAITS
@@ -237,17 +239,6 @@ def event_of_stance(event: float, fraction: float, come: Events, seen: Events, t
     found = max(event, TOES_ON) if toes_on else event
     found = max(found, HEEL_OFF) if heel_off else found
     return TOES_OFF if toes_off else found
-
-
-def events_found(since_strike: float, stride_time: float, late: Events) -> Events:
-    """Fractions [turns] at which an event that is detected now has come; ``late`` [s] is the delay of each."""
-    now = since_strike + late.strike
-    return Events(
-        strike=0.0,
-        toes_on=(now - late.toes_on) / stride_time,
-        heel_off=(now - late.heel_off) / stride_time,
-        toes_off=(now - late.toes_off) / stride_time,
-    )
 
 
 def learnt_events(come: Events, seen: Events, found: Events, weight: float) -> Events:
@@ -280,10 +271,12 @@ def next_strides(
     no even stride.
     """
     known = strides.mean_time if strides.counted > 0.5 else first_time
+    # The first stride sets the mean if it is within half and twice the setting.
     first = (strides.counted < 0.5) & (taken > 0.5 * known) & (taken < 2.0 * known)
     near = abs(taken - known) < EVEN * known
     repeats = abs(taken - strides.last) < EVEN * strides.last
     share = max(weight, 1.0 / (strides.counted + 1.0))
+    # Like the mean: averaged. Like the last but not the mean: a new pace.
     moved = known + share * (taken - known) if near else 0.5 * (taken + strides.last)
     moved = taken if first else moved
     counts = ends & (first | near | repeats)
@@ -347,7 +340,15 @@ def next_clock(
     taken = before.since_strike + period
     on_heel, usual = phase.heel.loaded > 0.5, phase_rules.stride_weight
     strides = next_strides(clock.strides, struck, ends, on_heel, taken, phase.stride_time, usual)
-    found = events_found(phase.since_strike, strides.mean_time, late)
+    # Fractions at which an event that is detected now has come.
+    # The strike itself was detected late: time since it is longer by that delay.
+    now = phase.since_strike + late.strike
+    found = Events(
+        strike=0.0,
+        toes_on=(now - late.toes_on) / strides.mean_time,
+        heel_off=(now - late.heel_off) / strides.mean_time,
+        toes_off=(now - late.toes_off) / strides.mean_time,
+    )
     strides = paced(strides, seen, found, clock.come, weight)
     stride, predicts = strides.this_time, strides.even > 0.5
     learnt = learnt_events(clock.come, seen, found, max(usual, 1.0 / max(strides.counted, 1.0)))

@@ -122,6 +122,7 @@ def _of_plant(actuator: ActuatorModel, function: Callable[..., Any], plant: Any,
     """Result of a function of a model for numbers any of which may be arrays of one length."""
     if actuator is VANE:
         return function(plant, *given)
+    # A kind's function takes floats: where numbers are columns it is called for each combination.
     flat = leaves(plant)
 
     def alone(*values: float) -> Any:

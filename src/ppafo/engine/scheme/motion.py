@@ -219,12 +219,14 @@ def depart(
     first = (start_torque - sliding - plant.viscous_damping * velocity) * per_inertia
     last = (next_torque - sliding) * per_inertia
     next_rate = next_velocity(plant, velocity, first, next_torque - sliding, duration)
+    # Exact for an acceleration that runs linearly from first to last.
     travel = duration * velocity + duration * duration * (first + first + last) * SIXTH
     goes = moving or leaves_at_once or leaves_later
     # A vane that turned once more inside the rest of a step stops there: the next step decides what it does.
     turned = next_rate * way <= 0.0
     angle = departure.angle + (travel if goes and travel * way > 0.0 else 0.0)
     rate = next_rate if goes and not turned else 0.0
+    # A vane that meets a stop in the rest of a step stays there; its rebound would be a second event.
     hits = angle < plant.angle_min or angle > plant.angle_max
     return clamp_angle(plant, angle), (0.0 if hits else rate)
 
@@ -252,6 +254,7 @@ def begin_part(
     meets_stop = way != 0.0 and gets_there and impact <= longest
     length = impact if meets_stop else longest
     stop = plant.angle_max if way > 0.0 else plant.angle_min
+    # The path at the present acceleration: what it misses is in the error of the part.
     free_angle = clamp_angle(plant, state.angle + length * (velocity + 0.5 * length * acceleration))
     next_angle = stop if meets_stop else free_angle
     return FreePart(
@@ -321,6 +324,7 @@ def part_error(plant: PlantParameters, begun: FreePart, slid: PartSlide, angle: 
     """Error of the angle [rad] at which a part ends over what is allowed [-]."""
     sliding_torque = slid.torque - begun.way * slid.friction.in_motion
     last = (sliding_torque - plant.viscous_damping * slid.angular_velocity) * (1.0 / plant.inertia)
+    # A change of acceleration over the part bends the path by a sixth of it times the length squared.
     bent = abs(last - begun.acceleration) * length * length * SIXTH if begun.way != 0.0 else 0.0
     # The gas worked against a motion that did not happen: that is an error although the vane is where it is.
     missed = MISSED_FRACTION * abs(angle - begun.next_angle)
@@ -408,6 +412,7 @@ def end_free(
     friction = friction_now(plant, velocity + begun.acceleration * step, next_1, next_2)
     sliding_torque = next_torque - way * friction.in_motion
     full_velocity = next_velocity(plant, velocity, begun.acceleration, sliding_torque, step)
+    # '&' and no branch: the step of a walk runs on all lanes.
     slides_through = (way != 0.0) & (full_velocity * way > 0.0) & (begun.free_angle == predicted)
     return FreeEnd(
         torque=next_torque,

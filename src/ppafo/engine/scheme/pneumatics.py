@@ -419,6 +419,7 @@ def opening_error(plant: PlantParameters, begun: StillGas, shift: float, next_an
     response_2 = abs(begun.linear.d - 1.0) * abs(begun.first.mass_2)
     content_1 = volume_1 * pressure_that_matters(plant, begun.end_1)
     content_2 = volume_2 * pressure_that_matters(plant, begun.end_2)
+    # A twelfth of the product of both changes is what the mean of a product exceeds the product of means by.
     weight = 1.0 / (12.0 * GAMMA * ALLOWED_OF_PRESSURE)
     return weight * shift * step * plant.gas_product * larger_share(response_1, content_1, response_2, content_2)
 
@@ -450,6 +451,7 @@ def is_slow(plant: PlantParameters, step: float, lowest_angle: float, highest_an
     how much stiffer than at constant temperature the gas is: 1, or the heat capacity ratio, by which adiabatic chambers
     also fill faster. Any of the numbers may be an array (runs,), and the result is one then.
     """
+    # The smaller chamber fills fastest: its volume at the end of the range where it is least.
     volume = smaller(chamber_volumes(plant, lowest_angle)[0], chamber_volumes(plant, highest_angle)[1])
     # 1e-9 above, so that a step that was made from this very limit passes.
     return step * STEPS_PER_FILLING * stiffness <= filling_time(plant, volume) * (1.0 + 1.0e-9)

@@ -149,6 +149,7 @@ class FedThermalGas(NamedTuple):
 
 def with_line(flow: PortFlowSlopes, fraction: float) -> PortFlowSlopes:
     """The flow of a port whose line loses what its chamber gains; ``fraction`` as in ``with_lines``."""
+    # A chamber that draws lowers its own supply: the flow responds more strongly.
     more = flow.source_slope * fraction
     return PortFlowSlopes(
         total=flow.total,

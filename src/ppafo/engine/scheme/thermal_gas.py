@@ -120,6 +120,7 @@ def thermal_flows(
     heat_1 = wall_rate(thermal, volume_1, state.mass_1, masses.mass_1)
     heat_2 = wall_rate(thermal, volume_2, state.mass_2, masses.mass_2)
     leaked_enthalpy = leak * leak_carries.content
+    # In units of content, the work P dV of a chamber is (k - 1) times its content over its volume.
     work = (thermal.heat_capacity_ratio - 1.0) * growth
     return ThermalFlows(
         content_1=enthalpy_1 - leaked_enthalpy - work * state.mass_1 / volume_1 + heat_1,
@@ -402,6 +403,7 @@ def second_thermal_stage(thermal: ThermalParameters, begun: ThermalGas, flowing:
         flowing.in_2,
         flowing.leak,
     )
+    # Right-hand side of ROS2: the flows at the end of the first stage less twice that stage, less the drift.
     right = combine_flows(combine_flows(flows, 1.0, begun.first, -2.0), 1.0, begun.drift, -1.0)
     return solve_thermal_stage(begun.matrix, right)
 
@@ -554,7 +556,7 @@ ENERGY_BALANCE = GasScheme(
     move=lambda rows, state, assumed, reached: [
         f"{state} = {rows.add(after_motion)}(plant, thermal, {state}, {assumed}, {reached})"
     ],
-    # A held vane takes no work.
+    # A locked vane takes no work.
     work=lambda rows: (
         [] if rows.program.is_locked else [f"warmed = {rows.add(with_work)}(plant, warmed, state, after)"]
     ),

@@ -100,6 +100,7 @@ def torque_with_carried(
     active = now.moment if contact == ground.HEEL else now.healthy_torque
     muscles = active - passive_torque(leg, now.ankle)
     wearer = leg.residual_share * muscles + passive_torque(leg, angle)
+    # Grouped so that a wearer without a device walks the measured gait to the last bit.
     return wearer + heel + -carried.plate - carried.foot
 
 
@@ -261,6 +262,7 @@ def reach_end(
     predicted = clamp_angle(plant, begun.free.free_angle)
     # One direction of the foot for the whole end: where an event stops it short, the difference is of second order.
     foot = foot_direction(now.shank, predicted if free else begun.led.angle)
+    # The same for both ends of an event: the foot's direction changes little within a step.
     carried = carried_foot(leg, share, now, foot)
     torque = torque_with_carried(leg, walk.contact, now, timing.ground_angle, predicted, carried)
     slid = end_free(plant, state, ahead, begun.free, torque, step)
@@ -340,6 +342,7 @@ def advance_walk(
     ``height`` of the toes [m] against the healthy gait at the same instant, ``turned`` [rad] in this step.
     """
     strikes = landed.strikes > 0.5
+    # A foot that points down at the strike meets the ground with its toes.
     touches_first = ground.foot_angle(now.shank, state.angle) < timing.ground_angle
     toes_first = (1.0 if touches_first else 0.0) if strikes else walk.toes_first
     heel, toe = ground.ground_forces(landed.contact, timing, now, toes_first)

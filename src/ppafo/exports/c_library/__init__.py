@@ -90,6 +90,7 @@ def scenario_library(scenario: Scenario) -> Library:
 
 def commanded(scenario: Scenario) -> Scenario:
     """The plant of a scenario alone, under a command that is handed in at every step of its engine."""
+    # The engine's own step: commands come once in each, and nothing lies between.
     step = step_counts(
         scenario.run.duration, scenario.run.step, scenario.run.output_interval, scenario.controller.period
     ).step
@@ -115,6 +116,7 @@ def walk_library(configuration: "Scenario") -> Library:
     )
     from ppafo.walking.planning import plan_walk
 
+    # Before anything is planned: what cannot be exported should be said at once.
     check_can_leave(configuration)
     program = exported(batch_of(plan_walk(configuration)).program)
     settings, links = settings_of_walk(configuration), links_of_walk(configuration)

@@ -91,6 +91,7 @@ def _paths(groups: Mapping[str, type]) -> list[str]:
 
 def struct_of(name: str, groups: Mapping[str, type], name_of: NameOf) -> Shared:
     """A struct of groups of rows, without those that hold no number."""
+    # C has no empty structs.
     found = ((group, type_of(row, name_of)) for group, row in groups.items() if leaf_paths(row, group))
     return Shared(Row(name, tuple(found)))
 
@@ -109,4 +110,5 @@ def type_of(row: object, name_of: NameOf) -> Type:
     if inner and is_row(row):
         assert isinstance(row, type)
         return Row(name_of(row), inner)
+    # A tuple has no names in C either: its items are numbered.
     return Items(tuple(kind for _, kind in inner))

@@ -171,6 +171,7 @@ class Library:
 
 def c_identifier(name: str) -> str:
     """A name as C can have it."""
+    # A name in C begins with a letter here: those that begin with an underscore belong to compilers.
     found = re.sub(r"[^A-Za-z0-9]+", "_", name).strip("_").lower()
     return found if found[:1].isalpha() else f"run_{found}"
 
@@ -191,6 +192,7 @@ def library_files(library: Library) -> dict[str, bytes]:
         return "\n\n".join(add(collector, boundary) for add in written)
 
     settings = [item.name for item in library.settings]
+    # The interface is written around the functions, whose names must not hide its own.
     interface = "".join(filled(template(_FOLDER, file), words) for file in ("interface.c", surface.source))
     functions = c_text_of_run(program, title, name, settings, further if written else None, interface)
     texts[f"{name}.c"] = f"{head}{functions}\n{interface}"
@@ -245,6 +247,7 @@ def _words(library: Library, name: str) -> dict[str, str]:
             f'        print_metric("{kind.name}", metrics.{kind.name}, "{kind.unit}", "{kind.summary}");'
             for kind in program.metrics
         ),
+        # Every scenario has a supply pressure, which is what a user would try first.
         "example": next(
             f"{item.name} = {item.value!r};" for item in library.settings if item.name == "supply_pressure"
         ),
@@ -288,6 +291,7 @@ def conditions_of_program(library: Library) -> list[tuple[str, str]]:
     found = []
     for item in library.switches:
         if item.is_above:
+            # The setting that switches the program on is the one to name where all of them are 0.
             was_above = next(name for name in item.names if values[name] > 0.0)
             found.append((f"!({' || '.join(f'settings->{name} > 0.0' for name in item.names)})", was_above))
         else:
@@ -325,6 +329,7 @@ def _relations(library: Library) -> list[tuple[str, str]]:
 
 def _rules_of_times(library: Library) -> list[tuple[str, str]]:
     """Conditions on the times of a scenario as text in C, each with the setting that is named."""
+    # A plant alone has no times of a file, and a walk checks its own.
     rules = RULES_OF_TIMES if library.keeps_times and not library.program.program.walks else ()
     return [(rule.format(*(f"settings->{name}" for name in names)), named) for named, rule, names in rules]
 
@@ -333,6 +338,7 @@ def _related(item: Relation) -> tuple[str, str]:
     """That a setting does not contradict another."""
     other, sign = f"settings->{item.other}", "-" if item.relation == "at least" else "+"
     if item.tolerance:
+        # With the tolerance of files, or a setting that a file accepts would be refused in C.
         other = f"{other} * (1.0 {sign} {item.tolerance!r})" if item.is_share else f"{other} {sign} {item.tolerance!r}"
     return f"settings->{item.name} {_SIGNS[item.relation]} {other}", item.name
 
@@ -352,6 +358,7 @@ def _line_of_table(item: Setting, is_as_chosen: bool) -> str:
 
 
 def _limits(quantity: Quantity) -> tuple[float, float]:
+    # C can write no infinity as a literal; no setting is that large.
     return max(quantity.minimum, -sys.float_info.max), min(quantity.maximum, sys.float_info.max)
 
 
@@ -467,6 +474,7 @@ def choosing(device: Device) -> list[str]:
     # A valve may look only at which settings are 0, so both cases of each tell what chooses.
     for pattern in itertools.product((0.0, 0.01), repeat=len(names)):
         model = kind.choose(dict(zip(names, pattern, strict=True)))
+        # The model and whether it has a dead time: both decide which program is composed.
         chosen[pattern] = model, model.command_delay(dict(zip(names, pattern, strict=True))) > 0.0
     return [
         name

@@ -99,6 +99,7 @@ def plant_of(item: Scenario) -> PlantAlone:
     first: tuple[tuple[str, str], ...] = ()
     lead: tuple[tuple[str, str], ...] = ()
     if isinstance(motion, PrescribedMotion):
+        # An angle and its rate at each step make a ramp, which the profile of the library already is.
         said, first, lead = LED, _FIRST_ANGLE, _LEAD_ANGLE
         angle = motion.profile.start_level
         settings = {one.path: one for one in library.settings}
@@ -129,8 +130,10 @@ def plant_of(item: Scenario) -> PlantAlone:
     else:
         said, command, highest = ON_LEG, WALKING_COMMAND, VENT
     unused = ("sensors.", "motion.profile.", "motion.external_torque", "motion.ankle_torque")
+    # Times of a run and of a controller mean nothing to a plant that is stepped from outside.
     hidden = {"run.duration", "run.output_interval", "controller.period", "controller.command"}
     outputs = tuple(name for name in library.program.outputs if name not in unseen)
+    # Metrics need a whole run, which only the caller sees.
     program = replace(library.program.program, meters=(), traced=outputs)
     return PlantAlone(
         library=replace(library, program=ExportedProgram(program, ()), keeps_times=False),
@@ -154,6 +157,7 @@ def _volume_conditions(alone: PlantAlone, names: list[str]) -> list[str]:
     if "angle" not in names or alone.library.program.program.has_shape:
         return []
     plant = "run->parameters.plant"
+    # Where V = V_dead + B (angle - stop) is 0: beyond it a chamber would have no volume.
     low = f"{plant}.angle_min - {plant}.dead_volume_1 / {plant}.volume_per_angle"
     high = f"{plant}.angle_max + {plant}.dead_volume_2 / {plant}.volume_per_angle"
     ends = ["angle"]

@@ -79,6 +79,7 @@ def following_text(settings: Sequence[Setting], links: Graph, collector: Collect
         for link in reversed(found):
             number = " + ".join([*(_term(term, rows, collector) for term in link.terms), repr(link.gap)])
             source = link.sources[0]
+            # Compared with the default to the bit: a value that was written again counts as not set.
             is_set = f"{cell('settings', source)} != {settings[places[source]].value!r}"
             text = f"(({number}) if {is_set} else {text})" if link.when_set else f"({number})"
         lines.append(f"{name} = {text} if {own} == {settings[places[path]].value!r} else {own}")
@@ -210,6 +211,7 @@ class Writing:
             fields["actuator"] |= {"torque_constant": "0.0", "volume_per_angle": "0.0"}
         constant = f"{add(specific_gas_constant)}({UNIVERSAL_GAS_CONSTANT!r}, gas_molar_mass)"
         fields["gas"] = fields["gas"] | {"specific_gas_constant": constant}
+        # Lines have a check valve of their own, so that the valve may push gas back into them.
         is_relieving = self.device.supply.relieving or self.lines is not None
         fields["supply"] = fields["supply"] | {"relieving": repr(float(is_relieving))}
         for section, inner in fields.items():
@@ -233,9 +235,11 @@ class Writing:
         """Lines that make a plant from a vane's and the actuator's shape; what came from a file is constant."""
         add, actuator, model = self.add, self.device.actuator, self.program.actuator
         settings = self.section("actuator", list(actuator.settings))
+        # A file that the set names is read here, not by the library.
         measured = "" if actuator.table is None else f", {self.constant(actuator.table, 'table')}"
         yield f"stops = {add(Range)}({', '.join(self.section('actuator', Range._fields).values())})"
         yield f"shape = {add(model.prepare)}({self.row('ActuatorSettings', settings)}, stops{measured})"
+        # The mean growth is taken at the supply's pressure, at which most of the work is done.
         gauge = f"{vane}.supply_pressure - {vane}.atmospheric_pressure"
         yield f"growth = {add(mean_growth)}(shape, stops, {gauge}, {add(model.chambers)})"
         fields = [
@@ -246,6 +250,7 @@ class Writing:
 
     def _restriction(self, section: str, orifice: Any) -> str:
         """An orifice with the gas, in the form that it has."""
+        # Each form of an orifice has its own settings and its own way to a conductance.
         is_sonic = isinstance(orifice, SonicOrifice)
         names = ("sonic_conductance", "critical_ratio") if is_sonic else ("area", "discharge_coefficient")
         made = self.row("SonicOrifice" if is_sonic else "Orifice", self.section(section, names))
@@ -257,6 +262,7 @@ class Writing:
         names = [item.name for item in VALVES[self.device.valve.kind].quantities]
         yield f"valve_settings = {self.row('ValveSettings', self.section('valve', names))}"
         yield f"valve = {add(model.prepare)}(valve_settings)"
+        # The step that the counts found, not the one that was asked for.
         yield "step = counts_of_steps.step"
         yield f"command_delay = {add(model.command_delay)}(valve_settings)"
         yield f"command_steps, command_lag = {add(whole_and_rest)}(command_delay, step)"
@@ -273,6 +279,7 @@ class Writing:
             walls = self.section("gas_model", [item.name for item in gas_settings(THERMAL)])
             yield f"thermal = {add(thermal_gas)}({self.row('Walls', walls)}, gas)"
         if self.lines is not None:
+            # Droop, largest flow and volume, line by line, as the struct of the lines has them.
             of_lines = [
                 c_identifier(f"{SUPPLY_LINE}.{line}.{name}")
                 for line in SUPPLY_LINES

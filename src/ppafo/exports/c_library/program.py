@@ -60,6 +60,7 @@ class _ForOneRun(ast.NodeTransformer):
     def visit_Call(self, node: ast.Call) -> ast.expr:
         """A function over runs is called for this one."""
         self.generic_visit(node)
+        # For one run no number is a column, so the function itself is what is meant.
         if self.value_of(node.func) is not over_runs:
             return node
         return ast.copy_location(ast.Call(node.args[0], node.args[1:], node.keywords), node)
@@ -239,6 +240,7 @@ def _short(collector: SourceCollector) -> dict[str, str]:
     from ppafo.translation.c99 import is_free
 
     own = {name: name_of(item) for name, item in collector.owners.items()}
+    # A short name is taken only where it is unambiguous; all others keep their module's path.
     counts = Counter(own.values())
     taken = _names_around()
     return {name: short for name, short in own.items() if counts[short] == 1 and short not in taken and is_free(short)}
@@ -355,6 +357,7 @@ def metrics_entry(item: ExportedProgram, collector: Collector, boundary: Boundar
     kind: Any = ThermalTotals if program.is_thermal else Totals
     make: Callable[..., Any] = thermal_totals if program.is_thermal else totals
     if program.has_true_masses and not program.is_thermal:
+        # Totals of a gas that is not ideal count true masses.
         make = real_totals
     further = ", plant, thermal" if program.is_thermal else ""
     parameters = program.parameter_rows()
@@ -365,7 +368,9 @@ def metrics_entry(item: ExportedProgram, collector: Collector, boundary: Boundar
     for array in ("first", "states"):
         state = boundary.taken(array, "state", groups, collector.add)
         masses = f", {boundary.taken(array, 'masses', groups, collector.add)}" if program.has_true_masses else ""
+        # Before and after: metrics are what a run added to its totals.
         lines.append(f"{array}_total = {add(make)}({state}{masses}{further})")
+    # What a run gained: metrics need differences, since a state may begin with gas in it.
     gains = ", ".join(f"{name}=states_total.{name} - first_total.{name}" for name in kind._fields)
     meters = ", ".join(
         f"{name}={boundary.taken('states', group, groups, collector.add)}"

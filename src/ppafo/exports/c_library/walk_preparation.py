@@ -1,4 +1,4 @@
-"""From the settings of a walk to the numbers of a run: one composed function, which calls those of the planning.
+"""From the settings of a walk to the numbers of a run: one composed function that calls the planning.
 
 What a gait comes to (series, events, how its heel rolls) and a course in time are numbers written out.
 """
@@ -193,6 +193,7 @@ def preparation_of_walk(configuration: Scenario, program: Program, collector: Co
 
 def _leg(configuration: Scenario, writing: Writing) -> Iterator[str]:
     """Lines that make the leg, the gait on it, and the plant with both."""
+    # The rocker is fitted to the gait here: a fit has no place in a library.
     add, fit = writing.add, fit_rocker(walk_of(configuration).gait)
     yield f"wearer = {writing.row('Wearer', writing.section('wearer', [item.name for item in WEARER]))}"
     fitted = ", ".join(map(repr, fit))
@@ -228,8 +229,10 @@ def _plant_faults(configuration: Scenario, writing: Writing) -> Iterator[str]:
 def _fault(writing: Writing, kind: str, names: Mapping[str, str]) -> str:
     """A fault of a sensor from its settings, or none."""
     if not kind:
+        # A sensor without a fault has one that never begins, so that one program serves both.
         return f"{writing.add(fixed_fault)}({NEVER!r}, 0.0, 0.0, 0.0)"
     if kind != DISTORTED:
+        # A frozen sensor keeps its last value; the other kinds show a reading of their own.
         holds = 1.0 if kind == FROZEN else 0.0
         reading = names.get("reading", "0.0")
         return f"{writing.add(fixed_fault)}({names['time']}, {holds!r}, {reading}, {names['period']})"
@@ -243,6 +246,7 @@ def _steps(configuration: Scenario, writing: Writing) -> Iterator[str]:
     if configuration.supply_lines is not None:
         volumes = (c_identifier(f"supply_line.{line}.volume") for line in SUPPLY_LINES)
         yield f"volume = min(volume, {', '.join(volumes)})"
+    # Adiabatic gas is stiffer by the heat capacity ratio, so its steps are shorter.
     stiffness = "1.0" if configuration.gas_model is None else "gas_heat_capacity_ratio"
     given = "run_duration, run_step, run_output_interval, controller_period"
     yield f"counts_of_steps = {writing.add(walk_step_counts)}({given}, plant, volume, {stiffness})"

@@ -79,11 +79,13 @@ def build(name: str, sources: Mapping[str, bytes], main: str) -> bytes:
 
 def build_library(name: str, sources: Mapping[str, bytes], main: str, flags: Sequence[str]) -> bytes:
     """A library of some sources for a platform; ProgramError as in ``build``."""
+    # No -march: a unit runs on processors that nobody here has seen.
     command = [*compiler_for(name), *FLAGS, *flags]
     with tempfile.TemporaryDirectory() as folder:
         for file, content in sources.items():
             (Path(folder) / file).write_bytes(content)
         library = Path(folder) / f"unit{PLATFORMS[name].suffix}"
+        # Windows has the mathematics in its C library.
         mathematics = [] if name == "win64" else ["-lm"]
         done = asked([*command, main, "-o", library.name, *mathematics], _ANOTHER, folder)
         if done.returncode != 0:
@@ -115,6 +117,7 @@ def compiler_for(name: str) -> Sequence[str]:
     raise ProgramError(f"platform {name} needs {needed} (pip install 'ppafo[native]')")
 
 
+# The earliest date of a zip file: a unit does not depend on the day on which it was made.
 _FIRST_DAY = (1980, 1, 1, 0, 0, 0)
 _HEADERS = {
     2: ("fmi2FunctionTypes.h", "fmi2Functions.h", "fmi2TypesPlatform.h"),
@@ -136,7 +139,16 @@ _LOOP_TUNING = (
 
 def functional_unit(interface: Interface, fmi: int, platforms: Sequence[str]) -> dict[str, bytes]:
     """A unit by the name of its file. ProgramError for what cannot be translated or built."""
-    chosen = {name: _platform(name, fmi) for name in platforms}
+    # Before anything is built: a misspelt platform should not cost a compilation.
+    chosen = {}
+    for name in platforms:
+        found = PLATFORMS.get(name)
+        if found is None:
+            hint = nearest_name(name, PLATFORMS)
+            raise ScenarioError(f"platform '{name}' is not known{hint}; available: {', '.join(PLATFORMS)}")
+        if fmi == 2 and found.folder_2 is None:
+            raise ScenarioError(f"platform {name} has no name in FMI 2: take --fmi 3")
+        chosen[name] = found
     identifier = interface.library.name
     sources = _sources(interface, fmi)
     token = hashlib.sha256(b"".join(sources.values())).hexdigest()[:32]
@@ -177,16 +189,6 @@ def closed_loop(item: Scenario) -> Interface:
         inputs=(),
         words={},
     )
-
-
-def _platform(name: str, fmi: int) -> Platform:
-    found = PLATFORMS.get(name)
-    if found is None:
-        hint = nearest_name(name, PLATFORMS)
-        raise ScenarioError(f"platform '{name}' is not known{hint}; available: {', '.join(PLATFORMS)}")
-    if fmi == 2 and found.folder_2 is None:
-        raise ScenarioError(f"platform {name} has no name in FMI 2: take --fmi 3")
-    return found
 
 
 def _sources(interface: Interface, fmi: int) -> dict[str, bytes]:
@@ -245,6 +247,7 @@ def _archive(contents: Mapping[str, bytes]) -> bytes:
         for name, content in contents.items():
             item = zipfile.ZipInfo(name, _FIRST_DAY)
             item.compress_type = zipfile.ZIP_DEFLATED
+            # Permissions of Unix in the upper half; a library must be executable for some tools.
             item.external_attr = (0o755 if name.startswith("binaries/") else 0o644) << 16
             archive.writestr(item, content)
     return target.getvalue()
@@ -260,7 +263,7 @@ PLANT_TUNING = "They are taken at the next communication step."
 def plant_alone(item: Scenario) -> Interface:
     """The plant; an unconstrained vane takes an external torque, one with a prescribed angle takes angle and rate.
 
-    For a walk it is the device on its walking leg, which takes the command alone. It equals that of ``export c``.
+    For a walk it is the device on its walking leg, which takes the command alone. ``export c`` writes the same plant.
     """
     alone = surfaced(plant_of(item))
     library = alone.library

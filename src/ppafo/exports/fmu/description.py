@@ -156,12 +156,14 @@ def description_of_fmi2(interface: Interface, identifier: str, token: str) -> by
         canNotUseMemoryManagementFunctions="true",
         canHandleVariableCommunicationStepSize=_truth(not interface.is_step_fixed),
     )
+    # One file that takes the others in: tools that build from source need no list.
     Xml.SubElement(Xml.SubElement(kind, "SourceFiles"), "File", name="fmi2.c")
     _units(root, variables)
     categories = Xml.SubElement(root, "LogCategories")
     Xml.SubElement(categories, "Category", name="logStatusError", description="why a call failed")
     _experiment(root, interface)
     table = Xml.SubElement(root, "ModelVariables")
+    # FMI 2 counts variables by their place in the list, from 1.
     places = {item.number: place for place, item in enumerate(variables, start=1)}
     for item in variables:
         row = Xml.SubElement(table, "ScalarVariable", _scalar(item))
@@ -198,6 +200,7 @@ def description_of_fmi3(interface: Interface, identifier: str, token: str) -> by
     Xml.SubElement(categories, "Category", name="logStatusError", description="why a call failed")
     _experiment(root, interface)
     table = Xml.SubElement(root, "ModelVariables")
+    # Clock and time get numbers behind all variables of the C.
     first = 1 + max(item.number for item in variables)
     if interface.clock is not None:
         clock = {"valueReference": str(first), "description": interface.clock, "causality": "output"}

@@ -175,6 +175,7 @@ def stop_by_interrupt() -> Iterator[Callable[[], bool]]:
     def ask(_signal: int, _frame: object) -> None:
         if asked.is_set():
             raise KeyboardInterrupt
+        # The first signal lets the run vent and end in order; only the second one breaks it off.
         asked.set()
 
     if threading.current_thread() is not threading.main_thread():
@@ -338,6 +339,7 @@ class Bench:
         # Send the first sample until it is answered; false where it was not.
         self.judge.sent = 0
         self._show(wire.BEGIN)
+        # The first sample is repeated until somebody answers: a controller may be started later than the plant.
         first = wire.sample_bytes(self._shown)
         for _ in range(max(1, math.ceil(patience / _CALL_INTERVAL))):
             self.port.send(first)
@@ -361,6 +363,7 @@ class Bench:
                 self.port.send(wire.sample_bytes(self._shown))
             self._exchange(sent, late)
         stopped = self._is_going_on
+        # A stopped run goes on vented for half a second, so that its end can be seen in the recording.
         if stopped:
             self._vent_to_the_end()
         self._say_over()

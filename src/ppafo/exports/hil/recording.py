@@ -108,12 +108,14 @@ class Collector:
             self.ignored["of another run"] += 1
             return False
         self.is_over = self.is_over or bool(packet.flags & wire.OVER)
+        # Columns of a file are fixed by its first sample.
         if packet.counts.keys() != first.counts.keys():
             self.ignored["with other channels"] += 1
             return False
         # Numbers of 32 bits wrap after 50 days at 1 kHz, time stamps after 71 minutes: both are taken as steps from the
         # newest.
         number = self._newest + _difference(packet.sequence, self._newest)
+        # UDP may double a packet, and a repeated sample would be a step of 0 s.
         if number in self._seen:
             self.ignored["doubled"] += 1
             return False
@@ -239,6 +241,7 @@ def kept_aside(target: Path) -> Iterator[Callable[[str], None]]:
     """
     aside = target.with_name(f"{target.stem}{ASIDE}{target.suffix}")
     try:
+        # Exclusive: two recordings with one target must not write into one file.
         file = os.open(aside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
     except FileExistsError:
         raise DataError(
@@ -262,6 +265,7 @@ def kept_aside(target: Path) -> Iterator[Callable[[str], None]]:
     try:
         yield keep
     except (DataError, KeyboardInterrupt) as error:
+        # An empty file says nothing and goes away.
         if os.fstat(file).st_size:
             left = f"; what came is in {aside}"
             raise type(error)(f"{str(error) or 'interrupted'}{left}") from error

@@ -224,7 +224,7 @@ class HardwareRun:
         return "\n".join([*lines, *([f"port       {exchange.failure}"] if exchange.failure else [])])
 
     def files(self) -> dict[str, bytes]:
-        """The files beside those of a result, by name."""
+        """The files beside a result's own, by name."""
         # The log as a table; an empty cell is something that was not there.
         buffer = io.StringIO()
         writer = csv.writer(buffer, lineterminator="\n")
@@ -242,6 +242,7 @@ class HardwareRun:
             found |= {f"link.{form}": content for form, content in figure.items()}
         vented_at = self.exchange.vented_at
         if vented_at is not None and len(before := self.result.recording.time[self.result.recording.time < vented_at]):
+            # A fit wants the part in which the controller acted.
             found["until-vented.csv"] = marked_csv_bytes(self.result.recording.between(0.0, float(before[-1])))
         return found
 
@@ -294,6 +295,7 @@ def run_plant(
     # Not from a seed: packets of an earlier run that are still under way must have another number.
     number = random.SystemRandom().randint(0, _LARGEST_RUN) if run is None else run
     before = load_now()
+    # Built before the clock starts: arrays and programs take milliseconds.
     begun = plant.begin()
     with without_collections():
         exchange = Bench(begun, plant.period, port, pace(plant.period), number).run(patience, is_stopped)
@@ -316,6 +318,7 @@ def run_at(
     """Open a port and run a scenario's plant there; ``say`` hears of a rate that does not fit, and of the call."""
     port = wire.open_port(port_name, baud)
     try:
+        # A datagram has no line whose rate could be too low.
         if port.is_stream:
             check_baud(baud, rate)
         plant, period = plant_of(scenario, rate), scenario.controller.period

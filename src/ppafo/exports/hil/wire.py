@@ -172,6 +172,7 @@ class Reader:
                 break
             self._drop("stray bytes", at)
             waiting, at = waiting[at:], 0
+            # The head is checked before all bytes are there: a wrong length would wait for bytes that never come.
             why = _wrong_head(waiting)
             if why is None and (len(waiting) < _HEADER.size or len(waiting) < waiting[4]):
                 break
@@ -233,8 +234,10 @@ def _read(data: bytes) -> Packet | str:
         return answer if is_good else "content"
     (mask,) = _MASK.unpack_from(data, _HEADER.size)
     names = [channel.name for number, channel in enumerate(CHANNELS) if mask >> number & 1]
+    # Bits of channels that this version does not know, or a length that is not theirs.
     if mask >> len(CHANNELS) or len(data) != sample_length(len(names)):
         return "content"
+    # Little-endian and signed, as the protocol says, whatever this computer is.
     values = struct.unpack_from(f"<{len(names)}i", data, _HEADER.size + _MASK.size)
     counts = dict(zip(names, values, strict=True))
     return Sample(flags=flags, run=run, sequence=sequence, time=time, counts=counts)
@@ -294,6 +297,7 @@ class UdpPort:
         self.strangers = 0
         self._socket = own
         self._other = other
+        # The plant's time must not stop in a full buffer.
         self._socket.setblocking(False)
 
     def send(self, data: bytes) -> None:

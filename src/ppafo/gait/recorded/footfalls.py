@@ -171,6 +171,7 @@ def force_of_plates(
                 ends = [np.inf if end is None else end + step for _, end in own]
                 spans = zip(starts, ends, strict=True)
                 inside = np.any([(plate.time >= low) & (plate.time <= high) for low, high in spans], axis=0)
+                # Only over this foot's contacts: the same plate may carry the other foot before or after.
                 force = np.where(inside, plate.values, 0.0)
                 other = 0.0 if total is None else np.interp(plate.time, total.time, total.values)
                 total = Signal(table.file, table.time, force + other)
@@ -190,6 +191,7 @@ def _is_own(contact: Contact, plate: Signal, shank: Signal) -> bool:
     start, end = max(float(start), float(shank.time[0])), min(float(end), float(shank.time[-1]))
     if end <= start:
         return False
+    # Over its own contact the shank leans forward, so that its angle falls.
     before, after = np.interp([start, end], shank.time, shank.values)
     least = _LEAST_LEAN if None not in contact else _LEAST_LEAN_OF_PART
     return bool(before - after > least * np.ptp(shank.values))
@@ -220,6 +222,7 @@ def wrap_cycle(walk: Mapping[str, Signal]) -> Cycle | None:
     """Return a record of one cycle three times over, None where its start and end are not the same motion."""
     start = max(walk[name].time[0] for name in REQUIRED)
     end = min(walk[name].time[-1] for name in REQUIRED)
+    # One even clock for both curves, whatever the rates of their files.
     time = np.arange(start, end, 1.0 / _RATE)
     shortest = max(_SHORTEST, (end - start) / LONGEST)
     first = int(np.ceil(shortest * _RATE))
@@ -236,6 +239,7 @@ def wrap_cycle(walk: Mapping[str, Signal]) -> Cycle | None:
         [np.sqrt(np.mean((features[:, shift:] - features[:, : time.size - shift]) ** 2)) for shift in shifts]
     )
     best = int(np.argmin(misfits))
+    # Start and end are not the same motion: the record is no whole cycle, or the walk is not steady.
     if misfits[best] > _MISFIT:
         return None
     period = float(shifts[best]) / _RATE
@@ -258,6 +262,7 @@ def _repeat(signal: Signal, span: tuple[float, float], period: float, is_load: b
     values, later = (np.interp(one + shift, signal.time, signal.values) for shift in (0.0, period))
     overlap = min(end, float(signal.time[-1])) - start - period
     inside = one <= start + max(overlap, 0.0)
+    # A position goes on by the distance walked in a cycle.
     way = float(np.mean((later - values)[inside])) if signal.is_position else 0.0
     weight = np.clip((one - start) / overlap, 0.0, 1.0) if overlap > 0.0 else np.ones(count)
     blend = weight * values + (1.0 - weight) * (later - way)
@@ -316,6 +321,7 @@ def find_footfalls(
     cycle = wrap_cycle(walk)
     if cycle is None:
         return found
+    # Three cycles in a row have one whole stride in the middle, wherever the record begins.
     again = _of_walk(cycle.walk, (), side, 1)
     whole = usable_strides(cycle.walk, again.strides)
     if not whole:
@@ -358,11 +364,13 @@ def _of_walk(walk: Mapping[str, Signal], tables: Sequence[MotionTable], side: Si
 def _strides_of_file(tables: Sequence[MotionTable], side: Side) -> list[Stride]:
     """Return the strides between the events that a C3D file has of a foot; a stride needs its toe-off."""
     trials = [table.trial for table in tables if table.trial is not None]
+    # Events of two trials have two clocks.
     if len(trials) != 1:
         return []
     strikes, offs = trials[0].strikes(side), trials[0].offs(side)
     strides = []
     for start, end in pairwise(strikes):
+        # Two toe-offs between two strikes are a missed strike: such a stride is none.
         between = [time for time in offs if start < time < end]
         if len(between) == 1:
             strides.append(Stride(start, between[0], end))
@@ -380,6 +388,7 @@ def _by_contacts(strides: list[Stride], contacts: Sequence[Contact]) -> tuple[li
     ]
     if not early:
         return strides, "strides from the shank, which no plate corrects: heel strikes and toe-offs are less exact"
+    # Strikes and toe-offs of the shank are early or late by one time for a person, which the plates show.
     strike, off = (float(np.mean(values)) for values in zip(*early, strict=True))
     moved = [Stride(item.start + strike, item.toe_off + off, item.end + strike) for item in strides]
     return moved, (

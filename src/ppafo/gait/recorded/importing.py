@@ -113,6 +113,7 @@ def over_strides(name: str, curves: Floats, strides: Sequence[Stride]) -> CurveS
     if name == "centre_of_pressure":
         percent = phases()
         fraction = float(np.mean([item.stance_share for item in strides]))
+        # Without its ends: where hardly any force acts its place has no meaning.
         inside = (percent > _UNLOADED_FORCE) & (percent < fraction - _UNLOADED_FORCE)
         at, first = percent[inside], float(mean[inside][0])
         # The line over the swing goes on into the next stride, where the stance begins again.
@@ -143,6 +144,7 @@ def of_usual_time(strides: Sequence[Stride], least: int) -> Strides:
     """Return strides without those whose time differs from the median by more than LARGEST_STRIDE_CHANGE of it."""
     if not strides:
         return Strides((), (), least)
+    # The median: one stop among ten strides would move a mean.
     median = float(np.median([item.time for item in strides]))
     kept = [item for item in strides if abs(item.time - median) <= LARGEST_STRIDE_CHANGE * median]
     why = "{:.3g} s long, the others are about " + f"{_mean([item.time for item in kept]):.3g} s"
@@ -229,6 +231,7 @@ def without_odd_shapes(curves: Mapping[str, CurveStatistics], strides: Strides) 
         if len(item.strides) < _FEWEST_TO_COMPARE or name == "centre_of_pressure":
             continue
         middle = np.median(item.curves, axis=0)
+        # From the median curve, which one odd stride does not move.
         away = np.abs(item.curves - middle)
         is_odd = np.zeros(len(item.strides), dtype=bool)
         for share, distances in ((ODD_SHAPE, np.sqrt(np.mean(away**2, axis=1))), (ODD_PHASE, np.max(away, axis=1))):
@@ -332,6 +335,7 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: li
     if len(tables) < len(files):
         raise_noted(wrong)
     if settings.columns is None:
+        # Only without a map: a user's map names the columns as the file has them.
         tables = [arranged(table) for table in tables]
     settings, said = _with_subject(settings, tables, wrong)
     # Without a body mass loads are looked at per kg of 1 kg, and scaled to 1 below.
@@ -347,6 +351,7 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: li
         columns = columns.model_copy(update={"ankle_angle": columns.ankle_angle.model_copy(update=neutral)})
     mapped = [getattr(columns, name) for name in GaitMap.model_fields if name != "schema_version"]
     names = [name.removeprefix("-") for item in mapped if item is not None for name in column_names(item)]
+    # Only the columns in use: a gap elsewhere needs no word.
     tables = [fill_gaps(table, names, settings.longest_gap) for table in tables]
     walk = walk_signals(tables, columns, person, settings.columns is None, wrong)
     if settings.body_mass is None:
@@ -455,6 +460,7 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
     source = read_source(files, settings, wrong)
     settings = source.settings
     walk: Mapping[str, Signal] = source.walk
+    # A force in a wrong unit is noted, and scaled to 1 so that its events are still found.
     force = walk.get(FORCE)
     if force is not None:
         try:
@@ -646,6 +652,7 @@ def _sampling_remarks(walk: Mapping[str, Signal], strides: Sequence[Stride]) -> 
     if force is None:
         return said
     spans = [(item.toe_off, item.end, _WITHIN_SWING * (item.end - item.toe_off)) for item in strides]
+    # Only the middle of the swing: at its ends the foot may still be on the plate.
     swings = [force.values[(force.time > off + slack) & (force.time < end - slack)] for off, end, slack in spans]
     scatter = max((float(np.std(values)) for values in swings if values.size > 1), default=0.0)
     if scatter > _NOISY_FORCE:

@@ -36,6 +36,7 @@ def form_of(path: str | Path, name: str = "") -> GaitForm:
                 f"there is no gait form '{one_line(name)}'{nearest_name(name, FORMS)}; available: {', '.join(FORMS)}"
             )
         return form
+    # Any form may know the suffix: forms of other packages are loaded before it is refused.
     FORMS.load_all()
     # Forms of other packages are asked first: a user who installs one wants it for his files.
     forms = sorted(FORMS.loaded().values(), key=lambda item: FORMS.is_own(item.name))
@@ -79,6 +80,7 @@ def find_convention(tables: Sequence[MotionTable], side: Side, body_mass: float)
         columns[name] = fitting[0] if fitting else choices[0]
     plates = tuple(dict.fromkeys(plate for item in found for plate in item.plates))
     remarks = tuple(dict.fromkeys(remark for item in found for remark in item.remarks))
+    # A force by the name of this foot is surer than contacts chosen by the lean of the shank.
     has_force = any(_is_there(columns["vertical_force"], table) for table in tables)
     return Convention(GaitMap(**columns), () if has_force else plates, remarks)
 

@@ -70,6 +70,7 @@ def cut_table(
     high = float(table.time[-1] if end is None else end)
     steps = np.diff(table.time)
     median = float(np.median(steps))
+    # Gaps outside of what is used do not matter.
     seen = (table.time[:-1] >= low) & (table.time[1:] <= high)
     jumps = np.flatnonzero(seen & (steps > _LARGEST_JUMP * median)).tolist()
     for index in jumps:
@@ -112,6 +113,7 @@ def fill_gaps(table: MotionTable, names: Iterable[str], longest: float) -> Motio
         short = [gap for gap in stretches if time[gap[1]] - time[gap[0] - 1] <= longest + 1e-9]
         if not short:
             continue
+        # Through all that was seen, not only the neighbours of the gap: slopes at its ends count.
         through = CubicSpline(time[known], whole[known])
         for first, last in short:
             whole[first:last] = through(time[first:last])

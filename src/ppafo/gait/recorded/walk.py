@@ -175,6 +175,7 @@ def find_columns(
 ) -> CurveColumns | None:
     """Return the one table that has every column of a curve; None where it may be missing and no table has one."""
     bare = [name.removeprefix("-") for name in names]
+    # One table must have all terms: files need not share a clock to the sample.
     holders = [table for table in tables if all(name in table.columns for name in bare)]
     if len(holders) > 1:
         files = " and ".join(table.file for table in holders)
@@ -227,7 +228,9 @@ def foot_markers_angle(found: CurveColumns, mapped: AngleMap, shank: Signal) -> 
     lean = np.interp(time, shank.time, shank.values)
     flat = np.zeros(time.size, dtype=np.bool_)
     if time.size >= 3:
+        # Flat: the foot hardly turns while the shank leans over it. The median of these samples is the zero.
         flat = (np.abs(np.gradient(values, time)) < _SLOW) & (np.gradient(lean, time) < 0.0)
+    # Less than a tenth of a second of flat foot may be a pause of the swing.
     if np.count_nonzero(flat) < _LEAST_FLAT * seen.rate:
         raise DataError(
             f"{found.table.file}: the line from {mapped.heel!r} to {mapped.toe!r} never stands still while the "
@@ -287,6 +290,7 @@ def knee_signals(
                 f"{-height:.2f} m with the other sign: its sign is reversed; correct it in the file, or change the "
                 "sign of knee.up in a gait map"
             )
+        # The file has the hip: the knee follows by the lean of the thigh.
         forward, up = knee_position(forward, up, lean, _thigh_length(mapped, stature))
     file, time = found.table.file, found.table.time
     columns = tuple(dict.fromkeys(name for _, name in found.terms))
@@ -343,6 +347,7 @@ def acceleration_of(position: Floats, harmonics: int, stride_time: float) -> Flo
     The mean speed is taken out, a Fourier series fitted, and the series differentiated twice.
     """
     phase = np.linspace(0.0, 1.0, position.size)
+    # A straight line through both ends leaves a periodic rest, which a series can follow.
     curve, _ = fit_curve(position - (position[-1] - position[0]) * phase, harmonics)
     return curve.derivative(stride_time).derivative(stride_time).values_at(phase)
 

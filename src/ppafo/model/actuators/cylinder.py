@@ -109,6 +109,7 @@ def problem(settings: Mapping[str, float], stops: Range) -> str:
     """A rod as wide as the bore, or a lever that comes to its dead centre between the stops."""
     if settings["rod_diameter"] >= settings["bore"]:
         return "rod_diameter must be below bore"
+    # Both stops suffice: between them the angle runs from one to the other, and the sine has no minimum inside.
     between = [angle + settings["lever_offset"] for angle in (stops.angle_min, stops.angle_max)]
     if min(between) <= 0.0 or max(between) >= math.pi or min(math.sin(angle) for angle in between) < LEAST_SINE:
         low, high = (math.degrees(angle) for angle in between)

@@ -126,6 +126,7 @@ def mean_growth(shape: Any, stops: Range, gauge: float, chambers: Callable[..., 
     still = AtRest(shape, 0.0)
     first = chambers(still, stops.angle_min, gauge, 0.0).volume_1
     last = chambers(still, stops.angle_max, gauge, 0.0).volume_1
+    # 1e-9 rad: stops that coincide must not divide by 0.
     return (last - first) / max(stops.angle_max - stops.angle_min, 1.0e-9)
 
 

@@ -182,6 +182,7 @@ def climb(rise: Rise, gain: Level, volume: float, found: float, content: float, 
     # Stretches from the lowest up: the last one that the content reaches says the pressure.
     inside = pressure_in(stretch, content, begin)
     beyond = content / (volume + gain.volume)
+    # Above the last measured pressure the volume is constant.
     own = inside if inside < begin + rise.length else beyond
     return own if content > begin * volume else found
 

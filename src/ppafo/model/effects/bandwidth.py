@@ -26,6 +26,7 @@ class SensorState(NamedTuple):
 
 def prepare(settings: Any, _device: Any) -> SensorRates:
     """How fast sensors with some bandwidths [Hz] follow."""
+    # A first order with a bandwidth f (-3 dB) follows at the rate 2 pi f.
     turn = 2.0 * math.pi
     return SensorRates(angle=turn * settings["angle_bandwidth"], pressure=turn * settings["pressure_bandwidth"])
 

@@ -48,6 +48,7 @@ def prepare(settings: Any, _device: Any) -> CoilHeating:
     It is within 0.6 % of the formula for every allowed rise and share, and needs no logarithm in each step.
     """
     steady, share = settings["steady_rise"], settings["pull_in_share"]
+    # A parabola through three points of the formula, exact at no rise, half and full rise.
     half, full = slower(0.5 * steady, share) - 1.0, slower(steady, share) - 1.0
     # Without a rise both differences are 0, and so is the parabola.
     whole = max(steady, 1.0e-30)

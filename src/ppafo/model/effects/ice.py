@@ -46,6 +46,7 @@ def advance(ice: Ice, ice_state: IceState, _before: Moment, after: Moment, step:
 
 def slopes(ice: Ice, ice_state: IceState, now: Moment) -> IceState:
     """Rate of the blockage [1/s]."""
+    # The same balance as in ``advance``, for the solver in continuous time.
     return IceState(ice.blockage_per_gas * max(now.vented_flow, 0.0) - ice.melting * ice_state.blockage)
 
 

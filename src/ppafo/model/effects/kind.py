@@ -128,6 +128,7 @@ class Effect:
         """Whether the effect is on with some settings; for arrays (runs,) among them an array of truth values."""
         found: Any = self.always
         for name in self.switch:
+            # Not "or": settings may be columns of an ensemble.
             found = found | (settings[name] > 0.0)
         return found
 
@@ -159,6 +160,7 @@ def _problems(effect: Effect) -> Iterator[str]:
     if not effect.always:
         yield from _problems_of_switch(effect)
     for name, defaults in effect.of_gas.items():
+        # A gas without a default would silently get another gas's number.
         lacking = [species for species in SPECIES if species not in defaults]
         if lacking or all(item.name != name for item in effect.quantities):
             missing = f"has no default for {', '.join(lacking)}" if lacking else "is no quantity"
@@ -173,6 +175,7 @@ def _problems_of_switch(effect: Effect) -> Iterator[str]:
     for item in effect.quantities:
         if item.default is None:
             yield f"'{item.name}' has no default: a device that says nothing of an effect must be without it"
+    # A switch below 0 would be on or off by its sign.
     lowest = {item.name: item.minimum for item in effect.quantities}
     if not effect.switch:
         yield "has no switch"
@@ -200,6 +203,7 @@ def laws_in_order(effects: Sequence[Effect]) -> dict[Any, Any]:
                     f"effects '{last[port].name}' and '{effect.name}' both act on {port.__name__}, and "
                     f"{law.__name__} of '{effect.name}' does not call it: switch one of them off"
                 )
+            # A law that calls its port gets what stood there before it.
             found[law, port] = found.get(port, port)
             found[port], last[port] = law, effect
     return found

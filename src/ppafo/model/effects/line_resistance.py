@@ -24,6 +24,7 @@ def prepare(settings: Any, device: Any) -> LineResistance:
         gas.specific_gas_constant,
         gas.temperature,
     )
+    # Without an area there is no line and no loss, and a conductance of 0 would divide by 0.
     return LineResistance(1.0 / (conductance * conductance) if area > 0.0 else 0.0)
 
 

@@ -33,6 +33,7 @@ def spool_position(position: float, command: float, play_width: float) -> float:
     """
     half = 0.5 * play_width
     inner = position * (1.0 - half)
+    # The play operator: the inside moves only as far as the command pushes it.
     inner = max(command - half, min(command + half, inner))
     return max(-1.0, min(1.0, inner / (1.0 - half)))
 

@@ -78,6 +78,7 @@ class ValveKind:
     lag: Callable[[Mapping[str, float]], float] | None = None
 
 
+# Beyond full opening, so that one number says both, and no rounding of -1 to 1 comes near it.
 VENT = 2.0
 """Joins both chambers to the atmosphere: solenoids off; a proportional valve needs a vent valve for it."""
 

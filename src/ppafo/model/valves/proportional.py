@@ -149,6 +149,7 @@ def shift_of_spool(state: SpoolState, next_state: SpoolState) -> float:
 def openings_of(opening: float) -> Openings:
     """Fractions [-] of the full area for an opening from -1 to 1 (clipped); above 0 feeds chamber 1. Equation (8)."""
     clipped = max(-1.0, min(1.0, opening))
+    # One spool: what opens chamber 1 to the source opens chamber 2 to the atmosphere.
     towards_1 = max(clipped, 0.0)
     towards_2 = max(-clipped, 0.0)
     return Openings(source_1=towards_1, vent_1=towards_2, source_2=towards_2, vent_2=towards_1)
@@ -182,6 +183,7 @@ def instant_moving(valve: MovingProportional, state: SpoolState, command: float)
 def rates_moving(valve: MovingProportional, state: SpoolState, command: float) -> SpoolState:
     """Rates of the requested and of the actual opening [1/s], and the second derivative of the opening [1/s^2]."""
     target = opening_of_command(command, valve.dead_band)
+    # Between two events the request stands or moves at the limit; the solver meets the arrival as an event.
     slew = 0.0 if target == state.requested else (valve.slew_limit if target > state.requested else -valve.slew_limit)
     if valve.frequency == 0.0:
         return SpoolState(slew, slew, 0.0)
@@ -278,6 +280,7 @@ def dead_time(settings: Mapping[str, float]) -> float:
 def lag(settings: Mapping[str, float]) -> float:
     """Time [s] until the opening has followed a command: dead time, spool, and the way at the slew limit."""
     frequency, slew_limit = settings["spool_frequency"], settings["slew_limit"]
+    # Mean delay of a second-order system: 2 d / w.
     spool = 2.0 * settings["spool_damping_ratio"] / (2.0 * math.pi * frequency) if frequency > 0.0 else 0.0
     slew = 1.0 / slew_limit if slew_limit > 0.0 else 0.0
     return settings["delay"] + spool + slew
@@ -322,6 +325,7 @@ MOVING = ValveModel(
 
 def choose(settings: Mapping[str, float]) -> ValveModel:
     """The ideal model where nothing moves, else the moving one, from ``settings`` [SI]."""
+    # A delay needs the moving model too: its command arrives inside a step.
     at_once = settings["spool_frequency"] == 0.0 and settings["slew_limit"] == 0.0 and settings["delay"] == 0.0
     return IDEAL if at_once else MOVING
 

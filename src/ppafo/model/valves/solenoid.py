@@ -98,18 +98,13 @@ def accept_time(coil: Coil, switching_interval: float, time: float) -> float:
     return max(time, coil.accepted_time + switching_interval)
 
 
-def flow_position(coil: Coil, time: float) -> float:
-    """Position [-] of the flow at ``time`` [s] of a coil that has no new command."""
-    return coil.target if coil.change_time <= time + SAME_INSTANT else coil.position
-
-
 def command_coil(valve: TimedSolenoid, coil: Coil, wanted: float, time: float, opening_delay: float) -> Coil:
     """A coil at ``time`` [s] with an order waiting: the flow moves if it is due, then the order is taken if it may be.
 
     A change that is still waiting when the coil is commanded otherwise is lost.
     """
     # The due change first: an order at the same instant would otherwise cancel a flow that has already moved.
-    position = flow_position(coil, time)
+    position = coil.target if coil.change_time <= time + SAME_INSTANT else coil.position
     accepts = wanted != coil.target and accept_time(coil, valve.switching_interval, time) <= time + SAME_INSTANT
     delay = opening_delay if wanted > 0.5 else valve.closing_delay
     # Without a delay the flow follows in the same call, since no later event is scheduled for it.
@@ -203,6 +198,7 @@ def both_off() -> PairPositions:
 
 def both_off_long_ago() -> PairState:
     """Two coils that were switched off long ago."""
+    # Long ago: the first order is taken at once, whatever the switching interval.
     coil = Coil(position=0.0, target=0.0, accepted_time=NEVER, change_time=NEVER)
     return PairState(coil, coil)
 

@@ -48,6 +48,7 @@ def settle(valve: RecyclingSolenoid, state: RecyclingState, command: float, time
     """Coils and joint after the changes and orders that are due at ``time`` [s]."""
     pair = solenoid.settle_timed(valve.pair, state.pair, command, time)
     feeds_1, feeds_2 = pair.coil_a.position > 0.5, pair.coil_b.position > 0.5
+    # The moment at which the flow of valve A, not its order, leaves the source.
     shuts = state.pair.coil_a.position > 0.5 and not feeds_1
     # A valve B that is switched off ends the hold at once: chamber 2 is then to vent.
     lets_go = state.keeps_gas > 0.5 and not feeds_2

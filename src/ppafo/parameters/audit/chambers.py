@@ -22,25 +22,23 @@ def check_virtual_work(evidence: Evidence) -> Iterator[Finding]:
     if found is None or min(found) <= 0.0:
         return
     if efficiency is not None and abs(found[1] * efficiency / found[0] - 1.0) <= _TOLERANCE:
-        yield _closure(evidence, found[0] / found[1])
+        # The shaft's work is the gas's less the stated loss.
+        ratio = found[0] / found[1]
+        yield Finding(
+            id=_ID,
+            severity="note",
+            title="torque constant and displacement per radian agree, with the stated efficiency",
+            values=evidence.values_of(_TORQUE_CONSTANT, _VOLUME_PER_ANGLE, _EFFICIENCY),
+            sides=(Side("torque constant over displacement per radian", ratio, ""),),
+            paragraph=(
+                f"Energy closes: the shaft gets {100.0 * ratio:.3g} % of the work p dV of the gas, and the other "
+                f"{100.0 * (1.0 - ratio):.3g} % are the stated loss. The model takes the same ratio where "
+                "the shaft drives "
+                "the vane and compresses gas, where a real loss has the other sign."
+            ),
+        )
     elif abs(found[1] / found[0] - 1.0) > _TOLERANCE:
         yield _contradiction(evidence, *found)
-
-
-def _closure(evidence: Evidence, ratio: float) -> Finding:
-    """Return the note that the shaft's work is the gas's less the stated loss."""
-    return Finding(
-        id=_ID,
-        severity="note",
-        title="torque constant and displacement per radian agree, with the stated efficiency",
-        values=evidence.values_of(_TORQUE_CONSTANT, _VOLUME_PER_ANGLE, _EFFICIENCY),
-        sides=(Side("torque constant over displacement per radian", ratio, ""),),
-        paragraph=(
-            f"Energy closes: the shaft gets {100.0 * ratio:.3g} % of the work p dV of the gas, and the other "
-            f"{100.0 * (1.0 - ratio):.3g} % are the stated loss. The model takes the same ratio where the shaft drives "
-            "the vane and compresses gas, where a real loss has the other sign."
-        ),
-    )
 
 
 def _contradiction(evidence: Evidence, torque_constant: float, volume_per_angle: float) -> Finding:

@@ -63,6 +63,7 @@ def _is_same(path: str, parameter_set: ParameterSet, parent: ParameterSet) -> bo
         return True
     quantity = parameter_set.declarations()[path]
     try:
+        # Gauge pressures count from each set's own atmosphere.
         mine = entry_in_si(new, quantity, atmospheric_pressure(parameter_set))
         theirs = entry_in_si(old, quantity, atmospheric_pressure(parent))
     except UnitError:  # A unit that does not fit, as one may be reported: its correction is a change.

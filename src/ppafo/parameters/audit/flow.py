@@ -26,7 +26,18 @@ def check_orifices(evidence: Evidence) -> Iterator[Finding]:
     for section in ("actuator.leak", *valves.values()):
         names = both_forms(evidence.parameter_set, section)
         if names:
-            yield _two_forms(evidence, section, names)
+            yield Finding(
+                id=f"forms-of-{section.rpartition('.')[2]}",
+                severity="error",
+                title=f"{section} is given in two forms",
+                values=evidence.values_of(*(f"{section}.{name}" for name in names)),
+                sides=(),
+                paragraph=(
+                    f"{section} has {', '.join(names)}, which specify one orifice twice, so no device can "
+                    "be built. "
+                    "Give area and discharge_coefficient alone, or sonic_conductance and critical_ratio alone."
+                ),
+            )
     for name, section in valves.items():
         yield from _open_flow(evidence, name, section)
 
@@ -69,20 +80,6 @@ def check_bores(evidence: Evidence) -> Iterator[Finding]:
                     "and only its product with the area has a meaning."
                 ),
             )
-
-
-def _two_forms(evidence: Evidence, section: str, names: tuple[str, ...]) -> Finding:
-    return Finding(
-        id=f"forms-of-{section.rpartition('.')[2]}",
-        severity="error",
-        title=f"{section} is given in two forms",
-        values=evidence.values_of(*(f"{section}.{name}" for name in names)),
-        sides=(),
-        paragraph=(
-            f"{section} has {', '.join(names)}, which specify one orifice twice, so no device can be built. "
-            "Give area and discharge_coefficient alone, or sonic_conductance and critical_ratio alone."
-        ),
-    )
 
 
 def _open_flow(evidence: Evidence, name: str, section: str) -> Iterator[Finding]:
@@ -173,6 +170,7 @@ def check_choked_flow(evidence: Evidence) -> Iterator[Finding]:
     if gas is None:
         return
     k, constant = gas.heat_capacity_ratio, gas.specific_gas_constant
+    # The paper gives the critical ratio upstream over downstream.
     expected = {
         _C1: choked_flow_constant(k, constant, gas.temperature),
         "reported.subsonic_flow_constant": subsonic_flow_constant(k, constant, gas.temperature),
@@ -220,6 +218,7 @@ def _exponent(evidence: Evidence, gas: Gas) -> Iterator[Finding]:
         text = f"The formula '{formula}' cannot be read as arithmetic in k; the right exponent is (k + 1)/(k - 1)."
         yield Finding("choked-flow-exponent", "warning", title, values, (), text)
         return
+    # C1 is the root of a power: half the difference of exponents is left.
     literal = correct * (2.0 / (k + 1.0)) ** (0.5 * (exponent - right))
     yield Finding(
         id="choked-flow-exponent",
@@ -267,7 +266,31 @@ def check_flow(evidence: Evidence) -> Iterator[Finding]:
     flows = [flow for name in evidence.parameter_set.valve_kinds if (flow := _flow(evidence, name)) is not None]
     for flow in flows:
         if not flow.agrees:
-            yield _contradiction(evidence, flow)
+            area_path, _, flow_path, pressure_path = _paths(flow.name)
+            needed = flow.measured / flow.per_area
+            reported = evidence.in_set_unit(flow_path, flow.measured)
+            pressure = evidence.in_set_unit(pressure_path, evidence.number(pressure_path) or 0.0)
+            yield Finding(
+                id=f"flow-of-{flow.name}",
+                severity="error",
+                title=f"the reported flow of valve '{flow.name}' does not follow from Cd A",
+                values=evidence.values_of(*_paths(flow.name)),
+                sides=(
+                    Side("reported flow", flow.measured, "kg/s"),
+                    Side("Cd A C1 P", flow.predicted, "kg/s"),
+                    Side("Cd A that gives the reported flow", needed, "m^2"),
+                ),
+                paragraph=(
+                    f"Fully open at {pressure} the valve '{flow.name}' passes "
+                    f"{evidence.in_set_unit(flow_path, flow.predicted)} by Cd A = {flow.coefficient:.4g} x "
+                    f"{evidence.in_set_unit(area_path, flow.area)}, reported is {reported}: a factor "
+                    f"{flow.predicted / flow.measured:.3g}. Would be consistent with Cd A = "
+                    f"{1e6 * needed:.4g} mm^2, that is "
+                    f"Cd = {needed / flow.area:.3g} with the reported area, or "
+                    f"{evidence.in_set_unit(area_path, needed / flow.coefficient)} with the reported Cd; or with "
+                    f"{evidence.in_set_unit(flow_path, flow.predicted)} as the flow."
+                ),
+            )
     yield from _check_shared_coefficient(evidence, flows)
 
 
@@ -283,6 +306,7 @@ def _paths(name: str) -> tuple[str, ...]:
 
 def _flow(evidence: Evidence, name: str) -> _ValveFlow | None:
     gas, found = evidence.gas(), evidence.numbers(*_paths(name))
+    # Reported digits leave ranges open: a contradiction must hold for all numbers in them.
     ranges = [interval for path in _paths(name)[:3] if (interval := evidence.magnitude(path)) is not None]
     if gas is None or found is None or len(ranges) < 3 or min(found) <= 0.0:
         return None
@@ -295,33 +319,6 @@ def _flow(evidence: Evidence, name: str) -> _ValveFlow | None:
         return None
     agrees = ranges[0].times(ranges[1]).times(room).meets(ranges[2])
     return _ValveFlow(name, area, coefficient, measured, coefficient * area * per_area, per_area, agrees)
-
-
-def _contradiction(evidence: Evidence, flow: _ValveFlow) -> Finding:
-    area_path, _, flow_path, pressure_path = _paths(flow.name)
-    needed = flow.measured / flow.per_area
-    reported = evidence.in_set_unit(flow_path, flow.measured)
-    pressure = evidence.in_set_unit(pressure_path, evidence.number(pressure_path) or 0.0)
-    return Finding(
-        id=f"flow-of-{flow.name}",
-        severity="error",
-        title=f"the reported flow of valve '{flow.name}' does not follow from Cd A",
-        values=evidence.values_of(*_paths(flow.name)),
-        sides=(
-            Side("reported flow", flow.measured, "kg/s"),
-            Side("Cd A C1 P", flow.predicted, "kg/s"),
-            Side("Cd A that gives the reported flow", needed, "m^2"),
-        ),
-        paragraph=(
-            f"Fully open at {pressure} the valve '{flow.name}' passes "
-            f"{evidence.in_set_unit(flow_path, flow.predicted)} by Cd A = {flow.coefficient:.4g} x "
-            f"{evidence.in_set_unit(area_path, flow.area)}, reported is {reported}: a factor "
-            f"{flow.predicted / flow.measured:.3g}. Would be consistent with Cd A = {1e6 * needed:.4g} mm^2, that is "
-            f"Cd = {needed / flow.area:.3g} with the reported area, or "
-            f"{evidence.in_set_unit(area_path, needed / flow.coefficient)} with the reported Cd; or with "
-            f"{evidence.in_set_unit(flow_path, flow.predicted)} as the flow."
-        ),
-    )
 
 
 def _check_shared_coefficient(evidence: Evidence, flows: list[_ValveFlow]) -> Iterator[Finding]:

@@ -38,6 +38,7 @@ def check_inertia(evidence: Evidence) -> Iterator[Finding]:
             continue
         implied.append(reported.over(rate))
         yield _product(evidence, product, rate_path, name, _middle(rate))
+    # One inertia can be tested only where both products disagree with the reported one.
     if len(implied) > 1:
         yield from _one_inertia(evidence, implied[0], implied[1], decay_path)
 
@@ -135,6 +136,7 @@ def check_torque_ceiling(evidence: Evidence) -> Iterator[Finding]:
         return
     ceilings = {path: constant * (value - evidence.atmosphere()) for path, value in supplies.items()}
     severity, verdict = _verdict(evidence, max(ceilings.values()), constant)
+    # Torque constants are quoted per psi in the field.
     per_psi = constant * to_si(1.0, "psi", "Pa")
     pressures = {path: evidence.in_set_unit(path, value) for path, value in supplies.items()}
     held = (f"{ceilings[path]:#.3g} N m at {pressures[path]} ({path})" for path in supplies)
@@ -188,28 +190,25 @@ def check_published_torque(evidence: Evidence) -> Iterator[Finding]:
         found = evidence.numbers(_TORQUE_CONSTANT, *paths)
         if found is None or min(found) <= 0.0 or found[2] <= evidence.atmosphere():
             continue
-        yield _at_rest(evidence, name, paths, found)
+        constant, torque, pressure = found
+        note = evidence.parameter_set.numbers[paths[0]].note
+        held = constant * (pressure - evidence.atmosphere())
+        agrees = abs(held / torque - 1.0) <= _ROOM
+        yield Finding(
+            id=f"{name}-torque",
+            severity="note" if agrees else "warning",
+            title=f"the published {name} torque {'agrees' if agrees else 'does not agree'} with the torque constant",
+            values=evidence.values_of(_TORQUE_CONSTANT, *paths),
+            sides=(Side("torque constant times pressure", held, "N m"), Side("published", torque, "N m")),
+            paragraph=(
+                f"At {evidence.in_set_unit(paths[1], pressure)} the vane gives {held:.3g} N m, published "
+                f"are {torque:.3g} "
+                "N m. This speaks of the torque constant alone: a vane at rest has any volume."
+                f"{f' {note}' if note else ''}"
+            ),
+        )
         if name == "walking":
             yield from _while_walking(evidence, found[1], found[2])
-
-
-def _at_rest(evidence: Evidence, name: str, paths: tuple[str, str], found: tuple[float, ...]) -> Finding:
-    constant, torque, pressure = found
-    note = evidence.parameter_set.numbers[paths[0]].note
-    held = constant * (pressure - evidence.atmosphere())
-    agrees = abs(held / torque - 1.0) <= _ROOM
-    return Finding(
-        id=f"{name}-torque",
-        severity="note" if agrees else "warning",
-        title=f"the published {name} torque {'agrees' if agrees else 'does not agree'} with the torque constant",
-        values=evidence.values_of(_TORQUE_CONSTANT, *paths),
-        sides=(Side("torque constant times pressure", held, "N m"), Side("published", torque, "N m")),
-        paragraph=(
-            f"At {evidence.in_set_unit(paths[1], pressure)} the vane gives {held:.3g} N m, published are {torque:.3g} "
-            "N m. This speaks of the torque constant alone: a vane at rest has any volume."
-            f"{f' {note}' if note else ''}"
-        ),
-    )
 
 
 def _while_walking(evidence: Evidence, torque: float, pressure: float) -> Iterator[Finding]:

@@ -65,7 +65,23 @@ def check_dimensions(evidence: Evidence) -> Iterator[Finding]:
     refused = dict(_refusals(evidence))
     inverted = [path for path in refused if _fits_inverse(evidence, path)]
     for path in inverted:
-        yield _upside_down(evidence, path)
+        entry, quantity = evidence.parameter_set.numbers[path], evidence.declared[path]
+        inverse_unit = _inverse_unit(quantity.unit)
+        value = to_si(entry.value, entry.unit, inverse_unit)
+        name = path.rpartition(".")[2].replace("_", "-")
+        yield Finding(
+            id=f"{name}-upside-down",
+            severity="error",
+            title=f"{path} is upside down: its unit belongs to the inverse",
+            values=evidence.values_of(path),
+            sides=(Side("as reported", value, inverse_unit), Side("taken literally", 1.0 / value, quantity.unit)),
+            paragraph=(
+                f"{path} = {number_text(entry)} is meant as: {quantity.summary}. That has the unit "
+                f"{quantity.unit}; the reported "
+                f"unit {entry.unit} belongs to its inverse. Turn the ratio over and keep the "
+                f"number: taken literally it would be {1.0 / value:.3g} {quantity.unit}."
+            ),
+        )
     foreign = [path for path in refused if path not in inverted]
     if foreign:
         yield _foreign(evidence, foreign)
@@ -89,26 +105,6 @@ def _fits_inverse(evidence: Evidence, path: str) -> bool:
 
 def _inverse_unit(unit: str) -> str:
     return f"1/({unit})" if " " in unit or "/" in unit else f"1/{unit}"
-
-
-def _upside_down(evidence: Evidence, path: str) -> Finding:
-    entry, quantity = evidence.parameter_set.numbers[path], evidence.declared[path]
-    inverse_unit = _inverse_unit(quantity.unit)
-    value = to_si(entry.value, entry.unit, inverse_unit)
-    name = path.rpartition(".")[2].replace("_", "-")
-    return Finding(
-        id=f"{name}-upside-down",
-        severity="error",
-        title=f"{path} is upside down: its unit belongs to the inverse",
-        values=evidence.values_of(path),
-        sides=(Side("as reported", value, inverse_unit), Side("taken literally", 1.0 / value, quantity.unit)),
-        paragraph=(
-            f"{path} = {number_text(entry)} is meant as: {quantity.summary}. That has the unit "
-            f"{quantity.unit}; the reported "
-            f"unit {entry.unit} belongs to its inverse. Turn the ratio over and keep the "
-            f"number: taken literally it would be {1.0 / value:.3g} {quantity.unit}."
-        ),
-    )
 
 
 def _foreign(evidence: Evidence, paths: list[str]) -> Finding:
@@ -173,15 +169,13 @@ def check_gas_data(evidence: Evidence) -> Iterator[Finding]:
         return
     species = SPECIES.get(name)
     if species is None:
-        yield (
-            Finding(
-                id="gas-species",
-                severity="error",
-                title=f"no data for the gas '{name}'",
-                values=evidence.values_of("gas.species"),
-                sides=(),
-                paragraph=f"The gas '{name}' is not one of {', '.join(SPECIES)}; name one of these.",
-            )
+        yield Finding(
+            id="gas-species",
+            severity="error",
+            title=f"no data for the gas '{name}'",
+            values=evidence.values_of("gas.species"),
+            sides=(),
+            paragraph=f"The gas '{name}' is not one of {', '.join(SPECIES)}; name one of these.",
         )
         return
     tabulated = {"gas.molar_mass": species.molar_mass, "gas.heat_capacity_ratio": species.heat_capacity_ratio}
@@ -189,19 +183,17 @@ def check_gas_data(evidence: Evidence) -> Iterator[Finding]:
         value = evidence.number(path)
         if value is not None and abs(value / expected - 1.0) > _TOLERANCE:
             unit = evidence.declared[path].unit
-            yield (
-                Finding(
-                    id=path.replace(".", "-").replace("_", "-"),
-                    severity="error",
-                    title=f"{path} does not belong to the named gas",
-                    values=evidence.values_of("gas.species", path),
-                    sides=(Side("in the set", value, unit), Side("of the gas", expected, unit)),
-                    paragraph=(
-                        f"{path} is {evidence.in_set_unit(path, value)}, but {evidence.text('gas.species')} has "
-                        f"{evidence.in_set_unit(path, expected)} ({species.source}). "
-                        "Give that value, or name the gas in use."
-                    ),
-                )
+            yield Finding(
+                id=path.replace(".", "-").replace("_", "-"),
+                severity="error",
+                title=f"{path} does not belong to the named gas",
+                values=evidence.values_of("gas.species", path),
+                sides=(Side("in the set", value, unit), Side("of the gas", expected, unit)),
+                paragraph=(
+                    f"{path} is {evidence.in_set_unit(path, value)}, but {evidence.text('gas.species')} has "
+                    f"{evidence.in_set_unit(path, expected)} ({species.source}). "
+                    "Give that value, or name the gas in use."
+                ),
             )
 
 

@@ -94,6 +94,7 @@ def bottle_parts() -> Mapping[str, Part]:
 def scaled_entries(part: Part, paper: Mapping[str, Entry]) -> dict[str, Entry]:
     """Return the values of a bottle with the content [kg] and the empty mass [kg] of a part, from the ``paper``'s."""
     content, empty = part.values["content"], part.values["empty_mass"]
+    # The same density of filling: content over the paper's, and the volume with it.
     ratio = 1000.0 * content / paper["bottle.gas_mass"].value
     found = {
         "bottle.gas_mass": _entry(1000.0 * content, "g", f"catalogue of parts, {part.name}"),
@@ -273,7 +274,9 @@ def load_bottle(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Bott
     # A bottle file has its own walls and regulator; a part of the same name has only a content and a mass.
     part = None if str(name_or_path) in FILE.names() else bottle_parts().get(str(name_or_path))
     _check_name(name_or_path)
+    # A part has no file of its own: the paper's bottle gives what a catalogue does not say.
     parsed, file = read_model(FILE, bottle_file(), name_or_path if part is None else PAPER_BOTTLE)
+    # A file without regulator and hose values has the paper's.
     found = _warming() | _given(parsed)
     if part is not None:
         parsed = parsed.model_copy(update={"name": part.name, "title": f"{part.maker}: {part.model}, with a regulator"})
@@ -365,6 +368,7 @@ def _mass_of_fill(values: Mapping[str, float], fluid: Fluid, file: str) -> float
     """Return the mass of gas [kg] in a full bottle, given as such or by pressure and temperature."""
     by_pressure = [f"bottle.{item.name}" for item in FILL_BY_PRESSURE]
     given = [path for path in by_pressure if path in values]
+    # Exactly one form: by mass, or by pressure and temperature.
     if ("bottle.gas_mass" in values) == bool(given):
         raise ParameterError(f"{file}: give either bottle.gas_mass or {' and '.join(by_pressure)}")
     if not given:
@@ -374,6 +378,7 @@ def _mass_of_fill(values: Mapping[str, float], fluid: Fluid, file: str) -> float
         raise ParameterError(f"{file}: {said_missing(missing)} beside {given[0]}")
     pressure, temperature = (values[path] for path in by_pressure)
     _check_temperature("bottle.fill_temperature", temperature, fluid, file)
+    # Above the saturated vapour the rest is liquid: pressure and temperature then leave the mass open.
     if fluid_pressure(fluid.table, temperature, math.inf) < pressure:
         most = fluid_pressure(fluid.table, temperature, math.inf)
         raise ParameterError(

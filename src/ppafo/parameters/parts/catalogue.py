@@ -117,11 +117,13 @@ class Part:
     @property
     def full_mass(self) -> float:
         """Mass [kg] of the part as it is carried: of a bottle, with its gas."""
+        # Only a bottle has no mass of its own: it is empty mass and content.
         return self.values["mass"] if "mass" in self.values else self.values["empty_mass"] + self.values["content"]
 
     @property
     def model_numbers(self) -> dict[str, float]:
         """Numbers of a valve by path, in SI; what its maker does not state is ideal, by the defaults."""
+        # A figure that is not given is left at the model's default, which is the ideal valve.
         settings = {item.name: item.default for item in VALVES[self.kind].quantities if item.default is not None}
         orifice = {item.name: self.values[item.name] for item in ORIFICE if item.name in self.values}
         own = {name: self.values[name] for name in settings if name in self.values}
@@ -150,6 +152,7 @@ def _part_table(title: str, group: str, quantities: tuple[Quantity, ...], extra:
 
 
 def _valve_table(kind: str) -> Any:
+    # Each kind of valve has a table of its own, so that a figure of another kind is refused by name.
     own = {"kind": (Literal[kind], Field(description=VALVES[kind].summary))}
     return _part_table(f"{kind.capitalize()}ValvePart", "valves", figures_of("valves", kind), own)
 
@@ -235,6 +238,7 @@ def parse_catalogue(content: bytes, file: str) -> Catalogue:
 
 
 def _part(file: str, group: str, name: str, parsed: Any) -> Part:
+    # Only valves come in kinds.
     kind = getattr(parsed, "kind", "")
     declared = {item.name: item for item in figures_of(group, kind)}
     figures = {key: figure for key in declared if isinstance(figure := getattr(parsed, key), Figure)}
@@ -262,6 +266,7 @@ def _check_unknown(
 def _check_orifice(place: str, figures: Mapping[str, Figure]) -> None:
     """Refuse a valve that has not exactly one of the two forms of an orifice, whole."""
     given = [[item.name for item in form if item.name in figures] for form in (AREA_FORM, SONIC_FORM)]
+    # Half a form is as unusable as two forms at once.
     if sorted(map(len, given)) != [0, 2]:
         raise ParameterError(
             f"{place}: needs either area and discharge_coefficient or sonic_conductance and critical_ratio, "
@@ -270,6 +275,7 @@ def _check_orifice(place: str, figures: Mapping[str, Figure]) -> None:
 
 
 def _in_si(place: str, figure: Figure, quantity: Quantity) -> float:
+    # A guess without its reason cannot be checked by the next reader.
     if figure.origin in _NEEDS_A_REASON and not figure.note.strip():
         raise ParameterError(f"{place}.note is missing: a figure that is {figure.origin} needs its reason")
     with refused_as(ParameterError, f"{place} = {figure.value:g} {figure.unit}", UnitError):

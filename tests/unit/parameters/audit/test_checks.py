@@ -155,7 +155,7 @@ def test_a_set_with_almost_nothing_in_it_has_almost_nothing_to_say() -> None:
 def test_a_stated_efficiency_that_explains_the_volume_is_a_note_and_another_is_a_warning() -> None:
     closed = findings("actuator.volume_per_angle=18.1 cm^3/rad", "reported.torque_efficiency=0.8")["virtual-work"]
     assert closed.severity == "note"
-    assert side(closed, "torque constant over displacement") == pytest.approx(0.8, rel=0.01)
+    assert side(closed, "torque constant over displacement per radian") == pytest.approx(0.8, rel=0.01)
     assert findings("reported.torque_efficiency=0.8")["virtual-work"].severity == "warning"
     assert findings("actuator.volume_per_angle=18.1 cm^3/rad")["virtual-work"].severity == "warning"
     assert "virtual-work" not in findings("actuator.volume_per_angle=14.5 cm^3/rad")

@@ -77,6 +77,7 @@ def read_c3d(path: str | Path) -> MotionTable:
                 columns[name], units[name] = values, unit
     for name, values in _plates(content, frames):
         columns[name], units[name] = values, "N"
+    # A trial that was cut keeps its clock: events count from the beginning of the capture.
     first = max(0, int(content["header"]["points"].get("first_frame", 0)))
     trial = _trial(parameters)
     time = (first + np.arange(frames)) / rate
@@ -112,6 +113,7 @@ def _bare(label: str) -> str:
 
 def _channels(group: Any, analogs: Floats, frames: int) -> Iterator[tuple[str, Floats, str]]:
     """Yield name, values at the times of the points and unit of each channel whose label is its own."""
+    # Analog samples are a whole multiple of the points' by the format.
     step = analogs.shape[1] // frames
     labels = [_bare(label) for label in _texts(group, "LABELS")][: analogs.shape[0]]
     stated = _texts(group, "UNITS")

@@ -59,6 +59,7 @@ def _named_columns(header: str) -> list[tuple[str, str]]:
 
 
 def _delimiter(header: str) -> str:
+    # The most frequent one; a tie goes to the comma, which stands first.
     return max(_DELIMITERS, key=header.count)
 
 

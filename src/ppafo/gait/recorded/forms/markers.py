@@ -72,6 +72,7 @@ def _pair(labels: Sequence[str], foot: str) -> tuple[str, str]:
 
 def _label(labels: Sequence[str], pattern: str) -> str | None:
     """Return the shortest label that matches, whatever its case; points and lines in it do not count."""
+    # The shortest: model outputs often add a suffix to the plain name.
     matching = [label for label in labels if re.fullmatch(pattern, re.sub(r"[.\s_-]", "", label), re.IGNORECASE)]
     return min(matching, key=len, default=None)
 
@@ -85,6 +86,7 @@ def _ankle_map(labels: Sequence[str], foot: str, axes: tuple[Axis, Vertical]) ->
     """Return the ankle angle of the model, or from heel and toe where the file has only markers."""
     angles = _label(labels, foot + _ANGLES)
     heel, toe = (_first(labels, foot, names) for names in (_HEELS, _TOES))
+    # The model's own angle is preferred: its zero comes from a static trial.
     if angles is None and heel is not None and toe is not None:
         forward, vertical = axes
         said = f"ankle angle from the markers {heel} and {toe}; its zero is the foot that stands flat"
@@ -147,6 +149,7 @@ def _axes(
             return "x" if up else "y", _UPWARDS[up], ()
         way = pointing
     elif pointing is not None and np.delete(pointing, up) @ np.delete(way, up) < 0.0:
+        # The ankle's travel says the axis, the foot the direction: on a treadmill both may differ.
         way = -way
     along = max((axis for axis in range(3) if axis != up), key=lambda axis: abs(float(way[axis])))
     # Indices of the axes are 0, 1 and 2, whose sum is 3.
@@ -203,6 +206,7 @@ def load_unit(table: MotionTable, name: str, kind: str, body_mass: float) -> tup
     for unit, factor in _FACTORS[kind].items():
         per_mass = (1.0e-3 if unit == "N mm" else 1.0) / body_mass if factor is None else factor
         fitting += [unit] if low <= per_mass * peak <= high else []
+    # The stated unit is believed where it can be true, and where nothing else can.
     if stated in fitting or (not fitting and stated in _FACTORS[kind]):
         return stated, []
     if len(fitting) != 1:
