@@ -85,7 +85,7 @@ def test_the_torque_ceiling_is_5_newton_metres_at_50_psig_and_5_5_at_55() -> Non
 def test_virtual_work_wants_torque_constant_and_volume_per_angle_equal() -> None:
     finding = FOUND["virtual-work"]
     assert finding.severity == "warning"
-    assert side(finding, "volume per angle") / side(finding, "torque constant") == pytest.approx(3.5, abs=0.02)
+    assert side(finding, "displacement per radian") / side(finding, "torque constant") == pytest.approx(3.5, abs=0.02)
 
 
 def test_the_gas_use_needs_more_than_the_torque_constant_sweeps_and_lines_have_a_part_of_it() -> None:
