@@ -106,7 +106,7 @@ def _draw_temperature(axes: "Axes", found: Endurance, minutes: Floats) -> None:
         label="room",
     )
     axes.plot(minutes, display_values(recording["wall_temperature"], "temperature"), color=ORANGE, label="wall")
-    axes.plot(minutes, display_values(recording["bottle_temperature"], "temperature"), color=BLUE, label="content")
+    axes.plot(minutes, display_values(recording["bottle_temperature"], "temperature"), color=BLUE, label="fluid")
     axes.set_title(f"Temperature of the bottle ({axis_unit('temperature')})")
     label_lines(axes)
 
