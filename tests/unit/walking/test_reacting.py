@@ -308,7 +308,7 @@ def test_a_gait_of_an_option_is_refused_as_one_of_the_file_is() -> None:
 
 
 def test_what_needs_a_prescribed_gait_refuses_in_one_line() -> None:
-    scenario, line = load_walk(WALK), "needs a prescribed gait, and its wearer reacts"
+    scenario, line = load_walk(WALK), "needs a prescribed gait, and this walk has a neuromuscular model"
     with pytest.raises(ScenarioError, match=line):
         walk_population(scenario, 0.1, 8)
     assert "lowest_toes is over the ground" in lacking(scenario, METRICS["toe_clearance"])
