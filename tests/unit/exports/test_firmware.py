@@ -203,7 +203,7 @@ def test_a_chip_with_other_numbers_is_found_out(
     monkeypatch.setattr("ppafo.processor.lock_step.firmware", lambda *_: wrong)
     found = compare_drawn(scenario, 400, target=target.name)
     assert found.differences > 0
-    assert "on the chip" in found.first_difference
+    assert "on the processor" in found.first_difference
     built(wrong, tmp_path)
     assert sizes(tmp_path / "firmware.elf", target).flash > sizes(tmp_path / "simulated.elf", target).flash
 

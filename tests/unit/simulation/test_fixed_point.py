@@ -84,7 +84,7 @@ def test_a_converter_without_whole_numbers_is_refused() -> None:
     [
         ("torque-task-proportional", "fixed", r'write controller.kind = "pid_on_chip"'),
         ("torque-task-solenoid", "fixed", r'write controller.kind = "on_off_on_chip"'),
-        ("torque-task-proportional", "float", "leave it out: every controller but those on a chip"),
+        ("torque-task-proportional", "float", "leave it out: every controller but the fixed-point ones"),
         ("step-response", "fixed", "'constant' has no fixed-point form; controllers that have one: pid_on_chip"),
     ],
 )

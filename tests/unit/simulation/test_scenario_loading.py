@@ -187,7 +187,7 @@ def test_a_scenario_is_shown_in_a_few_lines() -> None:
     for told in (
         "'small'",
         "ppafo2011, valve proportional",
-        "held at 75 deg",
+        "locked at 75 deg",
         "python, Relay, every 0.001 s",
         "1 s, in steps",
     ):
