@@ -47,7 +47,7 @@ def test_the_page_on_architecture_shows_the_layers_of_the_contract() -> None:
         "contracts"
     ]
     page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
-    rooms = re.findall(r"^ {4}(\S+(?: \| \S+)?) {2,}\S", page, re.MULTILINE)
+    rooms = re.findall(r"^ {4}(\S+(?: \| \S+)*) {2,}\S", page, re.MULTILINE)
     assert rooms == [layer.replace("ppafo.", "") for layer in contracts[0]["layers"]]
 
 
