@@ -175,3 +175,11 @@ def test_help_looks_for_commands_of_other_packages_and_a_scenario_of_the_package
     )
     done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
+
+
+def test_a_kind_of_a_room_that_is_not_installed_is_not_listed_and_says_so() -> None:
+    laws: Kinds[object] = Kinds("ppafo.laws", "law", object, {"here": "ppafo.kinds:Kind", "there": "ppafo.absent:LAW"})
+    assert list(laws) == ["here"]
+    laws.load_own()
+    with pytest.raises(KindError, match=r"law 'there' is part of ppafo\.absent, which is not installed"):
+        laws["there"]

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+import ppafo
 from ppafo.engine.loading import NUMBA, chosen_compiler
 
 HEAVY = frozenset(
@@ -19,8 +20,10 @@ HEAVY = frozenset(
 )
 READING, DRAWING = {"numpy", "pydantic"}, {"matplotlib", "PIL"}
 WRITING = {"h5netcdf", "h5py", "jinja2"}
-MOST_BEFORE_THE_RUN, MOST = 140, 160
+MOST_BEFORE_THE_RUN, MOST = 115, 150
 """Modules of the package that a run of a scenario may load; what has no part in it stays out."""
+MOST_FROM_PYTHON, MOST_LINES_FROM_PYTHON = 102, 19_200
+"""Modules and their lines that a run from Python may load: 99 and 18,848 when this was written."""
 
 CODE = """
 import json, sys
@@ -75,7 +78,7 @@ def test_a_run_loads_no_library_that_it_does_not_use(simulated: tuple[list[str],
 def test_a_run_of_a_scenario_loads_no_walks_studies_rigs_and_questions(
     simulated: tuple[list[str], list[str]],
 ) -> None:
-    foreign = ("walking", "gait", "studies", "rig", "identification", "validation", "gym")
+    foreign = ("walking", "gait", "studies", "rig", "identification", "validation", "gym", "processor")
     _, after = simulated
     assert {name for name in own(after) if name.startswith(tuple(f"ppafo.{part}" for part in foreign))} == set()
     assert {name for name in own(after) if name.startswith("ppafo.analyses")} == set()
@@ -102,11 +105,38 @@ def test_the_number_of_modules_of_a_run_does_not_grow_unnoticed(simulated: tuple
     assert len(own(after)) <= MOST
 
 
-def test_a_run_from_python_draws_and_writes_nothing() -> None:
+@pytest.fixture(scope="module")
+def run_from_python() -> list[str]:
+    """What ``ppafo.simulate`` loads, with everything made that is kept."""
     command = "import ppafo\nppafo.simulate('torque-task-proportional')"
     loaded_by(command)
-    _, after = loaded_by(command)
-    assert heavy(after) == READING
+    return loaded_by(command)[1]
+
+
+def test_a_run_from_python_draws_and_writes_nothing(run_from_python: list[str]) -> None:
+    assert heavy(run_from_python) == READING
+
+
+def test_what_a_run_from_python_loads_does_not_grow_unnoticed(run_from_python: list[str]) -> None:
+    loaded = own(run_from_python)
+    lines = sum(file_of(name).read_text(encoding="utf-8").count("\n") for name in loaded)
+    assert len(loaded) <= MOST_FROM_PYTHON
+    assert lines <= MOST_LINES_FROM_PYTHON
+    late = (
+        "metrics.gas",
+        "report.writing",
+        "storage.netcdf",
+        "translation.c99",
+        "model.plant_faults",
+        "simulation.sampled",
+    )
+    assert not {f"ppafo.{name}" for name in late} & loaded
+
+
+def file_of(name: str) -> Path:
+    """The file of a module of the package."""
+    place = Path(ppafo.__file__).parent.joinpath(*name.split(".")[1:])
+    return place / "__init__.py" if place.is_dir() else place.with_suffix(".py")
 
 
 def test_a_walk_reads_units_without_their_library(tmp_path: Path) -> None:
