@@ -146,6 +146,9 @@ def causes_of(
             alike = [one for one in named if one.gain > named[0].gain - search.penalty]
             first, *others = sorted(alike, key=lambda one: not one.numbers)
             return Causes(replace(first, same=tuple(others)), None, len(tried))
+    if settings.motion == "measured":
+        # Only samples were searched: that no change explains the recordings would say too much.
+        return Causes()
     # What is wrong with samples is seen in them, whatever else is wrong.
     nearest = max(tried, key=lambda one: (one.name.startswith(_SAMPLES), one.gain), default=None)
     return Causes(None, nearest, len(tried))
