@@ -282,13 +282,13 @@ def _record_of(measured: Measured, agreement: RecordingAgreement, device: Device
         words += [f"{one.channel} {fault}"] if fault else []
     names, sizes = tuple(one.channel for one in chosen), np.array(noise)
     record = _Record(
-        measured,
-        names,
-        np.stack(series) / sizes[:, None],
-        sizes,
-        np.stack(good).astype(np.float64),
-        tuple(words),
-        agreement.delay.correction,
+        measured=measured,
+        channels=names,
+        values=np.stack(series) / sizes[:, None],
+        noise=sizes,
+        good=np.stack(good).astype(np.float64),
+        words=tuple(words),
+        delay=agreement.delay.correction,
     )
     own, count = replay_of(measured, device, settings), samples_at_rest(recording)
     wanted = [own]
