@@ -139,6 +139,7 @@ def _both_ways(*sizes: float) -> tuple[float, ...]:
 
 _ZEROS = _both_ways(0.003, 0.01, 0.03, 0.1, 0.3, 0.6)
 """In radians, full openings and gauge pressures of the supply."""
+# Grids are so fine that two Gauss-Newton steps reach the least squares, and no likely fault lies at one of their ends.
 _GAINS = (0.3, 0.6, 0.8, 0.95, 0.98, 1.02, 1.05, 1.25, 1.6, 3.0)
 _DELAYS = _both_ways(0.001, 0.003, 0.006, 0.012, 0.025)
 _LONG_DELAYS = _both_ways(0.015, 0.03, 0.05, 0.08, 0.12)
@@ -188,6 +189,7 @@ def sizes(device: Device, names: Collection[str]) -> Iterator[Candidate]:
 _FACTORS = (0.01, 0.05, 0.2, 0.5, 0.8, 0.95, 1.05, 1.25, 2.0, 5.0, 20.0)
 _ROOMS = (0.6, 0.7, 0.8, 0.9, 0.95, 1.03, 1.1)
 _SECTIONS = ("valve", "actuator", "friction", "foot_plate", "supply", "gas")
+# Only a vane that reaches a stop tells these, and a replay starts between the stops.
 _NOT_TRIED = ("actuator.angle_min", "actuator.angle_max", "actuator.restitution")
 _ATMOSPHERE = "supply.atmospheric_pressure"
 _OF_SUPPLY = {"supply.pressure": SUPPLY, "supply.dorsiflexion_pressure": DORSIFLEXION_SUPPLY}

@@ -146,6 +146,9 @@ def causes_of(
             alike = [one for one in named if one.gain > named[0].gain - search.penalty]
             first, *others = sorted(alike, key=lambda one: not one.numbers)
             return Causes(replace(first, same=tuple(others)), None, len(tried))
+    if settings.motion == "measured":
+        # Only samples were searched: that no change explains the recordings would say too much.
+        return Causes()
     # What is wrong with samples is seen in them, whatever else is wrong.
     nearest = max(tried, key=lambda one: (one.name.startswith(_SAMPLES), one.gain), default=None)
     return Causes(None, nearest, len(tried))
@@ -279,13 +282,13 @@ def _record_of(measured: Measured, agreement: RecordingAgreement, device: Device
         words += [f"{one.channel} {fault}"] if fault else []
     names, sizes = tuple(one.channel for one in chosen), np.array(noise)
     record = _Record(
-        measured,
-        names,
-        np.stack(series) / sizes[:, None],
-        sizes,
-        np.stack(good).astype(np.float64),
-        tuple(words),
-        agreement.delay.correction,
+        measured=measured,
+        channels=names,
+        values=np.stack(series) / sizes[:, None],
+        noise=sizes,
+        good=np.stack(good).astype(np.float64),
+        words=tuple(words),
+        delay=agreement.delay.correction,
     )
     own, count = replay_of(measured, device, settings), samples_at_rest(recording)
     wanted = [own]
