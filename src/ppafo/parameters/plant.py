@@ -167,7 +167,7 @@ def effect_row(effect: Effect, device: Device, others: Sections = _NO_SECTIONS) 
     def prepared(*numbers: float) -> Any:
         own, rest = numbers[: len(settings)], iter(numbers[len(settings) :])
         parts = [_part(section, inner)(*[next(rest) for _ in inner]) for section, inner in names.items()]
-        return prepare(dict(zip(settings, own, strict=True)), _part("device", tuple(names))(*parts))
+        return prepare(effect.settings(*own), _part("device", tuple(names))(*parts))
 
     return over_runs(prepared, *settings.values(), *given)
 

@@ -1,8 +1,8 @@
 """Coils of solenoid valves that warm while they are on: a hot coil has more resistance, and lifts its valve later."""
 
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Number
 from ppafo.model.effects.kind import Effect, Moment, State
 from ppafo.model.elementary import logarithm
 from ppafo.model.ports import opening_time
@@ -42,17 +42,31 @@ def slower(rise: float, pull_in_share: float) -> float:
     return logarithm(1.0 - pull_in_share * ratio) / (ratio * logarithm(1.0 - pull_in_share))
 
 
-def prepare(settings: Any, _device: Any) -> CoilHeating:
+class CoilSettings(NamedTuple):
+    """How warm a coil becomes, how soon, and how much current lifts its valve."""
+
+    steady_rise: Annotated[
+        float, Number("K", "rise of temperature of a coil that is always on, 0 for none", 0.0, 0.0, 100.0)
+    ]
+    time_constant: Annotated[
+        float, Number("s", "time constant with which a coil warms and cools", 300.0, 1.0e-3, 1.0e6)
+    ]
+    pull_in_share: Annotated[
+        float, Number("", "current that lifts the valve, over the last one of a cold coil", 0.5, 0.01, 0.6)
+    ]
+
+
+def prepare(settings: CoilSettings, _device: Any) -> CoilHeating:
     """The row of the settings, with the parabola through a cold, a half warm and a hot coil: lanes take no power.
 
     It is within 0.6 % of the formula for every rise and share that are allowed.
     """
-    steady, share = settings["steady_rise"], settings["pull_in_share"]
+    steady, share = settings.steady_rise, settings.pull_in_share
     half, full = slower(0.5 * steady, share) - 1.0, slower(steady, share) - 1.0
     whole = max(steady, 1.0e-30)
     return CoilHeating(
         steady_rise=steady,
-        warming=1.0 / settings["time_constant"],
+        warming=1.0 / settings.time_constant,
         slowing=(4.0 * half - full) / whole,
         slowing_squared=2.0 * (full - 2.0 * half) / (whole * whole),
     )
@@ -93,11 +107,7 @@ def slopes(coil_heating: CoilHeating, coil_heating_state: CoilRises, now: Moment
 EFFECT = Effect(
     name="coil_heating",
     summary="Coils of solenoid valves that warm while they are on, and then lift their valves later.",
-    quantities=(
-        Quantity("steady_rise", "K", "rise of temperature of a coil that is always on, 0 for none", 0.0, 0.0, 100.0),
-        Quantity("time_constant", "s", "time constant with which a coil warms and cools", 300.0, 1.0e-3, 1.0e6),
-        Quantity("pull_in_share", "", "current that lifts the valve, over the last one of a cold coil", 0.5, 0.01, 0.6),
-    ),
+    settings=CoilSettings,
     parameters=CoilHeating,
     prepare=prepare,
     switch=("steady_rise",),
