@@ -67,11 +67,12 @@ def plant_parameters(device: Device, external_torque: float = 0.0) -> PlantParam
 def shape_and_growth(device: Device) -> tuple[Any, Any]:
     """Shape of an actuator that is no vane, and how chamber 1 grows with the angle on average [m^3/rad]."""
     actuator, supply = device.actuator, device.supply
-    names, model = tuple(actuator.settings), ACTUATORS[actuator.kind].model
+    kind = ACTUATORS[actuator.kind]
+    model = kind.model
 
     def prepared(low: float, high: float, dead_1: float, dead_2: float, pressed: float, *values: float) -> Any:
         stops = Range(angle_min=low, angle_max=high, dead_volume_1=dead_1, dead_volume_2=dead_2)
-        given = dict(zip(names, values, strict=True))
+        given = kind.settings(*values)
         table = actuator.table
         shape = model.prepare(given, stops) if table is None else model.prepare(given, stops, table)
         return shape, mean_growth(shape, stops, pressed, model.chambers)
