@@ -6,13 +6,13 @@ from functools import cache
 from typing import Any, NamedTuple, cast
 
 from ppafo.model.actuators.kind import Range, mean_growth, plant_in_shape
-from ppafo.model.catalog import ACTUATORS, find_effects, ordered_effects
+from ppafo.model.catalog import ACTUATORS, VALVES, find_effects, ordered_effects
 from ppafo.model.columns import first, over_runs
 from ppafo.model.effects.kind import SECTION, Effect
 from ppafo.model.orifice import FlowCurve, area_conductance, isentropic_curve, iso6358_curve, sonic_conductance_mass
 from ppafo.model.plant import PlantParameters
 from ppafo.parameters.declaration import members
-from ppafo.parameters.device import Device, Gas, Orifice, SonicOrifice
+from ppafo.parameters.device import Device, Gas, Orifice, SonicOrifice, Valve
 
 
 class Restriction(NamedTuple):
@@ -50,6 +50,16 @@ def restriction(orifice: Orifice | SonicOrifice, gas: Gas, linear_ratio: float) 
 def orifice_conductance(orifice: Orifice | SonicOrifice, gas: Gas) -> float:
     """Conductance [kg/(s Pa)] of an orifice in either form; choked flow over upstream pressure. Equation (6)."""
     return restriction(orifice, gas, 0.0).conductance
+
+
+def valve_settings(valve: Valve) -> Any:
+    """Return the settings [SI] of a valve as the class of its kind, whose numbers may be arrays (runs,)."""
+    return VALVES[valve.kind].settings(**valve.settings)
+
+
+def first_settings(valve: Valve) -> Any:
+    """Return the same of the first run, which choose the model of the valve."""
+    return valve_settings(valve)._make(map(first, valve_settings(valve)))
 
 
 def plant_parameters(device: Device, external_torque: float = 0.0) -> PlantParameters:

@@ -473,8 +473,9 @@ def choosing(device: Device) -> list[str]:
     names = [item.name for item in kind.quantities]
     chosen = {}
     for pattern in itertools.product((0.0, 0.01), repeat=len(names)):
-        model = kind.choose(dict(zip(names, pattern, strict=True)))
-        chosen[pattern] = model, model.command_delay(dict(zip(names, pattern, strict=True))) > 0.0
+        settings = kind.settings(*pattern)
+        model = kind.choose(settings)
+        chosen[pattern] = model, model.command_delay(settings) > 0.0
     return [
         name
         for place, name in enumerate(names)

@@ -273,8 +273,12 @@ def run_with(prepared: PreparedExperiment, numbers: Mapping[str, Any]) -> Run:
     counts = [value.size for value in settings.values() if isinstance(value, np.ndarray)]
     for run in range(max(counts, default=1)):
         own = {name: at(value, run) for name, value in settings.items()}
-        valve = VALVES[device.valve.kind].choose(own)
-        if valve != base.program.valve or (valve.command_delay(own) > 0.0) != base.program.late_commands:
+        kind = VALVES[device.valve.kind]
+        valve = kind.choose(kind.settings(**own))
+        if (
+            valve != base.program.valve
+            or (valve.command_delay(kind.settings(**own)) > 0.0) != base.program.late_commands
+        ):
             fitted = {path.rpartition(".")[2] for path in numbers if path.startswith("valves.")}
             at_zero = [name for name in own if name in fitted and own[name] == 0.0]
             moved = at_zero or [
