@@ -187,13 +187,13 @@ def rates_timed(valve: TimedSolenoid, state: PairState, command: float) -> PairS
     return PairState(still, still)
 
 
-def prepare_ideal(_settings: TimedSolenoid) -> IdealSolenoid:
+def prepare_ideal(settings: TimedSolenoid) -> IdealSolenoid:
     """Parameters of the ideal pair from ``settings`` [SI]."""
     return IdealSolenoid()
 
 
 def prepare_timed(settings: TimedSolenoid) -> TimedSolenoid:
-    """Parameters [s] of the pair with delays: its settings."""
+    """Parameters [s] of the pair with delays."""
     return TimedSolenoid(settings.opening_delay, settings.closing_delay, settings.switching_interval)
 
 
@@ -208,7 +208,7 @@ def both_off_long_ago() -> PairState:
     return PairState(coil, coil)
 
 
-def no_dead_time(_settings: Any) -> float:
+def no_dead_time(settings: Any) -> float:
     """Dead time of the command [s]: none, the delays belong to the coils."""
     return 0.0
 
