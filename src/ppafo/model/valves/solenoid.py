@@ -192,7 +192,7 @@ def prepare_ideal(settings: TimedSolenoid) -> IdealSolenoid:
     return IdealSolenoid()
 
 
-def prepare_timed(settings: TimedSolenoid) -> TimedSolenoid:
+def prepare_timed(settings: Any) -> TimedSolenoid:
     """Parameters [s] of the pair with delays."""
     return TimedSolenoid(settings.opening_delay, settings.closing_delay, settings.switching_interval)
 

@@ -150,8 +150,7 @@ class RecyclingSettings(NamedTuple):
 
 def prepare(settings: RecyclingSettings) -> RecyclingSolenoid:
     """Parameters [s] from ``settings`` [SI]."""
-    pair = TimedSolenoid(settings.opening_delay, settings.closing_delay, settings.switching_interval)
-    return RecyclingSolenoid(pair, settings.joining_time, settings.holding_time)
+    return RecyclingSolenoid(solenoid.prepare_timed(settings), settings.joining_time, settings.holding_time)
 
 
 def parted_long_ago() -> RecyclingState:
