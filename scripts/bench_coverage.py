@@ -39,7 +39,7 @@ def truths(truth: Mapping[str, Any]) -> dict[str, float]:
         "effects.seal_friction.static_per_pressure": preset["friction.static_per_pressure"],
         "friction.viscous_damping": device["friction"]["viscous_damping"],
         "friction.dynamic_torque": device["friction"]["dynamic_torque"],
-        "valves.proportional.discharge_coefficient": valve["orifice"]["discharge_coefficient"],
+        "valves.proportional.discharge_coefficient": valve["discharge_coefficient"],
         "valves.proportional.dead_band": preset["valve.dead_band"],
         "valve_map.hysteresis": preset["valve.hysteresis"],
         "actuator.leak.area": actuator["leak"]["area"],

@@ -41,7 +41,7 @@ def test_every_value_lies_inside_its_interval_or_is_flagged(bench: Path, found: 
         "effects.seal_friction.static_per_pressure": preset["friction.static_per_pressure"],
         "friction.viscous_damping": device["friction"]["viscous_damping"],
         "friction.dynamic_torque": device["friction"]["dynamic_torque"],
-        "valves.proportional.discharge_coefficient": device["valve"]["orifice"]["discharge_coefficient"],
+        "valves.proportional.discharge_coefficient": device["valve"]["discharge_coefficient"],
         "valves.proportional.dead_band": preset["valve.dead_band"],
         "valve_map.hysteresis": preset["valve.hysteresis"],
         "actuator.leak.area": device["actuator"]["leak"]["area"],

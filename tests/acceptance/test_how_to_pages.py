@@ -201,7 +201,7 @@ VENTS = (0.0, 1.0, 0.0, 1.0)
     ],
 )
 def test_a_valve_does_with_a_command_what_the_page_says(kind: str, command: float, expected: tuple[float, ...]) -> None:
-    settings = {item.name: item.default or 0.0 for item in VALVES[kind].quantities}
+    settings = VALVES[kind].settings(*(item.default or 0.0 for item in VALVES[kind].quantities))
     model = VALVES[kind].choose(settings)
     valve = model.prepare(settings)
     state = model.settle(valve, model.initial(), command, 0.0)

@@ -29,7 +29,9 @@ PAGES = [
 PAPER_EQUATIONS = tuple(range(1, 15))
 
 GROUPS_OF_NUMBERS = (plant.PlantParameters, plant.PlantState, plant.Openings, sensors.Measurement)
-DEVICE_PARTS = [part for _, part in inspect.getmembers(device, dataclasses.is_dataclass)]
+DEVICE_PARTS = [
+    part for _, part in inspect.getmembers(device, dataclasses.is_dataclass) if part.__module__ == device.__name__
+]
 
 MACHINE_TRACES = (
     r"(?<!no-emit-)index[-]url",

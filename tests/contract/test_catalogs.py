@@ -5,6 +5,7 @@ import itertools
 import math
 import random
 import re
+from typing import Any
 
 import pytest
 
@@ -28,14 +29,15 @@ def defaults(kind: ControllerKind | ProfileKind | ValveKind) -> dict[str, float]
     return {item.name: 1.0 if item.default is None else item.default for item in kind.quantities}
 
 
-def valve_models() -> list[tuple[str, ValveModel, dict[str, float]]]:
+def valve_models() -> list[tuple[str, ValveModel, Any]]:
     """Every model that the valves choose, with settings that lead to it."""
     found = []
     for name, kind in VALVES.items():
         settings = defaults(kind)
         busy = {item.name: min(item.maximum, max(item.minimum, 0.01)) for item in kind.quantities}
         busy |= {"spool_frequency": 80.0} if "spool_frequency" in busy else {}
-        found += [(f"{name}-plain", kind.choose(settings), settings), (f"{name}-busy", kind.choose(busy), busy)]
+        for label, given in (("plain", kind.settings(**settings)), ("busy", kind.settings(**busy))):
+            found.append((f"{name}-{label}", kind.choose(given), given))
     return found
 
 
@@ -121,7 +123,7 @@ def test_profiles_stay_within_the_bounds_that_they_state_and_reach_them(kind: Pr
 
 @pytest.mark.parametrize(("name", "model", "settings"), valve_models())
 def test_valve_models_show_the_reference_solver_openings_between_0_and_1(
-    name: str, model: ValveModel, settings: dict[str, float]
+    name: str, model: ValveModel, settings: Any
 ) -> None:
     valve = model.prepare(settings)
     for command in (-1.0, -0.3, 0.0, 0.4, 1.0):
@@ -132,7 +134,7 @@ def test_valve_models_show_the_reference_solver_openings_between_0_and_1(
 
 
 @pytest.mark.parametrize(("name", "model", "settings"), valve_models())
-def test_valve_states_survive_the_way_through_rows(name: str, model: ValveModel, settings: dict[str, float]) -> None:
+def test_valve_states_survive_the_way_through_rows(name: str, model: ValveModel, settings: Any) -> None:
     state = model.settle(model.prepare(settings), model.initial(), 0.6, 0.0)
     assert rebuild(model.state, numbers(state)) == state, name
 
@@ -148,7 +150,9 @@ def test_a_valve_chooses_its_model_by_which_settings_are_zero_and_by_nothing_els
     for _ in range(200):
         zeros = {item.name for item in kind.quantities if item.minimum == 0.0 and draw.random() < 0.5}
         drawn = [
-            {item.name: 0.0 if item.name in zeros else draw.uniform(1e-6, item.maximum) for item in kind.quantities}
+            kind.settings(
+                *(0.0 if item.name in zeros else draw.uniform(1e-6, item.maximum) for item in kind.quantities)
+            )
             for _ in range(2)
         ]
         first, second = (kind.choose(settings) for settings in drawn)

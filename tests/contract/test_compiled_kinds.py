@@ -92,7 +92,8 @@ def valves(draw: random.Random) -> Iterator[Entry]:
         plain = {item.name: item.default or 0.0 for item in kind.quantities}
         busy = {item.name: min(item.maximum, max(item.minimum, 0.01)) for item in kind.quantities}
         busy |= {"spool_frequency": 80.0} if "spool_frequency" in busy else {}
-        models = {id(kind.choose(given)): (kind.choose(given), given) for given in (plain, busy)}
+        both = kind.settings(**plain), kind.settings(**busy)
+        models = {id(kind.choose(given)): (kind.choose(given), given) for given in both}
         for number, (model, given) in enumerate(models.values()):
             valve, state = model.prepare(given), model.initial()
             stepped, instants, events, shifts = [], [], [], []

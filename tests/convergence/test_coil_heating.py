@@ -5,7 +5,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ppafo.model.effects.coil_heating import COPPER, CoilRises, advance, opening_when_warm, prepare, slower
+from ppafo.model.effects.coil_heating import (
+    COPPER,
+    CoilRises,
+    CoilSettings,
+    advance,
+    opening_when_warm,
+    prepare,
+    slower,
+)
 from ppafo.model.effects.kind import Moment
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario
@@ -13,7 +21,7 @@ from ppafo.simulation.plan import plan_run
 from ppafo.simulation.simulate import simulate
 from tests.judge.reference_solver import compare_with_reference
 
-SETTINGS = {"steady_rise": 80.0, "time_constant": 0.2, "pull_in_share": 0.6}
+SETTINGS = CoilSettings(steady_rise=80.0, time_constant=0.2, pull_in_share=0.6)
 WARM = tuple(
     f"effects.coil_heating.{path}" for path in ("steady_rise=80 K", "time_constant=0.2 s", "pull_in_share=0.6")
 )
@@ -31,7 +39,7 @@ def test_warm_coils_in_the_lanes_are_those_of_the_reference_solver(texts: tuple[
 
 
 def test_the_parabola_is_the_opening_time_of_a_coil_with_resistance_and_inductance() -> None:
-    row = prepare(SETTINGS | {"steady_rise": 100.0}, SimpleNamespace())
+    row = prepare(SETTINGS._replace(steady_rise=100.0), SimpleNamespace())
     for rise in np.linspace(0.0, 100.0, 41).tolist():
         ratio = 1.0 + COPPER * rise
         exact = np.log(1.0 - 0.6 * ratio) / (ratio * np.log(0.4))

@@ -2,12 +2,12 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 import pytest
 
 from ppafo.model.catalog import EFFECTS
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Number
 from ppafo.model.effects.kind import Effect, Moment, State
 from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
@@ -70,18 +70,13 @@ def test_the_error_of_a_state_shortens_steps() -> None:
 class Runaway(NamedTuple):
     """A rate [1/s]."""
 
-    rate: float
+    rate: Annotated[float, Number("1/s", "rate", 0.0, 0.0, 1e6)]
 
 
 class Amount(NamedTuple):
     """What grows [-]."""
 
     amount: float
-
-
-def prepared(settings: Any, _device: Any) -> Runaway:
-    """The rate."""
-    return Runaway(settings["rate"])
 
 
 def started(_runaway: Runaway, _now: Moment) -> Amount:
@@ -105,9 +100,9 @@ def _runaway() -> Iterator[None]:
     EFFECTS["runaway"] = Effect(
         name="runaway",
         summary="A state that leaves what is possible.",
-        quantities=(Quantity("rate", "1/s", "rate", 0.0, 0.0, 1e6),),
+        settings=Runaway,
         parameters=Runaway,
-        prepare=prepared,
+        prepare=None,
         switch=("rate",),
         laws={},
         state=State(row=Amount, start=started, advance=advanced, slopes=grows),

@@ -6,7 +6,7 @@ import pytest
 from ppafo.analyses.linearise.solve import linearise
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.model.effects.leak_opening import LeakOpening, lifted
-from ppafo.model.effects.line_resistance import fed_through_line, prepare
+from ppafo.model.effects.line_resistance import LineSettings, fed_through_line, prepare
 from ppafo.model.effects.spool_play import SpoolPlace, SpoolPlay, behind_play, settle, spool_position
 from ppafo.model.orifice import area_conductance
 from ppafo.parameters.loading import load_device
@@ -163,7 +163,7 @@ def test_lines_slow_the_filling_of_one_chamber_and_the_venting_of_the_other() ->
 
 
 def test_a_line_counts_as_the_orifice_of_the_rig_does() -> None:
-    row = prepare({"area": 2e-5, "discharge_coefficient": 0.6}, load_device("ppafo2011"))
+    row = prepare(LineSettings(2e-5, 0.6), load_device("ppafo2011"))
     alone = area_conductance(2e-5, 0.6, 1.289, 188.92, 293.15)
     assert row.resistance == pytest.approx(alone**-2, rel=0.02)
     assert fed_through_line(1.0, row) == pytest.approx(row.resistance**-0.5)

@@ -23,7 +23,7 @@ from ppafo.model.orifice import ExactOrifice
 from ppafo.model.plant import Openings, ThermalParameters, chamber_pressures, single_port_flow, single_port_flow_slopes
 from ppafo.model.valves import solenoid_recycling
 from ppafo.parameters import load_device
-from ppafo.parameters.plant import plant_parameters
+from ppafo.parameters.plant import plant_parameters, valve_settings
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import ProfileChoice
@@ -59,7 +59,7 @@ def stepped(*overrides: str) -> Course:
     """Push-off and then lifting with a vane held at 75 deg, by the functions of the lanes in plain Python."""
     device = load_device("ppafo2011", "solenoid_recycling", (f"valve.joining_time={JOINED} s", *overrides))
     plant = plant_parameters(device)
-    valve, coils = solenoid_recycling.prepare(device.valve.settings), solenoid_recycling.parted_long_ago()
+    valve, coils = solenoid_recycling.prepare(valve_settings(device.valve)), solenoid_recycling.parted_long_ago()
     state = vented_state(plant, math.radians(75.0), 0.0)
     held = held_chambers(plant, state.angle)
     rows = []

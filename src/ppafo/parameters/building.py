@@ -127,7 +127,7 @@ def actuator_problem(actuator: Actuator) -> str:
         dead_volume_1=actuator.dead_volume_1,
         dead_volume_2=actuator.dead_volume_2,
     )
-    return ACTUATORS[actuator.kind].problem(actuator.settings, stops) or _outside(actuator.table, stops)
+    return ACTUATORS[actuator.kind].problem(actuator, stops) or _outside(actuator.table, stops)
 
 
 def _outside(table: "Table | None", stops: Range) -> str:

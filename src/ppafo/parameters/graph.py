@@ -31,19 +31,20 @@ def itself(number: Any) -> Any:
 class Term:
     """A function of other numbers, floats or arrays (runs,), which is one of floats that can be translated to C.
 
-    With ``names`` it takes its sources as one mapping under these names, else one by one.
+    With ``settings`` it takes its sources as one NamedTuple of this class, else one by one.
     """
 
     sources: tuple[str, ...]
     function: Callable[..., Any] = itself
-    names: tuple[str, ...] = ()
+    settings: type | None = None
 
     def number(self, present: Callable[[str], Any]) -> Any:
         """Return what the function makes of what the sources are at ``present``."""
         given = [present(source) for source in self.sources]
-        if not self.names:
+        if self.settings is None:
             return given[0] if self.function is itself else over_runs(self.function, *given)
-        return over_runs(lambda *numbers: self.function(dict(zip(self.names, numbers, strict=True))), *given)
+        settings = self.settings
+        return over_runs(lambda *numbers: self.function(settings(*numbers)), *given)
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,13 +6,13 @@ from functools import cache
 from typing import Any, NamedTuple, cast
 
 from ppafo.model.actuators.kind import Range, mean_growth, plant_in_shape
-from ppafo.model.catalog import ACTUATORS, find_effects, ordered_effects
+from ppafo.model.catalog import ACTUATORS, VALVES, find_effects, ordered_effects
 from ppafo.model.columns import first, over_runs
 from ppafo.model.effects.kind import SECTION, Effect
 from ppafo.model.orifice import FlowCurve, area_conductance, isentropic_curve, iso6358_curve, sonic_conductance_mass
 from ppafo.model.plant import PlantParameters
 from ppafo.parameters.declaration import members
-from ppafo.parameters.device import Device, Gas, Orifice, SonicOrifice
+from ppafo.parameters.device import Device, Gas, Orifice, SonicOrifice, Valve
 
 
 class Restriction(NamedTuple):
@@ -52,6 +52,16 @@ def orifice_conductance(orifice: Orifice | SonicOrifice, gas: Gas) -> float:
     return restriction(orifice, gas, 0.0).conductance
 
 
+def valve_settings(valve: Valve) -> Any:
+    """Return the settings [SI] of a valve as the class of its kind, whose numbers may be arrays (runs,)."""
+    return VALVES[valve.kind].settings(**valve.settings)
+
+
+def first_settings(valve: Valve) -> Any:
+    """Return the same of the first run, which choose the model of the valve."""
+    return valve_settings(valve)._make(map(first, valve_settings(valve)))
+
+
 def plant_parameters(device: Device, external_torque: float = 0.0) -> PlantParameters:
     """The plant of a device, with a constant external torque T_ex [N m] on a free vane."""
     ratio = device.flow.linear_ratio
@@ -67,11 +77,12 @@ def plant_parameters(device: Device, external_torque: float = 0.0) -> PlantParam
 def shape_and_growth(device: Device) -> tuple[Any, Any]:
     """Shape of an actuator that is no vane, and how chamber 1 grows with the angle on average [m^3/rad]."""
     actuator, supply = device.actuator, device.supply
-    names, model = tuple(actuator.settings), ACTUATORS[actuator.kind].model
+    kind = ACTUATORS[actuator.kind]
+    model = kind.model
 
     def prepared(low: float, high: float, dead_1: float, dead_2: float, pressed: float, *values: float) -> Any:
         stops = Range(angle_min=low, angle_max=high, dead_volume_1=dead_1, dead_volume_2=dead_2)
-        given = dict(zip(names, values, strict=True))
+        given = kind.settings(*values)
         table = actuator.table
         shape = model.prepare(given, stops) if table is None else model.prepare(given, stops, table)
         return shape, mean_growth(shape, stops, pressed, model.chambers)
@@ -167,7 +178,7 @@ def effect_row(effect: Effect, device: Device, others: Sections = _NO_SECTIONS) 
     def prepared(*numbers: float) -> Any:
         own, rest = numbers[: len(settings)], iter(numbers[len(settings) :])
         parts = [_part(section, inner)(*[next(rest) for _ in inner]) for section, inner in names.items()]
-        return prepare(dict(zip(settings, own, strict=True)), _part("device", tuple(names))(*parts))
+        return prepare(effect.settings(*own), _part("device", tuple(names))(*parts))
 
     return over_runs(prepared, *settings.values(), *given)
 

@@ -31,6 +31,7 @@ from ppafo.parameters import load_device
 from ppafo.parameters.declaration import SECTIONS
 from ppafo.parameters.device import VANE, Device
 from ppafo.parameters.loading import load_parameter_set
+from ppafo.parameters.plant import valve_settings
 from ppafo.rig.dynamics import RigPhysics, RigState, ambient_node, leak_exchange, orifice_exchange
 from ppafo.rig.preset import (
     CHANNEL_SENSORS,
@@ -169,7 +170,8 @@ def record_valve_map(request: Request) -> Outcome:
     supply, orifice = device.supply, exact_orifice(device.valve.orifice, device)
     # The openings once nothing moves any more: of the valve with every time and frequency taken out.
     kind = VALVES[device.valve.kind]
-    still = {item.name: 0.0 if item.unit else device.valve.settings[item.name] for item in kind.quantities}
+    with_times = valve_settings(device.valve)
+    still = with_times._replace(**{item.name: 0.0 for item in kind.quantities if item.unit})
     model = kind.choose(still)
     parameters = model.prepare(still)
     rising = np.linspace(-1.0, 1.0, COMMAND_STEPS + 1)

@@ -280,7 +280,7 @@ def rig_physics(device: Device, preset: Preset) -> RigPhysics:
         line_volume=values["line.volume"],
         laminar_conductance=values["leak.laminar_conductance"],
         seal_friction=SealFriction(values["friction.static_per_pressure"], values["friction.dynamic_per_pressure"]),
-        stribeck=stribeck.prepare({"velocity": velocity, "share": share}, device),
+        stribeck=stribeck.prepare(stribeck.StribeckSettings(velocity, share), device),
         angle_follow_rate=TWO_PI * values["angle_sensor.bandwidth"],
         pressure_follow_rate=TWO_PI * values["pressure_sensor.bandwidth"],
         chambers_open=0.0,

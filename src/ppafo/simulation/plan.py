@@ -49,7 +49,14 @@ from ppafo.model.regulator import LineState, SupplyLines
 from ppafo.model.sensors import SensorParameters
 from ppafo.model.valves.kind import ValveModel
 from ppafo.parameters.device import Device, Gas, Orifice, SonicOrifice
-from ppafo.parameters.plant import effect_rows, effects_of, orifice_conductance, plant_parameters
+from ppafo.parameters.plant import (
+    effect_rows,
+    effects_of,
+    first_settings,
+    orifice_conductance,
+    plant_parameters,
+    valve_settings,
+)
 from ppafo.simulation.scenario import (
     PYTHON_CONTROLLER,
     FreeMotion,
@@ -140,7 +147,7 @@ def compose_run(
 
     Every law, valve, motion, gas and supply goes with every other here.
     """
-    settings = components.device.valve.settings
+    settings = valve_settings(components.device.valve)
     delay = components.valve.command_delay(settings)
     plant = plant_behind_lines(plant, components.supply_lines)
     leg = None if components.leg is None else led_leg(plant, components.leg)
@@ -238,7 +245,7 @@ def plan_runs(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
     numbers, problems = _numbers_of_law(law, scenario, plant.torque_constant)
     components = Components(
         device=device,
-        valve=VALVES[device.valve.kind].choose({name: first(value) for name, value in device.valve.settings.items()}),
+        valve=VALVES[device.valve.kind].choose(first_settings(device.valve)),
         controller=law,
         settings=numbers,
         reference=scenario.reference,
@@ -339,13 +346,13 @@ def with_load(plant: PlantParameters, load: FootLoad) -> PlantParameters:
     return plant._replace(inertia=load.inertia, gravity_torque=0.0)
 
 
-def valve_parameters(valve: ValveModel, settings: Mapping[str, float]) -> Any:
-    """Parameters of a valve from its settings in SI units, which may be arrays (runs,)."""
+def valve_parameters(valve: ValveModel, settings: Any) -> Any:
+    """Parameters of a valve from its settings in SI units, a NamedTuple whose numbers may be arrays (runs,)."""
 
     def prepare(*values: float) -> Any:
-        return valve.prepare(dict(zip(settings, values, strict=True)))
+        return valve.prepare(type(settings)(*values))
 
-    return over_runs(prepare, *settings.values())
+    return over_runs(prepare, *settings)
 
 
 def too_many_steps(scenario: Scenario, step: float, step_count: int) -> Problem:

@@ -12,6 +12,7 @@ from ppafo.control.kind import ControllerKind
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.errors import ScenarioError
 from ppafo.model.columns import Problem, at, larger, smaller
+from ppafo.parameters.plant import valve_settings
 from ppafo.simulation.declaration import Reading, short_quantity_text
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario
 from ppafo.walking.motion import walk_of
@@ -151,7 +152,7 @@ def _times(scenario: Scenario) -> Iterator[Contradiction]:
         settings["flat_from"] >= settings["flat_to"],
         lambda run: f"must be below controller.flat_to, which is {at(settings['flat_to'], run):g}",
     )
-    delay = walking_valve(scenario.device.valve).command_delay(scenario.device.valve.settings)
+    delay = walking_valve(scenario.device.valve).command_delay(valve_settings(scenario.device.valve))
     for name in ("fill_time", "vent_time"):
         yield Contradiction(
             f"controller.{name}",

@@ -432,8 +432,8 @@ def _terms(valve: Valve) -> dict[str, Term]:
     names = tuple(item.name for item in kind.quantities)
     paths, delay = tuple(f"valve.{name}" for name in names), walking_valve(valve).command_delay
     return {
-        VALVE_LAG: Term(paths, kind.lag or delay, names),
-        VALVE_DELAY: Term(paths, delay, names),
+        VALVE_LAG: Term(paths, kind.lag or delay, kind.settings),
+        VALVE_DELAY: Term(paths, delay, kind.settings),
         PRESSURE_LAG: Term(("sensors.pressure_bandwidth",), lag_of_bandwidth),
         FORCE_LAG: Term(("sensors.force_bandwidth",), lag_of_bandwidth),
     }

@@ -85,7 +85,7 @@ def nominal_terms(device: Device, lines: SupplyLines | None) -> dict[str, Term]:
         "critical_ratio": Term(_SONIC[1:]) if is_sonic else Term(_GAS[1:2], critical_pressure_ratio),
         "relieving": Term(_ANY, yes if device.supply.relieving else no),
         "pair": Term(_ANY, yes if is_pair else no),
-        "lag": Term(tuple(f"valve.{name}" for name in names), kind.lag, names)
+        "lag": Term(tuple(f"valve.{name}" for name in names), kind.lag, kind.settings)
         if valve.kind == _SPOOL and kind.lag is not None
         else Term(_ANY, no),
         "joining_time": Term(("valve.joining_time", "valve.holding_time"), time_of_joint)

@@ -27,7 +27,7 @@ from ppafo.model.sensors import GaitSensors
 from ppafo.model.valves import vent_valve
 from ppafo.model.valves.kind import ValveModel
 from ppafo.parameters.device import Device, Valve
-from ppafo.parameters.plant import plant_parameters
+from ppafo.parameters.plant import first_settings, plant_parameters
 from ppafo.simulation.plan import Components, Steps, compose_run, sensor_parameters, too_many_steps
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, ProfileChoice, Scenario
 from ppafo.walking.course import PlannedCourse, WalkingCourse, plan_course, standing_gait
@@ -290,5 +290,5 @@ def planned_course(course: WalkingCourse, gait: Gait, number: Any = 0.0) -> Plan
 
 def walking_valve(valve: Valve) -> ValveModel:
     """The valve of a walking device; a proportional one has a vent valve for free motion."""
-    settings = {name: first(value) for name, value in valve.settings.items()}
+    settings = first_settings(valve)
     return vent_valve.choose(settings) if valve.kind == "proportional" else VALVES[valve.kind].choose(settings)

@@ -59,6 +59,6 @@ def test_device_and_overrides_reach_the_rig(tmp_path: Path, capsys: pytest.Captu
     ]
     assert main(["rig", "simulate", "open-valve-flow", *words, "--json", "--out", str(tmp_path)]) == 0
     document = json.loads(capsys.readouterr().out)
-    assert document["device"]["valve"]["orifice"]["area"] == pytest.approx(1e-5)
+    assert document["device"]["valve"]["area"] == pytest.approx(1e-5)
     assert document["preset"]["values"]["flow_sensor.noise"] == 0.0
     assert document["files"] == ["open-valve-flow.csv", "rig.json"]

@@ -84,7 +84,7 @@ def test_an_override_reaches_the_device_of_the_saved_scenario(tmp_path: Path) ->
     folder = tmp_path / "step"
     assert main(["simulate", "step-response", "--set", "valve.area=12.6mm^2", "--out", str(folder)]) == 0
     scenario = read_result(folder).document["scenario"]
-    assert scenario["device"]["valve"]["orifice"]["area"] == 12.6e-6
+    assert scenario["device"]["valve"]["area"] == 12.6e-6
     assert scenario["origin"]["overrides"] == ["valve.area=12.6mm^2"]
 
 

@@ -1,7 +1,7 @@
 """Effects in a composed program: whoever needs a row is handed it, laws act in a row, what cannot act is refused."""
 
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import pytest
 
@@ -9,7 +9,7 @@ from ppafo.engine.outline import Outline
 from ppafo.engine.program import link_effects, link_program
 from ppafo.engine.source_text import SourceCollector, composed_lines
 from ppafo.errors import ProgramError
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Number
 from ppafo.model.effects.kind import Effect, effect_problem
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
@@ -35,6 +35,24 @@ def apart(amount: float) -> float:
     return amount - 1.0
 
 
+class Share(NamedTuple):
+    """The setting."""
+
+    share: Annotated[float, Number("", "share", 0.0, 0.0, 1.0)]
+
+
+class Needed(NamedTuple):
+    """A setting without a default."""
+
+    share: Annotated[float, Number("", "share", None, 0.0, 1.0)]
+
+
+class Half(NamedTuple):
+    """A setting that is not off by default."""
+
+    share: Annotated[float, Number("", "share", 0.5, 0.0, 1.0)]
+
+
 class Row(NamedTuple):
     """One number."""
 
@@ -58,7 +76,7 @@ def undoing_law(amount: float, second: Row) -> float:
 
 def prepared(settings: Any, device: Any) -> Row:
     """The row."""
-    return Row(settings["share"])
+    return Row(settings.share)
 
 
 def hands_it_over(amount: float) -> float:
@@ -82,11 +100,10 @@ def calls_a_law(amount: float) -> float:
     return first_law(amount, Row(0.5))
 
 
-SHARE = Quantity("share", "", "share", 0.0, 0.0, 1.0)
 FIRST = Effect(
     name="first",
     summary="",
-    quantities=(SHARE,),
+    settings=Share,
     parameters=Row,
     prepare=prepared,
     switch=("share",),
@@ -151,8 +168,8 @@ def test_what_would_lose_a_row_is_refused(function: Any, said: str) -> None:
     ("change", "said"),
     [
         ({"name": "two words"}, "must be an identifier"),
-        ({"quantities": (replace(SHARE, default=None),)}, "'share' has no default"),
-        ({"quantities": (replace(SHARE, default=0.5),)}, "its defaults leave it on"),
+        ({"settings": Needed}, "'share' has no default"),
+        ({"settings": Half}, "its defaults leave it on"),
         ({"switch": ("other",)}, "switch names 'other', which is no quantity with a minimum of 0"),
         ({"switch": ()}, "has no switch"),
         ({"laws": {place: apart, apart: hides_it}, "name": "third"}, ""),

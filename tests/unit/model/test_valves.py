@@ -9,8 +9,10 @@ import pytest
 from ppafo.engine.scheme.motion import until_jump
 from ppafo.model.valves import proportional, solenoid, solenoid_recycling
 
-SPOOL = {"dead_band": 0.0, "delay": 0.0, "spool_frequency": 50.0, "spool_damping_ratio": 0.5, "slew_limit": 0.0}
-PAIR = {"opening_delay": 0.003, "closing_delay": 0.005, "switching_interval": 0.05}
+SPOOL = proportional.ProportionalSettings(
+    dead_band=0.0, delay=0.0, spool_frequency=50.0, spool_damping_ratio=0.5, slew_limit=0.0
+)
+PAIR = solenoid.TimedSolenoid(opening_delay=0.003, closing_delay=0.005, switching_interval=0.05)
 
 
 def test_dead_band_hides_small_commands_and_leaves_full_command_full() -> None:
@@ -21,7 +23,7 @@ def test_dead_band_hides_small_commands_and_leaves_full_command_full() -> None:
 
 @pytest.mark.parametrize("damping_ratio", [0.2, 0.7, 1.0, 2.5])
 def test_spool_step_is_exact_whatever_its_length(damping_ratio: float) -> None:
-    settings = {**SPOOL, "spool_damping_ratio": damping_ratio}
+    settings = SPOOL._replace(spool_damping_ratio=damping_ratio)
     valve = proportional.prepare_moving(settings)
     state = proportional.SpoolState(0.8, 0.1, 3.0)
     shares = []
@@ -71,7 +73,7 @@ def test_spool_step_is_the_closed_form_for_any_frequency_damping_and_length(deca
 
 
 def test_spool_answers_a_step_as_a_second_order_system() -> None:
-    settings = {**SPOOL, "spool_damping_ratio": 0.2}
+    settings = SPOOL._replace(spool_damping_ratio=0.2)
     valve = proportional.prepare_moving(settings)
     state, highest = proportional.spool_at_rest(), 0.0
     for _ in range(1000):
@@ -82,7 +84,7 @@ def test_spool_answers_a_step_as_a_second_order_system() -> None:
 
 
 def test_slew_limit_bounds_the_rate_of_the_opening() -> None:
-    valve = proportional.prepare_moving({**SPOOL, "spool_frequency": 0.0, "slew_limit": 20.0})
+    valve = proportional.prepare_moving(SPOOL._replace(spool_frequency=0.0, slew_limit=20.0))
     state = proportional.spool_at_rest()
     for _ in range(25):
         _, state = proportional.advance_moving(valve, state, 0.6, 0.0, 1e-3)
@@ -90,7 +92,7 @@ def test_slew_limit_bounds_the_rate_of_the_opening() -> None:
 
 
 def run_pair(
-    settings: dict[str, float], command_at: dict[float, float], until: float
+    settings: solenoid.TimedSolenoid, command_at: dict[float, float], until: float
 ) -> list[tuple[float, str, float]]:
     """Switchings (time, valve, position) of a pair whose command changes at given times."""
     valve = solenoid.prepare_timed(settings)
@@ -119,21 +121,21 @@ def test_coil_accepts_a_second_order_only_after_the_switching_interval() -> None
 
 
 def test_pulse_shorter_than_the_opening_delay_never_reaches_the_flow() -> None:
-    settings = {**PAIR, "switching_interval": 0.0}
+    settings = PAIR._replace(switching_interval=0.0)
     assert run_pair(settings, {0.0: 1.0, 0.002: 0.0}, 0.2) == []
 
 
 def test_no_command_vents_both_chambers() -> None:
-    openings = solenoid.instant_ideal(solenoid.prepare_ideal({}), solenoid.both_off(), 0.0)
+    openings = solenoid.instant_ideal(solenoid.prepare_ideal(PAIR), solenoid.both_off(), 0.0)
     assert openings == (0.0, 1.0, 0.0, 1.0)
 
 
 def test_command_above_zero_feeds_chamber_1_and_vents_chamber_2() -> None:
-    openings = solenoid.instant_ideal(solenoid.prepare_ideal({}), solenoid.both_off(), 1.0)
+    openings = solenoid.instant_ideal(solenoid.prepare_ideal(PAIR), solenoid.both_off(), 1.0)
     assert openings == (1.0, 0.0, 0.0, 1.0)
 
 
-def parts_of_a_step(settings: dict[str, float], command: float, step: float) -> list[float]:
+def parts_of_a_step(settings: solenoid.TimedSolenoid, command: float, step: float) -> list[float]:
     """Lengths of the parts of a step that begins with a pair energised for chamber 1 long ago."""
     valve = solenoid.prepare_timed(settings)
     state = solenoid.settle_timed(valve, solenoid.both_off_long_ago(), 1.0, 0.0)
@@ -149,7 +151,7 @@ def parts_of_a_step(settings: dict[str, float], command: float, step: float) -> 
 
 
 def test_step_is_cut_at_every_switching_inside_it() -> None:
-    settings = {"opening_delay": 0.0003, "closing_delay": 0.0007, "switching_interval": 0.0}
+    settings = solenoid.TimedSolenoid(opening_delay=0.0003, closing_delay=0.0007, switching_interval=0.0)
     assert parts_of_a_step(settings, -1.0, 1e-3) == pytest.approx([0.0003, 0.0004, 0.0003])
 
 
@@ -159,7 +161,7 @@ def test_step_without_a_switching_is_whole() -> None:
 
 def recycled(joining: float, holding: float, command_at: dict[float, float]) -> list[tuple[float, tuple[float, ...]]]:
     """Times and openings (source 1, vent 1, source 2, vent 2, joint) of a recycling pair, where they change."""
-    valve = solenoid_recycling.prepare({**PAIR, "joining_time": joining, "holding_time": holding})
+    valve = solenoid_recycling.prepare(solenoid_recycling.RecyclingSettings(*PAIR, joining, holding))
     state, command, time, seen = solenoid_recycling.parted_long_ago(), 0.0, 0.0, []
     while time < 1.0:
         command = command_at.get(round(time, 6), command)

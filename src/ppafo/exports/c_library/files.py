@@ -473,9 +473,10 @@ def choosing(device: Device) -> list[str]:
     chosen = {}
     # A valve may look only at which settings are 0, so both cases of each tell what chooses.
     for pattern in itertools.product((0.0, 0.01), repeat=len(names)):
-        model = kind.choose(dict(zip(names, pattern, strict=True)))
         # The model and whether it has a dead time: both decide which program is composed.
-        chosen[pattern] = model, model.command_delay(dict(zip(names, pattern, strict=True))) > 0.0
+        settings = kind.settings(*pattern)
+        model = kind.choose(settings)
+        chosen[pattern] = model, model.command_delay(settings) > 0.0
     return [
         name
         for place, name in enumerate(names)

@@ -19,7 +19,7 @@ from ppafo.exports.c_library.program import COUNTS
 from ppafo.model.actuators.kind import Range, mean_growth
 from ppafo.model.catalog import VALVES, device_effects
 from ppafo.model.columns import smaller
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Quantity, quantities_of
 from ppafo.model.gait import ShankSeries
 from ppafo.model.gas import specific_gas_constant
 from ppafo.model.plant import PlantParameters
@@ -91,9 +91,9 @@ def following_text(settings: Sequence[Setting], links: Graph, collector: Collect
 def _term(term: Term, rows: list[str], collector: Collector) -> str:
     """A term of what is followed; structs that only it has are added to ``rows``."""
     given = ", ".join(map(c_identifier, term.sources))
-    if term.names:
+    if term.settings is not None:
         row = f"Followed{len(rows)}"
-        rows.append(f"{row} = namedtuple({row!r}, {list(term.names)!r})")
+        rows.append(f"{row} = namedtuple({row!r}, {[item.name for item in quantities_of(term.settings)]!r})")
         given = f"{row}({given})"
     return f"{collector.add(term.function)}({given})"
 

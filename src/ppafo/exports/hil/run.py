@@ -26,6 +26,7 @@ from ppafo.errors import ScenarioError
 from ppafo.exports.hil import wire
 from ppafo.exports.hil.loop import Bench, Exchange, LockStep, Pace, RealTime, Row, without_collections
 from ppafo.model.valves import vent_valve
+from ppafo.parameters.plant import valve_settings
 from ppafo.report.recording_figure import recording_figure
 from ppafo.report.style import ACTUAL, VERMILION, Margins, figure_of_free_panels, house_style, render_figure
 from ppafo.simulation.plan import plan_run
@@ -71,7 +72,7 @@ def plant_of(scenario: Scenario, rate: int = wire.RATE) -> Plant:
     run = plan_run(chosen)
     valve = chosen.device.valve
     if valve.kind == "proportional":
-        run = replace(run, program=replace(run.program, valve=vent_valve.choose(valve.settings)))
+        run = replace(run, program=replace(run.program, valve=vent_valve.choose(valve_settings(valve))))
     module = load_program(batch_of(run).program)
     return Plant(chosen, run, module, chosen_compiler().described(), period)
 

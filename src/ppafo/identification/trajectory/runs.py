@@ -257,10 +257,12 @@ def run_with(prepared: PreparedExperiment, numbers: Mapping[str, Any]) -> Run:
     said, before = f"experiment '{prepared.label}'", prepared.scenario.device.valve.settings
     settings: Mapping[str, Any] = device.valve.settings
     own = {path.rpartition(".")[2] for path in numbers if path.startswith("valves.")}
+    kind = VALVES[device.valve.kind]
     for run in range(max((value.size for value in settings.values() if isinstance(value, np.ndarray)), default=1)):
         now = {name: at(value, run) for name, value in settings.items()}
-        valve = VALVES[device.valve.kind].choose(now)
-        if valve != base.program.valve or (valve.command_delay(now) > 0.0) != base.program.late_commands:
+        given = kind.settings(**now)
+        valve = kind.choose(given)
+        if valve != base.program.valve or (valve.command_delay(given) > 0.0) != base.program.late_commands:
             moved = " or ".join(f"valve.{name}" for name in now if name in own and 0.0 in (now[name], before[name]))
             raise IdentificationError(
                 f"{said}: {moved} went to or from 0, another model of the valve; give a start and a lower bound above 0"

@@ -4,8 +4,7 @@ Chamber 1 is on the side of the piston, chamber 2 on the rod's. The cylinder gro
 """
 
 import math
-from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from ppafo.model.actuators.kind import ActuatorKind, ActuatorModel, Chambers, Range, ShapedPlant
 from ppafo.model.actuators.linear_chambers import (
@@ -15,7 +14,7 @@ from ppafo.model.actuators.linear_chambers import (
     linear_torque,
     rigid,
 )
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Number
 from ppafo.model.elementary import TURNS_OF_RADIAN, sine_and_cosine_of_turns
 
 LEAST_SINE = 0.05
@@ -87,10 +86,22 @@ def torque(plant: ShapedPlant, angle: float, pressure_1: float, pressure_2: floa
     return linear_torque(plant, chamber_1(shape, pins), chamber_2(shape, pins), pressure_1, pressure_2)
 
 
-def prepare(settings: Mapping[str, float], stops: Range) -> Cylinder:
+class CylinderSettings(NamedTuple):
+    """Bore, rod, lever and base of the cylinder."""
+
+    bore: Annotated[float, Number("m", "diameter of the piston", minimum=1.0e-3, maximum=0.5)]
+    rod_diameter: Annotated[float, Number("m", "diameter of the rod", minimum=0.0, maximum=0.5)]
+    lever_length: Annotated[float, Number("m", "joint to rod end", minimum=1.0e-3, maximum=2.0)]
+    base_distance: Annotated[float, Number("m", "joint to the base of the cylinder", minimum=1.0e-3, maximum=2.0)]
+    lever_offset: Annotated[
+        float, Number("rad", "angle between lever and base where the joint is at 0", 0.0, -10.0, 10.0)
+    ]
+
+
+def prepare(settings: CylinderSettings, stops: Range) -> Cylinder:
     """Numbers of the cylinder."""
-    bore, rod = settings["bore"], settings["rod_diameter"]
-    lever, base, offset = settings["lever_length"], settings["base_distance"], settings["lever_offset"]
+    bore, rod = settings.bore, settings.rod_diameter
+    lever, base, offset = settings.lever_length, settings.base_distance, settings.lever_offset
     quarter = 0.25 * math.pi
     return Cylinder(
         piston_area=quarter * bore * bore,
@@ -105,12 +116,12 @@ def prepare(settings: Mapping[str, float], stops: Range) -> Cylinder:
     )
 
 
-def problem(settings: Mapping[str, float], stops: Range) -> str:
+def problem(settings: CylinderSettings, stops: Range) -> str:
     """A rod as wide as the bore, or a lever that comes to its dead centre between the stops."""
-    if settings["rod_diameter"] >= settings["bore"]:
+    if settings.rod_diameter >= settings.bore:
         return "rod_diameter must be below bore"
     # Both stops suffice: between them the angle runs from one to the other, and the sine has no minimum inside.
-    between = [angle + settings["lever_offset"] for angle in (stops.angle_min, stops.angle_max)]
+    between = [angle + settings.lever_offset for angle in (stops.angle_min, stops.angle_max)]
     if min(between) <= 0.0 or max(between) >= math.pi or min(math.sin(angle) for angle in between) < LEAST_SINE:
         low, high = (math.degrees(angle) for angle in between)
         return (
@@ -123,13 +134,7 @@ def problem(settings: Mapping[str, float], stops: Range) -> str:
 KIND = ActuatorKind(
     name="cylinder",
     summary="A double-acting cylinder between two pins that drives a lever.",
-    quantities=(
-        Quantity("bore", "m", "diameter of the piston", minimum=1.0e-3, maximum=0.5),
-        Quantity("rod_diameter", "m", "diameter of the rod", minimum=0.0, maximum=0.5),
-        Quantity("lever_length", "m", "joint to rod end", minimum=1.0e-3, maximum=2.0),
-        Quantity("base_distance", "m", "joint to the base of the cylinder", minimum=1.0e-3, maximum=2.0),
-        Quantity("lever_offset", "rad", "angle between lever and base where the joint is at 0", 0.0, -10.0, 10.0),
-    ),
+    settings=CylinderSettings,
     model=ActuatorModel(Cylinder, prepare, chambers, pressures, torque),
     problem=problem,
 )

@@ -5,11 +5,11 @@ that d tau/dp = dV/dangle: what the gas gives as p dV the shaft gets. A kind is 
 """
 
 from collections import namedtuple
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol, get_type_hints
 
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Quantity, quantities_of
 from ppafo.model.plant import PlantParameters
 
 
@@ -68,14 +68,21 @@ class ActuatorModel:
 class ActuatorKind:
     """An actuator as the catalogue knows it: name, what it is, its numbers beside stops and dead volumes, its model.
 
+    ``settings`` is a NamedTuple class that declares the numbers, each an ``Annotated[float, Number(...)]``.
+
     ``problem(settings, range)`` says in words what of the numbers does not fit together; empty where all of it does.
     """
 
     name: str
     summary: str
-    quantities: tuple[Quantity, ...]
+    settings: type
     model: ActuatorModel
-    problem: Callable[[Mapping[str, float], Range], str]
+    problem: Callable[[Any, Range], str]
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """What its settings declare."""
+        return quantities_of(self.settings)
 
 
 class ShapedPlant(Protocol):

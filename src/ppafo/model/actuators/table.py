@@ -5,12 +5,11 @@ it runs straight from one measured pressure to the next, and no further. Its int
 and the torque is the derivative of that over the angle: d tau/dp = dV/dangle holds to rounding, whatever was measured.
 """
 
-from collections.abc import Mapping
 from typing import Annotated, NamedTuple
 
 from ppafo.model.actuators.kind import ActuatorKind, ActuatorModel, Chambers, Range, ShapedPlant
 from ppafo.model.actuators.linear_chambers import LinearChamber, pressure_in
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Number
 
 BENDS, RISES = 8, 4
 """Places inside the range of the angle where a spline may bend, and stretches between two measured pressures."""
@@ -236,18 +235,27 @@ def torque(plant: ShapedPlant, angle: float, pressure_1: float, pressure_2: floa
     return active_1 + active_2 - shape.stiffness * (angle - shape.rest_angle)
 
 
-def prepare(settings: Mapping[str, float], stops: Range, table: Table) -> Measured:
+class TableSettings(NamedTuple):
+    """What the material does without pressure."""
+
+    passive_stiffness: Annotated[
+        float, Number("N m/rad", "torque of the material per angle from rest", 0.0, 0.0, 1.0e4)
+    ]
+    rest_angle: Annotated[float, Number("rad", "angle at which the material gives no torque", 0.0, -10.0, 10.0)]
+
+
+def prepare(settings: TableSettings, stops: Range, table: Table) -> Measured:
     """Numbers of the actuator."""
     return Measured(
         table=table,
         dead_volume_1=stops.dead_volume_1,
         dead_volume_2=stops.dead_volume_2,
-        stiffness=settings["passive_stiffness"],
-        rest_angle=settings["rest_angle"],
+        stiffness=settings.passive_stiffness,
+        rest_angle=settings.rest_angle,
     )
 
 
-def problem(settings: Mapping[str, float], stops: Range) -> str:
+def problem(settings: TableSettings, stops: Range) -> str:
     """Nothing: the file is judged where it is read."""
     return ""
 
@@ -255,10 +263,7 @@ def problem(settings: Mapping[str, float], stops: Range) -> str:
 KIND = ActuatorKind(
     name="table",
     summary="An actuator that was measured: volumes over angle and pressure, from a CSV file.",
-    quantities=(
-        Quantity("passive_stiffness", "N m/rad", "torque of the material per angle from rest", 0.0, 0.0, 1.0e4),
-        Quantity("rest_angle", "rad", "angle at which the material gives no torque", 0.0, -10.0, 10.0),
-    ),
+    settings=TableSettings,
     model=ActuatorModel(Measured, prepare, chambers, pressures, torque, table=Table),
     problem=problem,
 )

@@ -4,10 +4,10 @@ Torque constant and displacement per radian are given apart, as they are reporte
 but for losses; where they differ, the shaft does not get the work of the gas (docs/decisions/0014).
 """
 
-from collections.abc import Mapping
+from typing import Annotated, Any, NamedTuple
 
 from ppafo.model.actuators.kind import ActuatorKind, ActuatorModel, Chambers, Range
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Number
 from ppafo.model.plant import PlantParameters, actuator_torque, chamber_pressures, chamber_volumes
 
 
@@ -22,11 +22,11 @@ def torque(plant: PlantParameters, angle: float, pressure_1: float, pressure_2: 
     return actuator_torque(pressure_1, pressure_2, plant.torque_constant)
 
 
-def prepare(settings: Mapping[str, float], stops: Range) -> None:
+def prepare(_settings: Any, _stops: Range) -> None:
     """Nothing: the numbers of a vane stand in the plant itself."""
 
 
-def problem(settings: Mapping[str, float], stops: Range) -> str:
+def problem(_settings: Any, _stops: Range) -> str:
     """Nothing: the declared limits say all."""
     return ""
 
@@ -34,13 +34,19 @@ def problem(settings: Mapping[str, float], stops: Range) -> str:
 MODEL = ActuatorModel(None, prepare, chambers, chamber_pressures, torque)
 SMALLEST_VOLUME = 1e-18
 """A cube of a micrometre [m^3]: less is a slip, and what is divided by it leaves the range of floats."""
+
+
+class VaneSettings(NamedTuple):
+    """Torque per pressure, and displacement per radian."""
+
+    torque_constant: Annotated[float, Number("m^3", "torque per pressure difference", minimum=SMALLEST_VOLUME)]
+    volume_per_angle: Annotated[float, Number("m^3/rad", "displacement per radian", minimum=SMALLEST_VOLUME)]
+
+
 KIND = ActuatorKind(
     name="vane",
     summary="A vane between two chambers whose volumes run linearly with the angle.",
-    quantities=(
-        Quantity("torque_constant", "m^3", "torque per pressure difference", minimum=SMALLEST_VOLUME),
-        Quantity("volume_per_angle", "m^3/rad", "displacement per radian", minimum=SMALLEST_VOLUME),
-    ),
+    settings=VaneSettings,
     model=MODEL,
     problem=problem,
 )

@@ -1,9 +1,9 @@
 """Sensors that follow with a bandwidth: what a controller sees lags behind, each signal by a first order."""
 
 import math
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Number
 from ppafo.model.effects.kind import Effect, Moment, State
 from ppafo.model.ports import shown_signals
 from ppafo.model.sensors import follow, follow_rate
@@ -24,11 +24,22 @@ class SensorState(NamedTuple):
     pressure_2: float
 
 
-def prepare(settings: Any, _device: Any) -> SensorRates:
+class Bandwidths(NamedTuple):
+    """Bandwidths of the sensors."""
+
+    angle_bandwidth: Annotated[
+        float, Number("Hz", "bandwidth of the angle sensor, 0 for an instant one", 0.0, 0.0, 1.0e6)
+    ]
+    pressure_bandwidth: Annotated[
+        float, Number("Hz", "bandwidth of the pressure sensors, 0 for instant ones", 0.0, 0.0, 1.0e6)
+    ]
+
+
+def prepare(settings: Bandwidths, _device: Any) -> SensorRates:
     """How fast sensors with some bandwidths [Hz] follow."""
     # A first order with a bandwidth f (-3 dB) follows at the rate 2 pi f.
     turn = 2.0 * math.pi
-    return SensorRates(angle=turn * settings["angle_bandwidth"], pressure=turn * settings["pressure_bandwidth"])
+    return SensorRates(angle=turn * settings.angle_bandwidth, pressure=turn * settings.pressure_bandwidth)
 
 
 def as_they_show(
@@ -73,10 +84,7 @@ def slopes(bandwidth: SensorRates, bandwidth_state: SensorState, now: Moment) ->
 EFFECT = Effect(
     name="bandwidth",
     summary="Sensors that follow by a first order.",
-    quantities=(
-        Quantity("angle_bandwidth", "Hz", "bandwidth of the angle sensor, 0 for an instant one", 0.0, 0.0, 1.0e6),
-        Quantity("pressure_bandwidth", "Hz", "bandwidth of the pressure sensors, 0 for instant ones", 0.0, 0.0, 1.0e6),
-    ),
+    settings=Bandwidths,
     parameters=SensorRates,
     prepare=prepare,
     switch=("angle_bandwidth", "pressure_bandwidth"),

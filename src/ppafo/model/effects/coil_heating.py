@@ -1,8 +1,8 @@
 """Coils of solenoid valves that warm while they are on: a hot coil has more resistance, and lifts its valve later."""
 
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Number
 from ppafo.model.effects.kind import Effect, Moment, State
 from ppafo.model.elementary import logarithm
 from ppafo.model.ports import opening_time
@@ -42,19 +42,33 @@ def slower(rise: float, pull_in_share: float) -> float:
     return logarithm(1.0 - pull_in_share * ratio) / (ratio * logarithm(1.0 - pull_in_share))
 
 
-def prepare(settings: Any, _device: Any) -> CoilHeating:
+class CoilSettings(NamedTuple):
+    """How warm a coil becomes, how soon, and how much current lifts its valve."""
+
+    steady_rise: Annotated[
+        float, Number("K", "rise of temperature of a coil that is always on, 0 for none", 0.0, 0.0, 100.0)
+    ]
+    time_constant: Annotated[
+        float, Number("s", "time constant with which a coil warms and cools", 300.0, 1.0e-3, 1.0e6)
+    ]
+    pull_in_share: Annotated[
+        float, Number("", "current that lifts the valve, over the last one of a cold coil", 0.5, 0.01, 0.6)
+    ]
+
+
+def prepare(settings: CoilSettings, _device: Any) -> CoilHeating:
     """Parameters from the settings, with the parabola through a cold, a half warm and a hot coil.
 
     It is within 0.6 % of the formula for every allowed rise and share, and needs no logarithm in each step.
     """
-    steady, share = settings["steady_rise"], settings["pull_in_share"]
     # A parabola through three points of the formula, exact at no rise, half and full rise.
+    steady, share = settings.steady_rise, settings.pull_in_share
     half, full = slower(0.5 * steady, share) - 1.0, slower(steady, share) - 1.0
     # Without a rise both differences are 0, and so is the parabola.
     whole = max(steady, 1.0e-30)
     return CoilHeating(
         steady_rise=steady,
-        warming=1.0 / settings["time_constant"],
+        warming=1.0 / settings.time_constant,
         slowing=(4.0 * half - full) / whole,
         slowing_squared=2.0 * (full - 2.0 * half) / (whole * whole),
     )
@@ -95,11 +109,7 @@ def slopes(coil_heating: CoilHeating, coil_heating_state: CoilRises, now: Moment
 EFFECT = Effect(
     name="coil_heating",
     summary="Coils of solenoid valves that warm while they are on, and then lift their valves later.",
-    quantities=(
-        Quantity("steady_rise", "K", "rise of temperature of a coil that is always on, 0 for none", 0.0, 0.0, 100.0),
-        Quantity("time_constant", "s", "time constant with which a coil warms and cools", 300.0, 1.0e-3, 1.0e6),
-        Quantity("pull_in_share", "", "current that lifts the valve, over the last one of a cold coil", 0.5, 0.01, 0.6),
-    ),
+    settings=CoilSettings,
     parameters=CoilHeating,
     prepare=prepare,
     switch=("steady_rise",),

@@ -1,8 +1,8 @@
 """Ice at the exhaust of the valve: cold gas lets moisture freeze there, which narrows the path and melts again."""
 
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Number
 from ppafo.model.effects.kind import Effect, Moment, State
 from ppafo.model.ports import exhaust_path
 from ppafo.model.sensors import decay_factors
@@ -21,9 +21,16 @@ class IceState(NamedTuple):
     blockage: float
 
 
-def prepare(settings: Any, _device: Any) -> Ice:
+class IceSettings(NamedTuple):
     """How ice grows and melts."""
-    return Ice(blockage_per_gas=settings["blockage_per_gas"], melting=1.0 / settings["melting_time"])
+
+    blockage_per_gas: Annotated[float, Number("1/kg", "blockage per gas that leaves, 0 for none", 0.0, 0.0, 1.0e6)]
+    melting_time: Annotated[float, Number("s", "time constant with which it melts", 30.0, 1.0e-3, 1.0e6)]
+
+
+def prepare(settings: IceSettings, _device: Any) -> Ice:
+    """How ice grows and melts."""
+    return Ice(blockage_per_gas=settings.blockage_per_gas, melting=1.0 / settings.melting_time)
 
 
 def narrowed(conductance: float, ice_state: IceState) -> float:
@@ -53,10 +60,7 @@ def slopes(ice: Ice, ice_state: IceState, now: Moment) -> IceState:
 EFFECT = Effect(
     name="ice",
     summary="Ice at the exhaust of the valve, which grows with the gas that leaves and melts.",
-    quantities=(
-        Quantity("blockage_per_gas", "1/kg", "blockage per gas that leaves, 0 for none", 0.0, 0.0, 1.0e6),
-        Quantity("melting_time", "s", "time constant with which it melts", 30.0, 1.0e-3, 1.0e6),
-    ),
+    settings=IceSettings,
     parameters=Ice,
     prepare=prepare,
     switch=("blockage_per_gas",),

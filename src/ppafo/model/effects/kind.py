@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 from ppafo.errors import ProgramError
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Quantity, quantities_of
 from ppafo.model.gas import SPECIES
 
 SECTION = "effects"
@@ -58,11 +58,13 @@ class State:
 class Effect:
     """A physical effect: its name in files, what it is, its settings in SI, its parameters, and its laws.
 
+    ``settings`` is a NamedTuple class that declares them, each an ``Annotated[float, Number(...)]``.
+
     ``switch`` names settings, none of them ever below 0; where all of them are 0 the effect is off, and programs are
     composed without it: they have the bits that they would have if it did not exist. One that is ``always`` on has no
     switch, and its settings are numbers that every device has, in a section of its own of a parameter set.
 
-    ``prepare(settings, device)`` makes the NamedTuple ``parameters`` from the settings by name and the numbers of the
+    ``prepare(settings, device)`` makes the NamedTuple ``parameters`` from the settings and the numbers of the
     device (``device.gas``, ``.actuator``, ``.friction``, ``.foot_plate`` and ``.supply``, by their names in a parameter
     set). It must be in the subset that is compiled, for an exported library has it in C. None where the parameters are
     the settings in their order, which columns of an ensemble then fill without a call for each run.
@@ -81,7 +83,7 @@ class Effect:
 
     name: str
     summary: str
-    quantities: tuple[Quantity, ...]
+    settings: type
     parameters: type
     prepare: Callable[..., Any] | None
     switch: tuple[str, ...]
@@ -93,6 +95,11 @@ class Effect:
     section_of_files: str = ""
     always: bool = False
     of_gas: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """What its settings declare."""
+        return quantities_of(self.settings)
 
     @property
     def section(self) -> str:

@@ -1,8 +1,8 @@
 """A leak that opens: below some pressure between the chambers the seal of the vane is tight."""
 
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Number
 from ppafo.model.effects.kind import Effect
 from ppafo.model.ports import leakage_path
 
@@ -14,9 +14,18 @@ class LeakOpening(NamedTuple):
     opening_rise: float
 
 
-def prepare(settings: Any, _device: Any) -> LeakOpening:
+class LeakSettings(NamedTuple):
+    """When the leak opens, and how slowly."""
+
+    pressure: Annotated[
+        float, Number("Pa_d", "pressure between chambers at which the leak opens, 0 for always", 0.0, 0.0, 1.0e7)
+    ]
+    rise: Annotated[float, Number("", "excess at which half of the leak is open, over that pressure", 1.0, 0.01, 100.0)]
+
+
+def prepare(settings: LeakSettings, _device: Any) -> LeakOpening:
     """Parameters from the settings."""
-    return LeakOpening(settings["pressure"], settings["rise"])
+    return LeakOpening(settings.pressure, settings.rise)
 
 
 def lifted(conductance: float, pressure_1: float, pressure_2: float, leak_opening: LeakOpening) -> float:
@@ -36,12 +45,7 @@ def lifted(conductance: float, pressure_1: float, pressure_2: float, leak_openin
 EFFECT = Effect(
     name="leak_opening",
     summary="A leak between the chambers that opens at a pressure.",
-    quantities=(
-        Quantity(
-            "pressure", "Pa_d", "pressure between chambers at which the leak opens, 0 for always", 0.0, 0.0, 1.0e7
-        ),
-        Quantity("rise", "", "excess at which half of the leak is open, over that pressure", 1.0, 0.01, 100.0),
-    ),
+    settings=LeakSettings,
     parameters=LeakOpening,
     prepare=prepare,
     switch=("pressure",),

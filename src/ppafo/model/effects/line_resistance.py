@@ -1,8 +1,8 @@
 """Lines with resistance between valve and chambers: what enters or leaves a chamber passes its line and the valve."""
 
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Number
 from ppafo.model.effects.kind import Effect
 from ppafo.model.orifice import area_conductance, conductance_in_series
 from ppafo.model.ports import exhaust_path, supply_path
@@ -14,12 +14,21 @@ class LineResistance(NamedTuple):
     resistance: float
 
 
-def prepare(settings: Any, device: Any) -> LineResistance:
+class LineSettings(NamedTuple):
+    """An orifice that loses as much pressure as a line."""
+
+    area: Annotated[
+        float, Number("m^2", "area of an orifice with the pressure loss of a line, 0 for no loss", 0.0, 0.0, 1.0e-2)
+    ]
+    discharge_coefficient: Annotated[float, Number("", "discharge coefficient of that orifice", 0.6, 0.01, 2.0)]
+
+
+def prepare(settings: LineSettings, device: Any) -> LineResistance:
     """Parameters of an orifice that loses as much pressure as a line does, with the gas of the device. Equation (6)."""
-    area, gas = settings["area"], device.gas
+    area, gas = settings.area, device.gas
     conductance = area_conductance(
         area,
-        settings["discharge_coefficient"],
+        settings.discharge_coefficient,
         gas.heat_capacity_ratio,
         gas.specific_gas_constant,
         gas.temperature,
@@ -45,10 +54,7 @@ def vented_through_line(conductance: float, line_resistance: LineResistance) -> 
 EFFECT = Effect(
     name="line_resistance",
     summary="Lines with resistance between valve and chambers.",
-    quantities=(
-        Quantity("area", "m^2", "area of an orifice with the pressure loss of a line, 0 for no loss", 0.0, 0.0, 1.0e-2),
-        Quantity("discharge_coefficient", "", "discharge coefficient of that orifice", 0.6, 0.01, 2.0),
-    ),
+    settings=LineSettings,
     parameters=LineResistance,
     prepare=prepare,
     switch=("area",),

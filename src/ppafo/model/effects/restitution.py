@@ -1,8 +1,8 @@
 """Rebound of the vane from its stops: every device has it, with a coefficient that may be 0."""
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Number
 from ppafo.model.effects.kind import Effect
 from ppafo.model.ports import rebound
 
@@ -10,7 +10,7 @@ from ppafo.model.ports import rebound
 class Restitution(NamedTuple):
     """Rebound speed over impact speed at a stop [-], 0 to 1."""
 
-    restitution: float
+    restitution: Annotated[float, Number("", "rebound speed over impact speed at a stop", minimum=0.0, maximum=1.0)]
 
 
 def thrown_back(angular_velocity: float, restitution: Restitution) -> float:
@@ -21,7 +21,7 @@ def thrown_back(angular_velocity: float, restitution: Restitution) -> float:
 EFFECT = Effect(
     name="restitution",
     summary="Rebound of the vane from its stops.",
-    quantities=(Quantity("restitution", "", "rebound speed over impact speed at a stop", minimum=0.0, maximum=1.0),),
+    settings=Restitution,
     parameters=Restitution,
     prepare=None,
     switch=(),

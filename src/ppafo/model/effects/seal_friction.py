@@ -1,8 +1,8 @@
 """Friction that grows with pressure: the gas presses the seals of the vane on its walls."""
 
-from typing import Any, NamedTuple
+from typing import Annotated, NamedTuple
 
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Number
 from ppafo.model.effects.kind import Effect
 from ppafo.model.ports import friction_at_rest, friction_in_motion
 
@@ -10,13 +10,10 @@ from ppafo.model.ports import friction_at_rest, friction_in_motion
 class SealFriction(NamedTuple):
     """Friction torque per pressure between the chambers [N m/Pa], at rest and in motion."""
 
-    static_per_pressure: float
-    dynamic_per_pressure: float
-
-
-def prepare(settings: Any, _device: Any) -> SealFriction:
-    """Parameters from both settings."""
-    return SealFriction(settings["static_per_pressure"], settings["dynamic_per_pressure"])
+    static_per_pressure: Annotated[
+        float, Number("N m/Pa", "largest friction torque at rest per pressure", 0.0, 0.0, 1.0)
+    ]
+    dynamic_per_pressure: Annotated[float, Number("N m/Pa", "friction torque in motion per pressure", 0.0, 0.0, 1.0)]
 
 
 def pressed_at_rest(torque: float, pressure_1: float, pressure_2: float, seal_friction: SealFriction) -> float:
@@ -37,12 +34,9 @@ def pressed_in_motion(
 EFFECT = Effect(
     name="seal_friction",
     summary="Friction that grows with the pressure between the chambers.",
-    quantities=(
-        Quantity("static_per_pressure", "N m/Pa", "largest friction torque at rest per pressure", 0.0, 0.0, 1.0),
-        Quantity("dynamic_per_pressure", "N m/Pa", "friction torque in motion per pressure", 0.0, 0.0, 1.0),
-    ),
+    settings=SealFriction,
     parameters=SealFriction,
-    prepare=prepare,
+    prepare=None,
     switch=("static_per_pressure", "dynamic_per_pressure"),
     laws={friction_at_rest: pressed_at_rest, friction_in_motion: pressed_in_motion},
     source="assumed: linear in the pressure on the seals, to be fitted to an actuator; the simulated bench has it too",

@@ -6,9 +6,9 @@ functions.
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Number
 from ppafo.model.effects.kind import Effect
 from ppafo.model.ports import gas_density, ideal_density
 
@@ -22,9 +22,27 @@ class SecondVirial(NamedTuple):
     per_mass: float
 
 
-def prepare(settings: Any, device: Any) -> SecondVirial:
+class VirialSettings(NamedTuple):
+    """The coefficient, and the share of it that the gas has."""
+
+    share: Annotated[
+        float, Number("", "share of the second virial coefficient that the gas has, 0 for ideal", 0.0, 0.0, 5.0)
+    ]
+    coefficient: Annotated[
+        float,
+        Number(
+            "m^3/mol",
+            "second virial coefficient, by default of gas.species at 298 K",
+            SECOND_VIRIAL["CO2"],
+            -1.0e-3,
+            1.0e-3,
+        ),
+    ]
+
+
+def prepare(settings: VirialSettings, device: Any) -> SecondVirial:
     """Parameters from a share of a molar coefficient, with the molar mass of the device's gas."""
-    return SecondVirial(settings["share"] * settings["coefficient"] / device.gas.molar_mass)
+    return SecondVirial(settings.share * settings.coefficient / device.gas.molar_mass)
 
 
 def real_gas_factor(density: float, virial: float) -> float:
@@ -67,17 +85,7 @@ def expanded(density: float, second_virial: SecondVirial) -> tuple[float, float]
 EFFECT = Effect(
     name="second_virial",
     summary="Gas that is not ideal, by its second virial coefficient.",
-    quantities=(
-        Quantity("share", "", "share of the second virial coefficient that the gas has, 0 for ideal", 0.0, 0.0, 5.0),
-        Quantity(
-            "coefficient",
-            "m^3/mol",
-            "second virial coefficient, by default of gas.species at 298 K",
-            SECOND_VIRIAL["CO2"],
-            -1.0e-3,
-            1.0e-3,
-        ),
-    ),
+    settings=VirialSettings,
     parameters=SecondVirial,
     prepare=prepare,
     switch=("share",),

@@ -1,8 +1,8 @@
 """A silencer behind the valve's exhaust: what leaves a chamber passes two restrictions, one behind the other."""
 
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Number
 from ppafo.model.effects.kind import Effect
 from ppafo.model.orifice import conductance_in_series, sonic_conductance_mass
 from ppafo.model.ports import exhaust_path
@@ -19,9 +19,17 @@ def behind_silencer(conductance: float, silencer: Silencer) -> float:
     return exhaust_path(conductance_in_series(conductance, silencer.resistance))
 
 
-def prepare(settings: Any, device: Any) -> Silencer:
+class SilencerSettings(NamedTuple):
+    """The silencer, as ISO 6358 describes it."""
+
+    sonic_conductance: Annotated[
+        float, Number("m^3/(s Pa)", "sonic conductance C of the silencer, 0 for none", 0.0, 0.0, 1.0e-4)
+    ]
+
+
+def prepare(settings: SilencerSettings, device: Any) -> Silencer:
     """Parameters from the sonic conductance of the silencer and the gas of the device, as ISO 6358 counts it."""
-    sonic, gas = settings["sonic_conductance"], device.gas
+    sonic, gas = settings.sonic_conductance, device.gas
     conductance = sonic_conductance_mass(sonic, gas.specific_gas_constant, gas.temperature)
     return Silencer(1.0 / (conductance * conductance) if sonic > 0.0 else 0.0)
 
@@ -29,11 +37,7 @@ def prepare(settings: Any, device: Any) -> Silencer:
 EFFECT = Effect(
     name="silencer",
     summary="A silencer at the exhaust of the valve, in a row with it.",
-    quantities=(
-        Quantity(
-            "sonic_conductance", "m^3/(s Pa)", "sonic conductance C of the silencer, 0 for none", 0.0, 0.0, 1.0e-4
-        ),
-    ),
+    settings=SilencerSettings,
     parameters=Silencer,
     prepare=prepare,
     switch=("sonic_conductance",),

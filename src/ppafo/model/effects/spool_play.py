@@ -1,8 +1,8 @@
 """Play of a spool behind its command, which makes a hysteresis: it moves only when the command has crossed the play."""
 
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Number
 from ppafo.model.effects.kind import Effect, Moment, State
 from ppafo.model.ports import at_valve
 from ppafo.model.valves.kind import VENTS_ABOVE
@@ -20,9 +20,15 @@ class SpoolPlace(NamedTuple):
     spool_command: float
 
 
-def prepare(settings: Any, _device: Any) -> SpoolPlay:
+class PlaySettings(NamedTuple):
+    """The play between command and spool."""
+
+    width: Annotated[float, Number("", "whole width of the play over the full command, 0 for none", 0.0, 0.0, 0.5)]
+
+
+def prepare(settings: PlaySettings, _device: Any) -> SpoolPlay:
     """Parameters from the setting."""
-    return SpoolPlay(settings["width"])
+    return SpoolPlay(settings.width)
 
 
 def spool_position(position: float, command: float, play_width: float) -> float:
@@ -70,7 +76,7 @@ def slopes(_spool_play: SpoolPlay, _spool_play_state: SpoolPlace, _now: Moment) 
 EFFECT = Effect(
     name="spool_play",
     summary="Play between command and spool of the valve.",
-    quantities=(Quantity("width", "", "whole width of the play over the full command, 0 for none", 0.0, 0.0, 0.5),),
+    settings=PlaySettings,
     parameters=SpoolPlay,
     prepare=prepare,
     switch=("width",),

@@ -1,8 +1,8 @@
 """Stribeck friction: near standstill a sliding vane has nearly the friction that it has at rest."""
 
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Number
 from ppafo.model.effects.kind import Effect
 from ppafo.model.ports import friction_in_motion
 
@@ -14,11 +14,22 @@ class Stribeck(NamedTuple):
     velocity_scale: float
 
 
-def prepare(settings: Any, device: Any) -> Stribeck:
+class StribeckSettings(NamedTuple):
+    """Velocity at which half of the rise is left, and the share of it."""
+
+    velocity: Annotated[
+        float, Number("rad/s", "angular velocity at which half of the rise is left, 0 for none", 0.0, 0.0, 1.0e4)
+    ]
+    share: Annotated[
+        float, Number("", "share of the fall from static to dynamic friction that the rise has", 0.9, 0.0, 0.99)
+    ]
+
+
+def prepare(settings: StribeckSettings, device: Any) -> Stribeck:
     """Parameters from the velocity at which half of the rise is left, and the friction of the device."""
-    velocity, friction = settings["velocity"], device.friction
+    velocity, friction = settings.velocity, device.friction
     scale = 1.0 / (velocity * velocity) if velocity > 0.0 else 0.0
-    return Stribeck(settings["share"] * (friction.static_torque - friction.dynamic_torque), scale)
+    return Stribeck(settings.share * (friction.static_torque - friction.dynamic_torque), scale)
 
 
 def more_near_standstill(
@@ -32,12 +43,7 @@ def more_near_standstill(
 EFFECT = Effect(
     name="stribeck",
     summary="More friction of the vane near standstill.",
-    quantities=(
-        Quantity(
-            "velocity", "rad/s", "angular velocity at which half of the rise is left, 0 for none", 0.0, 0.0, 1.0e4
-        ),
-        Quantity("share", "", "share of the fall from static to dynamic friction that the rise has", 0.9, 0.0, 0.99),
-    ),
+    settings=StribeckSettings,
     parameters=Stribeck,
     prepare=prepare,
     switch=("velocity",),

@@ -3,11 +3,11 @@
 A command goes from -1 to 1 as equation (8) says; one value stands for free motion.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Quantity, quantities_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +45,7 @@ class ValveModel:
 
     parameters: type
     state: type
-    prepare: Callable[[Mapping[str, float]], Any]
+    prepare: Callable[[Any], Any]
     initial: Callable[[], Any]
     advance: Callable[..., Any]
     connect: Callable[..., Any]
@@ -53,7 +53,7 @@ class ValveModel:
     port_flow_slopes: Callable[..., Any]
     jumps: bool
     shift: Callable[..., float] | None
-    command_delay: Callable[[Mapping[str, float]], float]
+    command_delay: Callable[[Any], float]
     instant: Callable[..., Any]
     rates: Callable[..., Any]
     next_event: Callable[..., float]
@@ -63,7 +63,9 @@ class ValveModel:
 
 @dataclass(frozen=True, slots=True)
 class ValveKind:
-    """A valve as the catalogue knows it: name, what it is, its parameters beside the orifice's, and its models.
+    """A valve as the catalogue knows it: name, what it is, its settings beside the orifice's, and its models.
+
+    ``settings`` is a NamedTuple class that declares the settings, each an ``Annotated[float, Number(...)]``.
 
     ``lag(settings)`` is the time [s] after which its flow has followed a command, None for the dead time alone.
 
@@ -73,9 +75,14 @@ class ValveKind:
 
     name: str
     summary: str
-    quantities: tuple[Quantity, ...]
-    choose: Callable[[Mapping[str, float]], ValveModel]
-    lag: Callable[[Mapping[str, float]], float] | None = None
+    settings: type
+    choose: Callable[[Any], ValveModel]
+    lag: Callable[[Any], float] | None = None
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """What its settings declare."""
+        return quantities_of(self.settings)
 
 
 # Beyond full opening, so that one number says both, and no rounding of -1 to 1 comes near it.

@@ -6,10 +6,9 @@ where the requested opening arrives.
 """
 
 import math
-from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Number
 from ppafo.model.elementary import DOUBLINGS, SMALLEST_FRACTION, TERMS
 from ppafo.model.plant import (
     Openings,
@@ -246,19 +245,31 @@ def spool_step(angular: float, damping_ratio: float, step: float) -> SpoolStep:
     )
 
 
-def prepare_ideal(settings: Mapping[str, float]) -> IdealProportional:
+class ProportionalSettings(NamedTuple):
+    """Dead band, dead time, and how the spool moves."""
+
+    dead_band: Annotated[float, Number("", "smallest command that opens the valve", 0.0, 0.0, 0.99)]
+    delay: Annotated[float, Number("s", "dead time between command and spool", 0.0, 0.0, 0.2)]
+    spool_frequency: Annotated[
+        float, Number("Hz", "undamped natural frequency of the spool, 0 for none", 0.0, 0.0, 2000.0)
+    ]
+    spool_damping_ratio: Annotated[float, Number("", "damping ratio of the spool", 0.7, 0.05, 5.0)]
+    slew_limit: Annotated[float, Number("1/s", "largest rate of the opening, 0 for none", 0.0, 0.0, 1.0e5)]
+
+
+def prepare_ideal(settings: ProportionalSettings) -> IdealProportional:
     """Parameters of the ideal valve from ``settings`` [SI]."""
-    return IdealProportional(settings["dead_band"], 1.0 / (1.0 - settings["dead_band"]))
+    return IdealProportional(settings.dead_band, 1.0 / (1.0 - settings.dead_band))
 
 
-def prepare_moving(settings: Mapping[str, float]) -> MovingProportional:
+def prepare_moving(settings: ProportionalSettings) -> MovingProportional:
     """Parameters of the moving valve from ``settings`` [SI]."""
-    limit = settings["slew_limit"]
+    limit = settings.slew_limit
     return MovingProportional(
-        dead_band=settings["dead_band"],
+        dead_band=settings.dead_band,
         slew_limit=NO_SLEW_LIMIT if limit == 0.0 else limit,
-        frequency=settings["spool_frequency"],
-        damping_ratio=settings["spool_damping_ratio"],
+        frequency=settings.spool_frequency,
+        damping_ratio=settings.spool_damping_ratio,
     )
 
 
@@ -272,18 +283,18 @@ def closed_valve() -> NoValveState:
     return NoValveState(0.0)
 
 
-def dead_time(settings: Mapping[str, float]) -> float:
+def dead_time(settings: ProportionalSettings) -> float:
     """Dead time of the command [s]."""
-    return settings["delay"]
+    return settings.delay
 
 
-def lag(settings: Mapping[str, float]) -> float:
+def lag(settings: ProportionalSettings) -> float:
     """Time [s] until the opening has followed a command: dead time, spool, and the way at the slew limit."""
-    frequency, slew_limit = settings["spool_frequency"], settings["slew_limit"]
     # Mean delay of a second-order system: 2 d / w.
-    spool = 2.0 * settings["spool_damping_ratio"] / (2.0 * math.pi * frequency) if frequency > 0.0 else 0.0
+    frequency, slew_limit = settings.spool_frequency, settings.slew_limit
+    spool = 2.0 * settings.spool_damping_ratio / (2.0 * math.pi * frequency) if frequency > 0.0 else 0.0
     slew = 1.0 / slew_limit if slew_limit > 0.0 else 0.0
-    return settings["delay"] + spool + slew
+    return settings.delay + spool + slew
 
 
 IDEAL = ValveModel(
@@ -323,23 +334,17 @@ MOVING = ValveModel(
 )
 
 
-def choose(settings: Mapping[str, float]) -> ValveModel:
+def choose(settings: ProportionalSettings) -> ValveModel:
     """The ideal model where nothing moves, else the moving one, from ``settings`` [SI]."""
     # A delay needs the moving model too: its command arrives inside a step.
-    at_once = settings["spool_frequency"] == 0.0 and settings["slew_limit"] == 0.0 and settings["delay"] == 0.0
+    at_once = settings.spool_frequency == 0.0 and settings.slew_limit == 0.0 and settings.delay == 0.0
     return IDEAL if at_once else MOVING
 
 
 KIND = ValveKind(
     name="proportional",
     summary="One spool valve: the opening follows the command from -1 to 1.",
-    quantities=(
-        Quantity("dead_band", "", "smallest command that opens the valve", 0.0, 0.0, 0.99),
-        Quantity("delay", "s", "dead time between command and spool", 0.0, 0.0, 0.2),
-        Quantity("spool_frequency", "Hz", "undamped natural frequency of the spool, 0 for none", 0.0, 0.0, 2000.0),
-        Quantity("spool_damping_ratio", "", "damping ratio of the spool", 0.7, 0.05, 5.0),
-        Quantity("slew_limit", "1/s", "largest rate of the opening, 0 for none", 0.0, 0.0, 1.0e5),
-    ),
+    settings=ProportionalSettings,
     choose=choose,
     lag=lag,
 )

@@ -6,10 +6,9 @@ the opening or closing delay, and is lost if the coil is commanded otherwise bef
 """
 
 import math
-from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Annotated, Any, NamedTuple
 
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Number
 from ppafo.model.plant import Openings, PlantParameters, SinglePort, single_port_flow, single_port_flow_slopes
 from ppafo.model.ports import exhaust_path, opening_time, supply_path
 from ppafo.model.valves.kind import VENTS_ABOVE, ValveKind, ValveModel
@@ -18,6 +17,11 @@ from ppafo.model.valves.kind import VENTS_ABOVE, ValveKind, ValveModel
 NEVER = -1.0e9
 FOREVER = 1.0e9
 SAME_INSTANT = 1.0e-9
+
+
+OpeningDelay = Annotated[float, Number("s", "time from energising to flow from the source", 0.0, 0.0, 0.2)]
+ClosingDelay = Annotated[float, Number("s", "time from de-energising to venting", 0.0, 0.0, 0.2)]
+SwitchingInterval = Annotated[float, Number("s", "shortest time between two switchings of one valve", 0.0, 0.0, 1.0)]
 
 
 class IdealSolenoid(NamedTuple):
@@ -34,9 +38,9 @@ class PairPositions(NamedTuple):
 class TimedSolenoid(NamedTuple):
     """Opening and closing delay and shortest time between two switchings of one coil [s]."""
 
-    opening_delay: float
-    closing_delay: float
-    switching_interval: float
+    opening_delay: OpeningDelay
+    closing_delay: ClosingDelay
+    switching_interval: SwitchingInterval
 
 
 class Coil(NamedTuple):
@@ -181,14 +185,14 @@ def rates_timed(valve: TimedSolenoid, state: PairState, command: float) -> PairS
     return PairState(still, still)
 
 
-def prepare_ideal(settings: Mapping[str, float]) -> IdealSolenoid:
+def prepare_ideal(settings: TimedSolenoid) -> IdealSolenoid:
     """Parameters of the ideal pair from ``settings`` [SI]."""
     return IdealSolenoid()
 
 
-def prepare_timed(settings: Mapping[str, float]) -> TimedSolenoid:
+def prepare_timed(settings: Any) -> TimedSolenoid:
     """Parameters [s] of the pair with delays."""
-    return TimedSolenoid(settings["opening_delay"], settings["closing_delay"], settings["switching_interval"])
+    return TimedSolenoid(settings.opening_delay, settings.closing_delay, settings.switching_interval)
 
 
 def both_off() -> PairPositions:
@@ -203,14 +207,14 @@ def both_off_long_ago() -> PairState:
     return PairState(coil, coil)
 
 
-def no_dead_time(settings: Mapping[str, float]) -> float:
+def no_dead_time(settings: Any) -> float:
     """Dead time of the command [s]: none, the delays belong to the coils."""
     return 0.0
 
 
-def lag(settings: Mapping[str, float]) -> float:
+def lag(settings: TimedSolenoid) -> float:
     """Time [s] until a valve has let go: its delay, and how long a coil waits for the next switching."""
-    return settings["closing_delay"] + settings["switching_interval"]
+    return settings.closing_delay + settings.switching_interval
 
 
 IDEAL = ValveModel(
@@ -250,19 +254,15 @@ TIMED = ValveModel(
 )
 
 
-def choose(settings: Mapping[str, float]) -> ValveModel:
+def choose(settings: TimedSolenoid) -> ValveModel:
     """The ideal model where no time [s] matters, else the timed one."""
-    return TIMED if any(value > 0.0 for value in settings.values()) else IDEAL
+    return TIMED if any(value > 0.0 for value in settings) else IDEAL
 
 
 KIND = ValveKind(
     name="solenoid",
     summary="Two on/off valves, one for each chamber; both off vents both chambers.",
-    quantities=(
-        Quantity("opening_delay", "s", "time from energising to flow from the source", 0.0, 0.0, 0.2),
-        Quantity("closing_delay", "s", "time from de-energising to venting", 0.0, 0.0, 0.2),
-        Quantity("switching_interval", "s", "shortest time between two switchings of one valve", 0.0, 0.0, 1.0),
-    ),
+    settings=TimedSolenoid,
     choose=choose,
     lag=lag,
 )

@@ -7,10 +7,9 @@ it has got for the holding time, or until valve B lets it go; then valve B tops 
 the others. Without a joining time it is the pair of ``solenoid``.
 """
 
-from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Number
 from ppafo.model.plant import Openings, PlantParameters, SinglePort, single_port_flow, single_port_flow_slopes
 from ppafo.model.valves import solenoid
 from ppafo.model.valves.kind import Joint, ValveKind, ValveModel
@@ -137,9 +136,23 @@ def rates(valve: RecyclingSolenoid, state: RecyclingState, command: float) -> Re
     return RecyclingState(PairState(still, still), joined=0.0, keeps_gas=0.0, parting_time=0.0, release_time=0.0)
 
 
-def prepare(settings: Mapping[str, float]) -> RecyclingSolenoid:
+class RecyclingSettings(NamedTuple):
+    """Those of the pair, and for how long the chambers are joined and chamber 2 keeps its gas."""
+
+    opening_delay: solenoid.OpeningDelay
+    closing_delay: solenoid.ClosingDelay
+    switching_interval: solenoid.SwitchingInterval
+    joining_time: Annotated[
+        float, Number("s", "time for which the chambers stay joined after plantarflexion", 0.06, 0.0, 1.0)
+    ]
+    holding_time: Annotated[
+        float, Number("s", "time for which chamber 2 then keeps its gas, without the source", 0.0, 0.0, 1.0)
+    ]
+
+
+def prepare(settings: RecyclingSettings) -> RecyclingSolenoid:
     """Parameters [s] from ``settings`` [SI]."""
-    return RecyclingSolenoid(solenoid.prepare_timed(settings), settings["joining_time"], settings["holding_time"])
+    return RecyclingSolenoid(solenoid.prepare_timed(settings), settings.joining_time, settings.holding_time)
 
 
 def parted_long_ago() -> RecyclingState:
@@ -169,7 +182,7 @@ MODEL = ValveModel(
 )
 
 
-def choose(settings: Mapping[str, float]) -> ValveModel:
+def choose(_settings: RecyclingSettings) -> ValveModel:
     """The one model there is."""
     return MODEL
 
@@ -177,11 +190,7 @@ def choose(settings: Mapping[str, float]) -> ValveModel:
 KIND = ValveKind(
     name="solenoid_recycling",
     summary="Two on/off valves and a third between the chambers, which opens for a time when chamber 1 was fed.",
-    quantities=(
-        *solenoid.KIND.quantities,
-        Quantity("joining_time", "s", "time for which the chambers stay joined after plantarflexion", 0.06, 0.0, 1.0),
-        Quantity("holding_time", "s", "time for which chamber 2 then keeps its gas, without the source", 0.0, 0.0, 1.0),
-    ),
+    settings=RecyclingSettings,
     choose=choose,
     lag=solenoid.lag,
 )

@@ -4,7 +4,6 @@ A spool valve alone cannot let the foot move: in its middle it locks the gas in 
 area of the proportional one and follows at once.
 """
 
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -124,6 +123,6 @@ MOVING = replace(
 )
 
 
-def choose(settings: Mapping[str, float]) -> ValveModel:
+def choose(settings: proportional.ProportionalSettings) -> ValveModel:
     """The ideal model where nothing moves, else the moving one, from ``settings`` [SI]."""
     return IDEAL if proportional.choose(settings) is proportional.IDEAL else MOVING

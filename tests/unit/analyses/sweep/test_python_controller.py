@@ -80,9 +80,11 @@ def test_a_study_goes_on_with_the_same_law_and_is_refused_with_any_other(
         note.unlink()
     for same in (law, written(LAW).Law()):
         assert np.array_equal(ppafo.sweep(controlled_by(same), out).found.table()["rms_error"], first)
-    with pytest.raises(StudyError, match=r"control\.custom\.settings\.gain was 0\.2 and is now 0\.3; undo the change"):
+    with pytest.raises(
+        StudyError, match=r"controller\.custom\.settings\.gain was 0\.2 and is now 0\.3; undo the change"
+    ):
         ppafo.sweep(controlled_by(written(LAW).Law(0.3)), out)
-    with pytest.raises(StudyError, match=r"control\.custom\.source was '.*' and is now '.*'; undo the change"):
+    with pytest.raises(StudyError, match=r"controller\.custom\.source was '.*' and is now '.*'; undo the change"):
         ppafo.sweep(controlled_by(written(LAW.replace("0.5 *", "0.6 *")).Law()), out)
 
 

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from ppafo.model.effects.silencer import EFFECT, behind_silencer, prepare
+from ppafo.model.effects.silencer import EFFECT, SilencerSettings, behind_silencer, prepare
 from ppafo.model.orifice import iso6358_flow_function
 
 CRITICAL = 0.5
@@ -45,7 +45,7 @@ def test_the_closed_form_is_exact_near_equal_pressures_and_low_where_it_chokes(
 
 
 def test_a_sonic_conductance_counts_air_as_iso_8778_has_it() -> None:
-    row = prepare({"sonic_conductance": 1.0e-8}, AIR)
+    row = prepare(SilencerSettings(1.0e-8), AIR)
     assert row.resistance**-0.5 == pytest.approx(1.0e-8 * 1.185, rel=2e-3)
 
 

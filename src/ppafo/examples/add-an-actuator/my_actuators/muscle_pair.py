@@ -8,8 +8,7 @@ stiffness.
 """
 
 import math
-from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from ppafo.model.actuators.kind import ActuatorKind, ActuatorModel, Chambers, Range, ShapedPlant
 from ppafo.model.actuators.linear_chambers import (
@@ -19,7 +18,7 @@ from ppafo.model.actuators.linear_chambers import (
     linear_torque,
     rigid,
 )
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Number
 
 FULLY_SHORT = 1.0 / math.sqrt(3.0)
 """Length over thread length at which a muscle has its largest volume and pulls no more."""
@@ -79,25 +78,42 @@ def torque(plant: ShapedPlant, angle: float, pressure_1: float, pressure_2: floa
     return active - shape.stiffness * (angle - shape.neutral_angle)
 
 
-def prepare(settings: Mapping[str, float], stops: Range) -> MusclePair:
+class MuscleSettings(NamedTuple):
+    """Threads, length and rubber of both muscles, and the pulley."""
+
+    thread_length: Annotated[float, Number("m", "length of a thread of the braid", minimum=1.0e-2, maximum=5.0)]
+    turns: Annotated[float, Number("", "turns of a thread around the muscle", minimum=0.05, maximum=100.0)]
+    muscle_length: Annotated[
+        float, Number("m", "length of both muscles at the neutral angle", minimum=1.0e-2, maximum=5.0)
+    ]
+    pulley_radius: Annotated[float, Number("m", "radius of the pulley", minimum=1.0e-3, maximum=1.0)]
+    neutral_angle: Annotated[
+        float, Number("rad", "angle at which both muscles are as long", minimum=-10.0, maximum=10.0)
+    ]
+    passive_stiffness: Annotated[
+        float, Number("N m/rad", "torque of the rubber per angle from neutral", 0.0, 0.0, 1.0e4)
+    ]
+
+
+def prepare(settings: MuscleSettings, stops: Range) -> MusclePair:
     """Numbers of the pair."""
-    thread, turns = settings["thread_length"], settings["turns"]
+    thread, turns = settings.thread_length, settings.turns
     return MusclePair(
         thread_square=thread * thread,
         per_turns=1.0 / (4.0 * math.pi * turns * turns),
-        length=settings["muscle_length"],
-        pulley=settings["pulley_radius"],
-        neutral_angle=settings["neutral_angle"],
-        stiffness=settings["passive_stiffness"],
+        length=settings.muscle_length,
+        pulley=settings.pulley_radius,
+        neutral_angle=settings.neutral_angle,
+        stiffness=settings.passive_stiffness,
         dead_volume_1=stops.dead_volume_1,
         dead_volume_2=stops.dead_volume_2,
     )
 
 
-def problem(settings: Mapping[str, float], stops: Range) -> str:
+def problem(settings: MuscleSettings, stops: Range) -> str:
     """A muscle that would be longer than its threads, or shorter than where it pulls, between the stops."""
-    farthest = max(abs(angle - settings["neutral_angle"]) for angle in (stops.angle_min, stops.angle_max))
-    length, way, thread = settings["muscle_length"], settings["pulley_radius"] * farthest, settings["thread_length"]
+    farthest = max(abs(angle - settings.neutral_angle) for angle in (stops.angle_min, stops.angle_max))
+    length, way, thread = settings.muscle_length, settings.pulley_radius * farthest, settings.thread_length
     if FULLY_SHORT * thread < length - way and length + way < thread:
         return ""
     return (
@@ -110,14 +126,7 @@ def problem(settings: Mapping[str, float], stops: Range) -> str:
 KIND = ActuatorKind(
     name="muscle_pair",
     summary="Two McKibben muscles on a pulley, one against the other.",
-    quantities=(
-        Quantity("thread_length", "m", "length of a thread of the braid", minimum=1.0e-2, maximum=5.0),
-        Quantity("turns", "", "turns of a thread around the muscle", minimum=0.05, maximum=100.0),
-        Quantity("muscle_length", "m", "length of both muscles at the neutral angle", minimum=1.0e-2, maximum=5.0),
-        Quantity("pulley_radius", "m", "radius of the pulley", minimum=1.0e-3, maximum=1.0),
-        Quantity("neutral_angle", "rad", "angle at which both muscles are as long", minimum=-10.0, maximum=10.0),
-        Quantity("passive_stiffness", "N m/rad", "torque of the rubber per angle from neutral", 0.0, 0.0, 1.0e4),
-    ),
+    settings=MuscleSettings,
     model=ActuatorModel(MusclePair, prepare, chambers, pressures, torque),
     problem=problem,
 )
