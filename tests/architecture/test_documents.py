@@ -225,7 +225,7 @@ def test_the_page_on_architecture_lists_every_room_and_no_other() -> None:
     text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
     rooms = text.partition("## The rooms")[2].partition("## ")[0]
     listed = {
-        name for line in re.findall(r"^ {4}(\S+(?: \| \S+)?) {2,}", rooms, re.MULTILINE) for name in line.split(" | ")
+        name for line in re.findall(r"^ {4}(\S+(?: \| \S+)*) {2,}", rooms, re.MULTILINE) for name in line.split(" | ")
     }
     packages = {path.parent.name for path in SOURCE.glob("*/__init__.py")}
     modules = {path.stem for path in SOURCE.glob("*.py")} - {"__init__"}
