@@ -17,9 +17,9 @@ import numpy as np
 
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.walking import load_walk
-from ppafo.wearer.settings import LONGEST_STEP
 from ppafo.walking.walk import with_device_off
 from ppafo.wearer.loading import list_wearers
+from ppafo.wearer.settings import LONGEST_STEP
 
 MEANS = {
     "walking_speed": ("speed (m/s)", 1.0, ".2f"),
