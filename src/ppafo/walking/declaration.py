@@ -14,7 +14,7 @@ from ppafo.control.walking.catalog import (
     walking_controllers,
 )
 from ppafo.documents.models import make_schema, one_of, optional, quote, table
-from ppafo.errors import KindError, ScenarioError, refused_as
+from ppafo.errors import KindError, ScenarioError, nearest_name, refused_as
 from ppafo.model.declaration import Quantity
 from ppafo.model.plant_faults import PLANT_FAULTS, SHUT_OFF
 from ppafo.simulation.declaration import (
@@ -25,7 +25,6 @@ from ppafo.simulation.declaration import (
     TEXTS,
     THERMAL_GAS,
     Declared,
-    check_known_motion,
     gas_settings,
     kind_at,
     line_paths,
@@ -165,20 +164,23 @@ def find_kinds(document: Mapping[str, Any], file: str) -> None:
         old = value_at(document, path)
         if old is not None:
             raise ScenarioError(f"{file}: {path} = {quote(old)}: {renamed_key(path, old)}")
-    with refused_as(ScenarioError, f"{file}: motion.kind", KindError):
-        WALKS.get(motion)
-    check_known_motion(motion, file)
+    _check_motion(motion, f"{file}: motion.kind = {quote(motion)}")
     with refused_as(ScenarioError, f"{file}: controller.kind", KindError):
         load_walking_controller(kind_at(document, "controller"))
 
 
 def _check_motion(kind: object, place: str) -> None:
-    """Raise ScenarioError for a motion of a vane alone, which has other sections; ``place`` begins the message."""
+    """Raise ScenarioError for a motion that is not known, or of a vane alone; ``place`` begins the message."""
     if kind in MOTIONS:
         raise ScenarioError(
             f"{place}: this is the file of a walk, and its motion is '{WALK}'; 'ppafo new scenario' writes the "
             "file of a vane alone"
         )
+    with refused_as(ScenarioError, place, KindError):
+        is_known = not kind or str(kind) in WALKS
+    if not is_known:
+        known = (*MOTIONS, *WALKS)
+        raise ScenarioError(f"{place} is not known{nearest_name(str(kind), known)}; allowed: {', '.join(known)}")
 
 
 def _texts(document: Mapping[str, Any]) -> tuple[str, ...]:
@@ -257,11 +259,12 @@ def _bottle() -> dict[str, Any]:
 
 def walk_file(document: Mapping[str, Any]) -> type[BaseModel]:
     """Return the model of the file of a kind of walk, for the controllers that are loaded."""
-    return _walk_file(tuple(walking_controllers().items()), (walk_kind_of(document),))
+    named = kind_at(document, "motion") or WALK
+    return _walk_file(tuple(walking_controllers().items()), ((named, walk_kind_of(document)),))
 
 
 @functools.lru_cache(maxsize=8)
-def _walk_file(_controllers: Any, walks: tuple[WalkKind, ...]) -> type[BaseModel]:
+def _walk_file(_controllers: Any, walks: tuple[tuple[str, WalkKind], ...]) -> type[BaseModel]:
     seed = Annotated[int, Field(ge=0, le=LARGEST_SEED)]
     sensors = quantity_fields(WALK_SENSORS)
     sensors["seed"] = (seed, Field(1, description=SEED.summary))
@@ -278,10 +281,10 @@ def _walk_file(_controllers: Any, walks: tuple[WalkKind, ...]) -> type[BaseModel
         ),
     }
     motion = one_of(
-        [table(f"{model_name(kind.name)}Motion", kind_field(kind.name, kind.summary) | which) for kind in walks]
+        [table(f"{model_name(name)}Motion", kind_field(name, kind.summary) | which) for name, kind in walks]
     )
     wearer: dict[str, Any] = {}
-    for kind in walks:
+    for _, kind in walks:
         texts = {path.partition(".")[2]: optional(str, summary) for path, summary in kind.texts.items()}
         wearer |= texts | quantity_fields(kind.numbers)
     own: dict[str, Any] = {
@@ -314,5 +317,5 @@ def json_schema() -> dict[str, Any]:
     WALKING_CONTROLLERS.load_all()
     CONTROLLERS.load_all()
     WALKS.load_all()
-    walks = tuple(kind_of_walk(name) for name in WALKS)
+    walks = tuple((name, kind_of_walk(name)) for name in WALKS)
     return make_schema(_walk_file(tuple(walking_controllers().items()), walks), "ppafo walk")
