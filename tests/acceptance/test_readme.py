@@ -12,7 +12,7 @@ from ppafo.analyses.reproduce.solve import reproduce
 from ppafo.cli.commands import COMMANDS
 from ppafo.cli.main import build_parser, main
 from ppafo.golden_bits import golden_hashes
-from ppafo.report.writing import text_of
+from ppafo.report.finding import text_of
 from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run

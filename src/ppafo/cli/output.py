@@ -91,7 +91,7 @@ def deliver(found: Any, as_json: bool, out: Path | None, command: str, *, has_wr
         if found.aside:
             print(f"ppafo: {found.aside}", file=sys.stderr)
         return found.exit_code
-    from ppafo.report.writing import REPORT, text_of
+    from ppafo.report.finding import REPORT, text_of
 
     text, document = text_of(found), found.to_dict()
     folder = str(document["folder"]) if has_written else None
@@ -99,7 +99,7 @@ def deliver(found: Any, as_json: bool, out: Path | None, command: str, *, has_wr
         from ppafo.report.drawing import load_drawing
 
         load_drawing()
-        from ppafo.report.writing import files_of
+        from ppafo.report.finding import files_of
 
         write_files(out, files_of(found), command)
         folder = str(out)

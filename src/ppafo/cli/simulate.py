@@ -42,8 +42,8 @@ def simulate(scenario: Scenario, *, check: bool = False, overrides: Overrides = 
     from ppafo.report.drawing import load_drawing
 
     load_drawing()
+    from ppafo.report.finding import REPORT, page_of
     from ppafo.report.recording_figure import figure_files
-    from ppafo.report.writing import REPORT, page_of
 
     figures = figure_files(result.plot())
     report = page_of(_finding(result, checked), {FIGURE: figures[f"{FIGURE}.svg"]})

@@ -1,18 +1,22 @@
 """What an analysis found, as values: sentences, tables of columns, panels. SI until it is text.
 
-A ``Finding`` is all that an analysis returns. ``writing`` makes text, JSON, page, figures and folder of it.
+A ``Finding`` is all that an analysis returns; text, JSON, page, figures and folder are made of it here.
 """
 
+import html
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from ppafo.documents.json_text import plain
+from ppafo.documents.json_text import json_text, plain
 from ppafo.report.kind import PLAIN, Interval, Kind
 from ppafo.report.panels import Panel, draw_panels
+from ppafo.report.style import render_figure
+from ppafo.report.writing import align_columns, inline_figure, render_page
 from ppafo.signals import RecordingKind
+from ppafo.version import __version__
 
 if TYPE_CHECKING:
     import matplotlib.figure
@@ -157,8 +161,6 @@ class Finding(Generic[T_co]):
 
     def __str__(self) -> str:
         """Return what the command prints."""
-        from ppafo.report.writing import text_of
-
         return text_of(self)
 
     def __repr__(self) -> str:
@@ -167,8 +169,6 @@ class Finding(Generic[T_co]):
 
     def _repr_html_(self) -> str:
         """Return the page, which a notebook shows."""
-        from ppafo.report.writing import notebook_of
-
         return notebook_of(self)
 
     def to_dict(self) -> dict[str, Any]:
@@ -187,7 +187,88 @@ class Finding(Generic[T_co]):
 
     def save(self, folder: str | Path) -> None:
         """Write text, JSON, page and figures into a folder: absent, empty or an earlier result, else DataError."""
-        from ppafo.report.writing import files_of
         from ppafo.storage.result_folder import write_marked_folder
 
         write_marked_folder(Path(folder), files_of(self), self.command or self.name)
+
+
+MARK = "*"
+REPORT = "report.html"
+FORMATS = ("png", "svg")
+_ORIGINS = {
+    "simulated": "Every run is of the model; nothing on this page was measured.",
+    "synthetic": "The recordings are synthetic: the simulated test bench made them, nothing was measured.",
+    "measured": "",
+}
+
+
+def text_of(finding: Finding[Any]) -> str:
+    """Return what is said first and every part that is no mere detail of the page."""
+    blocks = ["\n".join(finding.said), *(_part_text(part) for part in finding.parts if not part.is_detail)]
+    return "\n\n".join(block for block in blocks if block)
+
+
+def _part_text(part: Part) -> str:
+    body = [*part.said, *_table_lines(part), *part.remarks, *([part.code] if part.code else [])]
+    return "\n".join([part.heading, *body] if part.heading and body else body)
+
+
+def _table_lines(part: Part) -> list[str]:
+    rows: list[tuple[str, ...]] = part.rows
+    if not rows:
+        return []
+    if not part.has_head:
+        return align_columns(rows, len(part.columns))
+    rows = [tuple(column.head for column in part.columns), *rows]
+    if part.marked:
+        marks = ["", *(MARK if place in part.marked else "" for place in range(len(rows) - 1))]
+        rows = [(mark, *row) for mark, row in zip(marks, rows, strict=True)]
+    return align_columns(rows, part.left + bool(part.marked))
+
+
+def page_of(finding: Finding[Any], drawn: Mapping[str, bytes]) -> bytes:
+    """Return the page of a finding; ``drawn`` has the SVG or GIF content of each of its figures by name."""
+    if finding.page is not None:
+        return finding.page(drawn)
+    values = {
+        "finding": finding,
+        "parts": [
+            (
+                part,
+                [_unbroken_unit(column.head) for column in part.columns] if part.has_head else [],
+                inline_figure(drawn[part.name]) if part.name else "",
+            )
+            for part in finding.parts
+        ],
+        "origin": _ORIGINS[finding.kind],
+        "versions": f"ppafo {__version__}",
+        "live": None if finding.live is None else finding.live(),
+    }
+    return render_page("finding.html.jinja", values).encode()
+
+
+def _unbroken_unit(title: str) -> str:
+    """Return the title of a column whose unit, at its end, is not broken over two lines."""
+    words, bracket, unit = title.rpartition("(")
+    return words + bracket + unit.replace(" ", "\N{NO-BREAK SPACE}") if bracket and title.endswith(")") else title
+
+
+def files_of(finding: Finding[Any]) -> dict[str, bytes]:
+    """Return text, JSON, page, figures and further files of a finding by name; figures are drawn here."""
+    drawn: dict[str, Mapping[str, bytes]] = {}
+    for name, part in finding.figures.items():
+        figure = part.drawn(finding.kind)
+        drawn[name] = {"gif": figure} if isinstance(figure, bytes) else render_figure(figure, FORMATS)
+    return {
+        **{f"{name}.{form}": content for name, forms in drawn.items() for form, content in forms.items()},
+        **{name: content() for name, content in finding.files.items()},
+        f"{finding.name}.json": f"{json_text(finding.to_dict())}\n".encode(),
+        f"{finding.name}.txt": f"{text_of(finding)}\n".encode(),
+        REPORT: page_of(finding, {name: forms.get("svg") or forms["gif"] for name, forms in drawn.items()}),
+    }
+
+
+def notebook_of(finding: Finding[Any]) -> str:
+    """Return the page of a finding as a frame, which a notebook shows."""
+    page = files_of(finding)[REPORT].decode()
+    return f'<iframe srcdoc="{html.escape(page)}" width="100%" height="700" style="border: 0"></iframe>'

@@ -1,15 +1,9 @@
-"""The one writer of findings: as text, as a page, and every file by name in a folder that holds exactly these."""
+"""What is written becomes fit to be read: signs and units typeset, columns aligned, templates of pages filled."""
 
 import base64
-import html
 import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
-
-from ppafo.documents.json_text import json_text
-from ppafo.report.finding import Finding, Part
-from ppafo.report.style import render_figure
-from ppafo.version import __version__
 
 if TYPE_CHECKING:
     from markupsafe import Markup
@@ -86,76 +80,15 @@ def format_reported_quantity(value: float, unit: str) -> str:
     return f"{value:g} {'' if unit == '-' else unit}".rstrip()
 
 
-MARK = "*"
-
-
-def text_of(finding: Finding[Any]) -> str:
-    """Return what is said first and every part that is no mere detail of the page."""
-    blocks = ["\n".join(finding.said), *(_part_text(part) for part in finding.parts if not part.is_detail)]
-    return "\n\n".join(block for block in blocks if block)
-
-
 def align_columns(rows: Sequence[Sequence[str]], left: int = 1) -> list[str]:
     """Return rows of texts as lines of aligned columns: the first ``left`` to the left, all others to the right."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return ["  ".join(_pad_row(row, widths, left)).rstrip() for row in rows]
 
 
-def _part_text(part: Part) -> str:
-    body = [*part.said, *_table_lines(part), *part.remarks, *([part.code] if part.code else [])]
-    return "\n".join([part.heading, *body] if part.heading and body else body)
-
-
-def _table_lines(part: Part) -> list[str]:
-    rows: list[tuple[str, ...]] = part.rows
-    if not rows:
-        return []
-    if not part.has_head:
-        return align_columns(rows, len(part.columns))
-    rows = [tuple(column.head for column in part.columns), *rows]
-    if part.marked:
-        marks = ["", *(MARK if place in part.marked else "" for place in range(len(rows) - 1))]
-        rows = [(mark, *row) for mark, row in zip(marks, rows, strict=True)]
-    return align_columns(rows, part.left + bool(part.marked))
-
-
 def _pad_row(row: Sequence[str], widths: Sequence[int], left: int) -> list[str]:
     cells = zip(row, widths, strict=True)
     return [f"{cell:<{width}}" if place < left else f"{cell:>{width}}" for place, (cell, width) in enumerate(cells)]
-
-
-_ORIGINS = {
-    "simulated": "Every run is of the model; nothing on this page was measured.",
-    "synthetic": "The recordings are synthetic: the simulated test bench made them, nothing was measured.",
-    "measured": "",
-}
-
-
-def page_of(finding: Finding[Any], drawn: Mapping[str, bytes]) -> bytes:
-    """Return the page of a finding; ``drawn`` has the SVG or GIF content of each of its figures by name."""
-    if finding.page is not None:
-        return finding.page(drawn)
-    values = {
-        "finding": finding,
-        "parts": [
-            (
-                part,
-                [_unbroken_unit(column.head) for column in part.columns] if part.has_head else [],
-                inline_figure(drawn[part.name]) if part.name else "",
-            )
-            for part in finding.parts
-        ],
-        "origin": _ORIGINS[finding.kind],
-        "versions": f"ppafo {__version__}",
-        "live": None if finding.live is None else finding.live(),
-    }
-    return render_page("finding.html.jinja", values).encode()
-
-
-def _unbroken_unit(title: str) -> str:
-    """Return the title of a column whose unit, at its end, is not broken over two lines."""
-    words, bracket, unit = title.rpartition("(")
-    return words + bracket + unit.replace(" ", "\N{NO-BREAK SPACE}") if bracket and title.endswith(")") else title
 
 
 def render_page(template: str, values: Mapping[str, Any], package: str = "ppafo.report") -> str:
@@ -181,28 +114,3 @@ def inline_figure(content: bytes) -> str:
     """Return the content of an SVG or GIF file as the address of an image that is part of the page."""
     kind = "gif" if content.startswith(b"GIF8") else "svg+xml"
     return f"data:image/{kind};base64,{base64.b64encode(content).decode('ascii')}"
-
-
-REPORT = "report.html"
-FORMATS = ("png", "svg")
-
-
-def files_of(finding: Finding[Any]) -> dict[str, bytes]:
-    """Return text, JSON, page, figures and further files of a finding by name; figures are drawn here."""
-    drawn: dict[str, Mapping[str, bytes]] = {}
-    for name, part in finding.figures.items():
-        figure = part.drawn(finding.kind)
-        drawn[name] = {"gif": figure} if isinstance(figure, bytes) else render_figure(figure, FORMATS)
-    return {
-        **{f"{name}.{form}": content for name, forms in drawn.items() for form, content in forms.items()},
-        **{name: content() for name, content in finding.files.items()},
-        f"{finding.name}.json": f"{json_text(finding.to_dict())}\n".encode(),
-        f"{finding.name}.txt": f"{text_of(finding)}\n".encode(),
-        REPORT: page_of(finding, {name: forms.get("svg") or forms["gif"] for name, forms in drawn.items()}),
-    }
-
-
-def notebook_of(finding: Finding[Any]) -> str:
-    """Return the page of a finding as a frame, which a notebook shows."""
-    page = files_of(finding)[REPORT].decode()
-    return f'<iframe srcdoc="{html.escape(page)}" width="100%" height="700" style="border: 0"></iframe>'

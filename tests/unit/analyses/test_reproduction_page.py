@@ -22,7 +22,8 @@ from ppafo.analyses.reproduce.figures import step_response_figure, torque_task_f
 from ppafo.analyses.reproduce.step_response import Levels
 from ppafo.identification.bench.result import synthetic_figure_3
 from ppafo.page.html import bundled, digest
-from ppafo.report.writing import text_of, typeset
+from ppafo.report.finding import text_of
+from ppafo.report.writing import typeset
 
 LEVELS = Levels(480536.0, 101325.0)
 

@@ -21,7 +21,7 @@ from ppafo.identification.trajectory import Experiment, tolerance_parameters
 from ppafo.identification.trajectory.tolerances import stated_by
 from ppafo.parameters import apply_overrides, build_device
 from ppafo.parameters.loading import load_device, load_parameter_set, parameter_set_toml, parse_parameter_set
-from ppafo.report.writing import files_of, text_of
+from ppafo.report.finding import files_of, text_of
 from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 from ppafo.storage import write_csv

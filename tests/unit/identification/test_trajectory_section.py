@@ -17,7 +17,7 @@ from ppafo.identification.problem import json_schema
 from ppafo.identification.source import Use, double_use
 from ppafo.parameters.device import Orifice
 from ppafo.parameters.loading import load_device, parameter_set_toml, parse_parameter_set
-from ppafo.report.writing import files_of, text_of
+from ppafo.report.finding import files_of, text_of
 from ppafo.rig.experiments import record
 from ppafo.running import simulate
 from ppafo.signals.recording import Channel, Recording

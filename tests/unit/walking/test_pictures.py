@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from ppafo.analyses.walk.answer import comparison_table, wearers_finding
-from ppafo.report.finding import Part
-from ppafo.report.writing import text_of
+from ppafo.report.finding import Part, text_of
 from ppafo.signals import Channel, Recording
 from ppafo.walking import Comparison, WalkResult, compare_walks, load_walk, walk, walk_population
 from ppafo.walking.figures import over_time

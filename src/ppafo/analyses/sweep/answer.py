@@ -11,12 +11,11 @@ from pydantic import BaseModel
 
 from ppafo.analyses.sweep.results import SUMMARY, StudyResults
 from ppafo.errors import DataError
-from ppafo.report.finding import Finding, Part, columns_of, facts
+from ppafo.report.finding import Finding, Part, columns_of, facts, files_of
 from ppafo.report.kind import TIME, Kind, of_channel, of_metric, of_path
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.setting_names import label_of
 from ppafo.report.style import BLUE, GREEN, GREY, ORANGE, VERMILION
-from ppafo.report.writing import files_of
 from ppafo.signals.recording import CHANNELS
 from ppafo.storage.places import place_at, read_document
 from ppafo.studies.distributions import Floats

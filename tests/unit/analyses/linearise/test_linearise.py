@@ -19,7 +19,7 @@ from ppafo.engine.run import Run
 from ppafo.errors import ScenarioError
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState
 from ppafo.model.valves.proportional import openings_of, spool_acceleration
-from ppafo.report.writing import text_of
+from ppafo.report.finding import text_of
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import RegulatedLine, Scenario, SupplyLine
 from ppafo.translation.plant_rates import gas_flows, thermal_gas_flows

@@ -14,7 +14,7 @@ from ppafo.analyses.design.front.solve import Evaluation, design_columns, noise_
 from ppafo.analyses.design.loading import json_schema, load_design
 from ppafo.analyses.design.solve import design
 from ppafo.errors import PpafoError, StudyError
-from ppafo.report.writing import text_of
+from ppafo.report.finding import text_of
 from ppafo.running import simulate
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.numbers import with_numbers

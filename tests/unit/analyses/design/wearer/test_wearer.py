@@ -17,7 +17,7 @@ from ppafo.errors import StudyError
 from ppafo.parameters.parts import load_catalogue
 from ppafo.parameters.parts.catalogue import Catalogue
 from ppafo.progress import report_nothing
-from ppafo.report.writing import text_of
+from ppafo.report.finding import text_of
 from ppafo.signals import Channel, Recording
 
 PSI = 6894.757
