@@ -231,7 +231,7 @@ def test_the_learnt_stride_is_the_gait_at_the_knots() -> None:
 
 def test_a_timing_changes_no_controller_without_a_time_in_the_stride() -> None:
     assert not keeps_time(WALKING_CONTROLLERS["off"])
-    with pytest.raises(ScenarioError, match="goes by no time in the stride"):
+    with pytest.raises(ScenarioError, match="goes by no gait phase"):
         with_timing(WALKING_CONTROLLERS["off"], timing.FRACTIONAL)
     for kind in WALKING_CONTROLLERS.values():
         if keeps_time(kind):
