@@ -210,7 +210,7 @@ export class Extras {
     const { overlay, state } = app;
     const asked = app.named.map(async ({ name, configuration }) => {
       const run = app.runOf(configuration);
-      const isHeld = JSON.stringify(programNamed(app.content, configuration.program).document["motion"] ?? "").includes('"held"');
+      const isHeld = JSON.stringify(programNamed(app.content, configuration.program).document["motion"] ?? "").includes('"locked"');
       return { name, errors: run === null ? [] : await app.workers.agreement(run, valuesOf(app.content, configuration), isHeld) };
     });
     const found = await Promise.all(asked);

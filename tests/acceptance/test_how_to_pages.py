@@ -166,7 +166,9 @@ def test_the_message_on_the_scenario_page_is_the_real_one() -> None:
         ppafo.load_scenario("torque-task-proportional", ["motion.angel=75 deg"])
     assert "did you mean 'motion.angle'" in str(caught.value)
     held = 'schema_version = 1\nname = "a"\ndevice.set = "ppafo2011"\nrun.duration = "1 s"\n'
-    held += 'controller = { kind = "on_off", rate = "20 Hz" }\nmotion = { kind = "held", angle = "75 deg", angel = 1 }'
+    held += (
+        'controller = { kind = "on_off", rate = "20 Hz" }\nmotion = { kind = "locked", angle = "75 deg", angel = 1 }'
+    )
     with pytest.raises(ppafo.ScenarioError) as caught:
         parse_scenario(held.encode(), "stairs.toml")
     assert str(caught.value) == f"stairs.toml: {shown[0]}"
@@ -237,7 +239,7 @@ def test_the_controller_of_the_page_is_compiled_and_named_in_a_scenario(hysteres
         "name": "band",
         "device": {"set": "ppafo2011"},
         "run": {"duration": "0.5 s"},
-        "motion": {"kind": "held", "angle": "75 deg"},
+        "motion": {"kind": "locked", "angle": "75 deg"},
         "controller": {"kind": "hysteresis", "rate": "200 Hz", "band": "0.3 N m"},
         "reference": {"kind": "constant", "level": "2 N m"},
     }

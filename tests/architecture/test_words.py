@@ -59,12 +59,9 @@ COMPOSED = ("engine/", "translation/", "gym/episodes.py", "wearer/scheme.py")
 SOMETHING_ELSE = ("answers?", "courses?", "whole numbers?")
 """Words that messages need for something else: an answer of a board, `--course`, 'must be a whole number'."""
 ALLOWED_IN_MESSAGES: Mapping[str, tuple[str, str]] = {
-    "identification/trajectory/section.py": ("held", "the key of a problem file"),
     "metrics/metric.py": ("wearer who reacts", "what recordings on disk are told apart by"),
     "walking/result.py": ("walk of a wearer who reacts", "the format of a result on disk"),
     "report/display_units.py": ("volume per angle", "a kind of quantity, which no user reads"),
-    "validation/causes.py": ("--motion held", "the option of a command"),
-    "cli/verbs/bench.py": ("held: the vane is locked", "the option of a command"),
 }
 """By file: what stands there as a name, and of what."""
 ALLOWED_IN_FILES: Mapping[str, tuple[str, str]] = {

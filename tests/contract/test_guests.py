@@ -135,7 +135,7 @@ def test_a_name_of_a_guest_says_that_it_is_not_installed(bare: Path, tmp_path: P
 def test_a_motion_whose_folder_is_not_there_is_not_known(bare: Path, tmp_path: Path) -> None:
     done = called(bare, tmp_path, "walk", "reacting")
     assert (done.returncode, done.stderr.count("\n")) == (2, 1)
-    assert "motion.kind = 'react' is not known; allowed: free, held, prescribed, leg, walk" in done.stderr
+    assert "motion.kind = 'react' is not known; allowed: free, locked, prescribed, leg, walk" in done.stderr
 
 
 WALKED = """

@@ -152,7 +152,7 @@ def test_lines_with_resistance_in_the_lanes_are_those_of_the_reference_solver(
 
 
 def test_lines_slow_the_filling_of_one_chamber_and_the_venting_of_the_other() -> None:
-    held = ("motion.kind=held", "motion.angle=90 deg", "controller.kind=constant", "controller.command=1")
+    held = ("motion.kind=locked", "motion.angle=90 deg", "controller.kind=constant", "controller.command=1")
     plain, narrow = (
         simulate(load_scenario("step-response", (*held, "run.duration=0.1 s", *texts))).recording
         for texts in ((), ("effects.line_resistance.area=1 mm^2",))

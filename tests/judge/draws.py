@@ -355,7 +355,7 @@ def mixed(chance: Chance) -> Document:
     if chance.random() < 0.3:
         level, low = f"{chance.uniform(40.0, 110.0)} deg", f"{chance.uniform(40.0, 110.0)} deg"
         path = {"kind": "ramp_hold", "start_level": low, "level": level, "ramp_start": "0.05 s", "ramp_time": "0.1 s"}
-        motion = chance.choice([{"kind": "held", "angle": level}, {"kind": "prescribed", "profile": path}])
+        motion = chance.choice([{"kind": "locked", "angle": level}, {"kind": "prescribed", "profile": path}])
     elif chance.random() < 0.3:
         motion = leg(chance, 300.0, 30.0)
     more: Document = {"initial": start(chance, 90.0), "reference": ramp(chance)}

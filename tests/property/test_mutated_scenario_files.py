@@ -43,7 +43,7 @@ WORDS = [
     "pid",
     "on_off",
     "free",
-    "held",
+    "locked",
     "prescribed",
     "sine",
     "ramp_hold",

@@ -331,7 +331,7 @@ _LABELS = {
     "off": "Without help",
 }
 _WALK = "Walk"
-_TASKS = {"held": "Torque task", "prescribed": "Moving ankle", "free": "Unconstrained vane"}
+_TASKS = {"locked": "Torque task", "prescribed": "Moving ankle", "free": "Unconstrained vane"}
 _STEP = "Step response"
 
 
@@ -456,7 +456,7 @@ def _task(scenario: Scenario) -> str:
     motion = vane_motion(scenario)
     if isinstance(motion, FreeMotion):
         return _STEP if scenario.controller.kind == "constant" else _TASKS["free"]
-    return _TASKS["held" if motion.profile.kind == "constant" else "prescribed"]
+    return _TASKS["locked" if motion.profile.kind == "constant" else "prescribed"]
 
 
 def _tab(title: str, group: Sequence[Simulated]) -> dict[str, Any]:

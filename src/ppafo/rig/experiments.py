@@ -269,7 +269,7 @@ def record_vane_leak(request: Request) -> Outcome:
     # What belongs to the scenario is no override of a device.
     of_device = [item for item in request.overrides if item.strip().partition(".")[0] in sections]
     actuator = load_device(request.parameter_set, request.valve, of_device).actuator
-    motion = {"kind": "held", "angle": f"{0.5 * (actuator.angle_min + actuator.angle_max)!r} rad"}
+    motion = {"kind": "locked", "angle": f"{0.5 * (actuator.angle_min + actuator.angle_max)!r} rad"}
     initial = {"pressure_1": "supply", "pressure_2": "atmosphere"}
     scenario = _of_bench("vane-leak", request, motion, initial, "30 s")
     bench_run = rig_run(scenario, request, LEAK_RATE)

@@ -76,9 +76,9 @@ SUPPLY_LINES = tuple(item.name for item in fields(SupplyLine))
 
 _REGULATED = quantities_of(RegulatedLine)
 
-MOTIONS = ("free", "held", "prescribed", "leg")
-OLD_PRESCRIBED = "led"
-"""What version 0.1 called a prescribed motion."""
+MOTIONS = ("free", "locked", "prescribed", "leg")
+RENAMED_MOTIONS = {"led": "prescribed", "held": "locked"}
+"""Kinds of motion by their name in an earlier version."""
 SECTIONS = (
     "device",
     "run",
@@ -142,7 +142,7 @@ def quantities(document: Mapping[str, Any]) -> dict[str, Quantity]:
     # The settings of a kind of motion; a prescribed one has a profile instead.
     sections = {
         "run": (*RUN, ACCURACY),
-        "motion": {"free": FREE, "held": (ANGLE,), "leg": LEG}.get(motion, ()),
+        "motion": {"free": FREE, "locked": (ANGLE,), "leg": LEG}.get(motion, ()),
         "motion.profile": profile_settings(kind_at(document, "motion.profile"), ANGLE_LEVEL)
         if motion == "prescribed"
         else (),
@@ -211,8 +211,8 @@ def check_known_motion(kind: str, file: str) -> None:
 
 def check_motion_kind(kind: object, place: str) -> None:
     """Raise ScenarioError for an old name, or for the motion of a leg that walks; ``place`` begins the message."""
-    if kind == OLD_PRESCRIBED:
-        raise ScenarioError(f"{place}: the kind of motion 'led' is now called 'prescribed'")
+    if isinstance(kind, str) and kind in RENAMED_MOTIONS:
+        raise ScenarioError(f"{place}: the kind of motion '{kind}' is now called '{RENAMED_MOTIONS[kind]}'")
     if kind in tuple(WALKS):
         raise ScenarioError(
             f"{place}: a walk has a gait and a wearer, and here the motion of a vane alone is needed; 'ppafo new walk' "

@@ -47,7 +47,7 @@ def read_motion(
     angle = reading.number(_ANGLE_PATH, ANGLE)
     if not (device.actuator.angle_min - TOLERANCE <= angle <= device.actuator.angle_max + TOLERANCE):
         raise reading.refusal(_ANGLE_PATH, f"must be between the stops of {device.name}, {_range_text(_stops(device))}")
-    if kind == "held":
+    if kind == "locked":
         return PrescribedMotion(ProfileChoice("constant", {"level": angle}), kind)
     if kind == "leg":
         numbers = reading.section("motion", LEG)

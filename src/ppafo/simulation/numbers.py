@@ -143,7 +143,7 @@ def _kinds(scenario: Scenario) -> dict[str, Any]:
     if isinstance(scenario.motion, FreeMotion) and scenario.motion.leg is not None:
         motion = {"kind": "leg", "shank": {"kind": scenario.motion.leg.shank.kind}}
     if isinstance(scenario.motion, PrescribedMotion):
-        is_locked = scenario.motion.kind == "held"
+        is_locked = scenario.motion.kind == "locked"
         motion = {} if is_locked else {"kind": "prescribed", "profile": {"kind": scenario.motion.profile.kind}}
     controller = {"kind": scenario.controller.kind}
     gas: dict[str, Any] = {} if scenario.gas_model is None else {"gas_model": {"kind": declaration.THERMAL}}
@@ -162,7 +162,7 @@ def path_of_locked_angle(scenario: Scenario) -> str | None:
     motion = scenario.motion
     if not isinstance(motion, PrescribedMotion) or motion.profile.kind != "constant":
         return None
-    return LOCKED_ANGLE if motion.kind == "held" else "motion.profile.level"
+    return LOCKED_ANGLE if motion.kind == "locked" else "motion.profile.level"
 
 
 def _place(path: str, scenario: Scenario) -> tuple[str, ...]:

@@ -254,7 +254,7 @@ def check_absolute(recording: Recording, atmosphere: float, file: str) -> None:
 
 def locked_vane(angle: float) -> PrescribedMotion:
     """Return the motion of a vane that is held at an angle [rad]: both chambers are fixed volumes."""
-    return PrescribedMotion(ProfileChoice("constant", {"level": angle}), "held")
+    return PrescribedMotion(ProfileChoice("constant", {"level": angle}), "locked")
 
 
 def with_fixed_volume(device: Device, volume: float) -> Device:

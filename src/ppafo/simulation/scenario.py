@@ -95,9 +95,9 @@ class FreeMotion:
 
 @dataclass(frozen=True, slots=True)
 class PrescribedMotion:
-    """The angle of the vane [rad] is a given function of time; that of a held vane is a constant profile.
+    """The angle of the vane [rad] is a given function of time; a locked vane has a constant profile.
 
-    ``kind`` is the kind of motion that a file names, ``held`` or ``prescribed``.
+    ``kind`` is the kind of motion that a file names, ``locked`` or ``prescribed``.
     """
 
     profile: ProfileChoice

@@ -78,7 +78,8 @@ def _motion() -> Any:
                 kind_field("free", "the vane moves as the torques demand") | quantity_fields(declaration.FREE),
             ),
             table(
-                "HeldMotion", kind_field("held", "the vane stays at one angle") | quantity_fields((declaration.ANGLE,))
+                "LockedMotion",
+                kind_field("locked", "the vane stays at one angle") | quantity_fields((declaration.ANGLE,)),
             ),
             table(
                 "PrescribedMotion",

@@ -137,7 +137,7 @@ class ReplaySettings:
     """How recordings are replayed and judged.
 
     ``motion`` ``free`` lets the vane move as the model demands, ``measured`` prescribes the recorded angle,
-    ``held`` holds it where it starts, ``leg`` gives it the foot of ``leg``, else that on the fixture of figure 7. With
+    ``locked`` keeps it where it starts, ``leg`` gives it the foot of ``leg``, else the one of figure 7's fixture. With
     a ``volume`` [m^3] there is no vane: chamber 1 is a fixed volume that the valve fills and vents. ``initial`` values
     [SI] by channel go before the first samples; ``longest_delay`` [s] limits the delay looked for.
     """
@@ -285,7 +285,7 @@ def replay_of(measured: Measured, device: Device, settings: ReplaySettings) -> R
     motion, initial = settings.motion, settings.initial
     if settings.volume is not None:
         device = with_fixed_volume(device, settings.volume)
-        motion, initial = "held", initial_in_fixed_volume(device, initial)
+        motion, initial = "locked", initial_in_fixed_volume(device, initial)
     if motion == "measured" and not measured.has(ANGLE):
         raise DataError(f"{measured.file}: there is no channel '{ANGLE}' to prescribe (--motion measured)")
     start = start_of(measured, device, initial)
@@ -327,8 +327,8 @@ def measured_values(recording: Recording, name: str) -> Floats | None:
 def _comparisons(measured: Measured, replayed: Replayed, device: Device, settings: ReplaySettings) -> list[Comparison]:
     """The channels that the recording has and that the model was not given."""
     gauge = supply_gauge(measured.recording, device)
-    # Channels that say nothing where the vane is held, or where there is none.
-    silent: tuple[str, ...] = (ANGLE,) if settings.motion == "held" else ()
+    # Channels that say nothing where the vane is locked, or where there is none.
+    silent: tuple[str, ...] = (ANGLE,) if settings.motion == "locked" else ()
     if settings.volume is not None:
         silent = tuple(name for name in COMPARED if name != PRESSURE_1)
     items = []
@@ -359,7 +359,7 @@ def _remarks(measured: Measured, device: Device, settings: ReplaySettings) -> tu
         remarks.append("samples are not regular in time; changes of the command were moved to the nearest step")
     if settings.volume is not None:
         remarks.append(f"chamber 1 was treated as a fixed volume of {settings.volume * 1e6:.4g} cm^3 without a vane")
-    elif settings.motion == "held":
+    elif settings.motion == "locked":
         remarks.append("the vane was locked at its initial angle; the angle is not compared")
     if settings.motion == "measured":
         remarks.append("the recorded angle was prescribed, and is therefore not compared")

@@ -47,7 +47,7 @@ _FEWEST_CLIPPED, _OUTLIER, _OVER_STEPS = 5, 6.0, 3.0
 """Clipped samples over those of any other value; an outlier over the noise, and over the range of its neighbours."""
 
 _AT_REST = 2.0
-"""Standard deviation of the angle over its noise, below which a vane may be held."""
+"""Standard deviation of the angle over its noise, below which a vane may be locked."""
 
 _SWAPPED = {PRESSURE_1: PRESSURE_2, PRESSURE_2: PRESSURE_1}
 _SAMPLES = "samples of "
@@ -360,7 +360,7 @@ def _fault_of(values: Floats, one: ChannelAgreement, time: Floats) -> tuple[str,
     """Return what is wrong with samples of a channel, and with which: constant, clipped, isolated; else no words."""
     levels, counts = np.unique(values, return_counts=True)
     if len(levels) == 1:
-        held = "the vane was locked (--motion held), or " if one.channel == ANGLE else ""
+        held = "the vane was locked (--motion locked), or " if one.channel == ANGLE else ""
         return f"never changes: {held}its sensor is dead or not connected", np.ones(len(values), dtype=bool)
     for place, word in ((0, "least"), (-1, "largest")):
         is_there = values == levels[place]
@@ -391,9 +391,9 @@ def _samples(records: Sequence[_Record]) -> Iterator[Candidate]:
 
 
 def _motions(search: _Search) -> Iterator[Candidate]:
-    """A vane that is held, where the model moves it and the recorded angle rests."""
+    """A vane that is locked, where the model moves it and the recorded angle rests."""
     if search.settings.motion in ("free", "leg"):
         own = [(one, one.channels.index(ANGLE)) for one in search.records if ANGLE in one.channels]
         if own and all(float(np.std(one.values[place])) < _AT_REST for one, place in own):
-            words = "the vane seems to be locked, for its recorded angle rests (--motion held)"
-            yield Candidate("motion", words, lambda _: Change(motion="held"))
+            words = "the vane seems to be locked, for its recorded angle rests (--motion locked)"
+            yield Candidate("motion", words, lambda _: Change(motion="locked"))

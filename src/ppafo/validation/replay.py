@@ -37,8 +37,8 @@ from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion, Scenari
 from ppafo.units import parse_quantity
 from ppafo.validation.measured import ANGLE, PRESSURE_1, PRESSURE_2, Measured
 
-Motion = Literal["free", "measured", "held", "leg"]
-MOTIONS: tuple[Motion, ...] = ("free", "measured", "held", "leg")
+Motion = Literal["free", "measured", "locked", "leg"]
+MOTIONS: tuple[Motion, ...] = ("free", "measured", "locked", "leg")
 
 MAXIMUM_STEPS = 20_000_000
 _WHOLE = 1.0e-9
@@ -133,18 +133,18 @@ def followed_channels(measured: Measured, motion: Motion) -> tuple[str, ...]:
 
 
 def replayed_scenario(one: Replay) -> Scenario:
-    """Return the run of a recording: of a vane that is free, held or on a leg."""
+    """Return the run of a recording: of a vane that is unconstrained, locked or on a leg."""
     recording, start = one.measured.recording, one.start
     duration = recording.duration + max(one.extra, sample_period(recording.time))
     highest = with_highest_supply(one.device, recording, recording.names)
-    given: FreeMotion | PrescribedMotion | None = locked_vane(start.angle) if one.motion == "held" else None
+    given: FreeMotion | PrescribedMotion | None = locked_vane(start.angle) if one.motion == "locked" else None
     if one.motion == "leg":
         given = FreeMotion(start.angle, start.angular_velocity, leg=one.leg or leg_of_fixture())
     return replay_scenario(recording, highest, start, duration, one.measured.file, given)
 
 
 def _plan(one: Replay) -> Run:
-    """The run of a vane that is free, held or on a leg; a free one's steps are fine enough for a prescribed one too."""
+    """The run of a vane that is unconstrained, locked or on a leg, with steps fine enough for a prescribed one too."""
     scenario = replayed_scenario(one)
     run = plan_run(scenario)
     if run.step_count > MAXIMUM_STEPS:

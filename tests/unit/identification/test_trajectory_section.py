@@ -376,14 +376,14 @@ def test_a_fixed_volume_filled_or_vented_through_the_valve_gives_its_coefficient
 
 
 def test_a_held_vane_is_fitted_in_its_pressures(solve: Solve, laboratory: Path) -> None:
-    overrides = ["run.duration=0.4 s", "valve.discharge_coefficient=0.13", "motion.kind=held", "motion.angle=75 deg"]
+    overrides = ["run.duration=0.4 s", "valve.discharge_coefficient=0.13", "motion.kind=locked", "motion.angle=75 deg"]
     scenario = load_scenario("step-response", overrides)
     clean = simulate(scenario).recording
     supply = np.full(len(clean), scenario.device.supply.pressure)
     held = noisy(clean.with_channel("supply_pressure", supply, "Pa"), 3)
     kept = {name: held.channels[name] for name in ("pressure_1", "pressure_2", "command", "supply_pressure")}
     write_csv(laboratory / "held.csv", Recording("held", held.time, kept, "synthetic"))
-    text = TANK.replace("tank", "held").replace('volume = "60 cm^3"', 'held = "75 deg"')
+    text = TANK.replace("tank", "held").replace('volume = "60 cm^3"', 'locked = "75 deg"')
     outcome = solve(f"{ONE_NUMBER}{text}")
     assert outcome.trajectory is not None
     (found,) = outcome.trajectory.fit.estimates
@@ -395,7 +395,7 @@ def test_a_held_vane_is_fitted_in_its_pressures(solve: Solve, laboratory: Path) 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (f"{TANK}held = '75 deg'\n", "held and volume: with a fixed volume there is no vane"),
+        (f"{TANK}locked = '75 deg'\n", "locked and volume: with a fixed volume there is no vane"),
         (TANK.replace("60 cm^3", "0 cm^3"), "volume = '0 cm^3' must be above zero"),
         (TANK.replace("60 cm^3", "60 psi"), "volume"),
         (f"{TANK}inputs = ['command', 'angle']\n", "the vane is locked or absent, but inputs has 'angle'"),

@@ -21,7 +21,7 @@ SMALL: dict[str, Any] = {
     "name": "small",
     "device": {"set": "ppafo2011"},
     "run": {"duration": "1 s"},
-    "motion": {"kind": "held", "angle": "75 deg"},
+    "motion": {"kind": "locked", "angle": "75 deg"},
     "controller": {"kind": "pid", "rate": "1 kHz"},
     "reference": {"kind": "constant", "level": "0 N m"},
 }
@@ -30,7 +30,7 @@ schema_version = 1
 name = "small"
 device.set = "ppafo2011"
 run.duration = "1 s"
-motion = { kind = "held", angle = "75 deg" }
+motion = { kind = "locked", angle = "75 deg" }
 controller = { kind = "pid", rate = "1 kHz" }
 reference = { kind = "constant", level = "0 N m" }
 """
@@ -99,7 +99,7 @@ def test_what_is_left_out_has_its_declared_value() -> None:
 
 
 def test_a_held_vane_is_led_along_a_constant_angle() -> None:
-    assert small().motion == PrescribedMotion(ProfileChoice("constant", {"level": math.radians(75.0)}), "held")
+    assert small().motion == PrescribedMotion(ProfileChoice("constant", {"level": math.radians(75.0)}), "locked")
 
 
 def test_words_stand_for_the_pressures_of_the_device() -> None:

@@ -24,7 +24,7 @@ step = "1 ms"
 output_interval = "1 ms"
 
 [motion]
-kind = "held"
+kind = "locked"
 angle = "75 deg"
 
 [initial]
@@ -85,7 +85,8 @@ def test_a_misspelt_key_is_answered_with_the_nearest(old: str, new: str, key: st
     ("old", "new", "nearest"),
     [
         ('"pid"', '"pdi"', "controller.kind = 'pdi' is not known, did you mean 'pid'?"),
-        ('"held"', '"hold"', "motion.kind = 'hold' is not known, did you mean 'held'?"),
+        ('"locked"', '"lokced"', "motion.kind = 'lokced' is not known, did you mean 'locked'?"),
+        ('"locked"', '"held"', "the kind of motion 'held' is now called 'locked'"),
         ('"ramp_hold"', '"ramp"', "reference.kind = 'ramp' is not known"),
     ],
 )
@@ -194,19 +195,19 @@ PRESCRIBED = 'kind = "prescribed"\n[motion.profile]\n'
     ],
 )
 def test_a_prescribed_vane_that_leaves_the_stops_is_refused_with_the_time(profile: str) -> None:
-    message = problem_after('kind = "held"\nangle = "75 deg"', PRESCRIBED + profile)
+    message = problem_after('kind = "locked"\nangle = "75 deg"', PRESCRIBED + profile)
     assert "[motion.profile] leaves the stops of ppafo2011, 20 deg to 130 deg: it is at " in message
     assert message.endswith(" s")
 
 
 def test_a_prescribed_vane_may_touch_the_stops() -> None:
     profile = 'kind = "sine"\nlevel = "75 deg"\namplitude = "55 deg"\nfrequency = "0.7 Hz"'
-    assert parse_scenario(TEXT.replace('kind = "held"\nangle = "75 deg"', PRESCRIBED + profile).encode(), "task.toml")
+    assert parse_scenario(TEXT.replace('kind = "locked"\nangle = "75 deg"', PRESCRIBED + profile).encode(), "task.toml")
 
 
 def test_a_ramp_that_would_leave_the_stops_after_the_run_is_allowed() -> None:
     profile = 'kind = "ramp_hold"\nstart_level = "75 deg"\nlevel = "131 deg"\nramp_time = "4 s"'
-    assert parse_scenario(TEXT.replace('kind = "held"\nangle = "75 deg"', PRESCRIBED + profile).encode(), "task.toml")
+    assert parse_scenario(TEXT.replace('kind = "locked"\nangle = "75 deg"', PRESCRIBED + profile).encode(), "task.toml")
 
 
 @pytest.mark.parametrize(
@@ -331,7 +332,7 @@ def test_plain_values_of_a_wrong_type_are_clean_errors(change: dict[Any, Any]) -
 
 def test_the_old_name_of_a_prescribed_motion_is_refused_with_the_new_one() -> None:
     message = problem_after(
-        'kind = "held"\nangle = "75 deg"', 'kind = "led"\n[motion.profile]\nkind = "constant"\nlevel = "75 deg"'
+        'kind = "locked"\nangle = "75 deg"', 'kind = "led"\n[motion.profile]\nkind = "constant"\nlevel = "75 deg"'
     )
     assert message == "task.toml: motion.kind: the kind of motion 'led' is now called 'prescribed'"
     with pytest.raises(

@@ -33,7 +33,7 @@ def test_values_of_scenario_and_device_are_changed_together() -> None:
     scenario = load_scenario(TASK, ["valve.area=12.6mm^2", "reference.level=5 N m", "motion.angle=80 deg"])
     assert scenario.device.valve.area == 12.6e-6
     assert scenario.reference.level == 5.0
-    assert scenario.motion == PrescribedMotion(ProfileChoice("constant", {"level": math.radians(80.0)}), "held")
+    assert scenario.motion == PrescribedMotion(ProfileChoice("constant", {"level": math.radians(80.0)}), "locked")
 
 
 def test_the_overrides_stay_visible_and_the_file_is_kept_as_it_was() -> None:

@@ -107,7 +107,7 @@ def test_a_vane_that_was_held_is_named_where_the_model_moves_it(bench: Recording
     random = np.random.default_rng(3)
     angle = 1.0 + 2e-3 * random.standard_normal(len(bench))
     measured = check_recording(with_channel(bench, "angle", angle), device, "r.csv")
-    held = compare_recording(measured, device, ReplaySettings(motion="held")).model.resample(bench.time)
+    held = compare_recording(measured, device, ReplaySettings(motion="locked")).model.resample(bench.time)
     seen = measured.recording
     for name in ("pressure_1", "pressure_2"):
         seen = with_channel(seen, name, held[name] + 500.0 * random.standard_normal(len(seen)))

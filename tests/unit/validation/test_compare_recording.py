@@ -156,7 +156,7 @@ def tight() -> Device:
 def test_a_constant_does_not_agree_with_a_chamber_that_loses_pressure(agree: Agree) -> None:
     psi = 6894.757293168
     lost = 4.0e5 - 1.4 * psi * np.linspace(0.0, 1.0, 500)
-    agreement = agree(resting(lost), tight(), motion="held")
+    agreement = agree(resting(lost), tight(), motion="locked")
     chamber = next(one for one in agreement.channels if one.channel == "pressure_2")
     assert chamber.fraction < 0.10
     assert chamber.variation == pytest.approx(float(np.std(lost)), rel=0.05)

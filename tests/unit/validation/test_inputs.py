@@ -94,10 +94,10 @@ def test_a_held_vane_is_filled_as_an_independent_solver_has_it(agree: Agree) -> 
     pressures = independent(device, lambda _time: 4.4e5, lambda _time: 1.3)
     recording = recording_of(pressures, np.full(TIMES.size, 4.4e5), np.full(TIMES.size, 1.3))
     without = Recording("bench", TIMES, {n: recording.channels[n] for n in recording.names if n != "angle"})
-    agreement = agree(without, device, motion="held", initial={"angle": 1.3})
+    agreement = agree(without, device, motion="locked", initial={"angle": 1.3})
     assert {channel.channel for channel in agreement.channels} == {"pressure_1", "pressure_2", "pressure_difference"}
     assert max(channel.fraction for channel in agreement.channels) < 3e-4
-    moved = agree(without, device, motion="held", initial={"angle": 1.6})
+    moved = agree(without, device, motion="locked", initial={"angle": 1.6})
     assert max(channel.fraction for channel in moved.channels) > 2e-2
 
 

@@ -128,7 +128,7 @@ def test_a_walk_takes_its_own_motion_and_names_the_kinds_that_exist(tmp_path: Pa
         load_walk(NAME, ["motion.kind=free"])
     misspelt = written(tmp_path, (text_of(NAME) + MOTION).replace('"walk"', '"wlak"'))
     with pytest.raises(
-        ScenarioError, match=r"\.toml: motion\.kind = 'wlak' .* allowed: free, held, prescribed, leg, walk"
+        ScenarioError, match=r"\.toml: motion\.kind = 'wlak' .* allowed: free, locked, prescribed, leg, walk"
     ):
         load_walk(misspelt)
 

@@ -545,7 +545,7 @@ def sides_of(run: Run, point: Point) -> dict[str, str]:
     }
     said = {name: _regime(plant.valve_curve, *values) for name, values in paths.items()}
     said["leak over the vane"] = _regime(plant.leak_curve, first, second, 1.0)
-    motion = {None: "prescribed", 0.0: "held", 1.0: "slides in plantarflexion", -1.0: "slides in dorsiflexion"}
+    motion = {None: "prescribed", 0.0: "at rest", 1.0: "slides in plantarflexion", -1.0: "slides in dorsiflexion"}
     vane = motion[point.way]
     if point.way == 0.0:
         is_at_stop = not plant.angle_min < at["angle"] < plant.angle_max

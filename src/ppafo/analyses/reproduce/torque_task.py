@@ -65,7 +65,7 @@ def _has_phase(scenario: Scenario) -> bool:
     return (
         scenario.controller.kind == "on_off"
         and isinstance(scenario.motion, PrescribedMotion)
-        and scenario.motion.kind == "held"
+        and scenario.motion.kind == "locked"
         and scenario.gas_model is None
         and scenario.supply_lines is None
         and reference.kind == "ramp_hold"

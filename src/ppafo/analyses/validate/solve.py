@@ -102,7 +102,7 @@ def validate(
     """Return the errors (model less measured) of the model with a parameter set against each recording.
 
     ``recordings`` are CSV or NetCDF files or result folders. The model is run on the recorded command, supply pressure
-    and external torque; ``motion`` is ``free``, ``measured`` (the recorded angle is prescribed) or ``held``. With a
+    and external torque; ``motion`` is ``free``, ``measured`` (the recorded angle is prescribed) or ``locked``. With a
     ``volume`` [m^3] there is no vane and chamber 1 is a fixed volume. ``initial`` are texts such as
     ``pressure_2=0 psi_g`` for channels that were not recorded, ``thresholds`` texts such as ``5%`` or ``angle=2 deg``:
     the largest RMS errors that pass, of the full range or in a unit. Without any it is 10 % of full range, at

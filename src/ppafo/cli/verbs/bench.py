@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 Problem = Annotated["str | Path", Word("PROBLEM", Path)]
 Set = Annotated["str | Path", Word("PARAMETERS")]
 Recording = Annotated["str | Path", Word("RECORDING")]
-Motion = Annotated[str, Word("free|measured|held|leg")]
+Motion = Annotated[str, Word("free|measured|locked|leg")]
 Initial = Annotated[str, Word("CHANNEL=VALUE")]
 Limits = Annotated[Sequence[str], Word("[CHANNEL=]LIMIT", option="--threshold")]
 Columns = Annotated["ColumnMap | str | Path", Word("FILE.toml[:NAME]")]
@@ -155,7 +155,7 @@ def validate(
     parameter_set: name of a parameter set, or a .toml file
     recordings: a .csv or .nc file, or a result folder; several may be given
     valve: valve of the parameter set; default: its default valve
-    motion: free: the model moves the vane; measured: the vane follows the recorded angle; held: the vane is locked at
+    motion: free: the model moves the vane; measured: the vane follows the recorded angle; locked: the vane stays at
         its initial angle; leg: the model moves vane and foot on the fixture of step-response (default free)
     volume: no vane: the valve fills and vents chamber 1 of this fixed volume, for example '60 cm^3'; pressure_1 is
         compared

@@ -99,10 +99,12 @@ class ExperimentSection(StrictTable):
         None, description="time of the recording at which the run begins; 0 s, or the first sample"
     )
     step: Text | None = Field(None, description="longest step of time in the run, such as '0.1 ms'")
-    channels: Texts | None = Field(None, description="compared; default: angle and pressures, unless held or followed")
+    channels: Texts | None = Field(
+        None, description="compared; default: angle and pressures, unless locked or followed"
+    )
     noise: _Noise = Field({}, description="least standard deviation by channel, '0.1 deg', '500 Pa_d'; default: none")
     inputs: Texts | None = Field(None, description=f"recorded channels that the run follows: {', '.join(ALL_INPUTS)}")
-    held: Text | None = Field(
+    locked: Text | None = Field(
         None, description="angle at which the vane is locked, such as '75 deg'; without a scenario"
     )
     volume: Text | None = Field(None, description="fixed volume in place of the vane, '60 cm^3'; without a scenario")
@@ -153,6 +155,10 @@ def refuse_removed(document: Mapping[str, Any], file: str) -> None:
         )
     parameters = section.get("parameters") if isinstance(section, dict) else None
     tables = [section, *(parameters if isinstance(parameters, list) else ())]
+    experiments = section.get("experiments") if isinstance(section, dict) else None
+    for table in experiments if isinstance(experiments, list) else ():
+        if isinstance(table, dict) and "held" in table:
+            raise IdentificationError(f"{file}: trajectory.experiments: held: is now locked; write locked = '75 deg'")
     for key, instead in _REMOVED.items():
         if any(isinstance(table, dict) and key in table for table in tables):
             raise IdentificationError(f"{file}: trajectory: {key}: {instead}")
@@ -242,7 +248,7 @@ def _experiment(item: ExperimentSection, setting: Setting) -> Experiment:
     if item.scenario is None:
         scenario, start, inputs = _replay(item, source.recording, setting, said)
     else:
-        for name in ("held", "volume"):
+        for name in ("locked", "volume"):
             if getattr(item, name) is not None:
                 raise IdentificationError(
                     f"{said}: {name} and a scenario: the scenario prescribes how the vane moves; omit one of them"
@@ -307,15 +313,15 @@ def _replay(
     if setting.parameter_set is None:
         raise IdentificationError(f"{said}: needs a scenario, because no device was given")
     inputs = tuple(name for name in INPUTS if name in recording) if item.inputs is None else item.inputs
-    is_held, is_fixed = item.held is not None, item.volume is not None
+    is_locked, is_fixed = item.locked is not None, item.volume is not None
     refuse_first(
         said,
         (item.initial_state == "scenario", "initial_state = 'scenario', but it has no scenario; omit it"),
         (
-            (is_held or is_fixed) and ANGLE in inputs,
+            (is_locked or is_fixed) and ANGLE in inputs,
             f"the vane is locked or absent, but inputs has '{ANGLE}': omit one of them",
         ),
-        (is_held and is_fixed, "held and volume: with a fixed volume there is no vane; omit one of them"),
+        (is_locked and is_fixed, "locked and volume: with a fixed volume there is no vane; omit one of them"),
         (
             COMMAND not in recording,
             f"has no scenario, so its recording needs a channel '{COMMAND}'; it has {', '.join(recording.names)}",
@@ -326,7 +332,7 @@ def _replay(
     first = float(recording.time[0]) if first is None else first
     used = recording.between(first, float(recording.time[-1]))
     device = build_device(apply_overrides(setting.parameter_set, item.overrides, setting.valve), setting.valve)
-    angle, volume = quantity_in(item, "held", "rad", said), positive_in(item, "volume", "m^3", said)
+    angle, volume = quantity_in(item, "locked", "rad", said), positive_in(item, "volume", "m^3", said)
     known = {} if angle is None else {ANGLE: angle}
     if volume is not None:
         # Without a vane chamber 1 is the volume, and chamber 2 the room.
@@ -338,12 +344,12 @@ def _replay(
 
 
 def _compared_channels(item: ExperimentSection) -> tuple[str, ...]:
-    """Return what an experiment is compared in: as given, else all that is neither held nor followed."""
+    """Return what an experiment is compared in: as given, else all that is neither locked nor followed."""
     if item.channels is not None:
         return item.channels
     if item.volume is not None:
         return ("pressure_1",)
-    is_prescribed = item.held is not None or ANGLE in (item.inputs or ())
+    is_prescribed = item.locked is not None or ANGLE in (item.inputs or ())
     return FITTED_CHANNELS[1:] if is_prescribed else FITTED_CHANNELS
 
 
