@@ -220,7 +220,7 @@ _FRAMES = """() => {
 def drag(page: Any, seconds: float) -> dict[str, float]:
     """Drag the first slider to and fro; return frames a second, share of them within 17 ms, simulation in ms."""
     page.evaluate(_FRAMES)
-    slider = page.locator(".controller input[type=range]").first
+    slider = page.locator(".control input[type=range]").first
     box = slider.bounding_box()
     middle = box["y"] + box["height"] / 2
     page.mouse.move(box["x"] + 20, middle)
@@ -240,7 +240,7 @@ def drag(page: Any, seconds: float) -> dict[str, float]:
     }
 
 
-_BESIDE_THE_MAP = ".controller[data-key='reference.level'] input[type=range]"
+_BESIDE_THE_MAP = ".control[data-key='reference.level'] input[type=range]"
 """A slider that the map does not go over, so that all its runs are made anew."""
 
 
@@ -272,7 +272,7 @@ def measure(chromium: Any, file: Path, seconds: float = 10.0) -> dict[str, float
 
 _DRAG_AT_ONCE = """new MutationObserver((_, observer) => {
     observer.disconnect();
-    const slider = document.querySelector('.controller input[type=range]');
+    const slider = document.querySelector('.control input[type=range]');
     slider.value = 200;
     slider.dispatchEvent(new Event('input'));
     // Drawn in the coming frame, and seen when the one after it begins.

@@ -26,7 +26,8 @@ def valve_models(walks: bool) -> list[ValveModel]:
     for kind in VALVES.values():
         choose = vent_valve.choose if walks and kind.name == "proportional" else kind.choose
         names = [item.name for item in kind.quantities]
-        settings = [dict.fromkeys(names, 0.0), *({**dict.fromkeys(names, 0.0), name: 0.01} for name in names)]
+        nothing = dict.fromkeys(names, 0.0)
+        settings = [kind.settings(**given) for given in (nothing, *(nothing | {name: 0.01} for name in names))]
         for model in map(choose, settings):
             found |= {id(model): model}
     return list(found.values())

@@ -59,6 +59,7 @@ COMPOSED = ("engine/", "translation/", "gym/episodes.py", "wearer/scheme.py")
 SOMETHING_ELSE = ("answers?", "courses?", "whole numbers?")
 """Words that messages need for something else: an answer of a board, `--course`, 'must be a whole number'."""
 ALLOWED_IN_MESSAGES: Mapping[str, tuple[str, str]] = {
+    "identification/trajectory/section.py": ("held: is now locked", "the old key of a problem file"),
     "metrics/metric.py": ("wearer who reacts", "what recordings on disk are told apart by"),
     "walking/result.py": ("walk of a wearer who reacts", "the format of a result on disk"),
     "report/display_units.py": ("volume per angle", "a kind of quantity, which no user reads"),

@@ -153,6 +153,7 @@ def test_smaller_result_leaves_nothing_of_a_larger_one(tmp_path: Path, capsys: p
         MARK,
         "audit-ppafo2011-printed.txt",
         "audit-ppafo2011-printed.json",
+        "report.html",
     }
 
 

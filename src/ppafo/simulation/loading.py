@@ -430,10 +430,10 @@ def scenario_of(request: ScenarioRequest, layout: Layout) -> Scenario:
     declared.find_kinds(request.content, request.file)
     if request.overrides:
         wrong = [item for item in _problems(request.content, layout) if not is_gap(item)]
-        _refuse(wrong, request.file, layout.whole(request.content))
+        _refuse(wrong, request, layout, request.content)
     changed = apply_overrides(request.content, request.overrides, request.file, declared)
     declared.find_kinds(changed.document, request.file)
-    _refuse(_problems(changed.document, layout), request.file, layout.whole(changed.document))
+    _refuse(_problems(changed.document, layout), request, layout, changed.document)
     _check_forms(Reading(request.file, changed.document, changed.paths))
     return layout.build(request, changed)
 
@@ -458,6 +458,7 @@ def _problems(document: dict[str, Any], layout: Layout) -> list[ErrorDetails]:
     return found
 
 
-def _refuse(problems: list[ErrorDetails], file: str, model: type[BaseModel]) -> None:
+def _refuse(problems: list[ErrorDetails], request: ScenarioRequest, layout: Layout, document: dict[str, Any]) -> None:
+    # The whole layout has every kind of everything: it is made for a message alone.
     if problems:
-        raise ScenarioError(f"{file}: {all_problems(problems, model)}")
+        raise ScenarioError(f"{request.file}: {all_problems(problems, layout.whole(document))}")

@@ -38,7 +38,7 @@ def test_text_says_run_time_steps_and_why_it_ended(capsys: pytest.CaptureFixture
 
 def test_a_long_run_time_is_in_whole_minutes(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["bottle", "--gas-per-stride", "0.001 g", "--stride-time", "1.1 s"]) == 0
-    assert "run time                           1440 min of walking" in capsys.readouterr().out
+    assert "run time                         1440 min of walking" in capsys.readouterr().out
 
 
 def test_json_is_in_si_and_says_simulated(capsys: pytest.CaptureFixture[str]) -> None:

@@ -37,6 +37,7 @@ from ppafo.parameters import load_device
 from ppafo.parameters.plant import plant_parameters
 from ppafo.simulation.plan import initial_lines
 from ppafo.simulation.sampled import state_row_numbers
+from ppafo.simulation.scenario import RegulatedLine, SupplyLine
 from ppafo.walking import load_walk
 from ppafo.walking.motion import with_duration
 from ppafo.walking.planning import plan_walk
@@ -186,10 +187,16 @@ def test_without_droop_and_limit_a_filling_is_that_of_a_constant_supply() -> Non
     assert away[-1] < 2.0e-4, away
 
 
+def supply_line(lines: SupplyLines) -> SupplyLine:
+    """The lines of a scenario with these numbers."""
+    first = RegulatedLine(lines.droop_1, lines.largest_flow_1, lines.volume_1)
+    return SupplyLine(first, RegulatedLine(lines.droop_2, lines.largest_flow_2, lines.volume_2))
+
+
 def short_walk(name: str, lines: SupplyLines | None = None, overrides: tuple[str, ...] = ()) -> Run:
     """A few strides of a walk that comes with the package, perhaps with other lines or values."""
     plan = with_duration(load_walk(name, overrides), 5.0)
-    return plan_walk(plan if lines is None else replace(plan, supply_lines=lines))
+    return plan_walk(plan if lines is None else replace(plan, supply_line=supply_line(lines)))
 
 
 @pytest.mark.parametrize("name", ["solenoid-regulators", "proportional-regulators"])

@@ -135,7 +135,7 @@ def test_a_text_that_a_control_shows_can_be_edited_and_what_is_refused_is_forgot
     assert page.evaluate("workbench.values(0)")["supply.pressure"] == parse_quantity("55 psi_g", "Pa_a")
     field.fill("5 parsec")
     field.press("Enter")
-    fault = page.locator(".controller[data-key='supply.pressure'] .fault")
+    fault = page.locator(".control[data-key='supply.pressure'] .fault")
     assert "does not fit here" in fault.inner_text()
     page.get_by_role("button", name="Reset all").click()
     fault.wait_for(state="hidden")
@@ -164,7 +164,7 @@ def test_a_walk_is_short_and_no_shorter_than_python_allows(chromium: Any, file: 
     for text in ("5 s", "61 min"):
         field.fill(text)
         field.press("Enter")
-        assert "outside of its range" in page.locator(".controller[data-key='run.duration'] .fault").inner_text()
+        assert "outside of its range" in page.locator(".control[data-key='run.duration'] .fault").inner_text()
     field.fill("7")
     field.press("Enter")
     assert page.evaluate(lengths) == ["7 s", "7 s"]
@@ -172,7 +172,7 @@ def test_a_walk_is_short_and_no_shorter_than_python_allows(chromium: Any, file: 
     assert page.evaluate(lengths) == ["6 s", "6 s"]
     # The lowest stride time, 0.5192 s, is not a round one: no text of the slider is below it.
     page.locator("summary", has_text="Controller").click()
-    page.locator(".controller[data-key='controller.first_stride_time'] input[type=range]").press("Home")
+    page.locator(".control[data-key='controller.first_stride_time'] input[type=range]").press("Home")
     values = page.evaluate("[workbench.values(0), workbench.values(1)].map(all => all['controller.first_stride_time'])")
     assert values == [0.52, 0.52]
     # More samples than a module can be asked for are a message and not a trap.
@@ -284,7 +284,7 @@ def test_damaged_files_give_a_message_and_never_an_exception(chromium: Any, file
 def test_a_slider_is_dragged_and_the_drag_is_undone_at_once(chromium: Any, file: Path) -> None:
     page = opened(chromium, file, viewport={"width": 1400, "height": 1000})
     before, run = page.evaluate("workbench.file()"), page.evaluate("workbench.run(0).metrics")
-    slider = page.locator(".controller[data-key='supply.pressure'] input[type=range]")
+    slider = page.locator(".control[data-key='supply.pressure'] input[type=range]")
     slider.focus()
     box = slider.bounding_box()
     page.mouse.move(box["x"] + 0.4 * box["width"], box["y"] + box["height"] / 2)
@@ -312,7 +312,7 @@ def test_a_map_comes_in_two_parts_and_is_run_again_only_where_that_can_change_it
     assert page.locator(whole).count() == 0
     # A map that a later wish ends is none; the last one is run to its end.
     for _ in range(4):
-        page.locator(".controller[data-key='supply.pressure'] input[type=range]").press("ArrowRight")
+        page.locator(".control[data-key='supply.pressure'] input[type=range]").press("ArrowRight")
     page.wait_for_selector(whole)
     other = opened(chromium, file, f"#{page.evaluate('workbench.address()')}", viewport={"width": 1400, "height": 1000})
     other.locator("summary", has_text="Map of two settings").click()
@@ -366,7 +366,7 @@ def test_everything_can_be_reached_and_changed_by_keyboard_alone(chromium: Any, 
             page.evaluate("document.activeElement.getAttribute('aria-label') ?? document.activeElement.textContent")
         )
     assert {"Share and export", "Torque task", "Supply pressure", "Supply pressure, slider", "Valve opening"} <= reached
-    page.locator(".controller[data-key='supply.pressure'] input[type=range]").focus()
+    page.locator(".control[data-key='supply.pressure'] input[type=range]").focus()
     page.keyboard.press("ArrowRight")
     assert "supply.pressure" in page.evaluate("workbench.address()")
     page.get_by_label("Supply pressure", exact=True).fill("3 bar_g")

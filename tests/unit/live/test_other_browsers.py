@@ -8,7 +8,7 @@ import pytest
 from scripts.browsers import NAMES, DrivenPage, driven, missing
 from scripts.live_page import check_bits, check_damage
 
-SLIDER = ".controller[data-key='supply.pressure'] input[type=range]"
+SLIDER = ".control[data-key='supply.pressure'] input[type=range]"
 UNDO = "button[title^=Undo]:enabled"
 FOCUSED = "document.activeElement.getAttribute('aria-label') ?? document.activeElement.textContent"
 

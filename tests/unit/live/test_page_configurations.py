@@ -149,7 +149,7 @@ def test_the_focus_stays_where_configurations_are_added_and_removed(chromium: An
     page.keyboard.press("Enter")
     assert focused_with(1) == "Add a configuration"
     # A slider keeps it where the controls are made anew, and what is chosen where a choice is.
-    page.locator(".controller[data-key='supply.pressure'] input[type=range]").focus()
+    page.locator(".control[data-key='supply.pressure'] input[type=range]").focus()
     page.keyboard.press("Control+z")
     focused_with(2)
     page.keyboard.press("Control+z")

@@ -188,7 +188,7 @@ def test_ranges_are_written_as_people_write_them(chromium: Any, file: Path) -> N
         page.locator("summary", has_text=group).first.click()
     said = {}
     for key in ("friction.static_torque", "actuator.dead_volume_1", "actuator.angle_max", "run.step", "motion.angle"):
-        page.locator(f".controller[data-key='{key}'] .name").click()
+        page.locator(f".control[data-key='{key}'] .name").click()
         said[key] = page.locator(f"[id='about-{key}'] span").nth(1).inner_text().replace("\u00a0", " ")
     assert said == {
         "friction.static_torque": "0 to 10,000 N m. friction.static_torque",

@@ -1,5 +1,7 @@
 """Links between settings: which act, what they come to, and when they end."""
 
+from typing import NamedTuple
+
 import numpy as np
 import pytest
 
@@ -55,7 +57,14 @@ def test_a_gauge_pressure_of_supply_and_start_counts_from_the_atmosphere_and_no_
     assert gauge_link(FIRST, 2.0, "bar_a") == gauge_link("controller.filled_pressure", 2.0, "bar_g") == ()
 
 
-def test_terms_are_summed_and_one_with_names_takes_a_mapping() -> None:
-    link = Follows((Term(("a", "b"), lambda row: row["x"] * row["y"], ("x", "y")), Term(("b",))), 0.5)
+class Pair(NamedTuple):
+    """Two numbers, by name."""
+
+    x: float
+    y: float
+
+
+def test_terms_are_summed_and_one_with_settings_takes_them_by_name() -> None:
+    link = Follows((Term(("a", "b"), lambda row: row.x * row.y, Pair), Term(("b",))), 0.5)
     assert link.sources == ("a", "b", "b")
     assert link.number({"a": 2.0, "b": 3.0}.__getitem__) == pytest.approx(9.5)

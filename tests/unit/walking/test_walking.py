@@ -86,7 +86,8 @@ def test_metrics_at_one_kilohertz_are_within_two_per_cent(walk_plan: Callable[[s
     for name in ("event_on_off", "event_proportional"):
         found = []
         for step in (1.0e-3, 5.0e-5):
-            run = plan_walk(replace(walk_plan(name), time_step=step))
+            plan = walk_plan(name)
+            run = plan_walk(replace(plan, run=replace(plan.run, step=step)))
             rows = state_row_numbers(run)
             states = run_batch(batch_of(run)).states[:, 0]
             names = ("walk.positive_push_off_work", "walk.net_push_off_work", "state.supplied_mass")

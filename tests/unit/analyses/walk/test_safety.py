@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from ppafo.analyses.walk.reacting import reacting_finding
 
 from ppafo.analyses.walk.safety import safety_remarks
 from ppafo.constants import PASCALS_PER_PSI
@@ -13,6 +12,7 @@ from ppafo.model.helping import LIFTS
 from ppafo.signals import Channel
 from ppafo.walking import compare_walks, load_walk, walk
 from ppafo.walking.events import SafetyEvent
+from ppafo.wearer.answer import reacting_finding
 
 
 def test_a_peak_torque_above_the_limit_of_the_controller_is_said() -> None:

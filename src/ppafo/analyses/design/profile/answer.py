@@ -280,7 +280,7 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
                 "The torque",
                 panels=lambda: [torque_panel(sizing)],
                 name="torque",
-                caption="The prescribed torque and that of the suggestion.",
+                caption="The prescribed torque and the suggestion's.",
                 size=(9.0, 3.0),
                 is_detail=True,
             ),
