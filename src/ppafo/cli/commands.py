@@ -95,7 +95,7 @@ _EVERY: dict[str, dict[str, Command | Group]] = {
         "doctor": Command("ppafo.cli.doctor:doctor"),
     },
 }
-"""Headings of the help, by what somebody has come for, and under each the commands, those of guests too."""
+"""Headings of the help, by what somebody has come for, and under each the commands, guests' too."""
 
 
 def _installed(one: Command | Group) -> Command | Group | None:

@@ -24,9 +24,9 @@ _FIRST_TABLE = re.compile(r"^\s*\[", re.MULTILINE)
 
 @dataclass(frozen=True, slots=True)
 class _NewFile:
-    """A kind of file: what it is called, the folder of those of the package, what loads one, the command to try next.
+    """A kind of file: what it is called, the folder of the package's own, what loads one, the command to try next.
 
-    The command has ``FILE`` in the place of the new file and ``NAME`` in that of its name.
+    The command has ``FILE`` for the new file and ``NAME`` for its name.
     """
 
     noun: str
@@ -131,7 +131,7 @@ def new(
 
 
 def _content(kind: str, source: str | None, name: str, path: Path) -> str:
-    """Return the text of the new file: that of the template or of the source, under the new name."""
+    """Return the text of the new file: the template or the source, under the new name."""
     from importlib import resources
 
     from ppafo.documents.toml_text import TomlKind

@@ -67,7 +67,7 @@ def blame_out_option() -> Iterator[None]:
 class Said:
     """What a command that solves no question says: its text, its JSON document, and what else it leaves behind.
 
-    ``name`` is that of the files in the folder of ``--out``, in which ``draw`` makes a figure. ``aside`` is a line
+    ``name`` is the stem of the files in the folder of ``--out``, in which ``draw`` makes a figure. ``aside`` is a line
     for standard error after the result.
     """
 

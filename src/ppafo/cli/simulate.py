@@ -70,7 +70,7 @@ def simulate(scenario: Scenario, *, check: bool = False, overrides: Overrides = 
 
 
 def _error(result: "Result") -> "ErrorEstimate | None":
-    """Return the estimated error of a vane alone, which runs again in milliseconds; that of a walk is in its check."""
+    """Return the estimated error of a vane alone, which runs again in milliseconds; a walk's is in its check."""
     from ppafo.simulation.scenario import worn_kind
 
     return result.error() if result.status.is_completed and worn_kind(result.scenario) is None else None

@@ -32,7 +32,7 @@ def beside(name: str, folder: Path, known: Collection[str] = ()) -> str:
 
 @dataclass(frozen=True, slots=True)
 class TomlKind:
-    """A kind of file: what messages call it, its name for ``--schema``, those of the package, the error raised."""
+    """A kind of file: what messages call it, its name for ``--schema``, the files of the package, the error raised."""
 
     noun: str
     schema: str

@@ -24,7 +24,7 @@ def interval_factor(confidence: float) -> float:
 
 
 def half_width_for(confidence: float, half_width: float, stated: float) -> float:
-    """Return half the width of an interval for some confidence, from that of one ``stated`` for another."""
+    """Return half the width of an interval for some confidence, from one ``stated`` for another."""
     return half_width * interval_factor(confidence) / interval_factor(stated)
 
 

@@ -121,7 +121,7 @@ _STEPS = (1.0e-7, 1.0e-3)
 
 _HIGHEST_ORDER = 12
 _LARGEST_REFLECTION = 1.0 - 1.0e-9
-"""Of residuals that follow a law exactly, such as those of a constant: no innovation would be left."""
+"""Of residuals that follow a law exactly, such as a constant's: no innovation would be left."""
 
 _PASSES = 6
 _ROUNDS = 20
@@ -129,7 +129,7 @@ _SETTLED = 0.03
 _EVALUATIONS = 40
 _SIGNIFICANCE = 0.01
 _PARTING = 0.05
-"""Fraction of the covariance of all by which that of a group alone must be larger for its direction to be tested."""
+"""Fraction of the covariance of all by which a group's alone must be larger for its direction to be tested."""
 
 _RANK = 1.0e-13
 """Eigenvalue [-] of scaled numbers from which they are seen."""

@@ -28,7 +28,7 @@ _FORMS = ((_AREA_NAMES, _SONIC_NAMES), (_SONIC_NAMES, _AREA_NAMES))
 class NewSet:
     """A set with new values, and what is wrong with it as a device (an empty text if nothing).
 
-    ``written`` are the paths of the identified ones. ``fitted`` are those of values that hold for this model
+    ``written`` are the paths of the identified ones. ``fitted`` are the paths of values that hold for this model
     only: the set has them, with the origin ``fitted``, and they do not count as identified.
     """
 
@@ -85,7 +85,7 @@ def _with_estimate(parameter_set: ParameterSet, estimate: Estimate, quantity: Qu
     section, _, name = estimate.path.rpartition(".")
     others = {f"{section}.{member}" for form, other in _FORMS if name in form for member in other}
     kept = {path: old for path, old in parameter_set.numbers.items() if path not in others}
-    # What was fitted as the pressure of both regulators is that of both.
+    # What was fitted as the pressure of both regulators holds for both.
     links = acting(links_of_set(parameter_set), {estimate.path})
     found = {path: entry for path in (estimate.path, *(path for path, link in links.items() if link.when_set))}
     return replace(parameter_set, numbers={**kept, **found})

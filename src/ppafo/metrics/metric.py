@@ -45,7 +45,7 @@ class Metrics(dict[str, Metric]):
 class Readings:
     """What is left of runs that were metered and not recorded; every number is an array (runs,), or a float of one run.
 
-    ``meters`` has the last state of each meter by its name; ``course`` that of the reference, () where none needs it;
+    ``meters`` has the last state of each meter by its name; ``course`` the reference's, () where none needs it;
     ``interval`` is the time between two samples [s] and ``samples`` their number; ``gains`` has the last less the first
     value of channels; ``traces`` has channels sample by sample (samples, runs).
     """

@@ -1,7 +1,6 @@
 """Metrics of a walk stride by stride, without a recording: one meter that goes through the samples once.
 
-What is counted is that of ``walking/strides.py``, which counts it in a recording with its mean curves; tests compare
-the two.
+``walking/strides.py`` counts the same in a recording with its mean curves; tests compare the two.
 """
 
 import math
@@ -80,7 +79,7 @@ class Counted(NamedTuple):
 class Strides(NamedTuple):
     """A walk up to a sample: ``strikes``, gas [kg] from the supply at the first sample and now, its strides.
 
-    ``safe_time`` [s] is that of the first sample with less help, below 0 without one.
+    ``safe_time`` [s] is the time of the first sample with less help, below 0 without one.
     """
 
     strikes: float
@@ -103,7 +102,7 @@ def totals_at(now: StrideSample) -> StrideTotals:
 
 
 def sum_with(sums: StrideTotals, now: StrideTotals, begun: StrideTotals, on_toes: float) -> StrideTotals:
-    """Sums with those of a stride that went from one to the other; ``on_toes`` is 1 where it began on the toes."""
+    """Sums with the sums of a stride that went from one to the other; ``on_toes`` is 1 where it began on the toes."""
     return StrideTotals(
         gas=sums.gas + (now.gas - begun.gas),
         positive_push_off_work=sums.positive_push_off_work

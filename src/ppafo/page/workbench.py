@@ -71,7 +71,7 @@ def program_content(item: Simulated, module: str, intervals: Mapping[str, Interv
     """Return what the page knows of a scenario; ``module`` is the element that holds its program."""
     described = item.module.description
     gauge = _gauge_texts(item.scenario, described["settings"])
-    # The file of a scenario or walk with the overrides in it; those of the device stay overrides.
+    # The file of a scenario or walk with the overrides in it; overrides of the device stay overrides.
     declared = OF_A_VANE
     if described["kind"] == "walk":
         from ppafo.walking.declaration import OF_A_WALK
@@ -432,7 +432,7 @@ def openings_of(names: Iterable[str]) -> dict[str, dict[str, Any]]:
 def known_intervals() -> Mapping[str, Interval]:
     """Return 95 % intervals in SI, by key, of numbers of which the set does not say how well they are known.
 
-    They are those of a study, which takes long to read: ``scripts/known_intervals.py`` writes the file.
+    They come from a study, which takes long to read: ``scripts/known_intervals.py`` writes the file.
     """
     described = json.loads(files("ppafo.page").joinpath("intervals.json").read_text(encoding="utf-8"))
     return {path: (low, high) for path, (low, high) in described.items()}

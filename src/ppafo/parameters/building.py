@@ -54,7 +54,7 @@ _FLAT_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow")
 def build_device(parameter_set: ParameterSet, valve: str | None = None, links: Graph | None = None) -> Device:
     """Return the device with one of the set's valves (default: the set's own choice), in SI units.
 
-    ``links`` are those of the set unless given.
+    ``links`` are the set's unless given.
     """
     name = chosen_valve(parameter_set, valve)
     links = links_of_set(parameter_set) if links is None else links

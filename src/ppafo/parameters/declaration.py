@@ -82,7 +82,7 @@ def is_within(value: float, quantity: Quantity) -> bool:
 
 
 def actuator_quantities(kind: str) -> tuple[Quantity, ...]:
-    """Return what a set says of an actuator of a kind, beside its leak; that of the vane is ``ACTUATOR``."""
+    """Return what a set says of an actuator of a kind, beside its leak; the vane's is ``ACTUATOR``."""
     if kind == VANE.name:
         return ACTUATOR
     return (*ACTUATORS[kind].quantities, *(quantity for quantity in ACTUATOR if quantity.name not in _OF_A_VANE))

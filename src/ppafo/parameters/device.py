@@ -57,9 +57,9 @@ class Actuator:
     """An actuator between two stops; chamber 1 grows with the angle. Equations (2), (4), (5).
 
     torque_constant [m^3], volume_per_angle [m^3/rad], angle_min and angle_max [rad], dead_volume_1 and dead_volume_2
-    [m^3], restitution of the stops [-], leak between the chambers. ``kind`` is that of the catalogue; one that is no
-    vane has ``settings`` in SI, all of them present, one that was measured its ``table``, and the first two numbers are
-    then means over the range.
+    [m^3], restitution of the stops [-], leak between the chambers. ``kind`` is its name in the catalogue; one that is
+    no vane has ``settings`` in SI, all of them present, one that was measured its ``table``, and the first two numbers
+    are then means over the range.
     """
 
     torque_constant: float

@@ -65,7 +65,7 @@ class Follows:
 
     @property
     def is_same(self) -> bool:
-        """Whether the number is that of its source."""
+        """Whether the number is its source's."""
         return not self.gap and [term.function for term in self.terms] == [itself]
 
     def number(self, present: Callable[[str], Any]) -> Any:
@@ -124,7 +124,7 @@ def resolved(graph: Graph, given: Mapping[str, Any], present: Callable[[str], An
 
 
 def left(graph: Graph, given: Collection[str]) -> dict[str, tuple[Follows, ...]]:
-    """Return the links that remain once numbers are given: those of what is given go, as do those that it replaces."""
+    """Return the links that remain once numbers are given: links of what is given go, as do links that it replaces."""
     changed = acting(graph, given)
     return {
         path: (changed[path],) if path in changed and changed[path].when_set else links
@@ -147,7 +147,7 @@ def _holds(path: str, link: Follows, present: Callable[[str], Any]) -> bool:
 
 
 def joined(parts: Iterable[Graph]) -> dict[str, tuple[Follows, ...]]:
-    """Return several graphs as one; those of sources come first."""
+    """Return several graphs as one; links of sources come first."""
     found: dict[str, tuple[Follows, ...]] = {}
     for part in parts:
         found |= part

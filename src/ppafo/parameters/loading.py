@@ -203,7 +203,7 @@ def parse_parameter_set(content: bytes, file: str, folder: Path | None = None) -
 
 
 def _find_valves(document: dict[str, Any]) -> None:
-    """Load the kinds of valves that a set names, those of other packages too."""
+    """Load the kinds of valves that a set names, other packages' too."""
     valves = document.get("valves")
     for valve in valves.values() if isinstance(valves, dict) else ():
         kind = valve.get("kind") if isinstance(valve, dict) else None

@@ -73,7 +73,7 @@ def over(
 ) -> tuple[str, ...]:
     """Return two layers as one set: what the later one gives replaces the value, and another form, of the earlier.
 
-    The other arguments are those of ``override_set``.
+    The other arguments as in ``override_set``.
     """
     first, second = tuple(earlier), tuple(later)
     old, new = (override_set(layer, error, same, valve, forms) for layer in (first, second))

@@ -168,7 +168,7 @@ def links_of_set(
     """Return how pressures of a set follow others: gauge ones the atmosphere, the second regulator the first.
 
     It does where the set has one pressure for both, unless it was ``given`` by an override and the first was not. With
-    an ``atmosphere`` [Pa absolute] it is that at which they are compared, else that of the set.
+    an ``atmosphere`` [Pa absolute] they are compared at it, else at the set's.
     """
     numbers = parameter_set.numbers
     found = {

@@ -126,7 +126,7 @@ SEEN_BY_EFFECTS = ("gas", "actuator", "friction", "foot_plate", "supply")
 
 
 Sections = Mapping[str, Any]
-"""Objects whose attributes are settings of effects beside those of the device, by section of files."""
+"""Objects whose attributes are settings of effects beside the device's, by section of files."""
 _NO_SECTIONS: Sections = {}
 
 
@@ -144,7 +144,7 @@ def all_settings(device: Device) -> dict[str, dict[str, Any]]:
 
 
 def effects_of(device: Device, others: Sections = _NO_SECTIONS) -> tuple[Effect, ...]:
-    """Return the effects that are on, in the order in which they act; of columns those of the first run."""
+    """Return the effects that are on, in the order in which they act; of columns the first run's."""
     return tuple(
         effect
         for effect in _effects(device)

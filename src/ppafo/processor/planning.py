@@ -58,7 +58,7 @@ class Numbers:
 def on_chip(
     floats: ControllerKind, parameters: type, initial: Any, update: Callable[..., Any], plan: Numbers
 ) -> ControllerKind:
-    """The integer form of a law as a controller of the catalogue: its settings, and those of the converter."""
+    """The integer form of a law as a controller of the catalogue: its settings, and the converter's."""
     return replace(
         floats,
         name=plan.name,

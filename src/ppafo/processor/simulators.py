@@ -95,12 +95,12 @@ class ChipSimulator(Protocol):
 class Target:
     """A processor that firmware is written for.
 
-    ``processor`` and ``board`` say what it is, ``clock`` is that of the processor [Hz], ``interrupt_stack`` what an
-    interrupt of the board puts on the stack [bytes], ``converter_bits`` those of its converter. ``words`` fill the
+    ``processor`` and ``board`` say what it is, ``clock`` is the processor's [Hz], ``interrupt_stack`` what an
+    interrupt of the board puts on the stack [bytes], ``converter_bits`` the bits of its converter. ``words`` fill the
     templates: how it is compiled, linked and written, which pins it has. ``templates`` are the files that belong to
     this target alone, ``wiring`` is the one with the part of README.md that says what is wired to it.
 
-    ``tools`` are the programs that building and simulating need, ``packages`` those of Debian that have them.
+    ``tools`` are the programs that building and simulating need, ``packages`` Debian's packages that have them.
     ``simulator`` starts one with an image, ``machine`` is what QEMU has to know, ``counted`` what is counted of a
     sample: cycles or instructions.
     """
@@ -370,7 +370,7 @@ _THUMB, _LENGTH_OF_NOP = 1, 2
 
 @final
 class Debugger:
-    """A machine of QEMU that stands still but when it is told to go on; addresses are those of its processor."""
+    """A machine of QEMU that stands still but when it is told to go on; addresses are its processor's."""
 
     def __init__(self, machine: str, image: Image) -> None:
         time = f"shift={_SHIFT},sleep=off"

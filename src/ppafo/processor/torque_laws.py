@@ -155,7 +155,7 @@ def dead_zone_update(
 
 
 def prepare_on_off(settings: Mapping[str, float], period: float, torque_step: float) -> tuple[float, ...]:
-    """The law has no numbers but those of the converter."""
+    """The law has no numbers but the converter's."""
     return ()
 
 

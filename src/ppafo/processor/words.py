@@ -26,7 +26,7 @@ SAMPLES_OF_TABLE = 1000
 
 @dataclass(frozen=True, slots=True)
 class Tried:
-    """Text, document, whether every decision is that of the integer controller, and what draws it where it is drawn."""
+    """Text, document, whether every decision is the integer controller's, and what draws it where it is drawn."""
 
     text: str
     document: dict[str, Any]

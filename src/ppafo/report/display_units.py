@@ -55,7 +55,7 @@ _OF_UNIT |= {"Pa": "pressure", "kg": "mass"}
 def quantity_of_unit(si_unit: str) -> str:
     """Return the kind of quantity that has a unit in SI, empty for a plain number or a unit that is shown as it is.
 
-    ``kg`` is a mass and ``s`` a time; those of gas and parts, shown in grams, and what lasts minutes have to be named.
+    ``kg`` is a mass and ``s`` a time; masses of gas and parts, shown in grams, and what lasts minutes have to be named.
     """
     return _OF_UNIT.get(si_unit, "")
 
@@ -111,7 +111,7 @@ def quantity_text(value: float, quantity: str, form: str = ".3g") -> str:
 
 
 _OF_GAS = {"kg": "gas mass", "kg/J": "gas mass per energy"}
-"""Masses among the metrics are those of gas."""
+"""Masses among the metrics are masses of gas."""
 
 
 def metric_quantity(name: str) -> str:

@@ -76,7 +76,7 @@ class Part:
     """A part of a finding: what is said, a table, remarks below it, a figure, a text to copy.
 
     A table whose columns have no title is a list of facts; its first ``left`` columns are names, set to the left, and
-    ``marked`` are the numbers of its rows that stand out. ``name`` is that of the files of the figure: of ``panels``,
+    ``marked`` are the numbers of its rows that stand out. ``name`` is the stem of the figure's files: of ``panels``,
     ``across`` of them side by side, each of a ``size`` [inches], or of what ``draw`` returns, which may be the bytes of
     an animation (GIF). ``panels`` may be a function, called where the figure is wanted. A part that ``is_detail`` is on
     the page only.

@@ -36,7 +36,7 @@ class Panel:
 
     ``scale`` is what the colours of a map or of points stand for; panels that follow each other with one scale share
     its bar. ``legend`` is "above", "inside", "figure" (above all panels) or empty. ``then`` has the last word on the
-    axes. ``tall`` is its height over that of others. Two below each other that ``shares_x`` have one horizontal axis,
+    axes. ``tall`` is its height over the others'. Two below each other that ``shares_x`` have one horizontal axis,
     and say above them what the vertical one is. Where one has no marks, its place stays empty.
     """
 

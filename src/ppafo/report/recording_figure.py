@@ -169,7 +169,7 @@ def draw_stored_result(stored: StoredResult) -> "Figure":
 def draw_stored_walk(file: Path, document: Mapping[str, Any], recording: Recording) -> "Figure":
     """Return the figure of the last seconds of a saved walk, with the fall or failure that ended it.
 
-    ``document`` is that of ``file``, empty where there is none; DataError names the key that is of another form.
+    ``document`` is what ``file`` holds, empty where there is none; DataError names the key that is of another form.
     """
     end = float(recording.time[-1])
     part = f"the last {_END_OF_WALK:g} s of {end:.4g} s" if recording.duration > _END_OF_WALK else ""

@@ -187,7 +187,7 @@ def chamber_nodes(plant: PlantParameters, rig: RigPhysics, state: RigState, angl
 
 
 def observables(given: RigNumbers, state: RigState, angle: float, added_torque: float) -> Observables:
-    """What a bench could observe at an angle [rad]; ``added_torque`` [N m] is that of a leg."""
+    """What a bench could observe at an angle [rad]; ``added_torque`` [N m] comes from a leg."""
     plant, rig = given.plant, given.rig
     node_1, node_2 = chamber_nodes(plant, rig, state, angle)
     torque = driving_torque(plant, angle, node_1.pressure, node_2.pressure) + added_torque
@@ -253,7 +253,7 @@ def rig_rates(
 ) -> RigState:
     """Time derivatives of all unknowns [SI]; the vane slides towards ``direction`` (0: it is held or prescribed).
 
-    ``added_torque`` [N m] is that of a leg. Equations (1), (10): friction in motion is dynamic, and more near
+    ``added_torque`` [N m] comes from a leg. Equations (1), (10): friction in motion is dynamic, and more near
     standstill (Stribeck).
     """
     plant, rig, speed = given.plant, given.rig, state.angular_velocity

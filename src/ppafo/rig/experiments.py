@@ -139,7 +139,7 @@ COMMAND_STEPS = 100
 READING_INTERVAL = 2.0
 REPETITIONS = 2
 SMALL_METER = 0.1
-"""Range of the flow meter for the leak as a fraction [-] of that of the other."""
+"""Range of the flow meter for the leak as a fraction [-] of the other's."""
 
 
 def record_open_valve(request: Request) -> Outcome:
@@ -500,7 +500,7 @@ def check_rig_folder(folder: Path, experiment: str) -> None:
 
 
 def write_rig_recording(folder: Path, made: RigRecording) -> tuple[str, ...]:
-    """Write recording and truth into a folder beside those of other experiments; returns the file names.
+    """Write recording and truth into a folder beside other experiments'; returns the file names.
 
     DataError for a folder that belongs to something else.
     """

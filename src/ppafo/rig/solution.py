@@ -88,7 +88,7 @@ of a leg on it [N m]."""
 def rig_source() -> str:
     """Return the module of ``fill(y, slopes, parameters, inputs, direction)`` and of ``show`` with ``outputs``.
 
-    ``y`` and ``slopes`` are those of the unknowns of ``RigState``.
+    ``y`` and ``slopes`` belong to the unknowns of ``RigState``.
     """
     collector = SourceCollector(INLINE)
     add = collector.add
@@ -116,7 +116,7 @@ _ENERGY_TOLERANCE, _VALVE_TOLERANCE = 1e-8, 1e-10
 
 
 def absolute_tolerances(valve_unknowns: int) -> Floats:
-    """Return the absolute tolerances of all unknowns [SI], those of the valve last."""
+    """Return the absolute tolerances of all unknowns [SI], the valve's last."""
     found = []
     # Below a millionth of usual values: of a chamber 1e-4 kg and 10 J, of a supply 1e5 Pa.
     for name in RigState._fields:
@@ -225,7 +225,7 @@ class _Rig:
         given, run, controller = self.rig_run, self.run, self.run.program.controller
         if controller is None:
             raise SimulationError("the simulated test bench runs controllers of the catalogue only")
-        # The noise is that of the last recorded sample.
+        # The noise is the last recorded sample's.
         index = max(0, int(np.searchsorted(given.sample_times, self.time + SAME_TIME, side="right")) - 1)
         pressures = self.observe(self.time, self.y)[:2]
         signals = sensor_signals(given.physics, self.prescribe_angle(self.y, self.time), pressures)

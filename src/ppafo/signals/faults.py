@@ -21,9 +21,9 @@ MINIMUM_SAMPLES = 10
 _SPREAD_OF_MEDIAN = 1.4826
 _KEPT = 3.0
 _SHARE_OF_KEPT = 0.98658
-"""Standard deviation of a normal distribution cut at 3 standard deviations, over that of the whole."""
+"""Standard deviation of a normal distribution cut at 3 standard deviations, over the whole's."""
 _GAIN_OF_DIFFERENCES = math.sqrt(20.0)
-"""Standard deviation of the third difference of white noise over that of the noise."""
+"""Standard deviation of the third difference of white noise over the noise's."""
 _NOISY_FRACTION = 0.2
 _ABRUPT_FRACTION = 0.3
 _BEFORE = 5
@@ -89,7 +89,7 @@ def longest_run(flags: NDArray[np.bool_]) -> tuple[int, int]:
 
 
 def is_at_limit(values: Floats, plateau: Plateau) -> bool:
-    """Return whether a plateau is that of a sensor at its limit: noise stops there, or the signal runs into it.
+    """Return whether a plateau comes from a sensor at its limit: noise stops there, or the signal runs into it.
 
     A signal that comes to rest by itself has noise there too, or slows down before.
     """

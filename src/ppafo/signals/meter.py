@@ -57,7 +57,7 @@ class WearerSample(NamedTuple):
 
 
 class Sample(NamedTuple):
-    """One sample of a recording: its number from 0, channels in SI units, and those of a foot and of a stride.
+    """One sample of a recording: its number from 0, channels in SI units, and the channels of a foot and of a stride.
 
     What a run does not have is 0: reference, temperatures of gas without an energy balance, ``foot`` but on the shank
     of a gait, ``stride`` but in a walk. In a walk ``reference`` is the torque that the controller requests.

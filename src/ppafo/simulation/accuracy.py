@@ -13,14 +13,14 @@ SHORTER = 4
 MARGIN = 1.5
 """Estimated error over the change: it is then above the error in 99 % of drawn runs (docs/evidence.md)."""
 LARGEST_OF_ANGLE, LARGEST_OF_PRESSURE = 2.0e-4, 1.0e-3
-"""Errors over the range of the angle and over that of the pressures that a run keeps to unless it is sensitive."""
+"""Errors over the ranges of angle and pressures that a run keeps to unless it is sensitive."""
 
 
 @dataclass(frozen=True, slots=True)
 class ErrorEstimate:
     """Estimated error of a run from its time stepping: largest over time of the angle [rad] and of a pressure [Pa].
 
-    ``metrics`` has that of each metric in its SI unit, inf where the finer run has no such number.
+    ``metrics`` has the error of each metric in its SI unit, inf where the finer run has no such number.
     """
 
     angle: float

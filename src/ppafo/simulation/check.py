@@ -1,7 +1,7 @@
 """Whether a run can be repeated: it runs again with less error, and with start and measurements moved a little.
 
 A loop with coarse sensors or repeated impacts may amplify a difference that is too small to measure into other results.
-Then its metrics are numerically sensitive: those of one run among many, and a check says so.
+Then its metrics are numerically sensitive: they hold for one run among many, and a check says so.
 """
 
 from collections.abc import Callable, Mapping
@@ -29,7 +29,7 @@ class NumberCheck:
     """A number in SI units and how much it changed in each repeat, by name; inf where a repeat has no such number.
 
     ``value`` is a metric, or the range of an angle or a pressure whose ``changes`` are the largest over time;
-    ``allowed`` is the largest change that counts as none, ``allowed_error`` that of the run with finer steps.
+    ``allowed`` is the largest change that counts as none, ``allowed_error`` the largest of the run with finer steps.
     """
 
     name: str

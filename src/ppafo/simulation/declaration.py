@@ -112,7 +112,7 @@ class Declared:
     check_motion: Callable[[object, str], None] = lambda _kind, _place: None
 
     def paths(self, document: Mapping[str, Any]) -> tuple[str, ...]:
-        """Return every path that an override can set, beside those of the device."""
+        """Return every path that an override can set, beside the paths of the device."""
         return (*self.texts(document), *self.quantities(document), *self.appended)
 
 
@@ -122,7 +122,7 @@ def controller_settings(kind: str) -> tuple[Quantity, ...]:
 
 
 def profile_settings(kind: str, prescribed: Quantity) -> tuple[Quantity, ...]:
-    """Return the settings of a profile; a level, which has no unit of its own, gets that of what is prescribed."""
+    """Return the settings of a profile; a level, which has no unit of its own, gets the unit of what is prescribed."""
     return tuple(_level(item, prescribed) for item in PROFILES[kind].quantities) if kind in PROFILES else ()
 
 
@@ -132,7 +132,7 @@ def gas_settings(kind: str) -> tuple[Quantity, ...]:
 
 
 def shank_settings(kind: str) -> tuple[Quantity, ...]:
-    """Return the settings of the shank of a leg: those of a profile, or where in its stride a gait begins."""
+    """Return the settings of the shank of a leg: a profile's, or where in its stride a gait begins."""
     return (GAIT_START,) if kind == GAIT_SHANK else profile_settings(kind, SHANK_LEVEL)
 
 
@@ -168,7 +168,7 @@ def texts(document: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def find_kinds(document: Mapping[str, Any], file: str) -> None:
-    """Load the kinds that a document names, where they are those of other packages; ``file`` is for the message.
+    """Load the kinds that a document names, where other packages have them; ``file`` is for the message.
 
     ScenarioError where one cannot be loaded or has an old name.
     """

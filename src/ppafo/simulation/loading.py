@@ -139,7 +139,7 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
 
 
 def read_hardware(reading: Reading, request: ScenarioRequest, overrides: tuple[str, ...]) -> Hardware:
-    """Return the parameter set with the overrides of the file and then those of the caller."""
+    """Return the parameter set with the overrides of the file and then the caller's."""
     section, in_file = reading.document["device"], request.content.get("device", {})
     valve = section.get("valve")
     try:
@@ -364,7 +364,7 @@ class Layout:
 
 
 VANE = Layout(FILE, OF_A_VANE, lambda _: scenario_file(), lambda _: whole_scenario_file(), build_scenario)
-"""Scenarios of a vane alone; a room above this one has those of a leg."""
+"""Scenarios of a vane alone; a room above this one has the scenarios of a leg."""
 
 
 def list_scenarios() -> tuple[str, ...]:

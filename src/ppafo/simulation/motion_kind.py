@@ -41,7 +41,7 @@ class MotionKind:
 
 
 WALK, REACT = "walk", "react"
-"""The motion of a leg that a gait leads, and that of a neuromuscular gait model."""
+"""The motion of a leg that a gait leads, and the motion of a neuromuscular gait model."""
 
 _GROUP = "ppafo.motions"
 WALKS: Kinds[MotionKind] = Kinds(_GROUP, "motion", MotionKind, declared_kinds(_GROUP))

@@ -102,7 +102,7 @@ def with_numbers(scenario: Scenario, numbers: Mapping[str, Any]) -> Scenario:
 
 
 def moving_together(scenario: Scenario, given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return numbers by path with all that follow them as in a file with these numbers; those of ``TIMES`` do not.
+    """Return numbers by path with all that follow them as in a file with these numbers; ``TIMES`` do not follow.
 
     What was changed since the scenario was loaded follows nothing any more.
     """
@@ -110,7 +110,7 @@ def moving_together(scenario: Scenario, given: Mapping[str, Any]) -> dict[str, A
 
 
 def links_that_hold(scenario: Scenario) -> Graph:
-    """Return the links of a scenario without those of numbers that were changed since it was loaded."""
+    """Return the links of a scenario without links of numbers that were changed since it was loaded."""
     return holding(scenario.graph, lambda path: _number(scenario, _place(path, scenario)))
 
 

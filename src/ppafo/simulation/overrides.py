@@ -1,7 +1,7 @@
 """Overrides of a scenario as a set: kinds first by depth, then numbers, so that their order means nothing.
 
 What is given beside a kind that has no use for it is an error that names both. A document, or the overrides of a file,
-is a layer under those of the caller: there another kind drops what only the kind before had.
+is a layer under the caller's: there another kind drops what only the kind before had.
 """
 
 import copy
@@ -131,7 +131,7 @@ def _sections(chosen: str) -> tuple[str, ...]:
 def _choose_kinds(
     document: dict[str, Any], given: Mapping[str, Given], file: str, declared: Declared
 ) -> tuple[str, ...]:
-    """Set the kinds that are given, those of outer sections first, and return the paths that remain.
+    """Set the kinds that are given, outer sections first, and return the paths that remain.
 
     A kind whose section is not there remains.
     """

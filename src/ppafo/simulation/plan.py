@@ -96,7 +96,7 @@ class Components:
 
     Without a ``path`` the vane is free; without a ``controller`` the caller sets the command. ``thermal`` and
     ``supply_lines`` None stand for gas that keeps its temperature and for constant supply pressures. ``sections`` hold
-    settings of effects beside those of the device, by section.
+    settings of effects beside the device's, by section.
     """
 
     device: Device

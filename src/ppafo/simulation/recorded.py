@@ -176,7 +176,7 @@ class Start:
 
 
 def samples_at_rest(recording: Recording) -> int:
-    """Return the samples before the first command, at most those of 50 ms; 1 where the valve is open from the start."""
+    """Return the samples before the first command, at most 50 ms of them; 1 where the valve is open from the start."""
     command, time = recording[COMMAND], recording.time
     if command[0] != 0.0:
         return 1
@@ -188,7 +188,7 @@ def value_at_rest(time: Floats, values: Floats, at_end: bool = False) -> float:
     """Return the value [SI] with which a stretch at rest begins, or ends: the mean of its samples if they do not move.
 
     A chamber that leaks does move while valve and vane rest. Where a straight line has a slope that is seen, the value
-    is that of the line; where that is seen to bend, the same of the half that is nearer.
+    is the line's; where the samples are seen to bend, the same of the half that is nearer.
     """
     while values.size >= _FEWEST_ON_LINE:
         away = (time - (time[-1] if at_end else time[0])) / (time[-1] - time[0])
@@ -260,7 +260,7 @@ def locked_vane(angle: float) -> PrescribedMotion:
 def with_fixed_volume(device: Device, volume: float) -> Device:
     """Return the device with a fixed volume [m^3] in the place of chamber 1, whatever the actuator: nothing leaks.
 
-    It is that of a vane at the lower stop.
+    The vane is at the lower stop.
     """
     leak = device.actuator.leak
     shut = replace(leak, area=0.0) if isinstance(leak, Orifice) else replace(leak, sonic_conductance=0.0)

@@ -45,7 +45,7 @@ class Leg:
     Mass of the foot [kg], from the ankle to its mass centre [m], inertia about that [kg m^2], length of the shank [m],
     from the ankle to the toes [m], which nothing but the height of the toes asks for.
     ``ankle_torque`` [N m] is T_2, positive in plantarflexion. ``shank`` is its angle in time [rad], upright at 0; with
-    the kind ``gait`` that of a ``gait`` by its ``curves``, whose knee moves too, from the phase ``start`` [strides] on.
+    the kind ``gait`` a ``gait``'s by its ``curves``, whose knee moves too, from the phase ``start`` [strides] on.
     Defaults are the paper's subject (after equation (12)), with the mass centre half way along a foot of 0.18 m.
     """
 
@@ -188,7 +188,7 @@ class SupplyLine:
     dorsiflexion: RegulatedLine
 
     def row(self, supply: Supply) -> SupplyLines:
-        """Return the lines as the engine has them, with regulators that relieve where those of a supply do."""
+        """Return the lines as the engine has them, with regulators that relieve where the supply's do."""
         first, second = self.plantarflexion, self.dorsiflexion
         return SupplyLines(
             droop_1=first.droop,
@@ -277,7 +277,7 @@ class Scenario:
 
     The reference is a torque [N m]. Without ``gas_model`` the gas keeps its temperature, without ``supply_line`` the
     supply pressures are constant, both as in the paper. ``links`` say which numbers follow others that are varied,
-    beside those of the device.
+    beside the device's.
     """
 
     name: str
@@ -312,12 +312,12 @@ class Scenario:
 
     @property
     def effect_sections(self) -> dict[str, Any]:
-        """Settings of effects beside those of the device, by section."""
+        """Settings of effects beside the device's, by section."""
         return {"sensors": self.sensors}
 
     @property
     def graph(self) -> Graph:
-        """All links, those of the device first."""
+        """All links, the device's first."""
         return {**self.device.links, **self.links}
 
     def controlled_by(self, controller: PythonController) -> "Scenario":

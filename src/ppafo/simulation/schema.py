@@ -53,7 +53,7 @@ def kind_field(kind: str, summary: str) -> dict[str, Any]:
 
 
 def model_name(name: str) -> str:
-    """Return a name as that of a model: ``ramp_hold`` as ``RampHold``."""
+    """Return the name of a model: ``ramp_hold`` as ``RampHold``."""
     return "".join(part.capitalize() for part in re.split(r"\W|_", name))
 
 
@@ -169,7 +169,7 @@ def _sensors() -> dict[str, Any]:
 
 
 def file_model(name: str, own: dict[str, Any]) -> type[BaseModel]:
-    """Return the model of a file of a scenario: the sections that every one has, and those of its kind of motion."""
+    """Return the model of a file of a scenario: the sections that every one has, and the ones of its kind of motion."""
     fields: dict[str, Any] = {
         "schema_version": (Literal[1], Field(description="version of this layout")),
         "name": (str, Field(pattern=NAME, max_length=_LONGEST_NAME)),

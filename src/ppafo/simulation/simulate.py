@@ -86,7 +86,7 @@ Measured = tuple[Recording, "Mapping[str, Metric]"]
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Result:
-    """A finished run. ``versions`` are those of the packages, ``engine`` the figures of the time stepping."""
+    """A finished run. ``versions`` are the packages', ``engine`` the figures of the time stepping."""
 
     scenario: Scenario
     recording: Recording
@@ -408,7 +408,7 @@ def compile_models(scenarios: Iterable[Scenario]) -> None:
 
 
 def _error(result: Result, fine: Result) -> ErrorEstimate:
-    """The estimated error of a result, from that of the same run with finer steps; inf where that diverged."""
+    """The estimated error of a result, from the same run with finer steps; inf where that diverged."""
     if not fine.status.is_completed:
         return ErrorEstimate(math.inf, math.inf, dict.fromkeys(result.metrics, math.inf))
     angle, pressure = (

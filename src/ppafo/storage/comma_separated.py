@@ -89,7 +89,7 @@ def _between(word: str, name: str) -> Between | None:
 
 
 def check_clock(time: Floats, lines: Sequence[int]) -> None:
-    """Refuse a clock [s] that goes backwards or stands still; ``lines`` are those of the rows in the file.
+    """Refuse a clock [s] that goes backwards or stands still; ``lines`` are the lines of the rows in the file.
 
     DataError names the line.
     """

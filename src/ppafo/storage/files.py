@@ -47,7 +47,7 @@ def write_file(path: str | Path, content: bytes) -> Path:
 
 
 def add_files(folder: Path, contents: Mapping[str, bytes]) -> None:
-    """Write files into a folder, replacing those of the same names: all of them aside first, then renamed."""
+    """Write files into a folder, replacing files of the same names: all of them aside first, then renamed."""
     with _write_errors(folder), _make_folder(folder):
         _check_no_folder(folder, contents)
         aside = _sibling(folder / "files", "writing")

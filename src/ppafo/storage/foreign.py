@@ -164,7 +164,7 @@ def read_foreign(
 class _Table:
     """The columns that a map asks for, as numbers by channel, and the line of each row in the file.
 
-    Row by row, so that of a large file no cell is kept as a text.
+    Row by row, so that no cell of a large file is kept as a text.
     """
 
     lines: "array[int]"

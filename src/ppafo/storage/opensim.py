@@ -42,8 +42,8 @@ _KINDS: tuple[RecordingKind, ...] = ("simulated", "synthetic")
 class OpenSimTable:
     """A table: time [s] and columns by label; ``in_degrees`` is None where the header does not say.
 
-    ``is_old`` tells a header of the older style, that of SIMM, whose angles are in degrees.
-    ``kind`` is that of a recording that nobody measured, where this package wrote it.
+    ``is_old`` tells a header of the older style, SIMM's, whose angles are in degrees.
+    ``kind`` is the kind of a recording that nobody measured, where this package wrote it.
     ``first_line`` is the line of the file in which the first row stands, ``remarks`` say what was mended.
     """
 
@@ -298,7 +298,7 @@ def read_trc(path: str | Path) -> MarkerTable:
         if unit not in _UNITS:
             shown = one_line(unit)[:_LONGEST_SHOWN]
             raise DataError(f"line 3: Units is {shown!r}; allowed are {', '.join(_UNITS)}")
-        # The names of the markers; the two names before them are those of frame and time.
+        # The names of the markers; the two names before them are frame and time.
         line = lines[3]
         cells = [cell.strip() for cell in line.split("\t")]
         if len(cells) < 3 or cells[1].lower() != "time":
@@ -320,7 +320,7 @@ def read_trc(path: str | Path) -> MarkerTable:
 
 
 def _marker_row(line: str, number: int, markers: int) -> list[float]:
-    """Return time and coordinates of a row; cells that are not there are those of markers that were not seen."""
+    """Return time and coordinates of a row; cells that are not there belong to markers that were not seen."""
     cells = [cell.strip() for cell in line.split("\t")] if "\t" in line else line.split()
     wanted = 2 + 3 * markers
     if len(cells) > wanted and any(cells[wanted:]):
@@ -360,7 +360,7 @@ def opensim_recording(
 ) -> tuple[Recording, tuple[str, ...]]:
     """Return a recording of a walk in OpenSim's names, zero and signs, and the channels that need ``body_mass`` [kg].
 
-    Moment and force per mass become those of the body; without a body mass they are left out and named. DataError for
+    Moment and force per mass become the body's; without a body mass they are left out and named. DataError for
     that of a neuromuscular gait model.
     """
     if "other_hip_angle" in recording.names:

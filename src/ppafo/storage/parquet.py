@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 _LEVEL = 1
 _MAXIMUM_VALUES = 200_000_000
-"""Values of a table that is read; those of a chunk with channels over time are some millions."""
+"""Values of a table that is read; a chunk with channels over time has some millions."""
 
 _FLOATING = ("double", "float")
 

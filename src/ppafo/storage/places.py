@@ -119,7 +119,7 @@ class DiskFolder:
         return shutil.disk_usage(there).free
 
     def tidy(self) -> None:
-        """Remove files that were being written when a process was killed: a younger one may be that of another."""
+        """Remove files that were being written when a process was killed: a younger one may belong to another."""
         latest = time.time() - _LONGEST_WRITING
         for path in self.folder.rglob(f"*{LEFT_ASIDE}*"):
             with contextlib.suppress(OSError):

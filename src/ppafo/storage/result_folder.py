@@ -47,7 +47,7 @@ MARK = "ppafo.json"
 _FORMAT = "ppafo files"
 _HASHES = "sha256"
 _RENAMED = {"endurance": "bottle"}
-"""Commands under their earlier names, whose folders are those of the new ones."""
+"""Commands under their earlier names, whose folders belong to the new ones."""
 NOTHING_KEPT: Mapping[str, bytes] = MappingProxyType({})
 
 
@@ -85,7 +85,7 @@ def marking_command(folder: Path) -> str:
 
 
 def add_to_folder(folder: Path, contents: Mapping[str, bytes]) -> None:
-    """Write files into a folder, replacing those of the same names; the mark of a command states them from then on."""
+    """Write files into a folder, replacing files of the same names; the mark of a command states them from then on."""
     marks = {}
     for name in (MARK, RUN_FILE):
         document = read_json(folder / name) if (folder / name).is_file() else None
@@ -186,7 +186,7 @@ def _listed(folder: Path) -> list[Path]:
 
 
 def _foreign(folder: Path, own: Collection[str], above: str = "") -> Iterator[str]:
-    """Names in a folder, with those of its own folders ``above``, that are none of the result's own files."""
+    """Names in a folder, with the names of its own folders ``above``, that are none of the result's own files."""
     for entry in _listed(folder):
         name = f"{above}{entry.name}"
         if entry.is_dir() and not entry.is_symlink() and any(file.startswith(f"{name}/") for file in own):
@@ -288,7 +288,7 @@ WALK_RECORDING = "recording.nc"
 
 
 def read_recording(path: str | Path, atmosphere: float = STANDARD_ATMOSPHERE) -> Recording:
-    """Return the recording in a ``.nc`` or ``.csv`` file, or in a result folder or that of a walk.
+    """Return the recording in a ``.nc`` or ``.csv`` file, or in a result folder, of a walk too.
 
     Gauge pressure in a CSV file counts from ``atmosphere`` [Pa absolute]. DataError for a file that is not usable.
     """

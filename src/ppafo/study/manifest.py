@@ -189,7 +189,7 @@ class _StoredStudy(_Named):
 
 
 class _Stored(BaseModel):
-    """What everybody may rely on in the document; how it differs from that of a study is said elsewhere."""
+    """What everybody may rely on in the document; how it differs from a study's is said elsewhere."""
 
     study: _StoredStudy
     runs: Annotated[int, Field(ge=1)]

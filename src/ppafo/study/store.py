@@ -73,7 +73,7 @@ class Store:
 
     @classmethod
     def claim(cls, study: Study, place: Place, agreed: bool, threads: int | None) -> "Store":
-        """Make a place that of a study, or refuse it: of another study, of an earlier version, without room."""
+        """Give a place to a study, or refuse it: of another study, of an earlier version, without room."""
         names = place.names()
         if MANIFEST in names:
             check_same_study(place, read_manifest(place), manifest(study))

@@ -36,7 +36,7 @@ from ppafo.validation.replay import Replay, Replayed, replay_together, replayed_
 Flags = NDArray[np.bool_]
 
 ONLY_NOISE = 2.0
-"""Mean square left over that of the noise up to which nothing but noise is left: noise that is not white has more."""
+"""Mean square left over the noise's up to which nothing but noise is left: noise that is not white has more."""
 
 _TOGETHER = 32
 _STEPS = 2
@@ -44,7 +44,7 @@ _DIFFERENCE = 0.02
 """Fraction of the distance between two sizes of a grid over which a derivative is taken."""
 
 _FEWEST_CLIPPED, _OUTLIER, _OVER_STEPS = 5, 6.0, 3.0
-"""Clipped samples over those of any other value; an outlier over the noise, and over the range of its neighbours."""
+"""Clipped samples over samples of any other value; an outlier over the noise, and over the range of its neighbours."""
 
 _AT_REST = 2.0
 """Standard deviation of the angle over its noise, below which a vane may be locked."""
@@ -59,7 +59,7 @@ _STARTS = (-0.05, 0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.05)
 class Cause:
     """One cause: its name, what it seems to be in words, and by how much G [-] it explains more than none.
 
-    ``left`` is the largest error over noise [-] of any channel with it. ``numbers`` are those of the set that it
+    ``left`` is the largest error over noise [-] of any channel with it. ``numbers`` are the numbers of the set that it
     changes, by path, each with its SI unit. ``same`` are those that the recordings cannot tell from it, ``is_usual``
     says that any bench has as much.
     """

@@ -90,7 +90,7 @@ class Limit:
 
 @dataclass(frozen=True, slots=True)
 class Thresholds:
-    """The limit of every channel that has one of its own, and that of the others; None where none was given."""
+    """The limit of every channel that has one of its own, and the others' limit; None where none was given."""
 
     others: Limit | None
     channels: Mapping[str, Limit]

@@ -79,7 +79,7 @@ def replay_recording(wanted: Replay) -> Replayed:
 
 
 def replay_together(wanted: Sequence[Replay]) -> list[Replayed | PpafoError]:
-    """Return many replays, or why one cannot be made; those of one program, clock and inputs are one batch."""
+    """Return many replays, or why one cannot be made; all of one program, clock and inputs are one batch."""
     found: dict[int, Replayed | PpafoError] = {}
     planned: dict[int, tuple[Run, StepInputs, Batch]] = {}
     groups: dict[tuple[Any, ...], list[int]] = {}
@@ -217,7 +217,7 @@ def initial_in_fixed_volume(device: Device, given: Mapping[str, float]) -> dict[
 
 
 def start_of(measured: Measured, device: Device, given: Mapping[str, float]) -> Start:
-    """Return where the replay of a recording starts; ``given`` values [SI] go before those of the recording."""
+    """Return where the replay of a recording starts; ``given`` values [SI] go before the recording's."""
     count = samples_at_rest(measured.recording)
     values = {name: given[name] if name in given else _first(measured, name, count) for name in _UNITS}
     rate = _first(measured, "angular_velocity", count) if measured.has("angular_velocity") else 0.0

@@ -550,7 +550,7 @@ def _divergence(states: Floats, failure: int, state: SupplyState, time: float) -
 class _Lanes:
     """The lanes as their supply sees them: rows that follow it, and the numbers with gas of the ``start`` [K].
 
-    ``effects`` are those of the ``device`` that are on, whose rows may be of the temperature of its gas.
+    ``effects`` are the effects of the ``device`` that are on, whose rows may be of the temperature of its gas.
     """
 
     rows: list[int]

@@ -21,7 +21,7 @@ from ppafo.walking.planning import law_of, walking_valve
 _NEWTON, _RADIAN, _SECOND, _METRE, _PASCAL = "N", "rad", "s", "m", "Pa_a"
 
 COMPRESSION = 1.6
-"""Highest pressure in a chamber over that of the supply, with room: up to 1.38 in the shipped walks."""
+"""Highest pressure in a chamber over the supply pressure, with room: up to 1.38 in the shipped walks."""
 
 
 class Contradiction(NamedTuple):

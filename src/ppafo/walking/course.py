@@ -315,7 +315,7 @@ def plan_course(
 ) -> PlannedCourse:
     """The course of a wearer with these strides per second [Hz], or of many; ``strike_angle`` [rad] over flat.
 
-    A speed or cadence is relative to that of the gait: people of a population walk each at their own. ScenarioError for
+    A speed or cadence is relative to the gait's: people of a population walk each at their own. ScenarioError for
     a segment that the gait does not allow, or more parts than there are.
     """
     resting = course.segments[0].kind == "rest"

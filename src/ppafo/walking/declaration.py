@@ -81,7 +81,7 @@ READINGS = {
     "pressure_2": Quantity("reading", "Pa_a", "its reading from then on", 0.0, -1.0e9, 1.0e9),
 }
 _SLOPES = {"N": ("N", "N/s"), "rad": ("rad", "rad/s"), "Pa_a": ("Pa_d", "Pa/s")}
-"""Unit of a sensor to those of an offset and of a drift."""
+"""Units of offset and drift by the unit of a sensor."""
 
 PERIOD_OF_FAULT = Quantity(
     "period", "s", "the fault is there in the first half of each such period; always with 0", 0.0, 0.0, 1.0e6

@@ -141,7 +141,7 @@ class SafetyEvent:
     """Less help, a pause, a stop or a return of help at a time [s] of the recording.
 
     ``readings`` are what the sensors showed then and ``settings`` what they were compared with, by name, in SI units;
-    empty where help came back. ``units`` are those of the settings. Gauge pressures count from ``atmosphere`` [Pa
+    empty where help came back. ``units`` are the units of the settings. Gauge pressures count from ``atmosphere`` [Pa
     absolute].
     """
 

@@ -54,7 +54,7 @@ ROLL_ANGLES = tuple(math.radians(degrees) for degrees in range(2, 16))
 
 
 LONGER_THAN_A_FOOT = 1.0e3
-"""Lever [m] where nothing was measured: that of the heel bounds it."""
+"""Lever [m] where nothing was measured: the lever of the heel bounds it."""
 
 
 def gait_series(gait: Gait) -> GaitSeries:
@@ -77,7 +77,7 @@ def truncate(curve: Curve) -> Curve:
 def landing_phase(gait: Gait) -> float:
     """Phase [strides] at which the measured foot has come down: the first time within ``NEARLY_FLAT`` of flat.
 
-    The last degrees are those of heel pad and shoe, which the foot of the engine has not: it is flat at once.
+    The last degrees come from heel pad and shoe, which the foot of the engine has not: it is flat at once.
     """
     phases = np.linspace(0.0, FLAT_FROM, 151)
     down = foot_angles(gait, phases) < gait_timing(gait).ground_angle + NEARLY_FLAT

@@ -14,8 +14,8 @@ from ppafo.simulation.motion_kind import WALK, WALKS
 class WalkKind:
     """A kind of walk: a leg that a gait leads, or a body that walks by itself.
 
-    ``summary`` is for the layout of its files, ``label(motion)`` for messages. ``numbers`` and ``texts`` are those of
-    ``[wearer]`` with their meaning, ``step`` is the largest step, ``interval(seconds)`` the time [s] between two
+    ``summary`` is for the layout of its files, ``label(motion)`` for messages. ``numbers`` and ``texts`` of
+    ``[wearer]`` have their meaning, ``step`` is the largest step, ``interval(seconds)`` the time [s] between two
     samples of the record of a walk of this length [s]. ``read(reading, folder, instead, course)`` gives the attributes
     of ``WalkMotion`` that say who walks, after ``check_course``; ``links`` how the wearer's numbers follow others,
     ``duration(motion)`` how long a course takes unless given [s], None where the motion does not say.

@@ -102,7 +102,7 @@ def load_walk(
     """Return a scenario that is a walk by its name in the package or by the path of a TOML file, in SI units.
 
     ``overrides`` are texts such as ``controller.peak_torque=6 N m`` or ``valve.area=12.6mm^2``; ``gait``,
-    ``course`` and ``bottle`` replace those of the file. A gait that is named, by the file or by ``gait``, brings its
+    ``course`` and ``bottle`` replace the file's. A gait that is named, by the file or by ``gait``, brings its
     subject as the default wearer; ``parameter_set`` takes the place of the set that is named. ScenarioError,
     ParameterError or DataError for anything that cannot be used.
     """
@@ -246,7 +246,7 @@ def _absolute(name: str) -> str:
 
 
 def _duration(reading: Reading, scenario: Scenario) -> float:
-    """Return the length of a walk [s]: that of its file, else of its course, else a minute, or ten on a bottle."""
+    """Return the length of a walk [s]: its file's, else its course's, else a minute, or ten on a bottle."""
     motion = walk_of(scenario)
     of_course = motion.who.duration(motion)
     if value_at(reading.document, "run.duration") is not None:
@@ -305,7 +305,7 @@ def _control(
     sensors: SensorSettings,
     links: Graph,
 ) -> Control:
-    """Return the controller with its settings and those of its timing."""
+    """Return the controller with its settings and its timing's."""
     settings = _settings(reading, law, device, lines, sensors, links)
     return Control(law.name, settings, _period(reading))
 

@@ -146,7 +146,7 @@ PLACES: Mapping[str, tuple[str, ...]] = {
 
 
 def numbers_of_scenario(scenario: Scenario) -> dict[str, Quantity]:
-    """The declaration of every number of a walk beside those of its device, by path."""
+    """The declaration of every number of a walk beside its device's, by path."""
     motion, control = walk_of(scenario), scenario.controller
     own = controller_settings(control.kind)
     known = quantities(motion.who, control.kind, motion.timing)

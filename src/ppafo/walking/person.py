@@ -130,7 +130,7 @@ def _events(shank: SeriesOfMany, ankle: SeriesOfMany, stance_share: Floats) -> d
 class Person(NamedTuple):
     """Who walks: body mass and stature over the wearer's, strides, and angle [rad] of the foot over flat at its strike.
 
-    ``thresholds`` is a factor on the thresholds of the force sensors, ``start`` is added to that of the push-off.
+    ``thresholds`` is a factor on the thresholds of the force sensors, ``start`` is added to the start of the push-off.
     """
 
     mass: float
@@ -229,7 +229,7 @@ def settings_of_person(settings: dict[str, Any], person: Person) -> dict[str, An
 
 
 def as_drawn(gait: Gait, wearer: Wearer, number: float) -> tuple[Gait, Wearer]:
-    """Gait and wearer of the person with a number, for results: what is healthy is that of this person."""
+    """Gait and wearer of the person with a number, for results: healthy curves belong to this person."""
     if number == 0.0:
         return gait, wearer
     build, gaits, _ = _drawn(gait, number)

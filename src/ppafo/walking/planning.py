@@ -118,7 +118,7 @@ def components_of_walk(scenario: Scenario, device: Device, sensors: GaitSensors)
 
 
 def batch_of_many(scenario: Scenario, build: Build, gaits: VariedGaits, generator: np.random.Generator) -> Batch:
-    """The walks of many wearers, the first of whom is that of the scenario; nothing is recorded on the way."""
+    """The walks of many wearers, the first of whom is the scenario's; nothing is recorded on the way."""
     run, _ = plan_walks(crowd_of(scenario, build, gaits, generator))
     return unrecorded(run, build.mass.size)
 

@@ -142,7 +142,7 @@ def standing_on(
 ) -> GaitNow:
     """Shank vertical, foot flat, both at rest: where a course begins, at a phase [turns] and a load [body weights].
 
-    Sine and cosine are those of the flat foot's angle [rad]. Numbers may be arrays (wearers,).
+    Sine and cosine belong to the flat foot's angle [rad]. Numbers may be arrays (wearers,).
     """
     upright = 0.0 * ground_angle
     return GaitNow(

@@ -111,7 +111,7 @@ def _course_channels(
 ) -> dict[str, tuple[Any, str]]:
     """What a course has beside a walk of equal strides, and the toes over ground that may rise: stairs lift the ankle.
 
-    The healthy toes are as high as those of the gait, times the stride over the recorded one.
+    The healthy toes are as high as the gait's, times the stride over the recorded one.
     """
     course = led_leg(run).course
     assert course is not None, "of a course"
@@ -169,10 +169,10 @@ WALK_FORMAT, REACTING_WALK_FORMAT = "ppafo walk", "ppafo walk of a wearer who re
 class WalkResult:
     """A finished walk: recording, numbers of each stride (strides,), curves over the stride, and numbers of the whole.
 
-    ``averages`` and ``metrics`` are those of the strides with help, without the first ones, in which the controller
-    learns; ``vented_metrics`` those of the strides with less help (lifted only, paused or stopped), {} without such.
+    ``averages`` and ``metrics`` are over the strides with help, without the first ones, in which the controller
+    learns; ``vented_metrics`` over the strides with less help (lifted only, paused or stopped), {} without such.
     ``starts`` are the samples of the recording right after each heel strike, ``helped`` is True for each stride with
-    help throughout, and ``events`` are the pauses, the stop and the returns of help. ``segments`` are those of a
+    help throughout, and ``events`` are the pauses, the stop and the returns of help. ``segments`` are the segments of a
     course, none without one; means are then over its strides at an even speed on level ground.
     ``supply`` is the bottle over the walk, None where the device hangs on none.
     """

@@ -98,7 +98,7 @@ def walk_metrics(
     """Metrics of a walk by name, in SI, of its strides with help.
 
     ``starts`` are the samples after each heel strike, ``helped`` tells which strides had help and ``counted`` which of
-    all are for means. ``averages`` are those of the counted strides with help.
+    all are for means. ``averages`` are over the counted strides with help.
     """
     found = stride_metrics(configuration, strides, averages, helped & counted)
     found |= counts_of_strides(recording, helped)
@@ -211,7 +211,7 @@ def healthy_toe_height(configuration: Scenario) -> Floats:
 class SegmentResult:
     """One segment of a course, from ``start`` to ``end`` [s], SI units.
 
-    ``strides`` begin in it with a strike, ``helped`` are those of them in which the controller was not in its safe
+    ``strides`` begin in it with a strike, ``helped`` are the ones in which the controller was not in its safe
     state up to the next strike, or to the end. ``gas`` [kg], ``net_push_off_work`` [J] of the strides that begin in it,
     ``lowest_toes`` [m] over the ground in the middle of its swings, None without one. ``flat_push`` [N m] is the
     largest torque in plantarflexion with a loaded heel, ``safe_time`` [s] when the controller first helped less (lifted

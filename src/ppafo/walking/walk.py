@@ -326,7 +326,7 @@ def walk_population(
     seed: int = 1,
     progress: Progress = silent,
 ) -> Population:
-    """Let many wearers walk for ``minutes`` [min], or all of a course; the first is that of the configuration.
+    """Let many wearers walk for ``minutes`` [min], or all of a course; the first is the configuration's.
 
     ``progress`` gets the number of wearers that have walked and the number of all. ScenarioError for bad input.
     """

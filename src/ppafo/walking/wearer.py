@@ -150,7 +150,7 @@ def paper_subject() -> Wearer:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Build:
-    """Body mass and stature of many people over those of one, each (people,)."""
+    """Body mass and stature of many people over one person's, each (people,)."""
 
     mass: Floats
     stature: Floats
@@ -299,7 +299,7 @@ def _subject(gait: Gait) -> Wearer:
 
 
 def _of_stature(wearer: Wearer, gait: Gait, origin: str) -> str:
-    """Return the stature in words where it is not that of the subject who is named, and where nobody was measured."""
+    """Return the stature in words where it is not the named subject's, and where nobody was measured."""
     own = gait.stature if origin.startswith("the subject of") else None
     if abs(wearer.stature - (own or paper_subject().stature)) <= _SAME * wearer.stature:
         return ""
@@ -312,7 +312,7 @@ def _of_stature(wearer: Wearer, gait: Gait, origin: str) -> str:
 
 
 SCALED_MASS = (0.6, 1.7)
-"""Body masses, in those of the gait's subject, over which moment and force are scaled without a remark.
+"""Body masses, as multiples of the gait's subject, over which moment and force are scaled without a remark.
 
 About the 2nd to the 98th percentile of adults seen from a subject in their middle: 45 to 120 kg from 72 kg. Children
 walk otherwise, and not only with less mass.

@@ -149,7 +149,7 @@ def reacting_finding(comparison: Comparison) -> Finding[ReactingPair]:
 
 @dataclass(frozen=True, slots=True)
 class Likeness:
-    """How alike a curve of the wearer is to that of a gait: r, RMS difference [unit of the curve], and r after a delay.
+    """How alike a curve of the wearer is to a gait's: r, RMS difference [unit of the curve], and r after a delay.
 
     ``delay`` [strides] of the wearer is that at which r is largest, ``delayed_r``.
     """
@@ -206,7 +206,7 @@ def _likeness_part(comparison: Comparison) -> tuple[Part, ...]:
 
 
 def weak_remarks(wearer: ReactingWearer) -> list[str]:
-    """Return a line on the muscles that are weaker or stronger than those of the wearer's file."""
+    """Return a line on the muscles that are weaker or stronger than in the wearer's file."""
     changed = [
         f"{name.removesuffix('_strength')} {100.0 * value:.3g} %"
         for name, value in wearer.settings.items()

@@ -177,7 +177,7 @@ def _leg(document: Mapping[str, Any], side: str) -> dict[str, Any]:
 
 
 def _base(document: dict[str, Any], file: str, folder: Path) -> dict[str, Any]:
-    """The document that has the gains: this one, or that of the wearer on whom it is based."""
+    """The document that has the gains: this one, or the document of the wearer on whom it is based."""
     given = [key for key in ("gains", "found", "based_on") if key in document]
     if given == ["gains", "found"]:
         return document

@@ -1,7 +1,7 @@
 """A neuromuscular gait model in the file of a walk: whose reflexes, strength of each muscle, speed at the start.
 
-The device is on the left leg. A strength is that of a muscle of the left leg over the one that
-the wearer's file gives it; the body, the right leg and all gains are those of the file.
+The device is on the left leg. A strength is a muscle's of the left leg over the one that
+the wearer's file gives it; the body, the right leg and all gains are the file's.
 """
 
 from collections.abc import Mapping
@@ -88,7 +88,7 @@ FIRST_STRIDE = 1.0
 class ReactingWearer:
     """A neuromuscular gait model: its file, the body with muscles and gains that this gives, and its numbers by name.
 
-    ``settings`` has the numbers of ``REACTIONS``, without those of the way where there is a ``course``; each may be an
+    ``settings`` has the numbers of ``REACTIONS``, without the way's where there is a ``course``; each may be an
     array (runs,).
     """
 
@@ -204,7 +204,7 @@ def read_reacting(
 ) -> ReactingWearer:
     """Return the neuromuscular gait model of the file of a walk.
 
-    A relative path begins in ``folder``; ``instead`` has the files that options name in place of those of the
+    A relative path begins in ``folder``; ``instead`` has the files that options name in place of the ones of the
     document. ScenarioError for what does not go with a neuromuscular gait model;
     DataError for a file that cannot be used.
     """

@@ -97,7 +97,7 @@ def _links(_document: Mapping[str, Any]) -> Graph:
 
 
 def _interval(seconds: float) -> float:
-    # Each sample has some hundred numbers more than that of a leg along a gait.
+    # Each sample has some hundred numbers more than a leg along a gait has.
     return 5.0e-3 if seconds <= 61.0 else (1.0e-2 if seconds <= 601.0 else 5.0e-2)
 
 

@@ -72,8 +72,8 @@ class OnTask:
 class Compared:
     """Configurations on tasks, one of them the ``baseline``; numbers in SI.
 
-    ``draws`` is 0 without uncertainty; ``varied`` are the uncertain paths but the noise; ``confidence`` is that of the
-    intervals.
+    ``draws`` is 0 without uncertainty; ``varied`` are the uncertain paths but the noise; ``confidence`` is the level of
+    the intervals.
     """
 
     units: str

@@ -42,7 +42,7 @@ COMPARED: dict[str, int] = {
 
 @dataclass(frozen=True, slots=True)
 class Paired:
-    """One metric of a configuration against that of the baseline, over the pairs in which both have it.
+    """One metric of a configuration against the baseline's, over the pairs in which both have it.
 
     ``difference`` is the mean of configuration less baseline [SI] with its confidence interval; ``change`` the median
     over the draws of the same as a fraction of the baseline (nan where that is 0), ``change_low`` and ``change_high``

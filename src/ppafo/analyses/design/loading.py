@@ -33,7 +33,7 @@ def read_design_file(name_or_path: str | Path) -> tuple[DesignFile | SizingFile,
 def load_design(name_or_path: str | Path, seed: int | None = None) -> DesignProblem | SizingProblem:
     """Return the problem of a design file, by its name in the package or by its path; paths in it begin in its folder.
 
-    ``seed`` replaces that of a file with tasks. StudyError or ParameterError for what is not usable, in one line.
+    ``seed`` replaces the seed of a file with tasks. StudyError or ParameterError for what is not usable, in one line.
     """
     document, file = read_design_file(name_or_path)
     folder = Path(name_or_path).parent

@@ -106,8 +106,8 @@ def largest_flow(recording: Recording) -> float:
 class WalkGas:
     """A walk as far as its gas goes: name, recording, gas [kg] and time [s] of a stride.
 
-    ``gas_per_stride`` is that of the strides with help at the set pressure, 0 where the walk took none. A walk on a
-    ``course``, "" without one, is repeated as a whole: gas and time are then those of the course. ``scenario`` is what
+    ``gas_per_stride`` is the mean of the strides with help at the set pressure, 0 where the walk took none. A walk on a
+    ``course``, "" without one, is repeated as a whole: gas and time are then the whole's. ``scenario`` is what
     was walked.
     """
 
@@ -213,7 +213,7 @@ def draw_of_walk(walk: WalkGas) -> Draw:
     """Return the gas use of a walk that continues: a stride is one of the leg with the device."""
     if walk.gas_per_stride <= 0.0:
         raise DataError(f"walk '{walk.name}': no gas was taken from the supply, so a bottle would never be empty")
-    # An open valve may let gas back into the supply for moments, so the largest flow is that of a tenth of a second.
+    # An open valve may let gas back into the supply for moments, so the largest flow is a mean over 0.1 s.
     peak = max(largest_flow(walk.recording), walk.gas_per_stride / walk.stride_time)
     draw = draw_of_numbers(walk.gas_per_stride, walk.stride_time, peak)
     along = f" on course '{walk.course}'" if walk.course else ""

@@ -51,7 +51,7 @@ def endurance(
     """Return how long a full bottle lasts for a gas use that continues; ``Endurances`` for several recordings.
 
     A walk, its result or its folder, walks on the bottle until that ends it; ``bottle`` is its own, or the paper's,
-    unless given. Any other gas use is that of ``recordings``, or else ``gas_per_stride`` [kg] every ``stride_time`` [s]
+    unless given. Any other gas use comes from ``recordings``, or else ``gas_per_stride`` [kg] every ``stride_time`` [s]
     (default 1.1 s) with at most ``peak_flow`` [kg/s] (the mean flow). ``walk`` [s], 10 min unless given, and ``rest``
     [s] take turns, for at most ``longest`` [s]. ``overrides`` are texts such as ``room.temperature=5 degC``.
     ParameterError or DataError for bad input, SimulationError where the solver fails.

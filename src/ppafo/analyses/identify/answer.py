@@ -44,7 +44,7 @@ class Identification:
 
     @property
     def estimates(self) -> tuple[Estimate, ...]:
-        """All estimates of all procedures, those of the trajectory fit last."""
+        """All estimates of all procedures, the trajectory fit's last."""
         fitted = () if self.trajectory is None else self.trajectory.fit.estimates
         return (*bench_estimates(self.results), *fitted)
 

@@ -43,7 +43,7 @@ def identify(problem: str | Path, progress: Report = report_nothing) -> Finding[
 def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Report = report_nothing) -> Identification:
     """Return the outcome of a problem whose paths begin in ``folder``; ``file`` is what messages call it.
 
-    Errors are those of ``identify``.
+    Raises the errors of ``identify``.
     """
     before = _base_set(problem, folder)
     valve = chosen_valve(before, problem.device.valve)

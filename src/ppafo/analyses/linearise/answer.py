@@ -102,7 +102,7 @@ class LinearModel:
         eye, found = np.eye(len(self.states)), []
         for frequency in np.asarray(frequencies, dtype=np.float64).ravel().tolist():
             matrix = 2.0j * np.pi * frequency * eye - self.a
-            # States and their rates differ by powers of ten in SI: rank is that of rows and columns of one size.
+            # States and their rates differ by powers of ten in SI: rank is taken with rows and columns of one size.
             rows = _sizes(np.abs(matrix), axis=1)
             columns = _sizes(np.abs(matrix) / rows[:, None], axis=0)
             if np.linalg.cond(matrix / rows[:, None] / columns) > _SINGULAR:
@@ -177,7 +177,7 @@ SHARES = tuple(np.geomspace(3.0e-4, 0.3, 13).tolist())
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Steps:
-    """Torque [N m] after steps of the command, less that of the steady state: (steps, times) on the runs and linear.
+    """Torque [N m] after steps of the command, less the steady one: (steps, times) on the runs and linear.
 
     ``amplitudes`` (steps,) of the command [-], ``times`` [s] after the step.
     """

@@ -97,7 +97,7 @@ class Studies:
 
     @property
     def verdicts(self) -> list[Verdict]:
-        """The verdicts of all claims, those of the paper first."""
+        """The verdicts of all claims, the paper's first."""
         own = [] if self.reproduction is None else [claim.verdict for claim in self.reproduction.claims]
         return own + [item.verdict for study in self.studies for item in study.claims]
 

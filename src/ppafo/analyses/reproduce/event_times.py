@@ -35,7 +35,7 @@ def rms_of(parts: Sequence[Floats]) -> float:
 
 
 def uneven_course(cadence: float) -> WalkingCourse:
-    """Strides whose times vary as those of people do, about a cadence [1/s] of steps."""
+    """Strides whose times vary as people's do, about a cadence [1/s] of steps."""
     generator = np.random.default_rng(SEED)
     paces = cadence / (1.0 + VARIATION * np.clip(generator.standard_normal(UNEVEN_STRIDES), -2.0, 2.0))
     strides = (Segment("walk", {"cadence": pace, "strides": 1.0}) for pace in paces.tolist())

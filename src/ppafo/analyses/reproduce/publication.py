@@ -104,7 +104,7 @@ def recycling_saving(values: Values) -> float:
 
 
 def recycling_work(values: Values) -> float:
-    """Net work of a stride with the valve between the chambers over that of event-based control [-]."""
+    """Net work of a stride with the valve between the chambers over event-based control's [-]."""
     plain, recycling = (_work_of_a_stride(_nondisabled(name, values)) for name in (PAIR, RECYCLING))
     return recycling / plain
 
@@ -339,7 +339,7 @@ def check_study(study: str, overrides: Sequence[str]) -> None:
 
 
 def run_studies(study: str, report: Report) -> tuple[Study, ...]:
-    """Return one study, or all but that of the paper, with every claim judged; ScenarioError, SimulationError."""
+    """Return one study, or all but the paper's, with every claim judged; ScenarioError, SimulationError."""
     names = study_names()[1:-1] if study == ALL else (study,)
     return tuple(_run(load_publication(name), report) for name in names)
 

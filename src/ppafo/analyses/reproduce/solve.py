@@ -63,7 +63,7 @@ def reproduce(
     progress: Report | None = None,
     study: str = SEED,
 ) -> Finding[Reproduction] | Finding[Studies]:
-    """Run the paper's experiments with the shipped scenarios and judge every claim, or those of other publications.
+    """Run the paper's experiments with the shipped scenarios and judge its claims, or other publications' claims.
 
     ``overrides`` change the experiments (not the paper's reported numbers): a path of a scenario reaches those that
     have it, a path of the device all of them. The figures have synthetic measurements where the bench can make them.

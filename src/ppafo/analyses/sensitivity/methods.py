@@ -81,7 +81,7 @@ def _sobol_design(uncertainty: Uncertainty, blocks: int, seed: int) -> Floats:
     exchanged = np.arange(dimensions)
     for number in range(SCRAMBLES):
         own = replicate_seed(seed, number) % 2**32
-        # Saltelli (2002): a point A, its copies in which value i is that of B, and B. `seed`, not `rng`: the points of
+        # Saltelli (2002): a point A, its copies in which value i comes from B, and B. `seed`, not `rng`: the points of
         # earlier studies.
         points = qmc.Sobol(2 * dimensions, scramble=True, seed=own).random(each)
         design[:, number] = points[:, None, :dimensions]
@@ -104,7 +104,7 @@ def _sobol_indices(found: Evaluated, confidence: float) -> Indices:
 def _sobol_total_and_first(table: Floats) -> Floats:
     """Return total and first-order indices (2, paths) from blocks (blocks, paths + 2): a point, its copies, another.
 
-    With f(A) at the first point, f(B) at the last, f(AB_i) where value i is that of B, and V the variance of f(A) and
+    With f(A) at the first point, f(B) at the last, f(AB_i) where value i comes from B, and V the variance of f(A) and
     f(B): total_i = mean (f(A) - f(AB_i))^2 / 2 V (Jansen, 1999), first_i = mean f(B) (f(AB_i) - f(A)) / V (Saltelli et
     al., 2010).
     """
@@ -184,7 +184,7 @@ def _orders(count: int, blocks: int, seed: int) -> NDArray[np.intp]:
 
 
 def _conditional(covariance: Floats, free: NDArray[np.bool_]) -> tuple[Floats, Floats]:
-    """Return what makes scores of free values from those of held ones: a matrix for the mean, a factor of the rest."""
+    """Return what makes scores of free values from scores of fixed ones: a matrix for the mean, a factor of the rest."""
     across = covariance[np.ix_(free, ~free)]
     mean = np.asarray(np.linalg.solve(covariance[np.ix_(~free, ~free)], across.T).T, dtype=np.float64)
     rest = covariance[np.ix_(free, free)] - mean @ across.T

@@ -1,7 +1,7 @@
 """The sensitivity of metrics to what has a distribution in a study: the analysis at growing sizes, and the answer.
 
 Policy for runs that fail: where more than a fraction of all runs has no value it is refused, because the indices
-would be those of the survivors. Otherwise every block (base point or order) with such a run is left out whole,
+would be the survivors'. Otherwise every block (base point or order) with such a run is left out whole,
 since the formulas need whole blocks, and counted; the indices then hold for values with which the model runs.
 """
 
@@ -71,7 +71,7 @@ class Settling:
 class OfMetric:
     """The indices of a metric at growing sizes, the last the result; mean and standard deviation [SI] of all runs.
 
-    The change [SI] is that of the metric from the 5 to the 95 % quantile of each value, with its sign and the half
+    The change [SI] is how the metric goes from the 5 to the 95 % quantile of each value, with its sign and the half
     width of its band; nan for the noise.
     """
 
@@ -230,7 +230,7 @@ def sensitivity(
     """Return the sensitivity of metrics with regard to everything that has a distribution in a study.
 
     ``method`` is a name in ``METHODS``; by default Shapley effects where values are correlated, else Sobol indices.
-    ``metrics`` are those of the study by default; ``samples`` base points or orders (8192 for Sobol, 2048 for
+    ``metrics`` are the study's by default; ``samples`` base points or orders (8192 for Sobol, 2048 for
     Shapley). ``independent`` leaves the correlations of the study out. Noise of the sensors is one of the values.
     StudyError for bad input, and where more than the fraction ``maximum_failed`` of the runs fails; of fewer, whole
     blocks are left out and counted.

@@ -195,7 +195,7 @@ def sweep(
 
     ``out`` is a folder, or an address that fsspec knows; a study that was begun there resumes. Without it the results
     live in a temporary folder as long as the returned object. ``overrides`` change every configuration, ``draws``
-    and ``seed`` replace the number of draws and the random seed of the file. ``threads`` are those of this process, all
+    and ``seed`` replace the number of draws and the random seed of the file. ``threads`` are this process's, all
     cores by default; ``scheduler`` is the address of a Dask scheduler whose workers do the work, ``agreed`` the consent
     to a folder that takes much of the disk, and ``progress`` hears of every finished chunk.
 

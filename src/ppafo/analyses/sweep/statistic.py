@@ -1,6 +1,6 @@
 """A statistic over the distributions of a study, drawn until its interval is narrow enough.
 
-A mean is estimated from randomised Sobol replicates, which know that of a smooth function far better than as many
+A mean is estimated from randomised Sobol replicates, which know the mean of a smooth function far better than as many
 independent draws; its interval is never narrower than theirs, as nobody knows beforehand that no rare value decides.
 The intervals of quantiles and probabilities are exact for independent draws, and get those.
 
@@ -223,7 +223,7 @@ class Estimate:
     """A statistic of a metric, with its interval [SI] and the looks one after the other.
 
     ``is_met`` is true where the last interval is narrow enough and can be believed. ``share_of_noise`` is the fraction
-    of the variance that is due to sensor noise, None where there is none; ``values`` are those of the metric [SI].
+    of the variance that is due to sensor noise, None where there is none; ``values`` are the metric's [SI].
     """
 
     metric: str

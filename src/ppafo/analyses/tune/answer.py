@@ -79,9 +79,9 @@ class Setting:
 
     ``values`` are the metrics by which the search judges them [SI]: as the device is said to be, or at their bad end
     over the draws of the search; ``fresh`` the same over draws that the search did not use (empty without draws).
-    ``objective`` is that of the search; what is called fresh, that of the fresh draws (the same again without draws).
+    ``objective`` belongs to the search; what is called fresh, to the fresh draws (the same again without draws).
     ``share_of_noise`` is the fraction of the variance over the fresh draws that is due to sensor noise, by metric.
-    ``metrics`` are those of ``result``, one run of the nominal device.
+    ``metrics`` belong to ``result``, one run of the nominal device.
     """
 
     gains: Gains

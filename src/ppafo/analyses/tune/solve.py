@@ -196,9 +196,9 @@ def tune(
 ) -> Finding[Tuned]:
     """Search the best values of a tuning: a name, a TOML file, data laid out as one, or a Problem.
 
-    ``overrides`` change the scenario, ``seed`` is that of the search, of the file by default. Every generation is one
-    ensemble, and every candidate sees the same draws. StudyError for bad input, and where a goal has no scale because
-    the scenario as it is gives 0 or nothing.
+    ``overrides`` change the scenario, ``seed`` is the seed of the search, the file's by default. Every generation is
+    one ensemble, and every candidate sees the same draws. StudyError for bad input, and where a goal has no scale
+    because the scenario as it is gives 0 or nothing.
     """
     problem = _problem_of(tuning, overrides)
     if seed is not None:

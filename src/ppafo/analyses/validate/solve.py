@@ -107,7 +107,7 @@ def validate(
     ``pressure_2=0 psi_g`` for channels that were not recorded, ``thresholds`` texts such as ``5%`` or ``angle=2 deg``:
     the largest RMS errors that pass, of the full range or in a unit. Without any it is 10 % of full range, at
     least half of the variance of a signal beside its noise is explained, and no single cause in record, set or model
-    is found (``causes``) that is larger than those of any bench. ``longest_delay`` [s], at
+    is found (``causes``) that is larger than on any bench. ``longest_delay`` [s], at
     most 1 s, limits the delay of the measurement that is taken out. ``columns`` is a column map or
     ``FILE.toml[:NAME]``.
 
@@ -278,7 +278,7 @@ def finding_of(validation: Validation) -> Finding[Validation]:
 
 
 def recording_names(files: Sequence[str]) -> list[str]:
-    """Return a name for the files of each recording: that of its file or folder, with a number where two are alike."""
+    """Return a name for the files of each recording: its file's or folder's, with a number where two are alike."""
     stems = [_UNUSUAL.sub("-", Path(file).stem).strip("-.") or "recording" for file in files]
     return [
         f"{stem}-{1 + stems[:index].count(stem)}" if stems.count(stem) > 1 else stem for index, stem in enumerate(stems)

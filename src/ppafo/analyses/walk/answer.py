@@ -373,7 +373,7 @@ def walk_with_and_without(
     """Walk with the device, without it, and beside the healthy gait; or let many wearers walk with it.
 
     ``configuration`` is a walk file, its name or a loaded one; ``minutes`` the length of the walk [min], one or
-    that of its course unless given; ``gait``, ``course`` and ``bottle`` stand in place of those of the configuration;
+    its task sequence's unless given; ``gait``, ``course`` and ``bottle`` replace the configuration's;
     ``wearers`` the number of different wearers, drawn with ``seed``. ScenarioError
     for bad input; a walk that diverges is a finding that has not passed.
     """

@@ -79,8 +79,8 @@ _RELATIONS = (
 class ExportedWalk:
     """What an exported library has for a kind of walk.
 
-    ``leg`` are lines that make the leg and the plant with it, ``start`` those of the states at the start; ``words``
-    say of the motion what is fixed in the source, and of what a library has precomputed numbers.
+    ``leg`` are lines that make the leg and the plant with it, ``start`` make the states at the start; ``words`` say
+    of the motion what is fixed in the source, and of what a library has precomputed numbers.
     """
 
     leg: Callable[[Scenario, Writing], Iterator[str]]

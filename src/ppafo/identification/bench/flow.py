@@ -161,7 +161,7 @@ def solve_flow(
 ) -> tuple[Fit, Floats]:
     """Return the fit of an opening to the flow through it, and the flow that it gives [kg/s]; see ``law.solve``.
 
-    ``paths`` are those of its size and its critical ratio, which is not sought where it is empty. ``pressures`` are two
+    ``paths`` lead to its size and its critical ratio, which is not sought where it is empty. ``pressures`` are two
     channels [Pa absolute], the one from which a positive flow [kg/s] comes first.
     """
     size, critical = paths

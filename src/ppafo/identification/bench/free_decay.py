@@ -123,7 +123,7 @@ def _numbers(
         speed = max(float(np.abs(velocity[:_FEWEST_SMOOTHED]).max()), 1e-6)
         swept = max(abs(float(decay.angle[-1] - decay.angle[0])), 1e-9)
         starts.append(sought(f"start angle {number}", float(decay.angle[0]), scale=swept))
-        # The direction is that of the push: a speed of 0 or below would be another decay.
+        # The direction is the push's: a speed of 0 or below would be another decay.
         starts.append(sought(f"start speed {number}", speed, 1e-9 * speed, 10.0 * speed))
         # With viscous damping alone the way is speed over rate, with Coulomb friction alone speed^2 over twice the
         # deceleration: half of each is a start between the two.
@@ -169,7 +169,7 @@ def course_times(
 
 
 def course(times: Floats, speed: float, *friction: float) -> tuple[Floats, Floats]:
-    """Return angle swept [rad] and speed [rad/s] at times [s]; the other arguments are those of ``course_times``."""
+    """Return angle swept [rad] and speed [rad/s] at times [s]; the other arguments as in ``course_times``."""
     from scipy.interpolate import CubicHermiteSpline
 
     known, swept, speeds = course_times(speed, *friction)

@@ -47,7 +47,7 @@ def solve(
     """Return the fit of a law to readings, and what the law gives there, in the unit of what was measured.
 
     ``labels`` are two for each reading, of its recording or repetition and of its branch or level: readings of one
-    label are a group whose numbers are compared with those of all.
+    label are a group whose numbers are compared with the numbers of all.
     """
     names = [one.name for one in numbers]
     keys = list(zip(*labels, strict=True))

@@ -3,7 +3,7 @@
     m = Cd A C1 P_up psi(r)  or  C rho_0 sqrt(T_0 / T) P_up phi(r; b)  or  c (P_up^2 - P_down^2),   r = P_down / P_up
 
 m is the mass flow [kg/s], P_up and P_down the absolute pressures before and behind the valve [Pa]; flow functions and
-constants are those of ``flow``. Temperature and law of the gas, gains of the sensors, the zero of each of them are
+constants as in ``flow``. Temperature and law of the gas, gains of the sensors, the zero of each of them are
 tolerances. Of ISO 6358, C is the choked flow, and b shows only where there is choked and subsonic flow.
 """
 

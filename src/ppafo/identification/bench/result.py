@@ -66,7 +66,7 @@ def with_residuals(panel: Panel, x: Floats, residuals: Floats) -> tuple[Panel, P
 
 @dataclass(frozen=True, slots=True)
 class BenchResult:
-    """Result of one procedure. ``kind`` is that of its recordings; figures say so where nobody measured them.
+    """Result of one procedure. ``kind`` is the kind of its recordings; figures say so where nobody measured them.
 
     ``conflict`` is the sentence on readings that want other numbers than all together, empty where they agree.
     """

@@ -132,7 +132,7 @@ def _straight_line(readings: "Readings", names: str) -> tuple[float, float, floa
             "one channel"
         )
     deviation = float(np.std(readings.torque - design @ rough))
-    # Where friction is small its sign is that of the noise, and no reason to refuse.
+    # Where friction is small its sign is the noise's, and no reason to refuse.
     if friction < -_SIGMAS * deviation / np.sqrt(readings.pressure.size):
         raise IdentificationError(
             f"{names}: {PROCEDURE}: the rising branch lies above the falling one, as if friction drove the motion; "
@@ -188,7 +188,7 @@ def names_of(load: str, slides: bool) -> Names:
 class Readings:
     """Readings of both branches: pressure difference [Pa], load [N m or N], branch (+1, -1), repetition, recording.
 
-    ``weight`` is one over the noise of each, that of a usual reading being 1: the mean of many samples has less.
+    ``weight`` is one over the noise of each, 1 for a usual reading: the mean of many samples has less.
     """
 
     pressure: Floats

@@ -54,7 +54,7 @@ EDGE = 20
 """Samples at either end that are averaged for a first guess."""
 
 STANDS_STILL = 0.02
-"""Change of a pressure over that of the other, up to which a chamber counts as a room."""
+"""Change of a pressure over the other's, up to which a chamber counts as a room."""
 _NEARLY_EQUAL = 0.01
 _RATIO, _VOLUME, _RELAXATION = "ratio of the volumes", "volume", "time of the relaxation"
 _RELAXED, _MOST_RELAXED = 5.0, 0.02
@@ -210,7 +210,7 @@ class Falls(NamedTuple):
 def fall_of_difference(opening: Opening, size: float, first: float, second: float, ratio: float, rate: float) -> Falls:
     """Return times [s] and the difference [Pa] as it falls from two pressures [Pa] to a thousandth.
 
-    ``size`` is that of the opening, ``ratio`` V1/V2 [-], 0 beside a room, ``rate`` R T / V1 [Pa/kg].
+    ``size`` is the size of the opening, ``ratio`` V1/V2 [-], 0 beside a room, ``rate`` R T / V1 [Pa/kg].
     """
     start, conserved = max(first - second, 1.0), ratio * first + second
     # Even in the logarithm, as a laminar fall is in time.

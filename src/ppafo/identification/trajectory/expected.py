@@ -21,7 +21,7 @@ _STEPS, _UNITS_OF_NOISE = (1.0e-7, 1.0e-3), 3.0
 class Candidate:
     """An experiment that could be done: its scenario, the noise of each channel [rad], [Pa], time between samples [s].
 
-    The devices of candidates are those of their scenarios with the fitted numbers put in. Channels without ``noise``
+    The devices of candidates come from their scenarios, with the fitted numbers put in. Channels without ``noise``
     have the one that the fit found, and no others are compared.
     """
 

@@ -36,8 +36,9 @@ from ppafo.simulation.scenario import Scenario
 class ChannelFit:
     """What one channel of one experiment leaves, in its SI unit.
 
-    ``noise`` is the standard deviation that weighs it and ``order`` that of the autoregression that makes it white,
-    both of its sensor; ``rms`` and ``largest`` are of this recording, ``span`` is the range that the samples cover.
+    ``noise`` is the standard deviation that weighs it and ``order`` the order of the autoregression that makes it
+    white, both of its sensor; ``rms`` and ``largest`` are of this recording, ``span`` is the range that the samples
+    cover.
     """
 
     experiment: str

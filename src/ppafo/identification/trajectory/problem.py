@@ -41,7 +41,7 @@ INPUTS = (COMMAND, SUPPLY, EXTERNAL_TORQUE)
 """Channels that a run follows where they were recorded, sample by sample, if it has no scenario."""
 
 ALL_INPUTS = (*INPUTS, DORSIFLEXION_SUPPLY, ANGLE)
-"""Channels that a run may follow instead of its scenario; a recorded angle prescribes that of the vane."""
+"""Channels that a run may follow instead of its scenario; a recorded angle prescribes the vane's."""
 
 InitialState = Literal["scenario", "recording"]
 
@@ -131,7 +131,7 @@ _FITS = 1.0e-6
 def scenario_of(experiment: Experiment) -> Scenario:
     """Return the scenario of an experiment with all that it takes from the recording, but for the samples of inputs.
 
-    A state that is taken from the recording is that of the samples up to the start.
+    A state that is taken from the recording comes from the samples up to the start.
     """
     scenario, recording = experiment.scenario, experiment.recording
     if {SUPPLY, DORSIFLEXION_SUPPLY} & set(experiment.inputs):
@@ -141,7 +141,7 @@ def scenario_of(experiment: Experiment) -> Scenario:
         scenario = replace(scenario, controller=replay_control(recording), sensors=Sensors())
     said = f"experiment '{experiment.label}'"
     if ANGLE in experiment.inputs:
-        # From here the recorded angle prescribes that of the vane.
+        # From here the recorded angle prescribes the vane's.
         angle = np.interp([experiment.start], recording.time, recording[ANGLE])
         scenario = replace(scenario, motion=FreeMotion(float(between_stops(angle, scenario.device, said)[0])))
     if experiment.initial_state == "scenario":
@@ -219,13 +219,13 @@ def declaration_of(path: str, scenario: Scenario) -> Quantity:
 
 
 def number_at(scenario: Scenario, path: str) -> float:
-    """Return the number at a path in SI units; those of a recording are 0 before they are fitted."""
+    """Return the number at a path in SI units; numbers of a recording are 0 before they are fitted."""
     declaration_of(path, scenario)
     return 0.0 if path in _OF_RECORDING else numbers.number_at(scenario, path)
 
 
 def with_numbers(scenario: Scenario, changed: Mapping[str, float]) -> Scenario:
-    """Return the scenario with numbers [SI] replaced, by paths of ``declared_numbers``, but those of recordings."""
+    """Return the scenario with numbers [SI] replaced, by paths of ``declared_numbers``, but not of recordings."""
     # Those of a recording change what is compared, not the run.
     return numbers.with_numbers(scenario, {path: one for path, one in changed.items() if path not in _OF_RECORDING})
 

@@ -51,7 +51,7 @@ Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 FIT_TOLERANCE = 0.02
-"""Error that a run of a fit is allowed over that of any other run; columns of differences keep to 1e-3 with it."""
+"""Error that a run of a fit is allowed over any other run's; columns of differences keep to 1e-3 with it."""
 _FINER = 0.25
 _FITS = 1.0e-6
 
@@ -74,9 +74,10 @@ class Measured:
 class PreparedExperiment:
     """An experiment by its label, with its scenario completed and its samples placed in the record of a run.
 
-    ``time`` [s] is that of the samples in the run, ``reach`` how far [s] a fitted offset may move them. ``run`` has the
-    step and the clock of all columns; a sample is ``fraction`` [-] of the way from record ``place`` to the next.
-    ``inputs`` are what the run follows at each step, made of what ``recorded`` has; None where it follows nothing.
+    ``time`` [s] has the times of the samples in the run, ``reach`` how far [s] a fitted offset may move them. ``run``
+    has the step and the clock of all columns; a sample is ``fraction`` [-] of the way from record ``place`` to the
+    next. ``inputs`` are what the run follows at each step, made of what ``recorded`` has; None where it follows
+    nothing.
     """
 
     label: str
@@ -375,7 +376,7 @@ def _run_signals(prepared: PreparedExperiment, columns: Mapping[str, Floats], co
 
 @lru_cache(maxsize=16)
 def _rows_of(program: Program) -> tuple[tuple[int, ...], int]:
-    """Return the rows of the state that channels are made of, and that of the time of a failure."""
+    """Return the rows of the state that channels are made of, and the row with the time of a failure."""
     rows = row_numbers(program.state_rows())
     return tuple(rows[f"state.{name}"] for name in ("angle", "mass_1", "mass_2")), rows["result.failure_time"]
 

@@ -172,7 +172,7 @@ class Setting:
     """What a section leans on.
 
     ``read`` gives the recording of an experiment, ``folder`` is where paths of scenarios begin, ``file`` what messages
-    call the section. ``parameter_set`` takes the place of the sets that scenarios name, ``valve`` that of their valves.
+    call the section. ``parameter_set`` takes the place of the sets that scenarios name, ``valve`` of their valves.
     ``bench`` are estimates that came before, by path; ``used`` are the recordings from which they came. ``tolerances``
     are those of the bench.
     """

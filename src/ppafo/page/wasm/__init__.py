@@ -25,15 +25,15 @@ Many runs
     With ``channel`` -1 the last three are 0. Otherwise it also writes ``runs`` times ``places`` numbers: every
     ``every``-th sample of a channel, from the first on. Channels count as in the description without ``time``, so
     that 0 is the first after it; with ``channel`` -2 it writes all of them, for each run ``places`` numbers of one
-    after those of the other. Beyond the last sample of a run, and in runs that were not completed, there is NaN, as
+    after the other's. Beyond the last sample of a run, and in runs that were not completed, there is NaN, as
     in the metrics of the latter. Runs are quickest eight at a time with the same ``run``, delay and
     ``controller.period``.
 
 Statuses: 0 completed, 1 diverged, 2 diverged in too many parts of a step, 3 refused by ``check``, 4 no memory.
 
 What a module gives has the bits of ``ppafo.simulate`` for the same settings, in every sample of every channel; metrics
-differ by rounding, as those of an ensemble do. Each instance has a memory of its own: one for each worker. The bytes
-are those of a translation unit in C, built by ziglang, or what was built of the same one before.
+differ by rounding, as an ensemble's do. Each instance has a memory of its own: one for each worker. The bytes
+are a translation unit's in C, built by ziglang, or what was built of the same one before.
 
 What a page must know of a module: settings with range, unit and origin, channels, metrics; plain data for JSON.
 
@@ -55,7 +55,7 @@ What a page must know of a module: settings with range, unit and origin, channel
                     "tolerance": 0.0, "is_share": true where that is a share of the other}, ...]}
 
 ``key=value unit`` is an override of the scenario as ``ppafo simulate --set`` takes it. A value in SI is ``zero`` plus
-``factor`` times the one that is shown. ``origin`` is that of the parameter set (published, datasheet, derived,
+``factor`` times the one that is shown. ``origin`` is the parameter set's (published, datasheet, derived,
 identified, fitted, assumed), ``task`` for a number of the scenario itself, ``default`` for one that is not given, or
 ``changed`` for one that an override or a caller put there. What ``follows`` another setting is the same number as
 long as it is not changed itself; what is ``made`` of others is the sum of a gap and of what rules make of them.
@@ -257,7 +257,7 @@ def _origins(file: _File, device: Device, library: Library) -> dict[str, dict[st
 
 
 def _of_set(parameter_set: ParameterSet | None, device: Device, item: Setting) -> dict[str, Any]:
-    """Origin of a number of the device: that of the set where it has this very value."""
+    """Origin of a number of the device: the set's where it has this very value."""
     if parameter_set is None:
         return _CHANGED
     path = item.path

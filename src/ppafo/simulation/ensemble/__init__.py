@@ -57,7 +57,7 @@ def run_ensemble(
     """Run ``base`` once for each row of values; each run gives exactly what it gives alone.
 
     ``columns`` maps dotted paths, as in overrides (``supply.pressure``, ``valve.area``, ``reference.level``), to values
-    in SI units, shape (runs,), pressures absolute but for those of the paths in ``gauge``, which count from the
+    in SI units, shape (runs,), pressures absolute but for the paths in ``gauge``, which count from the
     atmosphere of their run. ``meters`` names metrics of ``ppafo.metrics``; ``bands`` names
     channels whose traces are kept every ``every`` [s] (the output interval unless given) to the end of the longest run.
     ScenarioError for unknown paths, metrics and channels, or for columns of different lengths; a run whose values are
@@ -67,7 +67,7 @@ def run_ensemble(
     Where a Python object controls ``base``, the runs are made one after the other: some 30 ms each.
 
     What follows a number that varies moves with it, as it does in a file: a gauge pressure with the atmosphere, a
-    pressure at the start with that of the supply which it names, the second regulator with the first.
+    pressure at the start with the supply which it names, the second regulator with the first.
     """
     metrics = {name: _metric(base, name) for name in meters}
     for name in bands:
@@ -95,7 +95,7 @@ def _run(plan: EnsemblePlan, outcome: Outcome, threads: int | None) -> Outcome:
 
 
 def _errors(outcome: Outcome, fine: Outcome) -> dict[str, Floats]:
-    """The estimated errors of metrics, from those of the same runs with finer steps."""
+    """The estimated errors of metrics, from the same runs with finer steps."""
     found = {}
     for name, values in outcome.metrics.items():
         changes = np.where(np.isfinite(fine.metrics[name]), np.abs(fine.metrics[name] - values), np.inf)

@@ -280,7 +280,7 @@ def reacts(scenario: Scenario) -> bool:
 
 
 def offered(scenario: Scenario) -> dict[str, MetricKind]:
-    """The metrics that runs of a scenario have, for messages: those of walks are not for a vane, nor the reverse."""
+    """The metrics that runs of a scenario have, for messages: metrics of walks are not for a vane, nor the reverse."""
     missing = frozenset() if scenario.gas_model is not None else _WITH_ENERGY_BALANCE
     return {
         name: kind

@@ -29,7 +29,7 @@ _PERCENT = 100.0 * PHASES
 
 @dataclass(frozen=True, slots=True)
 class _Panel:
-    """One panel: channels drawn for every walk, and what one SI unit is in that of the title; a level to mark."""
+    """One panel: channels drawn for every walk, and one SI unit in the unit of the title; a level to mark."""
 
     title: str
     channels: tuple[str, ...]

@@ -96,7 +96,7 @@ def read_variables(
 ) -> tuple[Variable, ...]:
     """Return the variables of a file; StudyError for a path that no scenario has, or limits that it refuses.
 
-    ``scenarios`` are those of all tasks by kind of valve.
+    ``scenarios`` has all tasks' by kind of valve.
     """
     everything = [scenario for of_kind in scenarios.values() for scenario in of_kind]
     find_effects(tables)
@@ -273,7 +273,7 @@ class DesignProblem:
 def design_problem(document: DesignFile, file: str, folder: Path, seed: int | None = None) -> DesignProblem:
     """Return the problem of a design file, which messages call ``file``; paths in it begin in ``folder``.
 
-    ``seed`` replaces that of the file. StudyError or ParameterError for what is not usable, in one line.
+    ``seed`` replaces the file's. StudyError or ParameterError for what is not usable, in one line.
     """
     catalogue = load_catalogue(beside(document.catalogue, folder))
     combinations = _combinations(document.parts, catalogue)

@@ -222,7 +222,7 @@ SCALES = (0.1, 0.6)
 CROSSED = 0.3
 """Fraction of the variables that a child has from the changed design, the others from its parent."""
 OTHER_PARTS = 0.1
-"""Fraction of the children that try parts at random; half of the others take those of the changed design."""
+"""Fraction of the children that try parts at random; half of the others take the changed design's."""
 PATIENCE = 10
 """Generations over which the hypervolume has to grow."""
 LARGEST_SEED = 2**32 - 1

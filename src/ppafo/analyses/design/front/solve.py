@@ -122,7 +122,7 @@ class Evaluation:
         return np.asarray(valves[candidates.choice] + size * actuators[candidates.choice] + fixed)
 
     def _by_valve(self, candidates: Candidates) -> list[tuple[Part, Members]]:
-        """Return each valve with its candidates: those of one valve have one kind and one form of orifice."""
+        """Return each valve with its candidates: all of one valve have one kind and one form of orifice."""
         names = np.array([item.valve.name for item in self.problem.combinations])[candidates.choice]
         valves = {item.valve.name: item.valve for item in self.problem.combinations}
         return [(valves[str(name)], np.flatnonzero(names == name)) for name in np.unique(names)]

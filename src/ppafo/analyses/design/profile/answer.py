@@ -67,7 +67,7 @@ class SizedValve:
 
     ``works`` False: it keeps the limit at no pressure; then ``pressure`` is the one with the smallest error.
     ``lowest_pressure`` [Pa absolute] is the lowest that works, and ``limit`` what keeps it from being lower. ``gains``
-    are those of the controller, by path, in SI. Error [N m], gas per repetition [kg], total gas with the reserve [kg];
+    are the controller's, by path, in SI. Error [N m], gas per repetition [kg], total gas with the reserve [kg];
     ``bottle`` None where none is large enough; ``mass`` [kg] of valve, bottle, regulators, and actuator where one was
     named. ``curve`` has pressures [Pa absolute], errors [N m] and gas per repetition [kg] with the best gains of each.
     """
@@ -164,7 +164,7 @@ _DOTTED = {"marker": ".", "markersize": 4}
 
 
 def torque_panel(sizing: Sizing) -> Panel:
-    """Return the prescribed torque over time, and that of the suggestion."""
+    """Return the prescribed torque over time, and the suggestion's."""
     times = np.linspace(0.0, sizing.problem.scenario.run.duration, 3001)
     prescribed = {"linestyle": REFERENCE.line, "linewidth": 1.2}
     profile = sizing.problem.profile.at(times)

@@ -169,7 +169,7 @@ class Trials:
 
 
 def highest_pressure(problem: SizingProblem, valve: Part) -> float:
-    """Return the highest pressure [Pa absolute] to try: that of the file, or what the parts are made for."""
+    """Return the highest pressure [Pa absolute] to try: the file's, or what the parts are made for."""
     parts = [valve, *problem.regulators, *([] if problem.actuator is None else [problem.actuator])]
     return min([problem.highest_pressure, *(part.values.get("largest_pressure", np.inf) for part in parts)])
 

@@ -48,7 +48,7 @@ _SHORTEST = 6.0
 _FEW = 0.15
 """Minutes of the walks that are compared at a constant supply."""
 _DORSIFLEXION = 0.9
-"""Gauge pressure of dorsiflexion over that of plantarflexion, of the walks with regulators: 45 of 50 psi."""
+"""Gauge pressure of dorsiflexion over plantarflexion's, of the walks with regulators: 45 of 50 psi."""
 _SHUT_OFF = {item.name: item.default or 0.0 for item in SHUT_OFF} | {"area": 1.0e-5}
 _REGULATORS = ("pipeline-jacpac-regulator", "festo-lrma-qs-4")
 _PROCESSOR, _CELL = "msp430g2553", "ncr18650b"
@@ -235,7 +235,7 @@ def _wearer(wish: Wish) -> list[str]:
 
 
 def _stature(wish: Wish) -> float:
-    """Return the stature [m] of the wearer, that of the paper's subject unless one is given."""
+    """Return the stature [m] of the wearer, the paper's subject unless one is given."""
     return paper_subject().stature if wish.stature is None else wish.stature
 
 
