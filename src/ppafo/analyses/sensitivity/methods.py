@@ -184,7 +184,7 @@ def _orders(count: int, blocks: int, seed: int) -> NDArray[np.intp]:
 
 
 def _conditional(covariance: Floats, free: NDArray[np.bool_]) -> tuple[Floats, Floats]:
-    """Return what makes scores of free values from scores of fixed ones: a matrix for the mean, a factor of the rest."""
+    """Return what gives scores of free values from fixed ones: a matrix for the mean, a factor for the rest."""
     across = covariance[np.ix_(free, ~free)]
     mean = np.asarray(np.linalg.solve(covariance[np.ix_(~free, ~free)], across.T).T, dtype=np.float64)
     rest = covariance[np.ix_(free, free)] - mean @ across.T
