@@ -125,7 +125,7 @@ def _rooms(package: Path) -> Iterator[str]:
     for path, length in sorted(lengths.items()):
         parts = path.relative_to(package).parts
         rooms.setdefault(parts[0] if len(parts) > 1 else "(top)", []).append(length)
-    yield f"| {'room':<15} | {'files':>5} | {'lines':>6} | {'median':>6} | {'longest':>7} |"
+    yield f"| {'package':<15} | {'files':>5} | {'lines':>6} | {'median':>6} | {'longest':>7} |"
     yield f"|{'-' * 17}|{'-' * 6}:|{'-' * 7}:|{'-' * 7}:|{'-' * 8}:|"
     for room, found in [*sorted(rooms.items()), ("all", list(lengths.values()))]:
         yield f"| {room:<15} | {len(found):>5} | {sum(found):>6} | {statistics.median(found):>6.0f} | {max(found):>7} |"

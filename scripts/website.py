@@ -126,7 +126,7 @@ def interface() -> dict[str, str]:
     rooms = {room: list(_modules(f"ppafo.{room}")) for room in ROOMS}
     pages |= {f"rooms/{room}": _room(room, modules) for room, modules in rooms.items()}
     pages["rooms/equations"] = _equations({module.__name__ for modules in rooms.values() for module in modules})
-    pages["rooms"] = _titled("Inside, by room", "Pure functions of floats, each with unit, sign and equation.") + _tree(
+    pages["rooms"] = _titled("Inside, by package", "Pure functions of floats, each with unit, sign and equation.") + _tree(
         ["rooms/equations", *(f"rooms/{room}" for room in ROOMS)], shown=True
     )
     pages["kinds"] = kinds()
@@ -147,7 +147,7 @@ def _first_line(module: ModuleType) -> str:
 
 
 def _index(homes: Mapping[str, Sequence[str]]) -> str:
-    """All public names by the room that they live in, each with its first line."""
+    """All public names by the package that they live in, each with its first line."""
     text = _titled("Python interface", "All that ``import ppafo`` offers, loaded when it is first used.")
     text += _tree(f"public/{room}" for room in sorted(homes))
     for room, names in sorted(homes.items()):
@@ -198,8 +198,8 @@ def _equations(described: set[str]) -> str:
     """Functions that carry an equation of the paper and live elsewhere: engine, walking, translation."""
     named = re.findall(r"`(ppafo\.[\w.]+)`", (DOCS / "equations.md").read_text(encoding="utf-8"))
     elsewhere = [name for name in dict.fromkeys(named) if name.rpartition(".")[0] not in described]
-    text = "Those that :doc:`the page on equations </docs/equations>` names and that are not in the rooms below."
-    return _titled("Equations in other rooms", text) + "".join(f".. autofunction:: {name}\n\n" for name in elsewhere)
+    text = "Functions that :doc:`the page on equations </docs/equations>` names and that are not in the packages below."
+    return _titled("Equations in other packages", text) + "".join(f".. autofunction:: {name}\n\n" for name in elsewhere)
 
 
 def kinds() -> str:

@@ -1,7 +1,7 @@
 """Catalogues of kinds: kinds of this package, and kinds that other packages offer, found when they are requested.
 
 A catalogue names the place of a kind of this package, ``module:KIND``, which is loaded when the kind is looked up: a
-run loads the valve and the controller that it has, and no other. A guest, a room that no other imports, is reached by
+run loads the valve and the controller that it has, and no other. A guest, a package that no other imports, is reached by
 such a name alone; where its folder is not installed its kinds are not listed. Another package offers a kind as an
 entry point of the catalogue's group; a module that is no package is named with its object, ``my_module:KIND``. Nothing
 is looked for before a name is requested that is not here.
@@ -45,7 +45,7 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
         self._places = {name: kind for name, kind in own.items() if isinstance(kind, str)}
         self._kinds = {name: kind for name, kind in own.items() if not isinstance(kind, str)}
         self._own = dict.fromkeys(own)
-        self._absent = {name: room_of(place) for name, place in self._places.items() if not is_installed(place)}
+        self._absent = {name: package_of(place) for name, place in self._places.items() if not is_installed(place)}
         for name in self._absent:
             del self._own[name], self._places[name]
 
@@ -148,18 +148,18 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
         return kind
 
 
-def room_of(place: str) -> str:
-    """Return the room of a place, ``ppafo.page`` of ``ppafo.page.workbench:live_part``."""
+def package_of(place: str) -> str:
+    """Return the package of a place, ``ppafo.page`` of ``ppafo.page.workbench:live_part``."""
     return ".".join(place.partition(":")[0].split(".")[:2])
 
 
 @lru_cache(maxsize=256)
 def is_installed(place: str) -> bool:
-    """Tell whether the room of a place is there; a folder without modules is none."""
-    room = room_of(place)
-    if room in sys.modules:
+    """Tell whether the package of a place is there; a folder without modules is none."""
+    package = package_of(place)
+    if package in sys.modules:
         return True
-    found = importlib.util.find_spec(room)
+    found = importlib.util.find_spec(package)
     return found is not None and found.origin is not None
 
 

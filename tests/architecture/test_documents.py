@@ -253,7 +253,7 @@ def test_every_path_that_a_page_names_exists(page: Path) -> None:
 
 def test_the_page_on_architecture_lists_every_room_and_no_other() -> None:
     text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
-    rooms = text.partition("## The rooms")[2].partition("## ")[0]
+    rooms = text.partition("## The packages")[2].partition("## ")[0]
     listed = {
         name for line in re.findall(r"^ {4}(\S+(?: \| \S+)*) {2,}", rooms, re.MULTILINE) for name in line.split(" | ")
     }
