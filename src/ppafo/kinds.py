@@ -1,8 +1,8 @@
 """Catalogues of kinds: kinds of this package, and kinds that other packages offer, found when they are requested.
 
 A catalogue names the place of a kind of this package, ``module:KIND``, which is loaded when the kind is looked up: a
-run loads the valve and the controller that it has, and no other. A guest, a package that no other imports, is reached by
-such a name alone; where its folder is not installed its kinds are not listed. Another package offers a kind as an
+run loads the valve and the controller that it has, and no other. A guest, a package that no other imports, is reached
+by such a name alone; where its folder is not installed its kinds are not listed. Another package offers a kind as an
 entry point of the catalogue's group; a module that is no package is named with its object, ``my_module:KIND``. Nothing
 is looked for before a name is requested that is not here.
 """

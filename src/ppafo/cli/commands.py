@@ -8,7 +8,7 @@ from types import FunctionType
 
 from ppafo.cli.command_line import Command, Group, UsageError
 from ppafo.errors import nearest_name
-from ppafo.kinds import Kinds, is_installed, room_of
+from ppafo.kinds import Kinds, is_installed, package_of
 
 _ANALYSES, _BENCH, _DEVICE = "ppafo.cli.verbs.analyses", "ppafo.cli.verbs.bench", "ppafo.cli.verbs.device"
 _TOOLS, _WALKING = "ppafo.cli.verbs.tools", "ppafo.cli.verbs.walking"
@@ -191,7 +191,7 @@ def _check_installed(given: list[str]) -> None:
     if isinstance(one, Group):
         one = one.actions.get(shown[-1])
     if one is not None and not is_installed(one.verb):
-        raise UsageError(f"'ppafo {' '.join(shown)}' is part of {room_of(one.verb)}, which is not installed")
+        raise UsageError(f"'ppafo {' '.join(shown)}' is part of {package_of(one.verb)}, which is not installed")
 
 
 def list_commands() -> str:
