@@ -126,7 +126,7 @@ def interface() -> dict[str, str]:
     rooms = {room: list(_modules(f"ppafo.{room}")) for room in ROOMS}
     pages |= {f"rooms/{room}": _room(room, modules) for room, modules in rooms.items()}
     pages["rooms/equations"] = _equations({module.__name__ for modules in rooms.values() for module in modules})
-    pages["rooms"] = _titled("Inside, by package", "Pure functions of floats, each with unit, sign and equation.") + _tree(
+    pages["rooms"] = _titled("Inside, by package", "Pure functions of floats: unit, sign, equation.") + _tree(
         ["rooms/equations", *(f"rooms/{room}" for room in ROOMS)], shown=True
     )
     pages["kinds"] = kinds()

@@ -49,7 +49,7 @@ def _sensor(unit: str, what: str) -> tuple[Quantity, ...]:
     return (
         _from_zero("noise", unit, f"standard deviation of the noise of the {what}"),
         _from_zero("offset", unit, f"standard deviation of the offset of the {what}, drawn once"),
-        _from_zero("quantum", unit, f"step of the {what}, 0 for none"),
+        _from_zero("resolution", unit, f"step of the {what}, 0 for none"),
     )
 
 
@@ -340,12 +340,12 @@ class Sensor:
     """One sensor at work: offset that was drawn, step of quantisation, and the noise of every sample to come."""
 
     offset: float
-    quantum: float
+    resolution: float
     noise: Floats
 
     def reads(self, true: float, sample: int) -> float:
         """Return the reading at a sample, in the unit of ``true`` [SI]."""
-        return quantise(true + self.offset + float(self.noise[sample]), self.quantum)
+        return quantise(true + self.offset + float(self.noise[sample]), self.resolution)
 
     def readings(self, true: Floats) -> Floats:
         """Return the readings [SI] at the first samples."""
@@ -363,8 +363,8 @@ def sensor(preset: Preset, channel: str, seed: int, samples: int, fraction_of_ra
     ``fraction_of_range`` [-] scales offset, noise and step.
     """
     given = preset.section(CHANNEL_SENSORS[channel])
-    offset, noise, quantum = (fraction_of_range * given[name] for name in ("offset", "noise", "quantum"))
+    offset, noise, resolution = (fraction_of_range * given[name] for name in ("offset", "noise", "resolution"))
     stream = random_stream(seed, channel)
     # The offset comes first, so that a longer recording begins with the same noise.
     drawn = offset * float(stream.standard_normal())
-    return Sensor(drawn, quantum, noise * stream.standard_normal(samples))
+    return Sensor(drawn, resolution, noise * stream.standard_normal(samples))

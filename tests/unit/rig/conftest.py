@@ -15,7 +15,7 @@ def perfect() -> Preset:
     """The ideal laboratory without noise, offset and rounding."""
     preset = load_preset("ideal-laboratory")
     for path in preset.values:
-        if path.rpartition(".")[2] in {"noise", "offset", "quantum"}:
+        if path.rpartition(".")[2] in {"noise", "offset", "resolution"}:
             preset = preset.with_value(path, 0.0, "a test")
     return preset
 

@@ -98,7 +98,7 @@ def test_an_offset_is_drawn_once_and_told_in_the_truth(perfect: Preset) -> None:
 
 def test_readings_are_whole_steps_of_the_sensor() -> None:
     preset = load_preset("paper-bench")
-    angle = record("free-decay", preset, 2).recording["angle"] / preset.values["angle_sensor.quantum"]
+    angle = record("free-decay", preset, 2).recording["angle"] / preset.values["angle_sensor.resolution"]
     assert np.abs(angle - np.round(angle)).max() < 1e-6
     assert np.unique(np.round(angle)).size > 100
 

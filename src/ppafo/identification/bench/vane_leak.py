@@ -163,7 +163,7 @@ def closed_chambers(source: Source, settings: VaneLeakSettings) -> ClosedChamber
     skipped = check_no_gap(source, PROCEDURE, part)
     for name in CHANNELS:
         for plateau in plateaus(part[name]):
-            # Later plateaus may be the quantum of the sensor, as the pressure hardly falls any more.
+            # Later plateaus may be the resolution of the sensor, as the pressure hardly falls any more.
             if plateau.first < EDGE and stands_out(part[name], plateau):
                 raise IdentificationError(
                     f"{source.name}: {PROCEDURE}: channel '{name}' stays at exactly {1e-3 * plateau.value:g} kPa for "
