@@ -15,11 +15,12 @@ from pathlib import Path
 import pytest
 
 from ppafo.analyses.reproduce import solve as study
-from ppafo.analyses.reproduce.answer import Reproduction
+from ppafo.analyses.reproduce.answer import Reproduction, finding_of
 from ppafo.analyses.reproduce.bench import bench_figure
 from ppafo.cli.main import main
 from ppafo.errors import SimulationError
 from ppafo.progress import Report
+from ppafo.report.finding import Finding
 from ppafo.rig.solution import RigSolution
 from ppafo.storage import read_csv
 
@@ -154,9 +155,9 @@ def test_a_missed_window_is_named_and_fails_unless_values_were_changed(
         for claim in reproduction.claims
     )
 
-    def missing(overrides: Sequence[str], progress: Report, study: str) -> Reproduction:
+    def missing(overrides: Sequence[str], progress: Report, study: str) -> Finding[Reproduction]:
         assert study == "ppafo-2011"
-        return dataclasses.replace(reproduction, claims=claims, overrides=tuple(overrides))
+        return finding_of(dataclasses.replace(reproduction, claims=claims, overrides=tuple(overrides)))
 
     monkeypatch.setattr(study, "reproduce", missing)
     assert main(["reproduce"]) == 1

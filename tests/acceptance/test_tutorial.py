@@ -52,7 +52,7 @@ def test_the_valves_differ_as_the_page_says(names: Mapping[str, Any]) -> None:
 
 
 def test_the_identified_set_is_closer_to_the_recording(names: Mapping[str, Any]) -> None:
-    agreement = names["agreement"]
+    agreement = names["agreement"].found
     assert all(recording.passes for recording in agreement.recordings)  # each within 10 % of full range
     assert not agreement.causes.is_noise
     assert agreement.causes.found or agreement.causes.nearest
@@ -63,7 +63,7 @@ def test_the_identified_set_is_closer_to_the_recording(names: Mapping[str, Any])
 
 
 def test_the_values_of_the_bench_are_found_with_the_verdicts_of_the_page(names: Mapping[str, Any]) -> None:
-    verdicts = {item.path: item.verdict for item in names["found"].estimates}
+    verdicts = {item.path: item.verdict for item in names["identified"].found.estimates}
     assert verdicts["actuator.torque_constant"] == "holds for this model only"
     assert verdicts["valves.main.discharge_coefficient"] == "identified"
     assert "actuator.leak.area" not in verdicts

@@ -96,8 +96,10 @@ def test_mass_balance_closes_to_rounding_and_agrees_with_the_reference(
 
 def test_ten_thousand_random_devices_give_numbers_and_none_fails(draws: ModuleType) -> None:
     runs = [
-        dataclasses.replace(plan_run(dataclasses.replace(draws.random_scenario(seed), duration=0.3)), record_every=0)
-        for seed in range(MANY)
+        dataclasses.replace(
+            plan_run(dataclasses.replace(scenario, run=dataclasses.replace(scenario.run, duration=0.3))), record_every=0
+        )
+        for scenario in map(draws.random_scenario, range(MANY))
     ]
     rows = [state_row_numbers(run) for run in runs]
     for seed, (run, row, result) in enumerate(zip(runs, rows, run_together(runs), strict=True)):

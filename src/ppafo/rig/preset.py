@@ -308,7 +308,12 @@ def with_line(device: Device, plant: PlantParameters, preset: Preset) -> tuple[P
         line["area"], line["discharge_coefficient"], gas.heat_capacity_ratio, gas.specific_gas_constant, gas.temperature
     )
     shorter = plant._replace(dead_volume_1=plant.dead_volume_1 - volume, dead_volume_2=plant.dead_volume_2 - volume)
-    return shorter, ExactOrifice(conductance, 0.0, gas.heat_capacity_ratio, device.flow.linear_ratio)
+    return shorter, ExactOrifice(
+        conductance=conductance,
+        is_iso6358=0.0,
+        number=gas.heat_capacity_ratio,
+        linear_ratio=device.flow.linear_ratio,
+    )
 
 
 Floats = NDArray[np.float64]

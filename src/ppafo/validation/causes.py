@@ -114,6 +114,7 @@ class _Tried(NamedTuple):
     size: float
     left: _Left
     gain: float
+    rank: tuple[float, bool]
 
 
 def causes_of(
@@ -228,8 +229,10 @@ class _Search:
                 if left is not None:
                     parts = np.log(np.maximum(none, 1.0)) - np.log(np.maximum(left.squares, 1.0))
                     gain = float(counts @ parts) - self.penalty * (len(one.sizes) > 1)
-                    if one.name not in best or gain > best[one.name].gain:
-                        best[one.name] = _Tried(size, left, gain)
+                    # Sizes that leave nothing but noise are equal: one inside the grid is known better than its ends.
+                    inside = min(one.grid) < size < max(one.grid)
+                    if one.name not in best or (gain, inside) > best[one.name].rank:
+                        best[one.name] = _Tried(size, left, gain, (gain, inside))
             if step < _STEPS:
                 runs = self._improved([one for one in candidates if len(one.sizes) > 1 and one.name in best], best)
         return [
@@ -257,7 +260,7 @@ class _Search:
         runs = []
         for one, left in zip(moved, beside, strict=True):
             if left is not None:
-                size, before, _ = best[one.name]
+                size, before = best[one.name][:2]
                 slope = (left.errors - before.errors) / lengths[one.name]
                 low, high = ends[one.name]
                 size -= float(slope @ before.errors) / max(float(slope @ slope), 1.0e-300)
@@ -369,7 +372,8 @@ def _fault_of(values: Floats, one: ChannelAgreement, time: Floats) -> tuple[str,
         is_sudden = one.channel != ANGLE and any(is_at_limit(values, plateau) for plateau in plateaus(values))
         if is_many and (is_sudden or is_noisy(values[~is_there])):
             return f"is clipped: {counts[place]} samples are exactly its {word} value", is_there
-    around = np.lib.stride_tricks.sliding_window_view(np.pad(values, 2, mode="edge"), 5)
+    # Mirrored at the ends, where an outlier would else be three of its own five neighbours.
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(values, 2, mode="reflect"), 5)
     away = np.abs(values - np.median(around, axis=1))
     is_out = (away > _OUTLIER * one.noise) & (away > _OVER_STEPS * np.ptp(around[:, [0, 1, 3, 4]], axis=1))
     count = int(is_out.sum())

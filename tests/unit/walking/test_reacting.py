@@ -189,7 +189,7 @@ def test_a_walk_on_a_bottle_ends_with_the_fall_and_strides_are_those_of_the_wear
     assert isinstance(life, Endurance)
     assert life.draw.stride_time == pytest.approx(walk(load_walk(WALK), 0.1).metrics["stride_time"].value)
     (tmp_path / "walk.json").write_text(json.dumps({"format": pair.to_dict()["format"]}))
-    with pytest.raises(DataError, match="is the walk of a wearer who reacts: walk on the bottle"):
+    with pytest.raises(DataError, match="is the walk of a neuromuscular gait model: walk on the bottle"):
         endurance(tmp_path)
 
 

@@ -104,7 +104,8 @@ def test_a_dead_time_of_the_valve_delays_the_pressure(walk_plan: Callable[[str],
     seen = {}
     for delay in (0.0, 0.0304):
         valve = replace(plan.device.valve, settings={**plan.device.valve.settings, "delay": delay})
-        run = plan_walk(replace(plan, device=replace(plan.device, valve=valve), duration=3.0))
+        device = replace(plan.device, valve=valve)
+        run = plan_walk(replace(plan, device=device, run=replace(plan.run, duration=3.0)))
         rows = state_row_numbers(run)
         record = run_batch(batch_of(run)).record[:, :, 0]
         loaded = record[:, rows["state.supplied_mass"]] > 1e-6
