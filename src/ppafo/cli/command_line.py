@@ -119,6 +119,7 @@ def reading_of(annotation: Any) -> Reading:
     while True:
         origin, inner = typing.get_origin(annotation), typing.get_args(annotation)
         if origin is Annotated:
+            # Python flattens nested annotations with the outermost last: that one has the last word.
             word = word or next((item for item in reversed(inner) if isinstance(item, Word)), None)
             annotation = inner[0]
         elif origin in (typing.Union, types.UnionType):
@@ -173,6 +174,7 @@ def _add_parameter(
     word, is_required = reading.word, parameter.default is inspect.Parameter.empty
     default = None if is_required else parameter.default
     said = said.replace("{default}", f"{100.0 * default:g}%") if isinstance(default, float) else said
+    # argparse formats its help texts with %, so a per cent sign is doubled.
     options: dict[str, Any] = {"help": said.replace("%", "%%"), "default": default}
     option = option_of(parameter, reading)
     if option:
@@ -189,12 +191,14 @@ def _add_parameter(
     if not option:
         if reading.is_repeated:
             options["nargs"] = "+" if is_required else "*"
+        # With --list the word may be missing; without it ``run`` refuses that.
         elif not is_required or lists:
             options["nargs"] = "?"
         parser.add_argument(parameter.name, **options)
         return
     options["required"] = is_required
     if reading.is_repeated:
+        # A list, because argparse cannot append to a tuple, which a verb may have as its default.
         options |= {"action": "append", "default": list(default or ())}
     if word.const is not None:
         options |= {"nargs": "?", "const": word.const}
@@ -217,6 +221,7 @@ def run(parsed: argparse.Namespace, name: str, command: Command) -> int:
         folder = parsed.out
         if folder is None and command.default_folder:
             folder = kind_at(command.default_folder)(values)
+        # Before the verb runs: a folder that is refused must not cost a long run.
         output.check_output(folder, name)
     with output.progress_line() as progress:
         found = verb(**values, **({PROGRESS: progress} if PROGRESS in parameters else {}))

@@ -93,6 +93,7 @@ def _sentence(summary: str) -> str:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code: 0 good, 1 a check failed, 2 bad input, 130 interrupted."""
+    # A call from Python: its process goes on, and so must its garbage collection.
     if arguments is not None:
         return _run(list(arguments))
     gc.set_threshold(OBJECTS_BETWEEN_COLLECTIONS)

@@ -159,6 +159,7 @@ class World:
         if self.is_continuous:
             given[:] = np.reshape(actions, given.shape)
         else:
+            # Vent valve first: where there is none, the last column is the command, which the next line sets.
             given[:, -1] = 0.0
             given[:, 0] = np.subtract(actions, 1)
         if not np.isfinite(given).all():
@@ -400,6 +401,7 @@ class PneumaticVectorEnv(VectorEnv[Observations, Any, Any]):
         reset = np.zeros(self.num_envs, dtype=np.bool_)
         if self.autoreset_mode is AutoresetMode.NEXT_STEP and before.any():
             reset = before
+            # A step that resets ignores its action in Gymnasium's mode: it has no reward and ends nothing.
             for values in (seen.rewards, seen.terminated, seen.truncated):
                 values[reset] = 0
             self._ended = self._ended & ~reset
@@ -408,6 +410,7 @@ class PneumaticVectorEnv(VectorEnv[Observations, Any, Any]):
             # What environments that begin again at once showed at their end.
             last = np.full(self.num_envs, None, dtype=object)
             for place in np.flatnonzero(reset):
+                # A copy, because the observations of the new episode overwrite this row below.
                 last[place] = seen.observations[place].copy()
             info = _masked({"error": seen.errors, "supplied_mass": seen.supplied}, reset)
             infos |= {"final_obs": last, "_final_obs": reset.copy(), "final_info": info, "_final_info": reset.copy()}

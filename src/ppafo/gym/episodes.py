@@ -117,8 +117,10 @@ def _step(rows: LaneRows, task: Task) -> list[str]:
         *parts,
         "first = block * states.shape[1]",
         "width = min(states.shape[1], actions.shape[0] - first)",
+        # A call with 0 steps senses and observes alone: this is how episodes begin.
         "if steps > 0:",
         "    for lane in range(states.shape[1]):",
+        # Lanes without an environment take the action of the last one.
         "        place = min(first + lane, actions.shape[0] - 1)",
         f"        {rows.cells['result.command']} = {given}",
         f"    {call}",
@@ -233,6 +235,7 @@ class Environments:
     def __init__(self, program: Program, clock: Clock, task: Task, count: int, judging: Judging) -> None:
         self.count = count
         self._clock, self._judging = clock, judging
+        # Lanes in whole vectors: a few environments need no block of full width.
         width = min(lanes_of(program), -(-count // VECTOR) * VECTOR)
         blocks = -(-count // width)
         state_rows = [path for name, row in program.state_rows().items() for path in leaf_paths(row, name)]
@@ -277,11 +280,13 @@ class Environments:
         last = np.flatnonzero(places == self.count - 1)
         every = np.concatenate([np.arange(places.size), np.repeat(last, spare.size)])
         blocks, own = np.divmod(np.concatenate([places, spare[: spare.size * last.size]]), lanes)
+        # The last row is the step at which the episode begins: the drawn columns do not have it.
         self._states[blocks, :-1, own] = columns.states.T[every]
         self._states[blocks, self._start, own] = float(self._now)
         self._parameters[blocks, :, own] = columns.parameters.T[every]
         self._own[blocks, :, own] = 0.0
         self._own[blocks, : columns.goals.shape[0], own] = columns.goals.T[every]
+        # Delayed commands of the episode before must not reach this one.
         self._commands[blocks, :, own] = 0.0
         self._chosen[:] = 0.0
         self._chosen[places] = 1.0
@@ -310,6 +315,7 @@ class Environments:
             clock.signal_delay,
             clock.command_delay,
         )
+        # Copies, because the kernel writes the same arrays at the next step.
         rewards, errors, supplied = self._outcomes[:FAILED].copy()
         failed, through = self._outcomes[FAILED:] != 0.0
         return Seen(self._observations.astype(np.float32), rewards, errors, supplied, failed, through)

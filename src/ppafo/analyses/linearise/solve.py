@@ -85,6 +85,7 @@ class Plant:
 
     def function(self, expressions: Sequence[Any]) -> Callable[[Mapping[str, float]], Any]:
         """A function of the values of all symbols by name; it returns a column for each expression."""
+        # CasADi is an optional package: this module can be imported without it.
         import casadi
 
         made = casadi.Function("of_values", list(self.symbols.values()), list(expressions))
@@ -119,6 +120,7 @@ def plant_of(run: Run, way: float | None, compare: Compare = both_sides, time: f
     spool = dict(zip(valve_names, moves, strict=True))
     pressures: tuple[Any, Any] = (at["pressure_1"], at["pressure_2"])
     turning: dict[str, Any] = {}
+    # A vane that is held or prescribed has no acceleration: angle and velocity are no states then.
     if way:
         angle, rate = (at[name] for name in motion)
         acting = dict(zip(program.effects, run.effects, strict=True))
@@ -200,6 +202,7 @@ class Point:
 
 def point_at(scenario: Scenario, time: float) -> Point:
     """The point that the run of a scenario passes at a time [s], to the nearest step; ScenarioError outside the run."""
+    # Allowance for rounding: the end of the run itself is a valid time.
     if not 0.0 <= time <= scenario.run.duration * (1.0 + 1.0e-12):
         raise ScenarioError(
             f"{scenario.name}: --at {time:g} s is outside the run, which lasts {scenario.run.duration:g} s"
@@ -322,6 +325,7 @@ class _Search:
 
         self._names = [*plant.states, *([] if wanted is None else ["command"])]
         self._sizes = np.array([_size(name) for name in self._names])
+        # Rates over the sizes of their states, so that pascals and openings count alike.
         rates = [plant.rates[name] / _size(name) for name in plant.states]
         torque = [] if wanted is None else [plant.outputs["torque"] - wanted]
         residual = casadi.vertcat(*rates, *torque)
@@ -338,6 +342,7 @@ class _Search:
                 return values if abs(values["command"]) <= 1.0 + STEADY else None
             if not (np.isfinite(largest) and np.isfinite(slopes).all()):
                 return None
+            # Least squares instead of a solver that refuses: in a dead band the slopes are singular.
             step = np.linalg.lstsq(slopes * self._sizes, -residual, rcond=None)[0] * self._sizes
             share = 1.0
             while share > 1.0e-6:
@@ -452,6 +457,7 @@ class _Sides:
         larger = max(abs(one), abs(other))
         surplus = one - other if abs(one - other) > EQUAL * larger else ahead
         tests = {"<": surplus < 0.0, "<=": surplus <= 0.0, ">": surplus > 0.0, ">=": surplus >= 0.0}
+        # Signs that are not in the table are == and !=: they have no edge.
         is_true = tests.get(sign, (one == other) == (sign == "=="))
         if sign in tests and abs(one - other) <= ON_THE_EDGE * larger:
             self.edges[place] = Edge(place, is_true)
@@ -490,6 +496,7 @@ def _model(scenario: Scenario, run: Run, point: Point) -> LinearModel:
     edges = []
     for place, edge in decided.edges.items():
         others = _matrices(plant_of(run, point.way, _Sides(values, place), time), values)
+        # An edge counts only where the linear model on its other side is a different one.
         if any(_differs(one, other) for one, other in zip(matrices[:4], others[:4], strict=True)):
             edges.append(edge)
     a, b, c, d, found, shown = matrices

@@ -268,6 +268,7 @@ def draw_until(
     for size in rule.sizes:
         done = looks[-1].draws if looks else 0
         columns = statistic.columns(uncertainty, done, size - done, seed)
+        # Draws of the first look are kept: they are repeated with new noise to find its share of the variance.
         drawn = drawn or columns
         runs.run(columns)
         looks.append(_look(runs, metric, statistic, rule))

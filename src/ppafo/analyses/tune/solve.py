@@ -99,6 +99,7 @@ def bad_ends(values: Floats, spread: Spread | None, is_high: bool) -> Floats:
 def judge(runs: Crossed, problem: Problem, scales: Mapping[str, float]) -> Judgement:
     """Return objective and violation of candidates; ``scales`` are the sizes of the goals by metric [SI]."""
     failing = runs.without_value
+    # Candidates with failed runs are ranked by how many fail: 0 keeps nan out of the sums meanwhile.
     known = {name: np.where(failing[:, None] > 0.0, 0.0, values) for name, values in runs.metrics.items()}
     objective = sum((_term(goal, known, problem.spread, scales) for goal in problem.goals), np.zeros(failing.size))
     violation = sum((_excess(item, known, problem.spread) for item in problem.constraints), np.zeros(failing.size))
@@ -113,6 +114,7 @@ def _excess(item: Limit, values: Mapping[str, Floats], spread: Spread | None) ->
     """Return by how much a constraint is broken, as a fraction of its limit (candidates,); 0 where it is kept."""
     reached = bad_ends(values[item.metric], spread, item.is_most)
     beyond = reached - item.limit if item.is_most else item.limit - reached
+    # A limit of 0 has no fractions: the excess itself counts.
     return np.maximum(0.0, beyond) / (abs(item.limit) or 1.0)
 
 
@@ -141,6 +143,7 @@ def _start(costs: Costs, before: Sequence[float], effort: Effort, random: np.ran
 
     def generation(columns: Floats) -> Floats:
         nonlocal tried
+        # SciPy has a candidate in each column, the costs one in each row.
         fractions = np.clip(np.atleast_2d(columns.T), 0.0, 1.0)
         found = costs(fractions)
         tried += len(fractions)
@@ -162,9 +165,12 @@ def _start(costs: Costs, before: Sequence[float], effort: Effort, random: np.ran
         init="latinhypercube",
         popsize=effort.candidates_per_gain,
         maxiter=effort.generations,
+        # No test of SciPy's own: ``stop`` decides, which knows what a broken constraint adds to the costs.
         tol=0.0,
         callback=stop,
+        # Polishing would take derivatives of a cost that jumps where a constraint breaks.
         polish=False,
+        # A whole generation at a time, so that it is one ensemble.
         updating="deferred",
         vectorized=True,
         rng=random,
@@ -203,6 +209,7 @@ def tune(
     problem = _problem_of(tuning, overrides)
     if seed is not None:
         problem = replace(problem, effort=problem.effort.model_copy(update={"seed": seed}))
+        # Noise alone follows the seed of the search; draws of a study keep the seed of the study.
         if problem.spread is not None and not problem.spread.study:
             problem = replace(problem, spread=replace(problem.spread, seed=seed))
     effort, draws = problem.effort, 1 if problem.spread is None else problem.spread.draws
@@ -278,6 +285,7 @@ def _setting(runs: Runs, problem: Problem, scales: Mapping[str, float], gains: G
     spread = problem.spread
     seen = _of_gains(runs, problem, [gains], _draws(problem, 0, 1 if spread is None else spread.draws))
     judged: Judgement = judge(seen, problem, scales)
+    # Draws that follow those of the search: the gains were not chosen on them.
     columns = {} if spread is None else _draws(problem, spread.draws, FRESH_DRAWS)
     again = seen if spread is None else _of_gains(runs, problem, [gains], columns)
     rejudged: Judgement = judge(again, problem, scales)
@@ -337,11 +345,13 @@ def _is_explained(item: Limit, spread: Spread | None, values: Floats, lacking: F
         if not keeps(item, float(least[0])):
             return True
     rest = values[:, lacking[0] == 0.0]
+    # A standard deviation needs two draws.
     return rest.shape[1] < 2 or keeps(item, float(bad_ends(rest, spread, item.is_most)[0]))
 
 
 def scenario_with(problem: Problem, gains: Gains) -> Scenario:
     """Return the scenario of a problem with gains in it, as the pasted lines give it."""
+    # Gains that are unchanged are not written and read again, which would round them.
     if gains == problem.before:
         return problem.scenario
     return with_overrides(problem.scenario, problem.lines(gains))

@@ -202,6 +202,7 @@ def _channel_panels(agreement: RecordingAgreement, channel: ChannelAgreement, at
     name, measured, model = channel.channel, agreement.measured, agreement.model
     given = measured_values(measured, name)
     assert given is not None, "a channel that is compared was measured"
+    # The measurement is late by the delay, so the model is read that much earlier.
     line = np.interp(measured.time - agreement.delay.correction, model.time, model[name])
     is_short, is_chamber = measured.duration < _SHORT, name in (PRESSURE_1, PRESSURE_2)
     time, scale = (Kind("Time", "ms"), _MILLISECONDS) if is_short else (TIME, 1.0)
@@ -300,6 +301,7 @@ def verdict(validation: Validation) -> str:
     )
     why = _why(validation.causes)
     if not validation.passes:
+        # Where no channel is beyond its limit, an unusual cause alone is what fails the set.
         parts = (why, size, f"beyond the limit: {failed}") if why else (failed, size)
         return f"{name} does not agree: {'; '.join(parts if failed else parts[:2])}"
     rest = "nothing but noise is left" if validation.causes.is_noise else "; ".join([size, *([why] if why else [])])

@@ -129,6 +129,7 @@ class Trials:
         pressures, gains = np.repeat(pressure, sets), np.tile(np.arange(sets), pressure.size)
         trial = self.run(valve, pressures, gains, np.full(pressures.size, opening))
         shape = (pressure.size, sets)
+        # Infinite for failed runs: argmin would take nan for the smallest.
         error = np.where(np.isnan(trial.error), np.inf, trial.error).reshape(shape)
         works = error <= self.problem.largest_error
         gas = np.where(works, trial.gas.reshape(shape), np.inf)
@@ -184,6 +185,7 @@ def try_pressures(trials: Trials, valve: Part) -> Pressures:
         raise StudyError(f"{problem.file}: every run with '{valve.name}' failed; the first: {reason}")
     while found.first and found.pressure[found.first] - found.pressure[found.first - 1] > FINENESS:
         lower, upper = found.pressure[found.first - 1], found.pressure[found.first]
+        # Without both ends, which were tried before.
         finer = _pressures(trials, valve, np.linspace(lower, upper, GRID)[1:-1])
         found = _merge(found, finer)
     return found
@@ -233,6 +235,7 @@ def ceiling_pressure(problem: SizingProblem) -> float:
     atmosphere = problem.scenario.device.supply.atmospheric_pressure
     whole = atmosphere + problem.profile.largest / problem.torque_constant
     least = peak_pressure(problem)
+    # No root is there to be found where the limit is kept without any torque: brentq needs a change of sign.
     if cut_error(problem, atmosphere) <= problem.largest_error:
         return least
     cut = float(brentq(lambda pressure: cut_error(problem, pressure) - problem.largest_error, atmosphere, whole))
@@ -247,6 +250,7 @@ def peak_pressure(problem: SizingProblem) -> float:
 
 def cut_error(problem: SizingProblem, pressure: float) -> float:
     """Return the RMS error [N m] that is left if only the torque ceiling at a pressure [Pa] cuts the profile."""
+    # The end of a period is its start again and must count once.
     time = np.linspace(0.0, problem.profile.period, 2001)[:-1]
     wanted = problem.profile.at(time)
     most = ceiling(problem, pressure)
@@ -267,6 +271,7 @@ def flow_margin(trials: Trials, valve: Part, pressure: float) -> float:
     higher = np.array([atmosphere + MORE_PRESSURE * (pressure - atmosphere)])
     smallest = 1.0
     for opening in OPENINGS:
+        # Negated, so that a failed run, whose error is nan, ends the search too.
         if not trials.best(valve, higher, opening).error[0] <= trials.problem.largest_error:
             break
         smallest = opening

@@ -192,6 +192,7 @@ def size_for_wearer(wish: Wish, report: Report) -> WearerSizing:
         (valve, actuator)
         for valve in catalogue.groups["valves"].values()
         for actuator in catalogue.groups["actuators"].values()
+        # A part without a largest pressure in the catalogue is not left out.
         if all(part.values.get("largest_pressure", np.inf) >= wish.pressure for part in (valve, actuator))
     ]
     tried: list[Tried] = []
@@ -252,8 +253,10 @@ def _few_strides(wish: Wish, valve: Part, actuator: Part) -> list[Tried]:
         f"shut_off.area={_SHUT_OFF['area']:g} m^2",
     ]
     held = actuator.values["torque_constant"] * gauge
+    # No request above what the supply pressure can hold with this actuator.
     requests = [min(factor * wish.torque, held) for factor in _REQUESTS] if valve.kind == "proportional" else [None]
     best = None
+    # Requests that the limit made equal are walked with once.
     for request in dict.fromkeys(requests):
         chosen = tuple(overrides if request is None else [*overrides, *_requesting(request)])
         result = walk(load_walk(WALKS[valve.kind], chosen), _FEW)
@@ -283,6 +286,7 @@ def _lightest(
 
     No pair whose gas might do is left out, so that what is offered is found when it is asked for.
     """
+    # Heaviest first: of pairs with the same overrides the lightest replaces the others.
     strong = {one.overrides: one for one in sorted(tried, key=lambda one: -one.mass) if one.torque >= wish.torque}
     pairs = [(one, bottle) for one in strong.values() for bottle in bottles]
     too_thirsty: dict[str, float] = {}
@@ -357,6 +361,7 @@ def _instead(wish: Wish, tried: list[Tried], bottles: list[Part], report: Report
     if not strong:
         more = (_offered(*item, largest) for item in _at_more_pressure(wish, tried))
         yield from itertools.islice((_offer_text(wish, *found, largest) for found in more if found is not None), 1)
+    # A walk that ends early is no full answer: less torque for the whole time is offered beside it.
     if first is None or first[0].seconds < wish.seconds:
         found = _lasting(wish, weak, largest)
         if found is not None:
@@ -382,6 +387,7 @@ def _offered(asked: Wish, one: Tried, bottle: Part) -> tuple[Wish, Tried] | None
         asked = replace(asked, torque=math.floor(100.0 * one.torque) / 100.0)
     for again in _few_strides(asked, one.valve, one.actuator):
         walked = _walked(again, bottle, asked.seconds)
+        # Rounded down to what a command line can say, so that the offer is kept when it is asked for.
         hundredths = math.floor(min(_time(walked), asked.seconds) / 0.6)  # of a minute
         lasts = asked.seconds if _time(walked) >= asked.seconds else 0.6 * hundredths
         if again.torque >= asked.torque > 0.0 and lasts >= _SHORTEST and _keeps(walked, asked.torque):
@@ -414,6 +420,7 @@ def _at_gauge(wish: Wish, share: float) -> Wish:
 def _at_less_pressure(wish: Wish, tried: list[Tried], report: Report) -> Iterator[tuple[Wish, Tried]]:
     """Yield a few strides at less pressure, with the pairs that have the most torque for their gas."""
     thrifty = sorted((one for one in tried if one.flow > 0.0), key=lambda one: -one.torque / one.flow)
+    # Actuators of the same numbers walk alike: one of them is enough.
     pairs = list({(one.valve.name, one.torque, one.flow): one for one in thrifty}.values())[:_OFFERED]
     for place, share in enumerate(_LESS_PRESSURE):
         report(Progress("walking at less pressure", place, len(_LESS_PRESSURE), noun="pressures"))
