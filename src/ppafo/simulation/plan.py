@@ -152,6 +152,7 @@ def compose_run(
     plant = plant_behind_lines(plant, components.supply_lines)
     leg = None if components.leg is None else led_leg(plant, components.leg)
     plant = plant if leg is None else with_load(plant, leg.load)
+    # After lines and leg: the rule looks at the plant with both.
     steps = rule(plant)
     return Run(
         program=_program(components, steps, walk, has_delay=first(delay) > 0.0),
@@ -224,6 +225,7 @@ def _program(components: Components, steps: Steps, walk: WornLeg | None, has_del
         leg=None if walk is None else walk.scheme,
         feed=None if components.supply_lines is None else kind_at(_LINES),
         is_adaptive=bool(first(steps.needs_parts)),
+        # A broken number of steps to a sample puts samples inside steps.
         samples_inside=bool(first(steps.record_every % 1.0)),
         effects=effects,
         shank=None if components.leg is None else shank_kind(components.leg),
@@ -285,6 +287,7 @@ def scenario_steps(scenario: Scenario, plant: PlantParameters) -> Steps:
         step_count=whole(counts.step_count),
         steps_per_sample=whole(counts.steps_per_sample),
         record_every=counts.record_every,
+        # A stricter tolerance counts as a longer step; a looser one as the default.
         needs_parts=is_adaptive(scenario, plant, counts.step / smaller(1.0, tolerance)),
         tolerance=tolerance,
     )
@@ -437,6 +440,7 @@ def is_adaptive(scenario: Scenario, plant: PlantParameters, step: float) -> Any:
     motion = scenario.motion
     if not isinstance(motion, PrescribedMotion) or motion.profile.kind != "constant":
         return True
+    # The pressure of gas with an energy balance follows faster, by its heat capacity ratio.
     stiffness = 1.0 if scenario.gas_model is None else scenario.device.gas.heat_capacity_ratio
     return np.logical_not(is_slow_locked(plant, step, motion.profile.level, stiffness))
 
@@ -488,6 +492,7 @@ class StepCounts(NamedTuple):
 
 def step_counts(duration: float, time_step: float, output_interval: float, period: float) -> StepCounts:
     """The largest steps that divide a sample of the controller, and are no longer than ``time_step``; all in [s]."""
+    # WHOLE off first: a quotient that rounding put above a whole number would cost one more step.
     steps_per_sample = larger(1.0, rounded_up(period / time_step - WHOLE))
     step = period / steps_per_sample
     return StepCounts(

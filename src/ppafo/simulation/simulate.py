@@ -100,11 +100,13 @@ class Result:
 
     def __getattr__(self, name: str) -> Any:
         """Return recording or metrics where they were not made yet, and keep both."""
+        # Python comes here only where the ordinary look-up fails, as for a field that was never set.
         if name not in ("recording", "metrics"):
             raise AttributeError(f"a result has no '{name}'", name=name, obj=self)
         measure = self._measure
         if measure is not None:
             recording, metrics = measure()
+            # The class is frozen, and these two are only kept, so they are set past it.
             object.__setattr__(self, "recording", recording)
             object.__setattr__(self, "metrics", metrics)
             object.__setattr__(self, "_measure", None)
@@ -220,6 +222,7 @@ def results_of(scenario: Scenario, runs: Sequence[Run]) -> list[Result]:
 def simulate_many(scenarios: Sequence[Scenario], threads: int | None = None) -> list[Result]:
     """Run many scenarios side by side, each exactly as if it ran alone."""
     runs = [plan_run(scenario) for scenario in scenarios]
+    # A Python controller does not run in the lanes: its scenario runs by itself below.
     inside = [index for index, scenario in enumerate(scenarios) if scenario.controller.custom is None]
     outcomes = dict(zip(inside, run_together([runs[index] for index in inside], threads), strict=True))
     return [
@@ -234,6 +237,7 @@ def result_of(scenario: Scenario, run: Run, outcome: BatchResult) -> Result:
     times: Floats = np.arange(outcome.record.shape[0], dtype=np.float64) * (run.step * run.record_every)
     record = outcome.record[:, :, 0]
     status = _status(outcome, record, rows, times)
+    # The first sample stays in any case: a recording is never empty.
     kept = times.size if status.time is None else max(1, int(np.searchsorted(times, status.time)))
     versions = {"ppafo": __version__, "python": platform.python_version(), "numpy": np.__version__}
     engine = {"step": run.step, "steps": run.step_count, "steps_per_sample": run.steps_per_sample}
@@ -245,6 +249,7 @@ def result_of(scenario: Scenario, run: Run, outcome: BatchResult) -> Result:
         status = replace(status, message=ended) if status.is_completed else status
         return Result(scenario, recording, Metrics(metrics), status, versions, engine)
     shown = {path: row for path, row in rows.items() if not path.startswith(_OF_STEPS)}
+    # Without __init__ recording and metrics stay unset, so that __getattr__ makes them when first asked for.
     result: Result = object.__new__(Result)
     known = {"scenario": scenario, "status": status, "versions": versions, "engine": engine}
     measure = partial(_measure, scenario, run, times[:kept], record[:kept], shown)
@@ -271,7 +276,9 @@ def _status(outcome: BatchResult, record: Floats, rows: dict[str, int], times: F
     failed = float(outcome.states[rows["result.failure_time"], 0])
     if failed >= NEVER_FAILED and bool(np.isfinite(outcome.states).all()):
         return Status("completed", None, "completed")
+    # Without a time of failure the last sample is the best that is known.
     time = failed if failed < NEVER_FAILED else float(times[-1])
+    # The last sample before the failure: the one at it need not be finite.
     last = record[max(0, int(np.searchsorted(times, time)) - 1)]
     state = ", ".join(
         f"{name.replace('_', ' ')} {last[rows[f'state.{name}']]:.4g} {unit}"
@@ -380,6 +387,7 @@ def _torque_on_leg(leg: Leg, run: Run, times: Floats, rows: Mapping[str, Floats]
     added, needed = (over_samples(torque_on_foot, load, now, angle) for load in (run.leg.load, foot))
     net = torque + added - plant.external_torque - plant.viscous_damping * rate
     net -= np.sign(rate) * _sizes_of_friction(run, rows)
+    # A vane at rest is held by friction or a stop.
     acceleration = np.where(rate != 0.0, net / plant.inertia, 0.0)
     return np.asarray(foot.inertia * acceleration - needed + plant.external_torque)
 
@@ -450,10 +458,12 @@ def _start_moved(run: Run, move: float, apart: float) -> Run:
     angle = start.angle
     if run.program.angle is None:
         shifted = angle + move * (plant.angle_max - plant.angle_min)
+        # A start beyond a stop is no state of the vane.
         angle = min(max(shifted, plant.angle_min), plant.angle_max)
     actuator = run.program.actuator
     pressures = pressures_of(actuator, plant, start.angle, start.mass_1, start.mass_2)
     before, after = (volumes_of(actuator, plant, at, *pressures) for at in (start.angle, angle))
+    # Mass in proportion to volume keeps the pressure, so that only the move itself changes it.
     mass_1 = start.mass_1 * after[0] / before[0] * (1.0 + move)
     mass_2 = start.mass_2 * after[1] / before[1] * (1.0 + apart * move)
     return replace(run, initial=start._replace(angle=angle, mass_1=mass_1, mass_2=mass_2))
@@ -500,6 +510,7 @@ def _difference(now: float, before: float) -> float:
     """The change; inf where only one of both is a number."""
     if math.isfinite(now) and math.isfinite(before):
         return now - before
+    # Equal infinities and two values that are not known are no change.
     return 0.0 if now == before or (math.isnan(now) and math.isnan(before)) else math.inf
 
 
@@ -545,6 +556,7 @@ def _largest_content(recording: Recording) -> float:
 
 def _largest_differences(one: Recording, other: Recording, channels: Iterable[str]) -> Floats:
     """Largest difference of some channels at each sample that both have."""
+    # A repeat that diverged is shorter.
     count = min(len(one), len(other))
     return np.asarray(np.max([np.abs(one[name][:count] - other[name][:count]) for name in channels], axis=0))
 

@@ -218,6 +218,7 @@ def read_bottle(reading: Reading, device: Device, folder: Path) -> BottleSupply 
         bottle,
         line,
         numbers["fill"] * bottle.mass,
+        # The order of BOTTLE_NUMBERS is that of the fields after the mass.
         *(numbers[item.name] for item in BOTTLE_NUMBERS if item is not FILL),
     )
     _check(reading, device, supply)
@@ -476,7 +477,9 @@ def _use_bottle(
         device=device,
         effects=effects,
     )
+    # The line falls for a moment at each draw: its best over some strides counts, of two meetings at least.
     window = max(2, math.ceil(_STRIDES * stride_time / (every * run.step))) * every
+    # The line starts at the set pressure.
     gauges = [(0, 1.0)]
     done, first = 0, float(batch.states[regulated, 0].sum())
     before, until_rest = first, count
@@ -490,6 +493,7 @@ def _use_bottle(
         use.walked = walked_before + done * run.step
         time, state = use.walked + use.rested, met[-1][1]
         progress(use.walked / 60.0, (walked_before + count * run.step) / 60.0)
+        # Divergence first: a gas mass that is no number must not reach the supply.
         use.ending = _divergence(block.states, states["result.failure_time"], state, time)
         if use.ending is not None:
             break
@@ -511,6 +515,7 @@ def _use_bottle(
                 break
             if until_rest <= 0 and schedule.rest > 0.0:
                 _rest(supply, use, min(schedule.rest, schedule.longest - time))
+                # Gauges of before the rest say nothing of the bottle that has warmed in it.
                 gauges, until_rest = [(done, 1.0)], round(schedule.walk / run.step)
                 if use.walked + use.rested >= schedule.longest:
                     break
@@ -534,6 +539,7 @@ def _rest(supply: BottleSupply, use: _Use, rest: float) -> None:
 def _steps_to_meet(last: tuple[float, SupplyState, SupplyNow], step: float, every: int) -> int:
     """Return how many steps [of ``step`` s] the lanes go until they meet the supply again, at most ``every``."""
     _, state, now = last
+    # A regulator that passes nothing must not divide by zero.
     return max(1, min(every, int(_LARGEST_DRAW * state.mass / (max(now.largest_flow, _LEAST_FLOW) * step))))
 
 
@@ -566,6 +572,7 @@ class _Lanes:
         Then the rows of the effects, prepared anew for gas of that temperature.
         """
         plant, warmth = self.plant, now.gas_temperature / self.start
+        # Mass flow at given pressures goes with one over the root of the temperature of the gas.
         slower = 1.0 / math.sqrt(warmth)
         product, valve, leak = plant.gas_product, plant.valve_conductance, plant.leak_conductance
         own = [product * warmth, valve * slower, leak * slower, now.set_pressure, now.largest_flow]
@@ -585,17 +592,20 @@ def _ending(
     """Return what ends a walk, None while it goes on; ``reached`` is the best gauge pressure of late over the set."""
     bottle = supply.bottle
     left = _grams(state.mass)
+    # Freezing first: it ends the walk even at full torque.
     if now.content.temperature <= bottle.fluid.table.temperatures[0] + _ABOVE_FREEZING:
         return SupplyEnding("frozen", f"the fluid in the bottle freezes, with {left} left", time)
     if reached >= supply.least_torque:
         return None
     short = f"the supply gives less than {100.0 * supply.least_torque:.0f} % of the torque"
+    # The bottle still has the pressure: the flow is too small, by ice or by the seat itself.
     if now.set_pressure >= bottle.regulator.set_pressure and open_share(bottle.supply, state.ice) < _OPEN:
         kind: EndKind = "iced"
         why = f"dry ice in the seat leaves {100.0 * open_share(bottle.supply, state.ice):.0f} % of it open"
         return SupplyEnding(kind, f"the regulator is iced: {why}, and {short}; {left} are left", time)
     if now.set_pressure >= bottle.regulator.set_pressure:
         return SupplyEnding("too little flow", f"the regulator passes too little, and {short}; {left} are left", time)
+    # The same gas at room temperature tells a cold bottle from an empty one.
     warm = bottle_content(bottle.fluid.table, state.mass, bottle.volume, bottle.room_temperature).pressure
     if warm - bottle.regulator.pressure_margin >= bottle.regulator.set_pressure:
         degrees = f"{now.content.temperature - 273.15:.0f} degC"

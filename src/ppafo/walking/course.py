@@ -247,6 +247,7 @@ class _Planner:
 
     def __init__(self, frequency: Numbers, standing: Numbers, load: float) -> None:
         self.frequency = frequency
+        # Zero in the shape of the frequency, which may be an array (wearers,).
         self.time: Numbers = 0.0 * frequency
         self.turns: Numbers = standing + self.time
         self.ratio = 0.0
@@ -273,6 +274,7 @@ class _Planner:
 
         The slope of the ground [rad] goes to another one too.
         """
+        # The frequency changes evenly over the part, so its mean is that of both ends.
         length = turns / (0.5 * (self.ratio + ratio) * self.frequency)
         self._add(length, turns, ratio, stride, load, tilt, scuff, slope)
 
@@ -329,6 +331,7 @@ def plan_course(
         spans.append(Span(segment.kind, _title(segment), start, planner.time))
     duration = planner.time
     if planner.ratio == 0.0:
+        # The last part never ends, so that a step beyond the last segment has a part too.
         planner.stay(NEVER, planner.load)
     else:
         planner.go(NEVER, planner.ratio, planner.stride, slope=planner.slope)
