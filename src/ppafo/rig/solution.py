@@ -68,7 +68,7 @@ class RigSolution:
 
 def sensor_signals(physics: RigPhysics, state: Floats, pressures: Floats) -> tuple[float, float, float]:
     """Return angle [rad] and both pressures [Pa] behind the bandwidth of the sensors, before noise."""
-    now, is_slow = RigState(*state.tolist()), physics.pressure_follow_rate > 0.0
+    now, is_slow = RigState._make(state.tolist()), physics.pressure_follow_rate > 0.0
     first, second = (now.sensor_pressure_1, now.sensor_pressure_2) if is_slow else pressures.tolist()
     return now.sensor_angle if physics.angle_follow_rate > 0.0 else now.angle, first, second
 
@@ -137,7 +137,13 @@ class _Rig:
         self.rig_run, self.run, self.plant = rig_run, rig_run.run, rig_run.run.plant
         run, state = rig_run.run, rig_run.run.program.valve.initial()
         self.is_free = run.program.angle is None
-        given = RigNumbers(run.plant, rig_run.physics, run.valve_orifice, run.leak_orifice, rig_run.line_orifice)
+        given = RigNumbers(
+            plant=run.plant,
+            rig=rig_run.physics,
+            valve_orifice=run.valve_orifice,
+            leak_orifice=run.leak_orifice,
+            line_orifice=rig_run.line_orifice,
+        )
         parameters = np.array(numbers(given))
         self.y = np.array([*rig_run.initial, *numbers(state)], dtype=np.float64)
         self.tolerances = absolute_tolerances(self.y.size - UNKNOWNS)

@@ -232,7 +232,7 @@ class _Search:
                     # Sizes that leave nothing but noise are equal: one inside the grid is known better than its ends.
                     inside = min(one.grid) < size < max(one.grid)
                     if one.name not in best or (gain, inside) > best[one.name].rank:
-                        best[one.name] = _Tried(size, left, gain, (gain, inside))
+                        best[one.name] = _Tried(size=size, left=left, gain=gain, rank=(gain, inside))
             if step < _STEPS:
                 runs = self._improved([one for one in candidates if len(one.sizes) > 1 and one.name in best], best)
         return [
