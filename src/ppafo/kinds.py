@@ -153,10 +153,14 @@ def package_of(place: str) -> str:
     return ".".join(place.partition(":")[0].split(".")[:2])
 
 
-@lru_cache(maxsize=256)
 def is_installed(place: str) -> bool:
-    """Tell whether the package of a place is there; a folder without modules is none."""
-    package = package_of(place)
+    """Tell whether the package of a place is there."""
+    return _is_there(package_of(place))
+
+
+@lru_cache(maxsize=64)
+def _is_there(package: str) -> bool:
+    # Catalogues ask for each of their kinds, and a package is looked for once; a folder without modules is none.
     if package in sys.modules:
         return True
     found = importlib.util.find_spec(package)

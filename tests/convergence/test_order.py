@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 
 from ppafo.engine.lanes import run_batch
-from ppafo.engine.run import NEVER_FAILED, Run, batch_of, run_together
+from ppafo.engine.run import NEVER_FAILED, Run, batch_of, run_together, state_row_numbers
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.sampled import state_row_numbers
 from ppafo.simulation.scenario import Scenario
 from tests.judge.reference_solver import Agreement, measure_agreement, solve_reference
 

@@ -8,12 +8,11 @@ import pytest
 
 import ppafo
 from ppafo.engine.lanes import run_batch
-from ppafo.engine.run import batch_of
+from ppafo.engine.run import batch_of, state_row_numbers
 from ppafo.model.sensors import Measurement, decay_factors
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.sampled import state_row_numbers
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, PrescribedMotion, ProfileChoice
 from tests.judge.reference_solver import compare_with_reference
 

@@ -12,7 +12,7 @@ from ppafo.engine.lane_step import MAXIMUM_PARTS
 from ppafo.engine.lanes import Batch, BatchResult, Clock, load_programs, run_blocks
 from ppafo.engine.led_leg import LedLeg
 from ppafo.engine.program import LaneResult, LaneTiming, NoParameters, Program, composed_with
-from ppafo.engine.rows import leaves, rebuilt, table
+from ppafo.engine.rows import leaves, rebuilt, row_numbers, table
 from ppafo.engine.scheme.actuators import pressures_of
 from ppafo.engine.scheme.motion import Pace
 from ppafo.kinds import kind_at
@@ -158,6 +158,11 @@ def whole_and_rest(delay: float, step: float) -> tuple[float, float]:
 def batch_of(run: Run) -> Batch:
     """The run as a batch of one, for the lanes."""
     return batches_of(run, 1)[0][1]
+
+
+def state_row_numbers(run: Run) -> dict[str, int]:
+    """Row of each number of the state, by its path such as ``state.angle``."""
+    return row_numbers(run.program.state_rows())
 
 
 def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:

@@ -11,7 +11,6 @@ from ppafo.control.kind import PythonController
 from ppafo.engine.lanes import Batch, BatchResult, LaneBlock, group_of, load_program, samples_in
 from ppafo.engine.program import python_place
 from ppafo.engine.rows import row_numbers
-from ppafo.engine.run import Run
 from ppafo.engine.scheme.actuators import measurement_of
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.model.plant import actuator_torque, chamber_pressures
@@ -93,11 +92,6 @@ def run_in_turn(batch: Batch, controller: PythonController, take: Callable[[slic
         one = slice(run, run + 1)
         alone = Batch(batch.program, batch.clock, batch.parameters[:, one], batch.states[:, one])
         take(one, run_sampled(alone, controller))
-
-
-def state_row_numbers(run: Run) -> dict[str, int]:
-    """Row of each number of the state, by its path such as ``state.angle``."""
-    return row_numbers(run.program.state_rows())
 
 
 def _group(batch: Batch, name: str) -> Any:

@@ -17,8 +17,8 @@ from ppafo.engine.lanes import BatchResult, Floats, load_program, load_programs
 from ppafo.engine.led_leg import GAIT_SHANK, shank_over_samples
 from ppafo.engine.over_samples import over_samples
 from ppafo.engine.program import place_over_samples
-from ppafo.engine.rows import leaf_paths, rebuilt, row_numbers
-from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, batch_of, run_together
+from ppafo.engine.rows import leaf_paths, rebuilt
+from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, batch_of, run_together, state_row_numbers
 from ppafo.engine.scheme.actuators import pressures_of, torque_of, volumes_of
 from ppafo.errors import SimulationError
 from ppafo.model.gait import foot_in_gait
@@ -233,7 +233,7 @@ def simulate_many(scenarios: Sequence[Scenario], threads: int | None = None) -> 
 
 def result_of(scenario: Scenario, run: Run, outcome: BatchResult) -> Result:
     """The result of what a run came to; one that was stopped has the records up to there."""
-    rows = row_numbers(run.program.state_rows())
+    rows = state_row_numbers(run)
     times: Floats = np.arange(outcome.record.shape[0], dtype=np.float64) * (run.step * run.record_every)
     record = outcome.record[:, :, 0]
     status = _status(outcome, record, rows, times)

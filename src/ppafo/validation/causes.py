@@ -114,7 +114,7 @@ class _Tried(NamedTuple):
     size: float
     left: _Left
     gain: float
-    rank: tuple[float, bool]
+    is_inside: bool
 
 
 def causes_of(
@@ -231,8 +231,9 @@ class _Search:
                     gain = float(counts @ parts) - self.penalty * (len(one.sizes) > 1)
                     # Sizes that leave nothing but noise are equal: one inside the grid is known better than its ends.
                     inside = min(one.grid) < size < max(one.grid)
-                    if one.name not in best or (gain, inside) > best[one.name].rank:
-                        best[one.name] = _Tried(size=size, left=left, gain=gain, rank=(gain, inside))
+                    before = best.get(one.name)
+                    if before is None or (gain, inside) > (before.gain, before.is_inside):
+                        best[one.name] = _Tried(size=size, left=left, gain=gain, is_inside=inside)
             if step < _STEPS:
                 runs = self._improved([one for one in candidates if len(one.sizes) > 1 and one.name in best], best)
         return [
@@ -245,7 +246,7 @@ class _Search:
                 is_usual=0.0 < abs(at.size) <= one.usual,
             )
             for one, at in ((one, best[one.name]) for one in candidates if one.name in best)
-            if len(one.sizes) == 1 or min(one.grid) < at.size < max(one.grid)
+            if len(one.sizes) == 1 or at.is_inside
         ]
 
     def _improved(self, moved: Sequence[Candidate], best: Mapping[str, _Tried]) -> list[tuple[Candidate, float]]:

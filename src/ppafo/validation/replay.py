@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ppafo.engine.lanes import Batch, Floats, StepInputs, replay
-from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, batch_of
+from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, batch_of, state_row_numbers
 from ppafo.engine.scheme.actuators import pressures_of, torque_of
 from ppafo.errors import DataError, PpafoError, SimulationError, UnitError, nearest_name, one_line, refused_as
 from ppafo.parameters.device import Device
@@ -32,7 +32,6 @@ from ppafo.simulation.recorded import (
     with_highest_supply,
     with_prescribed_angle,
 )
-from ppafo.simulation.sampled import state_row_numbers
 from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion, Scenario
 from ppafo.units import parse_quantity
 from ppafo.validation.measured import ANGLE, PRESSURE_1, PRESSURE_2, Measured

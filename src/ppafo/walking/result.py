@@ -10,14 +10,13 @@ from numpy.typing import NDArray
 
 from ppafo.engine.lanes import BatchResult, Floats
 from ppafo.engine.program import LaneResult
-from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, Walk
+from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, Walk, state_row_numbers
 from ppafo.metrics import METRICS, Metric, evaluate
 from ppafo.metrics.metric import LED, LED_SHANK, REACTS, REQUEST, STEADY, MetricKind, Metrics
 from ppafo.model.contact import SWING
 from ppafo.model.leg import centrifugal_torques, gravity_torques, mass_matrix, passive_torque
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.motion_kind import REACT
-from ppafo.simulation.sampled import state_row_numbers
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario
 from ppafo.simulation.simulate import Status, gas_channels
 from ppafo.storage.opensim import opensim_recording, write_opensim

@@ -7,10 +7,9 @@ import pytest
 
 from ppafo.engine.lane_rows import lanes_of
 from ppafo.engine.lanes import Batch, begin_block, run_batch
-from ppafo.engine.run import NEVER_FAILED, Run, batch_of, run_together
+from ppafo.engine.run import NEVER_FAILED, Run, batch_of, run_together, state_row_numbers
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.sampled import state_row_numbers
 
 NAMES = ("step-response", "torque-task-proportional", "torque-task-solenoid", "torque-task-slow-valve")
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ppafo.engine.lanes import run_batch
-from ppafo.engine.run import Run, batch_of
+from ppafo.engine.run import Run, batch_of, state_row_numbers
 from ppafo.engine.scheme.motion import with_gas
 from ppafo.engine.scheme.pneumatics import (
     GasChange,
@@ -36,7 +36,6 @@ from ppafo.model.regulator import LineState, SupplyLines, line_pressures
 from ppafo.parameters import load_device
 from ppafo.parameters.plant import plant_parameters
 from ppafo.simulation.plan import initial_lines
-from ppafo.simulation.sampled import state_row_numbers
 from ppafo.simulation.scenario import RegulatedLine, SupplyLine
 from ppafo.walking import load_walk
 from ppafo.walking.motion import with_duration

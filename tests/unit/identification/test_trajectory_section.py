@@ -311,6 +311,7 @@ def test_the_published_schema_has_the_section() -> None:
         ),
         (FIT.replace("[trajectory]", "[trajectory]\nloss = 'huber'"), "loss: the first pass is robust by itself; omit"),
         (FIT.replace("low =", "scale = 'log'\nlow ="), "scale: the search scales numbers by itself; omit it"),
+        (f"{FIT}{REPLAYED}held = '75 deg'\n", "trajectory: held: is now locked; write locked = '75 deg'"),
         (f"{FIT}[bench.can]\nsupply_pressure = ['20 psi_g', '90 psi_g']\n", "write [[trajectory.candidates]]"),
     ],
 )

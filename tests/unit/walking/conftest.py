@@ -9,10 +9,9 @@ import pytest
 from numpy.typing import NDArray
 
 from ppafo.engine.lanes import run_batch
-from ppafo.engine.run import Run, batch_of
+from ppafo.engine.run import Run, batch_of, state_row_numbers
 from ppafo.gait import load_gait
 from ppafo.model.sensors import Fault
-from ppafo.simulation.sampled import state_row_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking import load_walk
 from ppafo.walking.motion import walk_of, with_duration

@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.engine.lanes import Batch, run_batch
 from ppafo.engine.rows import leaf_paths, numbers
-from ppafo.engine.run import batch_of
+from ppafo.engine.run import batch_of, state_row_numbers
 from ppafo.model.contact import TOE
 from ppafo.model.helping import HELPS, LIFTS
 from ppafo.model.plant import chamber_pressures
 from ppafo.model.sensors import Fault, GaitSensors
-from ppafo.simulation.sampled import state_row_numbers
 from ppafo.units import parse_quantity
 from ppafo.walking import load_walk, walk_population
 from ppafo.walking.events import SAFE_ROW

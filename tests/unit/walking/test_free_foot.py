@@ -9,14 +9,13 @@ import numpy as np
 import pytest
 
 from ppafo.engine.lanes import run_batch
-from ppafo.engine.run import Run, batch_of
+from ppafo.engine.run import Run, batch_of, state_row_numbers
 from ppafo.engine.scheme.walking import DeviceShare, foot_direction, leg_torque
 from ppafo.gait import Gait, load_gait
 from ppafo.gait.gait import Curve
 from ppafo.model import contact as ground
 from ppafo.model.gait import gait_at
 from ppafo.model.leg import foot_inertia_about_ankle, passive_torque
-from ppafo.simulation.sampled import state_row_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.gait_series import heel_rocker, landing_phase, truncate
 from ppafo.walking.motion import walk_of

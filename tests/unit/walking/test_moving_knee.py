@@ -9,7 +9,7 @@ import pytest
 
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.rows import leaves
-from ppafo.engine.run import batch_of
+from ppafo.engine.run import batch_of, state_row_numbers
 from ppafo.engine.scheme.walking import foot_direction
 from ppafo.gait import Gait, load_gait
 from ppafo.gait.gait import Curve
@@ -23,7 +23,6 @@ from ppafo.model.leg import (
     mass_matrix,
 )
 from ppafo.signals.recording import Floats
-from ppafo.simulation.sampled import state_row_numbers
 from ppafo.walking.gait_series import gait_series, gait_timing
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import plan_walk

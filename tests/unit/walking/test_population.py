@@ -8,10 +8,9 @@ import pytest
 
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.rows import leaf_paths
-from ppafo.engine.run import Run, batch_of
+from ppafo.engine.run import Run, batch_of, state_row_numbers
 from ppafo.gait import load_gait
 from ppafo.gait.gait import KNEE, Curve
-from ppafo.simulation.sampled import state_row_numbers
 from ppafo.walking import load_walk, walk_population
 from ppafo.walking.gait_series import gait_timing
 from ppafo.walking.motion import walk_of, with_duration

@@ -80,8 +80,7 @@ def test_the_device_gives_work_in_push_off_and_uses_gas(walked: Callable[[str], 
 
 def test_metrics_at_one_kilohertz_are_within_two_per_cent(walk_plan: Callable[[str], Any]) -> None:
     from ppafo.engine.lanes import run_batch
-    from ppafo.engine.run import batch_of
-    from ppafo.simulation.sampled import state_row_numbers
+    from ppafo.engine.run import batch_of, state_row_numbers
 
     for name in ("event_on_off", "event_proportional"):
         found = []
@@ -97,8 +96,7 @@ def test_metrics_at_one_kilohertz_are_within_two_per_cent(walk_plan: Callable[[s
 
 def test_a_dead_time_of_the_valve_delays_the_pressure(walk_plan: Callable[[str], Any]) -> None:
     from ppafo.engine.lanes import run_batch
-    from ppafo.engine.run import batch_of
-    from ppafo.simulation.sampled import state_row_numbers
+    from ppafo.engine.run import batch_of, state_row_numbers
 
     plan = walk_plan("event_proportional")
     seen = {}

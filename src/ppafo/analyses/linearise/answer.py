@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ppafo.engine.lanes import Floats, StepInputs, replay
-from ppafo.engine.run import batch_of
+from ppafo.engine.run import batch_of, state_row_numbers
 from ppafo.errors import ScenarioError, nearest_name, one_line
 from ppafo.model.plant import chamber_pressures
 from ppafo.report.display_units import quantity_of_unit
@@ -18,7 +18,6 @@ from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import BLACK, BLUE, GREY, VERMILION
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.sampled import state_row_numbers
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, Initial, PrescribedMotion, Scenario
 from ppafo.version import __version__
 

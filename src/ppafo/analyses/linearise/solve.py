@@ -16,7 +16,7 @@ from ppafo.engine.lanes import Floats, run_batch
 from ppafo.engine.led_leg import LedLeg, shank_at, torque_of_leg
 from ppafo.engine.program import Program, python_place
 from ppafo.engine.rows import leaf_paths, leaves, numbers, rebuilt
-from ppafo.engine.run import NEVER_FAILED, Run, batch_of
+from ppafo.engine.run import NEVER_FAILED, Run, batch_of, state_row_numbers
 from ppafo.errors import ScenarioError, SimulationError, UnitError, refused_as
 from ppafo.model.elementary import TURN, sine_and_cosine_of_turns
 from ppafo.model.leg import FootLoad, ShankNow, torque_on_foot
@@ -34,7 +34,7 @@ from ppafo.model.valves.proportional import NO_SLEW_LIMIT
 from ppafo.report.finding import Finding
 from ppafo.simulation.loading import scenario_or_load
 from ppafo.simulation.plan import plan_run, profile_values
-from ppafo.simulation.sampled import run_sampled, state_row_numbers
+from ppafo.simulation.sampled import run_sampled
 from ppafo.simulation.scenario import FreeMotion, Scenario
 from ppafo.simulation.simulate import OPEN_LOOP
 from ppafo.translation.plant_rates import (

@@ -444,7 +444,7 @@ def _finding(found: Estimate, statistic: Statistic, rule: StoppingRule) -> Findi
         (
             f"{look.draws:,}",
             f"{look.missing:,}",
-            *_ends(kind, look.interval),
+            *(kind.number(value) for value in (look.interval.value, look.interval.low, look.interval.high)),
             _difference(kind, look.interval.width),
             met,
         )
@@ -476,10 +476,6 @@ def _finding(found: Estimate, statistic: Statistic, rule: StoppingRule) -> Findi
 
 
 _ENDS = ("estimate", "low", "high")
-
-
-def _ends(kind: Kind, found: Interval) -> list[str]:
-    return [kind.number(value) for value in (found.value, found.low, found.high)]
 
 
 def _difference(kind: Kind, value: float) -> str:

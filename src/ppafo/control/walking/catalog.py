@@ -320,7 +320,7 @@ TIMINGS: Kinds[TimingKind] = Kinds(
 
 
 def keeps_time(kind: ControllerKind) -> bool:
-    """Return whether a controller of walking goes by a gait phase that can be known in several ways."""
+    """Return whether a walking controller uses a gait phase, which has several timings."""
     return "clock" in getattr(kind.initial, "_fields", ())
 
 

@@ -143,6 +143,7 @@ _REMOVED = {
     "directions": "recordings that want other numbers are found by themselves; omit it",
     "profiles": "intervals are the table's; omit it",
     "scale": "the search scales numbers by itself; omit it",
+    "held": "is now locked; write locked = '75 deg'",
 }
 
 
@@ -153,12 +154,8 @@ def refuse_removed(document: Mapping[str, Any], file: str) -> None:
         raise IdentificationError(
             f"{file}: bench.can: experiments are not proposed; write [[trajectory.candidates]], which are ranked"
         )
-    parameters = section.get("parameters") if isinstance(section, dict) else None
-    tables = [section, *(parameters if isinstance(parameters, list) else ())]
-    experiments = section.get("experiments") if isinstance(section, dict) else None
-    for table in experiments if isinstance(experiments, list) else ():
-        if isinstance(table, dict) and "held" in table:
-            raise IdentificationError(f"{file}: trajectory.experiments: held: is now locked; write locked = '75 deg'")
+    lists = [section.get(name) for name in ("parameters", "experiments")] if isinstance(section, dict) else []
+    tables = [section, *(table for tables in lists if isinstance(tables, list) for table in tables)]
     for key, instead in _REMOVED.items():
         if any(isinstance(table, dict) and key in table for table in tables):
             raise IdentificationError(f"{file}: trajectory: {key}: {instead}")

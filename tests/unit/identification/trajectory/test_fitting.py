@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ppafo.engine.lanes import run_batch
-from ppafo.engine.run import batch_of
+from ppafo.engine.run import batch_of, state_row_numbers
 from ppafo.errors import IdentificationError
 from ppafo.identification.trajectory import Experiment, FreeParameter, TrajectoryFit, TrajectoryProblem, fit
 from ppafo.identification.trajectory.problem import number_at, numbers_of, with_numbers
@@ -17,7 +17,6 @@ from ppafo.running import simulate
 from ppafo.signals.recording import Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.sampled import state_row_numbers
 from ppafo.simulation.scenario import Scenario
 
 INERTIA = FreeParameter("foot_plate.inertia", start=0.010)
