@@ -19,7 +19,7 @@ from ppafo.cli.commands import COMMANDS, OTHERS, RENAMED
 from ppafo.cli.main import build_parser, main
 from ppafo.exports.hil.wire import DEFAULT_BAUD, RATE
 from ppafo.kinds import kind_at
-from tests.page_code import code_blocks, write_package
+from tests.page_code import block_with, write_package
 
 VERBS: dict[str, Command] = {
     f"{name} {action}".strip(): command
@@ -151,14 +151,14 @@ def test_a_function_with_plain_types_is_a_command(capsys: pytest.CaptureFixture[
         del OTHERS["plain"]
 
 
-PAGE = "how-to/add-an-analysis.md"
+PAGE = "how-to/extend.md"
 WORDS = ("torque-task-proportional", "--pressure", "30 psi_g", "--pressure", "60 psi_g")
 
 
 @pytest.fixture
 def _installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """The package of the page, as an installer leaves it, with one more command that cannot be loaded."""
-    (module,), (entry_points,) = code_blocks(PAGE, "python"), code_blocks(PAGE, "toml")
+    module, entry_points = block_with(PAGE, "def pressures("), block_with(PAGE, "entry-points.\"ppafo.commands\"")
     write_package(
         tmp_path / "site", "my_analyses.pressures", module, f'{entry_points}broken = "my_analyses.nothing:broken"\n'
     )
@@ -175,7 +175,7 @@ def _installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None
 def test_a_function_of_another_package_is_a_command_that_answers_what_its_page_shows(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (shown,) = code_blocks(PAGE, "text")
+    shown = block_with(PAGE, "2 of 2 runs")
     assert main(["pressures", *WORDS]) == 0
     assert capsys.readouterr().out == shown
     assert main(["my_analyses.pressures:pressures", *WORDS, "--json", "--out", str(tmp_path / "out")]) == 0
