@@ -4,7 +4,7 @@ import math
 from collections import namedtuple
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, lru_cache
+from functools import lru_cache
 from typing import Any, NamedTuple, get_type_hints
 
 from ppafo.control.controllers import switching as constant_controller
@@ -245,7 +245,8 @@ class Program:
         free = FreePart if self.leg is None else self.leg.begun
         begun = free if self.angle is None else (NoParameters if self.is_locked else PrescribedStep)
         gas = self.gas.begun(self) if self.feed is None else self.feed.begun(self)
-        shown = _shown_by(self.valve.connect)
+        # What a valve shows beside its openings is the second in the order of declaration: plant, shown, result.
+        _, shown, _ = get_type_hints(self.valve.connect).values()
         return {
             **({} if self.leg is None else self.leg.led),
             **({"held": HeldChambers} if self.hands_chambers_on else {}),
@@ -265,14 +266,6 @@ class Program:
                 else {}
             ),
         }
-
-
-@cache
-def _shown_by(connect: Any) -> Any:
-    """The class of what a valve shows beside its openings, from the function that connects it."""
-    # In the order of declaration: plant, what the valve shows, result.
-    _, shown, _ = get_type_hints(connect).values()
-    return shown
 
 
 def link_program(program: Program, collector: Collector) -> None:

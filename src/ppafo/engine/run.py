@@ -183,8 +183,9 @@ def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:
     rest = [run.controller, run.reference, run.path, run.sensors, *walk, *lines, *leg, *run.effects]
     parameters = table([timing, *plant, *valve, *rest], runs)
     further = [*walk_states, *line_states, *states_at_start(run)]
+    controller = NoParameters() if program.controller is None else program.controller.initial
     states = table(
-        [AT_REST, Pace(run.step), *_device_at_start(run), *further],
+        [AT_REST, Pace(run.step), run.initial, gas_at_start(run), program.valve.initial(), controller, *further],
         runs,
     )
     counts = np.empty((runs, 6))
@@ -195,7 +196,9 @@ def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:
         clocks, groups = counts[:1], [np.arange(runs)]
     else:
         clocks, group = np.unique(counts, axis=0, return_inverse=True)
-        groups = _members(group.reshape(-1), len(clocks))
+        # Places of the runs of each clock, in order.
+        order = np.argsort(group.reshape(-1), kind="stable")
+        groups = np.split(order, np.cumsum(np.bincount(group.reshape(-1), minlength=len(clocks)))[:-1])
     batches = []
     for clock, members in zip(clocks, groups, strict=True):
         own, ticks = _program_and_clock(program, clock)
@@ -285,19 +288,6 @@ def _at_rest(initial: PlantState, pressure_1: float, pressure_2: float) -> Momen
         vented_flow=0.0,
         command=0.0,
     )
-
-
-def _device_at_start(run: Run) -> list[Any]:
-    """Initial states of plant, gas, valve and controller, in the order of ``Program``."""
-    program = run.program
-    controller = NoParameters() if program.controller is None else program.controller.initial
-    return [run.initial, gas_at_start(run), program.valve.initial(), controller]
-
-
-def _members(group: Members, groups: int) -> list[Members]:
-    """Places of the runs of each group, in order."""
-    order = np.argsort(group, kind="stable")
-    return np.split(order, np.cumsum(np.bincount(group, minlength=groups))[:-1])
 
 
 def run_together(runs: Sequence[Run], threads: int | None = None) -> list[BatchResult]:

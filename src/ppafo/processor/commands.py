@@ -2,7 +2,6 @@
 
 import shlex
 from collections.abc import Sequence
-from pathlib import Path
 
 from ppafo.cli import output
 from ppafo.cli.arguments import Count, Folder, Name, Overrides, Scenario
@@ -45,7 +44,17 @@ def export_firmware(
     if not (try_ or table or samples is not None):
         if len(scenarios) != 1 or out is None:
             raise ScenarioError("give one SCENARIO and --out DIR, or --try; see 'ppafo export firmware --help'")
-        return _firmware_of(scenarios[0], target or TARGETS[0], overrides, out)
+        from ppafo.processor.firmware import firmware
+        from ppafo.simulation.loading import load_scenario
+
+        chosen = target or TARGETS[0]
+        return output.export(
+            out,
+            COMMAND,
+            lambda: firmware(load_scenario(scenarios[0], overrides), chosen),
+            lambda _: f"make -C {shlex.quote(str(out))}",
+            target=chosen,
+        )
     if samples is not None and samples > MOST_SAMPLES:
         raise ScenarioError(f"--samples {samples}: must be 1 to {MOST_SAMPLES}")
     if table and (scenarios or overrides):
@@ -64,19 +73,6 @@ def export_firmware(
     if out is not None:
         output.write_files(out, output.said_files(said), COMMAND)
     return said
-
-
-def _firmware_of(name: str, target: str, overrides: Sequence[str], out: Path) -> Said:
-    from ppafo.processor.firmware import firmware
-    from ppafo.simulation.loading import load_scenario
-
-    return output.export(
-        out,
-        COMMAND,
-        lambda: firmware(load_scenario(name, overrides), target),
-        lambda _: f"make -C {shlex.quote(str(out))}",
-        target=target,
-    )
 
 
 def export_controller(scenario: Scenario, *, overrides: Overrides = (), out: Folder) -> Said:

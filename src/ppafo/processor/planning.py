@@ -52,7 +52,9 @@ class Numbers:
         every = (*converter, *over_runs(prepared, *given))
         numbers = dict(zip((item.name for item in self.quantities), every, strict=True))
         size = over_runs(largest, *given)
-        return numbers, (_broken_bit(bits), _too_large(size, self.name), _reference(reference, converter))
+        broken = np.asarray(bits % 1.0 != 0.0)
+        whole: Problem = (broken, lambda run: f"controller.converter_bits = {at(bits, run):g}: must be whole")
+        return numbers, (whole, _too_large(size, self.name), _reference(reference, converter))
 
 
 def on_chip(
@@ -70,11 +72,6 @@ def on_chip(
         restart=None,
         plan=plan,
     )
-
-
-def _broken_bit(bits: Any) -> Problem:
-    """A number of bits that is not whole."""
-    return np.asarray(bits % 1.0 != 0.0), lambda run: f"controller.converter_bits = {at(bits, run):g}: must be whole"
 
 
 def _too_large(size: Any, kind: str) -> Problem:

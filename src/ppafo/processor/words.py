@@ -56,7 +56,8 @@ def _runs(scenarios: Sequence[Scenario], target: str) -> Tried:
             f"{one.scenario.name} with the controller on the processor's simulator, ppafo as the plant",
             "",
             *_cost_lines(one.cost, one.scenario.controller.period),
-            *_compared_lines(one),
+            f"decisions   {one.samples}, {one.differences} different from the fixed-point controller in the simulation",
+            f"recording   {'the same bits' if one.same_bits else 'NOT the same bits'} as without the processor",
             *(f"{name:<12} {value * _SHOWN[name][1]:.4f} {_SHOWN[name][0]}" for name, value in metrics.items()),
         ]
         texts.append("\n".join(lines))
@@ -113,13 +114,6 @@ def table(targets: Sequence[str], samples: int | None) -> Tried:
 
 def _compared(found: ChipRun | Comparison) -> dict[str, Any]:
     return {"samples": found.samples, "differences": found.differences}
-
-
-def _compared_lines(found: ChipRun) -> list[str]:
-    return [
-        f"decisions   {found.samples}, {found.differences} different from the fixed-point controller in the simulation",
-        f"recording   {'the same bits' if found.same_bits else 'NOT the same bits'} as without the processor",
-    ]
 
 
 def _cost_lines(cost: Cost, period: float) -> list[str]:

@@ -337,7 +337,11 @@ def c_source(
     """
     # What returns nothing but empty rows is never called: an empty value is not written.
     functions = [item for item in module.functions if item.returns is None or not is_empty(item.returns)]
-    names = {} if reading is None else _short_names(functions, reading)
+    names: dict[str, str] = {}
+    if reading is not None:
+        for item in functions:
+            # A function for further types has their number behind its own name.
+            names[item.name] = f"{reading.names.get(item.source, item.source)}{item.name.removeprefix(item.source)}"
     writer = _Writer(documents, {names.get(item.name, item.name) for item in functions}, places or {}, names, reading)
     before = files("ppafo.translation").joinpath(prelude).read_text(encoding="utf-8")
     bodies = [writer.function(item) for item in functions]
@@ -355,14 +359,6 @@ def c_source(
         before = _prelude_for(before, own + reading.around)
         return "\n".join([_comment(title), before, own]).replace("PPAFO_INLINE", "static")
     return "\n".join([_comment(title), before, *parts, *structs, *bodies])
-
-
-def _short_names(functions: Sequence[Function], reading: Reading) -> dict[str, str]:
-    """Short names of functions in C by their own, with the number of a function for further types."""
-    found: dict[str, str] = {}
-    for item in functions:
-        found[item.name] = f"{reading.names.get(item.source, item.source)}{item.name.removeprefix(item.source)}"
-    return found
 
 
 _DEFINES = re.compile(r"(?:^|\s|\*)(ppafo_\w+)\(|\} (ppafo_\w+);|#define (PPAFO_\w+)")

@@ -385,7 +385,8 @@ def build(
 
 def _compiled(source: str, folder: Path, command: Sequence[str], flags: Sequence[str]) -> Path:
     """The library that a compiler makes of C, in a folder."""
-    if _is_mounted_without_execution(folder):
+    # Windows has no such mounts, nor the flag.
+    if hasattr(os, "ST_NOEXEC") and os.statvfs(folder).f_flag & os.ST_NOEXEC:
         raise CompilerError(f"libraries in {folder.parent} cannot be loaded (it is mounted noexec)", *COMPILERS)
     written, library = folder / "program.c", folder / _LIBRARY_FILE
     written.write_text(source, encoding="utf-8")
@@ -401,11 +402,6 @@ def _compiled(source: str, folder: Path, command: Sequence[str], flags: Sequence
     if not library.is_file():
         raise CompilerError(f"{name} ended without an error, but made no library")
     return library
-
-
-def _is_mounted_without_execution(folder: Path) -> bool:
-    # Windows has no such mounts, nor the flag.
-    return hasattr(os, "ST_NOEXEC") and bool(os.statvfs(folder).f_flag & os.ST_NOEXEC)
 
 
 def _fill(module: ModuleType, library: Path, entries: Entries) -> None:

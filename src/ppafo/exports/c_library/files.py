@@ -20,7 +20,7 @@ from ppafo.kinds import kind_at
 from ppafo.metrics import METRICS
 from ppafo.model.catalog import VALVES
 from ppafo.model.declaration import Quantity
-from ppafo.parameters.device import Device, Orifice, SonicOrifice
+from ppafo.parameters.device import Device, SonicOrifice
 from ppafo.parameters.graph import Graph
 from ppafo.parameters.plant import effects_of
 from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, Scenario
@@ -443,7 +443,12 @@ def _fixed_of_device(device: Device, is_thermal: bool, has_lines: bool) -> list[
     lines = "with lines behind the regulators" if has_lines else "constant supply pressures"
     effects = ", ".join(f"`{effect.name}`" for effect in effects_of(device) if effect.switch)
     return [
-        *(f"the form of the {name}, `{_form(orifice)}`" for name, orifice in forms.items()),
+        *(
+            f"the form of the {name}, `sonic_conductance, critical_ratio`"
+            if isinstance(orifice, SonicOrifice)
+            else f"the form of the {name}, `area, discharge_coefficient`"
+            for name, orifice in forms.items()
+        ),
         f"the gas, `{'thermal' if is_thermal else 'isothermal'}`; {lines}, which "
         f"{'let' if device.supply.relieving else 'do not let'} gas back in from a chamber above them",
         *([f"the effects, {effects}, none of which can be switched off"] if effects else []),
@@ -460,10 +465,6 @@ def _at_zero(device: Device, flaws: Sequence[float]) -> str:
 
 def _listed(items: Sequence[str]) -> str:
     return "\n".join(f"- {item}{'.' if item is items[-1] else ';'}" for item in items)
-
-
-def _form(orifice: Orifice | SonicOrifice) -> str:
-    return "sonic_conductance, critical_ratio" if isinstance(orifice, SonicOrifice) else "area, discharge_coefficient"
 
 
 def choosing(device: Device) -> list[str]:

@@ -160,7 +160,10 @@ class Writing:
         """
         body = [*boundary.named("settings", [item.name for item in settings], list(lines))]
         body += boundary.given("parameters", self.program.parameter_rows())
-        body += boundary.given("states", self._initial_rows())
+        # Task sequence and meters begin with the first sample.
+        later = {"course", *self.program.meter_groups}
+        begun = {name: row for name, row in self.program.state_rows().items() if name not in later}
+        body += boundary.given("states", begun)
         counted = {
             "interval": "counts_of_steps.record_every",
             "steps": "counts_of_steps.step_count",
@@ -173,11 +176,6 @@ class Writing:
         own = [f"{name} = namedtuple({name!r}, {fields!r})" for name, fields in self.rows.items()]
         head = boundary.head("prepare", dict.fromkeys(("settings", "parameters", "states", "counts"), "float64[::1]"))
         return "\n".join([*own, head, *indent(composed_lines(body, self.needs))])
-
-    def _initial_rows(self) -> dict[str, type]:
-        """States that a run begins with; meters begin with the first sample."""
-        later = {"course", *self.program.meter_groups}
-        return {name: row for name, row in self.program.state_rows().items() if name not in later}
 
     def row(self, name: str, fields: Mapping[str, str]) -> str:
         """A row that is made here alone, by its fields."""

@@ -153,22 +153,16 @@ class ExportedProgram:
 
 def exported(program: Program) -> ExportedProgram:
     """The program as it is exported; a metric that needs all samples of a channel is left out."""
-    missing = _missing(program)
+    missing = set() if program.is_thermal else {"temperature_1", "temperature_2"}
+    states = (path for name, row in program.state_rows().items() for path in leaf_paths(row, name))
+    if REQUEST not in states if program.walks else not program.has_reference:
+        missing.add("reference")
     offered = (kind for kind in METRICS.values() if has_channels(program, kind) and not kind.traced)
     metrics = tuple(kind for kind in offered if program.walks == (WALK in kind.needs))
     # By name: the same metrics in another order are the same program.
     meters = dict(sorted({meter.name: meter for kind in metrics for meter in kind.meters}.items()))
     outputs = (*(name for name in TRACED if name not in missing), *walk_traces(program))
     return ExportedProgram(replace(program, meters=tuple(meters.values()), traced=outputs), metrics)
-
-
-def _missing(program: Program) -> set[str]:
-    """Channels that a program does not have."""
-    missing = set() if program.is_thermal else {"temperature_1", "temperature_2"}
-    if program.walks:
-        states = (path for name, row in program.state_rows().items() for path in leaf_paths(row, name))
-        return missing if REQUEST in states else missing | {"reference"}
-    return missing if program.has_reference else missing | {"reference"}
 
 
 def places_of(groups: Mapping[str, type]) -> dict[str, str]:
