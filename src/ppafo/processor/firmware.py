@@ -126,6 +126,7 @@ def parameters_header(
     for item in law.number_quantities:
         number = int(numbers[item.name])
         lines.append(f"#define {macro(item)} {number} /* {item.summary}; {item.minimum:g} to {item.maximum:g} */")
+        # A user may edit this file: the proof that nothing overflows holds within these ranges only.
         lines += [f"#if {macro(item)} < {item.minimum:.0f} || {macro(item)} > {item.maximum:.0f}"]
         lines += [f'#error "{macro(item)} is beyond its range"', "#endif"]
     return "\n".join([*lines, "", "#endif", ""])
@@ -134,6 +135,7 @@ def parameters_header(
 def ticks_of(name: str, period: float) -> int:
     """Pulses of the timer in a sample period [s]; ScenarioError where there is no whole number of them."""
     ticks = round(period / TICK)
+    # Half of the range: the watchdog waits for two sample periods.
     if not 1 <= ticks <= MOST_TICKS // 2 or abs(ticks * TICK - period) > 1.0e-9 * period:
         raise ScenarioError(
             f"{name}: controller.period = {period:.9g} s: on the processor a multiple of 0.125 ms, "

@@ -25,9 +25,11 @@ class Gain(NamedTuple):
 
 def fraction_of(value: int, fraction: int) -> int:
     """``value`` (2^30 at most in size) times ``fraction`` / 2^15, rounded down at every bit of the fraction."""
+    # The MSP430 has no multiplier, and a product in C would ask for a run-time library that the image does not have.
     total = 0
     left = fraction
     for _ in range(FRACTION_BITS):
+        # Lowest bit first: halved after each addition, the sum stays below twice the value, and within 32 bits.
         total = (total + value if left & 1 == 1 else total) >> 1
         left = left >> 1
     return total
@@ -36,6 +38,7 @@ def fraction_of(value: int, fraction: int) -> int:
 def shifted(value: int, places: int) -> int:
     """``value`` divided by 2 to the power ``places``, rounded down."""
     result = value
+    # One place at a time: a shift by a variable is a call of the run-time library too.
     for _ in range(places):
         result = result >> 1
     return result
@@ -53,6 +56,7 @@ def gain_of(factor: float) -> Gain:
     _, exponent = math.frexp(factor)
     places = min(MOST_PLACES, max(0, FRACTION_BITS - exponent))
     fraction = math.floor(math.ldexp(factor, places) + 0.5)
+    # Rounding up can carry into a sixteenth bit.
     if fraction > LARGEST_FRACTION and places > 0:
         places -= 1
         fraction = math.floor(math.ldexp(factor, places) + 0.5)
@@ -136,6 +140,7 @@ def converter_with(steps: Steps, limits: Limits) -> Converter:
 
 def count_of(value: float, step: float, top: float) -> int:
     """Count that a converter shows for a value in the unit of its ``step``: rounded, and within 0 and ``top``."""
+    # What is not negative is rounded by adding a half, in C as in Python.
     return int(max(0.0, min(top, value / step + 0.5)))
 
 

@@ -125,7 +125,9 @@ class Target:
 
 UNTOUCHED = 0xA5
 """What the RAM for the stack is filled with, so that what the stack has overwritten can be seen."""
+# Seconds without a byte before a simulator is given up; a busy machine starts QEMU in some ten.
 _PATIENCE = 60.0
+# Of the ELF format: SHF_ALLOC; SHT_PROGBITS, SHT_SYMTAB; a section header and a symbol of 32 bits.
 _LOADED = 2
 _WITH_VALUES, _SYMBOL_TABLE = 1, 2
 _SECTION = struct.Struct("<IIIIIIIIII")
@@ -143,6 +145,7 @@ def built(contents: Mapping[str, bytes], folder: Path, goals: Sequence[str] = ("
         (folder / name).write_bytes(content)
     done = asked(["make", "-C", str(folder), *goals])
     if done.returncode != 0:
+        # Make says which goal failed; the line of the compiler says why.
         said = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr)
         raise SimulationError(f"the firmware cannot be built: {one_line(said)}")
 
@@ -205,6 +208,7 @@ class _Section(NamedTuple):
 
 def _sections(content: bytes) -> list[_Section]:
     """The sections of a 32-bit ELF file, lowest byte first."""
+    # Where the section headers begin, how long each is, and how many there are (e_shoff, e_shentsize, e_shnum).
     (start,) = struct.unpack_from("<I", content, 0x20)
     length, count = struct.unpack_from("<HH", content, 0x2E)
     return [_Section._make(_SECTION.unpack_from(content, start + length * place)) for place in range(count)]
@@ -215,6 +219,7 @@ def _sizes(content: bytes, target: Target) -> Sizes:
     in_ram = [item for item in loaded if target.ram.holds(item.address)]
     values = sum(item.size for item in in_ram if item.kind == _WITH_VALUES)
     flash = sum(item.size for item in loaded if target.flash.holds(item.address))
+    # Initial values of RAM lie in flash too, from where the start-up code copies them.
     return Sizes(flash + values, sum(item.size for item in in_ram))
 
 
@@ -269,6 +274,7 @@ class Console:
             said = os.read(self._process.stdout.fileno(), 65536) if ready else b""
             if not said:
                 raise SimulationError(f"{self._name} does not answer; {self._last()}")
+            # What comes behind the mark is kept for the next question.
             self._seen += said
         found, _, self._seen = self._seen.partition(mark)
         return found
@@ -378,6 +384,7 @@ class Debugger:
         quiet = ["-display", "none", "-monitor", "none", "-serial", "none", "-gdb", "stdio"]
         self._console = Console([*command, *quiet], image.file.parent)
         self.packet("QStartNoAckMode")
+        # The answer to this packet is the last that is acknowledged.
         self._console.say(b"+")
 
     def close(self) -> None:
@@ -387,6 +394,7 @@ class Debugger:
     def reset(self) -> None:
         """Reset the machine; it stands still at its beginning."""
         answer = self.packet(f"qRcmd,{b'system_reset'.hex()}")
+        # Before its OK, QEMU may send what the command has to say.
         while answer != "OK":
             answer = self._answer()
 
@@ -396,6 +404,7 @@ class Debugger:
 
     def go_on(self, address: int | None = None) -> None:
         """Let the machine run, from an address where one is given, until it stops."""
+        # Bit 0 of an address says that the instruction is Thumb; a Cortex-M has no other.
         self._expect(self.packet("c" if address is None else f"c{address | _THUMB:x}")[:3], "T05")
 
     def read(self, address: int, size: int) -> bytes:
@@ -463,10 +472,12 @@ class QemuSimulator:
     def sample(self, readings: Iterable[int]) -> Decision:
         """What the chip decides for the readings of one sample."""
         self.debugger.write(self._readings, b"".join(number.to_bytes(2, "little") for number in readings))
+        # Behind the breakpoint, or the machine would stop at once.
         self.debugger.go_on(self._stop + _LENGTH_OF_NOP)
         command, is_sound, begun, ended = _FORM_OF_OUTPUTS.unpack(
             self.debugger.read(self._outputs, _FORM_OF_OUTPUTS.size)
         )
+        # The counter counts down, and begins anew at 2^24.
         ticks = (begun - ended) % 2**_COUNTER_BITS
         return Decision(command, is_sound, round(ticks / self._ticks))
 

@@ -129,6 +129,7 @@ def dead_zone_sample(numbers: DeadZoneNumbers, state: DeadZoneCounts, readings: 
     """Command in steps: the opening, towards the reference, beyond the dead zone; 0, for good, after a bad reading."""
     sound = still_sound(state.sound, readings, numbers.limits)
     error = error_of(readings, numbers.limits)
+    # Hysteresis: the valve closes at the release, nearer to the reference than where it opens.
     limit_up = numbers.release if state.direction > 0 else numbers.dead_zone
     limit_down = numbers.release if state.direction < 0 else numbers.dead_zone
     direction = 1 if error > limit_up else (-1 if error < -limit_down else 0)
@@ -161,6 +162,7 @@ def prepare_on_off(settings: Mapping[str, float], period: float, torque_step: fl
 
 def prepare_dead_zone(settings: Mapping[str, float], period: float, torque_step: float) -> tuple[float, ...]:
     """Numbers of ``DeadZoneNumbers`` after the limits, for settings in SI units and a torque per count [N m]."""
+    # A release beyond the dead zone would close the valve before it opens.
     zone, release = settings["dead_zone"], min(settings["release"], settings["dead_zone"])
     counts = [float(min(LARGEST_READING, int(torque / torque_step + 0.5))) for torque in (zone, release)]
     return (*counts, float(int(settings["opening"] * COMMAND_STEPS + 0.5)))
@@ -220,6 +222,7 @@ FINE = 2**FINE_BITS
 WIDE = 2**FRACTION_BITS
 """What the error is multiplied by, so that ``fraction_of`` keeps all bits of its product with a gain."""
 SLOPE_UNIT = 65536
+# 8191 * 65536 is below 2^30, the largest value that `fraction_of` takes.
 LARGEST_CHANGE = 8191
 LARGEST_SLOPE = LARGEST_CHANGE * SLOPE_UNIT
 LARGEST_EXCESS = 32 * FULL
@@ -262,20 +265,26 @@ def pid_sample(numbers: PidNumbers, state: PidCounts, readings: Readings) -> tup
     """Command in steps from -1000 to 1000 at a sample; 0, for good, once a reading was at an end of its range."""
     sound = still_sound(state.sound, readings, numbers.limits)
     error = error_of(readings, numbers.limits)
+    # Without a last error there is no change: no derivative kick at the first sample.
     change = limited(error - state.error, LARGEST_CHANGE) if state.started == 1 else 0
     slope = limited(
         state.slope + fraction_of(change * SLOPE_UNIT - state.slope, numbers.filter_share),
         LARGEST_SLOPE,
     )
+    # Gains have 15 bits behind the point: an error of one count would be rounded away without as many of its own.
     wide_error = error * WIDE
+    # The integral has 256 parts of a part: what a small error adds in one period is less than a part.
     integral = state.integral + shifted(fraction_of(wide_error, numbers.integral), numbers.integral_places)
     proportional = shifted(fraction_of(wide_error, numbers.proportional), numbers.proportional_places)
     derivative = shifted(fraction_of(slope, numbers.derivative), numbers.derivative_places)
+    # Shifts and not divisions: both round down, in C of any compiler as in Python.
     unlimited = proportional + (integral >> FINE_BITS) + derivative
     command = limited(unlimited, FULL)
+    # Back-calculation, after the command: the integral of the next sample has it, as in equation (13) with floats.
     excess = limited(command - unlimited, LARGEST_EXCESS)
     integral = limited(integral + fraction_of(excess * FINE, numbers.anti_windup), LARGEST_INTEGRAL)
     after = PidCounts(integral=integral, error=error, slope=slope, started=1, sound=sound)
+    # A half first: the shift rounds down.
     return ((command + HALF_STEP) >> PART_BITS if sound == 1 else 0), after
 
 
@@ -290,6 +299,7 @@ def pid_update(
 
 def pid_factors(settings: Mapping[str, float], period: float, torque_step: float) -> tuple[float, ...]:
     """What the law multiplies by: error, error in the integral, slope, change of the slope, excess in the integral."""
+    # Gains of a torque [N m] and of seconds become gains of counts and samples.
     count = torque_step * FULL
     return (
         settings["proportional_gain"] * count,
