@@ -223,11 +223,12 @@ def effective_sample_size(values: Floats) -> float:
 def noise_interval(values: Floats, others: Floats, confidence: float) -> Interval | None:
     """Return the fraction of the variance that is due to noise, with its interval; None where nothing varies.
 
-    ``values`` and ``others`` (draws,) are the same draws with two independent noise streams: half the mean square of
-    their difference is the variance within a draw. The interval of this ratio of means is by the delta method.
+    ``others`` (draws,) are the first of the draws of ``values`` with an independent noise stream: half the mean square
+    of the difference is the variance within a draw. The interval of this ratio of means is by the delta method.
     """
     from scipy.special import ndtri
 
+    values = values[: others.size]
     both = np.isfinite(values) & np.isfinite(others)
     first, second = values[both], others[both]
     if first.size < 2:

@@ -19,7 +19,7 @@ from ppafo.parameters.parameter_set import Entry, atmospheric_pressure, entry_in
 from ppafo.simulation import declaration
 from ppafo.simulation.declaration import WRITTEN_UNITS
 from ppafo.simulation.loading import set_name
-from ppafo.simulation.numbers import declared_numbers
+from ppafo.simulation.numbers import declared_numbers, number_at
 from ppafo.simulation.overrides import is_of_device
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies import declaration as declared
@@ -116,6 +116,22 @@ def varied_path(path: str, scenario: Scenario) -> VariedPath:
         hint = nearest_name(path, known) or f"; for example {', '.join(near[:6] or list(known)[:6])}"
         raise ScenarioError(f"scenario '{scenario.name}' has no number '{path}'{hint}")
     return VariedPath(path, known[path], counts_from(path, scenario.device.supply.atmospheric_pressure))
+
+
+def value_at(path: str, scenario: Scenario) -> float | None:
+    """Return the value [SI] of a scenario at a path as in overrides; None where it has none there."""
+    run, period = scenario.run, scenario.controller.period
+    of_clock = {
+        "controller.period": period,
+        "controller.rate": 1.0 / period,
+        "run.duration": run.duration,
+        "run.step": run.step,
+        "run.output_interval": run.output_interval,
+    }
+    try:
+        return float(of_clock[path]) if path in of_clock else number_at(scenario, path)
+    except (AttributeError, KeyError, TypeError):
+        return None
 
 
 def in_its_unit(place: VariedPath, texts: Iterable[object]) -> VariedPath:

@@ -32,6 +32,7 @@ from ppafo.studies.distributions import Floats
 from ppafo.studies.study import Study
 from ppafo.study.blocks import Chunk, chunk, chunk_count, drawn_values, maximum_samples, samples_of, varied_columns
 from ppafo.study.manifest import MANIFEST, STUDY_COPY, check_same_study, manifest, manifest_bytes, read_manifest
+from ppafo.study.runs import unvaried
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -212,9 +213,7 @@ def _try(study: Study, threads: int | None) -> None:
 
 def _result(study: Study, part: Chunk, values: dict[str, Floats], threads: int | None) -> EnsembleResult:
     configuration, outputs = study.configurations[part.configuration], study.outputs
-    columns = varied_columns(study, configuration, values) or {
-        "supply.pressure": np.full(part.runs, configuration.scenario.device.supply.pressure)
-    }
+    columns = varied_columns(study, configuration, values) or unvaried(configuration.scenario, part.runs)
     every = outputs.every if outputs.traces else 0.0
     with refused_as(StudyError, f"configuration '{configuration.name}'", ScenarioError):
         return run_ensemble(

@@ -17,7 +17,7 @@ from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import BLACK, GREEN, VERMILION
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import Floats
-from ppafo.studies.draws import Uncertainty, atmosphere_of, check_metrics, level_of
+from ppafo.studies.draws import Limit, Uncertainty, atmosphere_of, check_metrics, level_of
 from ppafo.studies.sampling import NOISE, with_noise
 from ppafo.studies.study import with_overrides
 from ppafo.studies.varying import VariedPath, varied_path
@@ -34,20 +34,6 @@ ACCURACY = 1.0e-6
 _SEED = 1
 _RANGE = re.compile(r"\s*([^=\s]+)\s*=\s*(.+?)\s*\.\.\s*(.+?)\s*")
 _CONDITION = re.compile(r"\s*(\w+)\s*(<=|>=)\s*(.+?)\s*")
-
-
-@dataclass(frozen=True, slots=True)
-class Condition:
-    """A metric that must be at most (or else at least) a limit [SI]; ``text`` is how it was written."""
-
-    metric: str
-    is_upper_limit: bool
-    limit: float
-    text: str
-
-    def is_met(self, values: Floats) -> NDArray[np.bool_]:
-        """Return where values of the metric [SI] meet it; a run without a value does not."""
-        return values <= self.limit if self.is_upper_limit else values >= self.limit
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,12 +102,8 @@ def find(
             "for example 'final_error <= 0.3 N m'"
         )
     check_metrics([parts[1]], base)
-    condition = Condition(
-        parts[1],
-        parts[2] == "<=",
-        level_of(parts[3], parts[1], f"'{one_line(such_that)}'", atmosphere_of(base, [path.path])),
-        f"{parts[1]} {parts[2]} {parts[3]}",
-    )
+    limit = level_of(parts[3], parts[1], f"'{one_line(such_that)}'", atmosphere_of(base, [path.path]))
+    condition = Limit(parts[1], limit, parts[2] == "<=", f"{parts[1]} {parts[2]} {parts[3]}")
     if not FEWEST <= grid <= MOST:
         raise StudyError(f"grid = {grid}: must be at least {FEWEST} and at most {MOST:,}")
     noise = Uncertainty(with_noise((), None, [base], [path.path])[0])
@@ -147,7 +129,7 @@ def find(
 class _Search:
     """What was tried so far: values, the metric of each and its standard deviation over the noise, in that order."""
 
-    def __init__(self, path: str, condition: Condition, runs: Runs, seeds: Floats) -> None:
+    def __init__(self, path: str, condition: Limit, runs: Runs, seeds: Floats) -> None:
         self._path, self.condition, self.runs, self.seeds = path, condition, runs, seeds
         self.values: Floats = np.empty(0)
         self.metrics: Floats = np.empty(0)
@@ -171,7 +153,7 @@ class _Search:
     def ends(self, highest: bool) -> tuple[float | None, float | None]:
         """Return the outermost value that meets the condition, and its neighbour on the outer side."""
         order = np.argsort(-self.values if highest else self.values)
-        met = np.flatnonzero(self.condition.is_met(self.metrics[order]))
+        met = np.flatnonzero(self.condition.is_kept(self.metrics[order]))
         if met.size == 0:
             return None, None
         values = self.values[order]
@@ -206,14 +188,14 @@ def _finding(scenario: str, path: VariedPath, search: _Search, highest: bool, gr
     condition, order = search.condition, np.argsort(search.values)
     values, metrics, spread, of_grid = search.values[order], search.metrics[order], search.spread[order], order < grid
     value, beyond = search.ends(highest)
-    is_met = condition.is_met(metrics)
+    is_met = condition.is_kept(metrics)
     changes = int(np.count_nonzero(np.diff(is_met)))
     kind, of_condition = of_path(path.path, path.quantity.unit), of_metric(condition.metric)
     at_value = None if value is None else float(metrics[np.searchsorted(values, value)])
     ends = f"{kind.text(values[0])} to {kind.text(values[-1])}"
     wanted, further = ("highest", "higher") if highest else ("lowest", "lower")
     if value is None or at_value is None:
-        row = int((np.nanargmin if condition.is_upper_limit else np.nanargmax)(metrics))
+        row = int((np.nanargmin if condition.is_most else np.nanargmax)(metrics))
         verdict = (
             f"no {path.path} from {ends} meets {condition.text}; the nearest is {of_condition.text(metrics[row])} at "
             f"{kind.text(values[row])}"

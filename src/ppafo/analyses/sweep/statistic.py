@@ -37,6 +37,7 @@ from ppafo.studies.distributions import (
     quantile_interval,
 )
 from ppafo.studies.draws import (
+    FEWEST_DRAWS,
     MAXIMUM_DRAWS,
     REPLICATES,
     Columns,
@@ -45,15 +46,13 @@ from ppafo.studies.draws import (
     check_confidence,
     check_fraction,
     check_metrics,
-    choose_configuration,
     difference_of,
+    drawn_in,
     level_of,
-    study_of,
-    uncertainty_in,
     with_new_noise,
 )
 from ppafo.studies.study import Study
-from ppafo.study.runs import Rows, Runs, Tally
+from ppafo.study.runs import Runs, Tally
 from ppafo.units import number_text, parse_quantity
 
 GRAMMAR = "'mean', 'quantile 0.95', 'probability above VALUE' or 'probability below VALUE'"
@@ -135,13 +134,10 @@ def parse_statistic(text: str, metric: str, atmosphere: float | None) -> Statist
     raise StudyError(f"statistic '{text}' is not known; give {GRAMMAR}, with a fraction above 0 and below 1")
 
 
-FEWEST_DRAWS = 32
 FEWEST_EQUAL = 3000
 """Equal values from which they count as their mean: one in a thousand that differs would have come (95 %)."""
 _RULE_OF_THREE = 3.0
 """Over the draws: probability of an event that 95 of 100 such sets of draws show."""
-NOISE_DRAWS = 512
-"""Draws that are run again with other noise, at most: its fraction of the variance is then known to some percent."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -271,14 +267,17 @@ def draw_until(
         # Draws of the first look are kept: they are repeated with new noise to find its share of the variance.
         drawn = drawn or columns
         runs.run(columns)
-        looks.append(_look(runs, metric, statistic, rule))
-        if rule.is_narrow(looks[-1].interval) and looks[-1].is_carried:
+        rows = runs.table
+        runs.check(rows, rule.maximum_failed, "sweep --statistic", [metric])
+        found = rows[metric]
+        missing, interval = np.count_nonzero(~np.isfinite(found)), statistic.estimate(found, rule.confidence_of_look)
+        looks.append(Look(found.size, int(missing), interval, statistic.effective_size(found)))
+        if rule.is_narrow(interval) and looks[-1].is_carried:
             break
-    rows, failures, last = runs.table, runs.failures, looks[-1]
-    noise = None
+    # Counted before the same draws run again with other noise.
+    failures, last, noise = runs.failures, looks[-1], None
     if uncertainty.has_noise:
-        again = runs.run(with_new_noise(drawn, NOISE_DRAWS))[metric]
-        noise = noise_interval(rows[metric][: again.size], again, rule.confidence)
+        noise = noise_interval(rows[metric], runs.run(with_new_noise(drawn))[metric], rule.confidence)
     values = rows[metric][np.isfinite(rows[metric])]
     estimate = Estimate(
         metric=metric,
@@ -304,20 +303,6 @@ def _mean(values: Floats, level: float) -> OfMean:
     count = int(np.count_nonzero(np.isfinite(values)))
     mean = floored_interval(values, REPLICATES, level) if count else Interval(math.nan, -math.inf, math.inf)
     return OfMean(count, mean.value, mean.low, mean.high)
-
-
-def _look(runs: Runs, metric: str, statistic: Statistic, rule: StoppingRule) -> Look:
-    rows: Rows = runs.table
-    runs.check(rows, rule.maximum_failed, "sweep --statistic")
-    found = rows[metric]
-    missing = int(np.count_nonzero(~np.isfinite(found)))
-    if missing > rule.maximum_failed * found.size:
-        raise StudyError(
-            f"sweep --statistic: {missing:,} of {found.size:,} runs have no '{metric}'; choose another metric"
-        )
-    return Look(
-        found.size, missing, statistic.estimate(found, rule.confidence_of_look), statistic.effective_size(found)
-    )
 
 
 DEFAULT_WIDTH = "1 %"
@@ -349,9 +334,7 @@ def estimate(
     independent ones. ``seed`` is the study's by default. ``also`` names further metrics: means over the same draws.
     StudyError for bad input and where more than the fraction ``maximum_failed`` of the runs fails.
     """
-    chosen = study_of(study, overrides)
-    base = choose_configuration(chosen, configuration)
-    uncertainty = uncertainty_in(chosen, base).with_noise_of([base.scenario])
+    chosen, base, uncertainty = drawn_in(study, overrides, configuration)
     wanted = tuple(dict.fromkeys((metric, *also)))
     check_metrics(wanted, base.scenario)
     what = parse_statistic(statistic, metric, atmosphere_of(base.scenario, {*uncertainty.paths, *uncertainty.same}))
@@ -364,25 +347,15 @@ def estimate(
 def stopping_rule(statistic: Statistic, metric: str, width: str, like: StoppingRule) -> StoppingRule:
     """Return the rule with the width that a text says, else like another one."""
     text = width.strip()
-    is_relative = text.endswith("%")
     if statistic.threshold is not None:
-        number = _plain(text)
-    else:
-        number = parse_fraction(text) if is_relative else difference_of(text, metric, f"width = '{width}'")
-    return replace(like, width=number, is_relative=is_relative)
-
-
-def parse_fraction(text: str) -> float:
-    """Return a fraction from a text in percent, such as '1 %'."""
+        try:
+            return replace(like, width=float(number_text(text)), is_relative=False)
+        except ValueError as error:
+            raise StudyError(f"width = '{text}': for a probability give a plain number, such as 0.01") from error
+    if not text.endswith("%"):
+        return replace(like, width=difference_of(text, metric, f"width = '{width}'"), is_relative=False)
     with refused_as(StudyError, f"width = '{text}'", UnitError):
-        return parse_quantity(text, "")
-
-
-def _plain(text: str) -> float:
-    try:
-        return float(number_text(text))
-    except ValueError as error:
-        raise StudyError(f"width = '{text}': for a probability give a plain number, such as 0.01") from error
+        return replace(like, width=parse_quantity(text, ""), is_relative=True)
 
 
 def _kind(metric: str, statistic: Statistic) -> Kind:
@@ -420,6 +393,7 @@ def _remarks(last: Look, values: Floats, statistic: Statistic, kind: Kind, noise
     return said
 
 
+_ENDS = ("estimate", "low", "high")
 _MAXIMUM_BINS = 80
 _CAPTION = "Left: estimate and interval at each look; grey: the target width. Right: the values of all draws."
 
@@ -434,22 +408,28 @@ def _finding(found: Estimate, statistic: Statistic, rule: StoppingRule) -> Findi
         f"{found.statistic} of {found.metric}: {kind.interval(found.interval)} {unit}".rstrip()
         + f" after {found.draws:,} draws, {100.0 * rule.confidence:g} % confidence{ending}"
     )
-    width = f"{100.0 * rule.width:g} % of the value" if rule.is_relative else _difference(kind, rule.width)
+    width = f"{100.0 * rule.width:g} % of the value" if rule.is_relative else kind.change(rule.width)
     policy = (
         f"target width: {width}; at most {len(rule.sizes)} looks at doubling numbers of draws, each with "
         f"{100.0 * rule.confidence_of_look:.4g} % confidence (Bonferroni), so that all of them hold simultaneously; "
         f"{looks[-1].missing:,} draws have no value and are left out"
     )
-    rows = [
-        (
-            f"{look.draws:,}",
-            f"{look.missing:,}",
-            *(kind.number(value) for value in (look.interval.value, look.interval.low, look.interval.high)),
-            _difference(kind, look.interval.width),
-            met,
-        )
-        for look, met in ((look, _met(look, rule)) for look in looks)
+    rows = []
+    for look in looks:
+        met = "narrow enough" if rule.is_narrow(look.interval) else ""
+        met += "" if look.is_carried else f"{', but ' if met else ''}its effective sample size is small"
+        ends = (kind.number(value) for value in (look.interval.value, look.interval.low, look.interval.high))
+        reach = kind.change(look.interval.width) if math.isfinite(look.interval.width) else f"{look.interval.width:.3g}"
+        rows.append((f"{look.draws:,}", f"{look.missing:,}", *ends, reach, met))
+    further = [
+        (of_metric(name).title, f"{mean.draws:,}", *map(of_metric(name).number, (mean.value, mean.low, mean.high)))
+        for name, mean in found.also.items()
     ]
+    also = Part(
+        "Further metrics",
+        columns_of(("mean over the same draws", "with a value", *_ENDS), further),
+        said=[f"Each with {100.0 * rule.confidence_of_look:.4g} % confidence, of the draws that have a value."],
+    )
     title = f"{found.statistic} of {found.metric}"
     return Finding(
         name="statistic",
@@ -458,7 +438,7 @@ def _finding(found: Estimate, statistic: Statistic, rule: StoppingRule) -> Findi
         title=title[:1].upper() + title[1:],
         said=(verdict, *found.remarks),
         parts=(
-            *_further(found, rule),
+            *([also] if further else []),
             Part(
                 "Trace",
                 columns_of(("draws", "without value", *_ENDS, "width", ""), rows),
@@ -473,29 +453,6 @@ def _finding(found: Estimate, statistic: Statistic, rule: StoppingRule) -> Findi
         found=found,
         passed=found.is_met,
     )
-
-
-_ENDS = ("estimate", "low", "high")
-
-
-def _difference(kind: Kind, value: float) -> str:
-    return kind.change(value) if math.isfinite(value) else f"{value:.3g}"
-
-
-def _met(look: Look, rule: StoppingRule) -> str:
-    met = "narrow enough" if rule.is_narrow(look.interval) else ""
-    return met if look.is_carried else f"{met}{', but ' if met else ''}its effective sample size is small"
-
-
-def _further(found: Estimate, rule: StoppingRule) -> list[Part]:
-    """Return the means of further metrics, where some were requested."""
-    rows = [
-        (of_metric(name).title, f"{mean.draws:,}", *map(of_metric(name).number, (mean.value, mean.low, mean.high)))
-        for name, mean in found.also.items()
-    ]
-    columns = columns_of(("mean over the same draws", "with a value", *_ENDS), rows)
-    said = f"Each with {100.0 * rule.confidence_of_look:.4g} % confidence, of the draws that have a value."
-    return [Part("Further metrics", columns, said=[said])] * bool(rows)
 
 
 def _trace(found: Estimate, kind: Kind, rule: StoppingRule) -> Panel:

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from ppafo.analyses.tune.answer import INFEASIBLE, agreement
-from ppafo.analyses.tune.problem import Effort, Limit, Problem, Searched, Spread, Term
+from ppafo.analyses.tune.problem import Effort, Problem, Searched, Spread, Term
 from ppafo.analyses.tune.solve import UNUSABLE, Crossed, judge, search
 from ppafo.simulation.loading import load_scenario
 from ppafo.studies.distributions import Floats, NormalAround
-from ppafo.studies.draws import Uncertainty
+from ppafo.studies.draws import Limit, Uncertainty
 from ppafo.studies.study import Drawn
 from ppafo.studies.varying import varied_path
 
