@@ -98,12 +98,17 @@ def with_new_noise(columns: Columns) -> Columns:
     return first | {NOISE: other_noise(first[NOISE])}
 
 
-def study_of(study: Study | str | Path | Mapping[str, Any], overrides: Sequence[str] = ()) -> Study:
-    """Return a study: as it is, or by name, file or data, with overrides in every configuration."""
+def study_of(
+    study: Study | str | Path | Mapping[str, Any],
+    overrides: Sequence[str] = (),
+    draws: int | None = None,
+    seed: int | None = None,
+) -> Study:
+    """Return a study as it is, or as ``load_study`` reads a name, file or data; StudyError for both at once."""
     if not isinstance(study, Study):
-        return load_study(study, overrides)
-    if overrides:
-        raise StudyError("a loaded Study takes no overrides; give its name or file, or load it with the overrides")
+        return load_study(study, overrides, draws, seed)
+    if overrides or draws is not None or seed is not None:
+        raise StudyError("a loaded Study takes no overrides, draws or seed; give them to load_study, or give its name")
     return study
 
 

@@ -79,7 +79,10 @@ def drawn_values(study: Study, runs: NDArray[np.int64]) -> dict[str, Floats]:
         point, place = np.divmod(point, len(axis.values))
         columns[axis.path] = np.asarray(axis.values)[place]
     if study.drawn:
-        columns |= _random_values(study, draw)
+        uniform = _uniform_numbers(study, draw)
+        uniform = uniform if study.scores is None else correlate(uniform, study.scores)
+        rows = np.ascontiguousarray(uniform.T)
+        columns |= {item.path: item.distribution.values(row) for item, row in zip(study.drawn, rows, strict=True)}
     return {path: columns[path] for path in study.paths}
 
 
@@ -87,15 +90,6 @@ def varied_columns(study: Study, configuration: Configuration, values: dict[str,
     """Return the values that the runs of a configuration get."""
     own = {path: column for path, column in values.items() if study.varies(path, configuration.name)}
     return with_followers(own, study.same_in(configuration.name))
-
-
-def _random_values(study: Study, draws: NDArray[np.int64]) -> dict[str, Floats]:
-    """Return the values of the distributions."""
-    uniform = _uniform_numbers(study, draws)
-    if study.scores is not None:
-        uniform = correlate(uniform, study.scores)
-    columns = np.ascontiguousarray(uniform.T)
-    return {item.path: item.distribution.values(columns[row]) for row, item in enumerate(study.drawn)}
 
 
 def _uniform_numbers(study: Study, draws: NDArray[np.int64]) -> Floats:

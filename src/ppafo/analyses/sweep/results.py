@@ -97,15 +97,16 @@ class StudyResults:
 
     def thin(self, column: str, maximum: int) -> dict[str, np.ndarray[Any, Any]]:
         """Return a column by name of the configuration, of about ``maximum`` runs in all: every so many of them."""
+        # An odd step: an even one would see one half of a grid whose last axis has two values.
         step = -(-int(self.document["runs"]) // maximum) | 1
-        return {name: self._every(name, column, step) for name in self.configurations}
-
-    def _every(self, configuration: str, column: str, step: int) -> np.ndarray[Any, Any]:
-        parts, first = [], 0
-        for table in self.chunks([column], configuration):
-            parts.append(table.column(column).to_numpy()[first::step])
-            first = (first - table.num_rows) % step
-        return np.concatenate(parts)
+        thinned = {}
+        for name in self.configurations:
+            parts, first = [], 0
+            for table in self.chunks([column], name):
+                parts.append(table.column(column).to_numpy()[first::step])
+                first = (first - table.num_rows) % step
+            thinned[name] = np.concatenate(parts)
+        return thinned
 
     def parts(self, configuration: str, column: str) -> Iterator[np.ndarray[Any, Any]]:
         """Give the finite values of a column of a configuration, chunk by chunk."""
