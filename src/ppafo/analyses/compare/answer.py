@@ -118,6 +118,16 @@ def finding_of(found: Compared) -> Finding[Compared]:
     names = found.configurations
     has_errors = _ERROR in found.metrics
     said = [_READING] if found.draws else []
+    counts = ((len(found.tasks), "task"), (len(found.varied), "uncertain value"))
+    tasks, values = (f"{count} {noun}{'' if count == 1 else 's'}" for count, noun in counts)
+    lead = f"{len(names)} configurations on {tasks}, baseline {found.baseline}; "
+    if not found.draws:
+        lead += "the nominal device, without uncertainty"
+    elif not found.varied:
+        lead += f"the nominal device, over {found.draws:,} draws of the sensor noise"
+    else:
+        lead += f"{found.draws:,} draws of {values}{' and of the sensor noise' if found.has_noise else ''}, the same "
+        lead += f"for all; each interval with {100.0 * found.confidence:g} % confidence"
     pareto, change = (
         Part(
             "Error against gas",
@@ -140,7 +150,7 @@ def finding_of(found: Compared) -> Finding[Compared]:
         name="compare",
         kicker="Comparison",
         title=" and ".join(names) if len(names) == 2 else f"{len(names)} configurations against {found.baseline}",
-        said=(_lead(found),),
+        said=(lead,),
         parts=(
             *(part for task in found.tasks for part in _parts(found, task)),
             *([pareto] if has_errors else []),
@@ -154,24 +164,10 @@ def finding_of(found: Compared) -> Finding[Compared]:
     )
 
 
-def _lead(found: Compared) -> str:
-    tasks = f"{len(found.tasks)} task{'' if len(found.tasks) == 1 else 's'}"
-    words = f"{len(found.configurations)} configurations on {tasks}, baseline {found.baseline}"
-    if not found.draws:
-        return f"{words}; the nominal device, without uncertainty"
-    if not found.varied:
-        return f"{words}; the nominal device, over {found.draws:,} draws of the sensor noise"
-    values = f"{len(found.varied)} uncertain value{'' if len(found.varied) == 1 else 's'}"
-    noise = " and of the sensor noise" if found.has_noise else ""
-    return (
-        f"{words}; {found.draws:,} draws of {values}{noise}, the same for all; "
-        f"each interval with {100.0 * found.confidence:g} % confidence"
-    )
-
-
 def _parts(found: Compared, task: OnTask) -> list[Part]:
     """Return the metrics of all configurations, each other one against the baseline, and which is the best."""
     where = "" if len(found.tasks) == 1 else f", {task.task}"
+    kinds = [(name, of_metric(name)) for name in found.metrics]
     best = {
         metric: ", ".join(f"{name} {_PROBABILITY.interval(each)}" for name, each in task.best[metric].items())
         for metric in (_ERROR, _GAS)
@@ -182,7 +178,7 @@ def _parts(found: Compared, task: OnTask) -> list[Part]:
             f"Task: {task.task}",
             [
                 Column("configuration", [case.configuration for case in task.cases]),
-                *(_metric(name, [case.value(name) for case in task.cases]) for name in found.metrics),
+                *(Column(kind.words, [case.value(name) for case in task.cases], kind) for name, kind in kinds),
                 Column("status", [case.status.kind for case in task.cases]),
             ],
         ),
@@ -198,16 +194,14 @@ def _parts(found: Compared, task: OnTask) -> list[Part]:
 _PROBABILITY = Kind(form=".4g")
 
 
-def _metric(name: str, values: Sequence[float | None]) -> Column:
-    kind = of_metric(name)
-    return Column(kind.words, values, kind)
-
-
 def _paired(found: Compared, task: OnTask, name: str) -> list[Column]:
     """Return a row for each metric: change without and with uncertainty, mean difference, probability of a gain."""
     pairs = task.pairs[name]
     kinds = [of_metric(item.metric, "+.3g") for item in pairs]
-    nominal = [_nominal(task, item.metric, found.baseline, name) for item in pairs]
+    nominal = []
+    for item in pairs:
+        first, other = (task.case(each).value(item.metric) for each in (found.baseline, name))
+        nominal.append(_percent((other - first) / abs(first)) if first and other is not None else "")
     spread = [
         f"{_percent(item.change)} ({_percent(item.change_low)} to {_percent(item.change_high)})"
         if math.isfinite(item.change)
@@ -231,50 +225,38 @@ def _paired(found: Compared, task: OnTask, name: str) -> list[Column]:
     return [*columns, Column("spread due to noise", noise)] if found.has_noise else columns
 
 
-def _nominal(task: OnTask, metric: str, baseline: str, name: str) -> str:
-    first, other = (task.case(each).value(metric) for each in (baseline, name))
-    return _percent((other - first) / abs(first)) if first and other is not None else ""
-
-
 def _percent(fraction: float) -> str:
     return "" if math.isnan(fraction) else f"{100.0 * fraction:+.3g} %"
 
 
-def remarks_of(found: Compared, tasks: Sequence[OnTask]) -> list[str]:
+def remarks_of(found: Compared) -> list[str]:
     """Return what is not as one would expect: other tasks, runs that failed, means that few draws decide, noise."""
-    return [
-        *(text for task in tasks for text in _other_tasks(found.baseline, task)),
-        *(text for task in tasks for case in task.cases for text in _failures(case, task.task, found.draws)),
-        *(
+    said, failed, carried = [], [], []
+    for task in found.tasks:
+        asked = {case.configuration: (case.scenario.reference, case.scenario.run.duration) for case in task.cases}
+        others = [name for name, what in asked.items() if what != asked[found.baseline]]
+        if others:
+            said.append(
+                f"task '{task.task}': {', '.join(others)} follow a different reference, or run for a different time, "
+                f"than {found.baseline}: the differences come partly from the task"
+            )
+        for case in task.cases:
+            where = f"{case.configuration}, {task.task}"
+            failed += [] if case.status.is_completed else [f"{where}: {case.status.message}"]
+            if case.failed_draws:
+                failed.append(
+                    f"{where}: {case.failed_draws:,} of {found.draws:,} draws failed and are left out of every pair; "
+                    f"the first: {case.reason}"
+                )
+        carried += [
             f"{name}, task '{task.task}': the mean difference of {item.metric} has an effective sample size of "
             f"{item.effective_size:.3g} of {item.pairs:,} draws: do not trust its interval; the probability of being "
             "better is not affected"
-            for task in tasks
             for name, pairs in task.pairs.items()
             for item in pairs
             if item.effective_size < min(FEWEST_EFFECTIVE, 0.5 * item.pairs)
-        ),
-        *([_NOISE] if found.has_noise else []),
-    ]
-
-
-def _failures(case: Case, task: str, draws: int) -> list[str]:
-    said = [] if case.status.is_completed else [f"{case.configuration}, {task}: {case.status.message}"]
-    if case.failed_draws:
-        said.append(
-            f"{case.configuration}, {task}: {case.failed_draws:,} of {draws:,} draws failed and are left out of every "
-            f"pair; the first: {case.reason}"
-        )
-    return said
-
-
-def _other_tasks(baseline: str, task: OnTask) -> list[str]:
-    asked = {case.configuration: (case.scenario.reference, case.scenario.run.duration) for case in task.cases}
-    others = [name for name, what in asked.items() if what != asked[baseline]]
-    return [
-        f"task '{task.task}': {', '.join(others)} follow a different reference, or run for a different time, than "
-        f"{baseline}: the differences come partly from the task"
-    ] * bool(others)
+        ]
+    return [*said, *failed, *carried, *([_NOISE] if found.has_noise else [])]
 
 
 def front_of(cases: Sequence[Case]) -> list[str]:
@@ -334,20 +316,18 @@ def _change(found: Compared, task: OnTask, metric: str) -> Panel:
     words = f"{of_metric(metric).words}, change from {found.baseline}"
     is_first = metric == _ERROR
     title = f"Task: {task.task}" if len(found.tasks) > 1 and is_first else ""
+
+    def reach(axes: "Axes") -> None:
+        # Zero is shown where it is near: far from all changes it would squeeze them into a few pixels.
+        low, high = min(ends, default=0.0), max(ends, default=0.0)
+        span = high - low or 1.0
+        if low - 0.5 * span <= 0.0 <= high + 0.5 * span:
+            axes.axvline(0.0, color=BLACK, linewidth=0.8)
+            low, high = min(low, 0.0), max(high, 0.0)
+        axes.set_xlim(low - 0.08 * span, high + 0.08 * span)
+
     axis, draws = Kind(words, "%"), Kind("Draws" if is_first else "")
-    return Panel(axis, draws, marks, title, legend="" if is_first else "above", then=lambda axes: _reach(axes, ends))
-
-
-def _reach(axes: "Axes", ends: Sequence[float]) -> None:
-    """Show the changes, and zero where it is near: far from all changes it would squeeze them into a few pixels."""
-    if not ends:
-        return
-    low, high = min(ends), max(ends)
-    span = high - low or 1.0
-    if low - 0.5 * span <= 0.0 <= high + 0.5 * span:
-        axes.axvline(0.0, color=BLACK, linewidth=0.8)
-        low, high = min(low, 0.0), max(high, 0.0)
-    axes.set_xlim(low - 0.08 * span, high + 0.08 * span)
+    return Panel(axis, draws, marks, title, legend="" if is_first else "above", then=reach if ends else None)
 
 
 def _relative(baseline: Floats, other: Floats) -> Floats:

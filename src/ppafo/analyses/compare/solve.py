@@ -108,7 +108,7 @@ def compare(
         tasks=[_on_task(task, texts, cases[task], reference, metrics, confidence) for task, texts in wanted.items()],
         metrics=metrics,
     )
-    return finding_of(replace(found, remarks=remarks_of(found, found.tasks)))
+    return finding_of(replace(found, remarks=remarks_of(found)))
 
 
 def _tasks(tasks: Mapping[str, Sequence[str]] | Sequence[tuple[str, Sequence[str]]]) -> dict[str, Sequence[str]]:

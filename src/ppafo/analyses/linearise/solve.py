@@ -261,7 +261,17 @@ def equilibrium(scenario: Scenario) -> Point:
     held = None if run.program.angle is not None else 0.0
     found = _steady(run, held, values, wanted)
     if found is None:
-        raise ScenarioError(_no_equilibrium(scenario, run, held, values, wanted))
+        if wanted is None:
+            line = f"no equilibrium found for the command {values['command']:g}"
+            raise ScenarioError(f"{scenario.name}: {line}; take --at with a time")
+        line = f"no equilibrium at {wanted:.4g} N m, the last value of the reference"
+        full = dict.fromkeys(("command", *_spool(values)), 1.0 if wanted > 0.0 else -1.0)
+        most = _steady(run, held, {**values, **full}, None)
+        if most is not None:
+            torque = run.plant.torque_constant * (most["pressure_1"] - most["pressure_2"])
+            line += f": with the valve fully open the actuator comes to {torque:.4g} N m"
+        other = " or hold the ankle" if isinstance(scenario.motion, FreeMotion) else ""
+        raise ScenarioError(f"{scenario.name}: {line}; set another reference{other}, or take --at with a time")
     way = _way(run, found, scenario.run.duration)
     if way:
         raise ScenarioError(
@@ -351,22 +361,6 @@ def _settled(run: Run, values: Mapping[str, float]) -> Any:
     return run.program.valve.settle(run.valve, state, values["command"], 0.0)
 
 
-def _no_equilibrium(
-    scenario: Scenario, run: Run, held: float | None, values: Mapping[str, float], wanted: float | None
-) -> str:
-    """One line about a steady state that is not there."""
-    if wanted is None:
-        return f"{scenario.name}: no equilibrium found for the command {values['command']:g}; take --at with a time"
-    full = dict.fromkeys(("command", *_spool(values)), 1.0 if wanted > 0.0 else -1.0)
-    most = _steady(run, held, {**values, **full}, None)
-    line = f"{scenario.name}: no equilibrium at {wanted:.4g} N m, the last value of the reference"
-    if most is not None:
-        torque = run.plant.torque_constant * (most["pressure_1"] - most["pressure_2"])
-        line += f": with the valve fully open the actuator comes to {torque:.4g} N m"
-    is_free = isinstance(scenario.motion, FreeMotion)
-    return f"{line}; set another reference{' or hold the ankle' if is_free else ''}, or take --at with a time"
-
-
 EQUILIBRIUM = "equilibrium"
 MISSING_CASADI = "a linear model needs CasADi: pip install ppafo[control]"
 EQUAL = 1.0e-12
@@ -421,27 +415,22 @@ class _Sides:
     def __call__(self, sign: str, left: Any, right: Any, place: str) -> bool:
         import casadi
 
-        one, other, ahead = self._evaluated(left, right, casadi.SX(left) - casadi.SX(right))
+        # Both values at the point, and how fast the one grows beyond the other along the direction.
+        symbols = casadi.symvar(casadi.vertcat(left, right))
+        onward = casadi.DM([_direction(symbol.name(), self._values) for symbol in symbols])
+        surplus = casadi.SX(left) - casadi.SX(right)
+        growth = casadi.jtimes(surplus, casadi.vertcat(*symbols), onward) if symbols else 0.0
+        known = [self._values[symbol.name()] for symbol in symbols]
+        found = casadi.Function("values", symbols, [casadi.vertcat(left, right, growth)]).call(known)[0]
+        one, other, ahead = (float(item) for item in found.nonzeros())
         larger = max(abs(one), abs(other))
-        surplus = one - other if abs(one - other) > EQUAL * larger else ahead
-        tests = {"<": surplus < 0.0, "<=": surplus <= 0.0, ">": surplus > 0.0, ">=": surplus >= 0.0}
+        beyond = one - other if abs(one - other) > EQUAL * larger else ahead
+        tests = {"<": beyond < 0.0, "<=": beyond <= 0.0, ">": beyond > 0.0, ">=": beyond >= 0.0}
         # Signs that are not in the table are == and !=: they have no edge.
         is_true = tests.get(sign, (one == other) == (sign == "=="))
         if sign in tests and abs(one - other) <= ON_THE_EDGE * larger:
             self.edges[place] = Edge(place, is_true)
         return is_true != (place == self._other_side)
-
-    def _evaluated(self, left: Any, right: Any, surplus: Any) -> tuple[float, float, float]:
-        """Both values at the point, and how fast the one grows beyond the other along the direction."""
-        import casadi
-
-        symbols = casadi.symvar(casadi.vertcat(left, right))
-        known = [self._values[symbol.name()] for symbol in symbols]
-        onward = casadi.DM([_direction(symbol.name(), self._values) for symbol in symbols])
-        ahead = casadi.jtimes(surplus, casadi.vertcat(*symbols), onward) if symbols else 0.0
-        found = casadi.Function("values", symbols, [casadi.vertcat(left, right, ahead)]).call(known)[0]
-        one, other, growth = (float(item) for item in found.nonzeros())
-        return one, other, growth
 
 
 def _direction(name: str, values: Mapping[str, float]) -> float:
@@ -464,9 +453,12 @@ def _model(scenario: Scenario, run: Run, point: Point) -> LinearModel:
     edges = []
     for place, edge in decided.edges.items():
         others = _matrices(plant_of(run, point.way, _Sides(values, place), time), values)
-        # An edge counts only where the linear model on its other side is a different one.
-        if any(_differs(one, other) for one, other in zip(matrices[:4], others[:4], strict=True)):
-            edges.append(edge)
+        # An edge counts only where the linear model on its other side is another one, or of other states.
+        pairs = list(zip(matrices[:4], others[:4], strict=True))
+        is_same = all(one.shape == other.shape for one, other in pairs) and all(
+            np.allclose(one, other, rtol=ON_THE_EDGE, atol=0.0, equal_nan=True) for one, other in pairs
+        )
+        edges += [] if is_same else [edge]
     a, b, c, d, found, shown = matrices
     sides = sides_of(run, point)
     if not np.any(b[:, 0]) and not np.any(d[:, 0]):
@@ -499,11 +491,6 @@ def _matrices(plant: Plant, values: Mapping[str, float]) -> list[Floats]:
     rates, outputs = casadi.vertcat(*plant.rates.values()), casadi.vertcat(*plant.outputs.values())
     wanted = [casadi.jacobian(item, by) for item in (rates, outputs) for by in (x, u)]
     return [np.array(item) for item in plant.function([*wanted, rates, outputs])(values)]
-
-
-def _differs(one: Floats, other: Floats) -> bool:
-    """True for two matrices that are not the same to rounding, or of different states."""
-    return one.shape != other.shape or not np.allclose(one, other, rtol=ON_THE_EDGE, atol=0.0, equal_nan=True)
 
 
 def sides_of(run: Run, point: Point) -> dict[str, str]:
