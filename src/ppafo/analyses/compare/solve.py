@@ -51,13 +51,9 @@ def compare(
 ) -> Finding[Compared]:
     """Compare configurations on tasks, and over the distributions of a study with common random numbers.
 
-    ``configurations`` are scenarios by name (or a list of names, files or Scenario objects); those of the study by
-    default. ``study`` is a study file, name or Study, whose distributions hold in all of them. ``tasks`` has
-    overrides by name, such as ``{"slow": ["reference.ramp_time=2 s"]}``; ``overrides`` change every configuration.
-    ``baseline`` is the configuration that all others are compared with, by default the first. Draws are randomised
-    Sobol replicates whatever the study's sampling method; where a controller receives noise, each has a noise stream of
-    its own, the same in all configurations, and without a study the noise alone is drawn. StudyError for bad input and
-    where more than the fraction ``maximum_failed`` of a configuration's runs fails; fewer are left out in pairs.
+    ``study`` is a study file, name or Study, whose distributions hold in all configurations. ``tasks`` has overrides by
+    name, such as ``{"slow": ["reference.ramp_time=2 s"]}``; ``overrides`` change every configuration. The rest is as
+    ``ppafo.compare`` describes it.
     """
     if not FEWEST_DRAWS <= draws <= MAXIMUM_DRAWS:
         raise StudyError(f"draws = {draws!r}: must be at least {FEWEST_DRAWS} and at most {MAXIMUM_DRAWS:,}")

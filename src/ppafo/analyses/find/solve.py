@@ -88,10 +88,7 @@ def find(
     """Return the lowest value (or the ``highest``) [SI] of a number of a scenario that meets a condition on a metric.
 
     ``vary`` is the number with its range, ``"supply.pressure=20..90 psi_g"``; ``such_that`` the condition,
-    ``"final_error <= 0.3 N m"``. A grid of values over the range is run side by side; between the last one that does
-    not meet the condition and the first one that does, the bracket is divided again and again down to 1e-6 of the
-    range. What happens between two values of the grid on one side of the condition is not seen. StudyError or
-    ScenarioError for bad input, and where every run fails.
+    ``"final_error <= 0.3 N m"``. How it is searched, and what that does not see, ``ppafo.find`` describes.
     """
     base = with_overrides(scenario_or_load(scenario), overrides)
     path, low, high = _range(vary, base)

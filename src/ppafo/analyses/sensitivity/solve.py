@@ -210,10 +210,7 @@ def sensitivity(
     """Return the sensitivity of metrics with regard to everything that has a distribution in a study.
 
     ``method`` is a name in ``METHODS``; by default Shapley effects where values are correlated, else Sobol indices.
-    ``metrics`` are the study's by default; ``samples`` base points or orders (8192 for Sobol, 2048 for
-    Shapley). ``independent`` leaves the correlations of the study out. Noise of the sensors is one of the values.
-    StudyError for bad input, and where more than the fraction ``maximum_failed`` of the runs fails; of fewer, whole
-    blocks are left out and counted.
+    ``samples`` are base points or orders. The rest is as ``ppafo.sensitivity`` describes it.
     """
     if method is not None and method not in METHODS:
         raise StudyError(

@@ -193,9 +193,8 @@ def tune(
 ) -> Finding[Tuned]:
     """Search the best values of a tuning: a name, a TOML file, data laid out as one, or a Problem.
 
-    ``overrides`` change the scenario, ``seed`` is the seed of the search, the file's by default. Every generation is
-    one ensemble, and every candidate sees the same draws. StudyError for bad input, and where a goal has no scale
-    because the scenario as it is gives 0 or nothing.
+    ``overrides`` change the scenario, ``seed`` is the seed of the search, the file's by default. The rest is as
+    ``ppafo.tune`` describes it.
     """
     if tuning is None:
         raise StudyError("no tuning was given: name one or give a .toml file; 'ppafo tune --list' shows them")
