@@ -188,18 +188,14 @@ def check_metrics(metrics: Sequence[str], scenario: Scenario) -> None:
         raise StudyError(f"the metric '{repeated}' is named twice")
 
 
-def check_fraction(value: float, name: str) -> float:
-    """Return a number from 0 to below 1; StudyError for any other."""
-    if not 0.0 <= value < 1.0:
-        raise StudyError(f"{name} = {value!r}: must be at least 0 and less than 1")
-    return value
+def check_fraction(value: float, name: str, least: float = 0.0) -> None:
+    """Refuse a number that is below the least one, or not less than 1."""
+    if not least <= value < 1.0:
+        raise StudyError(f"{name} = {value!r}: must be at least {least:g} and less than 1")
 
 
-def check_confidence(value: float) -> float:
-    """Return a confidence from 0.5 to below 1; StudyError for any other."""
-    if not 0.5 <= value < 1.0:
-        raise StudyError(f"confidence = {value!r}: must be at least 0.5 and less than 1")
-    return value
+CONFIDENCE = "confidence", 0.5
+"""What ``check_fraction`` is told of a confidence: one below a half is a mistake, such as 0.05."""
 
 
 def atmosphere_of(scenario: Scenario, varied: Collection[str]) -> float | None:

@@ -8,6 +8,8 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ppafo.documents.models import validate
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import (
@@ -27,7 +29,7 @@ from ppafo.parameters.overrides import other_forms, override_set
 from ppafo.simulation.numbers import chosen_path
 from ppafo.studies import declaration as declared
 from ppafo.studies.distributions import Above
-from ppafo.studies.sampling import MAXIMUM_SOBOL_DIMENSIONS, Factor, cholesky_factor, correlation_matrix, with_noise
+from ppafo.studies.sampling import MAXIMUM_SOBOL_DIMENSIONS, Factor, cholesky_factor, with_noise
 from ppafo.studies.study import Axis, Configuration, Drawn, Sample, Study, valid_outputs
 from ppafo.studies.varying import VariedPath, axis_or_distribution, in_its_unit, stated_normal, texts_of, varied_path
 
@@ -200,20 +202,16 @@ def _place(item: declared.Varied, configurations: Sequence[Configuration], parse
 
 def _axis_or_drawn(item: declared.Varied, place: VariedPath, configurations: Iterable[Configuration]) -> Axis | Drawn:
     with refused_as(StudyError, f"vary '{item.path}'", UnitError):
-        if isinstance(item, declared.Stated):
-            return _stated_distribution(item, place, _varying(item, configurations))
-        return axis_or_distribution(item, place)
-
-
-def _stated_distribution(item: declared.Stated, place: VariedPath, configurations: Iterable[Configuration]) -> Drawn:
-    # One draw is run in every configuration, so all of them must mean the same distribution.
-    found = {stated_normal(place, each.scenario)[0] for each in configurations}
-    if len(found) > 1:
-        raise UnitError(
-            "the parameter sets of the configurations state different values; use 'only', or give the values"
-        )
-    stated = found.pop()
-    return Drawn(item.path, Above(stated, place.atmosphere) if place.is_gauge else stated)
+        if not isinstance(item, declared.Stated):
+            return axis_or_distribution(item, place)
+        # One draw is run in every configuration, so all of them must mean the same distribution.
+        found = {stated_normal(place, each.scenario)[0] for each in _varying(item, configurations)}
+        if len(found) > 1:
+            raise UnitError(
+                "the parameter sets of the configurations state different values; use 'only', or give the values"
+            )
+        stated = found.pop()
+        return Drawn(item.path, Above(stated, place.atmosphere) if place.is_gauge else stated)
 
 
 def _followers(parsed: declared.StudyFile, places: Mapping[str, VariedPath]) -> dict[str, str]:
@@ -257,7 +255,11 @@ def _scores(parsed: declared.StudyFile, drawn: Sequence[Drawn]) -> Factor | None
                 f"correlations: between = ['{one}', '{other}'] must name two different paths, and each pair only once"
             )
         coefficients[one, other] = item.coefficient
-    factor = cholesky_factor(correlation_matrix(paths, coefficients))
+    matrix = np.eye(len(paths))
+    for (one, other), coefficient in coefficients.items():
+        row, column = paths.index(one), paths.index(other)
+        matrix[row, column] = matrix[column, row] = coefficient
+    factor = cholesky_factor(matrix)
     if factor is None:
         shown = ", ".join(f"{one} with {other}: {value:g}" for (one, other), value in coefficients.items())
         raise StudyError(

@@ -1,5 +1,6 @@
 """A study as frozen values in SI units: what it keeps, its runs, grid points and draws, and its configurations."""
 
+import math
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -161,17 +162,9 @@ class Study:
         return (*(axis.path for axis in self.axes), *(item.path for item in self.drawn))
 
     @property
-    def grid_points(self) -> int:
-        """Number of points of the grid, 1 where there is none."""
-        points = 1
-        for axis in self.axes:
-            points *= len(axis.values)
-        return points
-
-    @property
     def runs_of_configuration(self) -> int:
-        """Number of runs of every configuration."""
-        return self.grid_points * self.sample.runs
+        """Number of runs of every configuration: the draws, at each point of the grid."""
+        return math.prod(len(axis.values) for axis in self.axes) * self.sample.runs
 
     @property
     def runs(self) -> int:
@@ -212,8 +205,13 @@ def choose_configurations(
                 f"study '{study.name}': '{path}' varies only in {', '.join(varying)}; "
                 "compare the study's own configurations"
             )
-        pairs = configurations.items() if isinstance(configurations, Mapping) else _with_names(configurations)
-        found = tuple(Configuration(name, scenario_or_load(item)) for name, item in pairs)
+        given = configurations.values() if isinstance(configurations, Mapping) else configurations
+        scenarios = [scenario_or_load(item) for item in given]
+        names = list(configurations) if isinstance(configurations, Mapping) else [item.name for item in scenarios]
+        repeated = first_twice(names)
+        if repeated is not None:
+            raise StudyError(f"two of the scenarios are named '{repeated}'; give them different names in a study file")
+        found = tuple(map(Configuration, names, scenarios))
     if len(found) < 2:
         raise StudyError(f"a comparison needs at least two configurations, there is {len(found)}")
     return tuple(replace(item, scenario=with_overrides(item.scenario, overrides)) for item in found)
@@ -235,13 +233,3 @@ def with_overrides(scenario: Scenario, overrides: Sequence[str]) -> Scenario:
             f"scenario '{scenario.name}' was changed in Python; overrides need the scenario as it is in its file"
         )
     return reloaded(scenario, overrides)
-
-
-def _with_names(scenarios: Sequence[Scenario | str | Path]) -> list[tuple[str, Scenario]]:
-    """Return scenarios by their own names; StudyError where two are called the same."""
-    found = [scenario_or_load(item) for item in scenarios]
-    names = [scenario.name for scenario in found]
-    repeated = first_twice(names)
-    if repeated is not None:
-        raise StudyError(f"two of the scenarios are named '{repeated}'; give them different names in a study file")
-    return list(zip(names, found, strict=True))

@@ -15,7 +15,7 @@ from ppafo.parameters import apply_overrides, load_parameter_set
 from ppafo.parameters.declaration import alternatives, is_within
 from ppafo.parameters.graph import counts_from, gauge_link
 from ppafo.parameters.overrides import split_override
-from ppafo.parameters.parameter_set import Entry, atmospheric_pressure, entry_in_si
+from ppafo.parameters.parameter_set import atmospheric_pressure, entry_in_si
 from ppafo.simulation import declaration
 from ppafo.simulation.declaration import WRITTEN_UNITS
 from ppafo.simulation.loading import set_name
@@ -64,7 +64,13 @@ class VariedPath:
         """Return a value of the path in SI; UnitError where the unit does not fit or the path does not allow it."""
         number = self._in_si(value, self.quantity)
         if not is_within(number, self.quantity):
-            raise UnitError(f"{self.path} must be {self._limits()}")
+            lowest, highest = self.quantity.minimum, self.quantity.maximum
+            word = "at least" if self.quantity.minimum_allowed else "more than"
+            # Limits of a pressure are absolute, whatever its values count from.
+            quote = replace(self, is_gauge=False).quote
+            limits = [f"{word} {quote(lowest)}"] if math.isfinite(lowest) else []
+            limits += [f"at most {quote(highest)}"] if math.isfinite(highest) else []
+            raise UnitError(f"{self.path} must be {' and '.join(limits)}")
         return _parse(str(value), self.quantity, 0.0) if self.is_gauge else number
 
     def distance(self, value: str | float) -> float:
@@ -87,12 +93,6 @@ class VariedPath:
         if quantity.unit not in declaration.PLAIN:
             raise UnitError(f"a number without a unit; give a text with a unit such as {quantity.unit}")
         return float(value)
-
-    def _limits(self) -> str:
-        lowest, highest = self.quantity.minimum, self.quantity.maximum
-        word, quote = "at least" if self.quantity.minimum_allowed else "more than", replace(self, is_gauge=False).quote
-        parts = [f"{word} {quote(lowest)}"] if math.isfinite(lowest) else []
-        return " and ".join([*parts, f"at most {quote(highest)}"] if math.isfinite(highest) else parts)
 
 
 def _parse(text: str, quantity: Quantity, atmosphere: float) -> float:
@@ -286,7 +286,15 @@ def _level(key: str, value: str | float, place: VariedPath) -> float:
 
 def stated_normal(place: VariedPath, scenario: Scenario) -> tuple[NormalAround, str]:
     """Return the distribution of a path, and its unit in the set; UnitError where that states no uncertainty for it."""
-    entry, mean = _stated_entry(place.path, scenario)
+    origin, path = scenario.origin, place.path
+    folder = Path(origin.file).parent if origin.file is not None else Path()
+    own = [text for text in origin.overrides if is_of_device(split_override(text).typed)]
+    # What the set reports with the overrides of the scenario: one that replaces a value takes its uncertainty away.
+    parameters = load_parameter_set(set_name(origin.parameter_set, folder))
+    for given in (origin.content["device"].get("overrides", ()), own):
+        parameters = apply_overrides(parameters, given, origin.valve)
+    inside = f"valves.{origin.valve}.{path.removeprefix('valve.')}" if path.startswith("valve.") else path
+    entry = parameters.numbers.get(inside)
     if entry is None or not entry.uncertainty:
         why = "was changed by an override" if entry is not None and entry.source == "override" else "has none"
         raise UnitError(
@@ -296,19 +304,5 @@ def stated_normal(place: VariedPath, scenario: Scenario) -> tuple[NormalAround, 
     if unit.endswith(("_g", "_a")):
         unit = f"{unit[:-2]}_d"
     half_width = place.distance(f"{entry.uncertainty!r} {unit}".strip())
+    mean = entry_in_si(entry, parameters.declarations()[inside], atmospheric_pressure(parameters))
     return NormalAround(mean, half_width / DEVIATIONS_IN_HALF_WIDTH), entry.unit
-
-
-def _stated_entry(path: str, scenario: Scenario) -> tuple[Entry | None, float]:
-    """Return what the set, with the overrides of the scenario, reports of a path, and the value in SI."""
-    origin = scenario.origin
-    folder = Path(origin.file).parent if origin.file is not None else Path()
-    own = [text for text in origin.overrides if is_of_device(split_override(text).typed)]
-    parameters = load_parameter_set(set_name(origin.parameter_set, folder))
-    for given in (origin.content["device"].get("overrides", ()), own):
-        parameters = apply_overrides(parameters, given, origin.valve)
-    inside = f"valves.{origin.valve}.{path.removeprefix('valve.')}" if path.startswith("valve.") else path
-    entry = parameters.numbers.get(inside)
-    if entry is None:
-        return None, 0.0
-    return entry, entry_in_si(entry, parameters.declarations()[inside], atmospheric_pressure(parameters))

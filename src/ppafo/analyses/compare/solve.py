@@ -14,10 +14,10 @@ from ppafo.report.kind import Interval
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate_many
 from ppafo.studies.draws import (
+    CONFIDENCE,
     FEWEST_DRAWS,
     MAXIMUM_DRAWS,
     Uncertainty,
-    check_confidence,
     check_fraction,
     study_of,
     uncertainty_of,
@@ -57,7 +57,7 @@ def compare(
     """
     if not FEWEST_DRAWS <= draws <= MAXIMUM_DRAWS:
         raise StudyError(f"draws = {draws!r}: must be at least {FEWEST_DRAWS} and at most {MAXIMUM_DRAWS:,}")
-    check_confidence(confidence)
+    check_fraction(confidence, *CONFIDENCE)
     check_fraction(maximum_failed, "maximum_failed")
     known = study_of(study) if study is not None else None
     chosen = choose_configurations(configurations or None, known, overrides)

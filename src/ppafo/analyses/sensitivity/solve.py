@@ -23,7 +23,7 @@ from ppafo.report.panels import Mark, Panel
 from ppafo.report.setting_names import label_of
 from ppafo.report.style import BLUE, COLOURS, ORANGE
 from ppafo.studies.distributions import Floats
-from ppafo.studies.draws import Uncertainty, check_confidence, check_fraction, drawn_in
+from ppafo.studies.draws import CONFIDENCE, Uncertainty, check_fraction, drawn_in
 from ppafo.studies.sampling import NOISE
 from ppafo.studies.study import Study
 from ppafo.study.runs import Runs, Tally
@@ -135,7 +135,7 @@ def analyse(runs: Runs, uncertainty: Uncertainty, method: Method, settings: Sett
         )
     if settings.seed < 0:
         raise StudyError(f"seed = {settings.seed}: must be 0 or more")
-    check_confidence(settings.confidence)
+    check_fraction(settings.confidence, *CONFIDENCE)
     check_fraction(settings.maximum_failed, "maximum_failed")
     design = method.design(uncertainty, settings.samples, settings.seed)
     columns = uncertainty.columns(design)

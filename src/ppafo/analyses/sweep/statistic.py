@@ -37,13 +37,13 @@ from ppafo.studies.distributions import (
     quantile_interval,
 )
 from ppafo.studies.draws import (
+    CONFIDENCE,
     FEWEST_DRAWS,
     MAXIMUM_DRAWS,
     REPLICATES,
     Columns,
     Uncertainty,
     atmosphere_of,
-    check_confidence,
     check_fraction,
     check_metrics,
     difference_of,
@@ -165,7 +165,7 @@ class StoppingRule:
                 f"first = {self.first!r} and maximum = {self.maximum!r} draws: must be at least {FEWEST_DRAWS}, the "
                 f"first not more than the maximum, and the maximum not above {MAXIMUM_DRAWS:,}"
             )
-        check_confidence(self.confidence)
+        check_fraction(self.confidence, *CONFIDENCE)
         check_fraction(self.maximum_failed, "maximum_failed")
 
     @property
