@@ -295,15 +295,6 @@ def recording_kind(name: str) -> RecordingKind:
     raise DataError(f"{name!r} is no kind of recording{nearest_name(name, _KINDS)}; available: {', '.join(_KINDS)}")
 
 
-def align(first: Recording, second: Recording) -> tuple[Recording, Recording]:
-    """Return both recordings at the times of the first that lie within the second, for a comparison in time."""
-    start, end = max(first.time[0], second.time[0]), min(first.time[-1], second.time[-1])
-    if start > end:
-        raise DataError(f"{first.label} and {second.label} have no time in common: {_span(first)}, {_span(second)}")
-    common = first.between(float(start), float(end))
-    return common, second.resample(common.time)
-
-
 def between_samples(recording: Recording, name: str, times: Floats, start: float = 0.0) -> Floats:
     """Return a channel [SI] at times [s] that count from ``start``, as it declares: held, or on a line.
 
