@@ -42,7 +42,12 @@ def reversals(values: Floats, swing: float) -> int:
     """
     count, direction = 0, 0
     lowest = highest = float(values[0])
-    for value in _extremes(values).tolist():
+    # The first and the last value, and each between them at which the signal turns back: the rest decide nothing.
+    moving = values[np.flatnonzero(np.diff(values, prepend=np.nan))]
+    if moving.size > 1:
+        rises = np.diff(moving) > 0.0
+        moving = moving[np.concatenate([[True], rises[1:] != rises[:-1], [True]])]
+    for value in moving.tolist():
         if direction >= 0 and value < highest - swing:
             count += direction
             direction, lowest = -1, value
@@ -51,13 +56,6 @@ def reversals(values: Floats, swing: float) -> int:
             direction, highest = 1, value
         lowest, highest = min(lowest, value), max(highest, value)
     return count
-
-
-def _extremes(values: Floats) -> Floats:
-    """The first and the last value, and each between them at which a signal turns back."""
-    moving = values[np.flatnonzero(np.diff(values, prepend=np.nan))]
-    rises = np.diff(moving) > 0.0
-    return moving[np.concatenate([[True], rises[1:] != rises[:-1], [True]])] if moving.size > 1 else moving
 
 
 def _oscillations(recording: Recording, part: slice | None) -> float | None:

@@ -95,7 +95,11 @@ def is_at_limit(values: Floats, plateau: Plateau) -> bool:
     """
     if plateau.count < FEWEST_AT_LIMIT or plateau.count == values.size:
         return False
-    return is_noisy(values[values != plateau.value]) or _runs_into(values, plateau)
+    # Whether it was still moving fast, for this signal, just before the plateau.
+    before = min(plateau.first, _BEFORE)
+    steps = np.abs(values[before:] - values[:-before]) if before else np.zeros(1)
+    runs_into = float(steps[plateau.first - before]) > _ABRUPT_FRACTION * float(steps.max())
+    return is_noisy(values[values != plateau.value]) or runs_into
 
 
 def is_noisy(values: Floats) -> bool:
@@ -117,13 +121,6 @@ def stands_out(values: Floats, plateau: Plateau) -> bool:
     changes = np.flatnonzero(np.diff(rest))
     others = np.diff(np.concatenate(([-1], changes, [rest.size - 1])))
     return plateau.count > _EXCEPTIONAL * int(others.max())
-
-
-def _runs_into(values: Floats, plateau: Plateau) -> bool:
-    """Return whether the signal was still moving fast, for this signal, just before the plateau."""
-    before = min(plateau.first, _BEFORE)
-    steps = np.abs(values[before:] - values[:-before]) if before else np.zeros(1)
-    return float(steps[plateau.first - before]) > _ABRUPT_FRACTION * float(steps.max())
 
 
 def noise_of(values: Floats) -> float:

@@ -69,11 +69,6 @@ class Judgement:
         usual = np.where(self.violation > 0.0, INFEASIBLE + self.violation, self.objective)
         return np.where(self.without_value > 0.0, UNUSABLE * (1.0 + self.without_value), usual)
 
-    @property
-    def is_feasible(self) -> NDArray[np.bool_]:
-        """Which candidates satisfy all constraints and never fail."""
-        return np.asarray((self.violation == 0.0) & (self.without_value == 0.0))
-
 
 def shortfall(scenario: Scenario) -> Floats:
     """Return what the supply lacks of the largest reference [N m] in each run (runs,); 0 for nothing.

@@ -108,7 +108,7 @@ def test_feasible_comes_before_infeasible_and_both_before_failed() -> None:
         problem(),
         SCALES,
     )
-    assert judged.is_feasible.tolist() == [True, False, False, False]
+    assert ((judged.violation == 0.0) & (judged.without_value == 0.0)).tolist() == [True, False, False, False]
     assert judged.cost[0] == 4.5
     assert judged.violation[:3] == pytest.approx([0.0, 0.2, 0.8])
     assert judged.cost[0] < INFEASIBLE < judged.cost[1] < judged.cost[2] < UNUSABLE < judged.cost[3]
