@@ -59,7 +59,7 @@ class Plateau:
 
 def longest_gap(time: Floats) -> Gap | None:
     """Return the longest time without samples [s] where it is one of many usual intervals, else None."""
-    # Against the median: a recording may be made of parts that were sampled at other rates.
+    # Against the median, which one gap does not move.
     intervals = np.diff(time)
     if intervals.size < 2:
         return None

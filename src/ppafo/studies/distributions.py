@@ -185,6 +185,7 @@ def floored_interval(values: Floats, replicates: int, confidence: float) -> Inte
 
     spread = replicates_interval(values, replicates, confidence)
     known = values[np.isfinite(values)]
+    # A replicate without a value has no mean: nothing is known of the spread.
     if not math.isfinite(spread.width):
         return spread
     plain = float(ndtri(0.5 + 0.5 * confidence)) * float(np.std(known)) / math.sqrt(known.size)

@@ -62,6 +62,7 @@ class Uncertainty:
         Draw j is number j // REPLICATES of the scramble j % REPLICATES. The scrambles are independent, so that the
         spread between their means says how well a mean is known (Owen, 1997).
         """
+        # Dealt out in turn: any number of draws from the start has all replicates to within one draw.
         numbers = np.arange(first, first + count)
         uniform = np.empty((count, len(self.drawn)))
         for replicate in range(REPLICATES):
@@ -114,6 +115,7 @@ def study_of(
 
 def uncertainty_of(study: Study) -> Uncertainty:
     """Return the distributions of a study; StudyError where it has none, or has a grid, which has no probability."""
+    # A grid has values and no probabilities: a mean over it would be of the grid, not of the device.
     if study.axes:
         raise StudyError(
             f"study '{study.name}': '{study.axes[0].path}' is varied over a grid or list, which has no "
@@ -210,6 +212,7 @@ def level_of(text: str, metric: str, what: str, atmosphere: float | None) -> flo
     no one atmosphere, which is None then.
     """
     atmospheres = (0.0, STANDARD_ATMOSPHERE) if atmosphere is None else (atmosphere,)
+    # The same under two atmospheres: an absolute pressure, or no pressure at all.
     found = common_level(text, METRICS[metric].unit, what, atmospheres)
     if found is None:
         raise StudyError(

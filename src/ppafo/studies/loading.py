@@ -107,6 +107,7 @@ def _build(parsed: declared.StudyFile, document: dict[str, Any], source: Source)
     moving = [item for item in parsed.vary if not isinstance(item, declared.SameAs)]
     varied = [_axis_or_drawn(item, places[item.path], configurations) for item in moving]
     own = tuple(item for item in varied if isinstance(item, Drawn))
+    # Noise comes last, so that it changes none of the draws before it; a grid alone is repeated as it is written.
     drawn, scores = own, _scores(parsed, own)
     scenarios = [item.scenario for item in configurations]
     if own:
@@ -172,6 +173,7 @@ def _check_requests(parsed: declared.StudyFile) -> None:
     if not parsed.vary and len(parsed.configurations) == 1:
         raise StudyError("varies nothing: give at least one [[vary]] or a second configuration")
     paths = [item.path for item in parsed.vary]
+    # Rows of channels over time are lists of one length, and bands are quantiles at one time.
     if "run.duration" in paths and (outputs.trajectories or outputs.bands):
         raise StudyError("'run.duration' cannot vary where trajectories or bands are kept: they need one length")
     repeated = first_twice(paths)
@@ -275,6 +277,7 @@ def _sample(parsed: declared.StudyFile, drawn: Sequence[Drawn]) -> Sample:
         return Sample(None, 1, 0)
     if parsed.sample is None:
         raise StudyError("'sample' is missing: distributions need [sample] with method and runs")
+    # The direction numbers of SciPy's sequence end there.
     if parsed.sample.method == "sobol" and len(drawn) > MAXIMUM_SOBOL_DIMENSIONS:
         raise StudyError(f"sample.method = 'sobol' allows at most {MAXIMUM_SOBOL_DIMENSIONS} distributions")
     return Sample(parsed.sample.method, parsed.sample.runs, parsed.sample.seed)

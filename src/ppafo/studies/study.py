@@ -48,6 +48,7 @@ def valid_outputs(outputs: declared.Outputs, scenarios: Sequence[Scenario]) -> O
     channels = (*outputs.trajectories, *outputs.bands)
     if "reference" in channels and all(scenario.controller.kind == OPEN_LOOP for scenario in scenarios):
         raise StudyError("outputs: 'reference' needs a reference, and the controllers here follow none")
+    # A metric that one configuration has is kept, empty for the others; 'all' takes those that any has.
     has = {name: [lacking(scenario, METRICS[name]) for scenario in scenarios] for name in metrics}
     missing = {name: reasons[0] for name, reasons in has.items() if all(reasons)}
     for name, reason in missing.items() if outputs.metrics != "all" else ():
@@ -194,6 +195,7 @@ def choose_configurations(
     configurations: Configurations | None, study: Study | None, overrides: Sequence[str]
 ) -> tuple[Configuration, ...]:
     """Return the given scenarios, else the configurations of the study; at least two, each with its own name."""
+    # Distributions that hold in some configurations only name those of the study, not the ones given here.
     if configurations is None:
         if study is None:
             raise StudyError("nothing to compare: give scenarios, a study, or both")

@@ -75,6 +75,7 @@ class VariedPath:
 
     def distance(self, value: str | float) -> float:
         """Return a difference of two values of the path in SI, such as a standard deviation."""
+        # A difference of absolute pressures has no zero to count from, one of temperatures in degC would be read with.
         unit = _UNIT_OF_DIFFERENCE.get(self.quantity.unit, self.quantity.unit)
         if isinstance(value, str) and split_quantity(value)[1] in _OFFSET_UNITS:
             raise UnitError("a difference of temperatures is given in K")
@@ -216,6 +217,7 @@ def _truncated_normal(item: declared.TruncatedNormal, place: VariedPath) -> Dist
 
 
 def _log_normal(item: declared.LogNormal, place: VariedPath) -> Distribution:
+    # Of the absolute pressure: a gauge pressure may be 0 or below, where there is no logarithm.
     median = _key(item, "median", replace(place, is_gauge=False))
     if median <= 0.0:
         raise UnitError(f"median = {item.median!r} must be above 0")

@@ -234,6 +234,7 @@ def remarks_of(found: Compared) -> list[str]:
     said, failed, carried = [], [], []
     for task in found.tasks:
         asked = {case.configuration: (case.scenario.reference, case.scenario.run.duration) for case in task.cases}
+        # Compared by what they follow and not by file: two configurations may name one task differently.
         others = [name for name, what in asked.items() if what != asked[found.baseline]]
         if others:
             said.append(
@@ -290,6 +291,7 @@ def _pareto(found: Compared, task: OnTask) -> Panel:
         x, y = (_or_nan(case.value(name)) for name in (_GAS, _ERROR))
         marks.append(Mark("line", [x], [y], label=case.configuration, colour=colour, style=marker))
         on_front += [(x, y)] if case.configuration in front else []
+    # From left to right, so that the front is a line and no zigzag.
     x_front, y_front = np.array(sorted(on_front)).reshape(-1, 2).T
     marks.append(Mark("line", x_front, y_front, colour=GREY, style={"linewidth": 1.0, "zorder": 1}))
     title = f"Task: {task.task}" if len(found.tasks) > 1 else ""
@@ -307,6 +309,7 @@ def _change(found: Compared, task: OnTask, metric: str) -> Panel:
         if change.size == 0:
             continue
         low, high = np.percentile(change, _SHOWN)
+        # Fewer bins for fewer draws, so that each has some of them.
         counts, edges = np.histogram(change, min(_BINS, max(8, round(1.5 * change.size**0.5))), (low, high))
         marks.append(Mark("bars", edges, counts, label=name, colour=colour))
         nominal = _relative(*(np.array([_or_nan(case.value(metric))]) for case in (baseline, own)))
@@ -331,5 +334,6 @@ def _change(found: Compared, task: OnTask, metric: str) -> Panel:
 
 
 def _relative(baseline: Floats, other: Floats) -> Floats:
+    # In pairs: a draw that failed on one side says nothing about a change.
     both = np.isfinite(baseline) & np.isfinite(other) & (baseline != 0.0)
     return np.asarray(100.0 * (other[both] - baseline[both]) / np.abs(baseline[both]))

@@ -101,6 +101,7 @@ def compare_pairs(
     first, second = baseline[both], other[both]
     if first.size == 0:
         return None
+    # Relative to the size of the baseline, so that the sign is the difference's; a baseline of 0 has no fractions.
     change = (second - first)[first != 0.0] / np.abs(first[first != 0.0])
     low, middle, high = (
         np.quantile(change, (OUTER_QUANTILES[0], 0.5, OUTER_QUANTILES[1])) if change.size else (np.nan,) * 3
@@ -109,6 +110,7 @@ def compare_pairs(
     noise = None
     if other_noise is not None:
         noise = noise_interval(difference, other_noise[1] - other_noise[0], confidence)
+    # A tie is no win on either side: of equal configurations neither is better in any draw.
     wins = np.where(both, better * (other - baseline) > 0.0, np.nan)
     return Paired(
         metric=metric,
@@ -130,5 +132,6 @@ def best_probabilities(values: Sequence[Floats], better: int, confidence: float)
     known = np.all(np.isfinite(table), axis=0)
     if not known.any():
         return []
+    # Draws in which one has no value say nothing about which is the best.
     is_best = np.where(known, table == np.max(table, axis=0), np.nan)
     return [share_interval(row, REPLICATES, confidence) for row in is_best]

@@ -76,6 +76,7 @@ def compare(
     if seed is None:
         seed = DEFAULT_SEED if known is None else known.sample.seed
     drawn = _runs(scenarios, metrics, known, uncertainty, draws, seed, maximum_failed, threads, progress)
+    # The nominal devices too, with the seed of each scenario: what the tables call nominal is one realisation.
     results = simulate_many(list(scenarios.values()), threads)
     cases: dict[str, list[Case]] = {task: [] for task in wanted}
     for ((task, name), scenario), result in zip(scenarios.items(), results, strict=True):
@@ -186,6 +187,7 @@ def _on_task(
     rows = [case.rows for case in cases if case.rows is not None]
     for name in metrics if rows else ():
         if COMPARED[name]:
+            # All at once: no pair says which of three is the best.
             shares = best_probabilities([each[name] for each in rows], COMPARED[name], confidence)
             best[name] = dict(zip([case.configuration for case in cases], shares, strict=False))
     return OnTask(task, list(overrides), cases, front_of(cases), pairs, best)

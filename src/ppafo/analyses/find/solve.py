@@ -103,6 +103,7 @@ def find(
     condition = Limit(parts[1], limit, parts[2] == "<=", f"{parts[1]} {parts[2]} {parts[3]}")
     if not FEWEST <= grid <= MOST:
         raise StudyError(f"grid = {grid}: must be at least {FEWEST} and at most {MOST:,}")
+    # The same streams for all values, so that neighbours differ by the value alone.
     noise = Uncertainty(with_noise((), None, [base], [path.path])[0])
     seeds = noise.random_columns(0, STREAMS, _SEED)[NOISE] if noise.has_noise else np.zeros(0)
     tally = Tally(grid * max(1, seeds.size), progress)
@@ -116,6 +117,7 @@ def find(
             f"scenario '{base.name}': no run from {path.quote(low)} to {path.quote(high)} has a "
             f"'{condition.metric}'{reason and '; the first: '}{reason}"
         )
+    # All parts of a bracket side by side: a bisection would wait for every one of its runs.
     value, beyond = search.ends(highest)
     while value is not None and beyond is not None and abs(value - beyond) > ACCURACY * (high - low):
         search.run(np.linspace(value, beyond, PARTS + 1)[1:-1])
@@ -140,6 +142,7 @@ class _Search:
         if self.seeds.size:
             columns[NOISE] = np.repeat(self.seeds, values.size)
         rows = self.runs.run(columns)
+        # One instant of a loop that oscillates may meet the condition by chance.
         judged = settled(rows, self.condition.metric)
         self.unsettled += int(np.count_nonzero(judged > rows[self.condition.metric]))
         found = judged.reshape(streams, values.size)
@@ -165,6 +168,7 @@ def _range(text: str, base: Scenario) -> tuple[VariedPath, float, float]:
         )
     with refused_as(StudyError, f"'{one_line(text)}'", ScenarioError, UnitError):
         path = varied_path(parts[1], base)
+        # As in '20..90 psi_g': the low end has the unit of the high one unless it says its own.
         unit = split_quantity(parts[3])[1]
         lower = parts[2] if split_quantity(parts[2])[1] else f"{parts[2]} {unit}".rstrip()
         low, high = path.level(lower), path.level(parts[3])
@@ -175,6 +179,7 @@ def _range(text: str, base: Scenario) -> tuple[VariedPath, float, float]:
 
 def stretches(values: Floats, is_met: NDArray[np.bool_]) -> list[list[float]]:
     """Return the first and last value [SI] of each stretch of neighbours that meet the condition."""
+    # Not met beyond both ends: a stretch that reaches the end of the range ends there.
     padded = np.concatenate([[False], is_met, [False]]).astype(int)
     first, after = np.flatnonzero(np.diff(padded) > 0), np.flatnonzero(np.diff(padded) < 0)
     return [[float(values[low]), float(values[high - 1])] for low, high in zip(first, after, strict=True)]
@@ -191,6 +196,7 @@ def _finding(scenario: str, path: VariedPath, search: _Search, highest: bool, gr
     at_value = None if value is None else float(metrics[np.searchsorted(values, value)])
     ends = f"{kind.text(values[0])} to {kind.text(values[-1])}"
     wanted, further = ("highest", "higher") if highest else ("lowest", "lower")
+    # Where none meets it, the one that comes nearest says whether a wider range could.
     if value is None or at_value is None:
         row = int((np.nanargmin if condition.is_most else np.nanargmax)(metrics))
         verdict = (

@@ -110,6 +110,7 @@ def overlapping_pairs(found: Influences, metric: OfMetric) -> list[tuple[str, st
     Nothing is said of two that both are surely below a hundredth of the largest: neither matters.
     """
     name, indices = METHODS[found.method].shown[0], metric.indices
+    # In the order of the table, in which only neighbours can be mistaken for each other.
     values, bands = indices.values[name], indices.bands[name]
     order = np.argsort(-values)
     order = order[(values + bands)[order] >= _NEGLIGIBLE * np.max(values)]
@@ -137,11 +138,13 @@ def analyse(runs: Runs, uncertainty: Uncertainty, method: Method, settings: Sett
         raise StudyError(f"seed = {settings.seed}: must be 0 or more")
     check_fraction(settings.confidence, *CONFIDENCE)
     check_fraction(settings.maximum_failed, "maximum_failed")
+    # Checked before anything runs: a design takes thousands of runs.
     design = method.design(uncertainty, settings.samples, settings.seed)
     columns = uncertainty.columns(design)
     rows = runs.run(columns)
     runs.check(rows, settings.maximum_failed, "sensitivity", runs.metrics)
     ends = np.array([item.distribution.values(np.array(_ENDS)) for item in uncertainty.drawn]).T
+    # A seed has no order: from its 5 to its 95 % quantile nothing changes.
     ends[:, [path == NOISE for path in uncertainty.paths]] = np.nan
     inputs = np.stack([columns[path] for path in uncertainty.paths], axis=1)
     blocks = np.repeat(np.arange(settings.samples), design.shape[0] // settings.samples)
@@ -154,6 +157,7 @@ def _of_metric(name: str, values: Floats, design: Evaluated, method: Method, set
     known = np.isfinite(values)
     if float(np.ptp(values[known])) == 0.0:
         raise StudyError(f"sensitivity: '{name}' is {values[known][0]:g} in every run, so no value influences it")
+    # The formulas need whole blocks: one run without a value takes its block with it.
     rows = values.size // settings.samples
     whole = np.all(known.reshape(-1, rows), axis=1)
     halved = {whole.size >> halvings for halvings in range(_SIZES)}
@@ -217,6 +221,7 @@ def sensitivity(
             f"there is no method '{method}'{nearest_name(method, METHODS)}; available: {', '.join(METHODS)}"
         )
     chosen, base, used = drawn_in(study, overrides, configuration, independent)
+    # Sobol indices of correlated values mean nothing; Shapley effects take more runs for the same bands.
     by = METHODS[method or ("sobol" if used.scores is None else "shapley")]
     requested = tuple(metrics) or chosen.outputs.metrics
     if not requested:

@@ -156,6 +156,7 @@ def _figure(results: StudyResults, said: Sequence[str], remarks: Sequence[str]) 
     """Return maps for a grid of two axes, points for two values that are drawn, else a panel a metric; and bands."""
     metrics = list(results.document["metrics"])[:MOST_METRICS]
     bands = list(results.document["study"]["outputs"].get("bands", ()))
+    # As many configurations as colours that can be told apart; a seed is no axis, since its size says nothing.
     names = results.configurations[:MOST_CONFIGURATIONS]
     device = [path for path in results.varied if path != NOISE]
     grid = [item["path"] for item in results.document["study"].get("vary", ()) if item["kind"] in _GRIDDED]
@@ -228,6 +229,7 @@ def _over(results: StudyResults, path: str, metric: str, names: Sequence[str]) -
     across, values = results.thin(path, MAXIMUM_DRAWN), results.thin(metric, MAXIMUM_DRAWN)
     marks = []
     for name, colour in zip(names, COLOURS, strict=False):
+        # Draws come in any order, a line goes from left to right.
         order = np.argsort(across[name], kind="stable")
         order = order[:: max(1, order.size // _MAXIMUM_POINTS)]
         marks.append(
@@ -241,6 +243,7 @@ def _map(results: StudyResults, grid: Sequence[str], metric: str, name: str, is_
     (columns, column), (rows, row) = (
         np.unique(results.thin(path, MAXIMUM_DRAWN)[name], return_inverse=True) for path in grid
     )
+    # A point of the grid may have several draws, some of which failed: the mean of the others.
     values = results.thin(metric, MAXIMUM_DRAWN)[name]
     place, known = row * columns.size + column, np.isfinite(values)
     count = np.bincount(place[known], minlength=rows.size * columns.size)
@@ -289,6 +292,7 @@ def _mark_plainly(axis: Any) -> None:
 def _band(results: StudyResults, channel: str, names: Sequence[str]) -> Panel:
     """Return the bands of a channel for every configuration: the outermost pair of quantiles light, the next darker."""
     table = results.bands()
+    # The quantiles that the study asked for are the columns of its file.
     fractions = sorted(float(name[1:]) for name in table if name.startswith("q"))
     pairs = [(low, high) for low, high in zip(fractions, reversed(fractions), strict=True) if low < high]
     marks = []

@@ -116,6 +116,7 @@ class StudyResults:
 
     def chunks(self, columns: Sequence[str], configuration: str | None = None) -> "Iterator[pa.Table]":
         """Give some columns of the chunks one after the other, of all configurations or of one."""
+        # No chunk holds runs of two configurations, and each configuration has the same number of them.
         numbers = range(self.document["chunks"])
         if configuration is not None:
             own = len(numbers) // len(self.configurations)

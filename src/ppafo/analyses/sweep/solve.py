@@ -73,6 +73,7 @@ def _summary(study: Study, results: StudyResults) -> dict[str, Any]:
             completed[name] += int(np.count_nonzero(rows))
             if len(failures) < _EXAMPLES and not rows.all():
                 failures += part.filter(~rows).slice(0, _EXAMPLES - len(failures)).to_pylist()
+    # A run that diverged has a time at which it did; one that was refused never began.
     failed = study.runs - sum(completed.values())
     diverged = sum(part.size for item in study.configurations for part in results.parts(item.name, "failure_time"))
     return {
@@ -160,6 +161,7 @@ def describe(parts: Parts, fractions: Sequence[float]) -> dict[str, Any]:
     count = sum(item[0] for item in sums)
     if count == 0:
         return {"count": 0}
+    # Squares about the mean, in a second pass: about 0 they would cancel where the spread is small.
     mean = math.fsum(item[1] for item in sums) / count
     levels = np.quantile(np.concatenate(list(parts())), fractions, method="linear", overwrite_input=True)
     squares = math.fsum(float(np.sum((part - mean) ** 2)) for part in parts())
@@ -289,6 +291,7 @@ def _work(task: Task, store: Store, scheduler: str | None, progress: Report | No
     def count(finished: Finished) -> None:
         tally.add(finished.runs, finished.failed)
 
+    # Rows change below: an old summary would pass for a finished study meanwhile.
     if missing and SUMMARY in place.names():
         place.remove(SUMMARY)
     if scheduler is None:

@@ -109,6 +109,7 @@ def probability_of(threshold: float, is_above: bool, text: str) -> Statistic:
     """Return the probability that a metric is above (or else below) a value [SI], written as ``text``."""
 
     def estimate(values: Floats, level: float) -> Interval:
+        # Strictly beyond: a metric that counts may be exactly at the threshold in many runs.
         known = values[np.isfinite(values)]
         hits = known > threshold if is_above else known < threshold
         return fraction_interval(int(np.count_nonzero(hits)), known.size, level)
@@ -171,6 +172,7 @@ class StoppingRule:
     @property
     def sizes(self) -> tuple[int, ...]:
         """The numbers of draws at which it is looked at the interval, at most."""
+        # Doubled each time: few looks have to share the allowed error, and the last takes half of all draws.
         found = [self.first]
         while found[-1] < self.maximum:
             found.append(min(2 * found[-1], self.maximum))

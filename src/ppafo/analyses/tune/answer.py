@@ -48,6 +48,7 @@ def agreement(starts: Sequence[Start]) -> float:
     As good is a cost within a hundredth; large where very different gains do as well, which the goal then leaves open.
     """
     best = starts[0]
+    # Of an infeasible cost only what the violation adds is compared: a hundredth of the offset would take in all.
     beyond = best.cost - INFEASIBLE if best.cost >= INFEASIBLE else best.cost
     as_good = [item for item in starts if item.cost <= best.cost + 0.01 * abs(beyond)]
     return max(float(np.max(np.abs(np.subtract(item.fractions, best.fractions)))) for item in as_good)
@@ -233,6 +234,7 @@ def verdict(problem: Problem, before: Setting, after: Setting) -> str:
             f"{name}: the gains found satisfy all constraints, which the previous gains did not; objective "
             f"{after.objective:.4g}"
         )
+    # Beyond a bound the gains before are no candidates, and the best within may be worse.
     if after.objective >= before.objective:
         return f"{name}: nothing better than the previous gains was found within the bounds"
     change = (after.objective - before.objective) / abs(before.objective) if before.objective else math.nan

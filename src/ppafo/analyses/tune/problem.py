@@ -180,6 +180,7 @@ class Spread:
         """Return the high, or low, end of values (candidates, draws) [SI], shape (candidates,)."""
         if self.fraction is not None:
             return np.asarray(np.quantile(values, self.fraction if is_high else 1.0 - self.fraction, axis=1))
+        # Of a sample, hence n - 1; the draws are the same for all candidates, so that it ranks them fairly.
         spread = self.deviations * np.std(values, axis=1, ddof=1)
         return np.asarray(np.mean(values, axis=1) + (spread if is_high else -spread))
 
@@ -224,6 +225,7 @@ class Problem:
 
     def gains(self, fractions: Sequence[float]) -> Gains:
         """Return the values [SI] at fractions of the way, rounded as written: what is pasted is what was run."""
+        # Through the text that is pasted: a run of that line gives these bits again.
         values = {
             item.path: float(item.value(np.asarray(fraction)))
             for item, fraction in zip(self.searched, fractions, strict=True)

@@ -66,6 +66,7 @@ class Judgement:
     @property
     def cost(self) -> Floats:
         """One number by which candidates are compared."""
+        # Deb's rules in one number, since SciPy compares nothing else.
         usual = np.where(self.violation > 0.0, INFEASIBLE + self.violation, self.objective)
         return np.where(self.without_value > 0.0, UNUSABLE * (1.0 + self.without_value), usual)
 
@@ -145,6 +146,7 @@ def _start(costs: Costs, before: Sequence[float], effort: Effort, random: np.ran
         is_settled = have_come_together(intermediate_result.population_energies)
         return is_settled
 
+    # SciPy refuses a first candidate beyond the bounds.
     is_within = all(0.0 <= fraction <= 1.0 for fraction in before)
     result = differential_evolution(
         generation,
@@ -240,6 +242,7 @@ def _crossed(runs: Runs, problem: Problem, values: Mapping[str, Floats], draws: 
 
 def _scales(problem: Problem, before: Crossed) -> dict[str, float]:
     """Return the size of each goal: the given one, or its value before tuning."""
+    # By default each goal is 1 before tuning: goals in different units then weigh as much as their weights say.
     scales = {}
     for goal in problem.goals:
         found = goal.scale
