@@ -107,7 +107,7 @@ def _build(parsed: declared.StudyFile, document: dict[str, Any], source: Source)
     moving = [item for item in parsed.vary if not isinstance(item, declared.SameAs)]
     varied = [_axis_or_drawn(item, places[item.path], configurations) for item in moving]
     own = tuple(item for item in varied if isinstance(item, Drawn))
-    # Noise comes last, so that it changes none of the draws before it; a grid alone is repeated as it is written.
+    # Noise comes last among what is drawn; a grid alone is run once, with the noise that its scenarios write.
     drawn, scores = own, _scores(parsed, own)
     scenarios = [item.scenario for item in configurations]
     if own:

@@ -22,7 +22,7 @@ from ppafo.engine.lanes import write_source
 from ppafo.errors import DataError, StudyError
 from ppafo.metrics import METRICS
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.scenario import Scenario, scenario_document
+from ppafo.simulation.scenario import scenario_document
 from ppafo.storage.places import Place, read_document
 from ppafo.studies.study import Study
 from ppafo.study.blocks import chunk_count, chunk_size
@@ -120,7 +120,19 @@ _COMPARED = ("ppafo", "study", "scenarios", "varied", "drawn", "programs")
 
 def manifest(study: Study) -> dict[str, Any]:
     """Return the document: study, base scenarios in SI units, runs, columns with units; no time and no machine."""
-    scenarios = {item.name: _without_origin(item.scenario) for item in study.configurations}
+    scenarios, programs = {}, {}
+    for item in study.configurations:
+        document, custom = _plain(scenario_document(item.scenario)), item.scenario.controller.custom
+        # Without the file it came from, which may lie elsewhere the next time.
+        del document["origin"]
+        if custom is not None:
+            document["controller"]["custom"] = controller_document(custom)
+        scenarios[item.name] = document
+        # What it computes: a law or a valve from a module of the user is a name elsewhere. A line of comment says where
+        # a function stands, which may be elsewhere the next time too.
+        lines = write_source(plan_run(item.scenario).program, 1)[1].splitlines()
+        code = "\n".join(line for line in lines if not line.startswith("#"))
+        programs[item.name] = hashlib.sha256(code.encode()).hexdigest()[:_DIGITS]
     # What is drawn may come from a parameter set, or have been changed in Python, and the file says neither.
     parts = {name: getattr(study, name) for name in ("axes", "drawn", "same", "scores", "sample", "outputs")}
     drawn = _plain(plain(parts))
@@ -129,7 +141,7 @@ def manifest(study: Study) -> dict[str, Any]:
         "study": _plain(study.document),
         "scenarios": scenarios,
         "drawn": drawn,
-        "programs": {item.name: _program_hash(item.scenario) for item in study.configurations},
+        "programs": programs,
     }
     return {
         "format": FORMAT,
@@ -198,23 +210,6 @@ def check_same_study(place: Place, stored: Mapping[str, Any], requested: Mapping
             f"{place.address}: contains results of an earlier version of '{now['name']}': {named}; undo the change "
             "or choose another folder"
         )
-
-
-def _without_origin(scenario: Scenario) -> dict[str, Any]:
-    """Return a base scenario in SI units without the file it came from, which may lie elsewhere the next time."""
-    document: dict[str, Any] = _plain(scenario_document(scenario))
-    del document["origin"]
-    if scenario.controller.custom is not None:
-        document["controller"]["custom"] = controller_document(scenario.controller.custom)
-    return document
-
-
-def _program_hash(scenario: Scenario) -> str:
-    """Return a hash of what a scenario computes: a law or a valve from a module of the user is a name elsewhere."""
-    lines = write_source(plan_run(scenario).program, 1)[1].splitlines()
-    # A line of comment says where a function stands, which may be elsewhere the next time.
-    code = "\n".join(line for line in lines if not line.startswith("#"))
-    return hashlib.sha256(code.encode()).hexdigest()[:_DIGITS]
 
 
 def _plain(document: Any) -> Any:

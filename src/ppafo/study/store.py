@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ppafo.documents.json_text import json_text
 from ppafo.errors import DataError, ScenarioError, StudyError, refused_as
@@ -199,14 +198,6 @@ def chunk_file(number: int) -> str:
 def note_file(number: int) -> str:
     """Return the name of the note by which a chunk counts as finished."""
     return f"finished/chunk-{number:07d}.json"
-
-
-def completed_rows(table: "pa.Table") -> NDArray[np.bool_]:
-    """Return which rows of a table of runs completed."""
-    import pyarrow.compute as pc
-
-    equal = pc.equal(table.column("status").cast("string"), STATUSES[0])
-    return np.asarray(equal.to_numpy(), dtype=np.bool_)
 
 
 def _result(study: Study, part: Chunk, values: dict[str, Floats], threads: int | None) -> EnsembleResult:

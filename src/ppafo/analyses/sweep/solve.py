@@ -42,10 +42,10 @@ from ppafo.study.blocks import chunk_count, samples_of
 from ppafo.study.manifest import read_manifest
 from ppafo.study.runs import Tally
 from ppafo.study.store import (
+    STATUSES,
     Finished,
     Store,
     Task,
-    completed_rows,
     compute_chunk,
     note_file,
     stored_unit,
@@ -69,7 +69,7 @@ def _summary(study: Study, results: StudyResults) -> dict[str, Any]:
     failures: list[dict[str, Any]] = []
     for name in completed:
         for part in results.chunks(["run", "configuration", "status", "reason"], name):
-            rows = completed_rows(part)
+            rows = np.asarray(part.column("status").to_numpy() == STATUSES[0])
             completed[name] += int(np.count_nonzero(rows))
             if len(failures) < _EXAMPLES and not rows.all():
                 failures += part.filter(~rows).slice(0, _EXAMPLES - len(failures)).to_pylist()
