@@ -221,6 +221,14 @@ def effective_sample_size(values: Floats) -> float:
     return float(values.size / max(1.0, skewness**2))
 
 
+def is_carried(effective: float, draws: int) -> bool:
+    """Tell whether enough of some draws determine a mean for its interval to be believed.
+
+    Of few draws half must: an interval without width, in which all are the same, is carried by all.
+    """
+    return effective >= min(FEWEST_EFFECTIVE, 0.5 * draws)
+
+
 def noise_interval(values: Floats, others: Floats, confidence: float) -> Interval | None:
     """Return the fraction of the variance that is due to noise, with its interval; None where nothing varies.
 

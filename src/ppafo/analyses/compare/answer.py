@@ -16,7 +16,7 @@ from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import BLACK, COLOURS, GREY
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Status
-from ppafo.studies.distributions import FEWEST_EFFECTIVE, Floats, fraction_text
+from ppafo.studies.distributions import Floats, fraction_text, is_carried
 from ppafo.study.runs import Rows
 
 if TYPE_CHECKING:
@@ -255,7 +255,7 @@ def remarks_of(found: Compared) -> list[str]:
             "better is not affected"
             for name, pairs in task.pairs.items()
             for item in pairs
-            if item.effective_size < min(FEWEST_EFFECTIVE, 0.5 * item.pairs)
+            if not is_carried(item.effective_size, item.pairs)
         ]
     return [*said, *failed, *carried, *([_NOISE] if found.has_noise else [])]
 

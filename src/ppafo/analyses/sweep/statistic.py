@@ -27,12 +27,12 @@ from ppafo.report.kind import Interval, Kind, of_metric
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import GREY, VERMILION
 from ppafo.studies.distributions import (
-    FEWEST_EFFECTIVE,
     Floats,
     effective_sample_size,
     floored_interval,
     fraction_interval,
     fraction_text,
+    is_carried,
     noise_interval,
     quantile_interval,
 )
@@ -202,8 +202,8 @@ class Look:
 
     @property
     def is_carried(self) -> bool:
-        """Tell whether enough draws determine the estimate; an interval without width is carried by all."""
-        return self.effective_size >= min(FEWEST_EFFECTIVE, 0.5 * (self.draws - self.missing))
+        """Tell whether enough draws determine the estimate."""
+        return is_carried(self.effective_size, self.draws - self.missing)
 
 
 @dataclass(frozen=True, slots=True)
@@ -281,6 +281,10 @@ def draw_until(
     if uncertainty.has_noise:
         noise = noise_interval(rows[metric], runs.run(with_new_noise(drawn))[metric], rule.confidence)
     values = rows[metric][np.isfinite(rows[metric])]
+    means = {}
+    for name in also:
+        mean = floored_interval(rows[name], REPLICATES, rule.confidence_of_look)
+        means[name] = OfMean(int(np.count_nonzero(np.isfinite(rows[name]))), mean.value, mean.low, mean.high)
     estimate = Estimate(
         metric=metric,
         statistic=statistic.label,
@@ -290,7 +294,7 @@ def draw_until(
         failed=failures,
         interval=last.interval,
         remarks=_remarks(last, values, statistic, _kind(metric, statistic), noise),
-        also={name: _mean(rows[name], rule.confidence_of_look) for name in also},
+        also=means,
         share_of_noise=noise,
         seed=seed,
         rule={**plain(rule), "looks": len(rule.sizes), "correction": "Bonferroni"},
@@ -298,13 +302,6 @@ def draw_until(
         values=values,
     )
     return _finding(estimate, statistic, rule)
-
-
-def _mean(values: Floats, level: float) -> OfMean:
-    """Return how many draws have a value, and their mean; its interval is infinite where few do."""
-    count = int(np.count_nonzero(np.isfinite(values)))
-    mean = floored_interval(values, REPLICATES, level) if count else Interval(math.nan, -math.inf, math.inf)
-    return OfMean(count, mean.value, mean.low, mean.high)
 
 
 DEFAULT_WIDTH = "1 %"
