@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -191,8 +192,8 @@ def _grid(item: declared.Grid, place: VariedPath) -> tuple[float, ...]:
     return tuple(np.geomspace(first, last, item.count).tolist())
 
 
-def _uniform(item: declared.Uniform, place: VariedPath) -> Distribution:
-    return UniformBetween(*_bounds(item, place))
+def _bounded(made: Callable[[float, float], Distribution], item: Any, place: VariedPath) -> Distribution:
+    return made(*_bounds(item, place))
 
 
 def _log_uniform(item: declared.LogUniform, place: VariedPath) -> Distribution:
@@ -245,19 +246,15 @@ def _choice(item: declared.Choice, place: VariedPath) -> Distribution:
     return OneOf(values, tuple(fractions.tolist()))
 
 
-def _whole_numbers(item: declared.WholeNumbers, place: VariedPath) -> Distribution:
-    return WholeNumbersBetween(*_bounds(item, place))
-
-
 _DISTRIBUTIONS: dict[str, Callable[[Any, VariedPath], Distribution]] = {
-    "uniform": _uniform,
+    "uniform": partial(_bounded, UniformBetween),
     "log_uniform": _log_uniform,
     "normal": _normal,
     "truncated_normal": _truncated_normal,
     "log_normal": _log_normal,
     "triangular": _triangular,
     "choice": _choice,
-    "whole_numbers": _whole_numbers,
+    "whole_numbers": partial(_bounded, WholeNumbersBetween),
 }
 """What builds each kind. To add one: a table in ``declaration``, a class in ``sampling.distributions``, a line here."""
 

@@ -41,7 +41,7 @@ def chunk_size(study: Study) -> int:
         return _SLOW_RUNS_OF_CHUNK
     if any(reacts(item.scenario) for item in study.configurations):
         return _REACTING_RUNS_OF_CHUNK
-    bytes_of_run = 8 * len(study.outputs.traces) * maximum_samples(study)
+    bytes_of_run = 8 * len(study.outputs.traces) * max(samples_of(study, item) for item in study.configurations)
     size = MAXIMUM_RUNS_OF_CHUNK
     while size > _FEWEST_RUNS_OF_CHUNK and size * bytes_of_run > _MAXIMUM_BYTES_OF_TRACES:
         size //= 2
@@ -51,11 +51,6 @@ def chunk_size(study: Study) -> int:
 def samples_of(study: Study, configuration: Configuration) -> int:
     """Return how many samples a channel over time has in a configuration."""
     return int(configuration.scenario.run.duration / study.outputs.every + 1.0e-9) + 1
-
-
-def maximum_samples(study: Study) -> int:
-    """Return how many samples a channel over time has, in the longest configuration."""
-    return max(samples_of(study, configuration) for configuration in study.configurations)
 
 
 def chunk_count(study: Study) -> int:

@@ -29,7 +29,7 @@ from ppafo.storage.parquet import (
 from ppafo.storage.places import Place, place_at, read_document
 from ppafo.studies.distributions import Floats
 from ppafo.studies.study import Study
-from ppafo.study.blocks import Chunk, chunk, chunk_count, drawn_values, maximum_samples, samples_of, varied_columns
+from ppafo.study.blocks import Chunk, chunk, chunk_count, drawn_values, samples_of, varied_columns
 from ppafo.study.manifest import MANIFEST, STUDY_COPY, check_same_study, manifest, read_manifest
 from ppafo.study.runs import unvaried
 
@@ -227,7 +227,7 @@ def stored_unit(unit: str) -> str:
 
 def estimate_bytes(study: Study) -> int:
     """Return an upper estimate of the bytes on disk: as if nothing could be compressed."""
-    outputs, samples = study.outputs, maximum_samples(study)
+    outputs, samples = study.outputs, max(samples_of(study, item) for item in study.configurations)
     numbers = 2 + len(study.paths) + len(outputs.metrics) * (2 if outputs.errors else 1)
     traces = sum(_BYTES_OF_NUMBER if name in outputs.bands else _BYTES_OF_SAMPLE for name in outputs.traces)
     row = _FIXED_BYTES_OF_ROW + _BYTES_OF_NUMBER * numbers + samples * traces

@@ -42,10 +42,10 @@ class Case:
     rows: Rows | None = field(compare=False, repr=False)
     renoised: Rows | None = field(compare=False, repr=False)
 
-    def value(self, metric: str) -> float | None:
-        """Return a metric [SI] of the nominal run, None where it has none."""
+    def value(self, metric: str) -> float:
+        """Return a metric [SI] of the nominal run, nan where it has none."""
         found = self.metrics.get(metric)
-        return None if found is None else found.value
+        return math.nan if found is None else found.value
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,11 +86,6 @@ class Compared:
     confidence: float
     tasks: list[OnTask]
     metrics: tuple[str, ...] = field(compare=False)
-
-    @property
-    def others(self) -> list[str]:
-        """All configurations but the baseline."""
-        return [name for name in self.configurations if name != self.baseline]
 
     @property
     def has_noise(self) -> bool:
@@ -201,7 +196,7 @@ def _paired(found: Compared, task: OnTask, name: str) -> list[Column]:
     nominal = []
     for item in pairs:
         first, other = (task.case(each).value(item.metric) for each in (found.baseline, name))
-        nominal.append(_percent((other - first) / abs(first)) if first and other is not None else "")
+        nominal.append(_percent((other - first) / abs(first)) if first else "")
     spread = [
         f"{_percent(item.change)} ({_percent(item.change_low)} to {_percent(item.change_high)})"
         if math.isfinite(item.change)
@@ -262,12 +257,8 @@ def remarks_of(found: Compared) -> list[str]:
 
 def front_of(cases: Sequence[Case]) -> list[str]:
     """Return the configurations that no other beats in both error and gas."""
-    points = np.array([[_or_nan(case.value(name)) for name in (_ERROR, _GAS)] for case in cases])
+    points = np.array([[case.value(name) for name in (_ERROR, _GAS)] for case in cases])
     return [case.configuration for case, is_front in zip(cases, pareto_front(points), strict=True) if is_front]
-
-
-def _or_nan(value: float | None) -> float:
-    return math.nan if value is None else value
 
 
 _MARKS = "osD^vP"
@@ -288,7 +279,7 @@ def _pareto(found: Compared, task: OnTask) -> Panel:
             gas, error = (case.rows[name][:_MAXIMUM_DOTS] for name in (_GAS, _ERROR))
             marks.append(Mark("line", gas, error, colour=colour, style=dots))
         marker = {"linestyle": "", "marker": _MARKS[number % len(_MARKS)], "markersize": 8, "markeredgecolor": "white"}
-        x, y = (_or_nan(case.value(name)) for name in (_GAS, _ERROR))
+        x, y = (case.value(name) for name in (_GAS, _ERROR))
         marks.append(Mark("line", [x], [y], label=case.configuration, colour=colour, style=marker))
         on_front += [(x, y)] if case.configuration in front else []
     # From left to right, so that the front is a line and no zigzag.
@@ -312,7 +303,7 @@ def _change(found: Compared, task: OnTask, metric: str) -> Panel:
         # Fewer bins for fewer draws, so that each has some of them.
         counts, edges = np.histogram(change, min(_BINS, max(8, round(1.5 * change.size**0.5))), (low, high))
         marks.append(Mark("bars", edges, counts, label=name, colour=colour))
-        nominal = _relative(*(np.array([_or_nan(case.value(metric))]) for case in (baseline, own)))
+        nominal = _relative(*(np.array([case.value(metric)]) for case in (baseline, own)))
         dashed = {"linestyle": "--", "linewidth": 1.2}
         marks += [Mark("at", value, label="as declared", colour=colour, style=dashed) for value in nominal]
         ends += [float(low), float(high), *nominal.tolist()]
