@@ -193,19 +193,12 @@ def steps_of(model: LinearModel, shares: tuple[float, ...] = SHARES) -> Steps:
     times: Floats = INTERVAL * np.arange(round(DURATION / INTERVAL) + 1, dtype=np.float64)
     still, *runs = (_torque(model, command * (1.0 + share)) for share in (0.0, *shares))
     amplitudes: Floats = command * np.array(shares, dtype=np.float64)
-    from scipy.linalg import expm
+    from scipy.signal import StateSpace, step
 
-    states = len(model.states)
     column = [item.name for item in model.inputs].index("command")
     row = [item.name for item in model.outputs].index("torque")
-    both = np.zeros((states + 1, states + 1))
-    both[:states, :states], both[:states, states] = model.a, model.b[:, column]
-    onward = expm(both * (times[1] - times[0]))
-    state, found = np.append(np.zeros(states), 1.0), []
-    for _ in times:
-        found.append(model.c[row] @ state[:states] + model.d[row, column])
-        state = onward @ state
-    linear = amplitudes[:, None] * np.array(found)
+    system = StateSpace(model.a, model.b[:, [column]], model.c[[row]], model.d[[row]][:, [column]])
+    linear = amplitudes[:, None] * step(system, T=times)[1]
     return Steps(amplitudes, times, np.array(runs) - still, linear)
 
 
