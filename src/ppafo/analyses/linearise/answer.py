@@ -82,6 +82,11 @@ class LinearModel:
     delays: Delays
 
     @property
+    def is_steady(self) -> bool:
+        """True for a model about a steady state."""
+        return self.time is None
+
+    @property
     def poles(self) -> "np.ndarray[Any, np.dtype[np.complex128]]":
         """Poles [1/s], the slowest first."""
         found = np.linalg.eigvals(self.a).astype(np.complex128)
@@ -356,7 +361,7 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
     motion = model.scenario.motion
     is_locked = isinstance(motion, PrescribedMotion) and motion.profile.kind == "constant"
     is_gas_alone = all(item.name.startswith("pressure") for item in model.states)
-    if model.time is None and is_locked and is_gas_alone and 0.0 < abs(_value(model, "command")) < 0.7:
+    if model.is_steady and is_locked and is_gas_alone and 0.0 < abs(_value(model, "command")) < 0.7:
         steps = Part("How far it holds", panels=lambda: steps_panels(model), name="steps", caption=_STEPS_CAPTION)
         parts.append(replace(steps, across=2, size=(4.4, 3.4)))
     size = f"{len(model.states)} states, {len(model.inputs)} inputs, {len(model.outputs)} outputs"

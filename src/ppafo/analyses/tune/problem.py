@@ -16,7 +16,7 @@ from ppafo.errors import ParameterError, ScenarioError, StudyError, UnitError, f
 from ppafo.loading import load_scenario, placed, reloaded
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.simulation.scenario import Scenario
-from ppafo.studies.distributions import Floats
+from ppafo.studies.distributions import Floats, LogUniformBetween, UniformBetween
 from ppafo.studies.draws import (
     Limit,
     Uncertainty,
@@ -125,9 +125,8 @@ class Searched:
 
     def value(self, fraction: Floats) -> Floats:
         """Return values [SI] at fractions of the way from the minimum to the maximum."""
-        if self.is_logarithmic:
-            return self.minimum * np.exp(math.log(self.maximum / self.minimum) * fraction)
-        return self.minimum + (self.maximum - self.minimum) * fraction
+        between = LogUniformBetween if self.is_logarithmic else UniformBetween
+        return between(self.minimum, self.maximum).values(fraction)
 
     def fraction(self, value: float) -> float:
         """Return the fraction of the way at which a value lies; outside 0 to 1 beyond the bounds."""
