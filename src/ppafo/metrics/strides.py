@@ -164,7 +164,7 @@ def go_on(stride: StrideNow, sample: Sample) -> StrideNow:
 
 def count(counted: Counted, stride: StrideNow, sample: Sample) -> Counted:
     """The strides with the one that ends at the first sample after a heel strike."""
-    # One with less help in any part of it is no example of the help; the first ones are learnt in.
+    # A stride with less help in a part of it is no example; in the first ones the controller still learns their time.
     now = totals_at(sample.stride)
     helps = stride.is_whole > 0.5 and stride.was_vented < 0.5
     counts = helps and counted.whole >= float(SETTLING)

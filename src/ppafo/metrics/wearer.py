@@ -93,7 +93,7 @@ def _per_stride(readings: Readings, gained: Floats) -> Floats:
 def _per_second(readings: Readings, gained: Floats) -> Floats:
     """What a total gained over the time of the strides."""
     totals = readings.meters["wearer"]
-    # Both sides of a choice are computed: the time of no stride is not divided by.
+    # Both sides of a choice are computed: the divisor is never 0.
     in_time = gained / larger(totals.last.time - totals.first.time, 1.0e-9)
     found: Floats = choose(_strides(readings) > 0.5, in_time, math.nan)
     return found

@@ -159,7 +159,7 @@ def with_noise(
 
     ``paths`` are all that vary; a seed among them is left as it is.
     """
-    # A constant command hears no sensor; summed levels may be arrays (runs,).
+    # An open-loop controller uses no sensor; levels may be arrays (runs,).
     closed = [item for item in scenarios if item.controller.kind != OPEN_LOOP]
     is_noisy = bool(closed) and any(path in _NOISE_LEVELS for path in paths)
     for item in closed:

@@ -76,7 +76,7 @@ class VariedPath:
 
     def distance(self, value: str | float) -> float:
         """Return a difference of two values of the path in SI, such as a standard deviation."""
-        # A difference of absolute pressures has no zero to count from, one of temperatures in degC would be read with.
+        # A difference of pressures counts from nothing; in degC it would get the offset of the scale.
         unit = _UNIT_OF_DIFFERENCE.get(self.quantity.unit, self.quantity.unit)
         if isinstance(value, str) and split_quantity(value)[1] in _OFFSET_UNITS:
             raise UnitError("a difference of temperatures is given in K")

@@ -42,7 +42,7 @@ class Tally:
         self.failed += failed
         if not self._earlier:
             self._earlier, self._started = self.done, time.monotonic()
-        # Nobody knows how long a search takes: a total that doubles is wrong less often than one that follows.
+        # A search does not know how many runs it will take: a total that follows would always say 'nearly done'.
         while self._runs < self.done:
             self._runs *= 2
         if self._report is not None:

@@ -276,7 +276,7 @@ def draw_until(
         looks.append(Look(found.size, int(missing), interval, statistic.effective_size(found)))
         if rule.is_narrow(interval) and looks[-1].is_carried:
             break
-    # Counted before the same draws run again with other noise.
+    # Failures are counted here: below, some of the same draws run again with other noise.
     failures, last, noise = runs.failures, looks[-1], None
     if uncertainty.has_noise:
         noise = noise_interval(rows[metric], runs.run(with_new_noise(drawn))[metric], rule.confidence)
