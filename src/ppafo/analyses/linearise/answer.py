@@ -347,17 +347,19 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
             caption=_FREQUENCY_CAPTION,
             size=(7.0, 2.4),
         ),
-        *[
-            Part(f"Matrix {name} (SI)", _matrix(values, rows, columns), is_detail=name in "CD")
-            for name, values, rows, columns in (
-                ("A", model.a, model.states, model.states),
-                ("B", model.b, model.states, model.inputs),
-                ("C", model.c, model.outputs, model.states),
-                ("D", model.d, model.outputs, model.inputs),
-            )
-        ],
     ]
-    # True for a steady state of a held ankle whose valve follows at once and is open: the runs can begin there.
+    matrices = (
+        ("A", model.a, model.states, model.states),
+        ("B", model.b, model.states, model.inputs),
+        ("C", model.c, model.outputs, model.states),
+        ("D", model.d, model.outputs, model.inputs),
+    )
+    for name, values, rows, columns in matrices:
+        cells = zip(columns, values.T.tolist(), strict=True)
+        own = [Column(item.name, column, Kind(form=".5g")) for item, column in cells]
+        table = [Column("", [item.name for item in rows]), *own]
+        parts.append(Part(f"Matrix {name} (SI)", table, is_detail=name in "CD"))
+    # For a steady state of a locked ankle whose valve follows at once and is open: the runs can begin there.
     motion = model.scenario.motion
     is_locked = isinstance(motion, PrescribedMotion) and motion.profile.kind == "constant"
     is_gas_alone = all(item.name.startswith("pressure") for item in model.states)
@@ -402,12 +404,6 @@ def _poles(model: LinearModel) -> list[Column]:
     constant, frequency = (Kind(quantity=quantity) for quantity in ("time", "frequency"))
     ratio = ("damping ratio", Kind(form=".3f"))
     return columns_of(("pole (1/s)", ("time constant", constant), ("frequency", frequency), ratio), rows)
-
-
-def _matrix(values: Floats, rows: Sequence[Variable], columns: Sequence[Variable]) -> list[Column]:
-    plain = Kind(form=".5g")
-    own = [Column(item.name, cells, plain) for item, cells in zip(columns, values.T.tolist(), strict=True)]
-    return [Column("", [item.name for item in rows]), *own]
 
 
 def _arrays(model: LinearModel) -> bytes:

@@ -166,7 +166,9 @@ def _figure(results: StudyResults, said: Sequence[str], remarks: Sequence[str]) 
     is_compared = is_mapped and len(names) > 1
     title = f"{results.name}, {results.summary['completed']:,} runs"
     if not is_mapped and len(device) > 1:
-        labels = [_in_a_sentence(label_of(path)) for path in device[:_NAMED]]
+        # Within a sentence: without a capital, unless the label begins with a name in capitals.
+        labels = [label_of(path) for path in device[:_NAMED]]
+        labels = [label if label[:2].isupper() else label[:1].lower() + label[1:] for label in labels]
         more = f" and {len(device) - _NAMED} more" if len(device) > _NAMED else ""
         title += f" over {len(device)} values: {', '.join(labels)}{more}"
 
@@ -194,11 +196,6 @@ def _figure(results: StudyResults, said: Sequence[str], remarks: Sequence[str]) 
         title=title,
         is_detail=True,
     )
-
-
-def _in_a_sentence(label: str) -> str:
-    """Return a label without its capital, but for a name in capitals."""
-    return label if label[:2].isupper() else label[:1].lower() + label[1:]
 
 
 def _kind(results: StudyResults, path: str) -> Kind:
