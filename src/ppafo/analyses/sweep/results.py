@@ -69,6 +69,7 @@ class StudyResults:
         Channels over time are columns of their own, which ``trajectories`` returns.
         """
         if columns is None:
+            # All chunks have the columns of the first.
             first = chunk_file(0)
             traces = {trace_column(name) for name in CHANNELS}
             columns = [name for name in column_names(self.place.open(first), first) if name not in traces]

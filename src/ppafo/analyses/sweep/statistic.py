@@ -337,6 +337,7 @@ def estimate(
     wanted = tuple(dict.fromkeys((metric, *also)))
     check_metrics(wanted, base.scenario)
     what = parse_statistic(statistic, metric, atmosphere_of(base.scenario, {*uncertainty.paths, *uncertainty.same}))
+    # A probability may be 0, of which a fraction says nothing: its width is a difference.
     asked = width or (PROBABILITY_WIDTH if what.threshold is not None else DEFAULT_WIDTH)
     rule = stopping_rule(what, metric, asked, StoppingRule(1.0, False, first_draws, draws, confidence, maximum_failed))
     runs = Runs(base.scenario, wanted, Tally(rule.first, progress), uncertainty.gauge, threads)
