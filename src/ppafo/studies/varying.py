@@ -256,7 +256,7 @@ _DISTRIBUTIONS: dict[str, Callable[[Any, VariedPath], Distribution]] = {
     "choice": _choice,
     "whole_numbers": partial(_bounded, WholeNumbersBetween),
 }
-"""What builds each kind. To add one: a table in ``declaration``, a class in ``sampling.distributions``, a line here."""
+"""What builds each kind. To add one: a table in ``declaration``, a class in ``distributions``, a line here."""
 
 
 def _bounds(item: Any, place: VariedPath) -> tuple[float, float]:
