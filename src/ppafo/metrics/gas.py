@@ -12,6 +12,7 @@ from ppafo.signals.meter import Course, MeterKind, Sample
 
 
 def _gain(recording: Recording, name: str) -> float:
+    # A total counts from the start of the run, and a recording may be a part of one.
     values = recording[name]
     return float(values[-1] - values[0])
 
@@ -33,6 +34,7 @@ def gas_leaked(recording: Recording) -> float:
 
 def gas_imbalance(recording: Recording) -> float:
     """Supplied less vented less stored gas [kg]; what a simulation loses or invents, near 0 for a sound one."""
+    # What leaks goes from one chamber to the other: it leaves neither sum.
     stored = _gain(recording, "mass_1") + _gain(recording, "mass_2")
     return gas_supplied(recording) - gas_vented(recording) - stored
 
@@ -69,6 +71,7 @@ def work_per_gas(recording: Recording) -> float | None:
 
 def gas_per_work(recording: Recording) -> float | None:
     """Gas taken from the supply per mechanical work [kg/J]; None where the actuator gave no work."""
+    # A task that takes work from the leg would have a ratio below 0, which would rank as the best.
     work = mechanical_work(recording)
     return gas_supplied(recording) / work if work > 0.0 else None
 
@@ -132,7 +135,11 @@ def update_work(state: Work, course: Course, sample: Sample) -> Work:
     return Work(sample.torque, sample.angle, state.work + piece)
 
 
+# A locked vane does no work: the engine leaves the meter as it started.
 WORK = MeterKind("work", Work, start_work, update_work, of_motion=True)
+
+
+# What reads a run is compiled into exported libraries: plain functions, no closures.
 
 
 def read_gas_supplied(readings: Readings) -> Floats:
@@ -193,6 +200,7 @@ def read_gas_per_work(readings: Readings) -> Floats:
 
 def _ratio(above: Floats, below: Floats) -> Floats:
     """One over the other; nan where the other is not above 0."""
+    # nan where a recording has None: a column has no other word for it.
     found: Floats = above / choose(below > 0.0, below, math.nan)
     return found
 

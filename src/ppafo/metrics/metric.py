@@ -87,11 +87,13 @@ def hold_start(recording: Recording) -> int | None:
     tolerance = SAME_LEVEL * float(np.max(np.abs(reference)))
     away = np.flatnonzero(np.abs(reference - reference[-1]) > tolerance)
     first = int(away[-1]) + 1 if away.size else 0
+    # One sample at rest has no time over which a mean could be taken.
     return first if len(recording) - first >= 2 else None
 
 
 def ramp(recording: Recording) -> slice | None:
     """Return the samples until the reference reaches the level it keeps; None where there is no ramp or no hold."""
+    # With the first sample of the hold, so that ramp and hold together are the whole task.
     start = hold_start(recording)
     return slice(start + 1) if start else None
 
@@ -104,6 +106,7 @@ def hold(recording: Recording) -> slice | None:
 
 def spans(readings: Readings) -> tuple[Floats, Floats]:
     """Number of samples before the hold and of intervals on it, of metered runs; nan where there is no such part."""
+    # Read at the end of a run, where the course has seen the whole reference.
     start = readings.course.hold_start
     length = readings.samples - 1 - start
     ramp_samples = choose(length >= 1.0, choose(start > 0.0, start, math.nan), math.nan)

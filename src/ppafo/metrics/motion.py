@@ -12,6 +12,7 @@ from ppafo.signals.meter import Course, MeterKind, Sample
 TRAVEL_FRACTION = 0.01
 """A move has begun when this fraction of its travel is done, and has arrived when this fraction is left."""
 
+# Travel [rad] below which nothing has moved: fractions of it would be rounding over rounding.
 _STANDSTILL = 1.0e-6
 
 
@@ -30,6 +31,7 @@ def _time_of_fraction(recording: Recording, fraction: float) -> float | None:
     travelled = recording["angle"] - recording["angle"][0]
     if abs(travelled[-1]) < _STANDSTILL:
         return None
+    # By a line between two samples; at the first one nothing is done, so that there is one before.
     done = travelled / travelled[-1]
     after = int(np.flatnonzero(done >= fraction)[0])
     return float(np.interp(fraction, done[after - 1 : after + 1], recording.time[after - 1 : after + 1]))
@@ -102,6 +104,7 @@ def _read_time_of_fraction(readings: Readings, fraction: float) -> Floats:
     travelled = readings.traces["angle"] - readings.traces["angle"][0]
     moves = np.abs(travelled[-1]) >= _STANDSTILL
     done = travelled / np.where(moves, travelled[-1], np.nan)
+    # The first True of each run; where nothing moves all are nan, and so is the time.
     after = np.argmax(done >= fraction, axis=0)
     runs = np.arange(after.size)
     before, reached = done[after - 1, runs], done[after, runs]
@@ -152,6 +155,9 @@ def update_foot_error(state: FootError, course: Course, sample: Sample) -> FootE
 
 
 FOOT_ERROR = MeterKind("foot_error", FootError, start_foot_error, update_foot_error)
+
+
+# The interval is the same between all samples, so that it cancels in a mean over time.
 
 
 def read_foot_angle_error(readings: Readings) -> Floats:

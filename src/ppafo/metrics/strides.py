@@ -130,6 +130,7 @@ def _start(_course: Course, sample: Sample) -> Strides:
 
 
 def _update(strides: Strides, _course: Course, sample: Sample) -> Strides:
+    # Counts are floats in the state of a run: half way between two of them is safe from rounding.
     strikes = sample.stride.strides - strides.strikes > 0.5
     on_toes = sample.stride.toe_landings - strides.stride.begun.toe_landing
     begun = StrideNow(
@@ -163,6 +164,7 @@ def go_on(stride: StrideNow, sample: Sample) -> StrideNow:
 
 def count(counted: Counted, stride: StrideNow, sample: Sample) -> Counted:
     """The strides with the one that ends at the first sample after a heel strike."""
+    # A stride with less help in a part of it is no example; in the first ones the controller still learns their time.
     now = totals_at(sample.stride)
     helps = stride.is_whole > 0.5 and stride.was_vented < 0.5
     counts = helps and counted.whole >= float(SETTLING)
@@ -181,6 +183,7 @@ METER = MeterKind("strides", Strides, _start, _update)
 
 def mean_of(total: Floats, count: Floats) -> Floats:
     """A sum over how many there are, in its unit; nan for none."""
+    # Both sides of a choice are computed, in the lanes too: the divisor is never 0.
     found: Floats = choose(count > 0.0, total / larger(count, 1.0), math.nan)
     return found
 

@@ -29,6 +29,7 @@ _NEEDED = ("torque", "reference")
 
 def switchings(recording: Recording) -> float:
     """Number of changes of state that the command orders, of both valves together."""
+    # As ``ordered_positions`` says it of one command.
     command = recording["command"]
     positions_a, positions_b = (command > SHUT) & (command < VENTS_ABOVE), command < -SHUT
     return float(np.count_nonzero(np.diff(positions_a)) + np.count_nonzero(np.diff(positions_b)))
@@ -40,9 +41,15 @@ def reversals(values: Floats, swing: float) -> int:
     Smaller wiggles, noise among them, count for nothing, however many they are. A signal that only rises or only
     falls has none.
     """
+    # No way yet: the first swing, up or down, is no reversal.
     count, direction = 0, 0
     lowest = highest = float(values[0])
-    for value in _extremes(values).tolist():
+    # The first and the last value, and each between them at which the signal turns back: the rest decide nothing.
+    moving = values[np.flatnonzero(np.diff(values, prepend=np.nan))]
+    if moving.size > 1:
+        rises = np.diff(moving) > 0.0
+        moving = moving[np.concatenate([[True], rises[1:] != rises[:-1], [True]])]
+    for value in moving.tolist():
         if direction >= 0 and value < highest - swing:
             count += direction
             direction, lowest = -1, value
@@ -53,15 +60,9 @@ def reversals(values: Floats, swing: float) -> int:
     return count
 
 
-def _extremes(values: Floats) -> Floats:
-    """The first and the last value, and each between them at which a signal turns back."""
-    moving = values[np.flatnonzero(np.diff(values, prepend=np.nan))]
-    rises = np.diff(moving) > 0.0
-    return moving[np.concatenate([[True], rises[1:] != rises[:-1], [True]])] if moving.size > 1 else moving
-
-
 def _oscillations(recording: Recording, part: slice | None) -> float | None:
     largest = float(np.max(np.abs(recording["reference"])))
+    # Without a reference there is nothing that the smallest swing could be a fraction of.
     if part is None or largest == 0.0:
         return None
     return float(reversals(recording["torque"][part], OSCILLATION_THRESHOLD * largest))
@@ -125,6 +126,7 @@ UNDECIDED = -0.5
 
 def next_swing(state: Swing, value: float, swing: float) -> Swing:
     """The state after one more value, in the unit of ``swing`` [N m]."""
+    # The sign of ``turns`` is the way and its size counts: a turn changes the one and adds 1 to the other.
     play = min(max(state.play, value - swing), value)
     turns_back = (play - state.play) * state.turns < 0.0
     turned = -state.turns + (1.0 if state.turns < 0.0 else -1.0)

@@ -23,6 +23,7 @@ def settled_error(final: Floats, on_hold: Floats, reversals: Floats) -> Floats:
 
 
 def _rms(recording: Recording, part: slice) -> float:
+    # Over time and not over samples: a recording may have more of them where more happens.
     time, error = recording.time[part], (recording["reference"] - recording["torque"])[part]
     return float(np.sqrt(np.trapezoid(error**2, time) / float(time[-1] - time[0])))
 
@@ -72,6 +73,7 @@ def update_squared_error(state: SquaredError, course: Course, sample: Sample) ->
     """One interval more."""
     error = sample.reference - sample.torque
     square = error * error
+    # In intervals: all have one length, which cancels where the sum is read.
     piece = 0.5 * (state.last + square)
     is_before = ends_before_hold(course, sample)
     return SquaredError(

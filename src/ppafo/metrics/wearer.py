@@ -29,6 +29,7 @@ def _start(_course: Course, sample: WearerSample) -> WearerTotals:
 
 
 def _update(totals: WearerTotals, _course: Course, sample: WearerSample) -> WearerTotals:
+    # Counts are floats in the state of a run; only the first strike behind the settling begins the counted strides.
     strikes = sample.strides - totals.now.strides > 0.5
     begins = strikes and sample.strides > float(SETTLING) and totals.first.time < 0.0
     first = totals.first
@@ -63,6 +64,7 @@ def _stays_up(readings: Readings) -> Floats:
 
 
 def _fall_time(readings: Readings) -> Floats:
+    # A time below 0 stands for what has not happened: the state of a run is floats alone.
     time = readings.meters["wearer"].now.fall_time
     found: Floats = choose(time >= 0.0, time, math.nan)
     return found
@@ -91,6 +93,7 @@ def _per_stride(readings: Readings, gained: Floats) -> Floats:
 def _per_second(readings: Readings, gained: Floats) -> Floats:
     """What a total gained over the time of the strides."""
     totals = readings.meters["wearer"]
+    # Both sides of a choice are computed: the divisor is never 0.
     in_time = gained / larger(totals.last.time - totals.first.time, 1.0e-9)
     found: Floats = choose(_strides(readings) > 0.5, in_time, math.nan)
     return found

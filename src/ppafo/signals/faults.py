@@ -18,12 +18,14 @@ FEWEST_AT_LIMIT = 20
 MINIMUM_SAMPLES = 10
 """Fewer do not show how large their noise is."""
 
+# The standard deviation of a normal distribution over the median of its sizes, which a few jumps do not move.
 _SPREAD_OF_MEDIAN = 1.4826
 _KEPT = 3.0
 _SHARE_OF_KEPT = 0.98658
 """Standard deviation of a normal distribution cut at 3 standard deviations, over the whole's."""
 _GAIN_OF_DIFFERENCES = math.sqrt(20.0)
 """Standard deviation of the third difference of white noise over the noise's."""
+# White noise turns at two of three samples, a smooth curve at hardly any.
 _NOISY_FRACTION = 0.2
 _ABRUPT_FRACTION = 0.3
 _BEFORE = 5
@@ -57,6 +59,7 @@ class Plateau:
 
 def longest_gap(time: Floats) -> Gap | None:
     """Return the longest time without samples [s] where it is one of many usual intervals, else None."""
+    # Against the median, which one gap does not move.
     intervals = np.diff(time)
     if intervals.size < 2:
         return None
@@ -95,7 +98,11 @@ def is_at_limit(values: Floats, plateau: Plateau) -> bool:
     """
     if plateau.count < FEWEST_AT_LIMIT or plateau.count == values.size:
         return False
-    return is_noisy(values[values != plateau.value]) or _runs_into(values, plateau)
+    # Whether it was still moving fast, for this signal, just before the plateau.
+    before = min(plateau.first, _BEFORE)
+    steps = np.abs(values[before:] - values[:-before]) if before else np.zeros(1)
+    runs_into = float(steps[plateau.first - before]) > _ABRUPT_FRACTION * float(steps.max())
+    return is_noisy(values[values != plateau.value]) or runs_into
 
 
 def is_noisy(values: Floats) -> bool:
@@ -113,17 +120,11 @@ def stands_out(values: Floats, plateau: Plateau) -> bool:
     """Return whether a plateau lasts far longer than any other value does: it is no step of a coarse converter."""
     if plateau.count < FEWEST_AT_LIMIT or plateau.count == values.size:
         return False
+    # A coarse converter has such plateaus everywhere: they are compared with the longest of the others.
     rest = np.concatenate([values[: plateau.first], values[plateau.last + 1 :]])
     changes = np.flatnonzero(np.diff(rest))
     others = np.diff(np.concatenate(([-1], changes, [rest.size - 1])))
     return plateau.count > _EXCEPTIONAL * int(others.max())
-
-
-def _runs_into(values: Floats, plateau: Plateau) -> bool:
-    """Return whether the signal was still moving fast, for this signal, just before the plateau."""
-    before = min(plateau.first, _BEFORE)
-    steps = np.abs(values[before:] - values[:-before]) if before else np.zeros(1)
-    return float(steps[plateau.first - before]) > _ABRUPT_FRACTION * float(steps.max())
 
 
 def noise_of(values: Floats) -> float:
@@ -133,6 +134,7 @@ def noise_of(values: Floats) -> float:
     """
     if values.size < MINIMUM_SAMPLES:
         return 0.0
+    # Third differences take away what a parabola through the neighbours explains.
     differences = np.abs(np.diff(values, n=3))
     most = _KEPT * _SPREAD_OF_MEDIAN * float(np.median(differences))
     inner = differences[differences <= most]

@@ -101,6 +101,7 @@ def is_away(reference: float, last: float, tolerance: float) -> bool:
 
 def advance_course(course: Course, sample: Sample) -> Course:
     """The course with one sample more, of a monotone reference: away from its last value first, then at rest."""
+    # Sample by sample, because a run is not kept; the last value and the largest are known from the profile before.
     away = is_away(sample.reference, course.last, course.tolerance)
     return Course(
         last=course.last,

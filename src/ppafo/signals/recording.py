@@ -155,6 +155,7 @@ class Channel:
     between: Between | None = None
 
     def __post_init__(self) -> None:
+        # Frozen: what is checked once stays true, and a channel can belong to several recordings.
         object.__setattr__(self, "values", _read_only(self.values))
         if self.between is not None and self.between not in BETWEEN:
             hint = nearest_name(str(self.between), BETWEEN)
@@ -190,6 +191,7 @@ class Recording:
     kind: RecordingKind = "measured"
 
     def __post_init__(self) -> None:
+        # Copies: the caller goes on with an array and a dict of its own.
         object.__setattr__(self, "time", _read_only(self.time))
         object.__setattr__(self, "channels", MappingProxyType(dict(self.channels)))
         if not self.label or not self.label.isprintable():
@@ -258,6 +260,7 @@ class Recording:
 
     def between(self, start: float, end: float) -> "Recording":
         """Return the samples with ``start`` <= time <= ``end`` [s]; times stay as they are."""
+        # Times stay: where a recording is cut must not move what happens in it.
         inside = (self.time >= start) & (self.time <= end)
         if not inside.any():
             raise DataError(f"{self.label}: there is no sample between {start:g} s and {end:g} s; {_span(self)}")
@@ -295,15 +298,6 @@ def recording_kind(name: str) -> RecordingKind:
     raise DataError(f"{name!r} is no kind of recording{nearest_name(name, _KINDS)}; available: {', '.join(_KINDS)}")
 
 
-def align(first: Recording, second: Recording) -> tuple[Recording, Recording]:
-    """Return both recordings at the times of the first that lie within the second, for a comparison in time."""
-    start, end = max(first.time[0], second.time[0]), min(first.time[-1], second.time[-1])
-    if start > end:
-        raise DataError(f"{first.label} and {second.label} have no time in common: {_span(first)}, {_span(second)}")
-    common = first.between(float(start), float(end))
-    return common, second.resample(common.time)
-
-
 def between_samples(recording: Recording, name: str, times: Floats, start: float = 0.0) -> Floats:
     """Return a channel [SI] at times [s] that count from ``start``, as it declares: held, or on a line.
 
@@ -311,6 +305,7 @@ def between_samples(recording: Recording, name: str, times: Floats, start: float
     """
     values, own_times = recording[name], recording.time - start
     if recording.is_held(name):
+        # The last sample at or before each time: a command holds from the instant at which it was given.
         return values[np.maximum(np.searchsorted(own_times, times, side="right") - 1, 0)]
     return np.interp(times, own_times, values)
 
@@ -341,6 +336,7 @@ def _check_channel(recording: Recording, name: str) -> None:
         counts = f"{len(channel.values)} values for {len(recording.time)} times"
         raise DataError(f"{recording.label}: channel '{name}' has {counts}")
     _check_finite(recording, f"channel '{name}'", channel.values)
+    # Functions of a recording take its numbers as they are: a known name says the unit as well.
     if name in CHANNELS and channel.unit != CHANNELS[name].unit:
         raise DataError(
             f"{recording.label}: channel '{name}' is in '{channel.unit}', it is always kept in '{CHANNELS[name].unit}'"

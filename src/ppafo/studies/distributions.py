@@ -185,6 +185,7 @@ def floored_interval(values: Floats, replicates: int, confidence: float) -> Inte
 
     spread = replicates_interval(values, replicates, confidence)
     known = values[np.isfinite(values)]
+    # A replicate without a value has no mean: nothing is known of the spread.
     if not math.isfinite(spread.width):
         return spread
     plain = float(ndtri(0.5 + 0.5 * confidence)) * float(np.std(known)) / math.sqrt(known.size)
@@ -220,14 +221,23 @@ def effective_sample_size(values: Floats) -> float:
     return float(values.size / max(1.0, skewness**2))
 
 
+def is_carried(effective: float, draws: int) -> bool:
+    """Tell whether enough of some draws determine a mean for its interval to be believed.
+
+    Of few draws half must: an interval without width, in which all are the same, is carried by all.
+    """
+    return effective >= min(FEWEST_EFFECTIVE, 0.5 * draws)
+
+
 def noise_interval(values: Floats, others: Floats, confidence: float) -> Interval | None:
     """Return the fraction of the variance that is due to noise, with its interval; None where nothing varies.
 
-    ``values`` and ``others`` (draws,) are the same draws with two independent noise streams: half the mean square of
-    their difference is the variance within a draw. The interval of this ratio of means is by the delta method.
+    ``others`` (draws,) are the first of the draws of ``values`` with an independent noise stream: half the mean square
+    of the difference is the variance within a draw. The interval of this ratio of means is by the delta method.
     """
     from scipy.special import ndtri
 
+    values = values[: others.size]
     both = np.isfinite(values) & np.isfinite(others)
     first, second = values[both], others[both]
     if first.size < 2:

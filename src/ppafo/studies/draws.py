@@ -19,7 +19,8 @@ from ppafo.studies.sampling import NOISE, correlate, other_noise, uniform_number
 from ppafo.studies.study import Configuration, Drawn, Sample, Study, with_followers
 from ppafo.units import parse_quantity
 
-MAXIMUM_DRAWS = 2**26
+FEWEST_DRAWS, MAXIMUM_DRAWS = 32, 2**26
+"""Two in each replicate, whose spread needs them, and what Sobol replicates are even for."""
 # Few enough that each keeps the evenness of a Sobol sequence, enough for Student's interval (2.13 for 95 %).
 REPLICATES = 16
 """Independent scrambles of the Sobol sequence among which draws are dealt out in turn."""
@@ -61,6 +62,7 @@ class Uncertainty:
         Draw j is number j // REPLICATES of the scramble j % REPLICATES. The scrambles are independent, so that the
         spread between their means says how well a mean is known (Owen, 1997).
         """
+        # Dealt out in turn: any number of draws from the start has all replicates to within one draw.
         numbers = np.arange(first, first + count)
         uniform = np.empty((count, len(self.drawn)))
         for replicate in range(REPLICATES):
@@ -87,23 +89,33 @@ def replicate_seed(seed: int, replicate: int) -> int:
     return int(np.random.SeedSequence([seed, replicate]).generate_state(1, np.uint64)[0])
 
 
-def with_new_noise(columns: Columns, maximum: int) -> Columns:
-    """Return the first ``maximum`` draws, each with another noise stream and all else as it was."""
-    first = {path: column[:maximum] for path, column in columns.items()}
+NOISE_DRAWS = 512
+"""Draws that are run again with other noise, at most: its fraction of the variance is then known to some percent."""
+
+
+def with_new_noise(columns: Columns) -> Columns:
+    """Return the first ``NOISE_DRAWS`` draws, each with another noise stream and all else as it was."""
+    first = {path: column[:NOISE_DRAWS] for path, column in columns.items()}
     return first | {NOISE: other_noise(first[NOISE])}
 
 
-def study_of(study: Study | str | Path | Mapping[str, Any], overrides: Sequence[str] = ()) -> Study:
-    """Return a study: as it is, or by name, file or data, with overrides in every configuration."""
+def study_of(
+    study: Study | str | Path | Mapping[str, Any],
+    overrides: Sequence[str] = (),
+    draws: int | None = None,
+    seed: int | None = None,
+) -> Study:
+    """Return a study as it is, or as ``load_study`` reads a name, file or data; StudyError for both at once."""
     if not isinstance(study, Study):
-        return load_study(study, overrides)
-    if overrides:
-        raise StudyError("a loaded Study takes no overrides; give its name or file, or load it with the overrides")
+        return load_study(study, overrides, draws, seed)
+    if overrides or draws is not None or seed is not None:
+        raise StudyError("a loaded Study takes no overrides, draws or seed; give them to load_study, or give its name")
     return study
 
 
 def uncertainty_of(study: Study) -> Uncertainty:
     """Return the distributions of a study; StudyError where it has none, or has a grid, which has no probability."""
+    # A grid has values and no probabilities: a mean over it would be of the grid, not of the device.
     if study.axes:
         raise StudyError(
             f"study '{study.name}': '{study.axes[0].path}' is varied over a grid or list, which has no "
@@ -122,10 +134,15 @@ def uncertainty_in(study: Study, configuration: Configuration) -> Uncertainty:
         raise StudyError(
             f"study '{study.name}': nothing has a distribution in the configuration '{configuration.name}'"
         )
-    same = study.same_in(configuration.name)
+    same, scores = study.same_in(configuration.name), whole.scores
     if len(kept) == len(whole.drawn):
         return replace(whole, same=same)
-    return Uncertainty(tuple(whole.drawn[row] for row in kept), _factor_of_some(whole.scores, kept), same, study.gauge)
+    if scores is not None:
+        # Rows of a factor are no factor of the correlation among some paths: that is factored anew.
+        lower = np.asarray(scores)
+        factor = np.linalg.cholesky((lower @ lower.T)[np.ix_(kept, kept)])
+        scores = tuple(tuple(float(number) for number in row) for row in factor)
+    return Uncertainty(tuple(whole.drawn[row] for row in kept), scores, same, study.gauge)
 
 
 def choose_configuration(study: Study, name: str | None) -> Configuration:
@@ -141,15 +158,18 @@ def choose_configuration(study: Study, name: str | None) -> Configuration:
     return study.configurations[names.index(name)]
 
 
-def _factor_of_some(
-    factor: tuple[tuple[float, ...], ...] | None, kept: Sequence[int]
-) -> tuple[tuple[float, ...], ...] | None:
-    """Return the Cholesky factor of the correlation among some of the paths."""
-    if factor is None:
-        return None
-    lower = np.asarray(factor)
-    correlation = (lower @ lower.T)[np.ix_(kept, kept)]
-    return tuple(tuple(float(number) for number in row) for row in np.linalg.cholesky(correlation))
+def drawn_in(
+    study: Study | str | Path | Mapping[str, Any], overrides: Sequence[str], name: str | None, independent: bool = False
+) -> tuple[Study, Configuration, Uncertainty]:
+    """Return a study, one of its configurations, and what is drawn in that, the noise of the sensors with it.
+
+    ``independent`` leaves the correlations out.
+    """
+    chosen = study_of(study, overrides)
+    base = choose_configuration(chosen, name)
+    known = uncertainty_in(chosen, base)
+    used = replace(known, scores=None) if independent else known
+    return chosen, base, used.with_noise_of([base.scenario])
 
 
 _OUTCOME_LEVELS = {"Pa": "Pa_a", "-": ""}
@@ -170,25 +190,14 @@ def check_metrics(metrics: Sequence[str], scenario: Scenario) -> None:
         raise StudyError(f"the metric '{repeated}' is named twice")
 
 
-def check_fraction(value: float, name: str) -> float:
-    """Return a number from 0 to below 1; StudyError for any other."""
-    if not 0.0 <= value < 1.0:
-        raise StudyError(f"{name} = {value!r}: must be at least 0 and less than 1")
-    return value
+def check_fraction(value: float, name: str, least: float = 0.0) -> None:
+    """Refuse a number that is below the least one, or not less than 1."""
+    if not least <= value < 1.0:
+        raise StudyError(f"{name} = {value!r}: must be at least {least:g} and less than 1")
 
 
-def check_confidence(value: float) -> float:
-    """Return a confidence from 0.5 to below 1; StudyError for any other."""
-    if not 0.5 <= value < 1.0:
-        raise StudyError(f"confidence = {value!r}: must be at least 0.5 and less than 1")
-    return value
-
-
-def check_draws(draws: int, fewest: int) -> int:
-    """Return a number of draws that can be made; StudyError for any other."""
-    if not fewest <= draws <= MAXIMUM_DRAWS:
-        raise StudyError(f"draws = {draws!r}: must be at least {fewest} and at most {MAXIMUM_DRAWS:,}")
-    return draws
+CONFIDENCE = "confidence", 0.5
+"""What ``check_fraction`` is told of a confidence: one below a half is a mistake, such as 0.05."""
 
 
 def atmosphere_of(scenario: Scenario, varied: Collection[str]) -> float | None:
@@ -203,6 +212,7 @@ def level_of(text: str, metric: str, what: str, atmosphere: float | None) -> flo
     no one atmosphere, which is None then.
     """
     atmospheres = (0.0, STANDARD_ATMOSPHERE) if atmosphere is None else (atmosphere,)
+    # The same under two atmospheres: an absolute pressure, or no pressure at all.
     found = common_level(text, METRICS[metric].unit, what, atmospheres)
     if found is None:
         raise StudyError(
@@ -230,3 +240,22 @@ def difference_of(text: str, metric: str, what: str) -> float:
 def _number(text: str, unit: str, what: str, atmosphere: float) -> float:
     with refused_as(StudyError, what, UnitError):
         return parse_quantity(text, unit, atmosphere)
+
+
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """A metric with the largest value that it may have [SI], or the smallest where not ``is_most``, and its text."""
+
+    metric: str
+    limit: float
+    is_most: bool
+    text: str
+
+    def is_kept(self, values: Any) -> Any:
+        """Return whether, or where, values of the metric [SI] keep it; nan, of a run without a value, does not."""
+        return values <= self.limit if self.is_most else values >= self.limit
+
+    @property
+    def words(self) -> str:
+        """The limit as it is written, after 'at most' or 'at least'."""
+        return f"at {'most' if self.is_most else 'least'} {self.text}"

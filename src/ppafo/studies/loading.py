@@ -8,6 +8,8 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ppafo.documents.models import validate
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import (
@@ -25,10 +27,9 @@ from ppafo.metrics import METRICS
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.overrides import other_forms, override_set
 from ppafo.simulation.numbers import chosen_path
-from ppafo.simulation.scenario import Scenario
 from ppafo.studies import declaration as declared
 from ppafo.studies.distributions import Above
-from ppafo.studies.sampling import MAXIMUM_SOBOL_DIMENSIONS, Factor, cholesky_factor, correlation_matrix, with_noise
+from ppafo.studies.sampling import MAXIMUM_SOBOL_DIMENSIONS, Factor, cholesky_factor, with_noise
 from ppafo.studies.study import Axis, Configuration, Drawn, Sample, Study, valid_outputs
 from ppafo.studies.varying import VariedPath, axis_or_distribution, in_its_unit, stated_normal, texts_of, varied_path
 
@@ -51,96 +52,90 @@ def load_study(
     ``overrides`` as on the command line change every configuration; ``draws`` and ``seed`` replace the number of draws
     and the random seed of the file. StudyError for anything that is not usable.
     """
-    if isinstance(study, Mapping):
-        STUDY_FILES.check_depth(study, "study")
-        document, source = copy.deepcopy(dict(study)), _Source("study", Path(), b"")
-    else:
-        source = _Source(label(str(study)), Path(study).parent, STUDY_FILES.read(study))
-        document = STUDY_FILES.parse(source.text, source.file)
+    document, source = read_source(STUDY_FILES, study)
     tables = document.get("vary")
     for table in tables if isinstance(tables, list | tuple) else ():
         if isinstance(table, dict) and "same_as" in table:
             table.setdefault("kind", "same_as")
-    changed = _apply_overrides(document, overrides, {"runs": draws, "seed": seed}, source)
-    return _build(changed, source)
+    parsed = validate(declared.StudyFile, document, source.file, StudyError)
+    given = {key: value for key, value in (("runs", draws), ("seed", seed)) if value is not None}
+    with refused_as(StudyError, source.file, StudyError):
+        # What the command line changes is written into the document, as if it stood in the file.
+        if overrides:
+            for table, item in zip(document["configurations"], parsed.configurations, strict=True):
+                loaded = _configuration(item, source.folder).scenario
+                with _refused_in(item):
+                    table["overrides"] = list(reloaded(loaded, overrides).origin.overrides)
+        if given and parsed.sample is None:
+            raise StudyError(
+                "has no [sample], so the number of runs follows from its grid and nothing is random: it takes neither "
+                "draws nor a seed"
+            )
+        if given:
+            document["sample"] |= given
+    parsed = validate(declared.StudyFile, document, source.file, StudyError)
+    with refused_as(StudyError, source.file, StudyError):
+        return _build(parsed, document, source)
 
 
 @dataclass(frozen=True, slots=True)
-class _Source:
-    """What messages call a study file, where relative paths in it begin, and its bytes."""
+class Source:
+    """What messages call a file, where relative paths in it begin, and its bytes; none of data."""
 
     file: str
     folder: Path
     text: bytes
 
-    def refusal(self, text: object) -> StudyError:
-        """Return an error that names the file."""
-        return StudyError(f"{self.file}: {text}")
+
+def read_source(kind: TomlKind, given: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any], Source]:
+    """Return a document that may be changed, and where it is from: a file of a kind, by name or path, or data."""
+    if isinstance(given, Mapping):
+        kind.check_depth(given, kind.noun)
+        return copy.deepcopy(dict(given)), Source(kind.noun, Path(), b"")
+    source = Source(label(str(given)), Path(given).parent, kind.read(given))
+    return kind.parse(source.text, source.file), source
 
 
-def _apply_overrides(
-    document: dict[str, Any], overrides: Sequence[str], sample: Mapping[str, int | None], source: _Source
-) -> dict[str, Any]:
-    """Return the document with the changes of the command line, as if they stood in the file."""
-    file = source.file
-    parsed = _parse(document, file)
-    if overrides:
-        for table, item in zip(document["configurations"], parsed.configurations, strict=True):
-            with _refused_in(item, source):
-                table["overrides"] = list(reloaded(_scenario(item, source), overrides).origin.overrides)
-    given = {key: value for key, value in sample.items() if value is not None}
-    if given and parsed.sample is None:
-        raise StudyError(
-            f"{file}: has no [sample], so the number of runs follows from its grid and nothing is random: "
-            "it takes neither draws nor a seed"
-        )
-    if given:
-        document["sample"] |= given
-    return document
-
-
-def _parse(document: Mapping[str, Any], file: str) -> declared.StudyFile:
-    return validate(declared.StudyFile, document, file, StudyError)
-
-
-def _build(document: dict[str, Any], source: _Source) -> Study:
-    parsed = _parse(document, source.file)
-    names = [item.name for item in parsed.configurations]
-    repeated = first_twice(names)
+def _build(parsed: declared.StudyFile, document: dict[str, Any], source: Source) -> Study:
+    repeated = first_twice([item.name for item in parsed.configurations])
     if repeated is not None:
-        raise source.refusal(f"there are two configurations named '{repeated}'; give each its own name")
-    configurations = tuple(Configuration(item.name, _scenario(item, source)) for item in parsed.configurations)
-    _check_requests(parsed, source)
-    _check_set_or_varied(parsed, configurations, source)
-    places = {item.path: _place(item, configurations, parsed, source) for item in parsed.vary}
+        raise StudyError(f"there are two configurations named '{repeated}'; give each its own name")
+    configurations = tuple(_configuration(item, source.folder) for item in parsed.configurations)
+    _check_requests(parsed)
+    _check_set_or_varied(parsed, configurations)
+    places = {item.path: _place(item, configurations, parsed) for item in parsed.vary}
     moving = [item for item in parsed.vary if not isinstance(item, declared.SameAs)]
-    varied = [_axis_or_drawn(item, places[item.path], configurations, source) for item in moving]
+    varied = [_axis_or_drawn(item, places[item.path], configurations) for item in moving]
     own = tuple(item for item in varied if isinstance(item, Drawn))
-    drawn, scores = own, _scores(parsed, own, source)
+    # Noise comes last among what is drawn; a grid alone is run once, with the noise that its scenarios write.
+    drawn, scores = own, _scores(parsed, own)
+    scenarios = [item.scenario for item in configurations]
     if own:
-        scenarios = [item.scenario for item in configurations]
         drawn, scores = with_noise(own, scores, scenarios, [item.path for item in parsed.vary])
     units = {path: place.quantity.unit or "-" for path, place in places.items()}
+    same = _followers(parsed, places)
+    # What follows a gauge pressure counts from the atmosphere of its run as well.
+    gauge = {path for path, place in places.items() if place.is_gauge}
     return Study(
         name=parsed.name,
         description=" ".join(parsed.description.split()),
         configurations=configurations,
         axes=tuple(item for item in varied if isinstance(item, Axis)),
         drawn=drawn,
-        same=_followers(parsed, places, source),
+        same=same,
         scores=scores,
-        sample=_sample(parsed, drawn, source),
-        outputs=valid_outputs(parsed.outputs, [item.scenario for item in configurations], source.refusal),
+        sample=_sample(parsed, drawn),
+        outputs=valid_outputs(parsed.outputs, scenarios),
         runs_of_chunk=parsed.runs_of_chunk,
         units=units | {item.path: "-" for item in drawn if item.path not in units},
-        gauge=_in_gauge(parsed, places),
+        gauge=frozenset(gauge | {path for path, other in same.items() if other in gauge}),
         only={item.path: item.only for item in parsed.vary if item.only},
         document=document,
         text=source.text,
     )
 
 
-def _check_set_or_varied(parsed: declared.StudyFile, configurations: Sequence[Configuration], source: _Source) -> None:
+def _check_set_or_varied(parsed: declared.StudyFile, configurations: Sequence[Configuration]) -> None:
     """Refuse a value that is set in a configuration in which it, or another form of it, also varies."""
     for each, loaded in zip(parsed.configurations, configurations, strict=True):
         given = override_set(each.overrides, StudyError, valve=loaded.scenario.device.valve_name)
@@ -154,92 +149,74 @@ def _check_set_or_varied(parsed: declared.StudyFile, configurations: Sequence[Co
                 or (item.only and each.name not in item.only)
             ):
                 continue
-            raise source.refusal(
+            raise StudyError(
                 f"configuration '{each.name}': '{given[unused[0]]}' is set and '{item.path}' is varied, so the set "
                 "value would be ignored; omit one, or restrict the [[vary]] to the other configurations with 'only'"
             )
 
 
-def _scenario(item: declared.Configuration, source: _Source) -> Scenario:
-    with _refused_in(item, source):
-        return load_scenario(placed(item.scenario, source.folder), item.overrides)
+def _configuration(item: declared.Configuration, folder: Path) -> Configuration:
+    with _refused_in(item):
+        return Configuration(item.name, load_scenario(placed(item.scenario, folder), item.overrides))
 
 
-def _refused_in(item: declared.Configuration, source: _Source) -> AbstractContextManager[None]:
+def _refused_in(item: declared.Configuration) -> AbstractContextManager[None]:
     """Return what names the configuration in errors about it."""
-    kinds = ScenarioError, ParameterError, DataError
-    return refused_as(source.refusal, f"configuration '{item.name}'", *kinds)
+    return refused_as(StudyError, f"configuration '{item.name}'", ScenarioError, ParameterError, DataError)
 
 
-def _check_requests(parsed: declared.StudyFile, source: _Source) -> None:
+def _check_requests(parsed: declared.StudyFile) -> None:
     outputs = parsed.outputs
     if not (outputs.metrics or outputs.trajectories or outputs.bands):
         known = ", ".join(list(METRICS)[:4])
-        raise source.refusal(f"[outputs] requests nothing: give metrics (such as {known}), trajectories or bands")
+        raise StudyError(f"[outputs] requests nothing: give metrics (such as {known}), trajectories or bands")
     if not parsed.vary and len(parsed.configurations) == 1:
-        raise source.refusal("varies nothing: give at least one [[vary]] or a second configuration")
+        raise StudyError("varies nothing: give at least one [[vary]] or a second configuration")
     paths = [item.path for item in parsed.vary]
+    # Rows of channels over time are lists of one length, and bands are quantiles at one time.
     if "run.duration" in paths and (outputs.trajectories or outputs.bands):
-        raise source.refusal("'run.duration' cannot vary where trajectories or bands are kept: they need one length")
+        raise StudyError("'run.duration' cannot vary where trajectories or bands are kept: they need one length")
     repeated = first_twice(paths)
     if repeated is not None:
-        raise source.refusal(f"'{repeated}' is varied twice; give it only one [[vary]]")
+        raise StudyError(f"'{repeated}' is varied twice; give it only one [[vary]]")
 
 
-def _in_gauge(parsed: declared.StudyFile, places: Mapping[str, VariedPath]) -> frozenset[str]:
-    """Return the paths whose values count from the atmosphere of their run, with those that follow one."""
-    own = {path for path, place in places.items() if place.is_gauge}
-    return frozenset(
-        own | {item.path for item in parsed.vary if isinstance(item, declared.SameAs) and item.same_as in own}
-    )
-
-
-def _place(
-    item: declared.Varied, configurations: Sequence[Configuration], parsed: declared.StudyFile, source: _Source
-) -> VariedPath:
+def _place(item: declared.Varied, configurations: Sequence[Configuration], parsed: declared.StudyFile) -> VariedPath:
     """Return the path with its declaration, which must be the same in all configurations that vary it."""
     names = [configuration.name for configuration in configurations]
     for name in item.only:
         if name not in names:
             hint = nearest_name(name, names)
-            raise source.refusal(f"vary '{item.path}': only: there is no configuration '{name}'{hint}")
-    with refused_as(source.refusal, f"vary '{item.path}'", ScenarioError):
+            raise StudyError(f"vary '{item.path}': only: there is no configuration '{name}'{hint}")
+    with refused_as(StudyError, f"vary '{item.path}'", ScenarioError):
         places = [varied_path(item.path, each.scenario) for each in _varying(item, configurations)]
     if any(place != places[0] for place in places):
-        raise source.refusal(
-            f"vary '{item.path}': has different units, limits or atmospheres in different configurations"
-        )
+        raise StudyError(f"vary '{item.path}': has different units, limits or atmospheres in different configurations")
     # Where the atmosphere is fixed, gauge is a constant away from absolute; where it varies, each run has its own zero.
     if isinstance(item, declared.SameAs) or ATMOSPHERE_PATH not in {other.path for other in parsed.vary}:
         return places[0]
-    with refused_as(source.refusal, f"vary '{item.path}'", UnitError):
+    with refused_as(StudyError, f"vary '{item.path}'", UnitError):
         first = _varying(item, configurations)[0].scenario
         is_stated = isinstance(item, declared.Stated)
         texts = [f"0 {stated_normal(places[0], first)[1]}"] if is_stated else texts_of(item)
         return in_its_unit(places[0], texts)
 
 
-def _axis_or_drawn(
-    item: declared.Varied, place: VariedPath, configurations: Iterable[Configuration], source: _Source
-) -> Axis | Drawn:
-    with refused_as(source.refusal, f"vary '{item.path}'", UnitError):
-        if isinstance(item, declared.Stated):
-            return _stated_distribution(item, place, _varying(item, configurations))
-        return axis_or_distribution(item, place)
+def _axis_or_drawn(item: declared.Varied, place: VariedPath, configurations: Iterable[Configuration]) -> Axis | Drawn:
+    with refused_as(StudyError, f"vary '{item.path}'", UnitError):
+        if not isinstance(item, declared.Stated):
+            return axis_or_distribution(item, place)
+        # One draw is run in every configuration, so all of them must mean the same distribution.
+        found = {stated_normal(place, each.scenario)[0] for each in _varying(item, configurations)}
+        if len(found) > 1:
+            raise UnitError(
+                "the parameter sets of the configurations state different values; use 'only', or give the values"
+            )
+        stated = found.pop()
+        return Drawn(item.path, Above(stated, place.atmosphere) if place.is_gauge else stated)
 
 
-def _stated_distribution(item: declared.Stated, place: VariedPath, configurations: Iterable[Configuration]) -> Drawn:
-    # One draw is run in every configuration, so all of them must mean the same distribution.
-    found = {stated_normal(place, each.scenario)[0] for each in configurations}
-    if len(found) > 1:
-        raise UnitError(
-            "the parameter sets of the configurations state different values; use 'only', or give the values"
-        )
-    stated = found.pop()
-    return Drawn(item.path, Above(stated, place.atmosphere) if place.is_gauge else stated)
-
-
-def _followers(parsed: declared.StudyFile, places: Mapping[str, VariedPath], source: _Source) -> dict[str, str]:
+def _followers(parsed: declared.StudyFile, places: Mapping[str, VariedPath]) -> dict[str, str]:
     """Return the path that a path follows, by path; refuses one that does not vary, or has another unit."""
     own = [item.path for item in parsed.vary if not isinstance(item, declared.SameAs)]
     same: dict[str, str] = {}
@@ -248,12 +225,10 @@ def _followers(parsed: declared.StudyFile, places: Mapping[str, VariedPath], sou
             continue
         if item.same_as not in own:
             hint = nearest_name(item.same_as, own) or f"; available: {', '.join(own) or 'none'}"
-            raise source.refusal(
-                f"vary '{item.path}': same_as = '{item.same_as}' does not vary independently here{hint}"
-            )
+            raise StudyError(f"vary '{item.path}': same_as = '{item.same_as}' does not vary independently here{hint}")
         unit, other = places[item.path].quantity.unit, places[item.same_as].quantity.unit
         if unit != other:
-            raise source.refusal(
+            raise StudyError(
                 f"vary '{item.path}': same_as = '{item.same_as}' is in '{other or '-'}', this path in '{unit or '-'}'"
             )
         same[item.path] = item.same_as
@@ -265,7 +240,7 @@ def _varying(item: declared.Varied, configurations: Iterable[Configuration]) -> 
     return [each for each in configurations if not item.only or each.name in item.only]
 
 
-def _scores(parsed: declared.StudyFile, drawn: Sequence[Drawn], source: _Source) -> Factor | None:
+def _scores(parsed: declared.StudyFile, drawn: Sequence[Drawn]) -> Factor | None:
     if not parsed.correlations:
         return None
     paths = [item.path for item in drawn]
@@ -274,30 +249,35 @@ def _scores(parsed: declared.StudyFile, drawn: Sequence[Drawn], source: _Source)
         one, other = item.between
         for path in item.between:
             if path not in paths:
-                raise source.refusal(
+                raise StudyError(
                     f"correlations: '{path}' has no distribution here{nearest_name(path, paths)}; available: {paths}"
                 )
         if one == other or (one, other) in coefficients or (other, one) in coefficients:
-            raise source.refusal(
+            raise StudyError(
                 f"correlations: between = ['{one}', '{other}'] must name two different paths, and each pair only once"
             )
         coefficients[one, other] = item.coefficient
-    factor = cholesky_factor(correlation_matrix(paths, coefficients))
+    matrix = np.eye(len(paths))
+    for (one, other), coefficient in coefficients.items():
+        row, column = paths.index(one), paths.index(other)
+        matrix[row, column] = matrix[column, row] = coefficient
+    factor = cholesky_factor(matrix)
     if factor is None:
         shown = ", ".join(f"{one} with {other}: {value:g}" for (one, other), value in coefficients.items())
-        raise source.refusal(
+        raise StudyError(
             f"correlations: contradict each other, their matrix is not positive definite ({shown}); make them smaller"
         )
     return factor
 
 
-def _sample(parsed: declared.StudyFile, drawn: Sequence[Drawn], source: _Source) -> Sample:
+def _sample(parsed: declared.StudyFile, drawn: Sequence[Drawn]) -> Sample:
     if not drawn:
         if parsed.sample is not None:
-            raise source.refusal("[sample] is given, but nothing has a distribution; omit it")
+            raise StudyError("[sample] is given, but nothing has a distribution; omit it")
         return Sample(None, 1, 0)
     if parsed.sample is None:
-        raise source.refusal("'sample' is missing: distributions need [sample] with method and runs")
+        raise StudyError("'sample' is missing: distributions need [sample] with method and runs")
+    # The direction numbers of SciPy's sequence end there.
     if parsed.sample.method == "sobol" and len(drawn) > MAXIMUM_SOBOL_DIMENSIONS:
-        raise source.refusal(f"sample.method = 'sobol' allows at most {MAXIMUM_SOBOL_DIMENSIONS} distributions")
+        raise StudyError(f"sample.method = 'sobol' allows at most {MAXIMUM_SOBOL_DIMENSIONS} distributions")
     return Sample(parsed.sample.method, parsed.sample.runs, parsed.sample.seed)

@@ -14,8 +14,7 @@ realisation: where sensors are noisy, every draw gets a noise stream of its own.
 
 import threading
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -34,8 +33,6 @@ _WORDS_PER_STEP = 4
 _FRACTION_BITS = 53
 _SOBOL_BITS = 32
 MAXIMUM_SOBOL_DIMENSIONS = 21201
-_MAXIMUM_ENGINES = 64
-"""Wound engines that are remembered; the one that was made first goes first."""
 
 
 def uniform_numbers(sample: Sample, dimensions: int, first: int, count: int) -> Floats:
@@ -63,15 +60,11 @@ def _random(seed: int, dimensions: int, first: int, count: int) -> Floats:
     return uniform.reshape(count, steps * _WORDS_PER_STEP)[:, :dimensions]
 
 
-@dataclass(slots=True)
-class _Wound:
-    """Scipy's Sobol engines by what made them, wound to where they were last used."""
-
-    engines: dict[tuple[int, int], Any]
-    lock: Any
-
-
-_WOUND = _Wound({}, threading.Lock())
+_ENGINES: dict[tuple[int, int], Any] = {}
+"""Scipy's Sobol engines by seed and dimensions, wound to where they were last used."""
+_LOCK = threading.Lock()
+_MAXIMUM_ENGINES = 64
+"""Engines that are remembered; the one that was made first goes first."""
 
 
 def _sobol(sample: Sample, dimensions: int, first: int, count: int) -> Floats:
@@ -79,13 +72,13 @@ def _sobol(sample: Sample, dimensions: int, first: int, count: int) -> Floats:
     from scipy.stats import qmc
 
     key = (sample.seed, dimensions)
-    with _WOUND.lock:
-        engine = _WOUND.engines.get(key)
+    with _LOCK:
+        engine = _ENGINES.get(key)
         if engine is None or engine.num_generated > first:
             engine = qmc.Sobol(dimensions, scramble=True, bits=_SOBOL_BITS, rng=np.random.default_rng(sample.seed))
-            _WOUND.engines[key] = engine
-            if len(_WOUND.engines) > _MAXIMUM_ENGINES:
-                del _WOUND.engines[next(iter(_WOUND.engines))]
+            _ENGINES[key] = engine
+            if len(_ENGINES) > _MAXIMUM_ENGINES:
+                del _ENGINES[next(iter(_ENGINES))]
         if first > engine.num_generated:
             engine.fast_forward(first - engine.num_generated)
         with warnings.catch_warnings():
@@ -117,15 +110,6 @@ def _mix(words: Words) -> Words:
     words = (words ^ (words >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     words = (words ^ (words >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
     return words ^ (words >> np.uint64(31))
-
-
-def correlation_matrix(paths: Sequence[str], coefficients: Mapping[tuple[str, str], float]) -> Floats:
-    """Return the correlation of the normal scores, shape (paths, paths)."""
-    matrix = np.eye(len(paths))
-    for (one, other), coefficient in coefficients.items():
-        row, column = paths.index(one), paths.index(other)
-        matrix[row, column] = matrix[column, row] = coefficient
-    return matrix
 
 
 _LEAST_SPREAD = 1.0e-6
@@ -168,19 +152,6 @@ _NOISE_LEVELS = ("sensors.angle_noise", "sensors.pressure_noise", "sensors.force
 _KEY = 1
 
 
-def is_noisy(scenarios: Iterable[Scenario], paths: Sequence[str] = ()) -> bool:
-    """Tell whether a controller receives noise in any of some scenarios, or where some paths vary."""
-    closed = [item for item in scenarios if item.controller.kind != OPEN_LOOP]
-    heard = any(np.any(np.asarray(_noise_of(item)) > 0.0) for item in closed)
-    return heard or (bool(closed) and any(path in _NOISE_LEVELS for path in paths))
-
-
-def _noise_of(scenario: Scenario) -> Any:
-    """Return the summed noise levels of a scenario, which may be an array (runs,)."""
-    worn = worn_kind(scenario)
-    return scenario.sensors.angle_noise + scenario.sensors.pressure_noise if worn is None else worn.noise(scenario)
-
-
 def with_noise(
     drawn: tuple[Drawn, ...], scores: Factor | None, scenarios: Iterable[Scenario], paths: Sequence[str]
 ) -> tuple[tuple[Drawn, ...], Factor | None]:
@@ -188,7 +159,14 @@ def with_noise(
 
     ``paths`` are all that vary; a seed among them is left as it is.
     """
-    if NOISE in paths or not is_noisy(scenarios, paths):
+    # An open-loop controller uses no sensor; levels may be arrays (runs,).
+    closed = [item for item in scenarios if item.controller.kind != OPEN_LOOP]
+    is_noisy = bool(closed) and any(path in _NOISE_LEVELS for path in paths)
+    for item in closed:
+        worn, sensors = worn_kind(item), item.sensors
+        level = sensors.angle_noise + sensors.pressure_noise if worn is None else worn.noise(item)
+        is_noisy = is_noisy or bool(np.any(np.asarray(level) > 0.0))
+    if NOISE in paths or not is_noisy:
         return drawn, scores
     noise = Drawn(NOISE, WholeNumbersBetween(0.0, float(LARGEST_SEED)))
     if scores is None:

@@ -1,7 +1,8 @@
 """A study as frozen values in SI units: what it keeps, its runs, grid points and draws, and its configurations."""
 
+import math
 import re
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -16,8 +17,6 @@ from ppafo.simulation.simulate import OPEN_LOOP
 from ppafo.studies import declaration as declared
 from ppafo.studies.distributions import Distribution
 from ppafo.units import parse_quantity
-
-Refusal = Callable[[object], StudyError]
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,54 +39,51 @@ class Outputs:
         return tuple(dict.fromkeys((*self.trajectories, *self.bands)))
 
 
-def valid_outputs(outputs: declared.Outputs, scenarios: Sequence[Scenario], refusal: Refusal) -> Outputs:
-    """Return the outputs in SI units; an error that ``refusal`` makes for a name that does not exist."""
+def valid_outputs(outputs: declared.Outputs, scenarios: Sequence[Scenario]) -> Outputs:
+    """Return the outputs in SI units; StudyError for a name that does not exist."""
     metrics = tuple(METRICS) if outputs.metrics == "all" else tuple(outputs.metrics)
-    _check_names(
-        "metrics", metrics, METRICS, refusal, dict.fromkeys(name for item in scenarios for name in offered(item))
-    )
-    _check_names("trajectories", outputs.trajectories, tuple(TRACED), refusal)
-    _check_names("bands", outputs.bands, tuple(TRACED), refusal)
+    _check_names("metrics", metrics, METRICS, dict.fromkeys(name for item in scenarios for name in offered(item)))
+    _check_names("trajectories", outputs.trajectories, tuple(TRACED))
+    _check_names("bands", outputs.bands, tuple(TRACED))
     channels = (*outputs.trajectories, *outputs.bands)
     if "reference" in channels and all(scenario.controller.kind == OPEN_LOOP for scenario in scenarios):
-        raise refusal("outputs: 'reference' needs a reference, and the controllers here follow none")
+        raise StudyError("outputs: 'reference' needs a reference, and the controllers here follow none")
+    # A metric that one configuration has is kept, empty for the others; 'all' takes those that any has.
     has = {name: [lacking(scenario, METRICS[name]) for scenario in scenarios] for name in metrics}
     missing = {name: reasons[0] for name, reasons in has.items() if all(reasons)}
     for name, reason in missing.items() if outputs.metrics != "all" else ():
-        raise refusal(f"outputs: no scenario has '{name}': {reason}")
+        raise StudyError(f"outputs: no scenario has '{name}': {reason}")
     metrics = tuple(name for name in metrics if name not in missing)
     return Outputs(
         metrics=metrics,
         trajectories=outputs.trajectories,
         bands=outputs.bands,
-        every=_interval(outputs, scenarios, refusal),
+        every=_interval(outputs, scenarios),
         quantiles=tuple(sorted(set(outputs.quantiles))),
         errors=outputs.errors,
     )
 
 
-def _check_names(
-    key: str, given: Sequence[str], known: Collection[str], refusal: Refusal, shown: Collection[str] = ()
-) -> None:
+def _check_names(key: str, given: Sequence[str], known: Collection[str], shown: Collection[str] = ()) -> None:
     """Refuse an unknown or repeated name; ``shown`` are the names that apply here, by default all that are known."""
     for name in given:
         if name not in known:
             what, apply = "metric" if key == "metrics" else "channel", shown or known
             hint = nearest_name(name, apply)
-            raise refusal(f"outputs.{key}: there is no {what} '{name}'{hint}; available: {', '.join(apply)}")
+            raise StudyError(f"outputs.{key}: there is no {what} '{name}'{hint}; available: {', '.join(apply)}")
     repeated = first_twice(given)
     if repeated is not None:
-        raise refusal(f"outputs.{key}: '{repeated}' is named twice")
+        raise StudyError(f"outputs.{key}: '{repeated}' is named twice")
 
 
-def _interval(outputs: declared.Outputs, scenarios: Sequence[Scenario], refusal: Refusal) -> float:
-    with refused_as(refusal, f"outputs.every = {outputs.every!r}", UnitError):
+def _interval(outputs: declared.Outputs, scenarios: Sequence[Scenario]) -> float:
+    with refused_as(StudyError, f"outputs.every = {outputs.every!r}", UnitError):
         every = parse_quantity(outputs.every, "s")
     if not (outputs.trajectories or outputs.bands):
         return every
     shortest = min(scenario.run.duration for scenario in scenarios)
     if not 0.0 < every <= shortest:
-        raise refusal(
+        raise StudyError(
             f"outputs.every = {outputs.every!r} must be more than 0 s and at most run.duration, {shortest:g} s"
         )
     return every
@@ -167,17 +163,9 @@ class Study:
         return (*(axis.path for axis in self.axes), *(item.path for item in self.drawn))
 
     @property
-    def grid_points(self) -> int:
-        """Number of points of the grid, 1 where there is none."""
-        points = 1
-        for axis in self.axes:
-            points *= len(axis.values)
-        return points
-
-    @property
     def runs_of_configuration(self) -> int:
-        """Number of runs of every configuration."""
-        return self.grid_points * self.sample.runs
+        """Number of runs of every configuration: the draws, at each point of the grid."""
+        return math.prod(len(axis.values) for axis in self.axes) * self.sample.runs
 
     @property
     def runs(self) -> int:
@@ -203,19 +191,11 @@ _SETTING = re.compile(r"\s*controller\.(?!rate|period)")
 Configurations = Mapping[str, Scenario | str | Path] | Sequence[Scenario | str | Path]
 
 
-@dataclass(frozen=True, slots=True)
-class ConfiguredTask:
-    """A configuration on a task: the two names and the scenario."""
-
-    task: str
-    configuration: str
-    scenario: Scenario
-
-
 def choose_configurations(
     configurations: Configurations | None, study: Study | None, overrides: Sequence[str]
 ) -> tuple[Configuration, ...]:
     """Return the given scenarios, else the configurations of the study; at least two, each with its own name."""
+    # Distributions that hold in some configurations only name those of the study, not the ones given here.
     if configurations is None:
         if study is None:
             raise StudyError("nothing to compare: give scenarios, a study, or both")
@@ -227,20 +207,16 @@ def choose_configurations(
                 f"study '{study.name}': '{path}' varies only in {', '.join(varying)}; "
                 "compare the study's own configurations"
             )
-        pairs = configurations.items() if isinstance(configurations, Mapping) else _with_names(configurations)
-        found = tuple(Configuration(name, scenario_or_load(item)) for name, item in pairs)
+        given = configurations.values() if isinstance(configurations, Mapping) else configurations
+        scenarios = [scenario_or_load(item) for item in given]
+        names = list(configurations) if isinstance(configurations, Mapping) else [item.name for item in scenarios]
+        repeated = first_twice(names)
+        if repeated is not None:
+            raise StudyError(f"two of the scenarios are named '{repeated}'; give them different names in a study file")
+        found = tuple(map(Configuration, names, scenarios))
     if len(found) < 2:
         raise StudyError(f"a comparison needs at least two configurations, there is {len(found)}")
     return tuple(replace(item, scenario=with_overrides(item.scenario, overrides)) for item in found)
-
-
-def valid_baseline(name: str | None, names: Sequence[str]) -> str:
-    """Return the configuration that all others are compared with; the first by default."""
-    if name is not None and name not in names:
-        raise StudyError(
-            f"baseline: no configuration '{name}'{nearest_name(name, names)}; available: {', '.join(names)}"
-        )
-    return name if name is not None else names[0]
 
 
 def with_overrides(scenario: Scenario, overrides: Sequence[str]) -> Scenario:
@@ -259,13 +235,3 @@ def with_overrides(scenario: Scenario, overrides: Sequence[str]) -> Scenario:
             f"scenario '{scenario.name}' was changed in Python; overrides need the scenario as it is in its file"
         )
     return reloaded(scenario, overrides)
-
-
-def _with_names(scenarios: Sequence[Scenario | str | Path]) -> list[tuple[str, Scenario]]:
-    """Return scenarios by their own names; StudyError where two are called the same."""
-    found = [scenario_or_load(item) for item in scenarios]
-    names = [scenario.name for scenario in found]
-    repeated = first_twice(names)
-    if repeated is not None:
-        raise StudyError(f"two of the scenarios are named '{repeated}'; give them different names in a study file")
-    return list(zip(names, found, strict=True))

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +16,11 @@ from ppafo.parameters import apply_overrides, load_parameter_set
 from ppafo.parameters.declaration import alternatives, is_within
 from ppafo.parameters.graph import counts_from, gauge_link
 from ppafo.parameters.overrides import split_override
-from ppafo.parameters.parameter_set import Entry, atmospheric_pressure, entry_in_si
+from ppafo.parameters.parameter_set import atmospheric_pressure, entry_in_si
 from ppafo.simulation import declaration
 from ppafo.simulation.declaration import WRITTEN_UNITS
 from ppafo.simulation.loading import set_name
-from ppafo.simulation.numbers import declared_numbers
+from ppafo.simulation.numbers import declared_numbers, number_at
 from ppafo.simulation.overrides import is_of_device
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies import declaration as declared
@@ -64,11 +65,18 @@ class VariedPath:
         """Return a value of the path in SI; UnitError where the unit does not fit or the path does not allow it."""
         number = self._in_si(value, self.quantity)
         if not is_within(number, self.quantity):
-            raise UnitError(f"{self.path} must be {self._limits()}")
+            lowest, highest = self.quantity.minimum, self.quantity.maximum
+            word = "at least" if self.quantity.minimum_allowed else "more than"
+            # Limits of a pressure are absolute, whatever its values count from.
+            quote = replace(self, is_gauge=False).quote
+            limits = [f"{word} {quote(lowest)}"] if math.isfinite(lowest) else []
+            limits += [f"at most {quote(highest)}"] if math.isfinite(highest) else []
+            raise UnitError(f"{self.path} must be {' and '.join(limits)}")
         return _parse(str(value), self.quantity, 0.0) if self.is_gauge else number
 
     def distance(self, value: str | float) -> float:
         """Return a difference of two values of the path in SI, such as a standard deviation."""
+        # A difference of pressures counts from nothing; in degC it would get the offset of the scale.
         unit = _UNIT_OF_DIFFERENCE.get(self.quantity.unit, self.quantity.unit)
         if isinstance(value, str) and split_quantity(value)[1] in _OFFSET_UNITS:
             raise UnitError("a difference of temperatures is given in K")
@@ -87,12 +95,6 @@ class VariedPath:
         if quantity.unit not in declaration.PLAIN:
             raise UnitError(f"a number without a unit; give a text with a unit such as {quantity.unit}")
         return float(value)
-
-    def _limits(self) -> str:
-        lowest, highest = self.quantity.minimum, self.quantity.maximum
-        word, quote = "at least" if self.quantity.minimum_allowed else "more than", replace(self, is_gauge=False).quote
-        parts = [f"{word} {quote(lowest)}"] if math.isfinite(lowest) else []
-        return " and ".join([*parts, f"at most {quote(highest)}"] if math.isfinite(highest) else parts)
 
 
 def _parse(text: str, quantity: Quantity, atmosphere: float) -> float:
@@ -116,6 +118,22 @@ def varied_path(path: str, scenario: Scenario) -> VariedPath:
         hint = nearest_name(path, known) or f"; for example {', '.join(near[:6] or list(known)[:6])}"
         raise ScenarioError(f"scenario '{scenario.name}' has no number '{path}'{hint}")
     return VariedPath(path, known[path], counts_from(path, scenario.device.supply.atmospheric_pressure))
+
+
+def value_at(path: str, scenario: Scenario) -> float | None:
+    """Return the value [SI] of a scenario at a path as in overrides; None where it has none there."""
+    run, period = scenario.run, scenario.controller.period
+    of_clock = {
+        "controller.period": period,
+        "controller.rate": 1.0 / period,
+        "run.duration": run.duration,
+        "run.step": run.step,
+        "run.output_interval": run.output_interval,
+    }
+    try:
+        return float(of_clock[path]) if path in of_clock else number_at(scenario, path)
+    except (AttributeError, KeyError, TypeError):
+        return None
 
 
 def in_its_unit(place: VariedPath, texts: Iterable[object]) -> VariedPath:
@@ -174,8 +192,8 @@ def _grid(item: declared.Grid, place: VariedPath) -> tuple[float, ...]:
     return tuple(np.geomspace(first, last, item.count).tolist())
 
 
-def _uniform(item: declared.Uniform, place: VariedPath) -> Distribution:
-    return UniformBetween(*_bounds(item, place))
+def _bounded(made: Callable[[float, float], Distribution], item: Any, place: VariedPath) -> Distribution:
+    return made(*_bounds(item, place))
 
 
 def _log_uniform(item: declared.LogUniform, place: VariedPath) -> Distribution:
@@ -200,6 +218,7 @@ def _truncated_normal(item: declared.TruncatedNormal, place: VariedPath) -> Dist
 
 
 def _log_normal(item: declared.LogNormal, place: VariedPath) -> Distribution:
+    # Of the absolute pressure: a gauge pressure may be 0 or below, where there is no logarithm.
     median = _key(item, "median", replace(place, is_gauge=False))
     if median <= 0.0:
         raise UnitError(f"median = {item.median!r} must be above 0")
@@ -227,21 +246,17 @@ def _choice(item: declared.Choice, place: VariedPath) -> Distribution:
     return OneOf(values, tuple(fractions.tolist()))
 
 
-def _whole_numbers(item: declared.WholeNumbers, place: VariedPath) -> Distribution:
-    return WholeNumbersBetween(*_bounds(item, place))
-
-
 _DISTRIBUTIONS: dict[str, Callable[[Any, VariedPath], Distribution]] = {
-    "uniform": _uniform,
+    "uniform": partial(_bounded, UniformBetween),
     "log_uniform": _log_uniform,
     "normal": _normal,
     "truncated_normal": _truncated_normal,
     "log_normal": _log_normal,
     "triangular": _triangular,
     "choice": _choice,
-    "whole_numbers": _whole_numbers,
+    "whole_numbers": partial(_bounded, WholeNumbersBetween),
 }
-"""What builds each kind. To add one: a table in ``declaration``, a class in ``sampling.distributions``, a line here."""
+"""What builds each kind. To add one: a table in ``declaration``, a class in ``distributions``, a line here."""
 
 
 def _bounds(item: Any, place: VariedPath) -> tuple[float, float]:
@@ -270,7 +285,15 @@ def _level(key: str, value: str | float, place: VariedPath) -> float:
 
 def stated_normal(place: VariedPath, scenario: Scenario) -> tuple[NormalAround, str]:
     """Return the distribution of a path, and its unit in the set; UnitError where that states no uncertainty for it."""
-    entry, mean = _stated_entry(place.path, scenario)
+    origin, path = scenario.origin, place.path
+    folder = Path(origin.file).parent if origin.file is not None else Path()
+    own = [text for text in origin.overrides if is_of_device(split_override(text).typed)]
+    # What the set reports with the overrides of the scenario: one that replaces a value takes its uncertainty away.
+    parameters = load_parameter_set(set_name(origin.parameter_set, folder))
+    for given in (origin.content["device"].get("overrides", ()), own):
+        parameters = apply_overrides(parameters, given, origin.valve)
+    inside = f"valves.{origin.valve}.{path.removeprefix('valve.')}" if path.startswith("valve.") else path
+    entry = parameters.numbers.get(inside)
     if entry is None or not entry.uncertainty:
         why = "was changed by an override" if entry is not None and entry.source == "override" else "has none"
         raise UnitError(
@@ -280,19 +303,5 @@ def stated_normal(place: VariedPath, scenario: Scenario) -> tuple[NormalAround, 
     if unit.endswith(("_g", "_a")):
         unit = f"{unit[:-2]}_d"
     half_width = place.distance(f"{entry.uncertainty!r} {unit}".strip())
+    mean = entry_in_si(entry, parameters.declarations()[inside], atmospheric_pressure(parameters))
     return NormalAround(mean, half_width / DEVIATIONS_IN_HALF_WIDTH), entry.unit
-
-
-def _stated_entry(path: str, scenario: Scenario) -> tuple[Entry | None, float]:
-    """Return what the set, with the overrides of the scenario, reports of a path, and the value in SI."""
-    origin = scenario.origin
-    folder = Path(origin.file).parent if origin.file is not None else Path()
-    own = [text for text in origin.overrides if is_of_device(split_override(text).typed)]
-    parameters = load_parameter_set(set_name(origin.parameter_set, folder))
-    for given in (origin.content["device"].get("overrides", ()), own):
-        parameters = apply_overrides(parameters, given, origin.valve)
-    inside = f"valves.{origin.valve}.{path.removeprefix('valve.')}" if path.startswith("valve.") else path
-    entry = parameters.numbers.get(inside)
-    if entry is None:
-        return None, 0.0
-    return entry, entry_in_si(entry, parameters.declarations()[inside], atmospheric_pressure(parameters))

@@ -41,7 +41,7 @@ def chunk_size(study: Study) -> int:
         return _SLOW_RUNS_OF_CHUNK
     if any(reacts(item.scenario) for item in study.configurations):
         return _REACTING_RUNS_OF_CHUNK
-    bytes_of_run = 8 * len(study.outputs.traces) * maximum_samples(study)
+    bytes_of_run = 8 * len(study.outputs.traces) * max(samples_of(study, item) for item in study.configurations)
     size = MAXIMUM_RUNS_OF_CHUNK
     while size > _FEWEST_RUNS_OF_CHUNK and size * bytes_of_run > _MAXIMUM_BYTES_OF_TRACES:
         size //= 2
@@ -51,11 +51,6 @@ def chunk_size(study: Study) -> int:
 def samples_of(study: Study, configuration: Configuration) -> int:
     """Return how many samples a channel over time has in a configuration."""
     return int(configuration.scenario.run.duration / study.outputs.every + 1.0e-9) + 1
-
-
-def maximum_samples(study: Study) -> int:
-    """Return how many samples a channel over time has, in the longest configuration."""
-    return max(samples_of(study, configuration) for configuration in study.configurations)
 
 
 def chunk_count(study: Study) -> int:
@@ -79,7 +74,10 @@ def drawn_values(study: Study, runs: NDArray[np.int64]) -> dict[str, Floats]:
         point, place = np.divmod(point, len(axis.values))
         columns[axis.path] = np.asarray(axis.values)[place]
     if study.drawn:
-        columns |= _random_values(study, draw)
+        uniform = _uniform_numbers(study, draw)
+        uniform = uniform if study.scores is None else correlate(uniform, study.scores)
+        rows = np.ascontiguousarray(uniform.T)
+        columns |= {item.path: item.distribution.values(row) for item, row in zip(study.drawn, rows, strict=True)}
     return {path: columns[path] for path in study.paths}
 
 
@@ -87,15 +85,6 @@ def varied_columns(study: Study, configuration: Configuration, values: dict[str,
     """Return the values that the runs of a configuration get."""
     own = {path: column for path, column in values.items() if study.varies(path, configuration.name)}
     return with_followers(own, study.same_in(configuration.name))
-
-
-def _random_values(study: Study, draws: NDArray[np.int64]) -> dict[str, Floats]:
-    """Return the values of the distributions."""
-    uniform = _uniform_numbers(study, draws)
-    if study.scores is not None:
-        uniform = correlate(uniform, study.scores)
-    columns = np.ascontiguousarray(uniform.T)
-    return {item.path: item.distribution.values(columns[row]) for row, item in enumerate(study.drawn)}
 
 
 def _uniform_numbers(study: Study, draws: NDArray[np.int64]) -> Floats:

@@ -16,13 +16,13 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from ppafo.control.kind import PythonController
-from ppafo.documents.json_text import json_text, plain
+from ppafo.documents.json_text import plain
 from ppafo.documents.models import quote, validate
 from ppafo.engine.lanes import write_source
 from ppafo.errors import DataError, StudyError
 from ppafo.metrics import METRICS
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.scenario import Scenario, scenario_document
+from ppafo.simulation.scenario import scenario_document
 from ppafo.storage.places import Place, read_document
 from ppafo.studies.study import Study
 from ppafo.study.blocks import chunk_count, chunk_size
@@ -54,30 +54,23 @@ def _object(value: object, inside: Inside) -> dict[str, Any]:
         found = None
     tables = [table for table in (found if isinstance(found, tuple) else (found,)) if isinstance(table, dict)]
     settings = {str(name): item for table in tables for name, item in table.items()}
-    kind = type(value)
-    return {"type": _name(kind), "source": _hash_of(kind.__mro__), "settings": _plain_setting(settings, inside)}
+    return {**_written(type(value), type(value).__mro__), "settings": _plain_setting(settings, inside)}
 
 
-def _name(made: type | FunctionType) -> str:
-    return f"{made.__module__}.{made.__qualname__}"
-
-
-def _hash_of(made: tuple[type | FunctionType, ...]) -> str:
-    """Return a hash of the files in which classes or functions are written; of their code where there is no file."""
+def _written(made: type | FunctionType, parts: tuple[type | FunctionType, ...]) -> dict[str, Any]:
+    """Return the name of a class or function, and a hash of the files of its parts; of their code without a file."""
     digest = hashlib.sha256()
-    for one in made:
+    for one in parts:
         # The standard library is another one with another Python, which is no other controller.
-        if one.__module__ == "__main__" or one.__module__.partition(".")[0] not in sys.stdlib_module_names:
-            digest.update(_text_of(one))
-    return digest.hexdigest()[:_DIGITS]
-
-
-def _text_of(made: type | FunctionType) -> bytes:
-    try:
-        return Path(inspect.getfile(made)).read_bytes()
-    except (TypeError, OSError):  # from a notebook, or typed in
-        functions = [made] if isinstance(made, FunctionType) else vars(made).values()
-        return repr([list(_code(one.__code__)) for one in functions if isinstance(one, FunctionType)]).encode()
+        if one.__module__ != "__main__" and one.__module__.partition(".")[0] in sys.stdlib_module_names:
+            continue
+        try:
+            text = Path(inspect.getfile(one)).read_bytes()
+        except (TypeError, OSError):  # from a notebook, or typed in
+            functions = [one] if isinstance(one, FunctionType) else vars(one).values()
+            text = repr([list(_code(item.__code__)) for item in functions if isinstance(item, FunctionType)]).encode()
+        digest.update(text)
+    return {"type": f"{made.__module__}.{made.__qualname__}", "source": digest.hexdigest()[:_DIGITS]}
 
 
 def _code(code: CodeType) -> Iterator[object]:
@@ -88,41 +81,33 @@ def _code(code: CodeType) -> Iterator[object]:
 
 def _plain_setting(value: object, inside: Inside) -> Any:
     """Return a setting as data that JSON can hold; one that holds itself, or lies too deep, is its type's name."""
-    if value is None or isinstance(value, str | bool | numbers.Number | np.generic):
+    if value is None or isinstance(value, str | bytes | bool | numbers.Number | np.generic):
         return _number_or_text(value)
-    if isinstance(value, bytes):
-        return hashlib.sha256(value).hexdigest()[:_DIGITS]
     if isinstance(value, type | FunctionType):
-        return {"type": _name(value), "source": _hash_of((value,))}
+        return _written(value, (value,))
     if id(value) in inside or len(inside) >= _DEEPEST:
-        return _name(type(value))
+        return f"{type(value).__module__}.{type(value).__qualname__}"
     deeper = (*inside, id(value))
     if isinstance(value, Mapping):
         return {str(key): _plain_setting(item, deeper) for key, item in value.items()}
-    items = _items(value)
-    return _object(value, deeper) if items is None else _shortened([_plain_setting(item, deeper) for item in items])
+    items: Any = np.atleast_1d(value).tolist() if isinstance(value, np.ndarray) else value
+    if isinstance(items, set | frozenset):
+        items = sorted(items, key=repr)
+    if not isinstance(items, tuple | list):
+        return _object(value, deeper)
+    plainly = [_plain_setting(item, deeper) for item in items]
+    digest = hashlib.sha256(json.dumps(plainly).encode()).hexdigest()
+    # Weights of a network, a long table of gains: that they are the same matters, not every one of them.
+    return plainly if len(plainly) <= _LONGEST else {"items": len(plainly), "sha256": digest}
 
 
 def _number_or_text(value: object) -> Any:
+    if isinstance(value, bytes):
+        return hashlib.sha256(value).hexdigest()[:_DIGITS]
     bare = value.item() if isinstance(value, np.generic) else value
-    if bare is None or isinstance(bare, str | bool | int):
-        return bare
-    return bare if isinstance(bare, float) and math.isfinite(bare) else repr(bare)
-
-
-def _items(value: object) -> list[Any] | None:
-    """Return what a collection has in it, None of what is none."""
-    if isinstance(value, np.ndarray):
-        return list(value.tolist()) if value.ndim else [value.item()]
-    if isinstance(value, set | frozenset):
-        return sorted(value, key=repr)
-    return list(value) if isinstance(value, tuple | list) else None
-
-
-def _shortened(items: list[Any]) -> Any:
-    if len(items) <= _LONGEST:
-        return items
-    return {"items": len(items), "sha256": hashlib.sha256(json.dumps(items).encode()).hexdigest()}
+    # JSON has no complex numbers, and no infinite ones.
+    is_plain = bare is None or isinstance(bare, str | int) or (isinstance(bare, float) and math.isfinite(bare))
+    return bare if is_plain else repr(bare)
 
 
 MANIFEST = "study.json"
@@ -135,7 +120,19 @@ _COMPARED = ("ppafo", "study", "scenarios", "varied", "drawn", "programs")
 
 def manifest(study: Study) -> dict[str, Any]:
     """Return the document: study, base scenarios in SI units, runs, columns with units; no time and no machine."""
-    scenarios = {item.name: _without_origin(item.scenario) for item in study.configurations}
+    scenarios, programs = {}, {}
+    for item in study.configurations:
+        document, custom = _plain(scenario_document(item.scenario)), item.scenario.controller.custom
+        # Without the file it came from, which may lie elsewhere the next time.
+        del document["origin"]
+        if custom is not None:
+            document["controller"]["custom"] = controller_document(custom)
+        scenarios[item.name] = document
+        # What it computes: a law or a valve from a module of the user is a name elsewhere. A line of comment says where
+        # a function stands, which may be elsewhere the next time too.
+        lines = write_source(plan_run(item.scenario).program, 1)[1].splitlines()
+        code = "\n".join(line for line in lines if not line.startswith("#"))
+        programs[item.name] = hashlib.sha256(code.encode()).hexdigest()[:_DIGITS]
     # What is drawn may come from a parameter set, or have been changed in Python, and the file says neither.
     parts = {name: getattr(study, name) for name in ("axes", "drawn", "same", "scores", "sample", "outputs")}
     drawn = _plain(plain(parts))
@@ -144,7 +141,7 @@ def manifest(study: Study) -> dict[str, Any]:
         "study": _plain(study.document),
         "scenarios": scenarios,
         "drawn": drawn,
-        "programs": {item.name: _program_hash(item.scenario) for item in study.configurations},
+        "programs": programs,
     }
     return {
         "format": FORMAT,
@@ -213,29 +210,6 @@ def check_same_study(place: Place, stored: Mapping[str, Any], requested: Mapping
             f"{place.address}: contains results of an earlier version of '{now['name']}': {named}; undo the change "
             "or choose another folder"
         )
-
-
-def manifest_bytes(document: Mapping[str, Any]) -> bytes:
-    """Return the content of the file."""
-    return f"{json_text(document)}\n".encode()
-
-
-def _without_origin(scenario: Scenario) -> dict[str, Any]:
-    """Return a base scenario in SI units without the file it came from, which may lie elsewhere the next time."""
-    document: dict[str, Any] = _plain(scenario_document(scenario))
-    del document["origin"]
-    custom = scenario.controller.custom
-    if custom is not None:
-        document["controller"]["custom"] = controller_document(custom)
-    return document
-
-
-def _program_hash(scenario: Scenario) -> str:
-    """Return a hash of what a scenario computes: a law or a valve from a module of the user is a name elsewhere."""
-    lines = write_source(plan_run(scenario).program, 1)[1].splitlines()
-    # A line of comment says where a function stands, which may be elsewhere the next time.
-    code = "\n".join(line for line in lines if not line.startswith("#"))
-    return hashlib.sha256(code.encode()).hexdigest()[:_DIGITS]
 
 
 def _plain(document: Any) -> Any:

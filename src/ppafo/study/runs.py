@@ -19,6 +19,8 @@ from ppafo.studies.draws import check_metrics
 
 Rows = dict[str, NDArray[Any]]
 """Columns of one length: metrics by name [SI], nan where a run has none, and whether each run ``failed``."""
+_Made = Callable[[Mapping[str, Floats]], tuple[Rows, str]]
+"""Columns in; rows out, and why the first of them failed."""
 FAILED = "failed"
 OSCILLATES = ("rms_error_hold", "oscillations_hold")
 """What says whether a metric at one instant can be believed."""
@@ -28,23 +30,24 @@ _AT_ONCE, _SLOW_AT_ONCE, _REACTING_AT_ONCE = 16_384, 32, 64
 
 @final
 class Tally:
-    """Counts runs for whoever watches: ``runs`` is how many there will be, doubled where there are more after all."""
+    """Counts runs for whoever watches, on from those ``done`` earlier; ``runs`` is doubled where there are more."""
 
-    def __init__(self, runs: int, progress: Report | None) -> None:
+    def __init__(self, runs: int, progress: Report | None, done: int = 0, failed: int = 0) -> None:
         self._runs, self._report, self._started = max(1, runs), progress, 0.0
-        self.done = self.failed = self._first = 0
+        self.done, self.failed, self._earlier = done, failed, 0
 
     def add(self, runs: int, failed: int) -> None:
         """Count runs that are done; the rate leaves out the first ones, before which models may be compiled."""
-        if self.done == 0:
-            self._first, self._started = runs, time.monotonic()
         self.done += runs
         self.failed += failed
+        if not self._earlier:
+            self._earlier, self._started = self.done, time.monotonic()
+        # A search does not know how many runs it will take: a total that follows would always say 'nearly done'.
         while self._runs < self.done:
             self._runs *= 2
         if self._report is not None:
             elapsed = time.monotonic() - self._started
-            self._report(Progress("", self.done, self._runs, self.failed, self._first, elapsed))
+            self._report(Progress("", self.done, self._runs, self.failed, self._earlier, elapsed))
 
 
 @final
@@ -58,7 +61,7 @@ class Runs:
         self,
         scenario: Scenario,
         metrics: Sequence[str],
-        tally: "Tally",
+        tally: Tally,
         gauge: Collection[str] = (),
         threads: int | None = None,
     ) -> None:
@@ -67,27 +70,33 @@ class Runs:
         Columns of the paths in ``gauge`` count from the atmosphere of their run.
         """
         check_metrics(metrics, scenario)
+
+        def rows(columns: Mapping[str, Floats]) -> tuple[Rows, str]:
+            with refused_as(StudyError, f"scenario '{scenario.name}'", ScenarioError):
+                result = run_ensemble(scenario, columns, metrics, threads=threads, gauge=gauge)
+            none = np.full(result.status.size, np.nan)
+            values: Rows = {name: result.metrics.get(name, none) for name in metrics}
+            reason = result.reasons[min(result.reasons)] if result.reasons else ""
+            return {**values, FAILED: result.status != 0}, reason
+
         at_once = _REACTING_AT_ONCE if reacts(scenario) else _AT_ONCE
-        self._at_once = at_once if scenario.controller.custom is None else _SLOW_AT_ONCE
-        self._tally = tally
-        self._begin(metrics, lambda columns: _ensemble(scenario, columns, metrics, threads, gauge))
+        self._begin(metrics, rows, tally, at_once if scenario.controller.custom is None else _SLOW_AT_ONCE)
 
     @classmethod
     def of_model(cls, model: Callable[[Mapping[str, Floats]], Mapping[str, Any]], metrics: Sequence[str]) -> "Runs":
         """Return runs of a function of the columns in place of a scenario; a run without a finite metric failed."""
         runs = cls.__new__(cls)
-        runs._at_once, runs._tally = _AT_ONCE, Tally(1, None)
 
         def rows(columns: Mapping[str, Floats]) -> tuple[Rows, str]:
             found = {name: np.asarray(values) for name, values in model(columns).items()}
             failed = found.get(FAILED, ~np.any([np.isfinite(found[name]) for name in metrics], axis=0))
             return {**found, FAILED: failed}, "diverged" if failed.any() else ""
 
-        runs._begin(metrics, rows)
+        runs._begin(metrics, rows, Tally(1, None), _AT_ONCE)
         return runs
 
-    def _begin(self, metrics: Sequence[str], rows: Callable[[Mapping[str, Floats]], tuple[Rows, str]]) -> None:
-        self.metrics, self._rows = tuple(metrics), rows
+    def _begin(self, metrics: Sequence[str], rows: _Made, tally: Tally, at_once: int) -> None:
+        self.metrics, self._rows, self._tally, self._at_once = tuple(metrics), rows, tally, at_once
         self._parts: list[Rows] = []
         self.count, self.failures, self.reason = 0, 0, ""
 
@@ -111,28 +120,26 @@ class Runs:
         """All rows so far, with the columns that made them."""
         return joined(self._parts) if self._parts else {}
 
-    def check(self, rows: Rows, maximum_failed: float, what: str) -> None:
-        """Refuse to continue where more than a fraction of some rows failed; ``what`` names them in the message."""
+    def check(self, rows: Rows, maximum_failed: float, what: str, metrics: Sequence[str] = ()) -> None:
+        """Refuse to continue where more than a fraction of some rows failed, or lacks one of some metrics.
+
+        The rest would be the survivors, whose statistics are other ones. ``what`` names the rows in the message.
+        """
         failures, runs = failures_of(rows), rows[FAILED].size
         if failures > maximum_failed * runs:
             raise StudyError(
                 f"{what}: {failures:,} of {runs:,} runs failed ({100.0 * failures / runs:.3g} %), more than the "
                 f"{100.0 * maximum_failed:.3g} % allowed; the first: {self.reason}"
             )
+        for name in metrics:
+            missing = int(np.count_nonzero(~np.isfinite(rows[name])))
+            if missing > maximum_failed * runs:
+                raise StudyError(f"{what}: {missing:,} of {runs:,} runs have no '{name}'; choose another metric")
 
 
-def _ensemble(
-    scenario: Scenario,
-    columns: Mapping[str, Floats],
-    metrics: Sequence[str],
-    threads: int | None,
-    gauge: Collection[str],
-) -> tuple[Rows, str]:
-    with refused_as(StudyError, f"scenario '{scenario.name}'", ScenarioError):
-        result = run_ensemble(scenario, columns, metrics, threads=threads, gauge=gauge)
-    runs = result.status.size
-    values: Rows = {name: result.metrics.get(name, np.full(runs, np.nan)) for name in metrics}
-    return {**values, FAILED: result.status != 0}, result.reasons[min(result.reasons)] if result.reasons else ""
+def unvaried(scenario: Scenario, runs: int) -> dict[str, Floats]:
+    """Return columns that leave a scenario as it is: an ensemble needs one column at least."""
+    return {"supply.pressure": np.full(runs, scenario.device.supply.pressure)}
 
 
 def joined(parts: Sequence[Rows]) -> Rows:

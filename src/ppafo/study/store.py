@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ppafo.documents.json_text import json_text
 from ppafo.errors import DataError, ScenarioError, StudyError, refused_as
@@ -30,8 +29,9 @@ from ppafo.storage.parquet import (
 from ppafo.storage.places import Place, place_at, read_document
 from ppafo.studies.distributions import Floats
 from ppafo.studies.study import Study
-from ppafo.study.blocks import Chunk, chunk, chunk_count, drawn_values, maximum_samples, samples_of, varied_columns
-from ppafo.study.manifest import MANIFEST, STUDY_COPY, check_same_study, manifest, manifest_bytes, read_manifest
+from ppafo.study.blocks import Chunk, chunk, chunk_count, drawn_values, samples_of, varied_columns
+from ppafo.study.manifest import MANIFEST, STUDY_COPY, check_same_study, manifest, read_manifest
+from ppafo.study.runs import unvaried
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -84,8 +84,12 @@ class Store:
             )
         else:
             check_room(study, place, agreed)
-            _try(study, threads)
-            place.write(MANIFEST, manifest_bytes(manifest(study)))
+            # A few runs of each configuration, spread evenly: a path that cannot vary is refused at once.
+            total = study.runs_of_configuration
+            runs = np.unique(np.linspace(0, total - 1, min(total, _TRIED_RUNS)).astype(np.int64))
+            for number in range(len(study.configurations)):
+                _result(study, Chunk(0, number, 0, runs.size), drawn_values(study, runs), threads)
+            place.write(MANIFEST, f"{json_text(manifest(study))}\n".encode())
         place.tidy()
         # After study.json, by which the folder is known to be ours.
         if study.text and STUDY_COPY not in names:
@@ -94,28 +98,31 @@ class Store:
 
     def finished(self) -> list[Finished]:
         """Return the chunks whose files are as they were written."""
-        there = self.place.names()
-        known = (self._known(number) for number in range(chunk_count(self.study)) if note_file(number) in there)
-        return [item for item in known if item is not None]
+        there, found = self.place.names(), []
+        for number in range(chunk_count(self.study)):
+            name = chunk_file(number)
+            if note_file(number) not in there:
+                continue
+            try:
+                note = read_document(self.place, note_file(number))
+                finished = Finished(number, int(note["runs"]), int(note["failed"]))
+                with self.place.open(name) as file:
+                    is_whole = hashlib.file_digest(file, "sha256").hexdigest() == note["sha256"][name]
+            except (OSError, ValueError, KeyError, TypeError, OverflowError):
+                continue
+            # A whole file of another size is of a study that was cut into other chunks.
+            if is_whole and finished.runs == chunk(self.study, number).runs:
+                found.append(finished)
+        return found
 
-    def write(self, finished: Finished, content: bytes) -> None:
-        """Write the file of a chunk, and last the note by which it counts as finished."""
+    def write(self, finished: Finished, content: bytes) -> Finished:
+        """Write the file of a chunk, and last the note by which it counts as finished; return that."""
         name = chunk_file(finished.number)
         self.place.write(name, content)
         checksums = {name: hashlib.sha256(content).hexdigest()}
         note = {"runs": finished.runs, "failed": finished.failed, "sha256": checksums}
         self.place.write(note_file(finished.number), f"{json_text(note)}\n".encode())
-
-    def _known(self, number: int) -> Finished | None:
-        try:
-            note = read_document(self.place, note_file(number))
-            finished = Finished(number, int(note["runs"]), int(note["failed"]))
-            name = chunk_file(number)
-            with self.place.open(name) as file:
-                is_whole = hashlib.file_digest(file, "sha256").hexdigest() == note["sha256"][name]
-        except (OSError, ValueError, KeyError, TypeError, OverflowError):
-            return None
-        return finished if is_whole and finished.runs == chunk(self.study, number).runs else None
+        return finished
 
 
 def stored_rows(place: Place, numbers: Sequence[int], columns: Sequence[str] | None = None) -> "Iterator[pa.Table]":
@@ -141,8 +148,10 @@ def compute_chunk(task: Task, number: int) -> tuple[Finished, bytes]:
     name = configuration.name
     own = absolute(configuration.scenario, varied_columns(study, configuration, dict(values)), study.gauge)
     names = [item.name for item in study.configurations]
+    first = part.configuration * study.runs_of_configuration + part.first
+    numbers = np.arange(first, first + part.runs, dtype=np.int64)
     columns = {
-        "run": TableColumn(_numbers(study, part), _PLAIN, "number of the run in the study"),
+        "run": TableColumn(numbers, _PLAIN, "number of the run in the study"),
         "configuration": TableColumn(
             encode_texts(np.full(part.runs, part.configuration), names), _PLAIN, "name of the base scenario"
         ),
@@ -173,9 +182,7 @@ def compute_chunk(task: Task, number: int) -> tuple[Finished, bytes]:
 
 def work_on_chunk(task: Task, number: int) -> Finished:
     """Compute and write a chunk: what a worker of a cluster does."""
-    finished, content = compute_chunk(task, number)
-    Store(task.study, place_at(task.address)).write(finished, content)
-    return finished
+    return Store(task.study, place_at(task.address)).write(*compute_chunk(task, number))
 
 
 def trace_column(channel: str) -> str:
@@ -193,28 +200,9 @@ def note_file(number: int) -> str:
     return f"finished/chunk-{number:07d}.json"
 
 
-def completed_rows(table: "pa.Table") -> NDArray[np.bool_]:
-    """Return which rows of a table of runs completed."""
-    import pyarrow.compute as pc
-
-    equal = pc.equal(table.column("status").cast("string"), STATUSES[0])
-    return np.asarray(equal.to_numpy(), dtype=np.bool_)
-
-
-def _try(study: Study, threads: int | None) -> None:
-    """Run a few runs of each configuration, spread evenly, so that a path that cannot vary is refused at once."""
-    total = study.runs_of_configuration
-    runs = np.unique(np.linspace(0, total - 1, min(total, _TRIED_RUNS)).astype(np.int64))
-    values = drawn_values(study, runs)
-    for number in range(len(study.configurations)):
-        _result(study, Chunk(0, number, 0, runs.size), values, threads)
-
-
 def _result(study: Study, part: Chunk, values: dict[str, Floats], threads: int | None) -> EnsembleResult:
     configuration, outputs = study.configurations[part.configuration], study.outputs
-    columns = varied_columns(study, configuration, values) or {
-        "supply.pressure": np.full(part.runs, configuration.scenario.device.supply.pressure)
-    }
+    columns = varied_columns(study, configuration, values) or unvaried(configuration.scenario, part.runs)
     every = outputs.every if outputs.traces else 0.0
     with refused_as(StudyError, f"configuration '{configuration.name}'", ScenarioError):
         return run_ensemble(
@@ -237,14 +225,9 @@ def stored_unit(unit: str) -> str:
     return "Pa_a" if unit == "Pa" else unit
 
 
-def _numbers(study: Study, chunk: Chunk) -> "np.ndarray[tuple[int], np.dtype[np.int64]]":
-    first = chunk.configuration * study.runs_of_configuration + chunk.first
-    return np.arange(first, first + chunk.runs, dtype=np.int64)
-
-
 def estimate_bytes(study: Study) -> int:
     """Return an upper estimate of the bytes on disk: as if nothing could be compressed."""
-    outputs, samples = study.outputs, maximum_samples(study)
+    outputs, samples = study.outputs, max(samples_of(study, item) for item in study.configurations)
     numbers = 2 + len(study.paths) + len(outputs.metrics) * (2 if outputs.errors else 1)
     traces = sum(_BYTES_OF_NUMBER if name in outputs.bands else _BYTES_OF_SAMPLE for name in outputs.traces)
     row = _FIXED_BYTES_OF_ROW + _BYTES_OF_NUMBER * numbers + samples * traces

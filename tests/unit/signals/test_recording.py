@@ -8,7 +8,6 @@ import pytest
 
 from ppafo.errors import DataError
 from ppafo.signals import Channel, Recording
-from ppafo.signals.recording import align
 
 
 def recording(label: str = "bench", start: float = 0.0) -> Recording:
@@ -137,17 +136,6 @@ def test_between_samples_a_command_is_held_and_everything_else_runs_straight() -
 def test_nothing_is_made_up_outside_a_recording() -> None:
     with pytest.raises(DataError, match="nothing is known"):
         recording().resample([3.0, 4.5])
-
-
-def test_two_recordings_are_brought_to_the_times_they_share() -> None:
-    first, second = align(recording(), recording("other", start=1.5))
-    assert first.time.tolist() == second.time.tolist() == [2.0, 3.0, 4.0]
-    assert second["angle"].tolist() == [0.5, 1.5, 2.5]
-
-
-def test_recordings_without_a_common_time_are_refused() -> None:
-    with pytest.raises(DataError, match="no time in common"):
-        align(recording(), recording("other", start=10.0))
 
 
 def test_copies_are_equal_and_stay_read_only() -> None:

@@ -10,8 +10,10 @@ from ppafo.errors import StudyError
 from ppafo.simulation.loading import load_scenario
 from ppafo.studies.distributions import effective_sample_size, fraction_interval, quantile_interval, replicates_interval
 from ppafo.studies.draws import (
+    Limit,
     check_metrics,
     choose_configuration,
+    drawn_in,
     study_of,
     uncertainty_in,
     uncertainty_of,
@@ -147,3 +149,18 @@ def test_a_quantile_that_few_draws_cannot_bound_has_an_open_end() -> None:
     interval = quantile_interval(np.arange(20.0), 0.99, 0.95)
     assert interval.high == math.inf
     assert interval.width == math.inf
+
+
+def test_a_limit_is_kept_at_itself_and_never_without_a_value() -> None:
+    most, least = Limit("rms_error", 0.5, True, "0.5 N m"), Limit("rms_error", 0.5, False, "0.5 N m")
+    values = np.array([0.4, 0.5, 0.6, np.nan])
+    assert most.is_kept(values).tolist() == [True, True, False, False]
+    assert least.is_kept(values).tolist() == [False, True, True, False]
+    assert (most.words, least.words) == ("at most 0.5 N m", "at least 0.5 N m")
+
+
+def test_what_is_drawn_in_a_configuration_has_the_noise_and_can_leave_correlations_out() -> None:
+    study, base, uncertainty = drawn_in("torque-task-uncertainty", (), "proportional")
+    assert (study.name, base.name) == ("torque-task-uncertainty", "proportional")
+    assert uncertainty.scores is not None
+    assert drawn_in(study, (), "proportional", independent=True)[2].scores is None

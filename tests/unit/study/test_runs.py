@@ -40,6 +40,22 @@ def test_a_run_that_is_refused_is_a_failure_with_its_reason() -> None:
     runs.check(rows, 0.34, "trial")
 
 
+def test_rows_that_lack_a_metric_are_refused_as_those_that_failed() -> None:
+    runs = Runs.of_model(lambda columns: {"y": columns["x"], FAILED: np.zeros(4, dtype=np.bool_)}, ["y"])
+    rows = runs.run({"x": np.array([1.0, np.nan, 3.0, 4.0])})
+    with pytest.raises(StudyError, match="trial: 1 of 4 runs have no 'y'; choose another metric"):
+        runs.check(rows, 0.2, "trial", ["y"])
+    runs.check(rows, 0.25, "trial", ["y"])
+
+
+def test_a_study_that_resumes_counts_on_from_what_is_there() -> None:
+    seen: list[Progress] = []
+    tally = Tally(100, seen.append, 40, 2)
+    tally.add(30, 1)
+    tally.add(30, 0)
+    assert [(item.done, item.failed, item.earlier) for item in seen] == [(70, 3, 70), (100, 3, 70)]
+
+
 def test_the_table_has_all_rows_with_the_values_that_made_them() -> None:
     def model(columns: Mapping[str, Floats]) -> dict[str, Floats]:
         return {"y": np.sqrt(columns["x"])}

@@ -16,7 +16,7 @@ from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import BLACK, COLOURS, GREY
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Status
-from ppafo.studies.distributions import FEWEST_EFFECTIVE, Floats, fraction_text
+from ppafo.studies.distributions import Floats, fraction_text, is_carried
 from ppafo.study.runs import Rows
 
 if TYPE_CHECKING:
@@ -42,10 +42,10 @@ class Case:
     rows: Rows | None = field(compare=False, repr=False)
     renoised: Rows | None = field(compare=False, repr=False)
 
-    def value(self, metric: str) -> float | None:
-        """Return a metric [SI] of the nominal run, None where it has none."""
+    def value(self, metric: str) -> float:
+        """Return a metric [SI] of the nominal run, nan where it has none."""
         found = self.metrics.get(metric)
-        return None if found is None else found.value
+        return math.nan if found is None else found.value
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,11 +88,6 @@ class Compared:
     metrics: tuple[str, ...] = field(compare=False)
 
     @property
-    def others(self) -> list[str]:
-        """All configurations but the baseline."""
-        return [name for name in self.configurations if name != self.baseline]
-
-    @property
     def has_noise(self) -> bool:
         """True where a controller receives noise."""
         return any(case.renoised is not None for task in self.tasks for case in task.cases)
@@ -118,6 +113,16 @@ def finding_of(found: Compared) -> Finding[Compared]:
     names = found.configurations
     has_errors = _ERROR in found.metrics
     said = [_READING] if found.draws else []
+    counts = ((len(found.tasks), "task"), (len(found.varied), "uncertain value"))
+    tasks, values = (f"{count} {noun}{'' if count == 1 else 's'}" for count, noun in counts)
+    lead = f"{len(names)} configurations on {tasks}, baseline {found.baseline}; "
+    if not found.draws:
+        lead += "the nominal device, without uncertainty"
+    elif not found.varied:
+        lead += f"the nominal device, over {found.draws:,} draws of the sensor noise"
+    else:
+        lead += f"{found.draws:,} draws of {values}{' and of the sensor noise' if found.has_noise else ''}, the same "
+        lead += f"for all; each interval with {100.0 * found.confidence:g} % confidence"
     pareto, change = (
         Part(
             "Error against gas",
@@ -140,7 +145,7 @@ def finding_of(found: Compared) -> Finding[Compared]:
         name="compare",
         kicker="Comparison",
         title=" and ".join(names) if len(names) == 2 else f"{len(names)} configurations against {found.baseline}",
-        said=(_lead(found),),
+        said=(lead,),
         parts=(
             *(part for task in found.tasks for part in _parts(found, task)),
             *([pareto] if has_errors else []),
@@ -154,24 +159,10 @@ def finding_of(found: Compared) -> Finding[Compared]:
     )
 
 
-def _lead(found: Compared) -> str:
-    tasks = f"{len(found.tasks)} task{'' if len(found.tasks) == 1 else 's'}"
-    words = f"{len(found.configurations)} configurations on {tasks}, baseline {found.baseline}"
-    if not found.draws:
-        return f"{words}; the nominal device, without uncertainty"
-    if not found.varied:
-        return f"{words}; the nominal device, over {found.draws:,} draws of the sensor noise"
-    values = f"{len(found.varied)} uncertain value{'' if len(found.varied) == 1 else 's'}"
-    noise = " and of the sensor noise" if found.has_noise else ""
-    return (
-        f"{words}; {found.draws:,} draws of {values}{noise}, the same for all; "
-        f"each interval with {100.0 * found.confidence:g} % confidence"
-    )
-
-
 def _parts(found: Compared, task: OnTask) -> list[Part]:
     """Return the metrics of all configurations, each other one against the baseline, and which is the best."""
     where = "" if len(found.tasks) == 1 else f", {task.task}"
+    kinds = [(name, of_metric(name)) for name in found.metrics]
     best = {
         metric: ", ".join(f"{name} {_PROBABILITY.interval(each)}" for name, each in task.best[metric].items())
         for metric in (_ERROR, _GAS)
@@ -182,7 +173,7 @@ def _parts(found: Compared, task: OnTask) -> list[Part]:
             f"Task: {task.task}",
             [
                 Column("configuration", [case.configuration for case in task.cases]),
-                *(_metric(name, [case.value(name) for case in task.cases]) for name in found.metrics),
+                *(Column(kind.words, [case.value(name) for case in task.cases], kind) for name, kind in kinds),
                 Column("status", [case.status.kind for case in task.cases]),
             ],
         ),
@@ -198,16 +189,14 @@ def _parts(found: Compared, task: OnTask) -> list[Part]:
 _PROBABILITY = Kind(form=".4g")
 
 
-def _metric(name: str, values: Sequence[float | None]) -> Column:
-    kind = of_metric(name)
-    return Column(kind.words, values, kind)
-
-
 def _paired(found: Compared, task: OnTask, name: str) -> list[Column]:
     """Return a row for each metric: change without and with uncertainty, mean difference, probability of a gain."""
     pairs = task.pairs[name]
     kinds = [of_metric(item.metric, "+.3g") for item in pairs]
-    nominal = [_nominal(task, item.metric, found.baseline, name) for item in pairs]
+    nominal = []
+    for item in pairs:
+        first, other = (task.case(each).value(item.metric) for each in (found.baseline, name))
+        nominal.append(_percent((other - first) / abs(first)) if first else "")
     spread = [
         f"{_percent(item.change)} ({_percent(item.change_low)} to {_percent(item.change_high)})"
         if math.isfinite(item.change)
@@ -231,60 +220,45 @@ def _paired(found: Compared, task: OnTask, name: str) -> list[Column]:
     return [*columns, Column("spread due to noise", noise)] if found.has_noise else columns
 
 
-def _nominal(task: OnTask, metric: str, baseline: str, name: str) -> str:
-    first, other = (task.case(each).value(metric) for each in (baseline, name))
-    return _percent((other - first) / abs(first)) if first and other is not None else ""
-
-
 def _percent(fraction: float) -> str:
     return "" if math.isnan(fraction) else f"{100.0 * fraction:+.3g} %"
 
 
-def remarks_of(found: Compared, tasks: Sequence[OnTask]) -> list[str]:
+def remarks_of(found: Compared) -> list[str]:
     """Return what is not as one would expect: other tasks, runs that failed, means that few draws decide, noise."""
-    return [
-        *(text for task in tasks for text in _other_tasks(found.baseline, task)),
-        *(text for task in tasks for case in task.cases for text in _failures(case, task.task, found.draws)),
-        *(
+    said, failed, carried = [], [], []
+    for task in found.tasks:
+        asked = {case.configuration: (case.scenario.reference, case.scenario.run.duration) for case in task.cases}
+        # Compared by what they follow and not by file: two configurations may name one task differently.
+        others = [name for name, what in asked.items() if what != asked[found.baseline]]
+        if others:
+            said.append(
+                f"task '{task.task}': {', '.join(others)} follow a different reference, or run for a different time, "
+                f"than {found.baseline}: the differences come partly from the task"
+            )
+        for case in task.cases:
+            where = f"{case.configuration}, {task.task}"
+            failed += [] if case.status.is_completed else [f"{where}: {case.status.message}"]
+            if case.failed_draws:
+                failed.append(
+                    f"{where}: {case.failed_draws:,} of {found.draws:,} draws failed and are left out of every pair; "
+                    f"the first: {case.reason}"
+                )
+        carried += [
             f"{name}, task '{task.task}': the mean difference of {item.metric} has an effective sample size of "
             f"{item.effective_size:.3g} of {item.pairs:,} draws: do not trust its interval; the probability of being "
             "better is not affected"
-            for task in tasks
             for name, pairs in task.pairs.items()
             for item in pairs
-            if item.effective_size < min(FEWEST_EFFECTIVE, 0.5 * item.pairs)
-        ),
-        *([_NOISE] if found.has_noise else []),
-    ]
-
-
-def _failures(case: Case, task: str, draws: int) -> list[str]:
-    said = [] if case.status.is_completed else [f"{case.configuration}, {task}: {case.status.message}"]
-    if case.failed_draws:
-        said.append(
-            f"{case.configuration}, {task}: {case.failed_draws:,} of {draws:,} draws failed and are left out of every "
-            f"pair; the first: {case.reason}"
-        )
-    return said
-
-
-def _other_tasks(baseline: str, task: OnTask) -> list[str]:
-    asked = {case.configuration: (case.scenario.reference, case.scenario.run.duration) for case in task.cases}
-    others = [name for name, what in asked.items() if what != asked[baseline]]
-    return [
-        f"task '{task.task}': {', '.join(others)} follow a different reference, or run for a different time, than "
-        f"{baseline}: the differences come partly from the task"
-    ] * bool(others)
+            if not is_carried(item.effective_size, item.pairs)
+        ]
+    return [*said, *failed, *carried, *([_NOISE] if found.has_noise else [])]
 
 
 def front_of(cases: Sequence[Case]) -> list[str]:
     """Return the configurations that no other beats in both error and gas."""
-    points = np.array([[_or_nan(case.value(name)) for name in (_ERROR, _GAS)] for case in cases])
+    points = np.array([[case.value(name) for name in (_ERROR, _GAS)] for case in cases])
     return [case.configuration for case, is_front in zip(cases, pareto_front(points), strict=True) if is_front]
-
-
-def _or_nan(value: float | None) -> float:
-    return math.nan if value is None else value
 
 
 _MARKS = "osD^vP"
@@ -305,9 +279,10 @@ def _pareto(found: Compared, task: OnTask) -> Panel:
             gas, error = (case.rows[name][:_MAXIMUM_DOTS] for name in (_GAS, _ERROR))
             marks.append(Mark("line", gas, error, colour=colour, style=dots))
         marker = {"linestyle": "", "marker": _MARKS[number % len(_MARKS)], "markersize": 8, "markeredgecolor": "white"}
-        x, y = (_or_nan(case.value(name)) for name in (_GAS, _ERROR))
+        x, y = (case.value(name) for name in (_GAS, _ERROR))
         marks.append(Mark("line", [x], [y], label=case.configuration, colour=colour, style=marker))
         on_front += [(x, y)] if case.configuration in front else []
+    # From left to right, so that the front is a line and no zigzag.
     x_front, y_front = np.array(sorted(on_front)).reshape(-1, 2).T
     marks.append(Mark("line", x_front, y_front, colour=GREY, style={"linewidth": 1.0, "zorder": 1}))
     title = f"Task: {task.task}" if len(found.tasks) > 1 else ""
@@ -325,31 +300,31 @@ def _change(found: Compared, task: OnTask, metric: str) -> Panel:
         if change.size == 0:
             continue
         low, high = np.percentile(change, _SHOWN)
+        # Fewer bins for fewer draws, so that each has some of them.
         counts, edges = np.histogram(change, min(_BINS, max(8, round(1.5 * change.size**0.5))), (low, high))
         marks.append(Mark("bars", edges, counts, label=name, colour=colour))
-        nominal = _relative(*(np.array([_or_nan(case.value(metric))]) for case in (baseline, own)))
+        nominal = _relative(*(np.array([case.value(metric)]) for case in (baseline, own)))
         dashed = {"linestyle": "--", "linewidth": 1.2}
         marks += [Mark("at", value, label="as declared", colour=colour, style=dashed) for value in nominal]
         ends += [float(low), float(high), *nominal.tolist()]
     words = f"{of_metric(metric).words}, change from {found.baseline}"
     is_first = metric == _ERROR
     title = f"Task: {task.task}" if len(found.tasks) > 1 and is_first else ""
+
+    def reach(axes: "Axes") -> None:
+        # Zero is shown where it is near: far from all changes it would squeeze them into a few pixels.
+        low, high = min(ends, default=0.0), max(ends, default=0.0)
+        span = high - low or 1.0
+        if low - 0.5 * span <= 0.0 <= high + 0.5 * span:
+            axes.axvline(0.0, color=BLACK, linewidth=0.8)
+            low, high = min(low, 0.0), max(high, 0.0)
+        axes.set_xlim(low - 0.08 * span, high + 0.08 * span)
+
     axis, draws = Kind(words, "%"), Kind("Draws" if is_first else "")
-    return Panel(axis, draws, marks, title, legend="" if is_first else "above", then=lambda axes: _reach(axes, ends))
-
-
-def _reach(axes: "Axes", ends: Sequence[float]) -> None:
-    """Show the changes, and zero where it is near: far from all changes it would squeeze them into a few pixels."""
-    if not ends:
-        return
-    low, high = min(ends), max(ends)
-    span = high - low or 1.0
-    if low - 0.5 * span <= 0.0 <= high + 0.5 * span:
-        axes.axvline(0.0, color=BLACK, linewidth=0.8)
-        low, high = min(low, 0.0), max(high, 0.0)
-    axes.set_xlim(low - 0.08 * span, high + 0.08 * span)
+    return Panel(axis, draws, marks, title, legend="" if is_first else "above", then=reach if ends else None)
 
 
 def _relative(baseline: Floats, other: Floats) -> Floats:
+    # In pairs: a draw that failed on one side says nothing about a change.
     both = np.isfinite(baseline) & np.isfinite(other) & (baseline != 0.0)
     return np.asarray(100.0 * (other[both] - baseline[both]) / np.abs(baseline[both]))

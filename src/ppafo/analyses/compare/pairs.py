@@ -1,12 +1,15 @@
 """Two configurations in the same draws: differences, probabilities, and what no other dominates."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.metrics import METRICS
 from ppafo.report.kind import Interval
+from ppafo.simulation.ensemble.running import lacking
+from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import (
     Floats,
     effective_sample_size,
@@ -38,6 +41,11 @@ COMPARED: dict[str, int] = {
     "muscle_work": -1,
 }
 """Metrics of the table: -1 where less is better, 1 where more is, 0 where neither is better as such."""
+
+
+def compared_metrics(scenarios: Collection[Scenario]) -> tuple[str, ...]:
+    """Return the metrics of the table that all scenarios can have: without a reference there is no error."""
+    return tuple(name for name in COMPARED if not any(lacking(scenario, METRICS[name]) for scenario in scenarios))
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +101,7 @@ def compare_pairs(
     first, second = baseline[both], other[both]
     if first.size == 0:
         return None
+    # Relative to the size of the baseline, so that the sign is the difference's; a baseline of 0 has no fractions.
     change = (second - first)[first != 0.0] / np.abs(first[first != 0.0])
     low, middle, high = (
         np.quantile(change, (OUTER_QUANTILES[0], 0.5, OUTER_QUANTILES[1])) if change.size else (np.nan,) * 3
@@ -100,8 +109,8 @@ def compare_pairs(
     difference = other - baseline
     noise = None
     if other_noise is not None:
-        again = other_noise[1] - other_noise[0]
-        noise = noise_interval(difference[: again.size], again, confidence)
+        noise = noise_interval(difference, other_noise[1] - other_noise[0], confidence)
+    # A tie is no win on either side: of equal configurations neither is better in any draw.
     wins = np.where(both, better * (other - baseline) > 0.0, np.nan)
     return Paired(
         metric=metric,
@@ -123,5 +132,6 @@ def best_probabilities(values: Sequence[Floats], better: int, confidence: float)
     known = np.all(np.isfinite(table), axis=0)
     if not known.any():
         return []
+    # Draws in which one has no value say nothing about which is the best.
     is_best = np.where(known, table == np.max(table, axis=0), np.nan)
     return [share_interval(row, REPLICATES, confidence) for row in is_best]

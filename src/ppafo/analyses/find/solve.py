@@ -17,7 +17,7 @@ from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import BLACK, GREEN, VERMILION
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import Floats
-from ppafo.studies.draws import Uncertainty, atmosphere_of, check_metrics, level_of
+from ppafo.studies.draws import Limit, Uncertainty, atmosphere_of, check_metrics, level_of
 from ppafo.studies.sampling import NOISE, with_noise
 from ppafo.studies.study import with_overrides
 from ppafo.studies.varying import VariedPath, varied_path
@@ -34,20 +34,6 @@ ACCURACY = 1.0e-6
 _SEED = 1
 _RANGE = re.compile(r"\s*([^=\s]+)\s*=\s*(.+?)\s*\.\.\s*(.+?)\s*")
 _CONDITION = re.compile(r"\s*(\w+)\s*(<=|>=)\s*(.+?)\s*")
-
-
-@dataclass(frozen=True, slots=True)
-class Condition:
-    """A metric that must be at most (or else at least) a limit [SI]; ``text`` is how it was written."""
-
-    metric: str
-    is_upper_limit: bool
-    limit: float
-    text: str
-
-    def is_met(self, values: Floats) -> NDArray[np.bool_]:
-        """Return where values of the metric [SI] meet it; a run without a value does not."""
-        return values <= self.limit if self.is_upper_limit else values >= self.limit
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,10 +88,7 @@ def find(
     """Return the lowest value (or the ``highest``) [SI] of a number of a scenario that meets a condition on a metric.
 
     ``vary`` is the number with its range, ``"supply.pressure=20..90 psi_g"``; ``such_that`` the condition,
-    ``"final_error <= 0.3 N m"``. A grid of values over the range is run side by side; between the last one that does
-    not meet the condition and the first one that does, the bracket is divided again and again down to 1e-6 of the
-    range. What happens between two values of the grid on one side of the condition is not seen. StudyError or
-    ScenarioError for bad input, and where every run fails.
+    ``"final_error <= 0.3 N m"``. How it is searched, and what that does not see, ``ppafo.find`` describes.
     """
     base = with_overrides(scenario_or_load(scenario), overrides)
     path, low, high = _range(vary, base)
@@ -116,14 +99,11 @@ def find(
             "for example 'final_error <= 0.3 N m'"
         )
     check_metrics([parts[1]], base)
-    condition = Condition(
-        parts[1],
-        parts[2] == "<=",
-        level_of(parts[3], parts[1], f"'{one_line(such_that)}'", atmosphere_of(base, [path.path])),
-        f"{parts[1]} {parts[2]} {parts[3]}",
-    )
+    limit = level_of(parts[3], parts[1], f"'{one_line(such_that)}'", atmosphere_of(base, [path.path]))
+    condition = Limit(parts[1], limit, parts[2] == "<=", f"{parts[1]} {parts[2]} {parts[3]}")
     if not FEWEST <= grid <= MOST:
         raise StudyError(f"grid = {grid}: must be at least {FEWEST} and at most {MOST:,}")
+    # The same streams for all values, so that neighbours differ by the value alone.
     noise = Uncertainty(with_noise((), None, [base], [path.path])[0])
     seeds = noise.random_columns(0, STREAMS, _SEED)[NOISE] if noise.has_noise else np.zeros(0)
     tally = Tally(grid * max(1, seeds.size), progress)
@@ -137,6 +117,7 @@ def find(
             f"scenario '{base.name}': no run from {path.quote(low)} to {path.quote(high)} has a "
             f"'{condition.metric}'{reason and '; the first: '}{reason}"
         )
+    # All parts of a bracket side by side: a bisection would wait for every one of its runs.
     value, beyond = search.ends(highest)
     while value is not None and beyond is not None and abs(value - beyond) > ACCURACY * (high - low):
         search.run(np.linspace(value, beyond, PARTS + 1)[1:-1])
@@ -147,7 +128,7 @@ def find(
 class _Search:
     """What was tried so far: values, the metric of each and its standard deviation over the noise, in that order."""
 
-    def __init__(self, path: str, condition: Condition, runs: Runs, seeds: Floats) -> None:
+    def __init__(self, path: str, condition: Limit, runs: Runs, seeds: Floats) -> None:
         self._path, self.condition, self.runs, self.seeds = path, condition, runs, seeds
         self.values: Floats = np.empty(0)
         self.metrics: Floats = np.empty(0)
@@ -161,6 +142,7 @@ class _Search:
         if self.seeds.size:
             columns[NOISE] = np.repeat(self.seeds, values.size)
         rows = self.runs.run(columns)
+        # One instant of a loop that oscillates may meet the condition by chance.
         judged = settled(rows, self.condition.metric)
         self.unsettled += int(np.count_nonzero(judged > rows[self.condition.metric]))
         found = judged.reshape(streams, values.size)
@@ -171,7 +153,7 @@ class _Search:
     def ends(self, highest: bool) -> tuple[float | None, float | None]:
         """Return the outermost value that meets the condition, and its neighbour on the outer side."""
         order = np.argsort(-self.values if highest else self.values)
-        met = np.flatnonzero(self.condition.is_met(self.metrics[order]))
+        met = np.flatnonzero(self.condition.is_kept(self.metrics[order]))
         if met.size == 0:
             return None, None
         values = self.values[order]
@@ -186,6 +168,7 @@ def _range(text: str, base: Scenario) -> tuple[VariedPath, float, float]:
         )
     with refused_as(StudyError, f"'{one_line(text)}'", ScenarioError, UnitError):
         path = varied_path(parts[1], base)
+        # As in '20..90 psi_g': the low end has the unit of the high one unless it says its own.
         unit = split_quantity(parts[3])[1]
         lower = parts[2] if split_quantity(parts[2])[1] else f"{parts[2]} {unit}".rstrip()
         low, high = path.level(lower), path.level(parts[3])
@@ -196,6 +179,7 @@ def _range(text: str, base: Scenario) -> tuple[VariedPath, float, float]:
 
 def stretches(values: Floats, is_met: NDArray[np.bool_]) -> list[list[float]]:
     """Return the first and last value [SI] of each stretch of neighbours that meet the condition."""
+    # Not met beyond both ends: a stretch that reaches the end of the range ends there.
     padded = np.concatenate([[False], is_met, [False]]).astype(int)
     first, after = np.flatnonzero(np.diff(padded) > 0), np.flatnonzero(np.diff(padded) < 0)
     return [[float(values[low]), float(values[high - 1])] for low, high in zip(first, after, strict=True)]
@@ -206,14 +190,15 @@ def _finding(scenario: str, path: VariedPath, search: _Search, highest: bool, gr
     condition, order = search.condition, np.argsort(search.values)
     values, metrics, spread, of_grid = search.values[order], search.metrics[order], search.spread[order], order < grid
     value, beyond = search.ends(highest)
-    is_met = condition.is_met(metrics)
+    is_met = condition.is_kept(metrics)
     changes = int(np.count_nonzero(np.diff(is_met)))
     kind, of_condition = of_path(path.path, path.quantity.unit), of_metric(condition.metric)
     at_value = None if value is None else float(metrics[np.searchsorted(values, value)])
     ends = f"{kind.text(values[0])} to {kind.text(values[-1])}"
     wanted, further = ("highest", "higher") if highest else ("lowest", "lower")
+    # Where none meets it, the one that comes nearest says whether a wider range could.
     if value is None or at_value is None:
-        row = int((np.nanargmin if condition.is_upper_limit else np.nanargmax)(metrics))
+        row = int((np.nanargmin if condition.is_most else np.nanargmax)(metrics))
         verdict = (
             f"no {path.path} from {ends} meets {condition.text}; the nearest is {of_condition.text(metrics[row])} at "
             f"{kind.text(values[row])}"

@@ -100,11 +100,12 @@ class LinearModel:
         row, column = _place(output, self.outputs, "output"), _place(source, self.inputs, "input")
         eye, found = np.eye(len(self.states)), []
         for frequency in np.asarray(frequencies, dtype=np.float64).ravel().tolist():
-            matrix = 2.0j * np.pi * frequency * eye - self.a
+            matrix = scaled = 2.0j * np.pi * frequency * eye - self.a
             # States and their rates differ by powers of ten in SI: rank is taken with rows and columns of one size.
-            rows = _sizes(np.abs(matrix), axis=1)
-            columns = _sizes(np.abs(matrix) / rows[:, None], axis=0)
-            if np.linalg.cond(matrix / rows[:, None] / columns) > _SINGULAR:
+            for axis in (1, 0):
+                largest = np.max(np.abs(scaled), axis=axis, keepdims=True, initial=0.0)
+                scaled = scaled / np.where(largest > 0.0, largest, 1.0)
+            if np.linalg.cond(scaled) > _SINGULAR:
                 raise ScenarioError(
                     f"{self.scenario.name}: the linear model has a pole at {frequency:g} Hz, where its response has no "
                     "end; give another frequency"
@@ -153,12 +154,6 @@ _SINGULAR = 1.0e13
 """Condition number from which what a matrix says is rounding."""
 
 
-def _sizes(entries: Floats, axis: int) -> Floats:
-    """Return the largest size in each row or column of entries' sizes, 1 where all are 0."""
-    largest = np.max(entries, axis=axis, initial=0.0)
-    return np.where(largest > 0.0, largest, 1.0)
-
-
 def _place(name: str, items: Sequence[Variable], kind: str) -> int:
     """Number of a variable; ScenarioError for a name that is none."""
     names = [item.name for item in items]
@@ -203,19 +198,12 @@ def steps_of(model: LinearModel, shares: tuple[float, ...] = SHARES) -> Steps:
     times: Floats = INTERVAL * np.arange(round(DURATION / INTERVAL) + 1, dtype=np.float64)
     still, *runs = (_torque(model, command * (1.0 + share)) for share in (0.0, *shares))
     amplitudes: Floats = command * np.array(shares, dtype=np.float64)
-    from scipy.linalg import expm
+    from scipy.signal import StateSpace, step
 
-    states = len(model.states)
     column = [item.name for item in model.inputs].index("command")
     row = [item.name for item in model.outputs].index("torque")
-    both = np.zeros((states + 1, states + 1))
-    both[:states, :states], both[:states, states] = model.a, model.b[:, column]
-    onward = expm(both * (times[1] - times[0]))
-    state, found = np.append(np.zeros(states), 1.0), []
-    for _ in times:
-        found.append(model.c[row] @ state[:states] + model.d[row, column])
-        state = onward @ state
-    linear = amplitudes[:, None] * np.array(found)
+    system = StateSpace(model.a, model.b[:, [column]], model.c[[row]], model.d[[row]][:, [column]])
+    linear = amplitudes[:, None] * step(system, T=times)[1]
     return Steps(amplitudes, times, np.array(runs) - still, linear)
 
 
@@ -290,17 +278,11 @@ def steps_panels(model: LinearModel) -> list[Panel]:
     """Return steps of the command on the runs and of the linear model, and their difference over the amplitude."""
     steps = steps_of(model)
     shares = 0.3 * steps.amplitudes / steps.amplitudes[-1]
-    over_time = [
-        Mark(
-            "line",
-            steps.times,
-            steps.runs[at] / steps.amplitudes[at],
-            (),
-            f"command {100.0 * shares[at]:+.3g} %",
-            colour,
-        )
-        for at, colour in zip(_SHOWN, (BLUE, VERMILION), strict=True)
-    ]
+    over_time = []
+    for at, colour in zip(_SHOWN, (BLUE, VERMILION), strict=True):
+        change = steps.runs[at] / steps.amplitudes[at]
+        label = f"command {100.0 * shares[at]:+.3g} %"
+        over_time.append(Mark("line", steps.times, change, label=label, colour=colour))
     linear = Mark("line", steps.times, steps.linear[-1] / steps.amplitudes[-1], (), "linear", BLACK, _DASHED)
     square = steps.errors[0] * (steps.sizes / steps.sizes[0]) ** 2
     dots = {"linestyle": "", "marker": "o", "markersize": 4}
@@ -345,10 +327,18 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
     kinds = (("state", model.states), ("input", model.inputs), ("output", model.outputs))
     # An output that is a state is in the table once.
     shown = [(kind, item) for kind, items in kinds for item in items if kind != "output" or item.name not in states]
-    point = [(kind, item.name, item.unit, _value_text(item)) for kind, item in shown]
+    point = []
+    for kind, item in shown:
+        of_item = Kind("", "" if item.unit == "1" else item.unit, quantity_of_unit(item.unit), ".5g")
+        point.append((kind, item.name, item.unit, of_item.text(item.value)))
+    edges = [
+        f"the point lies on an edge, with another linear model beyond: `{edge.place.partition(': ')[2]}` in "
+        f"{edge.place.partition(': ')[0]} was taken to be {'true' if edge.is_true else 'false'}"
+        for edge in model.edges
+    ]
     parts = [
         Part("The point", columns_of(("", "name", "unit in the model", "at the point"), point), left=3),
-        Part("Which side was taken", facts(model.sides.items()), remarks=_edges(model)),
+        Part("Which side was taken", facts(model.sides.items()), remarks=edges),
         Part(
             "Poles",
             _poles(model),
@@ -357,17 +347,19 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
             caption=_FREQUENCY_CAPTION,
             size=(7.0, 2.4),
         ),
-        *[
-            Part(f"Matrix {name} (SI)", _matrix(values, rows, columns), is_detail=name in "CD")
-            for name, values, rows, columns in (
-                ("A", model.a, model.states, model.states),
-                ("B", model.b, model.states, model.inputs),
-                ("C", model.c, model.outputs, model.states),
-                ("D", model.d, model.outputs, model.inputs),
-            )
-        ],
     ]
-    # True for a steady state of a held ankle whose valve follows at once and is open: the runs can begin there.
+    matrices = (
+        ("A", model.a, model.states, model.states),
+        ("B", model.b, model.states, model.inputs),
+        ("C", model.c, model.outputs, model.states),
+        ("D", model.d, model.outputs, model.inputs),
+    )
+    for name, values, rows, columns in matrices:
+        cells = zip(columns, values.T.tolist(), strict=True)
+        own = [Column(item.name, column, Kind(form=".5g")) for item, column in cells]
+        table = [Column("", [item.name for item in rows]), *own]
+        parts.append(Part(f"Matrix {name} (SI)", table, is_detail=name in "CD"))
+    # For a steady state of a locked ankle whose valve follows at once and is open: the runs can begin there.
     motion = model.scenario.motion
     is_locked = isinstance(motion, PrescribedMotion) and motion.profile.kind == "constant"
     is_gas_alone = all(item.name.startswith("pressure") for item in model.states)
@@ -399,19 +391,6 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
     )
 
 
-def _value_text(item: Variable) -> str:
-    return Kind("", "" if item.unit == "1" else item.unit, quantity_of_unit(item.unit), ".5g").text(item.value)
-
-
-def _edges(model: LinearModel) -> list[str]:
-    """Where the point lies on an edge of the plant, and what was taken to hold."""
-    return [
-        f"the point lies on an edge, with another linear model beyond: `{edge.place.partition(': ')[2]}` in "
-        f"{edge.place.partition(': ')[0]} was taken to be {'true' if edge.is_true else 'false'}"
-        for edge in model.edges
-    ]
-
-
 def _poles(model: LinearModel) -> list[Column]:
     """Poles with their time constants; a pair of complex ones is one row with its frequency and damping."""
     rows: list[tuple[str | float | None, ...]] = []
@@ -425,12 +404,6 @@ def _poles(model: LinearModel) -> list[Column]:
     constant, frequency = (Kind(quantity=quantity) for quantity in ("time", "frequency"))
     ratio = ("damping ratio", Kind(form=".3f"))
     return columns_of(("pole (1/s)", ("time constant", constant), ("frequency", frequency), ratio), rows)
-
-
-def _matrix(values: Floats, rows: Sequence[Variable], columns: Sequence[Variable]) -> list[Column]:
-    plain = Kind(form=".5g")
-    own = [Column(item.name, cells, plain) for item, cells in zip(columns, values.T.tolist(), strict=True)]
-    return [Column("", [item.name for item in rows]), *own]
 
 
 def _arrays(model: LinearModel) -> bytes:

@@ -1,6 +1,6 @@
 """A linear model at a point: an instant of a run, or the steady state that it has; the plant there, symbolically."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from numbers import Real
@@ -38,7 +38,6 @@ from ppafo.simulation.sampled import run_sampled
 from ppafo.simulation.scenario import FreeMotion, Scenario
 from ppafo.simulation.simulate import OPEN_LOOP
 from ppafo.translation.plant_rates import (
-    PlantRates,
     gas_rates,
     thermal_gas_rates,
     vane_acceleration,
@@ -115,20 +114,22 @@ def plant_of(run: Run, way: float | None, compare: Compare = both_sides, time: f
     given: dict[str, Any] = {name: at[name] for name in driven[1:]}
     plant = run.plant._replace(**given)
     openings, moves = _valve(run, [at[name] for name in valve_names], at["command"], compare)
-    found = _gas(run, plant, openings, at, compare)
+    acting = dict(zip(program.effects, run.effects, strict=True))
+    turn: tuple[Any, Any] = (at["angle"], at["angular_velocity"])
+    pressures: tuple[Any, Any] = (at["pressure_1"], at["pressure_2"])
+    if isinstance(run.thermal, ThermalParameters):
+        temperatures = at["temperature_1"], at["temperature_2"]
+        found = thermal_gas_rates(plant, run.thermal, openings, *turn, pressures, temperatures, compare, acting)
+    else:
+        found = gas_rates(plant, openings, *turn, pressures, compare=compare, acting=acting)
     gas = {name: getattr(found, name) for name in ("pressure_1", "pressure_2", *warm)}
     spool = dict(zip(valve_names, moves, strict=True))
-    pressures: tuple[Any, Any] = (at["pressure_1"], at["pressure_2"])
     turning: dict[str, Any] = {}
     # A vane that is held or prescribed has no acceleration: angle and velocity are no states then.
     if way:
-        angle, rate = (at[name] for name in motion)
-        acting = dict(zip(program.effects, run.effects, strict=True))
-        added = 0.0 if run.leg is None else _torque_of_leg(run.program, run.leg, time, angle)
-        turning = {
-            "angle": rate,
-            "angular_velocity": vane_acceleration(plant, angle, rate, pressures, way, compare, acting, added),
-        }
+        added = 0.0 if run.leg is None else _torque_of_leg(run.program, run.leg, time, at["angle"])
+        acceleration = vane_acceleration(plant, *turn, pressures, way, compare, acting, added)
+        turning = {"angle": at["angular_velocity"], "angular_velocity": acceleration}
     outputs = {"torque": actuator_torque(*pressures, plant.torque_constant)}
     outputs |= {name: at[name] for name in (*turning, *gas)}
     outputs |= {"supplied_flow": found.supplied, "vented_flow": found.vented}
@@ -161,17 +162,6 @@ def _valve(run: Run, state: list[Any], command: Any, compare: Compare) -> tuple[
     )
     openings = symbolic(valve.instant, *types, compare=compare)(run.valve, settled, command)
     return openings, leaves(symbolic(valve.rates, *types, compare=compare)(run.valve, settled, command))
-
-
-def _gas(run: Run, plant: Any, openings: Any, at: Mapping[str, Any], compare: Compare) -> PlantRates:
-    """Rates of the gas in both chambers."""
-    acting = dict(zip(run.program.effects, run.effects, strict=True))
-    pressures = at["pressure_1"], at["pressure_2"]
-    motion = at["angle"], at["angular_velocity"]
-    if not isinstance(run.thermal, ThermalParameters):
-        return gas_rates(plant, openings, *motion, pressures, compare=compare, acting=acting)
-    temperatures = at["temperature_1"], at["temperature_2"]
-    return thermal_gas_rates(plant, run.thermal, openings, *motion, pressures, temperatures, compare, acting)
 
 
 def without_slew_limit(run: Run) -> Run:
@@ -224,19 +214,15 @@ def _after(scenario: Scenario, run: Run, steps: int) -> tuple[dict[str, float], 
     if run.program.angle is not None:
         angle, rate, _ = run.program.angle.value(run.path, steps * run.step)
     pressure_1, pressure_2 = chamber_pressures(run.plant, angle, rows["state.mass_1"], rows["state.mass_2"])
-    values = _values(run, angle, rate, float(pressure_1), float(pressure_2)) | {"command": rows["result.command"]}
+    values = {"angle": angle, "angular_velocity": rate, "command": rows["result.command"]}
+    values |= {"pressure_1": float(pressure_1), "pressure_2": float(pressure_2)}
+    driven = ("supply_pressure", "dorsiflexion_pressure", "external_torque")
+    values |= {name: float(getattr(run.plant, name)) for name in driven}
     values |= {name: rows[path] for name, path in valve_states(run.program).items()}
     if isinstance(run.thermal, ThermalParameters):
         warm = [rows[f"state.mass_{side}"] / rows[f"masses.mass_{side}"] for side in (1, 2)]
         values |= {f"temperature_{side}": run.thermal.temperature * warm[side - 1] for side in (1, 2)}
     return values, _way(run, values, steps * run.step)
-
-
-def _values(run: Run, angle: float, rate: float, pressure_1: float, pressure_2: float) -> dict[str, float]:
-    """Values of motion, pressures and what drives the plant beside its command."""
-    values = {"angle": angle, "angular_velocity": rate, "pressure_1": pressure_1, "pressure_2": pressure_2}
-    driven = ("supply_pressure", "dorsiflexion_pressure", "external_torque")
-    return values | {name: float(getattr(run.plant, name)) for name in driven}
 
 
 def _way(run: Run, values: Mapping[str, float], time: float) -> float | None:
@@ -275,7 +261,17 @@ def equilibrium(scenario: Scenario) -> Point:
     held = None if run.program.angle is not None else 0.0
     found = _steady(run, held, values, wanted)
     if found is None:
-        raise ScenarioError(_no_equilibrium(scenario, run, held, values, wanted))
+        if wanted is None:
+            line = f"no equilibrium found for the command {values['command']:g}"
+            raise ScenarioError(f"{scenario.name}: {line}; take --at with a time")
+        line = f"no equilibrium at {wanted:.4g} N m, the last value of the reference"
+        full = dict.fromkeys(("command", *_spool(values)), 1.0 if wanted > 0.0 else -1.0)
+        most = _steady(run, held, {**values, **full}, None)
+        if most is not None:
+            torque = run.plant.torque_constant * (most["pressure_1"] - most["pressure_2"])
+            line += f": with the valve fully open the actuator comes to {torque:.4g} N m"
+        other = " or hold the ankle" if isinstance(scenario.motion, FreeMotion) else ""
+        raise ScenarioError(f"{scenario.name}: {line}; set another reference{other}, or take --at with a time")
     way = _way(run, found, scenario.run.duration)
     if way:
         raise ScenarioError(
@@ -291,25 +287,28 @@ def equilibrium(scenario: Scenario) -> Point:
 
 def _steady(run: Run, held: float | None, values: Mapping[str, float], wanted: float | None) -> dict[str, float] | None:
     """Values of a steady state with a torque [N m], or with the present command; None where none is found."""
-    plant = plant_of(run, held)
-    search = _Search(plant, wanted)
-    for start in _starts(run, values, wanted):
-        found = search.from_start(start)
-        if found is not None:
-            return found
-    return None
-
-
-def _starts(run: Run, values: Mapping[str, float], wanted: float | None) -> Iterator[dict[str, float]]:
-    """Where the search begins: at the end of the run, then about the pressures that have the torque."""
-    yield dict(values)
+    # Where the search begins: at the end of the run, then about the pressures that have the torque.
+    starts = [dict(values)]
     lowest, torque = run.plant.atmospheric_pressure, wanted or 0.0
     surplus = abs(torque) / run.plant.torque_constant
     for size in FIRST_COMMANDS:
         command = values["command"] if wanted is None else size if torque >= 0.0 else -size
         pressures = [1.001 * lowest + (surplus if is_fed else 0.0) for is_fed in (command > 0.0, command < 0.0)]
         fed = {"pressure_1": pressures[0], "pressure_2": pressures[1], "command": command}
-        yield {**values, **fed, **dict.fromkeys(_spool(values), command)}
+        starts.append({**values, **fed, **dict.fromkeys(_spool(values), command)})
+    import casadi
+
+    # All rates, and the torque where one is wanted, as functions of all states, and the command where that is free.
+    plant = plant_of(run, held)
+    names = [*plant.states, *([] if wanted is None else ["command"])]
+    sizes = np.array([SIZES.get(name.partition("_")[0], 1.0) for name in names])
+    # Rates over the sizes of their states, so that pascals and openings count alike.
+    rates = [plant.rates[name] / size for name, size in zip(plant.states, sizes.tolist(), strict=False)]
+    unknowns = casadi.vertcat(*(plant.symbols[name] for name in names))
+    residual = casadi.vertcat(*rates, *([] if wanted is None else [plant.outputs["torque"] - wanted]))
+    function = plant.function([residual, casadi.jacobian(residual, unknowns)])
+    reached = (_newton(function, names, sizes, start) for start in starts)
+    return next((found for found in reached if found is not None), None)
 
 
 def _spool(values: Mapping[str, float]) -> list[str]:
@@ -317,82 +316,49 @@ def _spool(values: Mapping[str, float]) -> list[str]:
     return [name for name in values if name in (f"{VALVE}requested", f"{VALVE}opening")]
 
 
-class _Search:
-    """Newton's method on all rates and, where one is wanted, the torque [N m]; a step that leads too far is cut."""
+def _newton(
+    function: Callable[[Mapping[str, float]], Any], names: Sequence[str], sizes: Floats, start: Mapping[str, float]
+) -> dict[str, float] | None:
+    """Values at which a function is 0, by Newton's method with steps cut where they lead too far; None where none."""
 
-    def __init__(self, plant: Plant, wanted: float | None) -> None:
-        import casadi
-
-        self._names = [*plant.states, *([] if wanted is None else ["command"])]
-        self._sizes = np.array([_size(name) for name in self._names])
-        # Rates over the sizes of their states, so that pascals and openings count alike.
-        rates = [plant.rates[name] / _size(name) for name in plant.states]
-        torque = [] if wanted is None else [plant.outputs["torque"] - wanted]
-        residual = casadi.vertcat(*rates, *torque)
-        unknowns = casadi.vertcat(*(plant.symbols[name] for name in self._names))
-        self._residual = plant.function([residual, casadi.jacobian(residual, unknowns)])
-
-    def from_start(self, start: Mapping[str, float]) -> dict[str, float] | None:
-        """The steady state that is reached from some values; None where none is."""
-        values = dict(start)
-        residual, slopes = self._at(values)
-        for _ in range(MOST_STEPS):
-            largest = float(np.max(np.abs(residual)))
-            if largest < STEADY:
-                return values if abs(values["command"]) <= 1.0 + STEADY else None
-            if not (np.isfinite(largest) and np.isfinite(slopes).all()):
-                return None
-            # Least squares instead of a solver that refuses: in a dead band the slopes are singular.
-            step = np.linalg.lstsq(slopes * self._sizes, -residual, rcond=None)[0] * self._sizes
-            share = 1.0
-            while share > 1.0e-6:
-                # Values after a step, pressures at least half of what they were, the command within -1 to 1.
-                moved = dict(values)
-                for name, change in zip(self._names, (share * step).tolist(), strict=True):
-                    moved[name] = values[name] + change
-                    if name.startswith(("pressure", "temperature")):
-                        moved[name] = max(moved[name], 0.5 * values[name])
-                    if name == "command":
-                        moved[name] = min(max(moved[name], -1.0), 1.0)
-                tried = moved
-                residual, slopes = self._at(tried)
-                if np.isfinite(residual).all() and float(np.max(np.abs(residual))) < largest:
-                    break
-                share *= 0.5
-            else:
-                return None
-            values = tried
-        return None
-
-    def _at(self, values: Mapping[str, float]) -> tuple[Floats, Floats]:
-        residual, slopes = (np.array(item) for item in self._residual(values))
+    def at(values: Mapping[str, float]) -> tuple[Floats, Floats]:
+        residual, slopes = (np.array(item) for item in function(values))
         return residual.ravel(), slopes
 
-
-def _size(name: str) -> float:
-    return SIZES.get(name.partition("_")[0], 1.0)
+    values = dict(start)
+    residual, slopes = at(values)
+    for _ in range(MOST_STEPS):
+        largest = float(np.max(np.abs(residual)))
+        if largest < STEADY:
+            return values if abs(values["command"]) <= 1.0 + STEADY else None
+        if not (np.isfinite(largest) and np.isfinite(slopes).all()):
+            return None
+        # Least squares instead of a solver that refuses: in a dead band the slopes are singular.
+        step = np.linalg.lstsq(slopes * sizes, -residual, rcond=None)[0] * sizes
+        share = 1.0
+        while share > 1.0e-6:
+            # Values after a step, pressures at least half of what they were, the command within -1 to 1.
+            moved = dict(values)
+            for name, change in zip(names, (share * step).tolist(), strict=True):
+                moved[name] = values[name] + change
+                if name.startswith(("pressure", "temperature")):
+                    moved[name] = max(moved[name], 0.5 * values[name])
+                if name == "command":
+                    moved[name] = min(max(moved[name], -1.0), 1.0)
+            residual, slopes = at(moved)
+            if np.isfinite(residual).all() and float(np.max(np.abs(residual))) < largest:
+                break
+            share *= 0.5
+        else:
+            return None
+        values = moved
+    return None
 
 
 def _settled(run: Run, values: Mapping[str, float]) -> Any:
     """State of the valve after the changes that it makes at once."""
     state: Any = rebuilt(run.program.valve.state, [values[name] for name in valve_states(run.program)])
     return run.program.valve.settle(run.valve, state, values["command"], 0.0)
-
-
-def _no_equilibrium(
-    scenario: Scenario, run: Run, held: float | None, values: Mapping[str, float], wanted: float | None
-) -> str:
-    """One line about a steady state that is not there."""
-    if wanted is None:
-        return f"{scenario.name}: no equilibrium found for the command {values['command']:g}; take --at with a time"
-    full = dict.fromkeys(("command", *_spool(values)), 1.0 if wanted > 0.0 else -1.0)
-    most = _steady(run, held, {**values, **full}, None)
-    line = f"{scenario.name}: no equilibrium at {wanted:.4g} N m, the last value of the reference"
-    if most is not None:
-        torque = run.plant.torque_constant * (most["pressure_1"] - most["pressure_2"])
-        line += f": with the valve fully open the actuator comes to {torque:.4g} N m"
-    is_free = isinstance(scenario.motion, FreeMotion)
-    return f"{line}; set another reference{' or hold the ankle' if is_free else ''}, or take --at with a time"
 
 
 EQUILIBRIUM = "equilibrium"
@@ -405,13 +371,9 @@ DEAF = "no small change of the command changes it (dead band, slew limit, beyond
 def linearise(
     scenario: Scenario | str | Path, at: float | str = EQUILIBRIUM, overrides: Sequence[str] = ()
 ) -> Finding[LinearModel]:
-    """Return the linear model of a scenario's plant, without controller and sensors, at a time or ``equilibrium``.
+    """Return the linear model of a scenario's plant, as ``ppafo.linearise`` describes it.
 
     A time is a number [s] or a text such as ``0.5 s``.
-
-    The equilibrium is the steady state whose torque is the last value of the reference, or, where the controller is a
-    constant command, whose command is that one; the ankle stands where the run leaves it. Derivatives are exact.
-    ScenarioError for a time outside the run, where there is no equilibrium, and for a valve that is on or off.
     """
     if find_spec("casadi") is None:
         raise ScenarioError(MISSING_CASADI)
@@ -420,7 +382,7 @@ def linearise(
     if chosen.supply_lines is not None:
         raise ScenarioError(f"{chosen.name}: linear models are for constant supplies; omit [supply_line]")
     chosen.device.check_vane("a linear model")
-    # False for a valve that is on or off: no small change of the command changes its openings or its movement.
+    # Of a valve that is on or off no small change of the command changes the openings or their movement.
     import casadi
 
     command = casadi.SX.sym("command")
@@ -453,27 +415,22 @@ class _Sides:
     def __call__(self, sign: str, left: Any, right: Any, place: str) -> bool:
         import casadi
 
-        one, other, ahead = self._evaluated(left, right, casadi.SX(left) - casadi.SX(right))
+        # Both values at the point, and how fast the one grows beyond the other along the direction.
+        symbols = casadi.symvar(casadi.vertcat(left, right))
+        onward = casadi.DM([_direction(symbol.name(), self._values) for symbol in symbols])
+        surplus = casadi.SX(left) - casadi.SX(right)
+        growth = casadi.jtimes(surplus, casadi.vertcat(*symbols), onward) if symbols else 0.0
+        known = [self._values[symbol.name()] for symbol in symbols]
+        found = casadi.Function("values", symbols, [casadi.vertcat(left, right, growth)]).call(known)[0]
+        one, other, ahead = (float(item) for item in found.nonzeros())
         larger = max(abs(one), abs(other))
-        surplus = one - other if abs(one - other) > EQUAL * larger else ahead
-        tests = {"<": surplus < 0.0, "<=": surplus <= 0.0, ">": surplus > 0.0, ">=": surplus >= 0.0}
+        beyond = one - other if abs(one - other) > EQUAL * larger else ahead
+        tests = {"<": beyond < 0.0, "<=": beyond <= 0.0, ">": beyond > 0.0, ">=": beyond >= 0.0}
         # Signs that are not in the table are == and !=: they have no edge.
         is_true = tests.get(sign, (one == other) == (sign == "=="))
         if sign in tests and abs(one - other) <= ON_THE_EDGE * larger:
             self.edges[place] = Edge(place, is_true)
         return is_true != (place == self._other_side)
-
-    def _evaluated(self, left: Any, right: Any, surplus: Any) -> tuple[float, float, float]:
-        """Both values at the point, and how fast the one grows beyond the other along the direction."""
-        import casadi
-
-        symbols = casadi.symvar(casadi.vertcat(left, right))
-        known = [self._values[symbol.name()] for symbol in symbols]
-        onward = casadi.DM([_direction(symbol.name(), self._values) for symbol in symbols])
-        ahead = casadi.jtimes(surplus, casadi.vertcat(*symbols), onward) if symbols else 0.0
-        found = casadi.Function("values", symbols, [casadi.vertcat(left, right, ahead)]).call(known)[0]
-        one, other, growth = (float(item) for item in found.nonzeros())
-        return one, other, growth
 
 
 def _direction(name: str, values: Mapping[str, float]) -> float:
@@ -496,9 +453,12 @@ def _model(scenario: Scenario, run: Run, point: Point) -> LinearModel:
     edges = []
     for place, edge in decided.edges.items():
         others = _matrices(plant_of(run, point.way, _Sides(values, place), time), values)
-        # An edge counts only where the linear model on its other side is a different one.
-        if any(_differs(one, other) for one, other in zip(matrices[:4], others[:4], strict=True)):
-            edges.append(edge)
+        # An edge counts only where the linear model on its other side is another one, or of other states.
+        pairs = list(zip(matrices[:4], others[:4], strict=True))
+        is_same = all(one.shape == other.shape for one, other in pairs) and all(
+            np.allclose(one, other, rtol=ON_THE_EDGE, atol=0.0, equal_nan=True) for one, other in pairs
+        )
+        edges += [] if is_same else [edge]
     a, b, c, d, found, shown = matrices
     sides = sides_of(run, point)
     if not np.any(b[:, 0]) and not np.any(d[:, 0]):
@@ -531,11 +491,6 @@ def _matrices(plant: Plant, values: Mapping[str, float]) -> list[Floats]:
     rates, outputs = casadi.vertcat(*plant.rates.values()), casadi.vertcat(*plant.outputs.values())
     wanted = [casadi.jacobian(item, by) for item in (rates, outputs) for by in (x, u)]
     return [np.array(item) for item in plant.function([*wanted, rates, outputs])(values)]
-
-
-def _differs(one: Floats, other: Floats) -> bool:
-    """True for two matrices that are not the same to rounding, or of different states."""
-    return one.shape != other.shape or not np.allclose(one, other, rtol=ON_THE_EDGE, atol=0.0, equal_nan=True)
 
 
 def sides_of(run: Run, point: Point) -> dict[str, str]:

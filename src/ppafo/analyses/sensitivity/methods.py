@@ -92,6 +92,7 @@ def _sobol_design(uncertainty: Uncertainty, blocks: int, seed: int) -> Floats:
 
 def _sobol_indices(found: Evaluated, confidence: float) -> Indices:
     """Return ``first`` and ``total`` with bands."""
+    # Points of one scramble depend on each other, scrambles do not: those are left out in turn.
     table = found.values.reshape(found.blocks.size, -1)
     scramble = found.blocks % SCRAMBLES
     parts = [scramble != number for number in np.unique(scramble)]
@@ -108,6 +109,7 @@ def _sobol_total_and_first(table: Floats) -> Floats:
     f(B): total_i = mean (f(A) - f(AB_i))^2 / 2 V (Jansen, 1999), first_i = mean f(B) (f(AB_i) - f(A)) / V (Saltelli et
     al., 2010).
     """
+    # Centred: the estimate of the first order is a mean of products, whose error grows with the mean of the metric.
     table = table - np.mean(table[:, [0, -1]])
     first, copies, second = table[:, :1], table[:, 1:-1], table[:, -1:]
     variance = float(np.mean(table[:, [0, -1]] ** 2))
@@ -145,6 +147,7 @@ def _shapley_design(uncertainty: Uncertainty, blocks: int, seed: int) -> Floats:
     scores = random.standard_normal((blocks, count - 1, 1, count)) @ lower.T
     scores = np.repeat(scores, _INNER, axis=2)
     fresh = random.standard_normal((blocks, count - 1, _INNER, count))
+    # In pattern after pattern of which values are free, since all rows of one share a conditional distribution.
     places = np.argsort(_orders(count, blocks, seed), axis=1)
     free = places[:, None, :] <= np.arange(count - 1)[None, :, None]
     for pattern in np.unique(free.reshape(-1, count), axis=0):
@@ -223,6 +226,7 @@ def changes(found: Evaluated, confidence: float) -> tuple[Floats, Floats]:
     """
     own = np.unique(found.blocks % SCRAMBLES, return_inverse=True)[1]
     part = np.repeat(own, found.values.size // found.blocks.size)
+    # About the mean, because the sums of the lines below cancel.
     values = found.values - np.mean(found.values)
     levels = np.array(
         [

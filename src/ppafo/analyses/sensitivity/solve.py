@@ -7,13 +7,12 @@ since the formulas need whole blocks, and counted; the indices then hold for val
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ppafo.analyses.sensitivity.methods import METHODS, Evaluated, Indices, Method, changes
 from ppafo.errors import StudyError, nearest_name
@@ -24,17 +23,10 @@ from ppafo.report.panels import Mark, Panel
 from ppafo.report.setting_names import label_of
 from ppafo.report.style import BLUE, COLOURS, ORANGE
 from ppafo.studies.distributions import Floats
-from ppafo.studies.draws import (
-    Uncertainty,
-    check_confidence,
-    check_fraction,
-    choose_configuration,
-    study_of,
-    uncertainty_in,
-)
+from ppafo.studies.draws import CONFIDENCE, Uncertainty, check_fraction, drawn_in
 from ppafo.studies.sampling import NOISE
 from ppafo.studies.study import Study
-from ppafo.study.runs import Rows, Runs, Tally
+from ppafo.study.runs import Runs, Tally
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -118,6 +110,7 @@ def overlapping_pairs(found: Influences, metric: OfMetric) -> list[tuple[str, st
     Nothing is said of two that both are surely below a hundredth of the largest: neither matters.
     """
     name, indices = METHODS[found.method].shown[0], metric.indices
+    # In the order of the table, in which only neighbours can be mistaken for each other.
     values, bands = indices.values[name], indices.bands[name]
     order = np.argsort(-values)
     order = order[(values + bands)[order] >= _NEGLIGIBLE * np.max(values)]
@@ -143,71 +136,62 @@ def analyse(runs: Runs, uncertainty: Uncertainty, method: Method, settings: Sett
         )
     if settings.seed < 0:
         raise StudyError(f"seed = {settings.seed}: must be 0 or more")
-    check_confidence(settings.confidence)
+    check_fraction(settings.confidence, *CONFIDENCE)
     check_fraction(settings.maximum_failed, "maximum_failed")
+    # Checked before anything runs: a design takes thousands of runs.
     design = method.design(uncertainty, settings.samples, settings.seed)
     columns = uncertainty.columns(design)
     rows = runs.run(columns)
-    runs.check(rows, settings.maximum_failed, "sensitivity")
+    runs.check(rows, settings.maximum_failed, "sensitivity", runs.metrics)
     ends = np.array([item.distribution.values(np.array(_ENDS)) for item in uncertainty.drawn]).T
+    # A seed has no order: from its 5 to its 95 % quantile nothing changes.
     ends[:, [path == NOISE for path in uncertainty.paths]] = np.nan
     inputs = np.stack([columns[path] for path in uncertainty.paths], axis=1)
     blocks = np.repeat(np.arange(settings.samples), design.shape[0] // settings.samples)
     whole = Evaluated(design, inputs, np.empty(0), blocks, ends, settings.seed)
-    found = [_of_metric(name, rows, whole, method, settings) for name in runs.metrics]
+    found = [_of_metric(name, rows[name], whole, method, settings) for name in runs.metrics]
     return Influences(study, method.name, settings, list(uncertainty.paths), runs.count, runs.failures, _POLICY, found)
 
 
-def _of_metric(name: str, found: Rows, design: Evaluated, method: Method, settings: Settings) -> OfMetric:
-    values = found[name]
+def _of_metric(name: str, values: Floats, design: Evaluated, method: Method, settings: Settings) -> OfMetric:
     known = np.isfinite(values)
-    missing = int(np.count_nonzero(~known))
-    if missing > settings.maximum_failed * values.size:
-        raise StudyError(f"sensitivity: {missing:,} of {values.size:,} runs have no '{name}'; choose another metric")
     if float(np.ptp(values[known])) == 0.0:
         raise StudyError(f"sensitivity: '{name}' is {values[known][0]:g} in every run, so no value influences it")
+    # The formulas need whole blocks: one run without a value takes its block with it.
     rows = values.size // settings.samples
     whole = np.all(known.reshape(-1, rows), axis=1)
-    sizes = [size for size in _sizes(whole.size, method.fewest) if _varies(values, whole, size, rows)]
+    halved = {whole.size >> halvings for halvings in range(_SIZES)}
+    sizes = []
+    for size in sorted({size for size in halved if size >= method.fewest} | {whole.size}):
+        # The first blocks may say nothing: many may be left out, and a metric that counts may be the same in all.
+        kept = values.reshape(-1, rows)[:size][whole[:size]]
+        if len(kept) >= _FEWEST_WHOLE and float(np.ptp(kept)) > 0.0:
+            sizes.append(size)
     if whole.size not in sizes:
         raise StudyError(
             f"sensitivity: {int(np.count_nonzero(whole)):,} of {whole.size:,} {method.sizes_label} have '{name}' in "
             "all their runs, which is too few; use more samples, or fix what makes the runs fail"
         )
-    parts = [_first_blocks(design, values, whole, size) for size in sizes]
-    change, band = changes(parts[-1], settings.confidence)
+    settling = []
+    for size in sizes:
+        kept = np.flatnonzero(whole[:size])
+        places = np.flatnonzero(np.isin(design.blocks, kept))
+        part = Evaluated(
+            design.fractions[places], design.inputs[places], values[places], kept, design.ends, design.seed
+        )
+        found = method.indices(part, settings.confidence)
+        indices, bands = ({name: each.tolist() for name, each in item.items()} for item in (found.values, found.bands))
+        settling.append(Settling(size, kept.size, indices, bands))
+    change, band = changes(part, settings.confidence)
     return OfMetric(
         metric=name,
         mean=float(np.mean(values[known])),
         standard_deviation=float(np.std(values[known], ddof=1)),
-        runs_without_value=missing,
+        runs_without_value=int(np.count_nonzero(~known)),
         change_from_5_to_95_percent=change.tolist(),
         band_of_change=band.tolist(),
-        settling=[_settling(size, part, method, settings) for size, part in zip(sizes, parts, strict=True)],
+        settling=settling,
     )
-
-
-def _settling(size: int, part: Evaluated, method: Method, settings: Settings) -> Settling:
-    found = method.indices(part, settings.confidence)
-    values, bands = ({name: each.tolist() for name, each in item.items()} for item in (found.values, found.bands))
-    return Settling(size, part.blocks.size, values, bands)
-
-
-def _sizes(blocks: int, fewest: int) -> list[int]:
-    sizes = [blocks >> halvings for halvings in range(_SIZES)]
-    return sorted({size for size in sizes if size >= fewest} | {blocks})
-
-
-def _varies(values: Floats, whole: NDArray[np.bool_], size: int, rows: int) -> bool:
-    """Tell whether the first blocks say anything: many may be left out, and a metric that counts may be the same."""
-    kept = values.reshape(-1, rows)[:size][whole[:size]]
-    return len(kept) >= _FEWEST_WHOLE and float(np.ptp(kept)) > 0.0
-
-
-def _first_blocks(design: Evaluated, values: Floats, whole: NDArray[np.bool_], size: int) -> Evaluated:
-    kept = np.flatnonzero(whole[:size])
-    rows = np.flatnonzero(np.isin(design.blocks, kept))
-    return Evaluated(design.fractions[rows], design.inputs[rows], values[rows], kept, design.ends, design.seed)
 
 
 DEFAULT_SAMPLES = {"sobol": 8192, "shapley": 2048}
@@ -230,19 +214,14 @@ def sensitivity(
     """Return the sensitivity of metrics with regard to everything that has a distribution in a study.
 
     ``method`` is a name in ``METHODS``; by default Shapley effects where values are correlated, else Sobol indices.
-    ``metrics`` are the study's by default; ``samples`` base points or orders (8192 for Sobol, 2048 for
-    Shapley). ``independent`` leaves the correlations of the study out. Noise of the sensors is one of the values.
-    StudyError for bad input, and where more than the fraction ``maximum_failed`` of the runs fails; of fewer, whole
-    blocks are left out and counted.
+    ``samples`` are base points or orders. The rest is as ``ppafo.sensitivity`` describes it.
     """
     if method is not None and method not in METHODS:
         raise StudyError(
             f"there is no method '{method}'{nearest_name(method, METHODS)}; available: {', '.join(METHODS)}"
         )
-    chosen = study_of(study, overrides)
-    base = choose_configuration(chosen, configuration)
-    known = uncertainty_in(chosen, base)
-    used = (replace(known, scores=None) if independent else known).with_noise_of([base.scenario])
+    chosen, base, used = drawn_in(study, overrides, configuration, independent)
+    # Sobol indices of correlated values mean nothing; Shapley effects take more runs for the same bands.
     by = METHODS[method or ("sobol" if used.scores is None else "shapley")]
     requested = tuple(metrics) or chosen.outputs.metrics
     if not requested:

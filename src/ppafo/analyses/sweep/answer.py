@@ -18,7 +18,6 @@ from ppafo.report.setting_names import label_of
 from ppafo.report.style import BLUE, GREEN, GREY, ORANGE, VERMILION
 from ppafo.signals.recording import CHANNELS
 from ppafo.storage.places import place_at, read_document
-from ppafo.studies.distributions import Floats
 from ppafo.studies.sampling import NOISE
 from ppafo.study.manifest import read_manifest
 
@@ -45,9 +44,16 @@ _CAPTION = (
 
 def finding_of(results: StudyResults) -> Finding[StudyResults]:
     """Return the results in words, tables and panels; they have passed where any run completed."""
-    study, summary = results.document["study"], results.summary
+    document, summary = results.document, results.summary
+    study, runs, first = document["study"], document["runs"], [*summary["failures"][:1]]
+    ended = ", ".join(f"{summary[key]:,} {key}" for key in ("completed", "diverged", "refused") if summary[key])
     described = " ".join(study.get("description", "").split())
     failed = [f"run {item['run']} ({item['configuration']}): {item['reason']}" for item in summary["failures"]]
+    remarks = [
+        f"{runs - summary['completed']:,} of {runs:,} runs failed and have no metrics; the first is run {item['run']}: "
+        f"{item['reason']}"
+        for item in first
+    ]
     said = [
         f"Correlation of {item['between'][0]} with {item['between'][1]}: {item['coefficient']}, of their normal scores."
         for item in study.get("correlations", ())
@@ -56,25 +62,39 @@ def finding_of(results: StudyResults) -> Finding[StudyResults]:
     if sample:
         method, seed = sample["method"].replace("_", " "), sample.get("seed", 1)
         said.append(f"Sampled by {method}: {sample['runs']} draws, seed {seed}.")
+    varied = []
+    for item in study.get("vary", ()):
+        others = [f"{key.replace('_', ' ')} {value}" for key, value in item.items() if key not in ("path", "kind")]
+        varied.append((item["path"], item["kind"], ", ".join(others)))
+    # What the base scenarios assume, once where several assume the same.
+    names: dict[tuple[str, str, str], list[str]] = {}
+    for name, scenario in document["scenarios"].items():
+        for item in scenario["assumptions"]:
+            names.setdefault((item["path"], item["value"], item["note"]), []).append(name)
+    assumed = [(*assumption, ", ".join(own)) for assumption, own in names.items()]
     files = (
         ("rows of all runs", "runs/*.parquet"),
         ("summary", SUMMARY),
-        ("study", f"study.json, sha256 {results.document['sha256'][:16]}"),
+        ("study", f"study.json, sha256 {document['sha256'][:16]}"),
     )
-    varied = [_varied_row(item) for item in study.get("vary", ())]
     quantile = f"Quantile: {summary['quantile_definition']}. Only completed runs that have the metric are counted."
     return Finding(
         name="sweep",
         kicker="Study",
         title=results.name,
-        said=(f"{results.name}: {count_sentence(results)}", *_failure_remarks(results)),
+        said=(f"{results.name}: {runs:,} runs: {ended}", *remarks),
         parts=(
             _figure(results, [described] if described else [], failed),
             *(_metrics(results, name, metrics) for name, metrics in results.metrics.items()),
             Part("How to read it", said=[quantile], is_detail=True),
             Part("What varied" if varied else "", columns_of(("path", "kind", ""), varied), left=3, is_detail=True),
             Part(said=said, is_detail=True),
-            _assumptions_section(results),
+            Part(
+                "What the base scenarios assume" if assumed else "",
+                columns_of(("value", "", "why", "in"), assumed),
+                left=4,
+                is_detail=True,
+            ),
             Part("Files", facts(files), is_detail=True),
         ),
         found=results,
@@ -116,62 +136,27 @@ class _Summary(BaseModel):
     configurations: dict[str, dict[str, dict[str, Any]]]
 
 
-def count_sentence(results: StudyResults) -> str:
-    """Return how many runs there are and how they ended."""
-    parts = [f"{results.summary[key]:,} {key}" for key in ("completed", "diverged", "refused") if results.summary[key]]
-    return f"{results.document['runs']:,} runs: {', '.join(parts)}"
-
-
-def _cells(name: str, item: Mapping[str, Any], columns: int) -> tuple[str, ...]:
-    """Return the cells of a metric in shown units; empty where no run has it."""
-    kind = of_metric(name)
-    first = (name, kind.shown_unit, f"{item['count']:,}")
-    if item["count"] == 0:
-        return (*first, *[""] * (columns - len(first)))
-    deviation = kind.change_number(item["sd"]) if "sd" in item else ""
-    return (*first, kind.number(item["mean"]), deviation, *map(kind.number, item["quantiles"].values()))
-
-
-def _failure_remarks(results: StudyResults) -> list[str]:
-    runs, completed = results.document["runs"], results.summary["completed"]
-    if completed == runs:
-        return []
-    first = results.summary["failures"][0]
-    return [
-        f"{runs - completed:,} of {runs:,} runs failed and have no metrics; the first is run {first['run']}: "
-        f"{first['reason']}"
-    ]
-
-
 def _metrics(results: StudyResults, name: str, metrics: Mapping[str, Mapping[str, Any]]) -> Part:
     described = [item for own in results.metrics.values() for item in own.values() if item["count"]]
     fractions = list(described[0]["quantiles"]) if described else []
     head = ("metric", "unit", "runs", "mean", "sd", *(f"{100 * float(fraction):g} %" for fraction in fractions))
-    rows = [_cells(metric, item, len(head)) for metric, item in metrics.items()]
+    rows = []
+    for metric, item in metrics.items():
+        kind = of_metric(metric)
+        cells = [metric, kind.shown_unit, f"{item['count']:,}"]
+        if item["count"]:
+            deviation = kind.change_number(item["sd"]) if "sd" in item else ""
+            cells += [kind.number(item["mean"]), deviation, *map(kind.number, item["quantiles"].values())]
+        rows.append([*cells, *[""] * (len(head) - len(cells))])
     completed = f"{name}: {results.summary['completed_by_configuration'][name]:,} runs completed"
     return Part(columns=columns_of(head, rows), said=[completed], left=2)
-
-
-def _varied_row(item: Mapping[str, Any]) -> tuple[str, str, str]:
-    others = [f"{key.replace('_', ' ')} {value}" for key, value in item.items() if key not in ("path", "kind")]
-    return item["path"], item["kind"], ", ".join(others)
-
-
-def _assumptions_section(results: StudyResults) -> Part:
-    """Return what the base scenarios assume, once where several assume the same."""
-    names: dict[tuple[str, str, str], list[str]] = {}
-    for name, scenario in results.document["scenarios"].items():
-        for item in scenario["assumptions"]:
-            names.setdefault((item["path"], item["value"], item["note"]), []).append(name)
-    rows = [(*assumption, ", ".join(own)) for assumption, own in names.items()]
-    heading = "What the base scenarios assume" if rows else ""
-    return Part(heading, columns_of(("value", "", "why", "in"), rows), left=4, is_detail=True)
 
 
 def _figure(results: StudyResults, said: Sequence[str], remarks: Sequence[str]) -> Part:
     """Return maps for a grid of two axes, points for two values that are drawn, else a panel a metric; and bands."""
     metrics = list(results.document["metrics"])[:MOST_METRICS]
     bands = list(results.document["study"]["outputs"].get("bands", ()))
+    # As many configurations as colours that can be told apart; a seed is no axis, since its size says nothing.
     names = results.configurations[:MOST_CONFIGURATIONS]
     device = [path for path in results.varied if path != NOISE]
     grid = [item["path"] for item in results.document["study"].get("vary", ()) if item["kind"] in _GRIDDED]
@@ -181,7 +166,9 @@ def _figure(results: StudyResults, said: Sequence[str], remarks: Sequence[str]) 
     is_compared = is_mapped and len(names) > 1
     title = f"{results.name}, {results.summary['completed']:,} runs"
     if not is_mapped and len(device) > 1:
-        labels = [_in_a_sentence(label_of(path)) for path in device[:_NAMED]]
+        # Within a sentence: without a capital, unless the label begins with a name in capitals.
+        labels = [label_of(path) for path in device[:_NAMED]]
+        labels = [label if label[:2].isupper() else label[:1].lower() + label[1:] for label in labels]
         more = f" and {len(device) - _NAMED} more" if len(device) > _NAMED else ""
         title += f" over {len(device)} values: {', '.join(labels)}{more}"
 
@@ -211,11 +198,6 @@ def _figure(results: StudyResults, said: Sequence[str], remarks: Sequence[str]) 
     )
 
 
-def _in_a_sentence(label: str) -> str:
-    """Return a label without its capital, but for a name in capitals."""
-    return label if label[:2].isupper() else label[:1].lower() + label[1:]
-
-
 def _kind(results: StudyResults, path: str) -> Kind:
     return of_path(path, results.document["varied"][path]["unit"].removeprefix("-"))
 
@@ -224,7 +206,13 @@ def _histogram(results: StudyResults, metric: str) -> Panel:
     """Return how often each value came, for every configuration."""
     parts = {name: values[np.isfinite(values)] for name, values in results.thin(metric, MAXIMUM_DRAWN).items()}
     filled = [values for values in parts.values() if values.size]
-    edges = _edges(filled) if filled else np.zeros(2)
+    edges = np.zeros(2)
+    if filled:
+        low, high = min(float(part.min()) for part in filled), max(float(part.max()) for part in filled)
+        is_counted = high - low < _HISTOGRAM_BINS and all(bool(np.all(part == np.round(part))) for part in filled)
+        bins = min(_HISTOGRAM_BINS, max(8, round(sum(part.size for part in filled) ** 0.5)))
+        # A bin for each whole number where values are counts of few kinds: others would be empty now and then.
+        edges = np.arange(low - 0.5, high + 1.0) if is_counted else np.linspace(low, high or low + 1.0, 1 + bins)
     marks = [
         Mark("bars", edges, np.histogram(own, edges)[0], label=name, colour=colour)
         for (name, own), colour in zip(parts.items(), COLOURS, strict=False)
@@ -233,20 +221,12 @@ def _histogram(results: StudyResults, metric: str) -> Panel:
     return Panel(of_metric(metric), Kind(), marks, then=lambda axes: axes.set_yticks([]))
 
 
-def _edges(parts: list[Floats]) -> Floats:
-    """Return the edges of the bins: one for each whole number where values are counts of few kinds."""
-    low, high = min(float(part.min()) for part in parts), max(float(part.max()) for part in parts)
-    if high - low < _HISTOGRAM_BINS and all(bool(np.all(part == np.round(part))) for part in parts):
-        return np.arange(low - 0.5, high + 1.0)
-    size = sum(part.size for part in parts)
-    return np.linspace(low, high or low + 1.0, 1 + min(_HISTOGRAM_BINS, max(8, round(size**0.5))))
-
-
 def _over(results: StudyResults, path: str, metric: str, names: Sequence[str]) -> Panel:
     """Return a metric over the one path that varies."""
     across, values = results.thin(path, MAXIMUM_DRAWN), results.thin(metric, MAXIMUM_DRAWN)
     marks = []
     for name, colour in zip(names, COLOURS, strict=False):
+        # Draws come in any order, a line goes from left to right.
         order = np.argsort(across[name], kind="stable")
         order = order[:: max(1, order.size // _MAXIMUM_POINTS)]
         marks.append(
@@ -260,6 +240,7 @@ def _map(results: StudyResults, grid: Sequence[str], metric: str, name: str, is_
     (columns, column), (rows, row) = (
         np.unique(results.thin(path, MAXIMUM_DRAWN)[name], return_inverse=True) for path in grid
     )
+    # A point of the grid may have several draws, some of which failed: the mean of the others.
     values = results.thin(metric, MAXIMUM_DRAWN)[name]
     place, known = row * columns.size + column, np.isfinite(values)
     count = np.bincount(place[known], minlength=rows.size * columns.size)
@@ -308,6 +289,7 @@ def _mark_plainly(axis: Any) -> None:
 def _band(results: StudyResults, channel: str, names: Sequence[str]) -> Panel:
     """Return the bands of a channel for every configuration: the outermost pair of quantiles light, the next darker."""
     table = results.bands()
+    # The quantiles that the study asked for are the columns of its file.
     fractions = sorted(float(name[1:]) for name in table if name.startswith("q"))
     pairs = [(low, high) for low, high in zip(fractions, reversed(fractions), strict=True) if low < high]
     marks = []

@@ -38,6 +38,7 @@ async def _reach(address: str, distributed: Any) -> None:
 def _work_through(client: Any, task: Task, numbers: Any, finish: Callable[[Finished], None], distributed: Any) -> None:
     queue = distributed.as_completed(loop=client.loop)
 
+    # Keys of this session alone: a scheduler answers an equal key with what an earlier task returned.
     sweep = f"{task.study.name}-{uuid4().hex[:8]}"
 
     def submit(count: int) -> None:

@@ -69,6 +69,7 @@ class StudyResults:
         Channels over time are columns of their own, which ``trajectories`` returns.
         """
         if columns is None:
+            # All chunks have the columns of the first.
             first = chunk_file(0)
             traces = {trace_column(name) for name in CHANNELS}
             columns = [name for name in column_names(self.place.open(first), first) if name not in traces]
@@ -97,15 +98,16 @@ class StudyResults:
 
     def thin(self, column: str, maximum: int) -> dict[str, np.ndarray[Any, Any]]:
         """Return a column by name of the configuration, of about ``maximum`` runs in all: every so many of them."""
+        # An odd step: an even one would see one half of a grid whose last axis has two values.
         step = -(-int(self.document["runs"]) // maximum) | 1
-        return {name: self._every(name, column, step) for name in self.configurations}
-
-    def _every(self, configuration: str, column: str, step: int) -> np.ndarray[Any, Any]:
-        parts, first = [], 0
-        for table in self.chunks([column], configuration):
-            parts.append(table.column(column).to_numpy()[first::step])
-            first = (first - table.num_rows) % step
-        return np.concatenate(parts)
+        thinned = {}
+        for name in self.configurations:
+            parts, first = [], 0
+            for table in self.chunks([column], name):
+                parts.append(table.column(column).to_numpy()[first::step])
+                first = (first - table.num_rows) % step
+            thinned[name] = np.concatenate(parts)
+        return thinned
 
     def parts(self, configuration: str, column: str) -> Iterator[np.ndarray[Any, Any]]:
         """Give the finite values of a column of a configuration, chunk by chunk."""
@@ -115,6 +117,7 @@ class StudyResults:
 
     def chunks(self, columns: Sequence[str], configuration: str | None = None) -> "Iterator[pa.Table]":
         """Give some columns of the chunks one after the other, of all configurations or of one."""
+        # No chunk holds runs of two configurations, and each configuration has the same number of them.
         numbers = range(self.document["chunks"])
         if configuration is not None:
             own = len(numbers) // len(self.configurations)

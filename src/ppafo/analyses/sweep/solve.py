@@ -14,7 +14,8 @@ import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +28,7 @@ from ppafo.analyses.sweep.statistic import MOST_DRAWS, Estimate, estimate
 from ppafo.documents.json_text import json_text
 from ppafo.errors import StudyError
 from ppafo.metrics import METRICS
-from ppafo.progress import Progress, Report
+from ppafo.progress import Report
 from ppafo.report.finding import Finding
 from ppafo.signals.recording import CHANNELS
 from ppafo.storage.parquet import TableColumn, encode_texts, matrix_of, parquet_bytes, table_of
@@ -39,12 +40,12 @@ from ppafo.studies.loading import list_studies, load_study
 from ppafo.studies.study import Study
 from ppafo.study.blocks import chunk_count, samples_of
 from ppafo.study.manifest import read_manifest
+from ppafo.study.runs import Tally
 from ppafo.study.store import (
     STATUSES,
     Finished,
     Store,
     Task,
-    completed_rows,
     compute_chunk,
     note_file,
     stored_unit,
@@ -62,26 +63,37 @@ Parts = Callable[[], Iterator[Floats]]
 """Gives the finite values of a column anew each time, in parts whose order is always the same."""
 
 
-def _completed_runs(results: StudyResults, configuration: str) -> int:
-    parts = results.chunks(["status"], configuration)
-    return sum(int(np.count_nonzero(completed_rows(part))) for part in parts)
-
-
-def _metric(study: Study, results: StudyResults, configuration: str, metric: str) -> dict[str, Any]:
-    kind = METRICS[metric]
-    said = {"unit": kind.unit, "summary": kind.summary}
-    return said | describe(lambda: results.parts(configuration, metric), study.outputs.quantiles)
-
-
-def _failures(results: StudyResults) -> list[dict[str, Any]]:
-    """Return the first few runs that failed, with their reasons."""
-    found: list[dict[str, Any]] = []
-    for part in results.chunks(["run", "configuration", "status", "reason"]):
-        rows = [row for row in part.to_pylist() if row["status"] != STATUSES[0]]
-        found += rows[: _EXAMPLES - len(found)]
-        if len(found) == _EXAMPLES:
-            break
-    return found
+def _summary(study: Study, results: StudyResults) -> dict[str, Any]:
+    """Return the content of ``summary.json``: counts, the first few runs that failed, and each metric."""
+    completed = dict.fromkeys((item.name for item in study.configurations), 0)
+    failures: list[dict[str, Any]] = []
+    for name in completed:
+        for part in results.chunks(["run", "configuration", "status", "reason"], name):
+            rows = np.asarray(part.column("status").to_numpy() == STATUSES[0])
+            completed[name] += int(np.count_nonzero(rows))
+            if len(failures) < _EXAMPLES and not rows.all():
+                failures += part.filter(~rows).slice(0, _EXAMPLES - len(failures)).to_pylist()
+    # A run that diverged has a time at which it did; one that was refused never began.
+    failed = study.runs - sum(completed.values())
+    diverged = sum(part.size for item in study.configurations for part in results.parts(item.name, "failure_time"))
+    return {
+        "study": study.name,
+        "runs": study.runs,
+        "completed": study.runs - failed,
+        "diverged": diverged,
+        "refused": failed - diverged,
+        "completed_by_configuration": completed,
+        "failures": failures,
+        "quantile_definition": QUANTILE_DEFINITION,
+        "configurations": {
+            item.name: {
+                metric: {"unit": METRICS[metric].unit, "summary": METRICS[metric].summary}
+                | describe(partial(results.parts, item.name, metric), study.outputs.quantiles)
+                for metric in study.outputs.metrics
+            }
+            for item in study.configurations
+        },
+    }
 
 
 def bands_file(study: Study, results: StudyResults) -> bytes:
@@ -102,6 +114,8 @@ def bands_file(study: Study, results: StudyResults) -> bytes:
                 }
             )
     joined = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    units = {stored_unit(CHANNELS[name].unit) for name in study.outputs.bands}
+    unit = units.pop() if len(units) == 1 else "SI unit of the channel"
     names = [item.name for item in study.configurations]
     columns = {
         "configuration": TableColumn(
@@ -110,7 +124,7 @@ def bands_file(study: Study, results: StudyResults) -> bytes:
         "channel": TableColumn(encode_texts(joined.pop("channel"), study.outputs.bands), "-", "name of the channel"),
         "time": TableColumn(joined.pop("time"), "s", "time since the start"),
         "runs": TableColumn(joined.pop("runs"), "-", "completed runs, without a fall so far"),
-        **{name: TableColumn(values, _si_of_channel(study), "quantile over runs") for name, values in joined.items()},
+        **{name: TableColumn(values, unit, "quantile over runs") for name, values in joined.items()},
     }
     return parquet_bytes(table_of(columns, {"study": study.name}))
 
@@ -141,17 +155,13 @@ def sorted_quantiles(ordered: Floats, counts: NDArray[np.int64], fractions: Sequ
     return np.asarray(below + (places - low) * (above - below), dtype=np.float64)
 
 
-def _si_of_channel(study: Study) -> str:
-    units = {stored_unit(CHANNELS[name].unit) for name in study.outputs.bands}
-    return units.pop() if len(units) == 1 else "SI unit of the channel"
-
-
 def describe(parts: Parts, fractions: Sequence[float]) -> dict[str, Any]:
     """Return count, and unless it is 0 mean, standard deviation (from 2 values on), extremes, quantiles by fraction."""
     sums = [(part.size, float(np.sum(part)), float(part.min()), float(part.max())) for part in parts() if part.size]
     count = sum(item[0] for item in sums)
     if count == 0:
         return {"count": 0}
+    # Squares about the mean, in a second pass: about 0 they would cancel where the spread is small.
     mean = math.fsum(item[1] for item in sums) / count
     levels = np.quantile(np.concatenate(list(parts())), fractions, method="linear", overwrite_input=True)
     squares = math.fsum(float(np.sum((part - mean) ** 2)) for part in parts())
@@ -168,16 +178,6 @@ def describe(parts: Parts, fractions: Sequence[float]) -> dict[str, Any]:
 LOG = "log.jsonl"
 """The only file that says when, where and how fast; all others are the same wherever they are made."""
 _INTERRUPTED = "interrupted; finished chunks are kept, and the same command resumes the study"
-
-
-@dataclass(frozen=True, slots=True)
-class Means:
-    """How a study is computed: threads of this process, a Dask scheduler, consent to a large folder, who watches."""
-
-    threads: int | None = None
-    scheduler: str | None = None
-    agreed: bool = False
-    progress: Report | None = None
 
 
 def sweep(
@@ -203,36 +203,18 @@ def sweep(
     nan where a run failed, which is a row that says so. StudyError for a study that cannot be used or does not fit onto
     the disk, and where the folder has results of another one; DataError for a folder that cannot be used.
     """
-    means = Means(threads, scheduler, agreed, progress)
-    chosen = _study_of(study, overrides, draws, seed)
+    chosen = study_of(study, overrides, draws, seed)
     kept = tempfile.TemporaryDirectory(prefix="ppafo-study-") if out is None else None
     place = place_at(kept.name if kept is not None else str(out))
-    store = Store.claim(chosen, place, means.agreed, means.threads)
-    _work(Task(chosen, place.address, means.threads), store, means)
-    # Write summary and bands of a study all of whose chunks are there, and return its results.
-    results = StudyResults(place, read_manifest(place), {})
-    # The content of ``summary.json``.
-    completed = {item.name: _completed_runs(results, item.name) for item in chosen.configurations}
-    failed = chosen.runs - sum(completed.values())
-    diverged = sum(part.size for item in chosen.configurations for part in results.parts(item.name, "failure_time"))
-    summary = {
-        "study": chosen.name,
-        "runs": chosen.runs,
-        "completed": chosen.runs - failed,
-        "diverged": diverged,
-        "refused": failed - diverged,
-        "completed_by_configuration": completed,
-        "failures": _failures(results) if failed else [],
-        "quantile_definition": QUANTILE_DEFINITION,
-        "configurations": {
-            item.name: {metric: _metric(chosen, results, item.name, metric) for metric in chosen.outputs.metrics}
-            for item in chosen.configurations
-        },
-    }
+    store = Store.claim(chosen, place, agreed, threads)
+    _work(Task(chosen, place.address, threads), store, scheduler, progress)
+    results = StudyResults(place, read_manifest(place), {}, kept)
+    summary = _summary(chosen, results)
     if chosen.outputs.bands:
         place.write(BANDS, bands_file(chosen, results))
+    # Last, because a study counts as finished once its summary is there.
     place.write(SUMMARY, f"{json_text(summary)}\n".encode())
-    return finding_of(replace(results, summary=summary, kept=kept))
+    return finding_of(replace(results, summary=summary))
 
 
 def sweep_into_folder(
@@ -271,16 +253,10 @@ def sweep_into_folder(
         unused = [*(["metric"] if metric is not None else []), *given]
         if unused:
             raise StudyError(f"{unused[0]}: needs a statistic, for example --statistic mean --metric rms_error")
-        chosen = _study_of(study, overrides, draws, seed)
+        chosen = study_of(study, overrides, draws, seed)
+        folder = out or Path("out") / chosen.name
         try:
-            swept = sweep(
-                chosen,
-                out or Path("out") / chosen.name,
-                threads=threads,
-                scheduler=scheduler,
-                agreed=agreed,
-                progress=progress,
-            )
+            swept = sweep(chosen, folder, (), None, None, threads, scheduler, agreed, progress)
             write_report(swept.found)
         except KeyboardInterrupt:
             raise KeyboardInterrupt(_INTERRUPTED) from None
@@ -290,23 +266,12 @@ def sweep_into_folder(
     if scheduler is not None:
         raise StudyError(f"--scheduler {scheduler}: a statistic is computed here; omit it")
     chosen = study_of(study, overrides)
-    folder = Path(out or Path("out") / f"{chosen.name}-{metric}")
-    check_owned_folder(folder, marked_folder("sweep"))
+    place = Path(out or Path("out") / f"{chosen.name}-{metric}")
+    check_owned_folder(place, marked_folder("sweep"))
     most = MOST_DRAWS if draws is None else draws
     found = estimate(chosen, metric, statistic, seed=seed, draws=most, threads=threads, progress=progress, **given)
-    found.save(folder)
-    return replace(found, found=replace(found.found, folder=str(folder)))
-
-
-def _study_of(
-    study: Study | str | Path | Mapping[str, Any], overrides: Sequence[str], draws: int | None, seed: int | None
-) -> Study:
-    """Return the study; StudyError where one that is loaded already comes with what only loading can change."""
-    if not isinstance(study, Study):
-        return load_study(study, overrides, draws, seed)
-    if overrides or draws is not None or seed is not None:
-        raise StudyError("a loaded Study takes no overrides, draws or seed; give them to load_study")
-    return study
+    found.save(place)
+    return replace(found, found=replace(found.found, folder=str(place)))
 
 
 def studies_of_the_package() -> list[dict[str, Any]]:
@@ -315,38 +280,43 @@ def studies_of_the_package() -> list[dict[str, Any]]:
     return [{"name": study.name, "runs": study.runs, "description": study.description} for study in studies]
 
 
-def _work(task: Task, store: Store, means: Means) -> None:
+def _work(task: Task, store: Store, scheduler: str | None, progress: Report | None) -> None:
+    """Compute the chunks that are missing, and add a line on this session to the log."""
     study, place, started = store.study, store.place, time.monotonic()
     known = store.finished()
-    tally = _Tally(study, means.progress, started, known)
-    missing = sorted(set(range(chunk_count(study))) - {item.number for item in known})
+    earlier, missing = sum(item.runs for item in known), set(range(chunk_count(study)))
+    missing -= {item.number for item in known}
+    tally = Tally(study.runs, progress, earlier, sum(item.failed for item in known))
+
+    def count(finished: Finished) -> None:
+        tally.add(finished.runs, finished.failed)
+
+    # Rows change below: an old summary would pass for a finished study meanwhile.
     if missing and SUMMARY in place.names():
         place.remove(SUMMARY)
-    if means.scheduler is not None:
+    if scheduler is None:
+        _compute_here(task, store, sorted(missing), count)
+    else:
         from ppafo.analyses.sweep.cluster import compute_on_cluster
 
-        compute_on_cluster(means.scheduler, task, missing, tally.add)
+        compute_on_cluster(scheduler, task, sorted(missing), count)
         place.tidy()
         names = place.names()
         if any(note_file(number) not in names for number in missing):
             raise StudyError(
-                f"--scheduler {means.scheduler}: the workers finished chunks that are not in {place.address}: "
-                "--out must be a folder that they share with this machine, or an address such as s3://bucket/study"
+                f"--scheduler {scheduler}: the workers finished chunks that are not in {place.address}: --out must be "
+                "a folder that they share with this machine, or an address such as s3://bucket/study"
             )
-    else:
-        _compute_here(task, store, missing, tally.add)
-    # Add a line on this session to the log.
-    elapsed = time.monotonic() - started
     line = {
         "ended": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
         "machine": platform.platform(),
         "processors": os.cpu_count(),
         "versions": {"ppafo": __version__, "python": platform.python_version(), "numpy": np.__version__},
-        "scheduler": means.scheduler,
-        "threads": means.threads,
-        "runs": tally.done - tally.earlier,
+        "scheduler": scheduler,
+        "threads": task.threads,
+        "runs": tally.done - earlier,
         "failed": tally.failed,
-        "seconds": round(elapsed, 3),
+        "seconds": round(time.monotonic() - started, 3),
     }
     try:
         with place.open(LOG) as file:
@@ -359,30 +329,11 @@ def _work(task: Task, store: Store, means: Means) -> None:
 def _compute_here(task: Task, store: Store, numbers: Iterable[int], finish: Callable[[Finished], None]) -> None:
     """Compute chunks one after the other; while one is written, the next one is computed."""
     with ThreadPoolExecutor(1, "ppafo-writing") as writer:
-        writing: tuple[Finished, Future[None]] | None = None
+        writing: Future[Finished] | None = None
         for number in numbers:
-            finished, content = compute_chunk(task, number)
+            computed = compute_chunk(task, number)
             if writing is not None:
-                writing[1].result()
-                finish(writing[0])
-            writing = finished, writer.submit(store.write, finished, content)
+                finish(writing.result())
+            writing = writer.submit(store.write, *computed)
         if writing is not None:
-            writing[1].result()
-            finish(writing[0])
-
-
-class _Tally:
-    """What is done so far, reported to whoever watches."""
-
-    def __init__(self, study: Study, progress: Report | None, started: float, known: Sequence[Finished]) -> None:
-        self._report, self._started, self._runs = progress, started, study.runs
-        self.earlier = self.done = sum(item.runs for item in known)
-        self.failed = sum(item.failed for item in known)
-
-    def add(self, finished: Finished) -> None:
-        """Count a chunk."""
-        self.done += finished.runs
-        self.failed += finished.failed
-        if self._report is not None:
-            elapsed = time.monotonic() - self._started
-            self._report(Progress("", self.done, self._runs, self.failed, self.earlier, elapsed))
+            finish(writing.result())

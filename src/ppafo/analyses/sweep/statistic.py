@@ -27,33 +27,32 @@ from ppafo.report.kind import Interval, Kind, of_metric
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import GREY, VERMILION
 from ppafo.studies.distributions import (
-    FEWEST_EFFECTIVE,
     Floats,
     effective_sample_size,
     floored_interval,
     fraction_interval,
     fraction_text,
+    is_carried,
     noise_interval,
     quantile_interval,
 )
 from ppafo.studies.draws import (
+    CONFIDENCE,
+    FEWEST_DRAWS,
     MAXIMUM_DRAWS,
     REPLICATES,
     Columns,
     Uncertainty,
     atmosphere_of,
-    check_confidence,
     check_fraction,
     check_metrics,
-    choose_configuration,
     difference_of,
+    drawn_in,
     level_of,
-    study_of,
-    uncertainty_in,
     with_new_noise,
 )
 from ppafo.studies.study import Study
-from ppafo.study.runs import Rows, Runs, Tally
+from ppafo.study.runs import Runs, Tally
 from ppafo.units import number_text, parse_quantity
 
 GRAMMAR = "'mean', 'quantile 0.95', 'probability above VALUE' or 'probability below VALUE'"
@@ -110,6 +109,7 @@ def probability_of(threshold: float, is_above: bool, text: str) -> Statistic:
     """Return the probability that a metric is above (or else below) a value [SI], written as ``text``."""
 
     def estimate(values: Floats, level: float) -> Interval:
+        # Strictly beyond: a metric that counts may be exactly at the threshold in many runs.
         known = values[np.isfinite(values)]
         hits = known > threshold if is_above else known < threshold
         return fraction_interval(int(np.count_nonzero(hits)), known.size, level)
@@ -135,13 +135,10 @@ def parse_statistic(text: str, metric: str, atmosphere: float | None) -> Statist
     raise StudyError(f"statistic '{text}' is not known; give {GRAMMAR}, with a fraction above 0 and below 1")
 
 
-FEWEST_DRAWS = 32
 FEWEST_EQUAL = 3000
 """Equal values from which they count as their mean: one in a thousand that differs would have come (95 %)."""
 _RULE_OF_THREE = 3.0
 """Over the draws: probability of an event that 95 of 100 such sets of draws show."""
-NOISE_DRAWS = 512
-"""Draws that are run again with other noise, at most: its fraction of the variance is then known to some percent."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,12 +166,13 @@ class StoppingRule:
                 f"first = {self.first!r} and maximum = {self.maximum!r} draws: must be at least {FEWEST_DRAWS}, the "
                 f"first not more than the maximum, and the maximum not above {MAXIMUM_DRAWS:,}"
             )
-        check_confidence(self.confidence)
+        check_fraction(self.confidence, *CONFIDENCE)
         check_fraction(self.maximum_failed, "maximum_failed")
 
     @property
     def sizes(self) -> tuple[int, ...]:
         """The numbers of draws at which it is looked at the interval, at most."""
+        # Doubled each time: few looks have to share the allowed error, and the last takes half of all draws.
         found = [self.first]
         while found[-1] < self.maximum:
             found.append(min(2 * found[-1], self.maximum))
@@ -204,8 +202,8 @@ class Look:
 
     @property
     def is_carried(self) -> bool:
-        """Tell whether enough draws determine the estimate; an interval without width is carried by all."""
-        return self.effective_size >= min(FEWEST_EFFECTIVE, 0.5 * (self.draws - self.missing))
+        """Tell whether enough draws determine the estimate."""
+        return is_carried(self.effective_size, self.draws - self.missing)
 
 
 @dataclass(frozen=True, slots=True)
@@ -271,15 +269,22 @@ def draw_until(
         # Draws of the first look are kept: they are repeated with new noise to find its share of the variance.
         drawn = drawn or columns
         runs.run(columns)
-        looks.append(_look(runs, metric, statistic, rule))
-        if rule.is_narrow(looks[-1].interval) and looks[-1].is_carried:
+        rows = runs.table
+        runs.check(rows, rule.maximum_failed, "sweep --statistic", [metric])
+        found = rows[metric]
+        missing, interval = np.count_nonzero(~np.isfinite(found)), statistic.estimate(found, rule.confidence_of_look)
+        looks.append(Look(found.size, int(missing), interval, statistic.effective_size(found)))
+        if rule.is_narrow(interval) and looks[-1].is_carried:
             break
-    rows, failures, last = runs.table, runs.failures, looks[-1]
-    noise = None
+    # Failures are counted here: below, some of the same draws run again with other noise.
+    failures, last, noise = runs.failures, looks[-1], None
     if uncertainty.has_noise:
-        again = runs.run(with_new_noise(drawn, NOISE_DRAWS))[metric]
-        noise = noise_interval(rows[metric][: again.size], again, rule.confidence)
+        noise = noise_interval(rows[metric], runs.run(with_new_noise(drawn))[metric], rule.confidence)
     values = rows[metric][np.isfinite(rows[metric])]
+    means = {}
+    for name in also:
+        mean = floored_interval(rows[name], REPLICATES, rule.confidence_of_look)
+        means[name] = OfMean(int(np.count_nonzero(np.isfinite(rows[name]))), mean.value, mean.low, mean.high)
     estimate = Estimate(
         metric=metric,
         statistic=statistic.label,
@@ -289,7 +294,7 @@ def draw_until(
         failed=failures,
         interval=last.interval,
         remarks=_remarks(last, values, statistic, _kind(metric, statistic), noise),
-        also={name: _mean(rows[name], rule.confidence_of_look) for name in also},
+        also=means,
         share_of_noise=noise,
         seed=seed,
         rule={**plain(rule), "looks": len(rule.sizes), "correction": "Bonferroni"},
@@ -297,27 +302,6 @@ def draw_until(
         values=values,
     )
     return _finding(estimate, statistic, rule)
-
-
-def _mean(values: Floats, level: float) -> OfMean:
-    """Return how many draws have a value, and their mean; its interval is infinite where few do."""
-    count = int(np.count_nonzero(np.isfinite(values)))
-    mean = floored_interval(values, REPLICATES, level) if count else Interval(math.nan, -math.inf, math.inf)
-    return OfMean(count, mean.value, mean.low, mean.high)
-
-
-def _look(runs: Runs, metric: str, statistic: Statistic, rule: StoppingRule) -> Look:
-    rows: Rows = runs.table
-    runs.check(rows, rule.maximum_failed, "sweep --statistic")
-    found = rows[metric]
-    missing = int(np.count_nonzero(~np.isfinite(found)))
-    if missing > rule.maximum_failed * found.size:
-        raise StudyError(
-            f"sweep --statistic: {missing:,} of {found.size:,} runs have no '{metric}'; choose another metric"
-        )
-    return Look(
-        found.size, missing, statistic.estimate(found, rule.confidence_of_look), statistic.effective_size(found)
-    )
 
 
 DEFAULT_WIDTH = "1 %"
@@ -349,12 +333,11 @@ def estimate(
     independent ones. ``seed`` is the study's by default. ``also`` names further metrics: means over the same draws.
     StudyError for bad input and where more than the fraction ``maximum_failed`` of the runs fails.
     """
-    chosen = study_of(study, overrides)
-    base = choose_configuration(chosen, configuration)
-    uncertainty = uncertainty_in(chosen, base).with_noise_of([base.scenario])
+    chosen, base, uncertainty = drawn_in(study, overrides, configuration)
     wanted = tuple(dict.fromkeys((metric, *also)))
     check_metrics(wanted, base.scenario)
     what = parse_statistic(statistic, metric, atmosphere_of(base.scenario, {*uncertainty.paths, *uncertainty.same}))
+    # A probability may be 0, of which a fraction says nothing: its width is a difference.
     asked = width or (PROBABILITY_WIDTH if what.threshold is not None else DEFAULT_WIDTH)
     rule = stopping_rule(what, metric, asked, StoppingRule(1.0, False, first_draws, draws, confidence, maximum_failed))
     runs = Runs(base.scenario, wanted, Tally(rule.first, progress), uncertainty.gauge, threads)
@@ -364,25 +347,15 @@ def estimate(
 def stopping_rule(statistic: Statistic, metric: str, width: str, like: StoppingRule) -> StoppingRule:
     """Return the rule with the width that a text says, else like another one."""
     text = width.strip()
-    is_relative = text.endswith("%")
     if statistic.threshold is not None:
-        number = _plain(text)
-    else:
-        number = parse_fraction(text) if is_relative else difference_of(text, metric, f"width = '{width}'")
-    return replace(like, width=number, is_relative=is_relative)
-
-
-def parse_fraction(text: str) -> float:
-    """Return a fraction from a text in percent, such as '1 %'."""
+        try:
+            return replace(like, width=float(number_text(text)), is_relative=False)
+        except ValueError as error:
+            raise StudyError(f"width = '{text}': for a probability give a plain number, such as 0.01") from error
+    if not text.endswith("%"):
+        return replace(like, width=difference_of(text, metric, f"width = '{width}'"), is_relative=False)
     with refused_as(StudyError, f"width = '{text}'", UnitError):
-        return parse_quantity(text, "")
-
-
-def _plain(text: str) -> float:
-    try:
-        return float(number_text(text))
-    except ValueError as error:
-        raise StudyError(f"width = '{text}': for a probability give a plain number, such as 0.01") from error
+        return replace(like, width=parse_quantity(text, ""), is_relative=True)
 
 
 def _kind(metric: str, statistic: Statistic) -> Kind:
@@ -420,6 +393,7 @@ def _remarks(last: Look, values: Floats, statistic: Statistic, kind: Kind, noise
     return said
 
 
+_ENDS = ("estimate", "low", "high")
 _MAXIMUM_BINS = 80
 _CAPTION = "Left: estimate and interval at each look; grey: the target width. Right: the values of all draws."
 
@@ -434,22 +408,28 @@ def _finding(found: Estimate, statistic: Statistic, rule: StoppingRule) -> Findi
         f"{found.statistic} of {found.metric}: {kind.interval(found.interval)} {unit}".rstrip()
         + f" after {found.draws:,} draws, {100.0 * rule.confidence:g} % confidence{ending}"
     )
-    width = f"{100.0 * rule.width:g} % of the value" if rule.is_relative else _difference(kind, rule.width)
+    width = f"{100.0 * rule.width:g} % of the value" if rule.is_relative else kind.change(rule.width)
     policy = (
         f"target width: {width}; at most {len(rule.sizes)} looks at doubling numbers of draws, each with "
         f"{100.0 * rule.confidence_of_look:.4g} % confidence (Bonferroni), so that all of them hold simultaneously; "
         f"{looks[-1].missing:,} draws have no value and are left out"
     )
-    rows = [
-        (
-            f"{look.draws:,}",
-            f"{look.missing:,}",
-            *(kind.number(value) for value in (look.interval.value, look.interval.low, look.interval.high)),
-            _difference(kind, look.interval.width),
-            met,
-        )
-        for look, met in ((look, _met(look, rule)) for look in looks)
+    rows = []
+    for look in looks:
+        met = "narrow enough" if rule.is_narrow(look.interval) else ""
+        met += "" if look.is_carried else f"{', but ' if met else ''}its effective sample size is small"
+        ends = (kind.number(value) for value in (look.interval.value, look.interval.low, look.interval.high))
+        reach = kind.change(look.interval.width) if math.isfinite(look.interval.width) else f"{look.interval.width:.3g}"
+        rows.append((f"{look.draws:,}", f"{look.missing:,}", *ends, reach, met))
+    further = [
+        (of_metric(name).title, f"{mean.draws:,}", *map(of_metric(name).number, (mean.value, mean.low, mean.high)))
+        for name, mean in found.also.items()
     ]
+    also = Part(
+        "Further metrics",
+        columns_of(("mean over the same draws", "with a value", *_ENDS), further),
+        said=[f"Each with {100.0 * rule.confidence_of_look:.4g} % confidence, of the draws that have a value."],
+    )
     title = f"{found.statistic} of {found.metric}"
     return Finding(
         name="statistic",
@@ -458,7 +438,7 @@ def _finding(found: Estimate, statistic: Statistic, rule: StoppingRule) -> Findi
         title=title[:1].upper() + title[1:],
         said=(verdict, *found.remarks),
         parts=(
-            *_further(found, rule),
+            *([also] if further else []),
             Part(
                 "Trace",
                 columns_of(("draws", "without value", *_ENDS, "width", ""), rows),
@@ -473,29 +453,6 @@ def _finding(found: Estimate, statistic: Statistic, rule: StoppingRule) -> Findi
         found=found,
         passed=found.is_met,
     )
-
-
-_ENDS = ("estimate", "low", "high")
-
-
-def _difference(kind: Kind, value: float) -> str:
-    return kind.change(value) if math.isfinite(value) else f"{value:.3g}"
-
-
-def _met(look: Look, rule: StoppingRule) -> str:
-    met = "narrow enough" if rule.is_narrow(look.interval) else ""
-    return met if look.is_carried else f"{met}{', but ' if met else ''}its effective sample size is small"
-
-
-def _further(found: Estimate, rule: StoppingRule) -> list[Part]:
-    """Return the means of further metrics, where some were requested."""
-    rows = [
-        (of_metric(name).title, f"{mean.draws:,}", *map(of_metric(name).number, (mean.value, mean.low, mean.high)))
-        for name, mean in found.also.items()
-    ]
-    columns = columns_of(("mean over the same draws", "with a value", *_ENDS), rows)
-    said = f"Each with {100.0 * rule.confidence_of_look:.4g} % confidence, of the draws that have a value."
-    return [Part("Further metrics", columns, said=[said])] * bool(rows)
 
 
 def _trace(found: Estimate, kind: Kind, rule: StoppingRule) -> Panel:

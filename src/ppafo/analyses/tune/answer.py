@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from ppafo.analyses.tune.problem import Gains, Limit, Problem, Term
+from ppafo.analyses.tune.problem import Gains, Problem, Term
 from ppafo.metrics import Metric
 from ppafo.parameters.overrides import over
 from ppafo.report.finding import Column, Finding, Part, columns_of
@@ -18,6 +18,7 @@ from ppafo.report.style import BLACK, BLUE, COLOURS, GREY, VERMILION
 from ppafo.simulation.scenario import worn_kind
 from ppafo.simulation.simulate import Result
 from ppafo.studies.distributions import fraction_text
+from ppafo.studies.draws import Limit
 from ppafo.units import percentage
 
 if TYPE_CHECKING:
@@ -25,11 +26,6 @@ if TYPE_CHECKING:
 
 INFEASIBLE = 1.0e6
 """Where the costs of candidates begin that break a constraint."""
-
-
-def keeps(item: Limit, value: float) -> bool:
-    """Tell whether a value [SI] keeps a constraint."""
-    return value <= item.limit if item.is_most else value >= item.limit
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +48,7 @@ def agreement(starts: Sequence[Start]) -> float:
     As good is a cost within a hundredth; large where very different gains do as well, which the goal then leaves open.
     """
     best = starts[0]
+    # Of an infeasible cost only what the violation adds is compared: a hundredth of the offset would take in all.
     beyond = best.cost - INFEASIBLE if best.cost >= INFEASIBLE else best.cost
     as_good = [item for item in starts if item.cost <= best.cost + 0.01 * abs(beyond)]
     return max(float(np.max(np.abs(np.subtract(item.fractions, best.fractions)))) for item in as_good)
@@ -156,13 +153,23 @@ def finding_of(
     options = " ".join(f'--set "{line}"' for line in overrides)
     verb = "simulate" if worn_kind(problem.scenario) is None else "walk"
     told = _remarks(problem, after, starts, runs, reached)
+    gains = []
+    for item in problem.searched:
+        numbers = (item.before, after.gains[item.path], item.minimum, item.maximum)
+        end = f"at its {reached[item.path]}" if item.path in reached else ""
+        gains.append((item.path, *map(item.place.quote, numbers), end))
+    listed = ", ".join(f'"{line}"' for line in overrides)
+    pasted = (
+        f"# {said}\n\n# on the command line\n{options}\n\n# in a study file\noverrides = [{listed}]\n\n"
+        f"# in Python\nppafo.{verb}({problem.scenario.name!r}, {'overrides=' * (verb == 'walk')}[{listed}])\n"
+    )
     return Finding(
         name="tune",
         kicker="Tuning",
         title=problem.name,
         said=(said, *([problem.description] if problem.description else [])),
         parts=(
-            Part("Gains", _gains(problem, after, reached)),
+            Part("Gains", columns_of(("gain", "before", "after", "minimum", "maximum", ""), gains)),
             Part(
                 "Before and after",
                 _metrics(problem, before, after),
@@ -204,7 +211,7 @@ def finding_of(
             problem=problem,
         ),
         passed=after.is_feasible,
-        files={"overrides.txt": lambda: _pasted(said, problem.scenario.name, verb, options, overrides).encode()},
+        files={"overrides.txt": pasted.encode},
     )
 
 
@@ -227,6 +234,7 @@ def verdict(problem: Problem, before: Setting, after: Setting) -> str:
             f"{name}: the gains found satisfy all constraints, which the previous gains did not; objective "
             f"{after.objective:.4g}"
         )
+    # Beyond a bound the gains before are no candidates, and the best within may be worse.
     if after.objective >= before.objective:
         return f"{name}: nothing better than the previous gains was found within the bounds"
     change = (after.objective - before.objective) / abs(before.objective) if before.objective else math.nan
@@ -245,25 +253,17 @@ def _by_ceiling(problem: Problem, after: Setting) -> str:
     )
 
 
-def _gains(problem: Problem, after: Setting, reached: Mapping[str, str]) -> list[Column]:
-    """Return a row for each searched number: before, after, bounds, and whether it ended at one."""
-    rows = []
-    for item in problem.searched:
-        numbers = (item.before, after.gains[item.path], item.minimum, item.maximum)
-        end = f"at its {reached[item.path]}" if item.path in reached else ""
-        rows.append((item.path, *map(item.place.quote, numbers), end))
-    return columns_of(("gain", "before", "after", "minimum", "maximum", ""), rows)
-
-
 def _metrics(problem: Problem, before: Setting, after: Setting) -> list[Column]:
     """Return a row for each metric of the goals and constraints."""
     names, spread = problem.metrics, problem.spread
-    limits = [", ".join(_limit(item) for item in problem.constraints if item.metric == name) for name in names]
+    limits = [", ".join(item.words for item in problem.constraints if item.metric == name) for name in names]
 
     def column(title: str, values: Mapping[str, float]) -> Column:
         return Column(title, [_number(name, values.get(name)) for name in names])
 
-    metric, constraint = Column("metric", [_title(name) for name in names]), Column("constraint", limits)
+    kinds = {name: of_metric(name) for name in names}
+    titles = [f"{name} ({kind.shown_unit})" if kind.quantity else name for name, kind in kinds.items()]
+    metric, constraint = Column("metric", titles), Column("constraint", limits)
     if spread is None:
         return [metric, column("before", before.values), column("after", after.values), constraint]
     nominal = [{name: item.value for name, item in side.metrics.items()} for side in (before, after)]
@@ -277,11 +277,6 @@ def _metrics(problem: Problem, before: Setting, after: Setting) -> list[Column]:
         column("before, nominal", nominal[0]),
         column("after, nominal", nominal[1]),
     ]
-
-
-def _title(name: str) -> str:
-    unit = of_metric(name).shown_unit if of_metric(name).quantity else ""
-    return f"{name} ({unit})" if unit else name
 
 
 def _remarks(
@@ -312,39 +307,20 @@ def _remarks(
             "draws that the search did not use"
         )
     fractions = ", ".join(f"{name} {fraction_text(fraction)}" for name, fraction in after.share_of_noise.items())
-    said += (
-        [f"fraction of the variance over the fresh draws that is due to sensor noise: {fractions}"] if fractions else []
-    )
-    return [*said, *(f"violated on fresh draws: {text}" for text in _violations_on_fresh(problem, after))]
-
-
-def _violations_on_fresh(problem: Problem, after: Setting) -> list[str]:
-    """Return what the result breaks over fresh draws: constraints, and runs that fail."""
-    values, lacking = after.fresh, after.fresh_share_without_value
+    if fractions:
+        said.append(f"fraction of the variance over the fresh draws that is due to sensor noise: {fractions}")
     broken = [
-        f"{item.metric} {_limit(item)}, it is {_number(item.metric, values[item.metric])}"
+        f"{item.metric} {item.words}, it is {_number(item.metric, after.fresh[item.metric])}"
         for item in problem.constraints
-        if item.metric in values and not keeps(item, values[item.metric])
+        if item.metric in after.fresh and not item.is_kept(after.fresh[item.metric])
     ]
-    return [*broken, *([f"{percentage(lacking, 2)} of the runs fail or lack a metric"] if values and lacking else [])]
-
-
-def _pasted(said: str, scenario: str, verb: str, options: str, overrides: Sequence[str]) -> str:
-    """Return the gains for a command line, a study file and Python."""
-    listed = ", ".join(f'"{line}"' for line in overrides)
-    given = "" if verb == "simulate" else "overrides="
-    return (
-        f"# {said}\n\n# on the command line\n{options}\n\n# in a study file\noverrides = [{listed}]\n\n"
-        f"# in Python\nppafo.{verb}({scenario!r}, {given}[{listed}])\n"
-    )
+    if after.fresh and after.fresh_share_without_value:
+        broken.append(f"{percentage(after.fresh_share_without_value, 2)} of the runs fail or lack a metric")
+    return [*said, *(f"violated on fresh draws: {text}" for text in broken)]
 
 
 def _number(name: str, value: float | None) -> str:
     return "" if value is None or math.isnan(value) else of_metric(name).number(value)
-
-
-def _limit(item: Limit) -> str:
-    return f"at {'most' if item.is_most else 'least'} {item.text}"
 
 
 _SHOWN = (

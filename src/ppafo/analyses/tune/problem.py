@@ -1,8 +1,7 @@
 """A tuning: its file, and the way from a name, a file or plain data to frozen values in SI units."""
 
-import copy
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -12,17 +11,24 @@ import numpy as np
 from pydantic import Field
 
 from ppafo.documents.models import NAME, StrictTable, Text, Texts, make_schema, validate
-from ppafo.documents.toml_text import TomlKind, beside, label
+from ppafo.documents.toml_text import TomlKind, beside
 from ppafo.errors import ParameterError, ScenarioError, StudyError, UnitError, first_twice, refused_as
 from ppafo.loading import load_scenario, placed, reloaded
 from ppafo.parameters.graph import ATMOSPHERE_PATH
-from ppafo.simulation.numbers import number_at
 from ppafo.simulation.scenario import Scenario
-from ppafo.studies.distributions import Floats
-from ppafo.studies.draws import Uncertainty, atmosphere_of, check_metrics, difference_of, level_of, uncertainty_of
-from ppafo.studies.loading import list_studies, load_study
+from ppafo.studies.distributions import Floats, LogUniformBetween, UniformBetween
+from ppafo.studies.draws import (
+    Limit,
+    Uncertainty,
+    atmosphere_of,
+    check_metrics,
+    difference_of,
+    level_of,
+    uncertainty_of,
+)
+from ppafo.studies.loading import list_studies, load_study, read_source
 from ppafo.studies.sampling import NOISE
-from ppafo.studies.varying import VariedPath, in_its_unit, varied_path
+from ppafo.studies.varying import VariedPath, in_its_unit, value_at, varied_path
 
 LARGEST_SEED = 2**32 - 1
 MAXIMUM_DRAWS = 4096
@@ -119,9 +125,8 @@ class Searched:
 
     def value(self, fraction: Floats) -> Floats:
         """Return values [SI] at fractions of the way from the minimum to the maximum."""
-        if self.is_logarithmic:
-            return self.minimum * np.exp(math.log(self.maximum / self.minimum) * fraction)
-        return self.minimum + (self.maximum - self.minimum) * fraction
+        between = LogUniformBetween if self.is_logarithmic else UniformBetween
+        return between(self.minimum, self.maximum).values(fraction)
 
     def fraction(self, value: float) -> float:
         """Return the fraction of the way at which a value lies; outside 0 to 1 beyond the bounds."""
@@ -144,16 +149,6 @@ class Term:
     metric: str
     weight: float
     scale: float | None
-
-
-@dataclass(frozen=True, slots=True)
-class Limit:
-    """A metric with the largest value that it may have [SI], or the smallest where not ``is_most``."""
-
-    metric: str
-    limit: float
-    is_most: bool
-    text: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,6 +179,7 @@ class Spread:
         """Return the high, or low, end of values (candidates, draws) [SI], shape (candidates,)."""
         if self.fraction is not None:
             return np.asarray(np.quantile(values, self.fraction if is_high else 1.0 - self.fraction, axis=1))
+        # Of a sample, hence n - 1; the draws are the same for all candidates, so that it ranks them fairly.
         spread = self.deviations * np.std(values, axis=1, ddof=1)
         return np.asarray(np.mean(values, axis=1) + (spread if is_high else -spread))
 
@@ -228,6 +224,7 @@ class Problem:
 
     def gains(self, fractions: Sequence[float]) -> Gains:
         """Return the values [SI] at fractions of the way, rounded as written: what is pasted is what was run."""
+        # Through the text that is pasted: a run of that line gives these bits again.
         values = {
             item.path: float(item.value(np.asarray(fraction)))
             for item, fraction in zip(self.searched, fractions, strict=True)
@@ -242,7 +239,6 @@ class Problem:
 TUNING = TomlKind("tuning", "tuning", resources.files("ppafo") / "analyses" / "tune" / "library", StudyError)
 NOISE_DRAWS = 16
 """Noise streams over which every candidate is judged where nothing else is uncertain."""
-Refusal = Callable[[object], StudyError]
 
 
 def list_tunings() -> tuple[str, ...]:
@@ -255,133 +251,98 @@ def load_tuning(tuning: str | Path | Mapping[str, Any], overrides: Sequence[str]
 
     ``overrides`` change the scenario. StudyError for anything that is not usable.
     """
-    if isinstance(tuning, Mapping):
-        TUNING.check_depth(tuning, "tuning")
-        return _problem(copy.deepcopy(dict(tuning)), "tuning", Path(), overrides)
-    file = label(str(tuning))
-    return _problem(TUNING.parse(TUNING.read(tuning), file), file, Path(tuning).parent, overrides)
+    document, source = read_source(TUNING, tuning)
+    parsed = validate(TuningFile, document, source.file, StudyError)
+    with refused_as(StudyError, source.file, ScenarioError, ParameterError, StudyError):
+        return _problem(parsed, source.folder, overrides)
 
 
-def _problem(document: dict[str, Any], file: str, folder: Path, overrides: Sequence[str]) -> Problem:
-    def refusal(text: object) -> StudyError:
-        return StudyError(f"{file}: {text}")
-
-    parsed = validate(TuningFile, document, file, StudyError)
-    try:
-        scenario = load_scenario(placed(parsed.scenario, folder), parsed.overrides)
-        scenario = reloaded(scenario, overrides) if overrides else scenario
-        check_metrics(_once([*parsed.objective, *parsed.constraints]), scenario)
-    except (ScenarioError, ParameterError, StudyError) as error:
-        raise refusal(error) from error
-    spread = _spread(parsed, folder, [item.path for item in parsed.search], scenario, refusal)
-    drawn = () if spread is None else (*spread.uncertainty.paths, *spread.uncertainty.same)
+def _problem(parsed: TuningFile, folder: Path, overrides: Sequence[str]) -> Problem:
+    scenario = load_scenario(placed(parsed.scenario, folder), parsed.overrides)
+    scenario = reloaded(scenario, overrides) if overrides else scenario
+    metrics = [*(item.metric for item in parsed.objective), *(item.metric for item in parsed.constraints)]
+    check_metrics(list(dict.fromkeys(metrics)), scenario)
     paths = [item.path for item in parsed.search]
+    spread = _spread(parsed, folder, paths, scenario)
+    drawn = () if spread is None else (*spread.uncertainty.paths, *spread.uncertainty.same)
     repeated = first_twice(paths)
     if repeated is not None:
-        raise refusal(f"'{repeated}' is searched twice; give it only one [[search]]")
+        raise StudyError(f"'{repeated}' is searched twice; give it only one [[search]]")
     varies = ATMOSPHERE_PATH in (*paths, *drawn)
-    searched = tuple(_search_variable(item, scenario, varies, refusal) for item in parsed.search)
-    atmosphere = atmosphere_of(scenario, (*drawn, *(item.path for item in searched)))
+    atmosphere = atmosphere_of(scenario, (*drawn, *paths))
     return Problem(
         name=parsed.name,
         description=" ".join(parsed.description.split()),
         scenario=scenario,
         overrides=scenario.origin.overrides,
-        searched=searched,
-        goals=tuple(_goal(item, refusal) for item in parsed.objective),
-        constraints=tuple(_constraint(item, atmosphere, refusal) for item in parsed.constraints),
+        searched=tuple(_searched(item, scenario, varies) for item in parsed.search),
+        goals=tuple(_goal(item) for item in parsed.objective),
+        constraints=tuple(_constraint(item, atmosphere) for item in parsed.constraints),
         spread=spread,
         effort=parsed.effort,
     )
 
 
-def _once(items: Sequence[Goal | Constraint]) -> list[str]:
-    return list(dict.fromkeys(item.metric for item in items))
-
-
-def _search_variable(item: SearchRange, scenario: Scenario, atmosphere_varies: bool, refusal: Refusal) -> Searched:
-    with refused_as(refusal, f"search '{item.path}'", UnitError, ScenarioError):
+def _searched(item: SearchRange, scenario: Scenario, atmosphere_varies: bool) -> Searched:
+    with refused_as(StudyError, f"search '{item.path}'", UnitError, ScenarioError):
         place = varied_path(item.path, scenario)
         place = in_its_unit(place, (item.minimum, item.maximum)) if atmosphere_varies else place
         minimum, maximum = place.level(item.minimum), place.level(item.maximum)
-        before = present_value(item.path, scenario) - (place.atmosphere if place.is_gauge else 0.0)
+        before = value_at(item.path, scenario)
+        if before is None:
+            raise ScenarioError(f"scenario '{scenario.name}' has no value for '{item.path}'; set one with an override")
     if item.path == NOISE:
-        raise refusal(f"search '{item.path}': all candidates get the same noise, so it cannot be searched")
+        raise StudyError(f"search '{item.path}': all candidates get the same noise, so it cannot be searched")
     if minimum >= maximum:
-        raise refusal(f"search '{item.path}': minimum = {item.minimum!r} must be less than maximum = {item.maximum!r}")
+        raise StudyError(
+            f"search '{item.path}': minimum = {item.minimum!r} must be less than maximum = {item.maximum!r}"
+        )
     is_logarithmic = item.spacing == "logarithmic"
     if is_logarithmic and minimum <= 0.0:
-        raise refusal(f"search '{item.path}': spacing = 'logarithmic' needs a minimum above 0, not {item.minimum!r}")
+        raise StudyError(f"search '{item.path}': spacing = 'logarithmic' needs a minimum above 0, not {item.minimum!r}")
+    # Where the atmosphere varies, gauge bounds count from each run's own; so does the value before.
+    before -= place.atmosphere if place.is_gauge else 0.0
     return Searched(item.path, minimum, maximum, is_logarithmic, before, place)
 
 
-def _goal(item: Goal, refusal: Refusal) -> Term:
+def _goal(item: Goal) -> Term:
     if item.weight == 0.0:
-        raise refusal(f"objective '{item.metric}': weight = 0 has no effect; omit it")
+        raise StudyError(f"objective '{item.metric}': weight = 0 has no effect; omit it")
     if item.scale is None:
         return Term(item.metric, item.weight, None)
-    try:
-        scale = difference_of(item.scale, item.metric, f"objective '{item.metric}': scale = '{item.scale}'")
-    except StudyError as error:
-        raise refusal(error) from error
+    place = f"objective '{item.metric}': scale = '{item.scale}'"
+    scale = difference_of(item.scale, item.metric, place)
     if scale <= 0.0:
-        raise refusal(f"objective '{item.metric}': scale = '{item.scale}' must be more than 0")
+        raise StudyError(f"{place} must be more than 0")
     return Term(item.metric, item.weight, scale)
 
 
-def _constraint(item: Constraint, atmosphere: float | None, refusal: Refusal) -> Limit:
+def _constraint(item: Constraint, atmosphere: float | None) -> Limit:
     given = [text for text in (item.at_most, item.at_least) if text is not None]
     if len(given) != 1:
-        raise refusal(
+        raise StudyError(
             f"constraint '{item.metric}': needs either at_most or at_least, it has {'both' if given else 'none'}"
         )
-    try:
-        limit = level_of(given[0], item.metric, f"constraint '{item.metric}' = '{given[0]}'", atmosphere)
-    except StudyError as error:
-        raise refusal(error) from error
+    limit = level_of(given[0], item.metric, f"constraint '{item.metric}' = '{given[0]}'", atmosphere)
     return Limit(item.metric, limit, item.at_most is not None, given[0])
 
 
-def _spread(
-    parsed: TuningFile, folder: Path, searched: Sequence[str], scenario: Scenario, refusal: Refusal
-) -> Spread | None:
+def _spread(parsed: TuningFile, folder: Path, searched: Sequence[str], scenario: Scenario) -> Spread | None:
     """Return what the candidates are judged over: draws of a study, of the noise, of both, or nothing."""
     robust = parsed.robust
     if robust is None:
         noise = Uncertainty(()).with_noise_of([scenario])
         return Spread(noise, "", NOISE_DRAWS, parsed.effort.seed, 0.0, None) if noise.drawn else None
-    with refused_as(refusal, "robust", StudyError):
+    with refused_as(StudyError, "robust", StudyError):
         study = load_study(beside(robust.study, folder, list_studies()))
-        uncertainty = _without_restriction(uncertainty_of(study), study.only).with_noise_of([scenario])
+        uncertainty = uncertainty_of(study).with_noise_of([scenario])
+        if study.only:
+            raise StudyError(
+                f"'{next(iter(study.only))}' varies only in some configurations of the study; a tuning needs a study "
+                "without 'only'"
+            )
     both = next((path for path in uncertainty.paths if path in searched), None)
     if both is not None:
-        raise refusal(f"robust: study '{study.name}' draws '{both}', which is searched here; it cannot be both")
+        raise StudyError(f"robust: study '{study.name}' draws '{both}', which is searched here; it cannot be both")
     share = robust.share if robust.measure == "quantile" else None
     return Spread(uncertainty, study.name, robust.draws, study.sample.seed, robust.deviations, share)
-
-
-def _without_restriction(uncertainty: Uncertainty, only: Mapping[str, Sequence[str]]) -> Uncertainty:
-    if only:
-        path = next(iter(only))
-        raise StudyError(
-            f"'{path}' varies only in some configurations of the study; a tuning needs a study without 'only'"
-        )
-    return uncertainty
-
-
-def present_value(path: str, scenario: Scenario) -> float:
-    """Return the value [SI] of a scenario at a path as in overrides; ScenarioError where it has none there."""
-    if path == "controller.rate":
-        return 1.0 / scenario.controller.period
-    of_clock = {
-        "controller.period": scenario.controller.period,
-        "run.duration": scenario.run.duration,
-        "run.step": scenario.run.step,
-        "run.output_interval": scenario.run.output_interval,
-    }
-    try:
-        return float(of_clock[path]) if path in of_clock else number_at(scenario, path)
-    except (AttributeError, KeyError, TypeError) as error:
-        raise ScenarioError(
-            f"scenario '{scenario.name}' has no value for '{path}'; set one with an override"
-        ) from error

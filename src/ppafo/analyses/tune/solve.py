@@ -20,9 +20,8 @@ from ppafo.analyses.tune.answer import (
     Start,
     Tuned,
     finding_of,
-    keeps,
 )
-from ppafo.analyses.tune.problem import Effort, Gains, Limit, Problem, Spread, Term, load_tuning
+from ppafo.analyses.tune.problem import Effort, Gains, Problem, Spread, load_tuning
 from ppafo.errors import StudyError
 from ppafo.metrics import METRICS
 from ppafo.parameters.device import VANE
@@ -34,7 +33,7 @@ from ppafo.simulation.plan import profile_bounds
 from ppafo.simulation.scenario import Scenario, worn_kind
 from ppafo.simulation.simulate import OPEN_LOOP, simulate
 from ppafo.studies.distributions import Floats, noise_interval
-from ppafo.studies.draws import with_new_noise
+from ppafo.studies.draws import NOISE_DRAWS, with_new_noise
 from ppafo.studies.study import with_overrides
 from ppafo.study.runs import FAILED, Runs, Tally, settled, with_companions
 
@@ -67,13 +66,9 @@ class Judgement:
     @property
     def cost(self) -> Floats:
         """One number by which candidates are compared."""
+        # Deb's rules in one number, since SciPy compares nothing else.
         usual = np.where(self.violation > 0.0, INFEASIBLE + self.violation, self.objective)
         return np.where(self.without_value > 0.0, UNUSABLE * (1.0 + self.without_value), usual)
-
-    @property
-    def is_feasible(self) -> NDArray[np.bool_]:
-        """Which candidates satisfy all constraints and never fail."""
-        return np.asarray((self.violation == 0.0) & (self.without_value == 0.0))
 
 
 def shortfall(scenario: Scenario) -> Floats:
@@ -101,21 +96,15 @@ def judge(runs: Crossed, problem: Problem, scales: Mapping[str, float]) -> Judge
     failing = runs.without_value
     # Candidates with failed runs are ranked by how many fail: 0 keeps nan out of the sums meanwhile.
     known = {name: np.where(failing[:, None] > 0.0, 0.0, values) for name, values in runs.metrics.items()}
-    objective = sum((_term(goal, known, problem.spread, scales) for goal in problem.goals), np.zeros(failing.size))
-    violation = sum((_excess(item, known, problem.spread) for item in problem.constraints), np.zeros(failing.size))
-    return Judgement(np.asarray(objective), np.asarray(violation), failing)
-
-
-def _term(goal: Term, values: Mapping[str, Floats], spread: Spread | None, scales: Mapping[str, float]) -> Floats:
-    return goal.weight * bad_ends(values[goal.metric], spread, goal.weight > 0.0) / scales[goal.metric]
-
-
-def _excess(item: Limit, values: Mapping[str, Floats], spread: Spread | None) -> Floats:
-    """Return by how much a constraint is broken, as a fraction of its limit (candidates,); 0 where it is kept."""
-    reached = bad_ends(values[item.metric], spread, item.is_most)
-    beyond = reached - item.limit if item.is_most else item.limit - reached
-    # A limit of 0 has no fractions: the excess itself counts.
-    return np.maximum(0.0, beyond) / (abs(item.limit) or 1.0)
+    objective, violation, spread = np.zeros(failing.size), np.zeros(failing.size), problem.spread
+    for goal in problem.goals:
+        objective += goal.weight * bad_ends(known[goal.metric], spread, goal.weight > 0.0) / scales[goal.metric]
+    for item in problem.constraints:
+        reached = bad_ends(known[item.metric], spread, item.is_most)
+        beyond = reached - item.limit if item.is_most else item.limit - reached
+        # As a fraction of the limit, so that constraints in different units add up; a limit of 0 has no fractions.
+        violation += np.maximum(0.0, beyond) / (abs(item.limit) or 1.0)
+    return Judgement(objective, violation, failing)
 
 
 Costs = Callable[[Floats], Floats]
@@ -157,6 +146,7 @@ def _start(costs: Costs, before: Sequence[float], effort: Effort, random: np.ran
         is_settled = have_come_together(intermediate_result.population_energies)
         return is_settled
 
+    # SciPy refuses a first candidate beyond the bounds.
     is_within = all(0.0 <= fraction <= 1.0 for fraction in before)
     result = differential_evolution(
         generation,
@@ -188,8 +178,6 @@ def have_come_together(costs: Floats) -> bool:
 
 MINIMUM_ERRORS = ("peak_error", "rms_error_hold")
 """Metrics that are never below what the supply lacks of the largest reference."""
-_NOISE_DRAWS = 512
-"""Fresh draws that are run once more with other noise."""
 _NOISE_CONFIDENCE = 0.95
 
 
@@ -202,56 +190,43 @@ def tune(
 ) -> Finding[Tuned]:
     """Search the best values of a tuning: a name, a TOML file, data laid out as one, or a Problem.
 
-    ``overrides`` change the scenario, ``seed`` is the seed of the search, the file's by default. Every generation is
-    one ensemble, and every candidate sees the same draws. StudyError for bad input, and where a goal has no scale
-    because the scenario as it is gives 0 or nothing.
+    ``overrides`` change the scenario, ``seed`` is the seed of the search, the file's by default. The rest is as
+    ``ppafo.tune`` describes it.
     """
-    problem = _problem_of(tuning, overrides)
+    if tuning is None:
+        raise StudyError("no tuning was given: name one or give a .toml file; 'ppafo tune --list' shows them")
+    if isinstance(tuning, Problem) and overrides:
+        raise StudyError("a loaded Problem takes no overrides; give them to load_tuning")
+    problem = tuning if isinstance(tuning, Problem) else load_tuning(tuning, overrides)
     if seed is not None:
         problem = replace(problem, effort=problem.effort.model_copy(update={"seed": seed}))
         # Noise alone follows the seed of the search; draws of a study keep the seed of the study.
         if problem.spread is not None and not problem.spread.study:
             problem = replace(problem, spread=replace(problem.spread, seed=seed))
-    effort, draws = problem.effort, 1 if problem.spread is None else problem.spread.draws
+    effort, spread = problem.effort, problem.spread
     candidates = effort.candidates_per_gain * len(problem.searched) * (effort.generations + 1) * effort.starts
-    noise = _NOISE_DRAWS if problem.spread is not None and problem.spread.uncertainty.has_noise else 0
-    tally = Tally(draws * (candidates + 3) + (2 * (FRESH_DRAWS + noise) if problem.spread is not None else 0), progress)
+    expected = candidates + 3
+    if spread is not None:
+        expected = spread.draws * expected + 2 * (FRESH_DRAWS + NOISE_DRAWS * spread.uncertainty.has_noise)
     metrics = with_companions(problem.metrics, problem.scenario)
-    runs = Runs(problem.scenario, metrics, tally, problem.gauge, threads)
-    fixed = _draws(problem, 0, 1 if problem.spread is None else problem.spread.draws)
-    scales = _scales(problem, _of_gains(runs, problem, [problem.before], fixed))
+    runs = Runs(problem.scenario, metrics, Tally(expected, progress), problem.gauge, threads)
+    draws = {} if spread is None else spread.uncertainty.random_columns(0, spread.draws, spread.seed)
+    scales = _scales(problem, _of_gains(runs, problem, problem.before, draws))
 
     def costs(fractions: Floats) -> Floats:
         values = {item.path: item.value(fractions[:, column]) for column, item in enumerate(problem.searched)}
-        return judge(_crossed(runs, problem, values, fixed), problem, scales).cost
+        return judge(_crossed(runs, problem, values, draws), problem, scales).cost
 
     before = [item.fraction(item.before) for item in problem.searched]
-    starts = search(costs, before, problem.effort)
+    starts = search(costs, before, effort)
     first, last = (
-        _setting(runs, problem, scales, gains) for gains in (problem.before, problem.gains(starts[0].fractions))
+        _setting(runs, problem, scales, gains, draws) for gains in (problem.before, problem.gains(starts[0].fractions))
     )
     return finding_of(problem, scales, first, last, starts, runs.count)
 
 
-def _problem_of(tuning: Problem | str | Path | Mapping[str, Any] | None, overrides: Sequence[str]) -> Problem:
-    if tuning is None:
-        raise StudyError("no tuning was given: name one or give a .toml file; 'ppafo tune --list' shows them")
-    if not isinstance(tuning, Problem):
-        return load_tuning(tuning, overrides)
-    if overrides:
-        raise StudyError("a loaded Problem takes no overrides; give them to load_tuning")
-    return tuning
-
-
-def _draws(problem: Problem, first: int, count: int) -> dict[str, Floats]:
-    """Return draws of the uncertain values; nothing without uncertainty."""
-    spread = problem.spread
-    return {} if spread is None else spread.uncertainty.random_columns(first, count, spread.seed)
-
-
-def _of_gains(runs: Runs, problem: Problem, gains: Sequence[Gains], draws: Mapping[str, Floats]) -> Crossed:
-    values = {item.path: np.array([one[item.path] for one in gains]) for item in problem.searched}
-    return _crossed(runs, problem, values, draws)
+def _of_gains(runs: Runs, problem: Problem, gains: Gains, draws: Mapping[str, Floats]) -> Crossed:
+    return _crossed(runs, problem, {item.path: np.array([gains[item.path]]) for item in problem.searched}, draws)
 
 
 def _crossed(runs: Runs, problem: Problem, values: Mapping[str, Floats], draws: Mapping[str, Floats]) -> Crossed:
@@ -267,6 +242,7 @@ def _crossed(runs: Runs, problem: Problem, values: Mapping[str, Floats], draws: 
 
 def _scales(problem: Problem, before: Crossed) -> dict[str, float]:
     """Return the size of each goal: the given one, or its value before tuning."""
+    # By default each goal is 1 before tuning: goals in different units then weigh as much as their weights say.
     scales = {}
     for goal in problem.goals:
         found = goal.scale
@@ -281,18 +257,22 @@ def _scales(problem: Problem, before: Crossed) -> dict[str, float]:
     return scales
 
 
-def _setting(runs: Runs, problem: Problem, scales: Mapping[str, float], gains: Gains) -> Setting:
+def _setting(
+    runs: Runs, problem: Problem, scales: Mapping[str, float], gains: Gains, draws: Mapping[str, Floats]
+) -> Setting:
     spread = problem.spread
-    seen = _of_gains(runs, problem, [gains], _draws(problem, 0, 1 if spread is None else spread.draws))
-    judged: Judgement = judge(seen, problem, scales)
-    # Draws that follow those of the search: the gains were not chosen on them.
-    columns = {} if spread is None else _draws(problem, spread.draws, FRESH_DRAWS)
-    again = seen if spread is None else _of_gains(runs, problem, [gains], columns)
-    rejudged: Judgement = judge(again, problem, scales)
+    again = seen = _of_gains(runs, problem, gains, draws)
+    fresh: dict[str, Floats] = {}
     noise: dict[str, Interval] = {}
-    if spread is not None and spread.uncertainty.has_noise:
-        other = _of_gains(runs, problem, [gains], with_new_noise(columns, _NOISE_DRAWS))
-        noise = _noise(again, other)
+    if spread is not None:
+        # Draws that follow those of the search: the gains were not chosen on them.
+        fresh = spread.uncertainty.random_columns(spread.draws, FRESH_DRAWS, spread.seed)
+        again = _of_gains(runs, problem, gains, fresh)
+        if spread.uncertainty.has_noise:
+            other = _of_gains(runs, problem, gains, with_new_noise(fresh)).metrics
+            shares = {name: noise_interval(again.metrics[name][0], other[name][0], _NOISE_CONFIDENCE) for name in other}
+            noise = {name: share for name, share in shares.items() if share is not None}
+    judged, rejudged = (judge(each, problem, scales) for each in (seen, again))
     result = simulate(scenario_with(problem, gains))
     return Setting(
         gains=gains,
@@ -303,20 +283,11 @@ def _setting(runs: Runs, problem: Problem, scales: Mapping[str, float], gains: G
         share_without_value=float(judged.without_value[0]),
         fresh_violation=float(rejudged.violation[0]),
         fresh_share_without_value=float(rejudged.without_value[0]),
-        torque_ceiling=_ceiling(problem, gains, columns, again),
+        torque_ceiling=_ceiling(problem, gains, fresh, again),
         share_of_noise=noise,
         metrics=result.metrics,
         result=result,
     )
-
-
-def _noise(runs: Crossed, other: Crossed) -> dict[str, Interval]:
-    """Return the fraction of noise in each metric of the first candidate, where it varies."""
-    pairs = {name: (runs.metrics[name][0], values[0]) for name, values in other.metrics.items()}
-    found = {
-        name: noise_interval(first[: second.size], second, _NOISE_CONFIDENCE) for name, (first, second) in pairs.items()
-    }
-    return {name: fraction for name, fraction in found.items() if fraction is not None}
 
 
 def _ceiling(problem: Problem, gains: Gains, draws: Mapping[str, Floats], runs: Crossed) -> Ceiling:
@@ -326,27 +297,22 @@ def _ceiling(problem: Problem, gains: Gains, draws: Mapping[str, Floats], runs: 
     scenario = with_numbers(base, given)
     if scenario.controller.kind == OPEN_LOOP or worn_kind(scenario) is not None:
         return Ceiling(0.0, ())
-    known = runs.metrics
-    lacking = np.broadcast_to(shortfall(scenario), known[problem.metrics[0]][:1].shape)
-    explained = [
-        item.metric
-        for item in problem.constraints
-        if "reference" in METRICS[item.metric].channels
-        and not keeps(item, float(bad_ends(known[item.metric], problem.spread, item.is_most)[0]))
-        and _is_explained(item, problem.spread, known[item.metric], lacking)
-    ]
+    lacking = np.broadcast_to(shortfall(scenario), runs.failed[:1].shape)
+    spread, explained = problem.spread, []
+    for item in problem.constraints:
+        values, is_most = runs.metrics[item.metric], item.is_most
+        follows = "reference" in METRICS[item.metric].channels
+        if not follows or item.is_kept(float(bad_ends(values, spread, is_most)[0])):
+            continue
+        # An error is never below what the supply lacks: where that alone is too much, no gains can keep the limit.
+        is_mean = spread is None or spread.fraction is None
+        least = np.mean(lacking, axis=1) if is_mean else bad_ends(lacking, spread, True)
+        is_out_of_reach = item.metric in MINIMUM_ERRORS and is_most and not item.is_kept(float(least[0]))
+        # Else the draws that lack nothing must keep it alone; a standard deviation needs two of them.
+        rest = values[:, lacking[0] == 0.0]
+        if is_out_of_reach or rest.shape[1] < 2 or item.is_kept(float(bad_ends(rest, spread, is_most)[0])):
+            explained.append(item.metric)
     return Ceiling(float(np.mean(lacking > 0.0)), tuple(explained) if lacking.any() else ())
-
-
-def _is_explained(item: Limit, spread: Spread | None, values: Floats, lacking: Floats) -> bool:
-    """Tell whether the draws below the ceiling alone break a constraint: no gains can, or the others keep it."""
-    if item.metric in MINIMUM_ERRORS and item.is_most:
-        least = np.mean(lacking, axis=1) if spread is None or spread.fraction is None else spread.bad_end(lacking, True)
-        if not keeps(item, float(least[0])):
-            return True
-    rest = values[:, lacking[0] == 0.0]
-    # A standard deviation needs two draws.
-    return rest.shape[1] < 2 or keeps(item, float(bad_ends(rest, spread, item.is_most)[0]))
 
 
 def scenario_with(problem: Problem, gains: Gains) -> Scenario:

@@ -9,9 +9,10 @@ import pytest
 
 import ppafo
 from ppafo.analyses.tune.answer import Tuned, verdict
-from ppafo.analyses.tune.problem import json_schema, list_tunings, load_tuning, present_value
+from ppafo.analyses.tune.problem import json_schema, list_tunings, load_tuning
 from ppafo.analyses.tune.solve import tune
 from ppafo.errors import StudyError
+from ppafo.studies.varying import value_at
 
 DOCUMENT: dict[str, Any] = {
     "schema_version": 1,
@@ -199,9 +200,10 @@ def test_a_goal_that_is_zero_before_needs_a_scale() -> None:
     ],
 )
 def test_present_values_are_found(path: str, value: float) -> None:
-    assert present_value(path, ppafo.load_scenario("torque-task-proportional")) == pytest.approx(value)
+    assert value_at(path, ppafo.load_scenario("torque-task-proportional")) == pytest.approx(value)
 
 
 def test_a_value_that_is_not_there_yet_is_said() -> None:
-    with pytest.raises(ppafo.ScenarioError, match=r"has no value for 'valve.sonic_conductance'; set one"):
-        present_value("valve.sonic_conductance", ppafo.load_scenario("torque-task-proportional"))
+    conductance = {"path": "valve.sonic_conductance", "minimum": "1e-9 m^3/(s Pa)", "maximum": "1e-8 m^3/(s Pa)"}
+    with pytest.raises(StudyError, match=r"has no value for 'valve.sonic_conductance'; set one"):
+        load_tuning(changed(search=[conductance]))
