@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +22,6 @@ from ppafo.metrics.strides import PER_STRIDE
 from ppafo.model.helping import STOPPED
 from ppafo.model.leg import passive_torque
 from ppafo.parameters.device import Actuator, FootPlate, Friction
-from ppafo.report.display_units import display_values, title_with_unit
-from ppafo.report.style import BLUE, GREY, VERMILION, house_style, mark_kind
 from ppafo.simulation.plan import MAXIMUM_STEPS
 from ppafo.simulation.sampled import run_sampled
 from ppafo.simulation.scenario import Control, Scenario
@@ -40,10 +38,6 @@ from ppafo.walking.preparation import FaultSettings
 from ppafo.walking.result import REMEDY, WalkResult, result_of_walk
 from ppafo.walking.strides import PHASES, healthy_positive_work, healthy_toe_height, lowest_toes
 from ppafo.walking.wearer import draw_builds
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 Progress = Callable[[float, float], None]
 
@@ -257,13 +251,6 @@ SHOWN = {
 }
 """Title, kind of quantity, and digits behind the point of what is known of every wearer."""
 
-_SIZE = (9.4, 5.6)
-_DRAWN_QUANTILES = (0.05, 0.5, 0.95)
-_HISTOGRAMS = ("gas", "positive_push_off_work", "net_push_off_work", "toe_clearance")
-_PAIRS = (("stride_time", "gas"), ("body_mass", "positive_push_off_work"))
-_BINS = 40
-_MAXIMUM_POINTS = 2000
-
 
 @dataclass(frozen=True, slots=True)
 class Number:
@@ -387,44 +374,3 @@ def _run_in_groups(batch: Batch, progress: Progress) -> Floats:
         found.append(run_batch(one).states)
         progress(float(min(first + group, count)), float(count))
     return np.concatenate(found, axis=1)
-
-
-def population_figure(population: Population) -> "Figure":
-    """Return four histograms with quantiles, and two pictures of outcome over trait."""
-    from matplotlib.figure import Figure
-
-    with house_style():
-        figure = Figure(figsize=_SIZE)
-        figure.subplots_adjust(left=0.06, right=0.985, top=0.885, bottom=0.095, hspace=0.36, wspace=0.27)
-        grid = figure.subplots(2, 3).ravel().tolist()
-        for axes, name in zip((grid[0], grid[1], grid[3], grid[4]), _HISTOGRAMS, strict=True):
-            _histogram(axes, population, name)
-        for axes, (trait, outcome) in zip((grid[2], grid[5]), _PAIRS, strict=True):
-            (across, across_quantity, _), (up, up_quantity, _) = SHOWN[trait], SHOWN[outcome]
-            x = display_values(population.traits[trait], across_quantity)
-            y = display_values(population.outcomes[outcome], up_quantity)
-            thin = slice(None, None, max(1, x.size // _MAXIMUM_POINTS))
-            axes.plot(x[thin], y[thin], ".", color=BLUE, markersize=2.5, alpha=0.35, markeredgewidth=0.0)
-            axes.plot(x[0], y[0], "o", color=VERMILION, markersize=6)
-            axes.set_ylabel(title_with_unit(up, up_quantity), fontsize=9)
-            axes.set_xlabel(title_with_unit(across, across_quantity), fontsize=9)
-            axes.locator_params(nbins=5)
-        width, height = _SIZE
-        title = f"{population.scenario.name}: {population.count} wearers, {population.minutes:.3g} min each"
-        figure.text(0.12 / width, 1.0 - 0.12 / height, title, ha="left", va="top", fontweight="bold")
-        remark = "lines: 5th, 50th and 95th percentiles; dot: the wearer of the configuration"
-        figure.text(0.12 / width, 1.0 - 0.36 / height, remark, ha="left", va="top", fontsize=9, color=GREY)
-        mark_kind(figure, "simulated")
-        return figure
-
-
-def _histogram(axes: "Axes", population: Population, name: str) -> None:
-    title, quantity, _ = SHOWN[name]
-    values = display_values(population.outcomes[name], quantity)
-    axes.hist(values, bins=_BINS, color=BLUE, alpha=0.55)
-    for fraction in _DRAWN_QUANTILES:
-        axes.axvline(float(np.quantile(values, fraction)), color=GREY, linewidth=1.4 if fraction == 0.5 else 0.9)
-    axes.plot(values[0], 0.0, "o", color=VERMILION, markersize=6, clip_on=False, zorder=5)
-    axes.set_xlabel(title_with_unit(title, quantity), fontsize=9)
-    axes.set_ylabel("Wearers", fontsize=9)
-    axes.locator_params(nbins=5)
