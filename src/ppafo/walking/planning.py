@@ -31,12 +31,12 @@ from ppafo.parameters.plant import first_settings, plant_parameters
 from ppafo.simulation.plan import Components, Steps, compose_run, sensor_parameters, too_many_steps
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, ProfileChoice, Scenario
 from ppafo.walking.course import PlannedCourse, WalkingCourse, plan_course, standing_gait
+from ppafo.walking.declaration import FORCES, WALK_SENSORS
 from ppafo.walking.gait_series import heel_rocker
 from ppafo.walking.motion import walk_of
 from ppafo.walking.person import Person, VariedGaits, crowd_of, leg_of_person, person_of, settings_of_person
 from ppafo.walking.preparation import (
     FaultSettings,
-    SensorSettings,
     device_share,
     longest_delay,
     sensors_of,
@@ -169,23 +169,24 @@ def of_each(function: Any, *rows: Any) -> Any:
 
 def gait_sensors_of(scenario: Scenario) -> GaitSensors:
     """The sensors of a walk with their faults, at the sample period of its controller."""
-    settings = sensor_settings(scenario)
-    names, values = tuple(settings.numbers), [*settings.numbers.values()]
-    faults = [(sensor, fault.kind, tuple(fault.numbers)) for sensor, fault in settings.faults.items()]
-    values += [value for fault in settings.faults.values() for value in fault.numbers.values()]
+    numbers, faults = sensor_numbers(scenario), walk_of(scenario).faults
+    given = [*numbers.values(), *(value for fault in faults.values() for value in fault.numbers.values())]
 
-    def made(period: float, *given: float) -> GaitSensors:
-        left = iter(given)
-        numbers = {name: next(left) for name in names}
-        own = {sensor: FaultSettings(kind, {name: next(left) for name in known}) for sensor, kind, known in faults}
-        return sensors_of(SensorSettings(numbers, own), period)
+    def made(period: float, *values: float) -> GaitSensors:
+        left = iter(values)
+        own = {name: next(left) for name in numbers}
+        failing = {
+            sensor: FaultSettings(fault.kind, {name: next(left) for name in fault.numbers})
+            for sensor, fault in faults.items()
+        }
+        return sensors_of(own, failing, period)
 
-    return over_runs(made, scenario.controller.period, *values)
+    return over_runs(made, scenario.controller.period, *given)
 
 
 def failing_of(scenario: Scenario) -> tuple[PlantFaults, ShutOff] | None:
     """What fails of the plant of a walk, and its shut-off valve; None without both."""
-    motion = walk_of(scenario)
+    motion, gas = walk_of(scenario), scenario.device.gas
     if not motion.broken and not motion.shut_off:
         return None
     names = leaf_paths(PlantFaults, "")
@@ -193,29 +194,18 @@ def failing_of(scenario: Scenario) -> tuple[PlantFaults, ShutOff] | None:
     for part, fault in motion.broken.items():
         declared = PLANT_FAULTS[part][fault.kind]
         numbers |= {declared.fields[name]: number for name, number in fault.numbers.items()}
-    return rebuilt(PlantFaults, list(numbers.values())), _shut_off(motion.shut_off, scenario.device)
+    shut_off, valve = NOT_FITTED, motion.shut_off
+    if valve:
+        warm = gas.heat_capacity_ratio, gas.specific_gas_constant, gas.temperature
+        conductance = over_runs(area_conductance, valve["area"], valve["discharge_coefficient"], *warm)
+        shut_off = ShutOff(conductance, valve["delay"], valve["silence"])
+    return rebuilt(PlantFaults, list(numbers.values())), shut_off
 
 
-def _shut_off(settings: Mapping[str, Any], device: Device) -> ShutOff:
-    if not settings:
-        return NOT_FITTED
-    gas = device.gas.heat_capacity_ratio, device.gas.specific_gas_constant, device.gas.temperature
-    conductance = over_runs(area_conductance, settings["area"], settings["discharge_coefficient"], *gas)
-    return ShutOff(conductance, settings["delay"], settings["silence"])
-
-
-def sensor_settings(scenario: Scenario) -> SensorSettings:
-    """What a walk states of its sensors and their faults, in SI units."""
-    sensors, motion = scenario.sensors, walk_of(scenario)
-    shared = {
-        "angle_bandwidth": sensors.angle_bandwidth,
-        "pressure_bandwidth": sensors.pressure_bandwidth,
-        "angle_noise": sensors.angle_noise,
-        "pressure_noise": sensors.pressure_noise,
-        "angle_resolution": sensors.angle_resolution,
-        "pressure_resolution": sensors.pressure_resolution,
-    }
-    return SensorSettings({**shared, **motion.forces}, motion.faults)
+def sensor_numbers(scenario: Scenario) -> dict[str, Any]:
+    """The settings of the sensors of a walk in SI units, by name; any may be an array (runs,)."""
+    shared = (item.name for item in WALK_SENSORS if item.name not in FORCES)
+    return {**{name: getattr(scenario.sensors, name) for name in shared}, **walk_of(scenario).forces}
 
 
 def flaws(scenario: Scenario) -> tuple[Any, ...]:
@@ -223,8 +213,7 @@ def flaws(scenario: Scenario) -> tuple[Any, ...]:
 
     The bandwidth of the force sensors is no such flaw: every walk has it.
     """
-    numbers = sensor_settings(scenario).numbers
-    return tuple(number for name, number in numbers.items() if name != "force_bandwidth")
+    return tuple(number for name, number in sensor_numbers(scenario).items() if name != "force_bandwidth")
 
 
 def has_ideal_sensors(scenario: Scenario) -> bool:
@@ -255,7 +244,7 @@ def _fitted(scenario: Scenario, person: Person) -> Scenario:
 
 
 def law_of(scenario: Scenario) -> ControllerKind:
-    """The controller of a walk with its way to know the time in the stride, computing with floats.
+    """The controller of a walk with its estimator of the gait phase, computing with floats.
 
     A constant command is no controller of a walk in a file: an exported plant has it, whose command is handed in.
     """

@@ -31,6 +31,8 @@ _TURN = 2.0 * math.pi
 NEVER = 1.0e9
 """Time [s] of a fault that does not happen."""
 DISTORTED, FROZEN = "distorted", "frozen"
+DISTORTING = ("time", "period", "gain", "offset", "drift", "crosstalk", "lag", "lost_share", "delay")
+"""Numbers of a distorted sensor, in the order of ``distorting_fault``; the angle has no crosstalk, which is 0."""
 
 
 def rocker_on_heel(flat: float, rise: float, half: float, heel_lever: float) -> HeelRocker:
@@ -255,43 +257,24 @@ def longest_delay(sensors: GaitSensors) -> float:
 
 @dataclass(frozen=True, slots=True)
 class FaultSettings:
-    """A kind of ``declaration.FAULT_KINDS`` and its numbers [SI]; no kind is a sensor without a fault."""
+    """A kind of ``declaration.FAULTS`` and its numbers [SI]; no kind is a sensor without a fault."""
 
     kind: str = ""
     numbers: Mapping[str, float] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, slots=True)
-class SensorSettings:
-    """Numbers [SI] of ``declaration.WALK_SENSORS``, and faults by the name of the sensor."""
-
-    numbers: Mapping[str, float]
-    faults: Mapping[str, FaultSettings]
+def sensors_of(numbers: Mapping[str, float], faults: Mapping[str, FaultSettings], period: float) -> GaitSensors:
+    """Return the sensors of some settings [SI], with faults by sensor, at a sample period [s] of the controller."""
+    failing = {f"{sensor}_fault": _fault_of(fault, period) for sensor, fault in faults.items()}
+    return gait_sensors(numbers, period, **failing)
 
 
-def sensors_of(settings: SensorSettings, period: float) -> GaitSensors:
-    """The sensors at a sample period [s] of the controller."""
-    faults = {f"{sensor}_fault": fault_of(fault, period) for sensor, fault in settings.faults.items()}
-    return gait_sensors(settings.numbers, period, **faults)
-
-
-def fault_of(fault: FaultSettings, period: float) -> Fault:
-    """A fault at a sample period [s] of the controller."""
+def _fault_of(fault: FaultSettings, period: float) -> Fault:
     given = fault.numbers
     if not fault.kind:
         return fixed_fault(NEVER, 0.0, 0.0, 0.0)
     if fault.kind != DISTORTED:
         holds = 1.0 if fault.kind == FROZEN else 0.0
         return fixed_fault(given["time"], holds, given.get("reading", 0.0), given["period"])
-    return distorting_fault(
-        given["time"],
-        given["period"],
-        given["gain"],
-        given["offset"],
-        given["drift"],
-        given.get("crosstalk", 0.0),
-        given["lag"],
-        given["lost_share"],
-        given["delay"],
-        period,
-    )
+    numbers = [given.get(name, 0.0) for name in DISTORTING]
+    return distorting_fault(*[*numbers, period])

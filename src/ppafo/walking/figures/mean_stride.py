@@ -94,7 +94,16 @@ def walk_figure(walks: Mapping[str, Strides]) -> "Figure":
     )
     # Between title and panels: a name with its number of strides is too long to stand beside the title of a panel.
     names, place = figure.axes[0].get_legend_handles_labels(), (0.008, 1.0 - 0.32 / figure.get_figheight())
-    figure.legend(*names, loc="upper left", bbox_to_anchor=place, ncols=3, borderaxespad=0.0, handlelength=1.8)
+    figure.legend(
+        *names,
+        loc="upper left",
+        bbox_to_anchor=place,
+        ncols=3,
+        borderaxespad=0.0,
+        handlelength=1.8,
+        frameon=False,
+        fontsize=9,
+    )
     return figure
 
 
