@@ -22,7 +22,7 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.walking.declaration import LARGEST_SEED
 from ppafo.walking.gait_series import EVENT_PHASES, gait_events, gait_series, gait_timing, strike_angle
 from ppafo.walking.motion import walk_of
-from ppafo.walking.wearer import Build, Wearer, draw_bounded_normal, draw_builds, segment_values
+from ppafo.walking.wearer import Build, Wearer, draw_bounded_normal, draw_builds, scaled
 
 SERIES = {
     "shank": "shank_angle",
@@ -45,10 +45,6 @@ THRESHOLD_VARIATION = 0.15
 
 START_VARIATION = 0.03
 """Standard deviation of the fraction of the stride at which the push-off begins. Assumed."""
-
-_LENGTHS = ("shank_length", "shank_mass_centre", "foot_mass_centre", "heel_lever", "flat_heel_lever", "toe_lever")
-_MASSES = ("body_mass", "shank_mass", "foot_mass")
-_INERTIAS = ("shank_inertia", "foot_inertia")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -212,10 +208,9 @@ def crowd_of(scenario: Scenario, build: Build, gaits: VariedGaits, generator: np
 
 def leg_of_person(leg: LegParameters, person: Person) -> LegParameters:
     """The leg of the wearer at a person's mass and stature; the heel has the same shape."""
-    scaled = {name: getattr(leg, name) * person.stature for name in _LENGTHS}
-    scaled |= {name: getattr(leg, name) * person.mass for name in _MASSES}
-    scaled |= {name: getattr(leg, name) * person.mass * person.stature**2 for name in _INERTIAS}
-    return leg._replace(**scaled)
+    # The heel of a gait has two levers, of which a wearer's file gives one.
+    flat = leg.flat_heel_lever * person.stature
+    return leg._replace(**scaled(leg, person.mass, person.stature), flat_heel_lever=flat)
 
 
 def settings_of_person(settings: dict[str, Any], person: Person) -> dict[str, Any]:
@@ -246,5 +241,5 @@ def as_drawn(gait: Gait, wearer: Wearer, number: float) -> tuple[Gait, Wearer]:
         stance_share=float(gaits.timing["toe_off"][1]),
         **curves,  # type: ignore[arg-type]
     )
-    segments = {name: float(values[1]) for name, values in segment_values(wearer, build).items()}
+    segments = scaled(wearer, float(build.mass[1]), float(build.stature[1]))
     return drawn, replace(wearer, **segments)
