@@ -24,6 +24,7 @@ from ppafo.simulation.declaration import RUN, SUPPLY_LINES
 from ppafo.simulation.numbers import device_numbers, number_at
 from ppafo.simulation.plan import profile_parameters
 from ppafo.simulation.scenario import Scenario
+from ppafo.walking.contradictions import PAIRS
 from ppafo.walking.course import flat_foot
 from ppafo.walking.declaration import PERSON, fault_numbers
 from ppafo.walking.gait_series import fit_rocker, gait_series, gait_timing
@@ -54,12 +55,7 @@ from ppafo.walking.wearer import WEARER, leg_parameters
 _FORCES = ("force_bandwidth", "force_noise", "force_resolution", "lost_share")
 _OTHERS = ("angle_bandwidth", "pressure_bandwidth", "angle_lost_share", "pressure_lost_share")
 _RELATIONS = (
-    ("wearer.shank_mass_centre", "at most", "wearer.shank_length"),
-    ("wearer.foot_mass_centre", "at most", "wearer.toe_lever"),
-    ("controller.unload_threshold", "below", "controller.load_threshold"),
-    ("controller.largest_force", "above", "controller.load_threshold"),
-    ("controller.flat_from", "below", "controller.flat_to"),
-    ("controller.lowest_angle", "below", "controller.highest_angle"),
+    *((pair.path, pair.relation, pair.other) for pair in PAIRS),
     ("controller.swing_angle", "above", "controller.lowest_angle"),
     ("controller.swing_angle", "below", "controller.highest_angle"),
     ("controller.swing_angle", "above", "actuator.angle_min"),
@@ -68,9 +64,6 @@ _RELATIONS = (
     ("controller.filled_pressure", "above", "supply.atmospheric_pressure"),
     ("controller.filled_pressure", "below", "supply.pressure"),
     ("controller.filled_pressure", "below", "supply.dorsiflexion_pressure"),
-    ("controller.push_off_end", "above", "controller.push_off_start"),
-    ("controller.rise_time", "at most", "controller.peak_time"),
-    ("controller.peak_time", "at least", "controller.push_off_start"),
 )
 """Contradictions of a walk file between two numbers; those with a third, or with the gait, are left to the caller."""
 
@@ -160,10 +153,7 @@ def relations_of_walk(configuration: Scenario) -> tuple[Relation, ...]:
     rules = [(path, relation, other) for path, relation, other, _ in consistency(configuration.device)]
     if configuration.supply_lines is not None:
         rules.append(("supply.dorsiflexion_pressure", "at most", "supply.pressure"))
-    if "load_threshold" in configuration.controller.settings:
-        rules += _RELATIONS
-    else:
-        rules += _RELATIONS[:2]
+    rules += _RELATIONS
     known = _numbers(configuration)
     return tuple(
         Relation(c_identifier(path), relation, c_identifier(other))
