@@ -206,9 +206,16 @@ def read_bottle(reading: Reading, device: Device, folder: Path) -> BottleSupply 
         name = section["name"]
         path = Path(name)
         bottle = load_bottle(folder / path if path.suffix == ".toml" and not path.is_absolute() else name, own)
-    _check_set_pressure(reading, bottle, device, section["name"])
+    pressure, own_pressure = device.supply.pressure, bottle.regulator.set_pressure
+    # A bottle of the package is set to the paper's pressure, which says nothing of this walk; a user's file does.
+    if path.suffix == ".toml" and abs(own_pressure - pressure) > _SAME_PRESSURE * pressure:
+        room = device.supply.atmospheric_pressure
+        raise ScenarioError(
+            f"{reading.file}: {BOTTLE_NAME}: {name} sets {_SET_PRESSURE} to "
+            f"{quantity_text(own_pressure, 'Pa_a', room)}, and supply.pressure is "
+            f"{quantity_text(pressure, 'Pa_a', room)}: give both the same"
+        )
     # The bottle with its regulator set to the supply pressure of the device, in its entries too.
-    pressure = device.supply.pressure
     entry = Entry(value=pressure, unit="Pa_a", origin="derived", source="supply.pressure of the walk")
     regulator = bottle.regulator._replace(set_pressure=pressure)
     bottle = replace(bottle, regulator=regulator, entries={**bottle.entries, _SET_PRESSURE: entry})
@@ -223,18 +230,6 @@ def read_bottle(reading: Reading, device: Device, folder: Path) -> BottleSupply 
     )
     _check(reading, device, supply)
     return supply
-
-
-def _check_set_pressure(reading: Reading, bottle: Bottle, device: Device, name: str) -> None:
-    """Refuse a file that sets its regulator to another pressure; bottles of the package have the paper's pressure."""
-    own, given = bottle.regulator.set_pressure, device.supply.pressure
-    if Path(name).suffix != ".toml" or abs(own - given) <= _SAME_PRESSURE * given:
-        return
-    atmosphere = device.supply.atmospheric_pressure
-    raise ScenarioError(
-        f"{reading.file}: {BOTTLE_NAME}: {name} sets {_SET_PRESSURE} to {quantity_text(own, 'Pa_a', atmosphere)}, and "
-        f"supply.pressure is {quantity_text(given, 'Pa_a', atmosphere)}: give both the same"
-    )
 
 
 def _numbers(reading: Reading, section: Mapping[str, Any], bottle: Bottle) -> dict[str, float]:
@@ -445,7 +440,8 @@ def life_on_bottle(
 
 def _course_of_use(supply: BottleSupply, use: _Use) -> SupplyCourse:
     time, state, _ = use.met[-1]
-    return _course(supply, use.met, use.regulated, use.ending or SupplyEnding(WALKED, _at_the_end(state), time))
+    over = f"the walk is over, and {_grams(state.mass)} are left in the bottle"
+    return _course(supply, use.met, use.regulated, use.ending or SupplyEnding(WALKED, over, time))
 
 
 def _use_bottle(
@@ -611,10 +607,6 @@ def _ending(
         degrees = f"{now.content.temperature - 273.15:.0f} degC"
         return SupplyEnding("too cold", f"the bottle is too cold, {degrees}, and {short}; {left} are left", time)
     return SupplyEnding("empty", f"the bottle is empty, and {short}; {left} are left", time)
-
-
-def _at_the_end(state: SupplyState) -> str:
-    return f"the walk is over, and {_grams(state.mass)} are left in the bottle"
 
 
 def _grams(mass: float) -> str:

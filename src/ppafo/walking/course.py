@@ -130,20 +130,17 @@ def load_course(name_or_path: str | Path) -> WalkingCourse:
             raise ScenarioError(f"{file}: segment {number}: kind = {quote(kind)} is not known{hint}; {allowed}")
         place = f"{file}: segment {number} ({kind})"
         validate(_segment_table(kind), given, place, ScenarioError)
-        segments.append(_segment(Reading(place, given), kind))
+        reading = Reading(place, given)
+        present = [item for item in KINDS[kind][1] if item not in _OPTIONAL or item.name in given]
+        values = {item.name: reading.number(item.name, item) for item in present}
+        strides = values.get("strides")
+        if strides is not None and strides != int(strides):
+            raise reading.refusal("strides", "must be a whole number")
+        segments.append(Segment(kind, values))
     course = WalkingCourse(document["name"], document.get("description", ""), tuple(segments), file)
     for index, reason in _contradictions(course.segments):
         raise course.refusal(index, reason)
     return course
-
-
-def _segment(reading: Reading, kind: str) -> Segment:
-    given = [item for item in KINDS[kind][1] if item not in _OPTIONAL or item.name in reading.document]
-    segment = Segment(kind, {item.name: reading.number(item.name, item) for item in given})
-    strides = segment.values.get("strides")
-    if strides is not None and strides != int(strides):
-        raise reading.refusal("strides", "must be a whole number")
-    return segment
 
 
 def _contradictions(segments: Iterable[Segment]) -> Iterator[tuple[int, str]]:
@@ -258,7 +255,7 @@ class _Planner:
 
     def stay(self, length: Numbers, load: float) -> None:
         """Stand for a time [s]; the load changes over it."""
-        self._add(length, 0.0, 0.0, 0.0, load, 0.0, 0.0, 0.0)
+        self._add(length, 0.0, 0.0, 0.0, load)
 
     def go(
         self,
@@ -285,11 +282,10 @@ class _Planner:
         ratio: float,
         stride: float,
         load: float,
-        tilt: Numbers,
-        scuff: float,
-        slope: float,
+        tilt: Numbers = 0.0,
+        scuff: float = 0.0,
+        slope: float = 0.0,
     ) -> None:
-        before = self.stride
         frequency = self.ratio * self.frequency
         self.parts.append(
             CoursePart(
@@ -298,8 +294,8 @@ class _Planner:
                 turns=self.turns,
                 frequency=frequency,
                 frequency_gain=ratio * self.frequency - frequency,
-                stride=before,
-                stride_gain=stride - before,
+                stride=self.stride,
+                stride_gain=stride - self.stride,
                 load=self.load,
                 load_gain=load - self.load,
                 slope=self.slope,

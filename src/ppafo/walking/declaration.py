@@ -218,14 +218,6 @@ OF_A_WALK = Declared(
 """What the file of a walk can hold. Gait and course stand at the top of the file or, as its motion, in [motion]."""
 
 
-def _timing() -> Any:
-    found = []
-    for name, kind in TIMINGS.items():
-        fields = {item.name: optional(number_type(item), item.summary) for item in kind.quantities}
-        found.append(table(f"{model_name(name)}Timing", kind_field(name, kind.summary) | fields))
-    return one_of(found)
-
-
 def _fault(part: str) -> Any:
     """Return the table of a sensor or a part of the plant that fails."""
     return one_of(
@@ -237,12 +229,6 @@ def _fault(part: str) -> Any:
             for kind, fault in FAULTS[part].items()
         ]
     )
-
-
-def _bottle() -> dict[str, Any]:
-    numbers = {item.name: optional(number_type(item), item.summary) for item in BOTTLE_NUMBERS}
-    changes: Any = (list[str], Field(default_factory=list, description="such as 'room.temperature=5 degC'"))
-    return {"name": optional(str, "name of a bottle, or the path of its file"), **numbers, "overrides": changes}
 
 
 def walk_file(document: Mapping[str, Any]) -> type[BaseModel]:
@@ -260,6 +246,13 @@ def _walk_file(_controllers: Any, walks: tuple[tuple[str, WalkKind], ...]) -> ty
         part: optional(_fault(part), f"fault of the {part} sensor" if part in FAULTY else f"fault of the plant: {part}")
         for part in FAULTS
     }
+    timings = []
+    for name, timing in TIMINGS.items():
+        own_fields = {item.name: optional(number_type(item), item.summary) for item in timing.quantities}
+        timings.append(table(f"{model_name(name)}Timing", kind_field(name, timing.summary) | own_fields))
+    bottle: dict[str, Any] = {"name": optional(str, "name of a bottle, or the path of its file")}
+    bottle |= {item.name: optional(number_type(item), item.summary) for item in BOTTLE_NUMBERS}
+    bottle["overrides"] = (list[str], Field(default_factory=list, description="such as 'room.temperature=5 degC'"))
     run = {"duration": optional(number_type(DURATION), DURATION.summary)}
     run |= quantity_fields((STEP,))
     which = {
@@ -285,7 +278,7 @@ def _walk_file(_controllers: Any, walks: tuple[tuple[str, WalkKind], ...]) -> ty
             controller_table(walking_controllers(), "Walking"),
             Field(description="what commands the valve"),
         ),
-        "timing": optional(_timing(), "how the controller estimates the gait phase; thresholds unless given"),
+        "timing": optional(one_of(timings), "how the controller estimates the gait phase; thresholds unless given"),
         "wearer": optional(
             table("Wearer", wearer), "who walks; the subject of the gait that is named, else the paper's, unless given"
         ),
@@ -296,7 +289,7 @@ def _walk_file(_controllers: Any, walks: tuple[tuple[str, WalkKind], ...]) -> ty
             "normally closed 3/2 valve in the supply line, part of the safe state; none unless given",
         ),
         BOTTLE: optional(
-            table("WalkBottle", _bottle()), "bottle that supplies the device; a supply without end unless given"
+            table("WalkBottle", bottle), "bottle that supplies the device; a supply without end unless given"
         ),
     }
     return file_model("WalkFile", own)

@@ -84,7 +84,7 @@ class EventErrors:
 
 
 def clock_row(record: Mapping[str, Floats], ending: str) -> Floats | None:
-    """The row of a controller that predicts the time in the stride, by the end of its path; None where it does not."""
+    """The row of a controller that predicts the gait phase, by the end of its path; None where it does not."""
     return next((row for name, row in record.items() if name.startswith(_STATE) and name.endswith(ending)), None)
 
 
@@ -160,7 +160,8 @@ class SafetyEvent:
             return f"{_RETURNS[self.level]} at {self.time:.2f} s"
         head = f"{_WORDS[self.level]} {self.time:.2f} s"
         zero = self.atmosphere
-        shown = [f"{_word(name)} {_text(value, _UNITS[name], zero)}" for name, value in self.readings.items()]
+        words = {name: name.replace("_force", "").replace("_", " ") for name in self.readings}
+        shown = [f"{words[name]} {_text(value, _UNITS[name], zero)}" for name, value in self.readings.items()]
         limits = [f"{name} {_text(value, self.units[name], zero)}" for name, value in self.settings.items()]
         return f"{head}: {self.fault_flag.summary}; {'; '.join(', '.join(part) for part in (shown, limits) if part)}"
 
@@ -216,10 +217,6 @@ def _venting(
         units={name: quantities[name].unit for name in flag.settings},
         atmosphere=configuration.device.supply.atmospheric_pressure,
     )
-
-
-def _word(name: str) -> str:
-    return name.replace("_force", "").replace("_", " ")
 
 
 def _text(value: float, si_unit: str, atmosphere: float) -> str:

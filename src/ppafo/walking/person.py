@@ -180,22 +180,20 @@ def drawn_people(build: Build, gaits: VariedGaits, generator: np.random.Generato
     mass: Any = build.mass
     stature: Any = build.stature
     start: Any = START_VARIATION * shift
-    series = GaitSeries(**{name: _series(curves) for name, curves in gaits.series.items()})
+    series: dict[str, Any] = {}
+    for name, curves in gaits.series.items():
+        pairs: Any = zip(curves.cosines.T, curves.sines.T, strict=True)
+        mean: Any = curves.mean
+        series[name] = Series(mean=mean, harmonics=tuple(Harmonic(*pair) for pair in pairs))
     return Person(
         mass=mass,
         stature=stature,
-        series=series,
+        series=GaitSeries(**series),
         timing=GaitTiming(**timing),
         strike_angle=strike,
         thresholds=thresholds,
         start=start,
     )
-
-
-def _series(curves: SeriesOfMany) -> Series:
-    pairs: Any = zip(curves.cosines.T, curves.sines.T, strict=True)
-    mean: Any = curves.mean
-    return Series(mean=mean, harmonics=tuple(Harmonic(*pair) for pair in pairs))
 
 
 def crowd_of(scenario: Scenario, build: Build, gaits: VariedGaits, generator: np.random.Generator) -> Scenario:

@@ -1,6 +1,5 @@
 """From a scenario that is a walk to a run of the engine. Any number of it may be an array (runs,), one for each run."""
 
-from collections.abc import Mapping
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -13,13 +12,11 @@ from ppafo.control.walking.catalog import TIMINGS, walking_controllers, with_tim
 from ppafo.engine.lanes import Batch
 from ppafo.engine.rows import leaf_paths, leaves, rebuilt
 from ppafo.engine.run import Run, Walk, batches_of
-from ppafo.engine.scheme.walking import WalkState
 from ppafo.errors import ScenarioError
 from ppafo.gait import Gait
 from ppafo.model.catalog import VALVES
 from ppafo.model.columns import Problem, first, over_runs, smaller, truncated, whole
-from ppafo.model.gait import Course, GaitSeries, GaitTiming, gait_at
-from ppafo.model.leg import LegParameters
+from ppafo.model.gait import gait_at
 from ppafo.model.orifice import area_conductance
 from ppafo.model.plant import PlantParameters
 from ppafo.model.plant_faults import NOT_FITTED, PLANT_FAULTS, SOUND, PlantFaults, ShutOff
@@ -34,7 +31,7 @@ from ppafo.walking.course import PlannedCourse, WalkingCourse, plan_course, stan
 from ppafo.walking.declaration import FORCES, WALK_SENSORS
 from ppafo.walking.gait_series import heel_rocker
 from ppafo.walking.motion import walk_of
-from ppafo.walking.person import Person, VariedGaits, crowd_of, leg_of_person, person_of, settings_of_person
+from ppafo.walking.person import VariedGaits, crowd_of, leg_of_person, person_of, settings_of_person
 from ppafo.walking.preparation import (
     FaultSettings,
     device_share,
@@ -77,18 +74,25 @@ def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
     bare = plant_parameters(device)
     sensors = gait_sensors_of(scenario)
     planned = course_of_walk(scenario)
-    course = None if planned is None else planned.course
+    if planned is None:
+        # A walk of equal strides begins at a heel strike, a course standing.
+        rows = leg, person.series, person.timing
+        initial = of_each(lambda leg, gait, timing: walk_from_strike(gait_at(gait, timing, leg, 0.0)), *rows)
+    else:
+        initial = of_each(lambda *rows: walk_from_standing(standing_gait(*rows)), leg, person.timing, planned.course)
     walk = Walk(
         leg=leg,
         share=device_share(bare, leg.gravity),
         gait=person.series,
         timing=person.timing,
         sensors=sensors,
-        initial=_start(leg, person.series, person.timing, course),
-        course=course,
+        initial=initial,
+        course=None if planned is None else planned.course,
         failing=failing_of(scenario),
     )
-    components = components_of_walk(_fitted(scenario, person), device, sensors)
+    # Whoever fits the controller to a person sets its thresholds and the start of its push-off anew.
+    fitted = replace(scenario.controller, settings=settings_of_person(dict(scenario.controller.settings), person))
+    components = components_of_walk(replace(scenario, controller=fitted), device, sensors)
     run = compose_run(
         components,
         with_leg(bare, leg),
@@ -101,12 +105,13 @@ def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
 
 def components_of_walk(scenario: Scenario, device: Device, sensors: GaitSensors) -> Components:
     """What the run of a walk is made of, whoever walks."""
-    controller, settings = controller_of(scenario)
+    # An object in charge is asked between the steps, so the program has no controller of its own.
+    is_outside = scenario.controller.kind == PYTHON_CONTROLLER
     return Components(
         device=device,
         valve=walking_valve(device.valve),
-        controller=controller,
-        settings=settings,
+        controller=None if is_outside else law_of(scenario),
+        settings={} if is_outside else scenario.controller.settings,
         reference=NO_REFERENCE,
         path=None,
         sensors=sensor_parameters(scenario),
@@ -144,16 +149,6 @@ def walk_steps(scenario: Scenario, plant: PlantParameters) -> Steps:
         record_every=whole(counts.record_every),
         needs_parts=False,
     )
-
-
-def _start(leg: LegParameters, series: GaitSeries, timing: GaitTiming, course: Course | None) -> WalkState:
-    """Where a walk begins: at a heel strike, or standing where there is a course."""
-    if course is None:
-        begun = of_each(lambda *rows: walk_from_strike(gait_at(rows[1], rows[2], rows[0], 0.0)), leg, series, timing)
-    else:
-        begun = of_each(lambda *rows: walk_from_standing(standing_gait(*rows)), leg, timing, course)
-    start: WalkState = begun
-    return start
 
 
 def of_each(function: Any, *rows: Any) -> Any:
@@ -237,12 +232,6 @@ def noise(scenario: Scenario) -> Any:
     return sum((*own, *lost), sensors.angle_noise + sensors.pressure_noise)
 
 
-def _fitted(scenario: Scenario, person: Person) -> Scenario:
-    """The walk with the settings of its controller as they were fitted to the person."""
-    settings = settings_of_person(dict(scenario.controller.settings), person)
-    return replace(scenario, controller=replace(scenario.controller, settings=settings))
-
-
 def law_of(scenario: Scenario) -> ControllerKind:
     """The controller of a walk with its estimator of the gait phase, computing with floats.
 
@@ -251,12 +240,6 @@ def law_of(scenario: Scenario) -> ControllerKind:
     if scenario.controller.kind == switching.CONSTANT.name:
         return switching.CONSTANT
     return with_timing(walking_controllers()[scenario.controller.kind], TIMINGS[walk_of(scenario).timing])
-
-
-def controller_of(scenario: Scenario) -> tuple[ControllerKind | None, Mapping[str, Any]]:
-    """The controller of a walk for the lanes, and its settings in SI units."""
-    control = scenario.controller
-    return (None, {}) if control.kind == PYTHON_CONTROLLER else (law_of(scenario), control.settings)
 
 
 def fed_device(scenario: Scenario) -> Device:

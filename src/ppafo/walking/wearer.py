@@ -8,7 +8,7 @@ of the gait, or the paper's where no gait is named. Where it gives the stature, 
 follows body mass and stature.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Annotated, Any, NamedTuple
 
@@ -234,15 +234,12 @@ def foot_inertia_of(stature: float, body_mass: float) -> float:
     return _FOOT_INERTIA * body_mass * stature * stature
 
 
-_OF_LENGTH = {
+_FOLLOWING: Mapping[str, Callable[..., float]] = {
     "shank_length": shank_length_of,
     "shank_mass_centre": shank_mass_centre_of,
     "foot_mass_centre": foot_mass_centre_of,
     "heel_lever": heel_lever_of,
     "toe_lever": toe_lever_of,
-}
-# These too follow the stature, which comes first in their terms: a link waits until its first source is given.
-_OF_BOTH = {
     "shank_mass": shank_mass_of,
     "foot_mass": foot_mass_of,
     "shank_inertia": shank_inertia_of,
@@ -254,10 +251,13 @@ STATURE, BODY_MASS = "wearer.stature", "wearer.body_mass"
 def links_of_stature(document: Mapping[str, Any]) -> Graph:
     """Return how the segments of a walk file follow stature and body mass: now, or once the stature is given."""
     later = value_at(document, STATURE) is None
-    terms = {name: Term((STATURE,), function) for name, function in _OF_LENGTH.items()}
-    terms |= {name: Term((STATURE, BODY_MASS), function) for name, function in _OF_BOTH.items()}
-    paths = {f"wearer.{name}": (Follows((term,), when_set=later),) for name, term in terms.items()}
-    return {path: links for path, links in paths.items() if value_at(document, path) is None}
+    found: dict[str, tuple[Follows, ...]] = {}
+    for name, function in _FOLLOWING.items():
+        # A link waits until its first source is given, so the stature comes first for masses too.
+        sources = (STATURE,) if SCALING[name] == (0, 1) else (STATURE, BODY_MASS)
+        if value_at(document, f"wearer.{name}") is None:
+            found[f"wearer.{name}"] = (Follows((Term(sources, function),), when_set=later),)
+    return found
 
 
 def read_wearer(reading: Reading, gait: Gait, is_named: bool) -> Wearer:
