@@ -102,6 +102,7 @@ def _contradictions(scenario: Scenario) -> Iterator[Contradiction]:
         if pair.path in present and pair.other in present:
             number, other = present[pair.path], present[pair.other]
             yield Contradiction(pair.path, _IS_BAD[pair.relation](number, other), partial(_reason, pair, other))
+    # An object in charge has no settings that could contradict.
     if scenario.controller.kind == PYTHON_CONTROLLER:
         return
     yield _valve(scenario)
@@ -148,6 +149,7 @@ def _times(scenario: Scenario) -> Iterator[Contradiction]:
             f"must be between half and twice the stride of the gait, which is {_text(round(stride, 4), run, 's')}"
         ),
     )
+    # A valve that has not moved yet neither fills nor vents, and would be taken for one that fails.
     delay = walking_valve(scenario.device.valve).command_delay(valve_settings(scenario.device.valve))
     for name in ("fill_time", "vent_time"):
         yield Contradiction(

@@ -336,6 +336,7 @@ def plan_course(
             f"{course.file}: takes {len(planner.parts)} parts, a change of speed counted apart, and {PARTS} is the "
             "most: leave segments out, or make it two courses"
         )
+    # The engine has a fixed number of parts, and a part that never begins changes nothing.
     unused = planner.parts[0]._replace(start=NEVER)
     parts = (*planner.parts, *(unused,) * (PARTS - len(planner.parts)))
     return PlannedCourse(Course(parts), tuple(spans), tuple(steady), duration)
@@ -355,6 +356,7 @@ def _strides(
     elif kind == "scuff":
         planner.go(1.0, planner.ratio, planner.ratio, scuff=values["contact"], slope=planner.slope)
     elif kind == "stumble":
+        # Both frequencies of a half have the mean usual / time, so that it takes ``time`` of its usual time.
         usual = planner.ratio
         planner.go(0.5, usual * (2.0 / values["time"] - 1.0), usual * values["length"], slope=planner.slope)
         planner.go(0.5, usual, usual, slope=planner.slope)
@@ -417,7 +419,9 @@ def _ratio(course: WalkingCourse, index: int, gait: Gait) -> float:
             raise course.refusal(
                 index, f"speed: gait '{gait.name}' has no walking speed, so it cannot be scaled to one; give a cadence"
             )
+        # Step length over cadence stays as it is over the speeds of walking, so both go with the root.
         return math.sqrt(values["speed"] / recorded)
+    # A cadence counts the steps of both legs.
     ratio = 0.5 * values["cadence"] * gait.stride_time if "cadence" in values else 1.0
     speed = (recorded or 1.0) * ratio * ratio
     if "cadence" in values and recorded is not None and not SLOWEST <= speed <= FASTEST:

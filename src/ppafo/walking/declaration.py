@@ -163,6 +163,7 @@ def timing_of(document: Mapping[str, Any]) -> str:
 def find_kinds(document: Mapping[str, Any], file: str) -> None:
     """Load the controller that a document names, where another package has it; ScenarioError where that fails."""
     motion = kind_at(document, "motion")
+    # Before the schema, which would only say that it does not know the old key.
     for path in RENAMED_KEYS:
         old = value_at(document, path)
         if old is not None:
@@ -182,6 +183,7 @@ def _check_motion(kind: object, place: str) -> None:
     with refused_as(ScenarioError, place, KindError):
         is_known = not kind or str(kind) in WALKS
     if not is_known:
+        # The motions of a vane are named too: the file may be meant for one.
         known = (*MOTIONS, *WALKS)
         raise ScenarioError(f"{place} is not known{nearest_name(str(kind), known)}; allowed: {', '.join(known)}")
 

@@ -114,6 +114,7 @@ def _begun(last: Floats) -> dict[str, Samples]:
 
 
 def _rises(is_so: NDArray[np.bool_]) -> Samples:
+    # The sample at which it is so first; what is so from the start did not happen in the record.
     return np.flatnonzero(is_so[1:] & ~is_so[:-1]) + 1
 
 
@@ -124,6 +125,7 @@ def event_errors(true: Samples, known: Samples, interval: float, stride_time: fl
     """
     if not (true.size and known.size):
         return EventErrors(np.empty(0), int(true.size), int(known.size))
+    # Every pair: a walk has some hundred events of a kind.
     apart = known[np.newaxis, :] - true[:, np.newaxis]
     nearest = np.argmin(np.abs(apart), axis=1)
     errors = interval * np.take_along_axis(apart, nearest[:, np.newaxis], axis=1)[:, 0]
@@ -192,6 +194,7 @@ def safety_events(configuration: Scenario, time: Floats, record: Mapping[str, Fl
         else SafetyEvent(float(time[place]), float(level[place]))
         for place in places
     )
+    # A watchdog that has acted stays, whatever the controller does when it comes back.
     return (*(event for event in found if not watchdog or event.time < watchdog[0].time), *watchdog)
 
 

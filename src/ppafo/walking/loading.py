@@ -139,6 +139,7 @@ def on_bottle(scenario: Scenario, bottle: str | Path | None, overrides: Iterable
         )
     content, before = origin.content, origin.overrides
     if bottle is not None:
+        # Another bottle takes the place of the whole section, its overrides included.
         content = {name: part for name, part in content.items() if name != BOTTLE}
         before = tuple(text for text in before if not text.startswith(f"{BOTTLE}."))
     changes = tuple(text if text.startswith(f"{BOTTLE}.") else f"{BOTTLE}.{text}" for text in overrides)
@@ -224,6 +225,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
         supply_line=line,
         links={**links, **who.links(reading.document)},
     )
+    # Contradictions are looked for in the whole, once each number is usable by itself.
     check_walk(scenario, reading)
     return with_duration(scenario, _duration(reading, scenario))
 

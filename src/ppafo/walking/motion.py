@@ -168,6 +168,7 @@ def with_duration(scenario: Scenario, seconds: float) -> Scenario:
 
 def duration_problems(scenario: Scenario, seconds: Any) -> tuple[Problem, ...]:
     """What is wrong with the length of a walk [s], which may be an array (runs,)."""
+    # The controller learns over the first strides, and means leave them out: a walk needs more than these.
     has_course = walk_of(scenario).course is not None
     shortest = SHORTEST_COURSE if has_course else SHORTEST_STRIDES * walk_of(scenario).gait.stride_time
     fits = np.logical_and(seconds >= shortest, seconds <= 60.0 * LONGEST_MINUTES)
@@ -186,6 +187,7 @@ def clock_with(scenario: Scenario, times: Mapping[str, Any]) -> tuple[Clock, tup
     """The clock of a walk with other times [s] by path, which may be arrays (runs,), and what is wrong with it."""
     duration = times.get("run.duration", scenario.run.duration)
     period = times.get("controller.period", scenario.controller.period)
+    # A rate is another word for the period, and stands in its place.
     if "controller.rate" in times:
         period = 1.0 / times["controller.rate"]
     output = (

@@ -88,6 +88,7 @@ def draw_gaits(gait: Gait, stature: Floats, generator: np.random.Generator) -> V
     time = gait.stride_time + gait.stride_time_deviation * draw_bounded_normal(generator, (count,))
     fraction = gait.stance_share + gait.stance_share_deviation * draw_bounded_normal(generator, (count,))
     time[0], fraction[0] = gait.stride_time, gait.stance_share
+    # The knee goes through a way that is larger by the stature, in another time.
     hurry = stature * (gait.stride_time / time) ** 2
     series |= {name: series[name].scale(hurry) for name in KNEE}
     timing = {"frequency": 1.0 / time, **_events(series["shank"], series["ankle"], fraction)}
@@ -100,6 +101,7 @@ def _draw_series(curve: Curve | None, count: int, generator: np.random.Generator
     missing = (0.0,) * HARMONICS
     cosines, sines = (np.array((*values, *missing)[:HARMONICS]) for values in (curve.cosines, curve.sines))
     power = 0.5 * (cosines**2 + sines**2)
+    # A curve that stays constant has no harmonics to vary.
     fraction = power / max(float(power.sum()), 1.0e-30)
     spread = curve.deviation * np.sqrt((1.0 - LEVEL_FRACTION) * fraction)
     normal = draw_bounded_normal(generator, (2, count, HARMONICS))
@@ -199,6 +201,7 @@ def drawn_people(build: Build, gaits: VariedGaits, generator: np.random.Generato
 def crowd_of(scenario: Scenario, build: Build, gaits: VariedGaits, generator: np.random.Generator) -> Scenario:
     """Many wearers as one walk whose numbers are arrays (people,); everybody has noise of his or her own."""
     people = drawn_people(build, gaits, generator)
+    # A seed of everybody: one noise for all would make their outcomes alike.
     seeds: Any = (scenario.sensors.seed + np.arange(build.mass.size, dtype=np.float64)) % LARGEST_SEED
     sensors = replace(scenario.sensors, seed=seeds)
     return replace(scenario, sensors=sensors, motion=replace(walk_of(scenario), person=people))

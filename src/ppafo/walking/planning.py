@@ -137,6 +137,7 @@ def unrecorded(run: Run, runs: int) -> Batch:
 def walk_steps(scenario: Scenario, plant: PlantParameters) -> Steps:
     """The steps of a walk: whole ones that follow the gas, as many to a sample of the controller as that asks for."""
     lines, volume = scenario.supply_lines, of_each(smallest_chamber, plant)
+    # Lines may be smaller than any chamber, and then fill first.
     volume = volume if lines is None else smaller(volume, smaller(lines.volume_1, lines.volume_2))
     # Adiabatic chambers fill faster than isothermal ones, by the ratio of heat capacities.
     stiffness = 1.0 if scenario.gas_model is None else scenario.device.gas.heat_capacity_ratio
@@ -184,6 +185,7 @@ def failing_of(scenario: Scenario) -> tuple[PlantFaults, ShutOff] | None:
     motion, gas = walk_of(scenario), scenario.device.gas
     if not motion.broken and not motion.shut_off:
         return None
+    # Every fault is there in the engine; what is not broken never begins.
     names = leaf_paths(PlantFaults, "")
     numbers: dict[str, Any] = dict(zip((name.lstrip(".") for name in names), leaves(SOUND), strict=True))
     for part, fault in motion.broken.items():
@@ -219,6 +221,7 @@ def has_ideal_sensors(scenario: Scenario) -> bool:
 
 def switches(scenario: Scenario) -> tuple[Any, ...]:
     """Settings that are 0 for all runs of a program or for none: flaws of sensors, samples by which one is late."""
+    # Samples and not seconds: the engine keeps whole ones, and a delay below half of one keeps none.
     delays = (fault.numbers.get("delay", 0.0) for fault in walk_of(scenario).faults.values())
     return *flaws(scenario), *(truncated(delay / scenario.controller.period + 0.5) for delay in delays)
 
@@ -237,6 +240,7 @@ def law_of(scenario: Scenario) -> ControllerKind:
 
     A constant command is no controller of a walk in a file: an exported plant has it, whose command is handed in.
     """
+    # The catalogue of walking has no constant command, which only an exported plant takes.
     if scenario.controller.kind == switching.CONSTANT.name:
         return switching.CONSTANT
     return with_timing(walking_controllers()[scenario.controller.kind], TIMINGS[walk_of(scenario).timing])
@@ -262,5 +266,6 @@ def planned_course(course: WalkingCourse, gait: Gait, number: Any = 0.0) -> Plan
 
 def walking_valve(valve: Valve) -> ValveModel:
     """The valve of a walking device; a proportional one has a vent valve for free motion."""
+    # Which valve it is must be one for all runs of an ensemble, so the first decides.
     settings = first_settings(valve)
     return vent_valve.choose(settings) if valve.kind == "proportional" else VALVES[valve.kind].choose(settings)

@@ -40,6 +40,7 @@ def rocker_on_heel(flat: float, rise: float, half: float, heel_lever: float) -> 
 
     ``flat`` and ``rise`` [m] are the lever nearly flat and how much longer it is far up, ``half`` [rad] as there.
     """
+    # A gait fitted on another foot may ask for a lever behind this heel.
     bounded = min(max(flat, 0.0), heel_lever)
     return HeelRocker(flat=bounded, raised=min(max(bounded + rise, bounded), heel_lever), half=half)
 
@@ -70,6 +71,7 @@ def without_leg(plant: PlantParameters) -> PlantParameters:
 
 def smallest_chamber(plant: PlantParameters) -> float:
     """Smallest volume [m^3] of either chamber at the angles of walking."""
+    # Chamber 1 is smallest in dorsiflexion, chamber 2 in plantarflexion.
     volume_1, _ = chamber_volumes(plant, LOWEST_ANGLE)
     _, volume_2 = chamber_volumes(plant, HIGHEST_ANGLE)
     return min(volume_1, volume_2)
@@ -89,6 +91,7 @@ def walk_step_counts(
     ``volume`` [m^3] is the smallest behind the valve. ``stiffness`` [-] is the ratio of heat capacities for gas with an
     energy balance, whose chambers fill faster by it, else 1.
     """
+    # A quotient that is whole but for rounding asks for no step more.
     coarse = larger(1.0, rounded_up(period / time_step - WHOLE))
     filling = filling_time(plant, volume)
     parts = larger(1.0, rounded_up(period / coarse * STEPS_PER_FILLING * stiffness / filling - WHOLE))
@@ -97,6 +100,7 @@ def walk_step_counts(
     record_every = larger(1.0, truncated(output_interval / step + 0.5))
     return StepCounts(
         step=step,
+        # Whole intervals of the record, so that the last step is recorded.
         step_count=rounded_up(duration / (step * record_every) - WHOLE) * record_every,
         steps_per_sample=steps,
         record_every=record_every,
@@ -241,9 +245,11 @@ def distorting_fault(
         offset=offset,
         drift=drift,
         crosstalk=crosstalk,
+        # Without a lag it follows at once, and keeps nothing of the last sample.
         memory=exponential(-period / lag) if lag > 0.0 else 0.0,
         lost_fraction=lost_share,
         period=fault_period,
+        # A delay is whole samples in the engine: the nearest number of them.
         late_samples=truncated(delay / period + 0.5),
     )
 
@@ -272,6 +278,7 @@ def sensors_of(numbers: Mapping[str, float], faults: Mapping[str, FaultSettings]
 def _fault_of(fault: FaultSettings, period: float) -> Fault:
     given = fault.numbers
     if not fault.kind:
+        # A sound sensor has a fault that never begins, so that one program serves both.
         return fixed_fault(NEVER, 0.0, 0.0, 0.0)
     if fault.kind != DISTORTED:
         holds = 1.0 if fault.kind == FROZEN else 0.0

@@ -306,6 +306,7 @@ def led_result(
     recording = recording_of_walk(scenario, run, time, record, supply)
     starts = stride_starts(record["walk.strides"])
     strides = per_stride(record, starts)
+    # A controller without a safe state helps in every stride.
     helped = helped_strides(record.get(SAFE_ROW, np.zeros(recording.time.size)), starts)
     planned = course_of_walk(scenario)
     steady = _counted(planned, recording, starts)

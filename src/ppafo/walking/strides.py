@@ -49,12 +49,14 @@ def per_stride(totals: Mapping[str, Floats], starts: NDArray[np.intp]) -> dict[s
 
 def helped_strides(level: Floats, starts: NDArray[np.intp]) -> NDArray[np.bool_]:
     """True for each whole stride that had help from strike to strike, from the level of help."""
+    # A running count of samples without help is the same at both strikes where there were none between.
     vented = np.concatenate([[0], np.cumsum(level > HELPS)])
     return np.asarray(vented[starts[1:]] == vented[starts[:-1]])
 
 
 def samples_of(chosen: NDArray[np.bool_], starts: NDArray[np.intp], samples: int) -> NDArray[np.bool_]:
     """True for each sample in one of the chosen strides."""
+    # One more where a chosen stride begins and one less where it ends: the running sum is 1 inside.
     edges = np.zeros(samples + 1)
     np.add.at(edges, starts[:-1][chosen], 1.0)
     np.add.at(edges, starts[1:][chosen], -1.0)
@@ -146,11 +148,13 @@ def stride_metrics(
                 fraction, "-", "positive work of T_ex in push-off over the healthy ankle's positive work"
             )
     if "dorsiflexor_moment" in averages:
+        # Phase 1 is phase 0 of the next stride, and counts once.
         moment = float(averages["dorsiflexor_moment"].mean[:-1].mean())
         found["dorsiflexor_moment"] = Metric(moment, "N m", "moment of the wearer's dorsiflexors, mean over the stride")
     if "toe_height" in averages:
         found["lowest_toes"] = lowest_toes(configuration, averages["toe_height"].mean)
     if "angle" in averages:
+        # Of the mean curves: what differs from stride to stride is in their deviation.
         away = averages["angle"].mean - averages["healthy_angle"].mean
         found["angle_difference"] = Metric(
             float(np.sqrt(np.mean(away**2))), "rad", "RMS difference of the mean ankle angle to the healthy one"
@@ -261,6 +265,7 @@ def _segment(
     last = min(float(span.end), float(time[-1]))
     own = (time >= float(span.start)) & (time <= last)
     strikes = time[starts]
+    # The last strike of a recording begins a stride that is not whole: it has no work of its own.
     begun = np.flatnonzero((strikes >= float(span.start)) & (strikes < last))
     gas = np.interp([float(span.start), last], time, recording["supplied_mass"])
     heel = recording["heel_force"] > LOADED_HEEL * walk_of(configuration).wearer.body_mass * STANDARD_GRAVITY

@@ -199,6 +199,7 @@ def without_device(configuration: Scenario) -> Scenario:
     off = with_device_off(configuration)
     device, motion = off.device, walk_of(off)
     lowest, highest = ANKLE_RANGE
+    # Nothing but its stops is left of the actuator: they are the range of the ankle.
     ankle = Actuator(0.0, 0.0, lowest, highest, _NO_CHAMBER, _NO_CHAMBER, 0.0, device.actuator.leak)
     leg = replace(
         device, actuator=ankle, friction=Friction(0.0, 0.0, 0.0), foot_plate=FootPlate(0.0, 0.0), effects={}, links={}
@@ -324,6 +325,7 @@ def walk_population(
         raise ScenarioError("many wearers walk at a constant supply: leave out the bottle, or the number of wearers")
     if walk_of(configuration).person:
         raise ScenarioError("many wearers are drawn about the wearer: leave out wearer.person, or their number")
+    # One generator, in this order, so that a seed gives the same people every time.
     generator = np.random.default_rng(seed)
     build = draw_builds(wearers, generator)
     gaits = draw_gaits(walk_of(configuration).gait, build.stature, generator)
@@ -340,6 +342,7 @@ def walk_population(
     walked = run.step * run.step_count
     # Numbers of each wearer from the totals; ``strides`` walked, parts of one included.
     strides = walked * gaits.timing["frequency"] if planned is None else turns_walked(planned.course, walked)
+    # Who never strikes must not divide by zero.
     strikes = np.maximum(rows["walk.strides"], 1.0)
     over = {"toe_clearance": strikes, "toe_landing": strikes}
     outcomes = {name: rows[item.total] / over.get(name, strides) for name, item in PER_STRIDE.items()}

@@ -160,6 +160,7 @@ def draw_builds(count: int, generator: np.random.Generator) -> Build:
     """Draw the build of ``count`` people; the first is the wearer that is scaled."""
     normal = draw_bounded_normal(generator, (2, count))
     stature = normal[0]
+    # Two normal numbers with this correlation, from two that have none.
     mass = CORRELATION * normal[0] + np.sqrt(1.0 - CORRELATION**2) * normal[1]
     scaled = 1.0 + MASS_VARIATION * mass, 1.0 + STATURE_VARIATION * stature
     for values in scaled:
@@ -265,6 +266,7 @@ def read_wearer(reading: Reading, gait: Gait, is_named: bool) -> Wearer:
 
     Where it gives the stature, segments follow that and the body mass.
     """
+    # The built-in gait, where nobody names it, is walked by the paper's subject and not by its own.
     subject = _subject(gait) if is_named else paper_subject()
     if value_at(reading.document, STATURE) is not None:
         known = {item.name: replace(item, default=getattr(subject, item.name)) for item in WEARER}
@@ -289,6 +291,7 @@ def read_wearer(reading: Reading, gait: Gait, is_named: bool) -> Wearer:
 def _subject(gait: Gait) -> Wearer:
     """Return the wearer with body mass, and lengths where the stature is known, of the subject of a gait."""
     paper = paper_subject()
+    # A subject of unknown stature has the lengths of the paper's.
     stature = 1.0 if gait.stature is None else SHANK_SHARE * gait.stature / paper.shank_length
     segments = scaled(paper, gait.body_mass / paper.body_mass, stature)
     return replace(paper, stature=paper.stature if gait.stature is None else gait.stature, **segments)

@@ -73,6 +73,7 @@ def legs_of(result: WalkResult, turns: Floats) -> Legs:
     configuration, recording = result.scenario, result.recording
     gait = walk_of(configuration).gait
     path = ankle_path(gait, gait_timing(gait), walk_of(configuration).wearer)
+    # A walk of equal strides has one stride time, of the gait that leads it.
     times = turns * gait.stride_time
     shank, angle, healthy = (
         np.interp(times, recording.time, recording[name]) for name in ("shank_angle", "angle", "healthy_angle")
@@ -85,6 +86,7 @@ def last_phases(result: WalkResult, strides: int, per_stride: int) -> Floats:
 
     They are the last ones in a row that had help, where there are as many.
     """
+    # Rounding must not take the last stride away.
     last = int(result.recording.time[-1] / walk_of(result.scenario).gait.stride_time + 1.0e-6)
     count = min(strides, max(1, last - 1))
     if not result.helped.all():

@@ -83,6 +83,7 @@ def over_time_figure(result: WalkResult) -> "Figure":
         axes.set_ylim(top=1.4 * axes.get_ylim()[1])
         named: list[tuple[float, list[str]]] = []
         for part, begin in failed.items():
+            # Labels of failures that are close would cover each other.
             if named and begin - named[-1][0] < _APART * end:
                 named[-1][1].append(part.replace("_", " "))
             else:

@@ -53,6 +53,7 @@ def _histogram(population: Population, name: str) -> Panel:
 
 def _pair(population: Population, trait: str, outcome: str) -> Panel:
     x, y = population.traits[trait], population.outcomes[outcome]
+    # A picture of a million points shows no more than one of two thousand.
     thin = slice(None, None, max(1, x.size // _MAXIMUM_POINTS))
     points = {"linestyle": "", "marker": ".", "markersize": 2.5, "alpha": 0.35, "markeredgewidth": 0.0}
     marks = [Mark("line", x[thin], y[thin], style=points), Mark("line", x[:1], y[:1], colour=VERMILION, style=_OWN)]
