@@ -439,9 +439,38 @@ def life_on_bottle(
 
 
 def _course_of_use(supply: BottleSupply, use: _Use) -> SupplyCourse:
-    time, state, _ = use.met[-1]
-    over = f"the walk is over, and {_grams(state.mass)} are left in the bottle"
-    return _course(supply, use.met, use.regulated, use.ending or SupplyEnding(WALKED, over, time))
+    """Return what a bottle went through; a use that nothing ended went to the end of the walk."""
+    met, (end, last, _) = use.met, use.met[-1]
+    over = f"the walk is over, and {_grams(last.mass)} are left in the bottle"
+    # In the order of ``UNITS``.
+    rows = [
+        (
+            state.mass,
+            now.content.liquid_mass,
+            now.content.temperature,
+            state.wall_temperature,
+            now.content.pressure,
+            state.body_temperature,
+            state.hose_temperature,
+            now.outlet_temperature,
+            now.gas_temperature,
+            now.set_pressure,
+            open_share(supply.bottle.supply, state.ice),
+        )
+        for _, state, now in met
+    ]
+    values = dict(zip(UNITS, np.array(rows).T.copy(), strict=True))
+    if not has_liquid(supply.bottle.fluid.table):
+        del values["liquid_mass"]
+    return SupplyCourse(
+        supply=supply,
+        times=np.array([time for time, _, _ in met]),
+        values=values,
+        first=met[0][1],
+        last=last,
+        regulated=use.regulated,
+        ending=use.ending or SupplyEnding(WALKED, over, end),
+    )
 
 
 def _use_bottle(
@@ -611,29 +640,3 @@ def _ending(
 
 def _grams(mass: float) -> str:
     return f"{mass * GRAMS_PER_KILOGRAM:.3g} g"
-
-
-def _course(
-    supply: BottleSupply, met: list[tuple[float, SupplyState, SupplyNow]], regulated: float, ending: SupplyEnding
-) -> SupplyCourse:
-    rows = [
-        (
-            state.mass,
-            now.content.liquid_mass,
-            now.content.temperature,
-            state.wall_temperature,
-            now.content.pressure,
-            state.body_temperature,
-            state.hose_temperature,
-            now.outlet_temperature,
-            now.gas_temperature,
-            now.set_pressure,
-            open_share(supply.bottle.supply, state.ice),
-        )
-        for _, state, now in met
-    ]
-    values = dict(zip(UNITS, np.array(rows).T.copy(), strict=True))
-    if not has_liquid(supply.bottle.fluid.table):
-        del values["liquid_mass"]
-    times = np.array([time for time, _, _ in met])
-    return SupplyCourse(supply, times, values, met[0][1], met[-1][1], regulated, ending)

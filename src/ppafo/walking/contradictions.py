@@ -5,6 +5,7 @@ Any number may be an array (runs,), one for each run of an ensemble.
 
 import operator
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -24,7 +25,8 @@ COMPRESSION = 1.6
 """Highest pressure in a chamber over the supply pressure, with room: up to 1.38 in the shipped walks."""
 
 
-class Pair(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Pair:
     """Two numbers of a walk: one must be below, above, at most or at least the other; ``unit`` in SI, words if not."""
 
     path: str

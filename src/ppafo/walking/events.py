@@ -181,7 +181,11 @@ class SafetyEvent:
 
 def safety_events(configuration: Scenario, time: Floats, record: Mapping[str, Floats]) -> tuple[SafetyEvent, ...]:
     """Return the events of a walk in their order, from its rows (samples,) by path at these times [s]."""
-    watchdog = _silenced(configuration, time, record)
+    watchdog: tuple[SafetyEvent, ...] = ()
+    shut_off = walk_of(configuration).shut_off
+    if SILENT_ROW in record and shut_off:
+        silent = np.flatnonzero(record[SILENT_ROW] > shut_off["silence"])
+        watchdog = (SafetyEvent(float(time[silent[0]]), STOPPED, SILENT),) if silent.size else ()
     if SAFE_ROW not in record:
         return watchdog
     level, ventings = record[SAFE_ROW], record[VENTINGS_ROW]
@@ -196,14 +200,6 @@ def safety_events(configuration: Scenario, time: Floats, record: Mapping[str, Fl
     )
     # A watchdog that has acted stays, whatever the controller does when it comes back.
     return (*(event for event in found if not watchdog or event.time < watchdog[0].time), *watchdog)
-
-
-def _silenced(configuration: Scenario, time: Floats, record: Mapping[str, Floats]) -> tuple[SafetyEvent, ...]:
-    """The event of the watchdog of a shut-off valve, where it has acted."""
-    if SILENT_ROW not in record or not walk_of(configuration).shut_off:
-        return ()
-    silent = np.flatnonzero(record[SILENT_ROW] > walk_of(configuration).shut_off["silence"])
-    return (SafetyEvent(float(time[silent[0]]), STOPPED, SILENT),) if silent.size else ()
 
 
 def _venting(

@@ -210,7 +210,7 @@ def without_device(configuration: Scenario) -> Scenario:
 
 def healthy_metrics(configuration: Scenario) -> dict[str, Metric]:
     """The metrics of a walk with a healthy ankle, SI units; without a moment curve there is no work."""
-    gait = walk_of(configuration).gait
+    gait, wearer = walk_of(configuration).gait, walk_of(configuration).wearer
     found = {
         "toe_clearance": Metric(0.0, "m", "0 by definition: measured from the healthy gait"),
         "lowest_toes": lowest_toes(configuration, healthy_toe_height(configuration)),
@@ -220,18 +220,14 @@ def healthy_metrics(configuration: Scenario) -> dict[str, Metric]:
     if gait.ankle_moment is not None:
         work = healthy_positive_work(configuration)
         found["positive_push_off_work"] = Metric(work, "J", "positive work of the ankle moment in one stride")
-        if walk_of(configuration).wearer.keeps_gait >= 0.5:
-            found["dorsiflexor_moment"] = _dorsiflexor_moment(configuration)
+        if wearer.keeps_gait >= 0.5:
+            # Muscles that lift the foot without any device give what the measured moment asks beyond tissue.
+            torque: Any = passive_torque  # plain arithmetic, of arrays too
+            tissue = torque(wearer.leg(), gait.ankle_angle.values_at(PHASES))
+            moment = np.maximum(tissue - wearer.body_mass * gait.ankle_moment.values_at(PHASES), 0.0)
+            summary = "moment of the wearer's dorsiflexors, mean over the stride"
+            found["dorsiflexor_moment"] = Metric(float(moment[:-1].mean()), "N m", summary)
     return found
-
-
-def _dorsiflexor_moment(configuration: Scenario) -> Metric:
-    """Moment of the muscles that lift the foot without any device, from the measured moment less tissue."""
-    gait, wearer = walk_of(configuration).gait, walk_of(configuration).wearer
-    torque: Any = passive_torque  # plain arithmetic, of arrays too
-    tissue = torque(wearer.leg(), gait.ankle_angle.values_at(PHASES))
-    moment = np.maximum(tissue - wearer.body_mass * gait.curve("ankle_moment").values_at(PHASES), 0.0)
-    return Metric(float(moment[:-1].mean()), "N m", "moment of the wearer's dorsiflexors, mean over the stride")
 
 
 MAXIMUM_WEARERS = 1_000_000
