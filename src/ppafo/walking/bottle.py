@@ -206,9 +206,16 @@ def read_bottle(reading: Reading, device: Device, folder: Path) -> BottleSupply 
         name = section["name"]
         path = Path(name)
         bottle = load_bottle(folder / path if path.suffix == ".toml" and not path.is_absolute() else name, own)
-    _check_set_pressure(reading, bottle, device, section["name"])
+    pressure, own_pressure = device.supply.pressure, bottle.regulator.set_pressure
+    # A bottle of the package is set to the paper's pressure, which says nothing of this walk; a user's file does.
+    if path.suffix == ".toml" and abs(own_pressure - pressure) > _SAME_PRESSURE * pressure:
+        room = device.supply.atmospheric_pressure
+        raise ScenarioError(
+            f"{reading.file}: {BOTTLE_NAME}: {name} sets {_SET_PRESSURE} to "
+            f"{quantity_text(own_pressure, 'Pa_a', room)}, and supply.pressure is "
+            f"{quantity_text(pressure, 'Pa_a', room)}: give both the same"
+        )
     # The bottle with its regulator set to the supply pressure of the device, in its entries too.
-    pressure = device.supply.pressure
     entry = Entry(value=pressure, unit="Pa_a", origin="derived", source="supply.pressure of the walk")
     regulator = bottle.regulator._replace(set_pressure=pressure)
     bottle = replace(bottle, regulator=regulator, entries={**bottle.entries, _SET_PRESSURE: entry})
@@ -223,18 +230,6 @@ def read_bottle(reading: Reading, device: Device, folder: Path) -> BottleSupply 
     )
     _check(reading, device, supply)
     return supply
-
-
-def _check_set_pressure(reading: Reading, bottle: Bottle, device: Device, name: str) -> None:
-    """Refuse a file that sets its regulator to another pressure; bottles of the package have the paper's pressure."""
-    own, given = bottle.regulator.set_pressure, device.supply.pressure
-    if Path(name).suffix != ".toml" or abs(own - given) <= _SAME_PRESSURE * given:
-        return
-    atmosphere = device.supply.atmospheric_pressure
-    raise ScenarioError(
-        f"{reading.file}: {BOTTLE_NAME}: {name} sets {_SET_PRESSURE} to {quantity_text(own, 'Pa_a', atmosphere)}, and "
-        f"supply.pressure is {quantity_text(given, 'Pa_a', atmosphere)}: give both the same"
-    )
 
 
 def _numbers(reading: Reading, section: Mapping[str, Any], bottle: Bottle) -> dict[str, float]:
@@ -444,8 +439,38 @@ def life_on_bottle(
 
 
 def _course_of_use(supply: BottleSupply, use: _Use) -> SupplyCourse:
-    time, state, _ = use.met[-1]
-    return _course(supply, use.met, use.regulated, use.ending or SupplyEnding(WALKED, _at_the_end(state), time))
+    """Return what a bottle went through; a use that nothing ended went to the end of the walk."""
+    met, (end, last, _) = use.met, use.met[-1]
+    over = f"the walk is over, and {_grams(last.mass)} are left in the bottle"
+    # In the order of ``UNITS``.
+    rows = [
+        (
+            state.mass,
+            now.content.liquid_mass,
+            now.content.temperature,
+            state.wall_temperature,
+            now.content.pressure,
+            state.body_temperature,
+            state.hose_temperature,
+            now.outlet_temperature,
+            now.gas_temperature,
+            now.set_pressure,
+            open_share(supply.bottle.supply, state.ice),
+        )
+        for _, state, now in met
+    ]
+    values = dict(zip(UNITS, np.array(rows).T.copy(), strict=True))
+    if not has_liquid(supply.bottle.fluid.table):
+        del values["liquid_mass"]
+    return SupplyCourse(
+        supply=supply,
+        times=np.array([time for time, _, _ in met]),
+        values=values,
+        first=met[0][1],
+        last=last,
+        regulated=use.regulated,
+        ending=use.ending or SupplyEnding(WALKED, over, end),
+    )
 
 
 def _use_bottle(
@@ -613,35 +638,5 @@ def _ending(
     return SupplyEnding("empty", f"the bottle is empty, and {short}; {left} are left", time)
 
 
-def _at_the_end(state: SupplyState) -> str:
-    return f"the walk is over, and {_grams(state.mass)} are left in the bottle"
-
-
 def _grams(mass: float) -> str:
     return f"{mass * GRAMS_PER_KILOGRAM:.3g} g"
-
-
-def _course(
-    supply: BottleSupply, met: list[tuple[float, SupplyState, SupplyNow]], regulated: float, ending: SupplyEnding
-) -> SupplyCourse:
-    rows = [
-        (
-            state.mass,
-            now.content.liquid_mass,
-            now.content.temperature,
-            state.wall_temperature,
-            now.content.pressure,
-            state.body_temperature,
-            state.hose_temperature,
-            now.outlet_temperature,
-            now.gas_temperature,
-            now.set_pressure,
-            open_share(supply.bottle.supply, state.ice),
-        )
-        for _, state, now in met
-    ]
-    values = dict(zip(UNITS, np.array(rows).T.copy(), strict=True))
-    if not has_liquid(supply.bottle.fluid.table):
-        del values["liquid_mass"]
-    times = np.array([time for time, _, _ in met])
-    return SupplyCourse(supply, times, values, met[0][1], met[-1][1], regulated, ending)

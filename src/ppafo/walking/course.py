@@ -130,20 +130,17 @@ def load_course(name_or_path: str | Path) -> WalkingCourse:
             raise ScenarioError(f"{file}: segment {number}: kind = {quote(kind)} is not known{hint}; {allowed}")
         place = f"{file}: segment {number} ({kind})"
         validate(_segment_table(kind), given, place, ScenarioError)
-        segments.append(_segment(Reading(place, given), kind))
+        reading = Reading(place, given)
+        present = [item for item in KINDS[kind][1] if item not in _OPTIONAL or item.name in given]
+        values = {item.name: reading.number(item.name, item) for item in present}
+        strides = values.get("strides")
+        if strides is not None and strides != int(strides):
+            raise reading.refusal("strides", "must be a whole number")
+        segments.append(Segment(kind, values))
     course = WalkingCourse(document["name"], document.get("description", ""), tuple(segments), file)
     for index, reason in _contradictions(course.segments):
         raise course.refusal(index, reason)
     return course
-
-
-def _segment(reading: Reading, kind: str) -> Segment:
-    given = [item for item in KINDS[kind][1] if item not in _OPTIONAL or item.name in reading.document]
-    segment = Segment(kind, {item.name: reading.number(item.name, item) for item in given})
-    strides = segment.values.get("strides")
-    if strides is not None and strides != int(strides):
-        raise reading.refusal("strides", "must be a whole number")
-    return segment
 
 
 def _contradictions(segments: Iterable[Segment]) -> Iterator[tuple[int, str]]:
@@ -258,7 +255,7 @@ class _Planner:
 
     def stay(self, length: Numbers, load: float) -> None:
         """Stand for a time [s]; the load changes over it."""
-        self._add(length, 0.0, 0.0, 0.0, load, 0.0, 0.0, 0.0)
+        self._add(length, 0.0, 0.0, 0.0, load)
 
     def go(
         self,
@@ -285,11 +282,10 @@ class _Planner:
         ratio: float,
         stride: float,
         load: float,
-        tilt: Numbers,
-        scuff: float,
-        slope: float,
+        tilt: Numbers = 0.0,
+        scuff: float = 0.0,
+        slope: float = 0.0,
     ) -> None:
-        before = self.stride
         frequency = self.ratio * self.frequency
         self.parts.append(
             CoursePart(
@@ -298,8 +294,8 @@ class _Planner:
                 turns=self.turns,
                 frequency=frequency,
                 frequency_gain=ratio * self.frequency - frequency,
-                stride=before,
-                stride_gain=stride - before,
+                stride=self.stride,
+                stride_gain=stride - self.stride,
                 load=self.load,
                 load_gain=load - self.load,
                 slope=self.slope,
@@ -340,6 +336,7 @@ def plan_course(
             f"{course.file}: takes {len(planner.parts)} parts, a change of speed counted apart, and {PARTS} is the "
             "most: leave segments out, or make it two courses"
         )
+    # The engine has a fixed number of parts, and a part that never begins changes nothing.
     unused = planner.parts[0]._replace(start=NEVER)
     parts = (*planner.parts, *(unused,) * (PARTS - len(planner.parts)))
     return PlannedCourse(Course(parts), tuple(spans), tuple(steady), duration)
@@ -359,6 +356,7 @@ def _strides(
     elif kind == "scuff":
         planner.go(1.0, planner.ratio, planner.ratio, scuff=values["contact"], slope=planner.slope)
     elif kind == "stumble":
+        # Both frequencies of a half have the mean usual / time, so that it takes ``time`` of its usual time.
         usual = planner.ratio
         planner.go(0.5, usual * (2.0 / values["time"] - 1.0), usual * values["length"], slope=planner.slope)
         planner.go(0.5, usual, usual, slope=planner.slope)
@@ -421,7 +419,9 @@ def _ratio(course: WalkingCourse, index: int, gait: Gait) -> float:
             raise course.refusal(
                 index, f"speed: gait '{gait.name}' has no walking speed, so it cannot be scaled to one; give a cadence"
             )
+        # Step length over cadence stays as it is over the speeds of walking, so both go with the root.
         return math.sqrt(values["speed"] / recorded)
+    # A cadence counts the steps of both legs.
     ratio = 0.5 * values["cadence"] * gait.stride_time if "cadence" in values else 1.0
     speed = (recorded or 1.0) * ratio * ratio
     if "cadence" in values and recorded is not None and not SLOWEST <= speed <= FASTEST:

@@ -1,7 +1,8 @@
 """Every value that the file of a walk can hold beside its device, and the layout of that file."""
 
 import functools
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from typing import Annotated, Any
 
 from pydantic import BaseModel, Field
@@ -16,14 +17,13 @@ from ppafo.control.walking.catalog import (
 from ppafo.documents.models import make_schema, one_of, optional, quote, table
 from ppafo.errors import KindError, ScenarioError, nearest_name, refused_as
 from ppafo.model.declaration import Quantity
-from ppafo.model.plant_faults import PLANT_FAULTS, SHUT_OFF
+from ppafo.model.plant_faults import PLANT_FAULTS, SHUT_OFF, PlantFault
 from ppafo.simulation.declaration import (
     MOTIONS,
     PERIOD,
     RATE,
     SENSORS,
     TEXTS,
-    THERMAL_GAS,
     Declared,
     gas_settings,
     kind_at,
@@ -41,9 +41,10 @@ from ppafo.simulation.schema import (
 )
 from ppafo.walking.bottle import BOTTLE, BOTTLE_NAME, BOTTLE_NUMBERS, BOTTLE_OVERRIDES
 from ppafo.walking.kind import WalkKind, kind_of_walk, walk_kind_of
+from ppafo.walking.preparation import DISTORTED, FROZEN
 
 THRESHOLDS = next(iter(TIMINGS))
-"""The way to know the time in the stride of a walk file that names none."""
+"""The estimator of the gait phase of a walk file that names none."""
 
 LARGEST_SEED = 2**32 - 1
 SEED = Quantity("seed", "", "seed of noise and lost samples, a whole number", 1.0, 0.0, float(LARGEST_SEED))
@@ -71,53 +72,59 @@ WALK_SENSORS = (
 FORCES = tuple(item.name for item in WALK_SENSORS if item not in SENSORS)
 """Settings of sensors that no vane has."""
 
-FAULTY = ("heel", "toe", "angle", "pressure_1", "pressure_2")
-FAULT_TIME = Quantity("time", "s", "when the sensor fails", None, 0.0, 1.0e6)
-READINGS = {
-    "heel": Quantity("reading", "N", "its reading from then on", 0.0, -1.0e6, 1.0e6),
-    "toe": Quantity("reading", "N", "its reading from then on", 0.0, -1.0e6, 1.0e6),
-    "angle": Quantity("reading", "rad", "its reading from then on", 0.0, -100.0, 100.0),
-    "pressure_1": Quantity("reading", "Pa_a", "its reading from then on", 0.0, -1.0e9, 1.0e9),
-    "pressure_2": Quantity("reading", "Pa_a", "its reading from then on", 0.0, -1.0e9, 1.0e9),
+_FAULTY = {
+    "heel": ("N", "N", "N/s", 1.0e6),
+    "toe": ("N", "N", "N/s", 1.0e6),
+    "angle": ("rad", "rad", "rad/s", 100.0),
+    "pressure_1": ("Pa_a", "Pa_d", "Pa/s", 1.0e9),
+    "pressure_2": ("Pa_a", "Pa_d", "Pa/s", 1.0e9),
 }
-_SLOPES = {"N": ("N", "N/s"), "rad": ("rad", "rad/s"), "Pa_a": ("Pa_d", "Pa/s")}
-"""Units of offset and drift by the unit of a sensor."""
-
-PERIOD_OF_FAULT = Quantity(
-    "period", "s", "the fault is there in the first half of each such period; always with 0", 0.0, 0.0, 1.0e6
-)
+"""Units of the reading, its offset and its drift, and the largest reading, by the sensor that can fail."""
+FAULTY = tuple(_FAULTY)
 
 
-def _distortions(unit: str) -> tuple[Quantity, ...]:
-    offset, drift = _SLOPES[unit]
-    return (
+@dataclass(frozen=True, slots=True)
+class SensorFault:
+    """What a fault of a sensor is, and its numbers; a fault of the plant has both too."""
+
+    summary: str
+    quantities: tuple[Quantity, ...]
+
+
+def _sensor_faults(sensor: str) -> dict[str, SensorFault]:
+    unit, offset, drift, largest = _FAULTY[sensor]
+    period = "the fault is there in the first half of each such period; always with 0"
+    times = (
+        Quantity("time", "s", "when the sensor fails", None, 0.0, 1.0e6),
+        Quantity("period", "s", period, 0.0, 0.0, 1.0e6),
+    )
+    mixed = "fraction of the other sensor's reading in it; 1 on both swaps them"
+    distortions = (
         Quantity("gain", "1", "what it shows over what is there", 1.0, -10.0, 100.0),
         Quantity("offset", offset, "what is added to it", 0.0, -1.0e9, 1.0e9),
         Quantity("drift", drift, "what is added in each second", 0.0, -1.0e9, 1.0e9),
-        Quantity("crosstalk", "1", "fraction of the other sensor's reading in it; 1 on both swaps them", 0.0, 0.0, 1.0),
+        # There is no other angle that could be mixed with it.
+        *(() if sensor == "angle" else (Quantity("crosstalk", "1", mixed, 0.0, 0.0, 1.0),)),
         Quantity("lag", "s", "time constant with which it follows", 0.0, 0.0, 100.0),
         Quantity("lost_share", "1", "fraction of its samples that are lost", 0.0, 0.0, 1.0),
         Quantity("delay", "s", "by how much it is late, to the nearest whole sample", 0.0, 0.0, 1.0),
     )
+    reading = Quantity("reading", unit, "its reading from then on", 0.0, -largest, largest)
+    return {
+        FROZEN: SensorFault("keeps its last reading", times),
+        "stuck": SensorFault("gives one fixed reading", (*times, reading)),
+        DISTORTED: SensorFault("gives a wrong reading that follows what is there", (*times, *distortions)),
+    }
 
 
-DISTORTIONS = {
-    sensor: tuple(item for item in _distortions(reading.unit) if sensor != "angle" or item.name != "crosstalk")
-    for sensor, reading in READINGS.items()
-}
-"""What can be wrong with the readings of a distorted sensor; there is no other angle to be mixed with."""
-
-FAULT_KINDS = {
-    "frozen": "keeps its last reading",
-    "stuck": "gives one fixed reading",
-    "distorted": "gives a wrong reading that follows what is there",
-}
+FAULTS: dict[str, Mapping[str, SensorFault | PlantFault]] = {sensor: _sensor_faults(sensor) for sensor in FAULTY}
+FAULTS |= PLANT_FAULTS
+"""Every fault of ``[faults]``, by the sensor or part of the plant that fails and by kind."""
 
 
-def fault_numbers(sensor: str, kind: str) -> tuple[Quantity, ...]:
-    """Return the numbers of a fault of a sensor, none without a kind."""
-    further = {"stuck": (READINGS[sensor],), "distorted": DISTORTIONS[sensor]}
-    return (FAULT_TIME, PERIOD_OF_FAULT, *further.get(kind, ())) if kind else ()
+def fault_numbers(part: str, kind: str) -> tuple[Quantity, ...]:
+    """Return the numbers of a fault of a sensor or a part of the plant, none without a kind."""
+    return FAULTS[part][kind].quantities if kind else ()
 
 
 def controller_settings(kind: str) -> tuple[Quantity, ...]:
@@ -127,39 +134,36 @@ def controller_settings(kind: str) -> tuple[Quantity, ...]:
 
 
 def timing_settings(kind: str) -> tuple[Quantity, ...]:
-    """Return the settings of a way to know the time in the stride, none where it is unknown."""
+    """Return the settings of an estimator of the gait phase, none where it is unknown."""
     return TIMINGS[kind].quantities if kind in TIMINGS else ()
 
 
-def quantities(kind: WalkKind, controller: str, timing: str = THRESHOLDS) -> dict[str, Quantity]:
-    """Return the declaration of every number that a file of a kind of walk can hold, by path."""
-    sections = {
+def sections(kind: WalkKind, controller: str, timing: str, gas: str) -> dict[str, tuple[Quantity, ...]]:
+    """Return the declarations of the numbers of any walk with these kinds, by section."""
+    return {
         "wearer": kind.numbers,
         "controller": (RATE, PERIOD, *controller_settings(controller)),
         "timing": timing_settings(timing),
         "sensors": (*WALK_SENSORS, SEED),
         "run": (DURATION, STEP),
-        "gas_model": THERMAL_GAS,
-        BOTTLE: BOTTLE_NUMBERS,
+        "gas_model": gas_settings(gas),
     }
-    found = {f"{section}.{item.name}": item for section, items in sections.items() for item in items}
-    for sensor in FAULTY:
-        items = (FAULT_TIME, PERIOD_OF_FAULT, READINGS[sensor], *DISTORTIONS[sensor])
-        found |= {f"faults.{sensor}.{item.name}": item for item in items}
-    for part, kinds in PLANT_FAULTS.items():
-        found |= {f"faults.{part}.{item.name}": item for fault in kinds.values() for item in fault.quantities}
-    found |= {f"shut_off.{item.name}": item for item in SHUT_OFF}
-    return found | line_paths()
+
+
+def by_path(declared: Mapping[str, Iterable[Quantity]]) -> dict[str, Quantity]:
+    """Return the declarations of numbers by section as declarations by path."""
+    return {f"{section}.{item.name}": item for section, items in declared.items() for item in items}
 
 
 def timing_of(document: Mapping[str, Any]) -> str:
-    """Return how a document says that the time in the stride is known."""
+    """Return which estimator of the gait phase a document names."""
     return kind_at(document, "timing") or THRESHOLDS
 
 
 def find_kinds(document: Mapping[str, Any], file: str) -> None:
     """Load the controller that a document names, where another package has it; ScenarioError where that fails."""
     motion = kind_at(document, "motion")
+    # Before the schema, which would only say that it does not know the old key.
     for path in RENAMED_KEYS:
         old = value_at(document, path)
         if old is not None:
@@ -179,6 +183,7 @@ def _check_motion(kind: object, place: str) -> None:
     with refused_as(ScenarioError, place, KindError):
         is_known = not kind or str(kind) in WALKS
     if not is_known:
+        # The motions of a vane are named too: the file may be meant for one.
         known = (*MOTIONS, *WALKS)
         raise ScenarioError(f"{place} is not known{nearest_name(str(kind), known)}; allowed: {', '.join(known)}")
 
@@ -189,7 +194,7 @@ def _texts(document: Mapping[str, Any]) -> tuple[str, ...]:
         "controller.kind",
         "timing.kind",
         "gas_model.kind",
-        *(f"faults.{part}.kind" for part in (*FAULTY, *PLANT_FAULTS)),
+        *(f"faults.{part}.kind" for part in FAULTS),
     )
     return (*TEXTS, "motion.kind", "gait", "course", *walk_kind_of(document).texts, BOTTLE_NAME, *kinds)
 
@@ -197,11 +202,11 @@ def _texts(document: Mapping[str, Any]) -> tuple[str, ...]:
 def _quantities(document: Mapping[str, Any]) -> dict[str, Quantity]:
     """Return the declaration of every number that a document with its kinds can hold, by path."""
     find_kinds(document, "the file of a walk")
-    found = quantities(walk_kind_of(document), kind_at(document, "controller"), timing_of(document))
-    lost = {
-        f"gas_model.{item.name}" for item in THERMAL_GAS if item not in gas_settings(kind_at(document, "gas_model"))
-    }
-    return {path: item for path, item in found.items() if path not in lost}
+    controller, gas = kind_at(document, "controller"), kind_at(document, "gas_model")
+    found = by_path(sections(walk_kind_of(document), controller, timing_of(document), gas) | {BOTTLE: BOTTLE_NUMBERS})
+    for part, kinds in FAULTS.items():
+        found |= by_path({f"faults.{part}": [item for fault in kinds.values() for item in fault.quantities]})
+    return found | by_path({"shut_off": SHUT_OFF}) | line_paths()
 
 
 OF_A_WALK = Declared(
@@ -215,46 +220,17 @@ OF_A_WALK = Declared(
 """What the file of a walk can hold. Gait and course stand at the top of the file or, as its motion, in [motion]."""
 
 
-def _timing() -> Any:
-    found = []
-    for name, kind in TIMINGS.items():
-        fields = {item.name: optional(number_type(item), item.summary) for item in kind.quantities}
-        found.append(table(f"{model_name(name)}Timing", kind_field(name, kind.summary) | fields))
-    return one_of(found)
-
-
-def _fault(sensor: str) -> Any:
-    timing = quantity_fields((FAULT_TIME, PERIOD_OF_FAULT))
-    own = {
-        "frozen": {},
-        "stuck": quantity_fields((READINGS[sensor],)),
-        "distorted": quantity_fields(DISTORTIONS[sensor]),
-    }
-    return one_of(
-        [
-            table(f"{model_name(sensor)}{kind.capitalize()}", kind_field(kind, summary) | timing | own[kind])
-            for kind, summary in FAULT_KINDS.items()
-        ]
-    )
-
-
-def _broken(part: str) -> Any:
-    """Return the table of a part of the plant that fails."""
+def _fault(part: str) -> Any:
+    """Return the table of a sensor or a part of the plant that fails."""
     return one_of(
         [
             table(
                 f"{model_name(part)}{model_name(kind)}",
                 kind_field(kind, fault.summary) | quantity_fields(fault.quantities),
             )
-            for kind, fault in PLANT_FAULTS[part].items()
+            for kind, fault in FAULTS[part].items()
         ]
     )
-
-
-def _bottle() -> dict[str, Any]:
-    numbers = {item.name: optional(number_type(item), item.summary) for item in BOTTLE_NUMBERS}
-    changes: Any = (list[str], Field(default_factory=list, description="such as 'room.temperature=5 degC'"))
-    return {"name": optional(str, "name of a bottle, or the path of its file"), **numbers, "overrides": changes}
 
 
 def walk_file(document: Mapping[str, Any]) -> type[BaseModel]:
@@ -268,8 +244,17 @@ def _walk_file(_controllers: Any, walks: tuple[tuple[str, WalkKind], ...]) -> ty
     seed = Annotated[int, Field(ge=0, le=LARGEST_SEED)]
     sensors = quantity_fields(WALK_SENSORS)
     sensors["seed"] = (seed, Field(1, description=SEED.summary))
-    faults = {name: optional(_fault(name), f"fault of the {name} sensor") for name in FAULTY}
-    faults |= {part: optional(_broken(part), f"fault of the plant: {part}") for part in PLANT_FAULTS}
+    faults = {
+        part: optional(_fault(part), f"fault of the {part} sensor" if part in FAULTY else f"fault of the plant: {part}")
+        for part in FAULTS
+    }
+    timings = []
+    for name, timing in TIMINGS.items():
+        own_fields = {item.name: optional(number_type(item), item.summary) for item in timing.quantities}
+        timings.append(table(f"{model_name(name)}Timing", kind_field(name, timing.summary) | own_fields))
+    bottle: dict[str, Any] = {"name": optional(str, "name of a bottle, or the path of its file")}
+    bottle |= {item.name: optional(number_type(item), item.summary) for item in BOTTLE_NUMBERS}
+    bottle["overrides"] = (list[str], Field(default_factory=list, description="such as 'room.temperature=5 degC'"))
     run = {"duration": optional(number_type(DURATION), DURATION.summary)}
     run |= quantity_fields((STEP,))
     which = {
@@ -295,7 +280,7 @@ def _walk_file(_controllers: Any, walks: tuple[tuple[str, WalkKind], ...]) -> ty
             controller_table(walking_controllers(), "Walking"),
             Field(description="what commands the valve"),
         ),
-        "timing": optional(_timing(), "how the controller estimates the gait phase; thresholds unless given"),
+        "timing": optional(one_of(timings), "how the controller estimates the gait phase; thresholds unless given"),
         "wearer": optional(
             table("Wearer", wearer), "who walks; the subject of the gait that is named, else the paper's, unless given"
         ),
@@ -306,7 +291,7 @@ def _walk_file(_controllers: Any, walks: tuple[tuple[str, WalkKind], ...]) -> ty
             "normally closed 3/2 valve in the supply line, part of the safe state; none unless given",
         ),
         BOTTLE: optional(
-            table("WalkBottle", _bottle()), "bottle that supplies the device; a supply without end unless given"
+            table("WalkBottle", bottle), "bottle that supplies the device; a supply without end unless given"
         ),
     }
     return file_model("WalkFile", own)

@@ -84,7 +84,7 @@ class EventErrors:
 
 
 def clock_row(record: Mapping[str, Floats], ending: str) -> Floats | None:
-    """The row of a controller that predicts the time in the stride, by the end of its path; None where it does not."""
+    """The row of a controller that predicts the gait phase, by the end of its path; None where it does not."""
     return next((row for name, row in record.items() if name.startswith(_STATE) and name.endswith(ending)), None)
 
 
@@ -114,6 +114,7 @@ def _begun(last: Floats) -> dict[str, Samples]:
 
 
 def _rises(is_so: NDArray[np.bool_]) -> Samples:
+    # The sample at which it is so first; what is so from the start did not happen in the record.
     return np.flatnonzero(is_so[1:] & ~is_so[:-1]) + 1
 
 
@@ -124,6 +125,7 @@ def event_errors(true: Samples, known: Samples, interval: float, stride_time: fl
     """
     if not (true.size and known.size):
         return EventErrors(np.empty(0), int(true.size), int(known.size))
+    # Every pair: a walk has some hundred events of a kind.
     apart = known[np.newaxis, :] - true[:, np.newaxis]
     nearest = np.argmin(np.abs(apart), axis=1)
     errors = interval * np.take_along_axis(apart, nearest[:, np.newaxis], axis=1)[:, 0]
@@ -160,7 +162,8 @@ class SafetyEvent:
             return f"{_RETURNS[self.level]} at {self.time:.2f} s"
         head = f"{_WORDS[self.level]} {self.time:.2f} s"
         zero = self.atmosphere
-        shown = [f"{_word(name)} {_text(value, _UNITS[name], zero)}" for name, value in self.readings.items()]
+        words = {name: name.replace("_force", "").replace("_", " ") for name in self.readings}
+        shown = [f"{words[name]} {_text(value, _UNITS[name], zero)}" for name, value in self.readings.items()]
         limits = [f"{name} {_text(value, self.units[name], zero)}" for name, value in self.settings.items()]
         return f"{head}: {self.fault_flag.summary}; {'; '.join(', '.join(part) for part in (shown, limits) if part)}"
 
@@ -178,7 +181,11 @@ class SafetyEvent:
 
 def safety_events(configuration: Scenario, time: Floats, record: Mapping[str, Floats]) -> tuple[SafetyEvent, ...]:
     """Return the events of a walk in their order, from its rows (samples,) by path at these times [s]."""
-    watchdog = _silenced(configuration, time, record)
+    watchdog: tuple[SafetyEvent, ...] = ()
+    shut_off = walk_of(configuration).shut_off
+    if SILENT_ROW in record and shut_off:
+        silent = np.flatnonzero(record[SILENT_ROW] > shut_off["silence"])
+        watchdog = (SafetyEvent(float(time[silent[0]]), STOPPED, SILENT),) if silent.size else ()
     if SAFE_ROW not in record:
         return watchdog
     level, ventings = record[SAFE_ROW], record[VENTINGS_ROW]
@@ -191,15 +198,8 @@ def safety_events(configuration: Scenario, time: Floats, record: Mapping[str, Fl
         else SafetyEvent(float(time[place]), float(level[place]))
         for place in places
     )
+    # A watchdog that has acted stays, whatever the controller does when it comes back.
     return (*(event for event in found if not watchdog or event.time < watchdog[0].time), *watchdog)
-
-
-def _silenced(configuration: Scenario, time: Floats, record: Mapping[str, Floats]) -> tuple[SafetyEvent, ...]:
-    """The event of the watchdog of a shut-off valve, where it has acted."""
-    if SILENT_ROW not in record or not walk_of(configuration).shut_off:
-        return ()
-    silent = np.flatnonzero(record[SILENT_ROW] > walk_of(configuration).shut_off["silence"])
-    return (SafetyEvent(float(time[silent[0]]), STOPPED, SILENT),) if silent.size else ()
 
 
 def _venting(
@@ -216,10 +216,6 @@ def _venting(
         units={name: quantities[name].unit for name in flag.settings},
         atmosphere=configuration.device.supply.atmospheric_pressure,
     )
-
-
-def _word(name: str) -> str:
-    return name.replace("_force", "").replace("_", " ")
 
 
 def _text(value: float, si_unit: str, atmosphere: float) -> str:

@@ -251,6 +251,7 @@ def _measured_levers(gait: Gait, phases: Floats) -> Floats | None:
 def _rise(half: float, tilt: Floats, levers: Floats, force: Floats) -> tuple[float, float, float]:
     """Squares left over, the rise [m] of the lever far up, and the angle [rad] of half of it; weighted by the force."""
     shape = force * tilt / (tilt + half)
+    # Exact sums: the fit must have the same bits on every computer, and NumPy adds in an order of its own.
     rise = math.fsum(shape * force * levers) / max(math.fsum(shape * shape), 1.0e-12)
     left = force * levers - rise * shape
     return math.fsum(left * left), rise, half

@@ -8,7 +8,6 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from ppafo.control.kind import ControllerKind
 from ppafo.control.walking.catalog import TIMINGS, walking_controllers, with_timing
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import DataError, ParameterError, PpafoError, ScenarioError, one_line, refused_as
@@ -23,7 +22,6 @@ from ppafo.parameters.graph import Follows, Graph, Term
 from ppafo.parameters.overrides import split_override
 from ppafo.simulation.declaration import PERIOD, RATE, SUPPLY_LINE, SUPPLY_LINES, Reading, kind_at, line_paths, value_at
 from ppafo.simulation.loading import (
-    Hardware,
     Layout,
     ScenarioRequest,
     assumed_lines,
@@ -70,7 +68,7 @@ from ppafo.walking.motion import (
 )
 from ppafo.walking.nominal import nominal_terms
 from ppafo.walking.planning import NO_REFERENCE, walking_valve
-from ppafo.walking.preparation import FaultSettings, SensorSettings
+from ppafo.walking.preparation import FaultSettings
 
 FILE = TomlKind("walk", "walk", resources.files("ppafo.walking") / "configurations", ScenarioError)
 DEFAULT_PERIOD = 1.0e-3
@@ -141,6 +139,7 @@ def on_bottle(scenario: Scenario, bottle: str | Path | None, overrides: Iterable
         )
     content, before = origin.content, origin.overrides
     if bottle is not None:
+        # Another bottle takes the place of the whole section, its overrides included.
         content = {name: part for name, part in content.items() if name != BOTTLE}
         before = tuple(text for text in before if not text.startswith(f"{BOTTLE}."))
     changes = tuple(text if text.startswith(f"{BOTTLE}.") else f"{BOTTLE}.{text}" for text in overrides)
@@ -166,9 +165,10 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     reading = Reading(request.file, document, changed.paths)
     kind = WALKS[kind_at(document, "motion") or WALK]
     who: WalkKind = kind.walk
-    law = walking_controllers()[kind_at(document, "controller")]
     hardware = read_hardware(reading, request, changed.device)
-    device = _device(reading, hardware)
+    device = read_device(reading, hardware)
+    with refused_as(ParameterError, f"{reading.file}: [device]", ParameterError):
+        device.check_vane("a walk")
     named_course = _named_file("course", request, document)
     with _named_by("course", reading, request, ScenarioError):
         course = None if named_course is None else load_course(named_course)
@@ -177,47 +177,55 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     with _named_by("gait", reading, request, DataError):
         walked = load_gait(_named_file("gait", request, document) or NORMATIVE)
     is_named = "gait" in instead or "gait" in document
-    carried = read_bottle(reading, device, Path() if BOTTLE_NAME in instead else request.folder)
-    line = _line(reading, document, device, carried)
-    lines = None if line is None else line.row(device.supply)
-    settings = _sensor_settings(reading)
-    # Which settings of controller and timing follow others because the file does not give them.
-    timing = timing_settings(timing_of(reading.document))
-    found = links_of_defaults({"controller": law.quantities, "timing": timing}, device, lines)
-    links = {path: links for path, links in found.items() if value_at(reading.document, path) is None}
-    _check_timing(law, reading)
+    bottle = read_bottle(reading, device, Path() if BOTTLE_NAME in instead else request.folder)
+    if bottle is not None:
+        # A bottle always feeds lines, with the defaults of what the file does not say of them.
+        document.setdefault(SUPPLY_LINE, {})
+    line = read_supply_line(reading, device)
+    line = line if line is None or bottle is None else bottle.fed(line)
+    sensors = reading.section("sensors", WALK_SENSORS)
+    faults = {sensor: _fault(reading, sensor) for sensor in FAULTY}
     motion = WalkMotion(
         kind=kind,
         gait=walked,
         timing=timing_of(document),
-        forces={name: number for name, number in settings.numbers.items() if name in FORCES},
-        faults=settings.faults,
-        bottle=carried,
-        broken=_broken(reading, lines),
+        forces={name: sensors[name] for name in FORCES},
+        faults=faults,
+        bottle=bottle,
+        broken=_broken(reading, line),
         shut_off=_shut_off(reading),
         **who.read(reading, request, walked, is_named, course),
     )
-    more = tuple(f"{path}={_absolute(item)}" for path, item in instead.items())
-    supply = device.supply
+    named = tuple(
+        # The path of a file in full means the same from any folder.
+        f"{path}={Path(name).absolute() if Path(name).suffix == '.toml' else name}"
+        for path, name in instead.items()
+    )
     step = reading.number("run.step", who.step)
+    controller, links = _control(reading, device, None if line is None else line.row(device.supply), sensors)
+    room = device.supply.atmospheric_pressure
     scenario = Scenario(
         name=document["name"],
         description=document.get("description", ""),
         device=device,
         run=RunSettings(DEFAULT_DURATION, step, who.interval(DEFAULT_DURATION)),
         motion=motion,
-        initial=Initial(supply.atmospheric_pressure, supply.atmospheric_pressure),
-        controller=_control(reading, law, device, lines, settings, links),
+        initial=Initial(room, room),
+        controller=controller,
         reference=NO_REFERENCE,
-        sensors=_sensors(reading, settings),
-        assumptions=_assumed(reading, carried),
+        sensors=Sensors(
+            **{name: number for name, number in sensors.items() if name not in FORCES},
+            seed=int(reading.number("sensors.seed", SEED)),
+        ),
+        assumptions=_assumed(reading, bottle),
         origin=Origin(
-            request.path, document["device"]["set"], hardware.valve, (*request.overrides, *more), request.content
+            request.path, document["device"]["set"], hardware.valve, (*request.overrides, *named), request.content
         ),
         gas_model=read_gas_model(reading),
         supply_line=line,
         links={**links, **who.links(reading.document)},
     )
+    # Contradictions are looked for in the whole, once each number is usable by itself.
     check_walk(scenario, reading)
     return with_duration(scenario, _duration(reading, scenario))
 
@@ -240,9 +248,78 @@ def _named_by(
     return refused_as(kind, reading.quote(path), kind) if own else nullcontext()
 
 
-def _absolute(name: str) -> str:
-    """Return a name as it is and the path of a file in full, which means the same from any folder."""
-    return str(Path(name).absolute()) if Path(name).suffix == ".toml" else name
+def _control(
+    reading: Reading, device: Device, lines: SupplyLines | None, sensors: Mapping[str, float]
+) -> tuple[Control, Graph]:
+    """Return the controller with its settings and its estimator's [SI], and which of them follow other numbers.
+
+    What the file does not give may follow valve, device, lines and sensors.
+    """
+    law = walking_controllers()[kind_at(reading.document, "controller")]
+    with refused_as(ScenarioError, f"{reading.file}", ScenarioError):
+        # A timing of a controller that uses no gait phase is refused.
+        with_timing(law, TIMINGS[timing_of(reading.document)])
+    sections = {"controller": law.quantities, "timing": timing_settings(timing_of(reading.document))}
+    found = links_of_defaults(sections, device, lines)
+    links = {path: own for path, own in found.items() if value_at(reading.document, path) is None}
+    present: dict[str, Any] = {f"valve.{name}": number for name, number in device.valve.settings.items()}
+    present |= {f"sensors.{name}": number for name, number in sensors.items()}
+    if lines is not None:
+        numbered = {line: number for number, line in enumerate(SUPPLY_LINES, start=1)}
+        for path in line_paths():
+            _, line, name = path.split(".")
+            present[path] = getattr(lines, f"{name}_{numbered[line]}")
+    followed = {source for own in links.values() for link in own for source in link.sources}
+    present |= {path: device_number_at(device, path) for path in followed - set(present)}
+    settings: dict[str, float] = {}
+    for section, items in sections.items():
+        known = (with_default(item, f"{section}.{item.name}", links, present.__getitem__) for item in items)
+        settings |= reading.section(section, tuple(known))
+    rate, period = (value_at(reading.document, f"controller.{name}") for name in ("rate", "period"))
+    seconds = DEFAULT_PERIOD if period is None else reading.number("controller.period", PERIOD)
+    if rate is not None:
+        seconds = 1.0 / reading.number("controller.rate", RATE)
+    return Control(law.name, settings, seconds), links
+
+
+def _fault(reading: Reading, part: str) -> FaultSettings:
+    """Return the fault of a sensor or a part of the plant; without a kind where it is sound."""
+    kind = kind_at(reading.document, f"faults.{part}")
+    return FaultSettings(kind, reading.section(f"faults.{part}", fault_numbers(part, kind)))
+
+
+def _broken(reading: Reading, line: SupplyLine | None) -> dict[str, FaultSettings]:
+    """Return the parts of the plant that fail; ScenarioError for one that a walk with supply lines does not have."""
+    found = {}
+    for part in PLANT_FAULTS:
+        fault = _fault(reading, part)
+        if not fault.kind:
+            continue
+        if line is not None and part.startswith(("regulator", "bottle")):
+            raise reading.refusal(
+                f"faults.{part}.kind", "a walk with [supply_line] has regulators of its own: leave these lines out"
+            )
+        found[part] = fault
+    return found
+
+
+def _shut_off(reading: Reading) -> dict[str, float]:
+    """Return the settings of the shut-off valve [SI], {} where none is fitted."""
+    if "shut_off" not in reading.document:
+        return {}
+    found = reading.section("shut_off", SHUT_OFF)
+    if found["area"] <= 0.0:
+        raise reading.refusal("shut_off.area", "must be above 0; leave [shut_off] out where none is fitted")
+    return found
+
+
+def _assumed(reading: Reading, bottle: BottleSupply | None) -> tuple[Assumption, ...]:
+    """Return what a walk assumes: its file says it, its lines and its bottle."""
+    own = reading.document.get("assumed", {}) | ({} if bottle is None else bottle.assumed)
+    values = ((path, value_at(reading.document, path), note) for path, note in own.items())
+    found = {path: Assumption(path, "" if value is None else str(value), note) for path, value, note in values}
+    lines = {item.path: replace(item, note=f"{item.value}, {item.note}") for item in assumed_lines(reading)}
+    return tuple({**found, **lines}.values())
 
 
 def _duration(reading: Reading, scenario: Scenario) -> float:
@@ -258,148 +335,6 @@ def _duration(reading: Reading, scenario: Scenario) -> float:
     if of_course is not None:
         return of_course
     return DEFAULT_DURATION if motion.bottle is None else BOTTLE_DURATION
-
-
-def _assumed(reading: Reading, carried: BottleSupply | None) -> tuple[Assumption, ...]:
-    """Return what a walk assumes: its file says it, its lines and the bottle that it hangs on."""
-    own = reading.document.get("assumed", {}) | ({} if carried is None else carried.assumed)
-    values = ((path, value_at(reading.document, path), note) for path, note in own.items())
-    found = {path: Assumption(path, "" if value is None else str(value), note) for path, value, note in values}
-    lines = {item.path: replace(item, note=f"{item.value}, {item.note}") for item in assumed_lines(reading)}
-    return tuple({**found, **lines}.values())
-
-
-def _check_timing(law: ControllerKind, reading: Reading) -> None:
-    """Raise ScenarioError for a timing of a controller that uses no gait phase."""
-    with refused_as(ScenarioError, f"{reading.file}", ScenarioError):
-        with_timing(law, TIMINGS[timing_of(reading.document)])
-
-
-def _settings(
-    reading: Reading,
-    law: ControllerKind,
-    device: Device,
-    lines: SupplyLines | None,
-    sensors: SensorSettings,
-    links: Graph,
-) -> dict[str, float]:
-    """Return the settings of controller and timing [SI]; what is not given may follow valve and sensors."""
-    present = {f"valve.{name}": number for name, number in device.valve.settings.items()}
-    present |= {f"sensors.{name}": number for name, number in sensors.numbers.items()}
-    sections = {"controller": law.quantities, "timing": timing_settings(timing_of(reading.document))}
-    found: dict[str, float] = {}
-    present |= _of_lines(lines)
-    present |= {path: device_number_at(device, path) for path in _followed(links, present)}
-    for section, items in sections.items():
-        paths = {f"{section}.{item.name}": item for item in items}
-        known = (with_default(item, path, links, present.__getitem__) for path, item in paths.items())
-        found |= reading.section(section, tuple(known))
-    return found
-
-
-def _control(
-    reading: Reading,
-    law: ControllerKind,
-    device: Device,
-    lines: SupplyLines | None,
-    sensors: SensorSettings,
-    links: Graph,
-) -> Control:
-    """Return the controller with its settings and its timing's."""
-    settings = _settings(reading, law, device, lines, sensors, links)
-    return Control(law.name, settings, _period(reading))
-
-
-def _of_lines(lines: SupplyLines | None) -> dict[str, float]:
-    """Return the numbers of supply lines by path, none without lines."""
-    if lines is None:
-        return {}
-    numbered = {line: number for number, line in enumerate(SUPPLY_LINES, start=1)}
-    return {path: getattr(lines, f"{path.split('.')[2]}_{numbered[path.split('.')[1]]}") for path in line_paths()}
-
-
-def _followed(links: Graph, present: Mapping[str, Any]) -> set[str]:
-    """Return the numbers of the device that settings follow."""
-    return {source for found in links.values() for link in found for source in link.sources} - set(present)
-
-
-def _device(reading: Reading, hardware: Hardware) -> Device:
-    device = read_device(reading, hardware)
-    try:
-        device.check_vane("a walk")
-    except ParameterError as error:
-        raise ParameterError(f"{reading.file}: [device]: {one_line(error)}") from error
-    return device
-
-
-def _line(
-    reading: Reading, document: dict[str, Any], device: Device, carried: BottleSupply | None
-) -> SupplyLine | None:
-    """Return the lines of a walk; a bottle always feeds some, with the defaults of what the file does not say."""
-    if carried is not None:
-        document.setdefault(SUPPLY_LINE, {})
-    line = read_supply_line(reading, device)
-    return line if line is None or carried is None else carried.fed(line)
-
-
-def _sensors(reading: Reading, settings: SensorSettings) -> Sensors:
-    values = settings.numbers
-    return Sensors(
-        angle_noise=values["angle_noise"],
-        pressure_noise=values["pressure_noise"],
-        angle_resolution=values["angle_resolution"],
-        pressure_resolution=values["pressure_resolution"],
-        seed=int(reading.number("sensors.seed", SEED)),
-        angle_bandwidth=values["angle_bandwidth"],
-        pressure_bandwidth=values["pressure_bandwidth"],
-    )
-
-
-def _sensor_settings(reading: Reading) -> SensorSettings:
-    numbers = reading.section("sensors", WALK_SENSORS)
-    return SensorSettings(numbers, {sensor: _fault(reading, sensor) for sensor in FAULTY})
-
-
-def _fault(reading: Reading, sensor: str) -> FaultSettings:
-    section = f"faults.{sensor}"
-    kind = kind_at(reading.document, section)
-    items = fault_numbers(sensor, kind)
-    return FaultSettings(kind, {item.name: reading.number(f"{section}.{item.name}", item) for item in items})
-
-
-def _broken(reading: Reading, lines: SupplyLines | None) -> dict[str, FaultSettings]:
-    """Return the parts of the plant that fail; ScenarioError for one that a walk with supply lines does not have."""
-    found = {}
-    for part, kinds in PLANT_FAULTS.items():
-        kind = kind_at(reading.document, f"faults.{part}")
-        if not kind:
-            continue
-        if lines is not None and part.startswith(("regulator", "bottle")):
-            raise reading.refusal(
-                f"faults.{part}.kind", "a walk with [supply_line] has regulators of its own: leave these lines out"
-            )
-        section = f"faults.{part}"
-        numbers = {item.name: reading.number(f"{section}.{item.name}", item) for item in kinds[kind].quantities}
-        found[part] = FaultSettings(kind, numbers)
-    return found
-
-
-def _shut_off(reading: Reading) -> dict[str, float]:
-    """Return the settings of the shut-off valve [SI], {} where none is fitted."""
-    if "shut_off" not in reading.document:
-        return {}
-    found = reading.section("shut_off", SHUT_OFF)
-    if found["area"] <= 0.0:
-        raise reading.refusal("shut_off.area", "must be above 0; leave [shut_off] out where none is fitted")
-    return found
-
-
-def _period(reading: Reading) -> float:
-    """Return the sample period [s] from a rate or a period, 1 ms where neither is given."""
-    rate, period = (value_at(reading.document, f"controller.{name}") for name in ("rate", "period"))
-    if rate is not None:
-        return 1.0 / reading.number("controller.rate", RATE)
-    return DEFAULT_PERIOD if period is None else reading.number("controller.period", PERIOD)
 
 
 WALKING = Layout(FILE, OF_A_WALK, walk_file, walk_file, build_walk)

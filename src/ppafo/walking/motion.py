@@ -14,20 +14,21 @@ from ppafo.errors import ScenarioError
 from ppafo.gait import Gait
 from ppafo.model.columns import Problem, at, over_runs
 from ppafo.model.declaration import Quantity
-from ppafo.model.plant_faults import PLANT_FAULTS, SHUT_OFF
+from ppafo.model.plant_faults import SHUT_OFF
 from ppafo.simulation.clock import Clock
-from ppafo.simulation.declaration import gas_settings, line_paths
+from ppafo.simulation.declaration import THERMAL, line_paths
 from ppafo.simulation.motion_kind import WALK, MotionKind
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.bottle import BottleSupply
 from ppafo.walking.course import WalkingCourse
 from ppafo.walking.declaration import (
+    FAULTS,
     FAULTY,
     FORCES,
     PERSON,
-    controller_settings,
+    by_path,
     fault_numbers,
-    quantities,
+    sections,
     timing_settings,
 )
 from ppafo.walking.kind import WalkKind
@@ -51,7 +52,7 @@ class WalkingBody(Protocol):
 class WalkMotion:
     """The device on a leg whose shank and loaded foot a gait leads, while it moves the free foot.
 
-    ``timing`` is how the controller knows the time in the stride, ``forces`` are the settings [SI] of sensors that no
+    ``timing`` is how the controller estimates the gait phase, ``forces`` are the settings [SI] of sensors that no
     vane has, by name, and ``faults`` those that fail, by sensor; ``broken`` are parts of the plant that fail, and
     ``shut_off`` is the valve of the safe state, {} where none is fitted. ``course`` is what the wearer does one after
     the other, None where stride follows equal stride; ``bottle`` the one that the device hangs on, None where its
@@ -121,22 +122,16 @@ LONGEST_MINUTES = 60.0
 
 PLACES: Mapping[str, tuple[str, ...]] = {
     **{f"wearer.{item.name}": ("motion", "wearer", item.name) for item in WEARER},
+    f"wearer.{PERSON.name}": ("motion", PERSON.name),
     **{
         f"timing.{item.name}": ("controller", "settings", item.name)
         for kind in TIMINGS
         for item in timing_settings(kind)
     },
-    f"wearer.{PERSON.name}": ("motion", PERSON.name),
     **{f"sensors.{name}": ("motion", "forces", name) for name in FORCES},
     **{
-        f"faults.{sensor}.{item.name}": ("motion", "faults", sensor, "numbers", item.name)
-        for sensor in FAULTY
-        for kind in ("stuck", "distorted")
-        for item in fault_numbers(sensor, kind)
-    },
-    **{
-        f"faults.{part}.{item.name}": ("motion", "broken", part, "numbers", item.name)
-        for part, kinds in PLANT_FAULTS.items()
+        f"faults.{part}.{item.name}": ("motion", "faults" if part in FAULTY else "broken", part, "numbers", item.name)
+        for part, kinds in FAULTS.items()
         for fault in kinds.values()
         for item in fault.quantities
     },
@@ -146,24 +141,18 @@ PLACES: Mapping[str, tuple[str, ...]] = {
 
 
 def numbers_of_scenario(scenario: Scenario) -> dict[str, Quantity]:
-    """The declaration of every number of a walk beside its device's, by path."""
+    """Return the declaration of every number of a walk beside its device's, by path."""
     motion, control = walk_of(scenario), scenario.controller
-    own = controller_settings(control.kind)
-    known = quantities(motion.who, control.kind, motion.timing)
-    kept = {f"controller.{item.name}" for item in own} | {"controller.rate", "controller.period"}
-    kept |= {path for path in known if path.partition(".")[0] in ("wearer", "timing", "sensors", "run")}
-    kept |= {f"gas_model.{item.name}" for item in gas_settings("" if scenario.gas_model is None else "thermal")}
-    kept |= set() if scenario.supply_lines is None else set(line_paths())
-    for sensor, fault in motion.faults.items():
-        kept |= {f"faults.{sensor}.{name}" for name in fault.numbers}
-    for part, fault in motion.broken.items():
-        kept |= {f"faults.{part}.{name}" for name in fault.numbers}
-    kept |= {f"shut_off.{name}" for name in motion.shut_off}
+    found = sections(motion.who, control.kind, motion.timing, "" if scenario.gas_model is None else THERMAL)
     if motion.body is not None:
-        kept -= {f"wearer.{item.name}" for item in motion.who.numbers if item.name not in motion.body.settings}
+        settings = motion.body.settings
+        found["wearer"] = tuple(item for item in found["wearer"] if item.name in settings)
     # An object in charge has no settings, and a timing is one of a controller that has some.
-    lost = {path for path in kept if path.startswith("timing.") and path.partition(".")[2] not in control.settings}
-    return {path: item for path, item in known.items() if path in kept - lost}
+    found["timing"] = tuple(item for item in found["timing"] if item.name in control.settings)
+    for part, fault in {**motion.faults, **motion.broken}.items():
+        found[f"faults.{part}"] = fault_numbers(part, fault.kind)
+    found["shut_off"] = SHUT_OFF if motion.shut_off else ()
+    return by_path(found) | ({} if scenario.supply_lines is None else line_paths())
 
 
 def record_interval(seconds: float) -> float:
@@ -179,6 +168,7 @@ def with_duration(scenario: Scenario, seconds: float) -> Scenario:
 
 def duration_problems(scenario: Scenario, seconds: Any) -> tuple[Problem, ...]:
     """What is wrong with the length of a walk [s], which may be an array (runs,)."""
+    # The controller learns over the first strides, and means leave them out: a walk needs more than these.
     has_course = walk_of(scenario).course is not None
     shortest = SHORTEST_COURSE if has_course else SHORTEST_STRIDES * walk_of(scenario).gait.stride_time
     fits = np.logical_and(seconds >= shortest, seconds <= 60.0 * LONGEST_MINUTES)
@@ -197,6 +187,7 @@ def clock_with(scenario: Scenario, times: Mapping[str, Any]) -> tuple[Clock, tup
     """The clock of a walk with other times [s] by path, which may be arrays (runs,), and what is wrong with it."""
     duration = times.get("run.duration", scenario.run.duration)
     period = times.get("controller.period", scenario.controller.period)
+    # A rate is another word for the period, and stands in its place.
     if "controller.rate" in times:
         period = 1.0 / times["controller.rate"]
     output = (

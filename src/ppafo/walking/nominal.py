@@ -83,6 +83,7 @@ def nominal_terms(device: Device, lines: SupplyLines | None) -> dict[str, Term]:
     found |= {
         "flow": flow if is_known else Term(_ANY, no),
         "critical_ratio": Term(_SONIC[1:]) if is_sonic else Term(_GAS[1:2], critical_pressure_ratio),
+        # Not a number that varies: the source is there because a term needs one.
         "relieving": Term(_ANY, yes if device.supply.relieving else no),
         "pair": Term(_ANY, yes if is_pair else no),
         "lag": Term(tuple(f"valve.{name}" for name in names), kind.lag, kind.settings)

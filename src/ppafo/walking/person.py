@@ -22,7 +22,7 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.walking.declaration import LARGEST_SEED
 from ppafo.walking.gait_series import EVENT_PHASES, gait_events, gait_series, gait_timing, strike_angle
 from ppafo.walking.motion import walk_of
-from ppafo.walking.wearer import Build, Wearer, draw_bounded_normal, draw_builds, segment_values
+from ppafo.walking.wearer import Build, Wearer, draw_bounded_normal, draw_builds, scaled
 
 SERIES = {
     "shank": "shank_angle",
@@ -45,10 +45,6 @@ THRESHOLD_VARIATION = 0.15
 
 START_VARIATION = 0.03
 """Standard deviation of the fraction of the stride at which the push-off begins. Assumed."""
-
-_LENGTHS = ("shank_length", "shank_mass_centre", "foot_mass_centre", "heel_lever", "flat_heel_lever", "toe_lever")
-_MASSES = ("body_mass", "shank_mass", "foot_mass")
-_INERTIAS = ("shank_inertia", "foot_inertia")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,6 +88,7 @@ def draw_gaits(gait: Gait, stature: Floats, generator: np.random.Generator) -> V
     time = gait.stride_time + gait.stride_time_deviation * draw_bounded_normal(generator, (count,))
     fraction = gait.stance_share + gait.stance_share_deviation * draw_bounded_normal(generator, (count,))
     time[0], fraction[0] = gait.stride_time, gait.stance_share
+    # The knee goes through a way that is larger by the stature, in another time.
     hurry = stature * (gait.stride_time / time) ** 2
     series |= {name: series[name].scale(hurry) for name in KNEE}
     timing = {"frequency": 1.0 / time, **_events(series["shank"], series["ankle"], fraction)}
@@ -104,6 +101,7 @@ def _draw_series(curve: Curve | None, count: int, generator: np.random.Generator
     missing = (0.0,) * HARMONICS
     cosines, sines = (np.array((*values, *missing)[:HARMONICS]) for values in (curve.cosines, curve.sines))
     power = 0.5 * (cosines**2 + sines**2)
+    # A curve that stays constant has no harmonics to vary.
     fraction = power / max(float(power.sum()), 1.0e-30)
     spread = curve.deviation * np.sqrt((1.0 - LEVEL_FRACTION) * fraction)
     normal = draw_bounded_normal(generator, (2, count, HARMONICS))
@@ -184,11 +182,15 @@ def drawn_people(build: Build, gaits: VariedGaits, generator: np.random.Generato
     mass: Any = build.mass
     stature: Any = build.stature
     start: Any = START_VARIATION * shift
-    series = GaitSeries(**{name: _series(curves) for name, curves in gaits.series.items()})
+    series: dict[str, Any] = {}
+    for name, curves in gaits.series.items():
+        pairs: Any = zip(curves.cosines.T, curves.sines.T, strict=True)
+        mean: Any = curves.mean
+        series[name] = Series(mean=mean, harmonics=tuple(Harmonic(*pair) for pair in pairs))
     return Person(
         mass=mass,
         stature=stature,
-        series=series,
+        series=GaitSeries(**series),
         timing=GaitTiming(**timing),
         strike_angle=strike,
         thresholds=thresholds,
@@ -196,15 +198,10 @@ def drawn_people(build: Build, gaits: VariedGaits, generator: np.random.Generato
     )
 
 
-def _series(curves: SeriesOfMany) -> Series:
-    pairs: Any = zip(curves.cosines.T, curves.sines.T, strict=True)
-    mean: Any = curves.mean
-    return Series(mean=mean, harmonics=tuple(Harmonic(*pair) for pair in pairs))
-
-
 def crowd_of(scenario: Scenario, build: Build, gaits: VariedGaits, generator: np.random.Generator) -> Scenario:
     """Many wearers as one walk whose numbers are arrays (people,); everybody has noise of his or her own."""
     people = drawn_people(build, gaits, generator)
+    # A seed of everybody: one noise for all would make their outcomes alike.
     seeds: Any = (scenario.sensors.seed + np.arange(build.mass.size, dtype=np.float64)) % LARGEST_SEED
     sensors = replace(scenario.sensors, seed=seeds)
     return replace(scenario, sensors=sensors, motion=replace(walk_of(scenario), person=people))
@@ -212,10 +209,9 @@ def crowd_of(scenario: Scenario, build: Build, gaits: VariedGaits, generator: np
 
 def leg_of_person(leg: LegParameters, person: Person) -> LegParameters:
     """The leg of the wearer at a person's mass and stature; the heel has the same shape."""
-    scaled = {name: getattr(leg, name) * person.stature for name in _LENGTHS}
-    scaled |= {name: getattr(leg, name) * person.mass for name in _MASSES}
-    scaled |= {name: getattr(leg, name) * person.mass * person.stature**2 for name in _INERTIAS}
-    return leg._replace(**scaled)
+    # The heel of a gait has two levers, of which a wearer's file gives one.
+    flat = leg.flat_heel_lever * person.stature
+    return leg._replace(**scaled(leg, person.mass, person.stature), flat_heel_lever=flat)
 
 
 def settings_of_person(settings: dict[str, Any], person: Person) -> dict[str, Any]:
@@ -246,5 +242,5 @@ def as_drawn(gait: Gait, wearer: Wearer, number: float) -> tuple[Gait, Wearer]:
         stance_share=float(gaits.timing["toe_off"][1]),
         **curves,  # type: ignore[arg-type]
     )
-    segments = {name: float(values[1]) for name, values in segment_values(wearer, build).items()}
+    segments = scaled(wearer, float(build.mass[1]), float(build.stature[1]))
     return drawn, replace(wearer, **segments)

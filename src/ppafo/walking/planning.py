@@ -1,6 +1,5 @@
 """From a scenario that is a walk to a run of the engine. Any number of it may be an array (runs,), one for each run."""
 
-from collections.abc import Mapping
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -13,13 +12,11 @@ from ppafo.control.walking.catalog import TIMINGS, walking_controllers, with_tim
 from ppafo.engine.lanes import Batch
 from ppafo.engine.rows import leaf_paths, leaves, rebuilt
 from ppafo.engine.run import Run, Walk, batches_of
-from ppafo.engine.scheme.walking import WalkState
 from ppafo.errors import ScenarioError
 from ppafo.gait import Gait
 from ppafo.model.catalog import VALVES
 from ppafo.model.columns import Problem, first, over_runs, smaller, truncated, whole
-from ppafo.model.gait import Course, GaitSeries, GaitTiming, gait_at
-from ppafo.model.leg import LegParameters
+from ppafo.model.gait import gait_at
 from ppafo.model.orifice import area_conductance
 from ppafo.model.plant import PlantParameters
 from ppafo.model.plant_faults import NOT_FITTED, PLANT_FAULTS, SOUND, PlantFaults, ShutOff
@@ -31,12 +28,12 @@ from ppafo.parameters.plant import first_settings, plant_parameters
 from ppafo.simulation.plan import Components, Steps, compose_run, sensor_parameters, too_many_steps
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, ProfileChoice, Scenario
 from ppafo.walking.course import PlannedCourse, WalkingCourse, plan_course, standing_gait
+from ppafo.walking.declaration import FORCES, WALK_SENSORS
 from ppafo.walking.gait_series import heel_rocker
 from ppafo.walking.motion import walk_of
-from ppafo.walking.person import Person, VariedGaits, crowd_of, leg_of_person, person_of, settings_of_person
+from ppafo.walking.person import VariedGaits, crowd_of, leg_of_person, person_of, settings_of_person
 from ppafo.walking.preparation import (
     FaultSettings,
-    SensorSettings,
     device_share,
     longest_delay,
     sensors_of,
@@ -77,18 +74,25 @@ def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
     bare = plant_parameters(device)
     sensors = gait_sensors_of(scenario)
     planned = course_of_walk(scenario)
-    course = None if planned is None else planned.course
+    if planned is None:
+        # A walk of equal strides begins at a heel strike, a course standing.
+        rows = leg, person.series, person.timing
+        initial = of_each(lambda leg, gait, timing: walk_from_strike(gait_at(gait, timing, leg, 0.0)), *rows)
+    else:
+        initial = of_each(lambda *rows: walk_from_standing(standing_gait(*rows)), leg, person.timing, planned.course)
     walk = Walk(
         leg=leg,
         share=device_share(bare, leg.gravity),
         gait=person.series,
         timing=person.timing,
         sensors=sensors,
-        initial=_start(leg, person.series, person.timing, course),
-        course=course,
+        initial=initial,
+        course=None if planned is None else planned.course,
         failing=failing_of(scenario),
     )
-    components = components_of_walk(_fitted(scenario, person), device, sensors)
+    # Whoever fits the controller to a person sets its thresholds and the start of its push-off anew.
+    fitted = replace(scenario.controller, settings=settings_of_person(dict(scenario.controller.settings), person))
+    components = components_of_walk(replace(scenario, controller=fitted), device, sensors)
     run = compose_run(
         components,
         with_leg(bare, leg),
@@ -101,12 +105,13 @@ def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
 
 def components_of_walk(scenario: Scenario, device: Device, sensors: GaitSensors) -> Components:
     """What the run of a walk is made of, whoever walks."""
-    controller, settings = controller_of(scenario)
+    # An object in charge is asked between the steps, so the program has no controller of its own.
+    is_outside = scenario.controller.kind == PYTHON_CONTROLLER
     return Components(
         device=device,
         valve=walking_valve(device.valve),
-        controller=controller,
-        settings=settings,
+        controller=None if is_outside else law_of(scenario),
+        settings={} if is_outside else scenario.controller.settings,
         reference=NO_REFERENCE,
         path=None,
         sensors=sensor_parameters(scenario),
@@ -132,6 +137,7 @@ def unrecorded(run: Run, runs: int) -> Batch:
 def walk_steps(scenario: Scenario, plant: PlantParameters) -> Steps:
     """The steps of a walk: whole ones that follow the gas, as many to a sample of the controller as that asks for."""
     lines, volume = scenario.supply_lines, of_each(smallest_chamber, plant)
+    # Lines may be smaller than any chamber, and then fill first.
     volume = volume if lines is None else smaller(volume, smaller(lines.volume_1, lines.volume_2))
     # Adiabatic chambers fill faster than isothermal ones, by the ratio of heat capacities.
     stiffness = 1.0 if scenario.gas_model is None else scenario.device.gas.heat_capacity_ratio
@@ -144,16 +150,6 @@ def walk_steps(scenario: Scenario, plant: PlantParameters) -> Steps:
         record_every=whole(counts.record_every),
         needs_parts=False,
     )
-
-
-def _start(leg: LegParameters, series: GaitSeries, timing: GaitTiming, course: Course | None) -> WalkState:
-    """Where a walk begins: at a heel strike, or standing where there is a course."""
-    if course is None:
-        begun = of_each(lambda *rows: walk_from_strike(gait_at(rows[1], rows[2], rows[0], 0.0)), leg, series, timing)
-    else:
-        begun = of_each(lambda *rows: walk_from_standing(standing_gait(*rows)), leg, timing, course)
-    start: WalkState = begun
-    return start
 
 
 def of_each(function: Any, *rows: Any) -> Any:
@@ -169,53 +165,44 @@ def of_each(function: Any, *rows: Any) -> Any:
 
 def gait_sensors_of(scenario: Scenario) -> GaitSensors:
     """The sensors of a walk with their faults, at the sample period of its controller."""
-    settings = sensor_settings(scenario)
-    names, values = tuple(settings.numbers), [*settings.numbers.values()]
-    faults = [(sensor, fault.kind, tuple(fault.numbers)) for sensor, fault in settings.faults.items()]
-    values += [value for fault in settings.faults.values() for value in fault.numbers.values()]
+    numbers, faults = sensor_numbers(scenario), walk_of(scenario).faults
+    given = [*numbers.values(), *(value for fault in faults.values() for value in fault.numbers.values())]
 
-    def made(period: float, *given: float) -> GaitSensors:
-        left = iter(given)
-        numbers = {name: next(left) for name in names}
-        own = {sensor: FaultSettings(kind, {name: next(left) for name in known}) for sensor, kind, known in faults}
-        return sensors_of(SensorSettings(numbers, own), period)
+    def made(period: float, *values: float) -> GaitSensors:
+        left = iter(values)
+        own = {name: next(left) for name in numbers}
+        failing = {
+            sensor: FaultSettings(fault.kind, {name: next(left) for name in fault.numbers})
+            for sensor, fault in faults.items()
+        }
+        return sensors_of(own, failing, period)
 
-    return over_runs(made, scenario.controller.period, *values)
+    return over_runs(made, scenario.controller.period, *given)
 
 
 def failing_of(scenario: Scenario) -> tuple[PlantFaults, ShutOff] | None:
     """What fails of the plant of a walk, and its shut-off valve; None without both."""
-    motion = walk_of(scenario)
+    motion, gas = walk_of(scenario), scenario.device.gas
     if not motion.broken and not motion.shut_off:
         return None
+    # Every fault is there in the engine; what is not broken never begins.
     names = leaf_paths(PlantFaults, "")
     numbers: dict[str, Any] = dict(zip((name.lstrip(".") for name in names), leaves(SOUND), strict=True))
     for part, fault in motion.broken.items():
         declared = PLANT_FAULTS[part][fault.kind]
         numbers |= {declared.fields[name]: number for name, number in fault.numbers.items()}
-    return rebuilt(PlantFaults, list(numbers.values())), _shut_off(motion.shut_off, scenario.device)
+    shut_off, valve = NOT_FITTED, motion.shut_off
+    if valve:
+        warm = gas.heat_capacity_ratio, gas.specific_gas_constant, gas.temperature
+        conductance = over_runs(area_conductance, valve["area"], valve["discharge_coefficient"], *warm)
+        shut_off = ShutOff(conductance, valve["delay"], valve["silence"])
+    return rebuilt(PlantFaults, list(numbers.values())), shut_off
 
 
-def _shut_off(settings: Mapping[str, Any], device: Device) -> ShutOff:
-    if not settings:
-        return NOT_FITTED
-    gas = device.gas.heat_capacity_ratio, device.gas.specific_gas_constant, device.gas.temperature
-    conductance = over_runs(area_conductance, settings["area"], settings["discharge_coefficient"], *gas)
-    return ShutOff(conductance, settings["delay"], settings["silence"])
-
-
-def sensor_settings(scenario: Scenario) -> SensorSettings:
-    """What a walk states of its sensors and their faults, in SI units."""
-    sensors, motion = scenario.sensors, walk_of(scenario)
-    shared = {
-        "angle_bandwidth": sensors.angle_bandwidth,
-        "pressure_bandwidth": sensors.pressure_bandwidth,
-        "angle_noise": sensors.angle_noise,
-        "pressure_noise": sensors.pressure_noise,
-        "angle_resolution": sensors.angle_resolution,
-        "pressure_resolution": sensors.pressure_resolution,
-    }
-    return SensorSettings({**shared, **motion.forces}, motion.faults)
+def sensor_numbers(scenario: Scenario) -> dict[str, Any]:
+    """The settings of the sensors of a walk in SI units, by name; any may be an array (runs,)."""
+    shared = (item.name for item in WALK_SENSORS if item.name not in FORCES)
+    return {**{name: getattr(scenario.sensors, name) for name in shared}, **walk_of(scenario).forces}
 
 
 def flaws(scenario: Scenario) -> tuple[Any, ...]:
@@ -223,8 +210,7 @@ def flaws(scenario: Scenario) -> tuple[Any, ...]:
 
     The bandwidth of the force sensors is no such flaw: every walk has it.
     """
-    numbers = sensor_settings(scenario).numbers
-    return tuple(number for name, number in numbers.items() if name != "force_bandwidth")
+    return tuple(number for name, number in sensor_numbers(scenario).items() if name != "force_bandwidth")
 
 
 def has_ideal_sensors(scenario: Scenario) -> bool:
@@ -235,6 +221,7 @@ def has_ideal_sensors(scenario: Scenario) -> bool:
 
 def switches(scenario: Scenario) -> tuple[Any, ...]:
     """Settings that are 0 for all runs of a program or for none: flaws of sensors, samples by which one is late."""
+    # Samples and not seconds: the engine keeps whole ones, and a delay below half of one keeps none.
     delays = (fault.numbers.get("delay", 0.0) for fault in walk_of(scenario).faults.values())
     return *flaws(scenario), *(truncated(delay / scenario.controller.period + 0.5) for delay in delays)
 
@@ -248,26 +235,15 @@ def noise(scenario: Scenario) -> Any:
     return sum((*own, *lost), sensors.angle_noise + sensors.pressure_noise)
 
 
-def _fitted(scenario: Scenario, person: Person) -> Scenario:
-    """The walk with the settings of its controller as they were fitted to the person."""
-    settings = settings_of_person(dict(scenario.controller.settings), person)
-    return replace(scenario, controller=replace(scenario.controller, settings=settings))
-
-
 def law_of(scenario: Scenario) -> ControllerKind:
-    """The controller of a walk with its way to know the time in the stride, computing with floats.
+    """The controller of a walk with its estimator of the gait phase, computing with floats.
 
     A constant command is no controller of a walk in a file: an exported plant has it, whose command is handed in.
     """
+    # The catalogue of walking has no constant command, which only an exported plant takes.
     if scenario.controller.kind == switching.CONSTANT.name:
         return switching.CONSTANT
     return with_timing(walking_controllers()[scenario.controller.kind], TIMINGS[walk_of(scenario).timing])
-
-
-def controller_of(scenario: Scenario) -> tuple[ControllerKind | None, Mapping[str, Any]]:
-    """The controller of a walk for the lanes, and its settings in SI units."""
-    control = scenario.controller
-    return (None, {}) if control.kind == PYTHON_CONTROLLER else (law_of(scenario), control.settings)
 
 
 def fed_device(scenario: Scenario) -> Device:
@@ -290,5 +266,6 @@ def planned_course(course: WalkingCourse, gait: Gait, number: Any = 0.0) -> Plan
 
 def walking_valve(valve: Valve) -> ValveModel:
     """The valve of a walking device; a proportional one has a vent valve for free motion."""
+    # Which valve it is must be one for all runs of an ensemble, so the first decides.
     settings = first_settings(valve)
     return vent_valve.choose(settings) if valve.kind == "proportional" else VALVES[valve.kind].choose(settings)

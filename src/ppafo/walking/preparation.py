@@ -31,6 +31,8 @@ _TURN = 2.0 * math.pi
 NEVER = 1.0e9
 """Time [s] of a fault that does not happen."""
 DISTORTED, FROZEN = "distorted", "frozen"
+DISTORTING = ("time", "period", "gain", "offset", "drift", "crosstalk", "lag", "lost_share", "delay")
+"""Numbers of a distorted sensor, in the order of ``distorting_fault``; the angle has no crosstalk, which is 0."""
 
 
 def rocker_on_heel(flat: float, rise: float, half: float, heel_lever: float) -> HeelRocker:
@@ -38,6 +40,7 @@ def rocker_on_heel(flat: float, rise: float, half: float, heel_lever: float) -> 
 
     ``flat`` and ``rise`` [m] are the lever nearly flat and how much longer it is far up, ``half`` [rad] as there.
     """
+    # A gait fitted on another foot may ask for a lever behind this heel.
     bounded = min(max(flat, 0.0), heel_lever)
     return HeelRocker(flat=bounded, raised=min(max(bounded + rise, bounded), heel_lever), half=half)
 
@@ -68,6 +71,7 @@ def without_leg(plant: PlantParameters) -> PlantParameters:
 
 def smallest_chamber(plant: PlantParameters) -> float:
     """Smallest volume [m^3] of either chamber at the angles of walking."""
+    # Chamber 1 is smallest in dorsiflexion, chamber 2 in plantarflexion.
     volume_1, _ = chamber_volumes(plant, LOWEST_ANGLE)
     _, volume_2 = chamber_volumes(plant, HIGHEST_ANGLE)
     return min(volume_1, volume_2)
@@ -87,6 +91,7 @@ def walk_step_counts(
     ``volume`` [m^3] is the smallest behind the valve. ``stiffness`` [-] is the ratio of heat capacities for gas with an
     energy balance, whose chambers fill faster by it, else 1.
     """
+    # A quotient that is whole but for rounding asks for no step more.
     coarse = larger(1.0, rounded_up(period / time_step - WHOLE))
     filling = filling_time(plant, volume)
     parts = larger(1.0, rounded_up(period / coarse * STEPS_PER_FILLING * stiffness / filling - WHOLE))
@@ -95,6 +100,7 @@ def walk_step_counts(
     record_every = larger(1.0, truncated(output_interval / step + 0.5))
     return StepCounts(
         step=step,
+        # Whole intervals of the record, so that the last step is recorded.
         step_count=rounded_up(duration / (step * record_every) - WHOLE) * record_every,
         steps_per_sample=steps,
         record_every=record_every,
@@ -239,9 +245,11 @@ def distorting_fault(
         offset=offset,
         drift=drift,
         crosstalk=crosstalk,
+        # Without a lag it follows at once, and keeps nothing of the last sample.
         memory=exponential(-period / lag) if lag > 0.0 else 0.0,
         lost_fraction=lost_share,
         period=fault_period,
+        # A delay is whole samples in the engine: the nearest number of them.
         late_samples=truncated(delay / period + 0.5),
     )
 
@@ -255,43 +263,25 @@ def longest_delay(sensors: GaitSensors) -> float:
 
 @dataclass(frozen=True, slots=True)
 class FaultSettings:
-    """A kind of ``declaration.FAULT_KINDS`` and its numbers [SI]; no kind is a sensor without a fault."""
+    """A kind of ``declaration.FAULTS`` and its numbers [SI]; no kind is a sensor without a fault."""
 
     kind: str = ""
     numbers: Mapping[str, float] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, slots=True)
-class SensorSettings:
-    """Numbers [SI] of ``declaration.WALK_SENSORS``, and faults by the name of the sensor."""
-
-    numbers: Mapping[str, float]
-    faults: Mapping[str, FaultSettings]
+def sensors_of(numbers: Mapping[str, float], faults: Mapping[str, FaultSettings], period: float) -> GaitSensors:
+    """Return the sensors of some settings [SI], with faults by sensor, at a sample period [s] of the controller."""
+    failing = {f"{sensor}_fault": _fault_of(fault, period) for sensor, fault in faults.items()}
+    return gait_sensors(numbers, period, **failing)
 
 
-def sensors_of(settings: SensorSettings, period: float) -> GaitSensors:
-    """The sensors at a sample period [s] of the controller."""
-    faults = {f"{sensor}_fault": fault_of(fault, period) for sensor, fault in settings.faults.items()}
-    return gait_sensors(settings.numbers, period, **faults)
-
-
-def fault_of(fault: FaultSettings, period: float) -> Fault:
-    """A fault at a sample period [s] of the controller."""
+def _fault_of(fault: FaultSettings, period: float) -> Fault:
     given = fault.numbers
     if not fault.kind:
+        # A sound sensor has a fault that never begins, so that one program serves both.
         return fixed_fault(NEVER, 0.0, 0.0, 0.0)
     if fault.kind != DISTORTED:
         holds = 1.0 if fault.kind == FROZEN else 0.0
         return fixed_fault(given["time"], holds, given.get("reading", 0.0), given["period"])
-    return distorting_fault(
-        given["time"],
-        given["period"],
-        given["gain"],
-        given["offset"],
-        given["drift"],
-        given.get("crosstalk", 0.0),
-        given["lag"],
-        given["lost_share"],
-        given["delay"],
-        period,
-    )
+    numbers = [given.get(name, 0.0) for name in DISTORTING]
+    return distorting_fault(*[*numbers, period])

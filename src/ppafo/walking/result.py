@@ -225,10 +225,17 @@ def result_of_walk(scenario: Scenario, run: Run, outcome: BatchResult, supply: S
     rows = state_row_numbers(run)
     record = {name: outcome.record[:, row, 0] for name, row in rows.items()}
     failed, too_many_parts = (float(outcome.states[rows[f"result.{name}"], 0]) for name in LaneResult._fields[1:])
-    status = _status(failed, bool(too_many_parts), outcome.states)
+    status = Status("completed", None, "completed")
+    # A number that is none at the end, which the run did not see itself, has no time: it counts from the start.
+    if failed < NEVER_FAILED or not np.isfinite(outcome.states).all():
+        begin = failed if failed < NEVER_FAILED else 0.0
+        status = Status(
+            "diverged", begin, f"diverged at t = {begin:.6g} s; {TOO_MANY_PARTS if too_many_parts else REMEDY}"
+        )
     time = np.arange(outcome.record.shape[0], dtype=np.float64) * (run.step * run.record_every)
     if status.time is not None:
         kept = time < status.time
+        # A recording has a sample, so a walk that fails at once keeps its start.
         kept[0] = True
         time, record = time[kept], {name: values[kept] for name, values in record.items()}
     found: WalkResult = walk_of(scenario).who.result(scenario, run, time, record, status, supply)
@@ -299,6 +306,7 @@ def led_result(
     recording = recording_of_walk(scenario, run, time, record, supply)
     starts = stride_starts(record["walk.strides"])
     strides = per_stride(record, starts)
+    # A controller without a safe state helps in every stride.
     helped = helped_strides(record.get(SAFE_ROW, np.zeros(recording.time.size)), starts)
     planned = course_of_walk(scenario)
     steady = _counted(planned, recording, starts)
@@ -332,10 +340,3 @@ def _counted(planned: PlannedCourse | None, recording: Recording, starts: NDArra
     if planned is not None:
         return steady_strides(planned, recording.time[starts])
     return settled(np.ones(max(starts.size - 1, 0), dtype=np.bool_))
-
-
-def _status(failed: float, too_many_parts: bool, states: Floats) -> Status:
-    if failed >= NEVER_FAILED and bool(np.isfinite(states).all()):
-        return Status("completed", None, "completed")
-    time = failed if failed < NEVER_FAILED else 0.0
-    return Status("diverged", time, f"diverged at t = {time:.6g} s; {TOO_MANY_PARTS if too_many_parts else REMEDY}")

@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.constants import STANDARD_GRAVITY
 from ppafo.metrics import Metric
 from ppafo.metrics.strides import PER_STRIDE, SETTLING
 from ppafo.model.contact import FLAT, SWING
@@ -48,12 +49,14 @@ def per_stride(totals: Mapping[str, Floats], starts: NDArray[np.intp]) -> dict[s
 
 def helped_strides(level: Floats, starts: NDArray[np.intp]) -> NDArray[np.bool_]:
     """True for each whole stride that had help from strike to strike, from the level of help."""
+    # A running count of samples without help is the same at both strikes where there were none between.
     vented = np.concatenate([[0], np.cumsum(level > HELPS)])
     return np.asarray(vented[starts[1:]] == vented[starts[:-1]])
 
 
 def samples_of(chosen: NDArray[np.bool_], starts: NDArray[np.intp], samples: int) -> NDArray[np.bool_]:
     """True for each sample in one of the chosen strides."""
+    # One more where a chosen stride begins and one less where it ends: the running sum is 1 inside.
     edges = np.zeros(samples + 1)
     np.add.at(edges, starts[:-1][chosen], 1.0)
     np.add.at(edges, starts[1:][chosen], -1.0)
@@ -73,17 +76,17 @@ def mean_curves(
     times = times_of_phases(recording.time, starts)
     times = times if chosen is None else times[chosen]
     names = [name for name in recording.names if not (name in CHANNELS and CHANNELS[name].is_held)]
-    return {name: _curves(np.interp(times, recording.time, recording[name]), recording.unit(name)) for name in names}
+    found = {}
+    for name in names:
+        strides = np.interp(times, recording.time, recording[name])
+        found[name] = Curves(strides.mean(axis=0), strides.std(axis=0), recording.unit(name))
+    return found
 
 
 def times_of_phases(time: Floats, starts: NDArray[np.intp]) -> Floats:
     """Times [s] of ``PHASES`` in each stride, shape (strides, phases)."""
     first, last = time[starts[:-1]], time[starts[1:]]
     return np.asarray(first[:, None] + PHASES * (last - first)[:, None])
-
-
-def _curves(strides: Floats, unit: str) -> Curves:
-    return Curves(strides.mean(axis=0), strides.std(axis=0), unit)
 
 
 def walk_metrics(
@@ -145,11 +148,13 @@ def stride_metrics(
                 fraction, "-", "positive work of T_ex in push-off over the healthy ankle's positive work"
             )
     if "dorsiflexor_moment" in averages:
+        # Phase 1 is phase 0 of the next stride, and counts once.
         moment = float(averages["dorsiflexor_moment"].mean[:-1].mean())
         found["dorsiflexor_moment"] = Metric(moment, "N m", "moment of the wearer's dorsiflexors, mean over the stride")
     if "toe_height" in averages:
         found["lowest_toes"] = lowest_toes(configuration, averages["toe_height"].mean)
     if "angle" in averages:
+        # Of the mean curves: what differs from stride to stride is in their deviation.
         away = averages["angle"].mean - averages["healthy_angle"].mean
         found["angle_difference"] = Metric(
             float(np.sqrt(np.mean(away**2))), "rad", "RMS difference of the mean ankle angle to the healthy one"
@@ -260,36 +265,34 @@ def _segment(
     last = min(float(span.end), float(time[-1]))
     own = (time >= float(span.start)) & (time <= last)
     strikes = time[starts]
+    # The last strike of a recording begins a stride that is not whole: it has no work of its own.
     begun = np.flatnonzero((strikes >= float(span.start)) & (strikes < last))
     gas = np.interp([float(span.start), last], time, recording["supplied_mass"])
-    heel = (
-        recording["heel_force"]
-        > LOADED_HEEL * walk_of(configuration).wearer.body_mass * walk_of(configuration).wearer.leg().gravity
-    )
+    heel = recording["heel_force"] > LOADED_HEEL * walk_of(configuration).wearer.body_mass * STANDARD_GRAVITY
     loaded = own & heel & (recording["contact"] <= FLAT) & (recording["contact"] != SWING)
     push = recording["torque"][loaded]
+    helped, safe_time = 0, None
+    # Where no controller works there is no help, and no safe state either.
+    if "safe_state" in recording:
+        safe = recording["safe_state"] > 0.5
+        edges = np.append(starts, time.size)
+        helped = sum(not safe[edges[stride] : edges[stride + 1]].any() for stride in begun)
+        # Where less help begins within the segment: one that was in its safe state before has no time of its own.
+        begins = np.flatnonzero(own & safe & ~np.append(False, safe[:-1]))
+        safe_time = float(time[begins[0]]) if begins.size else None
     return SegmentResult(
         kind=span.kind,
         title=span.title,
         start=float(span.start),
         end=last,
         strides=begun.size,
-        helped=_helped(recording, begun, starts),
+        helped=helped,
         gas=float(gas[1] - gas[0]),
         net_push_off_work=float(works[begun[begun < works.size]].sum()),
         lowest_toes=_lowest_toes(configuration, recording, own),
         flat_push=max(float(push.max()), 0.0) if push.size else 0.0,
-        safe_time=_safe_time(recording, own),
+        safe_time=safe_time,
     )
-
-
-def _helped(recording: Recording, begun: NDArray[np.intp], starts: NDArray[np.intp]) -> int:
-    """Number of strides without the safe state; none where no controller works."""
-    if "safe_state" not in recording:
-        return 0
-    safe = recording["safe_state"] > 0.5
-    edges = np.append(starts, recording.time.size)
-    return sum(not safe[edges[stride] : edges[stride + 1]].any() for stride in begun)
 
 
 def _lowest_toes(configuration: Scenario, recording: Recording, own: NDArray[np.bool_]) -> float | None:
@@ -305,15 +308,6 @@ def _lowest_toes(configuration: Scenario, recording: Recording, own: NDArray[np.
         middle = [first + round((last - first) * (at - timing.toe_off) / span) for at in timing[4:6]]
         found.append(float(recording["toe_height"][middle[0] : middle[1] + 1].min()))
     return min(found, default=None)
-
-
-def _safe_time(recording: Recording, own: NDArray[np.bool_]) -> float | None:
-    """When the controller first helped less within a segment [s]; None where it did not."""
-    if "safe_state" not in recording:
-        return None
-    safe = recording["safe_state"] > 0.5
-    begins = np.flatnonzero(own & safe & ~np.append(False, safe[:-1]))
-    return float(recording.time[begins[0]]) if begins.size else None
 
 
 _SAME_TIME = 0.05

@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +22,6 @@ from ppafo.metrics.strides import PER_STRIDE
 from ppafo.model.helping import STOPPED
 from ppafo.model.leg import passive_torque
 from ppafo.parameters.device import Actuator, FootPlate, Friction
-from ppafo.report.display_units import display_values, title_with_unit
-from ppafo.report.style import BLUE, GREY, VERMILION, house_style, mark_kind
 from ppafo.simulation.plan import MAXIMUM_STEPS
 from ppafo.simulation.sampled import run_sampled
 from ppafo.simulation.scenario import Control, Scenario
@@ -40,10 +38,6 @@ from ppafo.walking.preparation import FaultSettings
 from ppafo.walking.result import REMEDY, WalkResult, result_of_walk
 from ppafo.walking.strides import PHASES, healthy_positive_work, healthy_toe_height, lowest_toes
 from ppafo.walking.wearer import draw_builds
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 Progress = Callable[[float, float], None]
 
@@ -205,6 +199,7 @@ def without_device(configuration: Scenario) -> Scenario:
     off = with_device_off(configuration)
     device, motion = off.device, walk_of(off)
     lowest, highest = ANKLE_RANGE
+    # Nothing but its stops is left of the actuator: they are the range of the ankle.
     ankle = Actuator(0.0, 0.0, lowest, highest, _NO_CHAMBER, _NO_CHAMBER, 0.0, device.actuator.leak)
     leg = replace(
         device, actuator=ankle, friction=Friction(0.0, 0.0, 0.0), foot_plate=FootPlate(0.0, 0.0), effects={}, links={}
@@ -215,7 +210,7 @@ def without_device(configuration: Scenario) -> Scenario:
 
 def healthy_metrics(configuration: Scenario) -> dict[str, Metric]:
     """The metrics of a walk with a healthy ankle, SI units; without a moment curve there is no work."""
-    gait = walk_of(configuration).gait
+    gait, wearer = walk_of(configuration).gait, walk_of(configuration).wearer
     found = {
         "toe_clearance": Metric(0.0, "m", "0 by definition: measured from the healthy gait"),
         "lowest_toes": lowest_toes(configuration, healthy_toe_height(configuration)),
@@ -225,18 +220,14 @@ def healthy_metrics(configuration: Scenario) -> dict[str, Metric]:
     if gait.ankle_moment is not None:
         work = healthy_positive_work(configuration)
         found["positive_push_off_work"] = Metric(work, "J", "positive work of the ankle moment in one stride")
-        if walk_of(configuration).wearer.keeps_gait >= 0.5:
-            found["dorsiflexor_moment"] = _dorsiflexor_moment(configuration)
+        if wearer.keeps_gait >= 0.5:
+            # Muscles that lift the foot without any device give what the measured moment asks beyond tissue.
+            torque: Any = passive_torque  # plain arithmetic, of arrays too
+            tissue = torque(wearer.leg(), gait.ankle_angle.values_at(PHASES))
+            moment = np.maximum(tissue - wearer.body_mass * gait.ankle_moment.values_at(PHASES), 0.0)
+            summary = "moment of the wearer's dorsiflexors, mean over the stride"
+            found["dorsiflexor_moment"] = Metric(float(moment[:-1].mean()), "N m", summary)
     return found
-
-
-def _dorsiflexor_moment(configuration: Scenario) -> Metric:
-    """Moment of the muscles that lift the foot without any device, from the measured moment less tissue."""
-    gait, wearer = walk_of(configuration).gait, walk_of(configuration).wearer
-    torque: Any = passive_torque  # plain arithmetic, of arrays too
-    tissue = torque(wearer.leg(), gait.ankle_angle.values_at(PHASES))
-    moment = np.maximum(tissue - wearer.body_mass * gait.curve("ankle_moment").values_at(PHASES), 0.0)
-    return Metric(float(moment[:-1].mean()), "N m", "moment of the wearer's dorsiflexors, mean over the stride")
 
 
 MAXIMUM_WEARERS = 1_000_000
@@ -256,13 +247,6 @@ SHOWN = {
     "stance_share": ("Stance", "fraction", 1),
 }
 """Title, kind of quantity, and digits behind the point of what is known of every wearer."""
-
-_SIZE = (9.4, 5.6)
-_DRAWN_QUANTILES = (0.05, 0.5, 0.95)
-_HISTOGRAMS = ("gas", "positive_push_off_work", "net_push_off_work", "toe_clearance")
-_PAIRS = (("stride_time", "gas"), ("body_mass", "positive_push_off_work"))
-_BINS = 40
-_MAXIMUM_POINTS = 2000
 
 
 @dataclass(frozen=True, slots=True)
@@ -337,6 +321,7 @@ def walk_population(
         raise ScenarioError("many wearers walk at a constant supply: leave out the bottle, or the number of wearers")
     if walk_of(configuration).person:
         raise ScenarioError("many wearers are drawn about the wearer: leave out wearer.person, or their number")
+    # One generator, in this order, so that a seed gives the same people every time.
     generator = np.random.default_rng(seed)
     build = draw_builds(wearers, generator)
     gaits = draw_gaits(walk_of(configuration).gait, build.stature, generator)
@@ -353,6 +338,7 @@ def walk_population(
     walked = run.step * run.step_count
     # Numbers of each wearer from the totals; ``strides`` walked, parts of one included.
     strides = walked * gaits.timing["frequency"] if planned is None else turns_walked(planned.course, walked)
+    # Who never strikes must not divide by zero.
     strikes = np.maximum(rows["walk.strides"], 1.0)
     over = {"toe_clearance": strikes, "toe_landing": strikes}
     outcomes = {name: rows[item.total] / over.get(name, strides) for name, item in PER_STRIDE.items()}
@@ -387,44 +373,3 @@ def _run_in_groups(batch: Batch, progress: Progress) -> Floats:
         found.append(run_batch(one).states)
         progress(float(min(first + group, count)), float(count))
     return np.concatenate(found, axis=1)
-
-
-def population_figure(population: Population) -> "Figure":
-    """Return four histograms with quantiles, and two pictures of outcome over trait."""
-    from matplotlib.figure import Figure
-
-    with house_style():
-        figure = Figure(figsize=_SIZE)
-        figure.subplots_adjust(left=0.06, right=0.985, top=0.885, bottom=0.095, hspace=0.36, wspace=0.27)
-        grid = figure.subplots(2, 3).ravel().tolist()
-        for axes, name in zip((grid[0], grid[1], grid[3], grid[4]), _HISTOGRAMS, strict=True):
-            _histogram(axes, population, name)
-        for axes, (trait, outcome) in zip((grid[2], grid[5]), _PAIRS, strict=True):
-            (across, across_quantity, _), (up, up_quantity, _) = SHOWN[trait], SHOWN[outcome]
-            x = display_values(population.traits[trait], across_quantity)
-            y = display_values(population.outcomes[outcome], up_quantity)
-            thin = slice(None, None, max(1, x.size // _MAXIMUM_POINTS))
-            axes.plot(x[thin], y[thin], ".", color=BLUE, markersize=2.5, alpha=0.35, markeredgewidth=0.0)
-            axes.plot(x[0], y[0], "o", color=VERMILION, markersize=6)
-            axes.set_ylabel(title_with_unit(up, up_quantity), fontsize=9)
-            axes.set_xlabel(title_with_unit(across, across_quantity), fontsize=9)
-            axes.locator_params(nbins=5)
-        width, height = _SIZE
-        title = f"{population.scenario.name}: {population.count} wearers, {population.minutes:.3g} min each"
-        figure.text(0.12 / width, 1.0 - 0.12 / height, title, ha="left", va="top", fontweight="bold")
-        remark = "lines: 5th, 50th and 95th percentiles; dot: the wearer of the configuration"
-        figure.text(0.12 / width, 1.0 - 0.36 / height, remark, ha="left", va="top", fontsize=9, color=GREY)
-        mark_kind(figure, "simulated")
-        return figure
-
-
-def _histogram(axes: "Axes", population: Population, name: str) -> None:
-    title, quantity, _ = SHOWN[name]
-    values = display_values(population.outcomes[name], quantity)
-    axes.hist(values, bins=_BINS, color=BLUE, alpha=0.55)
-    for fraction in _DRAWN_QUANTILES:
-        axes.axvline(float(np.quantile(values, fraction)), color=GREY, linewidth=1.4 if fraction == 0.5 else 0.9)
-    axes.plot(values[0], 0.0, "o", color=VERMILION, markersize=6, clip_on=False, zorder=5)
-    axes.set_xlabel(title_with_unit(title, quantity), fontsize=9)
-    axes.set_ylabel("Wearers", fontsize=9)
-    axes.locator_params(nbins=5)

@@ -8,16 +8,16 @@ of the gait, or the paper's where no gait is named. Where it gives the stature, 
 follows body mass and stature.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.errors import ScenarioError
 from ppafo.gait import Gait
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Number, quantities_of
 from ppafo.model.leg import LegParameters
 from ppafo.parameters.graph import Follows, Graph, Term
 from ppafo.signals.recording import Floats
@@ -26,42 +26,6 @@ from ppafo.simulation.declaration import FOOT, Reading, value_at
 SHANK_SHARE = 0.246
 """Knee to ankle as a share of the stature: figure 4.1 of Winter, Biomechanics and Motor Control of Human Movement, 4th
 ed. 2009. The paper prints a shank of 0.46 m and no stature, which makes 1.87 m."""
-
-WEARER = (
-    Quantity("body_mass", "kg", "mass of the body", 72.5, 10.0, 300.0),
-    Quantity(
-        "stature",
-        "m",
-        "height of the body; given, the segments follow it and the body mass",
-        (FOOT["shank_length"].default or 0.0) / SHANK_SHARE,
-        0.5,
-        2.5,
-    ),
-    FOOT["shank_length"],
-    Quantity("shank_mass_centre", "m", "knee to the mass centre of the shank", 0.199, 0.0, 1.0),
-    Quantity("shank_mass", "kg", "mass of the shank", 4.5, 0.1, 30.0),
-    Quantity("shank_inertia", "kg m^2", "inertia of the shank about its mass centre", 0.1, 1.0e-4, 5.0),
-    FOOT["foot_mass_centre"],
-    FOOT["foot_mass"],
-    FOOT["foot_inertia"],
-    Quantity("heel_lever", "m", "ankle back to the heel; bounds the lever of the ground force", 0.05, 0.0, 0.2),
-    FOOT["toe_lever"],
-    Quantity("ankle_stiffness", "N m/rad", "stiffness of tissue at the ankle", 4.0, 0.0, 500.0),
-    Quantity("ankle_rest_angle", "rad", "angle at which passive tissue exerts no torque", 1.92, 0.5, 3.0),
-    Quantity("ankle_damping", "N m s/rad", "damping of tissue at the ankle", 0.2, 0.0, 50.0),
-    Quantity(
-        "residual_share", "1", "fraction of the healthy ankle moment that the wearer can still produce", 0.0, 0.0, 1.0
-    ),
-    Quantity(
-        "keeps_gait",
-        "1",
-        "1: nondisabled, muscles keep the measured ankle whatever the device does; 0: the ankle follows the torques",
-        0.0,
-        0.0,
-        1.0,
-    ),
-)
-"""Defaults: the paper's subject (after equation (12)); what it does not print is said in docs/decisions/0008."""
 
 MASS_VARIATION = 0.166
 STATURE_VARIATION = 0.039
@@ -74,12 +38,13 @@ CORRELATION = 0.5
 MAXIMUM_DEVIATIONS = 2.5
 """Draws further from the mean than this are taken at this distance."""
 
-_LENGTHS = ("shank_length", "shank_mass_centre", "foot_mass_centre", "heel_lever", "toe_lever")
-_MASSES = ("shank_mass", "foot_mass")
-_INERTIAS = ("shank_inertia", "foot_inertia")
-
 _SAME = 1.0e-3
 """Share of the body mass, or of the stature, that is rounding."""
+
+_STATURE = (FOOT["shank_length"].default or 0.0) / SHANK_SHARE
+_KEEPS_GAIT = (
+    "1: nondisabled, muscles keep the measured ankle whatever the device does; 0: the ankle follows the torques"
+)
 
 STATURES = (1.45, 2.0)
 """Statures [m] of nearly all adults, in which the fractions of segments were measured."""
@@ -95,28 +60,63 @@ class HeelRocker(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Wearer:
-    """One leg of a person; lengths [m], masses [kg], inertias [kg m^2], the ankle as in ``LegParameters``."""
+    """One leg of a person; what has no number here is declared with the foot of a leg alone.
 
-    body_mass: float
-    stature: float
+    Defaults: the paper's subject (after equation (12)); what it does not print is said in docs/decisions/0008.
+    """
+
+    body_mass: Annotated[float, Number("kg", "mass of the body", 72.5, 10.0, 300.0)]
+    stature: Annotated[
+        float, Number("m", "height of the body; given, the segments follow it and the body mass", _STATURE, 0.5, 2.5)
+    ]
     shank_length: float
-    shank_mass_centre: float
-    shank_mass: float
-    shank_inertia: float
+    shank_mass_centre: Annotated[float, Number("m", "knee to the mass centre of the shank", 0.199, 0.0, 1.0)]
+    shank_mass: Annotated[float, Number("kg", "mass of the shank", 4.5, 0.1, 30.0)]
+    shank_inertia: Annotated[float, Number("kg m^2", "inertia of the shank about its mass centre", 0.1, 1.0e-4, 5.0)]
     foot_mass_centre: float
     foot_mass: float
     foot_inertia: float
-    heel_lever: float
+    heel_lever: Annotated[
+        float, Number("m", "ankle back to the heel; bounds the lever of the ground force", 0.05, 0.0, 0.2)
+    ]
     toe_lever: float
-    ankle_stiffness: float
-    ankle_rest_angle: float
-    ankle_damping: float
-    residual_share: float
-    keeps_gait: float
+    ankle_stiffness: Annotated[float, Number("N m/rad", "stiffness of tissue at the ankle", 4.0, 0.0, 500.0)]
+    ankle_rest_angle: Annotated[float, Number("rad", "angle at which passive tissue exerts no torque", 1.92, 0.5, 3.0)]
+    ankle_damping: Annotated[float, Number("N m s/rad", "damping of tissue at the ankle", 0.2, 0.0, 50.0)]
+    residual_share: Annotated[
+        float, Number("1", "fraction of the healthy ankle moment that the wearer can still produce", 0.0, 0.0, 1.0)
+    ]
+    keeps_gait: Annotated[float, Number("1", _KEEPS_GAIT, 0.0, 0.0, 1.0)]
 
     def leg(self) -> LegParameters:
         """The leg as the engine takes it, on a heel that does not roll."""
         return leg_parameters(self, HeelRocker(self.heel_lever, self.heel_lever, 1.0))
+
+
+_DECLARED = FOOT | {item.name: item for item in quantities_of(Wearer)}
+WEARER = tuple(_DECLARED[item.name] for item in fields(Wearer))
+"""Numbers of ``[wearer]``, in the order of the fields."""
+
+SCALING = {
+    "body_mass": (1, 0),
+    "shank_length": (0, 1),
+    "shank_mass_centre": (0, 1),
+    "shank_mass": (1, 0),
+    "shank_inertia": (1, 2),
+    "foot_mass_centre": (0, 1),
+    "foot_mass": (1, 0),
+    "foot_inertia": (1, 2),
+    "heel_lever": (0, 1),
+    "toe_lever": (0, 1),
+}
+"""Powers of body mass and of stature with which the numbers of a leg go from one person to another."""
+
+
+def scaled(leg: Wearer | LegParameters, mass: Any, stature: Any) -> dict[str, Any]:
+    """Return the numbers of a leg [SI] at multiples [-] of body mass and stature, each of which may be an array."""
+    # A product has the same bits for one person as for a column of them, which a power need not have.
+    masses, statures = (1.0, mass), (1.0, stature, stature * stature)
+    return {name: getattr(leg, name) * masses[one] * statures[other] for name, (one, other) in SCALING.items()}
 
 
 def leg_parameters(wearer: Wearer, rocker: HeelRocker) -> LegParameters:
@@ -160,6 +160,7 @@ def draw_builds(count: int, generator: np.random.Generator) -> Build:
     """Draw the build of ``count`` people; the first is the wearer that is scaled."""
     normal = draw_bounded_normal(generator, (2, count))
     stature = normal[0]
+    # Two normal numbers with this correlation, from two that have none.
     mass = CORRELATION * normal[0] + np.sqrt(1.0 - CORRELATION**2) * normal[1]
     scaled = 1.0 + MASS_VARIATION * mass, 1.0 + STATURE_VARIATION * stature
     for values in scaled:
@@ -172,24 +173,21 @@ def draw_bounded_normal(generator: np.random.Generator, shape: tuple[int, ...]) 
     return np.clip(generator.standard_normal(shape), -MAXIMUM_DEVIATIONS, MAXIMUM_DEVIATIONS)
 
 
-def segment_values(wearer: Wearer, build: Build) -> dict[str, Floats]:
-    """Values of the leg (people,) by field of ``LegParameters``, in SI units."""
-    found = {name: getattr(wearer, name) * build.stature for name in _LENGTHS}
-    found |= {name: getattr(wearer, name) * build.mass for name in _MASSES}
-    found |= {name: getattr(wearer, name) * build.mass * build.stature**2 for name in _INERTIAS}
-    return {"body_mass": wearer.body_mass * build.mass, **found}
-
-
-def _share(name: str, power_of_mass: int, power_of_stature: int) -> float:
-    """Return a number of a segment of the paper's subject over its body mass and its stature to these powers."""
+def _shares() -> dict[str, float]:
+    """Return the numbers of the leg of the paper's subject over the powers of its body mass and its stature."""
     paper = paper_subject()
-    return float(getattr(paper, name) / (paper.body_mass**power_of_mass * paper.stature**power_of_stature))
+    return {
+        name: getattr(paper, name) / (paper.body_mass**of_mass * paper.stature**of_stature)
+        for name, (of_mass, of_stature) in SCALING.items()
+    }
 
 
-_SHANK_CENTRE, _FOOT_CENTRE = _share("shank_mass_centre", 0, 1), _share("foot_mass_centre", 0, 1)
-_HEEL, _TOE = _share("heel_lever", 0, 1), _share("toe_lever", 0, 1)
-_SHANK_MASS, _FOOT_MASS = _share("shank_mass", 1, 0), _share("foot_mass", 1, 0)
-_SHANK_INERTIA, _FOOT_INERTIA = _share("shank_inertia", 1, 2), _share("foot_inertia", 1, 2)
+# Constants of their own, for the functions below are translated to C.
+_SHARES = _shares()
+_SHANK_CENTRE, _FOOT_CENTRE = _SHARES["shank_mass_centre"], _SHARES["foot_mass_centre"]
+_HEEL, _TOE = _SHARES["heel_lever"], _SHARES["toe_lever"]
+_SHANK_MASS, _FOOT_MASS = _SHARES["shank_mass"], _SHARES["foot_mass"]
+_SHANK_INERTIA, _FOOT_INERTIA = _SHARES["shank_inertia"], _SHARES["foot_inertia"]
 
 
 def shank_length_of(stature: float) -> float:
@@ -237,15 +235,12 @@ def foot_inertia_of(stature: float, body_mass: float) -> float:
     return _FOOT_INERTIA * body_mass * stature * stature
 
 
-_OF_LENGTH = {
+_FOLLOWING: Mapping[str, Callable[..., float]] = {
     "shank_length": shank_length_of,
     "shank_mass_centre": shank_mass_centre_of,
     "foot_mass_centre": foot_mass_centre_of,
     "heel_lever": heel_lever_of,
     "toe_lever": toe_lever_of,
-}
-# These too follow the stature, which comes first in their terms: a link waits until its first source is given.
-_OF_BOTH = {
     "shank_mass": shank_mass_of,
     "foot_mass": foot_mass_of,
     "shank_inertia": shank_inertia_of,
@@ -257,10 +252,13 @@ STATURE, BODY_MASS = "wearer.stature", "wearer.body_mass"
 def links_of_stature(document: Mapping[str, Any]) -> Graph:
     """Return how the segments of a walk file follow stature and body mass: now, or once the stature is given."""
     later = value_at(document, STATURE) is None
-    terms = {name: Term((STATURE,), function) for name, function in _OF_LENGTH.items()}
-    terms |= {name: Term((STATURE, BODY_MASS), function) for name, function in _OF_BOTH.items()}
-    paths = {f"wearer.{name}": (Follows((term,), when_set=later),) for name, term in terms.items()}
-    return {path: links for path, links in paths.items() if value_at(document, path) is None}
+    found: dict[str, tuple[Follows, ...]] = {}
+    for name, function in _FOLLOWING.items():
+        # A link waits until its first source is given, so the stature comes first for masses too.
+        sources = (STATURE,) if SCALING[name] == (0, 1) else (STATURE, BODY_MASS)
+        if value_at(document, f"wearer.{name}") is None:
+            found[f"wearer.{name}"] = (Follows((Term(sources, function),), when_set=later),)
+    return found
 
 
 def read_wearer(reading: Reading, gait: Gait, is_named: bool) -> Wearer:
@@ -268,6 +266,7 @@ def read_wearer(reading: Reading, gait: Gait, is_named: bool) -> Wearer:
 
     Where it gives the stature, segments follow that and the body mass.
     """
+    # The built-in gait, where nobody names it, is walked by the paper's subject and not by its own.
     subject = _subject(gait) if is_named else paper_subject()
     if value_at(reading.document, STATURE) is not None:
         known = {item.name: replace(item, default=getattr(subject, item.name)) for item in WEARER}
@@ -292,9 +291,9 @@ def read_wearer(reading: Reading, gait: Gait, is_named: bool) -> Wearer:
 def _subject(gait: Gait) -> Wearer:
     """Return the wearer with body mass, and lengths where the stature is known, of the subject of a gait."""
     paper = paper_subject()
+    # A subject of unknown stature has the lengths of the paper's.
     stature = 1.0 if gait.stature is None else SHANK_SHARE * gait.stature / paper.shank_length
-    build = Build(np.array([gait.body_mass / paper.body_mass]), np.array([stature]))
-    segments = {name: float(values[0]) for name, values in segment_values(paper, build).items()}
+    segments = scaled(paper, gait.body_mass / paper.body_mass, stature)
     return replace(paper, stature=paper.stature if gait.stature is None else gait.stature, **segments)
 
 

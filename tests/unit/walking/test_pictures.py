@@ -15,9 +15,9 @@ from ppafo.walking.figures import over_time
 from ppafo.walking.figures.legs import animation, drags, frames_figure, last_phases, legs_of, strip_figure
 from ppafo.walking.figures.mean_stride import walk_figure
 from ppafo.walking.figures.over_time import acting_phase, over_time_figure
+from ppafo.walking.figures.population import population_figure
 from ppafo.walking.motion import walk_of
 from ppafo.walking.strides import settled
-from ppafo.walking.walk import population_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -161,8 +161,8 @@ def test_the_animation_has_two_strides_of_frames_at_half_speed() -> None:
 def test_histograms_hold_every_wearer() -> None:
     people = walk_population(load_walk("proportional"), 0.1, 60, seed=2)
     figure = population_figure(people)
-    heights = [patch.get_height() for patch in figure.axes[0].patches]
-    assert sum(heights) == 60
+    filled = next(patch for patch in figure.axes[0].patches if patch.get_fill())
+    assert filled.get_data().values.sum() == 60  # type: ignore[attr-defined]
     lines = text_of(wearers_finding(people)).splitlines()
     assert lines[0] == "proportional: 60 wearers, 0.1 min each"
     gas = [float(cell) for cell in next(line for line in lines if line.startswith("Gas")).split()[4:]]

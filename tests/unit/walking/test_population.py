@@ -19,11 +19,10 @@ from ppafo.walking.planning import batch_of_many, plan_walk
 from ppafo.walking.wearer import (
     MASS_VARIATION,
     STATURE_VARIATION,
-    Build,
     draw_bounded_normal,
     draw_builds,
     paper_subject,
-    segment_values,
+    scaled,
 )
 
 MINUTES = 0.15
@@ -70,7 +69,7 @@ def test_any_wearer_walks_as_it_would_alone() -> None:
     settings = dict(configuration.controller.settings)
     settings |= {name: settings[name] * scale for name in ("load_threshold", "unload_threshold")}
     settings["push_off_start"] += start
-    segments = segment_values(walk_of(configuration).wearer, build)
+    segments = scaled(walk_of(configuration).wearer, build.mass, build.stature)
     gait = replace(
         walk_of(configuration).gait,
         stride_time=float(gaits.stride_time[index]),
@@ -117,7 +116,7 @@ def test_builds_vary_as_stated_and_keep_the_shares_of_segments() -> None:
     assert build.stature.std() == pytest.approx(STATURE_VARIATION, rel=0.04)
     assert np.corrcoef(build.mass, build.stature)[0, 1] == pytest.approx(0.5, abs=0.03)
     wearer = paper_subject()
-    leg = segment_values(wearer, Build(np.array([1.0, 2.0]), np.array([1.0, 1.5])))
+    leg = scaled(wearer, np.array([1.0, 2.0]), np.array([1.0, 1.5]))
     assert leg["shank_length"].tolist() == pytest.approx([0.46, 0.69])
     assert leg["foot_mass"].tolist() == pytest.approx([1.0, 2.0])
     assert leg["shank_inertia"].tolist() == pytest.approx([0.1, 0.1 * 2.0 * 2.25])

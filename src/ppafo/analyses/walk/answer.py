@@ -38,6 +38,7 @@ from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.walking import course as courses
 from ppafo.walking.figures.legs import animation, frames_figure, strip_figure
 from ppafo.walking.figures.mean_stride import walk_figure
+from ppafo.walking.figures.population import population_figure
 from ppafo.walking.loading import FILE, check_duration_once, load_walk
 from ppafo.walking.motion import person_remarks, walk_of
 from ppafo.walking.person import START_VARIATION, THRESHOLD_VARIATION
@@ -52,7 +53,6 @@ from ppafo.walking.walk import (
     Number,
     Population,
     compare_walks,
-    population_figure,
     walk_population,
 )
 from ppafo.walking.wearer import CORRELATION, MASS_VARIATION, MAXIMUM_DEVIATIONS, STATURE_VARIATION

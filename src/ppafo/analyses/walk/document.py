@@ -9,7 +9,7 @@ from ppafo.documents.json_text import plain
 from ppafo.simulation.scenario import UNITS, Scenario
 from ppafo.version import __version__
 from ppafo.walking.motion import walk_of
-from ppafo.walking.planning import sensor_settings
+from ppafo.walking.planning import sensor_numbers
 from ppafo.walking.walk import Comparison
 
 
@@ -48,7 +48,11 @@ def walk_document(scenario: Scenario) -> dict[str, Any]:
         "settings": plain(control.settings),
         "period": control.period,
         "step": scenario.run.step,
-        "sensors": plain(sensor_settings(scenario)) | {"seed": scenario.sensors.seed},
+        "sensors": {
+            "numbers": plain(sensor_numbers(scenario)),
+            "faults": plain(motion.faults),
+            "seed": scenario.sensors.seed,
+        },
         "supply_line": plain(scenario.supply_line),
         "gas_model": plain(scenario.gas_model),
         "bottle": None if motion.bottle is None else motion.bottle.to_dict(),

@@ -24,13 +24,15 @@ from ppafo.simulation.declaration import RUN, SUPPLY_LINES
 from ppafo.simulation.numbers import device_numbers, number_at
 from ppafo.simulation.plan import profile_parameters
 from ppafo.simulation.scenario import Scenario
+from ppafo.walking.contradictions import PAIRS
 from ppafo.walking.course import flat_foot
 from ppafo.walking.declaration import PERSON, fault_numbers
 from ppafo.walking.gait_series import fit_rocker, gait_series, gait_timing
 from ppafo.walking.motion import WalkMotion, walk_of
-from ppafo.walking.planning import NO_REFERENCE, course_of_walk, failing_of, law_of, sensor_settings
+from ppafo.walking.planning import NO_REFERENCE, course_of_walk, failing_of, law_of
 from ppafo.walking.preparation import (
     DISTORTED,
+    DISTORTING,
     FROZEN,
     NEVER,
     FaultSettings,
@@ -52,14 +54,8 @@ from ppafo.walking.wearer import WEARER, leg_parameters
 
 _FORCES = ("force_bandwidth", "force_noise", "force_resolution", "lost_share")
 _OTHERS = ("angle_bandwidth", "pressure_bandwidth", "angle_lost_share", "pressure_lost_share")
-_DISTORTING = ("time", "period", "gain", "offset", "drift", "crosstalk", "lag", "lost_share", "delay")
 _RELATIONS = (
-    ("wearer.shank_mass_centre", "at most", "wearer.shank_length"),
-    ("wearer.foot_mass_centre", "at most", "wearer.toe_lever"),
-    ("controller.unload_threshold", "below", "controller.load_threshold"),
-    ("controller.largest_force", "above", "controller.load_threshold"),
-    ("controller.flat_from", "below", "controller.flat_to"),
-    ("controller.lowest_angle", "below", "controller.highest_angle"),
+    *((pair.path, pair.relation, pair.other) for pair in PAIRS),
     ("controller.swing_angle", "above", "controller.lowest_angle"),
     ("controller.swing_angle", "below", "controller.highest_angle"),
     ("controller.swing_angle", "above", "actuator.angle_min"),
@@ -68,9 +64,6 @@ _RELATIONS = (
     ("controller.filled_pressure", "above", "supply.atmospheric_pressure"),
     ("controller.filled_pressure", "below", "supply.pressure"),
     ("controller.filled_pressure", "below", "supply.dorsiflexion_pressure"),
-    ("controller.push_off_end", "above", "controller.push_off_start"),
-    ("controller.rise_time", "at most", "controller.peak_time"),
-    ("controller.peak_time", "at least", "controller.push_off_start"),
 )
 """Contradictions of a walk file between two numbers; those with a third, or with the gait, are left to the caller."""
 
@@ -135,7 +128,7 @@ def _numbers(configuration: Scenario) -> dict[str, tuple[Quantity, float]]:
 
 def sensors_that_fail(configuration: Scenario) -> dict[str, FaultSettings]:
     """Faults of a walk by the name of the sensor, only where there is one."""
-    return {sensor: item for sensor, item in sensor_settings(configuration).faults.items() if item.kind}
+    return {sensor: item for sensor, item in walk_of(configuration).faults.items() if item.kind}
 
 
 def _control(configuration: Scenario) -> dict[str, Quantity]:
@@ -160,10 +153,7 @@ def relations_of_walk(configuration: Scenario) -> tuple[Relation, ...]:
     rules = [(path, relation, other) for path, relation, other, _ in consistency(configuration.device)]
     if configuration.supply_lines is not None:
         rules.append(("supply.dorsiflexion_pressure", "at most", "supply.pressure"))
-    if "load_threshold" in configuration.controller.settings:
-        rules += _RELATIONS
-    else:
-        rules += _RELATIONS[:2]
+    rules += _RELATIONS
     known = _numbers(configuration)
     return tuple(
         Relation(c_identifier(path), relation, c_identifier(other))
@@ -207,13 +197,13 @@ def _leg(configuration: Scenario, writing: Writing) -> Iterator[str]:
 
 def _gait_sensors(configuration: Scenario, writing: Writing) -> Iterator[str]:
     """Lines that make the sensors with their faults, and the longest time by which one is late."""
-    add, settings = writing.add, sensor_settings(configuration)
-    for sensor, fault in settings.faults.items():
+    add, faults = writing.add, walk_of(configuration).faults
+    for sensor, fault in faults.items():
         names = writing.section(f"faults.{sensor}", [item.name for item in fault_numbers(sensor, fault.kind)])
         yield f"{sensor}_fault = {_fault(writing, fault.kind, names)}"
     row = writing.row("SensorNumbers", writing.section("sensors", (*_FORCES, *_OTHERS)))
-    faults = ", ".join(f"{sensor}_fault" for sensor in settings.faults)
-    yield f"gait_sensors = {add(gait_sensors)}({row}, controller_period, {faults})"
+    failing = ", ".join(f"{sensor}_fault" for sensor in faults)
+    yield f"gait_sensors = {add(gait_sensors)}({row}, controller_period, {failing})"
     yield f"signal_delay = {add(longest_delay)}(gait_sensors) * controller_period"
 
 
@@ -236,7 +226,7 @@ def _fault(writing: Writing, kind: str, names: Mapping[str, str]) -> str:
         holds = 1.0 if kind == FROZEN else 0.0
         reading = names.get("reading", "0.0")
         return f"{writing.add(fixed_fault)}({names['time']}, {holds!r}, {reading}, {names['period']})"
-    given = ", ".join(names.get(name, "0.0") for name in _DISTORTING)
+    given = ", ".join(names.get(name, "0.0") for name in DISTORTING)
     return f"{writing.add(distorting_fault)}({given}, controller_period)"
 
 

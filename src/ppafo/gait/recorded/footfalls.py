@@ -402,14 +402,15 @@ def strides_of_curve(footfalls: Footfalls, name: str, signal: Signal, strides: S
     inside = strides_within(signal, strides)
     if name not in LOADS or not (footfalls.is_overground or signal.absent is not None):
         return inside
-    return [item for item in inside if _is_loaded(footfalls.is_overground, name, signal, item)]
-
-
-def _is_loaded(is_overground: bool, name: str, signal: Signal, stride: Stride) -> bool:
-    slack = _ABOUT_STANCE * stride.time
-    stance = (signal.time >= stride.start + slack) & (signal.time <= stride.toe_off - slack)
-    if not stance.any() or (signal.absent is not None and bool(signal.absent[stance].any())):
-        return False
-    values = signal.values[stance]
-    there = values > UNLOADED if name == FORCE else values != 0.0
-    return not is_overground or float(np.mean(there)) >= _COVERED
+    covered = []
+    for item in inside:
+        slack = _ABOUT_STANCE * item.time
+        stance = (signal.time >= item.start + slack) & (signal.time <= item.toe_off - slack)
+        if not stance.any() or (signal.absent is not None and bool(signal.absent[stance].any())):
+            continue
+        values = signal.values[stance]
+        there = values > UNLOADED if name == FORCE else values != 0.0
+        # Overground the foot may have been on the plate for a part of the stance only.
+        if not footfalls.is_overground or float(np.mean(there)) >= _COVERED:
+            covered.append(item)
+    return covered

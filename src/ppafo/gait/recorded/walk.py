@@ -5,8 +5,9 @@ that turns against it), or, for the knee, from hip and thigh.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,11 +27,8 @@ from ppafo.gait.gait import HARMONICS, REQUIRED, fit_curve
 from ppafo.gait.plausible import SignSource, other_sign
 from ppafo.gait.recorded.mapping import (
     AngleMap,
-    ForceMap,
     GaitMap,
     KneeMap,
-    MomentMap,
-    PressureMap,
     ShankMap,
     column_names,
 )
@@ -396,63 +394,45 @@ def walk_signals(
                 return
             signal = foot_markers_angle(found, mapped, walk["shank_angle"])
         else:
-            signal = _READERS[name](found, mapped, person.body_mass)
+            signal = _curve_of(name, found, mapped, person.body_mass)
         signal = replace(signal, columns=tuple(column for _, column in found.terms))
         walk[name] = with_absence(signal) if name in LOADS else without_ends(signal)
 
-    def read_knee() -> None:
-        if columns.knee is not None:
-            knee = knee_signals(columns.knee, tables, person.stature, is_default)
-            walk.update((name, without_ends(signal)) for name, signal in knee.items())
-
-    for name in _READERS:
+    # The shank stands first: an ankle from markers of the foot turns against it.
+    for name in _UNITS:
         with noted_in(wrong):
             read_curve(name)
     with noted_in(wrong):
-        read_knee()
+        knee = {} if columns.knee is None else knee_signals(columns.knee, tables, person.stature, is_default)
+        walk |= {name: without_ends(signal) for name, signal in knee.items()}
     if any(name not in walk for name in REQUIRED):
         raise_noted(wrong)
     return walk
 
 
-def _shank(found: CurveColumns, mapped: ShankMap, _body_mass: float) -> Signal:
-    if mapped.terms is None:
-        ahead, up = between_markers(found, mapped, str(mapped.knee), str(mapped.ankle))
-        values = np.asarray(np.arctan2(ahead, -up), dtype=np.float64)
-    else:
-        values, _ = found.in_unit(mapped.unit, ("rad",))
-    sign = 1.0 if mapped.positive == "ankle_in_front" else -1.0
-    return Signal(found.table.file, found.table.time, sign * values)
-
-
-def _ankle(found: CurveColumns, mapped: AngleMap, _body_mass: float) -> Signal:
-    values, _ = found.in_unit(mapped.unit, ("rad",))
-    sign, neutral = mapped.sign_and_neutral()
-    return Signal(found.table.file, found.table.time, _RIGHT_ANGLE + sign * (values - neutral))
-
-
-def _moment(found: CurveColumns, mapped: MomentMap, body_mass: float) -> Signal:
-    values, unit = found.in_unit(mapped.unit, ("N m/kg", "N m"))
-    fraction = values / body_mass if unit == "N m" else values
-    return Signal(found.table.file, found.table.time, fraction if mapped.positive == "plantarflexion" else -fraction)
-
-
-def _force(found: CurveColumns, mapped: ForceMap, body_mass: float) -> Signal:
-    values, unit = found.in_unit(mapped.unit, ("", "N", "N/kg"))
-    weight = {"": 1.0, "N": body_mass * STANDARD_GRAVITY, "N/kg": STANDARD_GRAVITY}[unit]
-    sign = 1.0 if mapped.positive == "up" else -1.0
-    return Signal(found.table.file, found.table.time, sign * values / weight)
-
-
-def _pressure(found: CurveColumns, mapped: PressureMap, _body_mass: float) -> Signal:
-    values, _ = found.in_unit(mapped.unit, ("m",))
-    return Signal(found.table.file, found.table.time, values if mapped.positive == "forward" else -values)
-
-
-_READERS: dict[str, Callable[..., Signal]] = {
-    "shank_angle": _shank,
-    "ankle_angle": _ankle,
-    "ankle_moment": _moment,
-    "vertical_force": _force,
-    "centre_of_pressure": _pressure,
+_UNITS = {
+    "shank_angle": ("rad",),
+    "ankle_angle": ("rad",),
+    "ankle_moment": ("N m/kg", "N m"),
+    "vertical_force": ("", "N", "N/kg"),
+    "centre_of_pressure": ("m",),
 }
+"""Units in SI of the curves that a map names, the package's own first."""
+_POSITIVE = ("ankle_in_front", "plantarflexion", "up", "forward")
+"""Directions that count above 0 in the package."""
+
+
+def _curve_of(name: str, found: CurveColumns, mapped: Any, body_mass: float) -> Signal:
+    """Return the signal of a curve in SI units, with the signs of the package; loads per ``body_mass`` [kg]."""
+    if isinstance(mapped, ShankMap) and mapped.terms is None:
+        ahead, up = between_markers(found, mapped, str(mapped.knee), str(mapped.ankle))
+        values, unit = np.asarray(np.arctan2(ahead, -up), dtype=np.float64), "rad"
+    else:
+        values, unit = found.in_unit(mapped.unit, _UNITS[name])
+    if isinstance(mapped, AngleMap):
+        sign, neutral = mapped.sign_and_neutral()
+        return Signal(found.table.file, found.table.time, _RIGHT_ANGLE + sign * (values - neutral))
+    # A moment is per body mass, and a force in body weights.
+    over = {"N m": body_mass, "N": body_mass * STANDARD_GRAVITY, "N/kg": STANDARD_GRAVITY}.get(unit, 1.0)
+    sign = 1.0 if mapped.positive in _POSITIVE else -1.0
+    return Signal(found.table.file, found.table.time, sign * values / over)

@@ -73,6 +73,7 @@ def legs_of(result: WalkResult, turns: Floats) -> Legs:
     configuration, recording = result.scenario, result.recording
     gait = walk_of(configuration).gait
     path = ankle_path(gait, gait_timing(gait), walk_of(configuration).wearer)
+    # A walk of equal strides has one stride time, of the gait that leads it.
     times = turns * gait.stride_time
     shank, angle, healthy = (
         np.interp(times, recording.time, recording[name]) for name in ("shank_angle", "angle", "healthy_angle")
@@ -85,19 +86,14 @@ def last_phases(result: WalkResult, strides: int, per_stride: int) -> Floats:
 
     They are the last ones in a row that had help, where there are as many.
     """
+    # Rounding must not take the last stride away.
     last = int(result.recording.time[-1] / walk_of(result.scenario).gait.stride_time + 1.0e-6)
     count = min(strides, max(1, last - 1))
-    last = _last_helped(result.helped, last, count)
+    if not result.helped.all():
+        # The walk begins with a stride of its own, at a heel strike that is not counted.
+        ends = range(last, count, -1)
+        last = next((end for end in ends if result.helped[end - count - 1 : end - 1].sum() == count), last)
     return np.asarray(last - count + np.arange(count * per_stride) / per_stride)
-
-
-def _last_helped(helped: NDArray[np.bool_], last: int, count: int) -> int:
-    """Return the end [strides] of the last ``count`` strides with help up to ``last``; that where there are none."""
-    if helped.all():
-        return last
-    # The walk begins with a stride of its own, at a heel strike that is not counted.
-    ends = [end for end in range(last, count, -1) if helped[end - count - 1 : end - 1].sum() == count]
-    return ends[0] if ends else last
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,7 +106,8 @@ class LegArtists:
 
     def place(self, posture: Posture, index: int, offset: float) -> None:
         """Move the leg to one instant; ``offset`` [m] is taken from x."""
-        knee, ankle, heel, toe = (points[index] - (offset, 0.0) for points in _joints(posture))
+        joints = posture.knee, posture.ankle, posture.heel, posture.toe
+        knee, ankle, heel, toe = (points[index] - (offset, 0.0) for points in joints)
         self.shank.set_data([knee[0], ankle[0]], [knee[1], ankle[1]])
         self.foot.set_xy([ankle, heel, toe])
         self.joint.set_data([knee[0], ankle[0]], [knee[1], ankle[1]])
@@ -150,10 +147,6 @@ def draw_ground(axes: "Axes", left: float, right: float) -> None:
 def drags(legs: Legs, index: int) -> bool:
     """Return whether the toes are more than 1 cm below the ground."""
     return bool(legs.worn.toe[index, 1] < DRAG_LIMIT)
-
-
-def _joints(posture: Posture) -> tuple[Floats, ...]:
-    return posture.knee, posture.ankle, posture.heel, posture.toe
 
 
 def frames_figure(comparison: Comparison) -> "Figure":
@@ -361,15 +354,20 @@ class _Scene:
 def animation(comparison: Comparison) -> bytes:
     """Return the GIF; two strides at half speed."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from PIL import Image
 
+    worn = comparison.with_device
+    stride_time = walk_of(worn.scenario).gait.stride_time
     with house_style():
-        turns = last_phases(comparison.with_device, _STRIDES, _PER_STRIDE)
+        turns = last_phases(worn, _STRIDES, _PER_STRIDE)
+        # The command that is held at each instant: the last sample at or before it.
+        places = np.searchsorted(worn.recording.time, turns * stride_time, side="right") - 1
+        commands = worn.recording["command"][places]
         figure, scenes, cursor, lamp = _stage(comparison, turns)
         canvas: Any = FigureCanvasAgg(figure)
         canvas.draw()
         empty = canvas.copy_from_bbox(figure.bbox)
         images = []
-        commands = _commands(comparison.with_device, turns)
         for index in range(turns.size):
             canvas.restore_region(empty)
             for scene in scenes:
@@ -382,10 +380,8 @@ def animation(comparison: Comparison) -> bytes:
             lamp.get_bbox_patch().set_facecolor(colour)
             cursor.axes.draw_artist(cursor)
             cursor.axes.draw_artist(lamp)
-            from PIL import Image
-
             images.append(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB").copy())
-        return _gif(images, walk_of(comparison.with_device.scenario).gait.stride_time)
+        return _gif(images, stride_time)
 
 
 def _stage(comparison: Comparison, turns: np.ndarray) -> "tuple[Figure, list[_Scene], Any, Any]":
@@ -453,27 +449,12 @@ def _traces(axes: "Axes", result: WalkResult, turns: np.ndarray) -> None:
     )
 
 
-def _commands(result: WalkResult, turns: np.ndarray) -> np.ndarray:
-    times = turns * walk_of(result.scenario).gait.stride_time
-    return result.recording["command"][np.searchsorted(result.recording.time, times, side="right") - 1]
-
-
-def _together(images: "list[Image]") -> "Image":
-    """Return images one below the other."""
-    from PIL import Image
-
-    width, height = images[0].size
-    sheet = Image.new("RGB", (width, height * len(images)))
-    for index, image in enumerate(images):
-        sheet.paste(image, (0, index * height))
-    return sheet
-
-
 def _gif(images: "list[Image]", stride_time: float) -> bytes:
     """All frames on the palette of one, so that only what moves takes room."""
     from PIL import Image
 
-    palette = _together(images[:: _PER_STRIDE // 5]).quantize(_COLOURS, dither=Image.Dither.NONE)
+    sheet = Image.fromarray(np.concatenate([np.asarray(image) for image in images[:: _PER_STRIDE // 5]]))
+    palette = sheet.quantize(_COLOURS, dither=Image.Dither.NONE)
     tones = palette.getpalette() or []
     triples = [tones[start : start + 3] for start in range(0, len(tones), 3)]
     # What is nearly white is white, for averages with its edges would tint the background; a small red foot is kept.

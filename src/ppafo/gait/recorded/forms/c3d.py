@@ -53,7 +53,10 @@ def read_c3d(path: str | Path) -> MotionTable:
     check_can_be_read(Path(path), __name__, "open_c3d", "ezc3d")
     content = open_c3d(path)
     parameters: Any = content["parameters"]
-    rate = _rate(parameters, path)
+    rates = np.atleast_1d(parameters["POINT"]["RATE"]["value"])
+    rate = float(rates[0]) if rates.size else 0.0
+    if not 0.0 < rate < np.inf:
+        raise DataError(f"{path}: POINT:RATE is {rate:g}; points need a rate above 0 Hz")
     points: Floats = content["data"]["points"]
     # The labels, without the subject's name before a colon.
     group = parameters["POINT"]
@@ -97,14 +100,6 @@ def open_c3d(path: str | Path) -> Any:
             return ezc3d.c3d(str(path))
     except (OSError, RuntimeError, ValueError, IndexError, KeyError) as error:
         raise DataError(f"{path}: ezc3d cannot read it: {one_line(error)}") from error
-
-
-def _rate(parameters: Any, path: str | Path) -> float:
-    values = np.atleast_1d(parameters["POINT"]["RATE"]["value"])
-    rate = float(values[0]) if values.size else 0.0
-    if not 0.0 < rate < np.inf:
-        raise DataError(f"{path}: POINT:RATE is {rate:g}; points need a rate above 0 Hz")
-    return rate
 
 
 def _bare(label: str) -> str:

@@ -72,7 +72,15 @@ def _convention(table: MotionTable, side: Side, _body_mass: float) -> Convention
         # Where its flexion counts above 0, as in the newer OpenSim models, the knee is subtracted.
         counts_above = flexion is not None and bool(np.nanmax(flexion) > -np.nanmin(flexion))
         terms.append(f"-{name}" if counts_above else name)
-    usual = usual.model_copy(update={"shank_angle": ShankMap(terms=tuple(terms)), **_own_columns(table, side[0])})
+    maps: dict[str, object] = {"shank_angle": ShankMap(terms=tuple(terms))}
+    # What this package writes for OpenSim beside its coordinates (``storage/opensim.py``) is read as it is.
+    if f"shank_angle_{side[0]}" in table.columns:
+        maps["shank_angle"] = ShankMap(terms=(f"shank_angle_{side[0]}",))
+    if {"knee_forward", "knee_up"} <= set(table.columns):
+        maps["knee"] = KneeMap(forward=("knee_forward",), up=("knee_up",), unit="m/s^2")
+    if "centre_of_pressure" in table.columns:
+        maps["centre_of_pressure"] = PressureMap(terms=("centre_of_pressure",), unit="m")
+    usual = usual.model_copy(update=maps)
     own, other, numbered = _forces(table.columns, side)
     if own or (other and len(numbered) == 1):
         plates = own or numbered
@@ -81,18 +89,6 @@ def _convention(table: MotionTable, side: Side, _body_mass: float) -> Convention
     if len(numbered) == 1 and side == "right":
         return Convention(usual.model_copy(update={"vertical_force": ForceMap(terms=numbered)}))
     return Convention(usual.model_copy(update={"vertical_force": None}), numbered)
-
-
-def _own_columns(table: MotionTable, foot: str) -> dict[str, object]:
-    """Return the maps of what this package writes for OpenSim beside its coordinates (``storage/opensim.py``)."""
-    found: dict[str, object] = {}
-    if f"shank_angle_{foot}" in table.columns:
-        found["shank_angle"] = ShankMap(terms=(f"shank_angle_{foot}",))
-    if {"knee_forward", "knee_up"} <= set(table.columns):
-        found["knee"] = KneeMap(forward=("knee_forward",), up=("knee_up",), unit="m/s^2")
-    if "centre_of_pressure" in table.columns:
-        found["centre_of_pressure"] = PressureMap(terms=("centre_of_pressure",), unit="m")
-    return found
 
 
 def _forces(names: Iterable[str], side: Side) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
