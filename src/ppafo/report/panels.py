@@ -90,6 +90,7 @@ SHAPES: Mapping[str, Callable[..., Any]] = {
     "map": lambda axes, mark, x, y: axes.pcolormesh(
         x, y, mark.to, shading="nearest", rasterized=True, cmap="cividis", **mark.style
     ),
+    "text": lambda axes, mark, x, y: axes.text(x, y, mark.label, color=mark.colour, **mark.style),
     "points": lambda axes, mark, x, y: axes.scatter(
         x, y, c=mark.to, s=9, linewidths=0, cmap="cividis", rasterized=True, **mark.style
     ),
@@ -98,7 +99,7 @@ SHAPES: Mapping[str, Callable[..., Any]] = {
 
 ``line``, ``bars`` (edges and counts), ``reach`` (points with the half width ``to``), ``band`` (between two rows of y),
 ``span`` and ``strip`` (between two x, two y), ``upright`` (from one y to another), ``level`` and ``at`` (a line across
-or upright), ``map`` and ``points`` (coloured by ``to``).
+or upright), ``text`` (its name, written there), ``map`` and ``points`` (coloured by ``to``).
 """
 
 
@@ -158,7 +159,7 @@ def _draw(axes: "Axes", panel: Panel) -> Any:
     axes.set_xlabel(panel.x.axis)
     axes.set_ylabel(panel.y.axis if not panel.shares_x else panel.y.axis_unit if panel.title else "")
     axes.set_title(panel.title or (panel.y.axis if panel.shares_x else ""))
-    if panel.legend and any(mark.label for mark in panel.marks):
+    if panel.legend and any(mark.label for mark in panel.marks if mark.shape != "text"):
         if panel.legend == "above":
             label_lines(axes)
         elif panel.legend == "figure":

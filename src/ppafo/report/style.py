@@ -104,15 +104,14 @@ def house_style() -> Iterator[None]:
 
 def render_figure(figure: "Figure", file_formats: Iterable[str]) -> dict[str, bytes]:
     """Return file contents by format (``png``, ``svg``, ``pdf``); the same figure gives the same bytes."""
-    with house_style():
-        return {file_format: _encode_figure(figure, file_format) for file_format in file_formats}
-
-
-def _encode_figure(figure: "Figure", file_format: str) -> bytes:
-    buffer = io.BytesIO()
     undated: dict[str, Any] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
-    figure.savefig(buffer, format=file_format, metadata=undated.get(file_format))
-    return buffer.getvalue()
+    files = {}
+    with house_style():
+        for file_format in file_formats:
+            buffer = io.BytesIO()
+            figure.savefig(buffer, format=file_format, metadata=undated.get(file_format))
+            files[file_format] = buffer.getvalue()
+    return files
 
 
 def mark_kind(figure: "Figure", kind: RecordingKind) -> None:
