@@ -151,14 +151,18 @@ def option_of(parameter: inspect.Parameter, reading: Reading) -> str:
     return f"--{parameter.name.strip('_').replace('_', '-')}"
 
 
-def add_parameters(parser: argparse.ArgumentParser, command: Command) -> None:
-    """Add the parameters of a verb, ``--list`` where there is one, ``--json`` and ``--out`` to the parser."""
+def add_parameters(parser: argparse.ArgumentParser, command: Command, is_listing: bool = False) -> None:
+    """Add the parameters of a verb, ``--list`` where there is one, ``--json`` and ``--out`` to the parser.
+
+    A line with ``--list``, which ``is_listing`` says, needs none of them.
+    """
     verb = command.function()
     readings = list(parameters_of(verb))
     names = [parameter.name for parameter, _ in readings]
     helps = _help_by_parameter(verb, names)
     for parameter, reading in readings:
-        _add_parameter(parser, parameter, reading, helps.get(parameter.name, reading.word.help), command.lists)
+        said = helps.get(parameter.name, reading.word.help)
+        _add_parameter(parser, parameter, reading, said, command.lists, is_listing)
     if command.lists:
         parser.add_argument("--list", action="store_true", help="list what comes with the package")
     if OUT in names:
@@ -169,7 +173,12 @@ def add_parameters(parser: argparse.ArgumentParser, command: Command) -> None:
 
 
 def _add_parameter(
-    parser: argparse.ArgumentParser, parameter: inspect.Parameter, reading: Reading, said: str, lists: bool
+    parser: argparse.ArgumentParser,
+    parameter: inspect.Parameter,
+    reading: Reading,
+    said: str,
+    lists: bool,
+    is_listing: bool,
 ) -> None:
     word, is_required = reading.word, parameter.default is inspect.Parameter.empty
     default = None if is_required else parameter.default
@@ -190,13 +199,13 @@ def _add_parameter(
     options |= {"metavar": word.metavar, "type": word.read, "choices": reading.choices}
     if not option:
         if reading.is_repeated:
-            options["nargs"] = "+" if is_required else "*"
+            options["nargs"] = "+" if is_required and not is_listing else "*"
         # With --list the word may be missing; without it ``run`` refuses that.
         elif not is_required or lists:
             options["nargs"] = "?"
         parser.add_argument(parameter.name, **options)
         return
-    options["required"] = is_required
+    options["required"] = is_required and not is_listing
     if reading.is_repeated:
         # A list, because argparse cannot append to a tuple, which a verb may have as its default.
         options |= {"action": "append", "default": list(default or ())}
@@ -212,9 +221,9 @@ def run(parsed: argparse.Namespace, name: str, command: Command) -> int:
     verb = command.function()
     parameters = inspect.signature(verb).parameters
     values = {each: getattr(parsed, each) for each in parameters if each != PROGRESS}
-    for each, value in values.items():
-        if command.lists and value is None and parameters[each].default is inspect.Parameter.empty:
-            noun = reading_of_name(verb, each).metavar.lower()
+    for parameter, reading in parameters_of(verb):
+        if command.lists and values[parameter.name] is None and parameter.default is inspect.Parameter.empty:
+            noun = reading.word.metavar.lower()
             raise UsageError(f"no {noun} was given; 'ppafo {name} --list' shows what there is")
     folder = None
     if OUT not in parameters:
@@ -226,11 +235,6 @@ def run(parsed: argparse.Namespace, name: str, command: Command) -> int:
     with output.progress_line() as progress:
         found = verb(**values, **({PROGRESS: progress} if PROGRESS in parameters else {}))
     return output.deliver(found, parsed.json, folder, name, has_written=OUT in parameters)
-
-
-def reading_of_name(verb: Callable[..., Any], name: str) -> Word:
-    """Return the word of one parameter."""
-    return next(reading.word for parameter, reading in parameters_of(verb) if parameter.name == name)
 
 
 def _list(command: Command, as_json: bool) -> int:

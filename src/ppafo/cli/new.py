@@ -130,6 +130,18 @@ def new(
     return Said(f"written: {path}; next: {command}", document)
 
 
+def list_kinds() -> list[dict[str, str]]:
+    """Return what each word for KIND stands for, and the files of the package that ``--from`` copies."""
+    from importlib import resources
+
+    rows = []
+    for kind, one in KINDS.items():
+        files = resources.files("ppafo").joinpath(*one.shipped.split("/")).iterdir()
+        names = sorted(Path(file.name).stem for file in files if file.name.endswith(_SUFFIX))
+        rows.append({"name": kind, "noun": one.noun, "shipped": ", ".join(names)})
+    return [*rows, {"name": EXAMPLE, "noun": "files of a how-to page", "shipped": "see 'ppafo new example'"}]
+
+
 def _content(kind: str, source: str | None, name: str, path: Path) -> str:
     """Return the text of the new file: the template or the source, under the new name."""
     from importlib import resources

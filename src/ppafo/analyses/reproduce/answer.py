@@ -142,37 +142,55 @@ _TASK_METRICS = (
 
 def reproduction_page(reproduction: Reproduction, drawn: Mapping[str, bytes]) -> str:
     """Return the page as HTML; ``drawn`` has SVG files by the names of the figures, which become part of the page."""
-    reported = reproduction.printed_findings
     groups: dict[tuple[str, ...], list[AssumedValue]] = {}
     for value in reproduction.assumed:
         groups.setdefault(value.used_by, []).append(value)
+    # What all experiments rest on comes first.
     ordered = sorted(groups.items(), key=lambda item: -len(item[0]))
-    results = (reproduction.step, reproduction.solenoid, reproduction.proportional)
+    solenoid, proportional = reproduction.solenoid.metrics, reproduction.proportional.metrics
+    results = (reproduction.solenoid, reproduction.proportional, reproduction.step)
     steps = sorted({1e3 * float(result.engine["step"]) for result in results})
+    changed = [word for override in reproduction.overrides for word in ("--set", override)]
+    counts = verdict_counts(reproduction.claims).items()
+    severities = {"error": "contradictions", "warning": "remarks", "note": "notes"}
     values = {
-        **_summary(reproduction),
+        "paper": load_parameter_set(reproduction.printed_set).citation,
+        "nothing_confirmed": NOTHING_CONFIRMED,
+        "count_sentence": count_sentence(reproduction.claims),
+        "counts": [(name, VERDICTS[name], _SYMBOLS[name], MEANINGS[name], count) for name, count in counts],
+        "claims": reproduction.claims,
+        "words": VERDICTS,
+        "symbols": _SYMBOLS,
+        "not_published": [(entry.statement, entry.where) for entry in map(paper_entries().get, NOT_PUBLISHED) if entry],
+        "not_read": NOT_READ,
+        "overrides": reproduction.overrides,
+        "step_observations": reproduction.step_observations,
+        "torque_observations": reproduction.torque_observations,
         "printed_set": reproduction.printed_set,
         "completed_set": reproduction.completed_set,
-        "contradictions": _of_severity(reported, "error"),
-        "remarks": _of_severity(reported, "warning"),
-        "notes": _of_severity(reported, "note"),
+        **{
+            name: [finding for finding in reproduction.printed_findings if finding.severity == severity]
+            for severity, name in severities.items()
+        },
         "kept": [finding for finding in reproduction.completed_findings if finding.severity != "note"],
-        **_synthetic(reproduction, drawn.get(IDENTIFICATION_FIGURE)),
-        "readings_of_u": [(row.name, *_reading_texts(row)) for row in reproduction.readings_of_u],
+        **_synthetic(reproduction.synthetic, drawn.get(IDENTIFICATION_FIGURE)),
+        "readings_of_u": _reading_rows(reproduction.readings_of_u),
         "result_on_u": result_on_u(reproduction.readings_of_u) if reproduction.readings_of_u else (),
         "within_reach": f"{WITHIN_REACH:g}",
         "device_figure": inline_figure(drawn[DEVICE_FIGURE]),
         "step_figure": inline_figure(drawn[STEP_FIGURE]),
         "torque_figure": inline_figure(drawn[TORQUE_FIGURE]),
-        "task_rows": _task_rows(reproduction.solenoid.metrics, reproduction.proportional.metrics),
+        "task_rows": [
+            (solenoid[name].summary, _metric_text(solenoid[name]), _metric_text(proportional[name]))
+            for name in _TASK_METRICS
+            if name in solenoid and name in proportional
+        ],
         "ceiling": f"{holding_torque(reproduction.solenoid):.1f}",
         "assumed_groups": [(_users(users), values) for users, values in ordered],
         "versions": ", ".join(f"{name} {version}" for name, version in reproduction.step.versions.items()),
         "steps": f"{steps[0]:g} ms" if len(steps) == 1 else f"{steps[0]:g} to {steps[-1]:g} ms",
-        "live": live_part(
-            [result.scenario for result in (reproduction.solenoid, reproduction.proportional, reproduction.step)]
-        ),
-        "command": shlex.join(_command(reproduction.overrides)),
+        "live": live_part([result.scenario for result in results]),
+        "command": shlex.join(["ppafo", "reproduce", "--out", "out/reproduce", *changed]),
     }
     return render_page(TEMPLATE, values, "ppafo.analyses.reproduce")
 
@@ -183,61 +201,16 @@ def holding_torque(result: Result) -> float:
     return device.actuator.torque_constant * (device.supply.pressure - device.supply.atmospheric_pressure)
 
 
-def _summary(reproduction: Reproduction) -> dict[str, Any]:
-    citation = load_parameter_set(reproduction.printed_set).citation
-    counts = verdict_counts(reproduction.claims)
-    return {
-        "paper": citation,
-        "nothing_confirmed": NOTHING_CONFIRMED,
-        "count_sentence": count_sentence(reproduction.claims),
-        "counts": [
-            (verdict, VERDICTS[verdict], _SYMBOLS[verdict], MEANINGS[verdict], count)
-            for verdict, count in counts.items()
-        ],
-        "claims": [_claim_row(claim) for claim in reproduction.claims],
-        "not_published": [(entry.statement, entry.where) for entry in map(paper_entries().get, NOT_PUBLISHED) if entry],
-        "not_read": NOT_READ,
-        "missed": [claim.id for claim in reproduction.missed],
-        "overrides": reproduction.overrides,
-        "step_observations": reproduction.step_observations,
-        "torque_observations": reproduction.torque_observations,
-    }
+def _reading_rows(rows: Sequence[InterpretationOfU]) -> list[tuple[str, str, str, str]]:
+    return [(row.name, f"{row.error:.0f} %", f"{row.gas:.0f} %", f"{row.error_within_reach:.0f} %") for row in rows]
 
 
-def _claim_row(claim: Claim) -> dict[str, Any]:
-    return {
-        "id": claim.id,
-        "statement": claim.statement,
-        "source": claim.source,
-        "paper": claim.published,
-        "ours": claim.ours,
-        "verdict": claim.verdict,
-        "word": VERDICTS[claim.verdict],
-        "symbol": _SYMBOLS[claim.verdict],
-        "note": claim.note,
-    }
-
-
-def _reading_texts(row: InterpretationOfU) -> tuple[str, str, str]:
-    return f"{row.error:.0f} %", f"{row.gas:.0f} %", f"{row.error_within_reach:.0f} %"
-
-
-def _of_severity(findings: Sequence[AuditFinding], severity: str) -> list[AuditFinding]:
-    return [finding for finding in findings if finding.severity == severity]
-
-
-def _task_rows(solenoid: Mapping[str, Metric], proportional: Mapping[str, Metric]) -> list[tuple[str, str, str]]:
-    """Return meaning and both values of each metric of the task that both runs have."""
-    rows = []
-    for name in _TASK_METRICS:
-        if name in solenoid and name in proportional:
-            both = [metric_level(metrics[name].value, metrics[name].unit) for metrics in (solenoid, proportional)]
-            first, second = (quantity(value, unit, 3) for value, unit in both)
-            rows.append((solenoid[name].summary, first, second))
-    return rows
+def _metric_text(metric: Metric) -> str:
+    return quantity(*metric_level(metric.value, metric.unit), 3)
 
 
 def _users(names: tuple[str, ...]) -> str:
+    """Return whose assumptions a group is, as its heading says it."""
     if set(names) == set(_EXPERIMENTS):
         return "All experiments"
     if set(names) == {SOLENOID, PROPORTIONAL}:
@@ -245,18 +218,12 @@ def _users(names: tuple[str, ...]) -> str:
     return sentence(" and ".join(_EXPERIMENTS.get(name, name) for name in names)).rstrip(".")
 
 
-def _command(overrides: Sequence[str]) -> list[str]:
-    changed = [word for override in overrides for word in ("--set", override)]
-    return ["ppafo", "reproduce", "--out", "out/reproduce", *changed]
-
-
-def _synthetic(reproduction: Reproduction, figure: bytes | None) -> dict[str, Any]:
+def _synthetic(evidence: SyntheticEvidence | NoEvidence, figure: bytes | None) -> dict[str, Any]:
     """Return what the template needs of the synthetic measurements; without them only why there are none."""
-    evidence = reproduction.synthetic
     if isinstance(evidence, NoEvidence):
         return {"synthetic": None, "no_synthetic": evidence.reason}
-    decay = evidence.decay
     reported = load_reported()
+    slope = -evidence.decay["friction.viscous_damping"].value / reported.in_si("foot_plate.inertia")
     return {
         "no_synthetic": "",
         "synthetic": {
@@ -264,7 +231,7 @@ def _synthetic(reproduction: Reproduction, figure: bytes | None) -> dict[str, An
             "preset": BENCH_PRESET,
             "task_preset": TASK_PRESET,
             "seed": RIG_SEED,
-            "slope": f"{-decay['friction.viscous_damping'].value / reported.in_si('foot_plate.inertia'):.1f}",
+            "slope": f"{slope:.1f}",
             "reported_slope": f"{reported.number('reported.velocity_over_acceleration'):g}",
         },
     }
@@ -346,22 +313,14 @@ def _study_part(study: Study) -> Part:
 
 def _agrees(low: float | None, high: float | None, unit: str) -> str | None:
     """Return the range that agrees with a claim, in words."""
-    if low is not None and high is not None:
-        return f"{low:g} to {high:g} {unit}".rstrip()
     if low is None and high is None:
         return None
-    return f"at least {low:g} {unit}".rstrip() if high is None else f"at most {high:g} {unit}".rstrip()
+    ends = f"{low:g} to {high:g}" if low is not None and high is not None else ""
+    return f"{ends or (f'at most {high:g}' if low is None else f'at least {low:g}')} {unit}".rstrip()
 
 
-def _paper_rows(reproduction: Reproduction) -> tuple[tuple[str | None, ...], ...]:
-    return tuple((claim.id, claim.published, claim.ours, VERDICTS[claim.verdict]) for claim in reproduction.claims)
-
-
-def _readings_part(rows: Sequence[InterpretationOfU]) -> Part:
-    """Return what each meaning of U makes of the comparison."""
-    head = ("U is", "RMS error less by", "CO2 less by", f"error less by at {WITHIN_REACH:g} N m")
-    cells = [(row.name, *_reading_texts(row)) for row in rows]
-    return Part(columns=columns_of(head, cells), remarks=("", *result_on_u(rows)))
+def _paper_rows(reproduction: Reproduction) -> list[tuple[str, str, str, str]]:
+    return [(claim.id, claim.published, claim.ours, VERDICTS[claim.verdict]) for claim in reproduction.claims]
 
 
 def result_on_u(rows: Sequence[InterpretationOfU]) -> tuple[str, ...]:
@@ -382,72 +341,57 @@ def finding_of(reproduction: Reproduction) -> Finding[Reproduction]:
 
     Without the simulated test bench there is no figure 3.
     """
+    said, missed, rows = [NOTHING_CONFIRMED], reproduction.missed, reproduction.readings_of_u
+    if reproduction.overrides:
+        words = f"not the paper's device: values changed with --set {', '.join(reproduction.overrides)}"
+        said.append(f"{words}; the verdicts compare it with the paper all the same")
+    remarks = [
+        f"missed: {claim.id} is outside {claim.window[0]:g} to {claim.window[1]:g} {claim.unit}"
+        for claim in missed
+        if claim.window is not None
+    ]
+    claims = Part(
+        columns=columns_of(_HEAD, _paper_rows(reproduction)),
+        remarks=("", count_sentence(reproduction.claims), *remarks),
+        left=len(_HEAD),
+    )
+    head = ("U is", "RMS error less by", "CO2 less by", f"error less by at {WITHIN_REACH:g} N m")
+    of_u = [Part(columns=columns_of(head, _reading_rows(rows)), remarks=("", *result_on_u(rows)))] if rows else []
     runs = (reproduction.step, reproduction.solenoid, reproduction.proportional)
     return Finding(
         name="claims",
         kicker="Reproduction",
         title="The paper's claims",
-        said=(NOTHING_CONFIRMED, *_override_remarks(reproduction.overrides)),
-        parts=(
-            Part(
-                columns=columns_of(_HEAD, _paper_rows(reproduction)),
-                remarks=("", count_sentence(reproduction.claims), *_missed_claims(reproduction)),
-                left=len(_HEAD),
-            ),
-            *([_readings_part(reproduction.readings_of_u)] if reproduction.readings_of_u else []),
-            *_figures(reproduction),
-        ),
+        said=said,
+        parts=(claims, *of_u, *_figures(reproduction)),
         found=reproduction,
-        passed=not reproduction.missed or bool(reproduction.overrides),
+        passed=not missed or bool(reproduction.overrides),
         files={f"{run.scenario.name}.csv": partial(marked_csv_bytes, run.recording) for run in runs},
         command="reproduce",
         page=lambda drawn: reproduction_page(reproduction, drawn).encode(),
     )
 
 
-def _override_remarks(overrides: tuple[str, ...]) -> tuple[str, ...]:
-    """Return whose device the verdicts are about, where something was changed."""
-    if not overrides:
-        return ()
-    words = f"not the paper's device: values changed with --set {', '.join(overrides)}"
-    return (f"{words}; the verdicts compare it with the paper all the same",)
-
-
-def _missed_claims(reproduction: Reproduction) -> list[str]:
-    return [
-        f"missed: {claim.id} is outside {claim.window[0]:g} to {claim.window[1]:g} {claim.unit}"
-        for claim in reproduction.missed
-        if claim.window is not None
-    ]
-
-
 def _figures(reproduction: Reproduction) -> list[Part]:
-    drawn: dict[str, Callable[[], Drawing]] = {
-        DEVICE_FIGURE: device_figure,
-        STEP_FIGURE: partial(_step_figure, reproduction),
-        TORQUE_FIGURE: partial(_torque_figure, reproduction),
-    }
-    evidence = reproduction.synthetic
-    if not isinstance(evidence, NoEvidence):
-        drawn[IDENTIFICATION_FIGURE] = partial(synthetic_figure_3, evidence.torque, evidence.decay)
-    return [Part(name=name, draw=draw, is_detail=True) for name, draw in drawn.items()]
-
-
-def _step_figure(reproduction: Reproduction) -> "Drawing":
+    """Return the figures of the page, each drawn where it is wanted."""
     supply = reproduction.step.scenario.device.supply
     levels = Levels(supply.pressure, supply.atmospheric_pressure)
-    evidence = reproduction.synthetic
-    measured = None if isinstance(evidence, NoEvidence) else evidence.step
-    return step_response_figure(reproduction.step.recording, levels, reproduction.step_events, measured)
-
-
-def _torque_figure(reproduction: Reproduction) -> "Drawing":
-    stated = {claim.id: claim.paper for claim in reproduction.claims}
-    evidence = reproduction.synthetic
-    return torque_task_figure(
-        reproduction.solenoid.recording,
-        reproduction.proportional.recording,
-        holding_torque(reproduction.solenoid),
-        (stated["co2_solenoid"] or 0.0, stated["co2_proportional"] or 0.0),
-        None if isinstance(evidence, NoEvidence) else (evidence.solenoid, evidence.proportional),
-    )
+    stated = {claim.id: claim.paper or 0.0 for claim in reproduction.claims}
+    step, tasks, found = None, None, reproduction.synthetic
+    if not isinstance(found, NoEvidence):
+        step, tasks = found.step, (found.solenoid, found.proportional)
+    drawn: dict[str, Callable[[], Drawing]] = {
+        DEVICE_FIGURE: device_figure,
+        STEP_FIGURE: partial(step_response_figure, reproduction.step.recording, levels, reproduction.step_events, step),
+        TORQUE_FIGURE: partial(
+            torque_task_figure,
+            reproduction.solenoid.recording,
+            reproduction.proportional.recording,
+            holding_torque(reproduction.solenoid),
+            (stated["co2_solenoid"], stated["co2_proportional"]),
+            tasks,
+        ),
+    }
+    if not isinstance(found, NoEvidence):
+        drawn[IDENTIFICATION_FIGURE] = partial(synthetic_figure_3, found.torque, found.decay)
+    return [Part(name=name, draw=draw, is_detail=True) for name, draw in drawn.items()]
