@@ -68,7 +68,8 @@ def step_response_figure(
         for time, angle, words in ((breakaway, 120.0, "vane breaks away"), (stop, 25.0, "vane at rest")):
             named.append(Mark("text", time + 0.015 * end, angle, label=words, colour=GREY, style=_WORDS))
     ends = -_SHOWN_BEFORE_STEP * end, end
-    upper, lower = [], []
+    upper: list[Panel] = []
+    lower: list[Panel] = []
     for letter, (name, unit, colour, place), values, measured in zip(
         "ABCD",
         _CURVES,
