@@ -22,7 +22,6 @@ from ppafo.analyses.reproduce.claim import (
     Observation,
     Verdict,
     count_sentence,
-    count_words,
     load_reported,
     verdict_counts,
 )
@@ -156,7 +155,7 @@ def reproduction_page(reproduction: Reproduction, drawn: Mapping[str, bytes]) ->
     values = {
         "paper": load_parameter_set(reproduction.printed_set).citation,
         "nothing_confirmed": NOTHING_CONFIRMED,
-        "count_sentence": count_sentence(reproduction.claims),
+        "count_sentence": count_sentence([claim.verdict for claim in reproduction.claims]),
         "counts": [(name, VERDICTS[name], _SYMBOLS[name], MEANINGS[name], count) for name, count in counts],
         "claims": reproduction.claims,
         "words": VERDICTS,
@@ -232,7 +231,7 @@ def _synthetic(evidence: SyntheticEvidence | NoEvidence, figure: bytes | None) -
             "task_preset": TASK_PRESET,
             "seed": RIG_SEED,
             "slope": f"{slope:.1f}",
-            "reported_slope": f"{reported.number('reported.velocity_over_acceleration'):g}",
+            "reported_slope": f"{reported.entry('reported.velocity_over_acceleration').value:g}",
         },
     }
 
@@ -281,7 +280,7 @@ def finding_of_studies(solved: Studies) -> Finding[Studies]:
         parts=(
             Part(
                 columns=columns_of(_STUDIES_HEAD, rows),
-                remarks=("", count_words(solved.verdicts)),
+                remarks=("", count_sentence(solved.verdicts)),
                 left=len(_STUDIES_HEAD),
             ),
             Part("How to read it", said=(_RULE,), is_detail=True),
@@ -352,7 +351,7 @@ def finding_of(reproduction: Reproduction) -> Finding[Reproduction]:
     ]
     claims = Part(
         columns=columns_of(_HEAD, _paper_rows(reproduction)),
-        remarks=("", count_sentence(reproduction.claims), *remarks),
+        remarks=("", count_sentence([claim.verdict for claim in reproduction.claims]), *remarks),
         left=len(_HEAD),
     )
     head = ("U is", "RMS error less by", "CO2 less by", f"error less by at {WITHIN_REACH:g} N m")

@@ -56,7 +56,10 @@ def _line(
 
 def _pipe(axes: "Axes", *turns: float, colour: str = BLACK, width: float = 1.3, dashed: bool = False) -> None:
     """A line of level and upright pieces: x and y where it begins, then x, y, x, ... to which it goes in turn."""
-    points = [(turns[place], turns[place + 1])[:: 1 if place % 2 == 0 else -1] for place in range(len(turns) - 1)]
+    points = [(turns[0], turns[1])]
+    for place, turn in enumerate(turns[2:]):
+        x, y = points[-1]
+        points.append((turn, y) if place % 2 == 0 else (x, turn))
     _line(axes, *points, colour=colour, width=width, dashed=dashed)
 
 

@@ -4,12 +4,11 @@ The task starts in a tie: the error is exactly 0, and the decisions of the solen
 pair runs once for each phase, with either valve first.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ppafo.analyses.reproduce.bench import AssumedValue
 from ppafo.analyses.reproduce.claim import Claim, Observation, Verdict, observation, stated_claim
 from ppafo.constants import GRAMS_PER_KILOGRAM
 from ppafo.errors import ParameterError, ScenarioError, SimulationError
@@ -106,14 +105,14 @@ def _with_first_valve(scenario: Scenario, tie: float) -> Iterator[tuple[float, f
         yield float(np.sqrt(square / whole)), GRAMS_PER_KILOGRAM * gas
 
 
-def torque_task_claims(runs: PhasedRuns, proportional: Result, assumed: Sequence[AssumedValue]) -> list[Claim]:
+def torque_task_claims(runs: PhasedRuns, proportional: Result, rests_on: tuple[str, ...]) -> list[Claim]:
     """Return the claims on tracking error and gas over all phases; gas is what the supply gave.
 
     Each median has the window that the task as completed here has to meet. Without decimals: the range over the phases
     is wider than any.
     """
-    error, gas = proportional.metrics["rms_error"].value, _gas(proportional)
-    rests_on = tuple(value.sentence() for value in assumed)
+    error = proportional.metrics["rms_error"].value
+    gas = GRAMS_PER_KILOGRAM * proportional.metrics["gas_supplied"].value
     over = f"Median and range of {runs.count} runs over the unknown phase of the decisions, either valve first."
 
     def claim(identifier: str, values: Floats, decimals: int, note: str) -> Claim:
@@ -140,11 +139,6 @@ def torque_task_claims(runs: PhasedRuns, proportional: Result, assumed: Sequence
         claim("co2_proportional", np.array([gas]), 2, "Decided every millisecond, so that no phase matters."),
         claim("co2_saving", saved, 0, f"{over} It follows from the two amounts: no evidence of its own."),
     ]
-
-
-def _gas(run: Result) -> float:
-    """Gas that the supply gave [g]."""
-    return GRAMS_PER_KILOGRAM * run.metrics["gas_supplied"].value
 
 
 READINGS_OF_U = (("the opening, -1 to 1", 1.0), ("volts, 5 open the valve", 5.0), ("volts, 10 open the valve", 10.0))
