@@ -100,7 +100,9 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
         problems = []
         for point in _entry_points(self.group, tuple(sys.path)):
             try:
-                self._check_name(point)
+                if point.name in self._own:
+                    name = f"{self.word} '{one_line(point.name)}' of {_package(point)}"
+                    raise KindError(f"{name} has the name of one of ppafo's own; it needs another name")
                 if point.name not in self._kinds:
                     self._kinds[point.name] = self._load(point)
             except KindError as error:
@@ -125,13 +127,6 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
             self.load_all()
             return None
         return self._load(points[0])
-
-    def _check_name(self, point: "EntryPoint") -> None:
-        if point.name in self._own:
-            raise KindError(
-                f"{self.word} '{one_line(point.name)}' of {_package(point)} has the name of one of ppafo's own; "
-                "it needs another name"
-            )
 
     def _load(self, point: "EntryPoint") -> Kind:
         where = f"{self.word} '{one_line(point.name)}' of {_package(point)}"

@@ -204,13 +204,13 @@ _ORIGINS = {
 
 def text_of(finding: Finding[Any]) -> str:
     """Return what is said first and every part that is no mere detail of the page."""
-    blocks = ["\n".join(finding.said), *(_part_text(part) for part in finding.parts if not part.is_detail)]
+    blocks = ["\n".join(finding.said)]
+    for part in finding.parts:
+        if not part.is_detail:
+            body = [*part.said, *_table_lines(part), *part.remarks, *([part.code] if part.code else [])]
+            # A heading over nothing is left out, and a part of the page alone, a figure, has no text.
+            blocks.append("\n".join([part.heading, *body] if part.heading and body else body))
     return "\n\n".join(block for block in blocks if block)
-
-
-def _part_text(part: Part) -> str:
-    body = [*part.said, *_table_lines(part), *part.remarks, *([part.code] if part.code else [])]
-    return "\n".join([part.heading, *body] if part.heading and body else body)
 
 
 def _table_lines(part: Part) -> list[str]:

@@ -82,13 +82,11 @@ def format_reported_quantity(value: float, unit: str) -> str:
 
 def align_columns(rows: Sequence[Sequence[str]], left: int = 1) -> list[str]:
     """Return rows of texts as lines of aligned columns: the first ``left`` to the left, all others to the right."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return ["  ".join(_pad_row(row, widths, left)).rstrip() for row in rows]
-
-
-def _pad_row(row: Sequence[str], widths: Sequence[int], left: int) -> list[str]:
-    cells = zip(row, widths, strict=True)
-    return [f"{cell:<{width}}" if place < left else f"{cell:>{width}}" for place, (cell, width) in enumerate(cells)]
+    columns = []
+    for place, column in enumerate(zip(*rows, strict=True)):
+        width = max(map(len, column))
+        columns.append([f"{cell:<{width}}" if place < left else f"{cell:>{width}}" for cell in column])
+    return ["  ".join(cells).rstrip() for cells in zip(*columns, strict=True)]
 
 
 def render_page(template: str, values: Mapping[str, Any], package: str = "ppafo.report") -> str:
