@@ -102,6 +102,7 @@ def _help_by_parameter(verb: Callable[..., Any], names: Sequence[str]) -> dict[s
     found: dict[str, str] = {}
     latest = ""
     for line in (inspect.getdoc(verb) or "").splitlines():
+        # Only names of parameters: a sentence of the docstring may have a colon too.
         begun = _PARAMETER.fullmatch(line)
         if begun is not None and begun[1] in names:
             latest = begun[1]

@@ -243,6 +243,7 @@ def _slider(entry: Mapping[str, Any]) -> Interval:
     else:
         end = _nice(2.5 * abs(value)) if value else (high if high is not None and high <= 1.0 else 1.0)
         begin = -end if value < 0.0 else 0.0
+    # A slider to a bound that is not allowed ends a hundredth of its way before it.
     is_small = low is not None and (not entry["is_minimum_allowed"] or 0.0 < low < end / 100.0)
     if entry["kept"] == "above zero" or (low is not None and low >= begin and is_small):
         begin = max(begin, (low or 0.0) + (end - (low or 0.0)) / 100.0)
@@ -350,6 +351,7 @@ def live_part(scenarios: "Sequence[str | Scenario]") -> LivePart | None:
 
     Of scenarios with one name only the first is in it.
     """
+    # Backwards, so that of two with one name the first stays.
     named = {item if isinstance(item, str) else item.name: item for item in reversed(scenarios)}
     try:
         content, modules, _ = _content(list(reversed(named.values())), (), "block")

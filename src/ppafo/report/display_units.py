@@ -49,6 +49,7 @@ _NAMED = ("gas mass", "part mass", "body length", "duration", "fraction")
 _OF_UNIT = {si: quantity for quantity, (si, _) in QUANTITIES.items() if quantity not in _NAMED}
 
 
+# Metrics and channels write Pa for a level; of the quantities in kg the plain one is meant.
 _OF_UNIT |= {"Pa": "pressure", "kg": "mass"}
 
 
@@ -90,11 +91,13 @@ def rounded_text(value: float, quantity: str, digits: int) -> str:
 
 def display_difference(value: float, quantity: str) -> float:
     """Return a difference of two values in SI in the unit in which it is shown."""
+    # The zero of gauge pressures and of degrees Celsius falls out.
     return display_value(value, quantity) - display_value(0.0, quantity)
 
 
 def display_values(values: Floats, quantity: str) -> Floats:
     """Return values in SI (any shape) in the unit in which they are shown."""
+    # Units are affine, so that two values decide all.
     zero, one = display_value(0.0, quantity), display_value(1.0, quantity)
     return values if (zero, one) == (0.0, 1.0) else zero + (one - zero) * values
 

@@ -54,6 +54,7 @@ class Column:
             return NOTHING
         if isinstance(value, Interval):
             return self.kind.change_interval(value) if self.is_change else self.kind.interval(value)
+        # A count; a whole number of some quantity is shown in its unit and form.
         if isinstance(value, int) and not self.kind.quantity:
             return f"{value:,}"
         return self.kind.change_number(value, self.kind.form) if self.is_change else self.kind.number(value)
@@ -62,6 +63,7 @@ class Column:
 def columns_of(titles: Sequence[str | tuple[str, Kind]], rows: Iterable[Sequence[Cell]]) -> list[Column]:
     """Return the columns of some rows, each with a title, or with a title and the kind of its numbers."""
     pairs = [(title, PLAIN) if isinstance(title, str) else title for title in titles]
+    # Without a row there still are titles.
     cells = list(zip(*rows, strict=True)) or [()] * len(pairs)
     return [Column(title, values, kind) for (title, kind), values in zip(pairs, cells, strict=True)]
 

@@ -113,6 +113,7 @@ def _set_limits(
     span = max(shown) - min(shown)
     missing = max(0.0, smallest_span - span)
     air = _HEADROOM * (span + missing) + 0.5 * missing
+    # None, for a single sample, leaves the limits to Matplotlib, which warns of two equal ones.
     axes.set_xlim(ends)
     axes.set_ylim(min(shown) - air, max(shown) + air)
     axes.locator_params(axis="y", nbins=_MAXIMUM_TICKS)
@@ -137,6 +138,7 @@ def draw_stored_walk(file: Path, document: Mapping[str, Any], recording: Recordi
     ``document`` is what ``file`` holds, empty where there is none; DataError names the key that is of another form.
     """
     end = float(recording.time[-1])
+    # A short walk is drawn whole, and then nothing is left out that had to be said.
     part = f"the last {_END_OF_WALK:g} s of {end:.4g} s" if recording.duration > _END_OF_WALK else ""
     fall = _positive(file, document, "a time in s", "metrics", "fall_time", "value")
     fallen = "" if fall is None else f"the wearer falls at {fall:.1f} s"
@@ -173,6 +175,7 @@ def _positive(file: Path, document: Mapping[str, Any], wanted: str, *keys: str) 
     if keys[-1] not in table:
         return None
     given = table[keys[-1]]
+    # JSON has true and false, which Python takes for 1 and 0.
     if isinstance(given, bool) or not isinstance(given, int | float) or not 0.0 < given < _LARGEST:
         raise _other_form(file, ".".join(keys), given, wanted)
     return float(given)

@@ -34,6 +34,7 @@ _PATH = re.compile(r"\b[a-z_]+(?:\.[a-z0-9_]+)+\b")
 
 def typeset(text: str) -> str:
     """Return a plain text with superscripts and indices, signs, quotation marks, and psig instead of psi_g."""
+    # Powers of ten first: their sign is no minus sign of a number.
     text = _POWER_OF_TEN.sub(lambda found: f" {_TIMES} 10{str(int(found[1])).translate(_SUPERSCRIPTS)}", text)
     text = _EXPONENT.sub(lambda found: found[1].translate(_SUPERSCRIPTS), text)
     text = _INDEX.sub(lambda found: found[1] + found[2].translate(_SUBSCRIPTS), text)
@@ -93,6 +94,7 @@ def render_page(template: str, values: Mapping[str, Any], package: str = "ppafo.
     """Return a template of a package filled with values; texts are escaped, a value that is missing is an error."""
     from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 
+    # A page of an analysis includes the style sheet, which all pages share.
     packages = dict.fromkeys((package, "ppafo.report"))
     environment = Environment(
         loader=ChoiceLoader([PackageLoader(name) for name in packages]),

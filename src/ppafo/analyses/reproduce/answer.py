@@ -327,6 +327,7 @@ def result_on_u(rows: Sequence[InterpretationOfU]) -> tuple[str, ...]:
     entries = paper_entries()
     error, saving = entries["torque_rms_improvement"], entries["co2_saving"]
     low, high, least = error.at_least or 0.0, error.at_most or 0.0, saving.at_least or 0.0
+    # The first reading is the opening itself, the others are voltages.
     opening, *volts = rows
     is_opening_alone = low <= opening.error <= high and not any(low <= row.error <= high for row in volts)
     is_beyond_reach = not any(low <= row.error_within_reach <= high for row in rows)
@@ -344,6 +345,7 @@ def finding_of(reproduction: Reproduction) -> Finding[Reproduction]:
     if reproduction.overrides:
         words = f"not the paper's device: values changed with --set {', '.join(reproduction.overrides)}"
         said.append(f"{words}; the verdicts compare it with the paper all the same")
+    # On the page a claim has its window in its note; at the command line only what misses it is said.
     remarks = [
         f"missed: {claim.id} is outside {claim.window[0]:g} to {claim.window[1]:g} {claim.unit}"
         for claim in missed
@@ -364,6 +366,7 @@ def finding_of(reproduction: Reproduction) -> Finding[Reproduction]:
         said=said,
         parts=(claims, *of_u, *_figures(reproduction)),
         found=reproduction,
+        # A changed device may leave the windows of the paper: that is a result, no failure.
         passed=not missed or bool(reproduction.overrides),
         files={f"{run.scenario.name}.csv": partial(marked_csv_bytes, run.recording) for run in runs},
         command="reproduce",
@@ -376,6 +379,7 @@ def _figures(reproduction: Reproduction) -> list[Part]:
     supply = reproduction.step.scenario.device.supply
     levels = Levels(supply.pressure, supply.atmospheric_pressure)
     stated = {claim.id: claim.paper or 0.0 for claim in reproduction.claims}
+    # Without the bench figures 7 and 8 have the simulation alone.
     step, tasks, found = None, None, reproduction.synthetic
     if not isinstance(found, NoEvidence):
         step, tasks = found.step, (found.solenoid, found.proportional)

@@ -77,6 +77,7 @@ def assumed_values(scenarios: Mapping[str, Scenario]) -> tuple[AssumedValue, ...
 
 def _without_effect(scenario: Scenario, parameter_set: ParameterSet) -> set[str]:
     """Return the paths of the set that the run does not use."""
+    # Reported results are what a run is compared with; of two valves one is in the device.
     reported = {path for path in parameter_set.numbers if path.startswith("reported.")}
     valve = f"valves.{scenario.origin.valve}."
     others = {path for path in parameter_set.numbers if path.startswith("valves.") and not path.startswith(valve)}
@@ -130,6 +131,7 @@ def synthetic_evidence(
             solenoid=recorded["solenoid"],
             proportional=recorded["proportional"],
         )
+    # No claim rests on a recording: without them the figures show less, and the report says why.
     except (SimulationError, DataError) as error:
         return NoEvidence(str(error))
 
@@ -137,6 +139,7 @@ def synthetic_evidence(
 @cache
 def bench_figure() -> tuple[BenchResult, BenchResult]:
     """Identify torque constant and damping as figure 3 does, from synthetic recordings; SimulationError."""
+    # Kept: it takes seconds, and no override reaches it.
     inertia = FreeDecaySettings(inertia=load_device(PLANTED_SET).foot_plate.inertia)
     torque, decay = (
         Source(record(experiment, BENCH_PRESET, RIG_SEED, PLANTED_SET).recording)

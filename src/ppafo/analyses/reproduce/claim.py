@@ -253,6 +253,7 @@ def _orifice_constants(reported: Reported) -> Claim:
         "reported.subsonic_flow_constant": subsonic_flow_constant(k, constant, temperature),
         "reported.critical_pressure_ratio": 1.0 / critical_pressure_ratio(k),
     }
+    # The reported digits leave a range open; what is computed from the gas does not.
     holds = all(reported.range(path).meets(Interval(value, value)) for path, value in found.items())
     return Claim(
         id="orifice_constants",
@@ -275,6 +276,7 @@ def _step_percentages() -> Claim:
     errors = [entries[f"step_rms_{name}"].published or 0.0 for name in STEP_ERRORS]
     percents = [entries[f"step_percent_{name}"].published or 0.0 for name in STEP_ERRORS]
     ranges = list(STEP_ERRORS.values())
+    # Both numbers are rounded: their ranges have to meet.
     holds = all(
         Interval(*(100.0 * end / full for end in digits(error))).meets(digits(percent))
         for error, full, percent in zip(errors, ranges, percents, strict=True)
@@ -302,6 +304,7 @@ _RATES = {
 def _damping_and_friction(reported: Reported) -> Claim:
     """Compare damping and dynamic friction with inertia times the reported rates: one inertia decides both."""
     inertia = reported.range(_INERTIA)
+    # A deceleration is reported with its sign, a friction torque without.
     rates = {path: abs(reported.in_si(rate)) for path, rate in _RATES.items()}
     holds = all(inertia.times(reported.range(rate)).meets(reported.range(path)) for path, rate in _RATES.items())
     found = {path: reported.in_reported_unit(path, reported.in_si(_INERTIA) * rate) for path, rate in rates.items()}
@@ -333,6 +336,7 @@ def _discharge_coefficient(reported: Reported) -> Claim:
         pressure = reported.in_si(f"reported.valves.{valve}.flow_pressure")
         psi = isentropic_flow_function(min(STANDARD_ATMOSPHERE / pressure, 1.0), gas.heat_capacity_ratio)
         per_area = choked * pressure * psi
+        # The product Cd A follows from the flow; each area asks for a coefficient of its own.
         needed = reported.range(flow).over(reported.range(area)).over(Interval(per_area, per_area))
         held.append(needed.meets(reported.range(coefficient)))
         found.append(reported.in_si(flow) / (per_area * reported.in_si(area)))
@@ -366,6 +370,7 @@ _VANE_EFFICIENCY = Interval(0.7, 0.9)
 def _swept_volume(reported: Reported) -> Claim:
     """Compare the volume per angle with the torque constant over the efficiency of vanes: virtual work."""
     path, constant = "actuator.volume_per_angle", "actuator.torque_constant"
+    # Work at the shaft is efficiency times the work of the gas: k dtheta dp = eta V dtheta dp.
     needed = reported.range(constant).over(_VANE_EFFICIENCY)
     low, high = (reported.in_reported_unit(path, end) for end in needed)
     efficiency = reported.in_si(constant) / reported.in_si(path)

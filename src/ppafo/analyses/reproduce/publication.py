@@ -43,6 +43,7 @@ class Computation:
     compute: Callable[[Values], float]
 
 
+# Several claims rest on one walk, which takes seconds.
 @lru_cache(maxsize=16)
 def _walked(name: str, overrides: tuple[str, ...]) -> WalkResult:
     """Return a shipped walk; SimulationError where it does not reach its end with help."""
@@ -77,6 +78,7 @@ def swept_volume(_values: Values) -> float:
 
 def walking_torque(values: Values) -> float:
     """Largest torque [N m] of the mean stride of the walk 'solenoid' at a supply pressure."""
+    # As repr, so that the walk has this very number.
     overrides = (f"supply.pressure={float(values['pressure'])!r} Pa_a",)
     return float(_walked(PAIR, overrides).averages["torque"].mean.max())
 
@@ -106,6 +108,7 @@ def recycling_work(values: Values) -> float:
 def event_reduction(wearer: str, _values: Values) -> float:
     """Share [-] by which state estimation lowers the error of event times of one wearer, against thresholds."""
     configuration = load_walk(PAIR, WEARERS[wearer])
+    # Two steps a stride.
     course = uneven_course(2.0 / walk_of(configuration).gait.stride_time)
     errors = []
     for timing in ("thresholds", "estimated"):
@@ -169,10 +172,12 @@ def _checked(entry: ClaimEntry, citation: str, file: str) -> PublishedClaim:
         raise ScenarioError(f"{place}.computation: there is no '{entry.computation}'{hint}; available: {known}")
     if entry.at_least is None and entry.at_most is None:
         raise ScenarioError(f"{place}: give at_least or at_most, or both: what agrees with the claim")
+    # A side that the file leaves open.
     low = -math.inf if entry.at_least is None else entry.at_least
     high = math.inf if entry.at_most is None else entry.at_most
     if low > high:
         raise ScenarioError(f"{place}: at_least = {low:g} lies above at_most = {high:g}: no number agrees")
+    # What is published has to agree with itself: else the range was typed wrongly.
     if entry.published is not None and not low <= entry.published <= high:
         name, limit = ("at_least", low) if entry.published < low else ("at_most", high)
         raise ScenarioError(
@@ -180,6 +185,7 @@ def _checked(entry: ClaimEntry, citation: str, file: str) -> PublishedClaim:
         )
     computation = COMPUTATIONS[entry.computation]
     with refused_as(ScenarioError, f"{place}.unit", UnitError):
+        # Only for what it raises: here the place in the file is known.
         from_si(1.0, entry.unit, computation.unit)
     return PublishedClaim(entry, computation, _arguments(entry, computation, place), source)
 

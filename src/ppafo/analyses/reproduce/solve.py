@@ -70,6 +70,7 @@ def reproduce(
     SimulationError where a run diverges, ScenarioError for a study that is none.
     """
     report = progress or report_nothing
+    # Before anything runs, which takes long.
     check_study(study, overrides)
     if study == SEED:
         return finding_of(reproduce_paper(overrides, report))
@@ -145,6 +146,7 @@ def _scenarios(overrides: Sequence[str]) -> dict[str, Scenario]:
     """Return the experiments, each with the overrides that are meant for it."""
     meant: dict[str, list[str]] = {name: [] for name in EXPERIMENTS}
     given = override_set(overrides, ScenarioError)
+    # Kinds come first, outer ones before inner ones: they decide which numbers there are.
     kinds = [path for path in given if path.endswith(".kind")]
     for path in sorted(given, key=lambda path: (path not in kinds, path.count("."), path)):
         override = str(given[path])

@@ -68,9 +68,11 @@ def step_events(recording: Recording, resolution: float = RESOLUTION) -> StepEve
     travel = abs(float(angle[-1] - angle[0]))
     if travel < _SMALLEST_TRAVEL:
         return None
+    # The last sample at rest, not the first in motion.
     breakaway = int(np.flatnonzero(np.abs(angle - angle[0]) > resolution * travel)[0]) - 1
     away = np.flatnonzero(np.abs(angle - angle[-1]) > resolution * travel)
     stop = int(away[-1]) + 1
+    # Without a sample of rest at either end, and of motion between, nothing can be told.
     if stop >= len(recording) - 1 or stop - breakaway < 2 or breakaway < 1:
         return None
     return StepEvents(breakaway, stop, float(recording.time[breakaway]), float(recording.time[stop]))
@@ -143,6 +145,7 @@ def _rises(step: _Step) -> tuple[bool, str, str]:
 def _falls_in_motion(step: _Step) -> tuple[bool, str, str]:
     """Pressure 1 falls from its peak, while the vane sets off, to its lowest; the text has it fall to the stop."""
     pressure, angle = step.recording["pressure_1"], step.recording["angle"]
+    # Chamber 1 still fills while the vane sets off, so that the peak lies behind breakaway.
     gone = np.abs(angle - angle[0]) > _SETS_OFF * np.abs(angle[-1] - angle[0])
     peak = int(np.argmax(pressure[: int(np.argmax(gone)) + 1]))
     lowest = peak + int(np.argmin(pressure[peak : step.events.stop + 1]))
@@ -185,6 +188,7 @@ def _slows(step: _Step) -> tuple[bool, str, str]:
     before, after = float(np.max(rate[: slowest + 1])), float(np.max(rate[slowest:]))
     moving = pressure[start : end + 1]
     rise = float(np.max(moving - np.minimum.accumulate(moving)))
+    # The rate is that of falling, so that a rise is negative and slower than any fall.
     holds = rate[slowest] <= _SLOWED * min(before, after) and rise <= _LARGEST_RISE
     first, least, last = (value / (1e3 * PASCALS_PER_PSI) for value in (before, rate[slowest], after))
     slowed = f"rises by {-least:.2f} psi/ms" if least < 0.0 else f"falls by {least:.2f} psi/ms"

@@ -60,6 +60,8 @@ def phased_runs(solenoid: Result) -> PhasedRuns:
 
 
 def _has_phase(scenario: Scenario) -> bool:
+    # Two runs are joined by their pressures, which are the whole state only of a locked vane at constant temperature
+    # without lines; and a tie is only where reference and torque both begin at 0.
     reference, period = scenario.reference, scenario.controller.period
     return (
         scenario.controller.kind == "on_off"
@@ -80,6 +82,7 @@ def _with_first_valve(scenario: Scenario, tie: float) -> Iterator[tuple[float, f
     period, whole = scenario.controller.period, scenario.run.duration
     ramp = scenario.reference.settings
     slope = ramp["level"] / ramp["ramp_time"]
+    # A constant reference just off 0 calls one valve at once and holds it on.
     same = {**ramp, "start_level": tie, "level": tie}
     held = simulate(
         replace(
@@ -100,6 +103,7 @@ def _with_first_valve(scenario: Scenario, tie: float) -> Iterator[tuple[float, f
             )
         )
         before = slope * held.time[: last + 1] - held["torque"][: last + 1]
+        # Mean squares of both parts, each with its time.
         square = phase * float(np.mean(before**2)) + (whole - phase) * rest.metrics["rms_error"].value ** 2
         gas = float(held["supplied_mass"][last]) + rest.metrics["gas_supplied"].value
         yield float(np.sqrt(square / whole)), GRAMS_PER_KILOGRAM * gas
@@ -165,6 +169,7 @@ def readings_of_u(solenoid: Result, proportional: Result) -> tuple[Interpretatio
         return ()
 
     def better(full: float, level: float | None) -> tuple[float, float]:
+        # Volts times a gain for volts give the same opening.
         gains = {**spool.controller.settings, **{name: spool.controller.settings[name] / full for name in _GAINS}}
         both = [pair, replace(spool, controller=replace(spool.controller, settings=gains))]
         if level is not None:
@@ -260,6 +265,7 @@ def _with(run: Result, overrides: tuple[str, ...]) -> float | str:
     """Return the RMS error [N m] of a run's task with another law, or why there is none."""
     origin = run.scenario.origin
     try:
+        # Another law takes nothing that was set for this one.
         own = [override for override in origin.overrides if not override.startswith("controller.")]
         return simulate(load_scenario(run.scenario.name, [*own, *overrides])).metrics["rms_error"].value
     except (ParameterError, ScenarioError, SimulationError) as error:
@@ -273,6 +279,7 @@ def _limited_by_switching(solenoid: Result, runs: PhasedRuns) -> Claim:
         return stated_claim(entry.id, None, "undetermined", f"{entry.note} {faster}.")
     less = _PERCENT * (1.0 - faster / runs.errors)
     median, low, high = (float(end) for end in (np.median(less), less.min(), less.max()))
+    # In every phase, not in the middle one alone.
     verdict: Verdict = "plausible" if entry.at_least is not None and low >= entry.at_least else "undetermined"
     found = f"{median:.0f} % less error at 100 Hz" + (f" ({low:.0f} to {high:.0f})" if high > low else "")
     claim = stated_claim(entry.id, median, verdict, entry.note, ("the torque task as completed here",), None, found)
