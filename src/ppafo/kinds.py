@@ -120,9 +120,11 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
             with _with_working_folder():
                 return self._load(point)
         points = [point for point in _entry_points(self.group, tuple(sys.path)) if point.name == name]
+        # One entry found twice on the search path is no conflict.
         if len({(point.value, _package(point)) for point in points}) > 1:
             packages = ", ".join(sorted({_package(point) for point in points}))
             raise KindError(f"{self.word} '{one_line(name)}' is offered by several packages: {packages}")
+        # All are loaded, so that a message can name what there is.
         if not points:
             self.load_all()
             return None
@@ -197,6 +199,7 @@ def _entry_points(group: str, _path: tuple[str, ...]) -> tuple["EntryPoint", ...
     """Entry points of a group for a search path, in the order of their names."""
     from importlib.metadata import entry_points
 
+    # The path is part of the key, as it may grow while the program runs.
     found = entry_points(group=group)
     return tuple(sorted(found, key=lambda point: (point.name, point.value)))
 

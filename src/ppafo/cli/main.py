@@ -112,6 +112,7 @@ def _run(words: list[str]) -> int:
             return _complete(words[1:])
         check_words(words)
         parser = build_parser(words)
+        # Before argparse, which would complain of what is missing first.
         check_options(words, parser)
         parsed, unknown = parser.parse_known_args(words)
         if unknown:

@@ -300,7 +300,7 @@ def _scales(shown: Iterable[tuple[str, str]]) -> dict[str, list[dict[str, Any]]]
             try:
                 scale, offset, is_gauge = conversion(_typed(unit, si), si)
             except UnitError:
-                # A unit in SI that nobody may type, such as Pa alone, which does not say which pressure it is.
+                # A unit that is shown and cannot be typed for this quantity.
                 continue
             scales[si].append({"unit": unit, "scale": str(scale), "offset": str(offset), "isGauge": is_gauge})
     return scales

@@ -304,7 +304,7 @@ _RATES = {
 def _damping_and_friction(reported: Reported) -> Claim:
     """Compare damping and dynamic friction with inertia times the reported rates: one inertia decides both."""
     inertia = reported.range(_INERTIA)
-    # A deceleration is reported with its sign, a friction torque without.
+    # The slope of acceleration over velocity is reported with its sign, the damping without.
     rates = {path: abs(reported.in_si(rate)) for path, rate in _RATES.items()}
     holds = all(inertia.times(reported.range(rate)).meets(reported.range(path)) for path, rate in _RATES.items())
     found = {path: reported.in_reported_unit(path, reported.in_si(_INERTIA) * rate) for path, rate in rates.items()}
