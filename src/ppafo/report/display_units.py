@@ -67,12 +67,8 @@ def display_unit(quantity: str) -> str:
 
 
 def axis_unit(quantity: str) -> str:
-    """Return the unit in which a quantity is shown, as the label of an axis writes it."""
-    return typeset_unit(display_unit(quantity))
-
-
-def typeset_unit(unit: str) -> str:
-    """Return a unit as the label of an axis writes it, with its exponents raised."""
+    """Return the unit in which a quantity is shown, as the label of an axis writes it: with raised exponents."""
+    unit = display_unit(quantity)
     words = {"psi_g": "psig", "mm^2": "mm$^2$", "cm^3": "cm$^3$", "degC": "°C"}
     return words.get(unit, unit.replace("m^2", "m$^2$").replace("m^3", "m$^3$").replace("s^2", "s$^2$"))
 

@@ -243,6 +243,7 @@ TORQUE_FIGURE = "figure-8-torque-task"
 _HEAD = ("claim", "paper", "ours", "verdict")
 _PAPER = "'ppafo reproduce' without --study makes the page of these claims, with sources, figures and assumptions."
 _STUDIES_HEAD = ("study", "claim", "published", "ours", "verdict")
+_DETAILS_HEAD = ("claim", "statement and source", "agrees", "rests on", "note")
 _RULE = (
     "'Ours' is computed anew whenever this is run. "
     + " ".join(f"{VERDICTS[verdict].capitalize()}: {meaning}." for verdict, meaning in MEANINGS.items())
@@ -259,18 +260,20 @@ def finding_of_studies(solved: Studies) -> Finding[Studies]:
     """Return the table of studies; a claim of another publication that is not met is a result, no failure."""
     reproduction = solved.reproduction
     rows: list[Sequence[Cell]] = [] if reproduction is None else [(SEED, *row) for row in _paper_rows(reproduction)]
+    details = [] if reproduction is None else [Part(f"{SEED}: the paper", said=(_PAPER,), is_detail=True)]
     for study in solved.studies:
-        rows += [
-            (
-                study.publication.name,
-                item.claim.entry.id,
-                # A number that only own arithmetic on published ones gives.
-                item.published or (f"{item.claim.entry.own} (own sum)" if item.claim.entry.own else None),
-                item.ours,
-                VERDICTS[item.verdict],
-            )
-            for item in study.claims
-        ]
+        told: list[Sequence[Cell]] = []
+        for item in study.claims:
+            entry = item.claim.entry
+            # A number that only own arithmetic on published ones gives.
+            published = item.published or (f"{entry.own} (own sum)" if entry.own else None)
+            rows.append((study.publication.name, entry.id, published, item.ours, VERDICTS[item.verdict]))
+            stated = f"{entry.statement} ({item.claim.source})"
+            agrees = _agrees(entry.at_least, entry.at_most, entry.unit)
+            told.append((entry.id, stated, agrees, "; ".join(entry.assumed) or None, item.note or None))
+        heading, said = f"{study.publication.name}: {study.publication.title}", (study.publication.citation,)
+        columns = columns_of(_DETAILS_HEAD, told)
+        details.append(Part(heading, columns, said, left=len(_DETAILS_HEAD), is_detail=True))
     name = solved.studies[0].publication.name
     return Finding(
         name="claims",
@@ -284,30 +287,12 @@ def finding_of_studies(solved: Studies) -> Finding[Studies]:
                 left=len(_STUDIES_HEAD),
             ),
             Part("How to read it", said=(_RULE,), is_detail=True),
-            *([] if reproduction is None else [Part(f"{SEED}: the paper", said=(_PAPER,), is_detail=True)]),
-            *(_study_part(study) for study in solved.studies),
+            *details,
         ),
         found=solved,
         passed=reproduction is None or not reproduction.missed,
         command="reproduce",
     )
-
-
-def _study_part(study: Study) -> Part:
-    """Return what each claim of a publication says, where it stands, what it rests on, and why its verdict."""
-    head = ("claim", "statement and source", "agrees", "rests on", "note")
-    rows = [
-        (
-            item.claim.entry.id,
-            f"{item.claim.entry.statement} ({item.claim.source})",
-            _agrees(item.claim.entry.at_least, item.claim.entry.at_most, item.claim.entry.unit),
-            "; ".join(item.claim.entry.assumed) or None,
-            item.note or None,
-        )
-        for item in study.claims
-    ]
-    heading = f"{study.publication.name}: {study.publication.title}"
-    return Part(heading, columns_of(head, rows), (study.publication.citation,), left=len(head), is_detail=True)
 
 
 def _agrees(low: float | None, high: float | None, unit: str) -> str | None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal, TypeVar, get_args
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import ParameterError
@@ -24,14 +24,7 @@ Verdict = Literal[
     "undetermined",
     "not_testable",
 ]
-VERDICTS: dict[Verdict, str] = {
-    "consistent": "consistent",
-    "inconsistent_as_reported": "inconsistent as reported",
-    "met_by_fitted_settings": "met by fitted settings",
-    "plausible": "plausible",
-    "undetermined": "undetermined",
-    "not_testable": "not testable",
-}
+VERDICTS: dict[Verdict, str] = {verdict: verdict.replace("_", " ") for verdict in get_args(Verdict)}
 """Every verdict in words. Only the first two follow from reported numbers alone."""
 MEANINGS: dict[Verdict, str] = {
     "consistent": "the reported numbers agree with each other",
