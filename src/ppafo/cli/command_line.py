@@ -325,22 +325,13 @@ def check_options(words: Sequence[str], parser: CommandParser) -> None:
         name = word.partition("=")[0]
         if name in RENAMED and name not in known and RENAMED[name] in known:
             raise UsageError(f"{name} is now called {RENAMED[name]}")
-        if _looks_like_option(word) and not any(_stands_for(name, option) for option in known):
-            raise UsageError(
-                f"there is no option '{name}'{_nearest_option(name, known)}; available: {', '.join(known)}"
-            )
-
-
-def _nearest_option(name: str, known: Sequence[str]) -> str:
-    """Return the hint; the dashes, which all have in common, would make strangers look alike."""
-    hint = nearest_name(name.strip("-"), [option.removeprefix("--") for option in known if option.startswith("--")])
-    return hint.replace("'", "'--", 1)
-
-
-def _looks_like_option(word: str) -> bool:
-    """Tell whether argparse takes a word for an option: a dash alone, numbers and words with a space are values."""
-    is_number = _NEGATIVE_NUMBER.fullmatch(word) is not None
-    return word.startswith("-") and len(word) > 1 and " " not in word and not is_number
+        # As argparse has it: a dash alone, numbers and words with a space are values.
+        is_value = not word.startswith("-") or len(word) == 1 or " " in word or _NEGATIVE_NUMBER.fullmatch(word)
+        if not is_value and not any(_stands_for(name, option) for option in known):
+            # Without the dashes, which all have in common and which would make strangers look alike.
+            bare = [option.removeprefix("--") for option in known if option.startswith("--")]
+            hint = nearest_name(name.strip("-"), bare).replace("'", "'--", 1)
+            raise UsageError(f"there is no option '{name}'{hint}; available: {', '.join(known)}")
 
 
 def _stands_for(name: str, option: str) -> bool:

@@ -163,6 +163,7 @@ def _content(kind: str, source: str | None, name: str, path: Path) -> str:
     if kind == "set" and source is not None:
         # What the copy changes is shown by 'ppafo sets audit'; what the source changed is not its matter.
         parent = source if source in files.names() else os.path.relpath(source, path.parent)
+        # A text in JSON is one in TOML too.
         rest = f"\nparent = {json.dumps(parent, ensure_ascii=False)}{_PARENT_LINE.sub('', rest, count=1)}"
     text = f'{head}name = "{name}"{rest}'
     # A file of the package shows in its first lines how it is run.

@@ -44,6 +44,7 @@ def simulate(scenario: Scenario, *, check: bool = False, overrides: Overrides = 
     # A vane alone runs again in milliseconds; of a walk the error is estimated by its check only.
     if checked is None and result.status.is_completed and worn_kind(chosen) is None:
         error = result.error()
+    # Before anything else imports Matplotlib, so that it comes without what it does for others.
     from ppafo.report.drawing import load_drawing
 
     load_drawing()
