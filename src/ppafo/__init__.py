@@ -181,6 +181,7 @@ def _numba() -> Compiler:
     return numba_compiler()
 
 
+# By name, as the engine knows nothing of the translation above it.
 offer({**{name: partial(_compiler_of_c, name) for name in ("clang", "gcc", "zig")}, "numba": _numba})
 
 

@@ -107,16 +107,14 @@ def nearest_name(name: str, allowed: Iterable[str]) -> str:
 
     A name that is far from all in letters may be short for one: its first word, or another.
     """
-    known = list(allowed)
+    word, known = str(name), list(allowed)
     # 0.6 finds a transposed or forgotten letter, and is difflib's own default.
-    near = difflib.get_close_matches(str(name), known, n=1, cutoff=0.6) or _first_with_word(str(name), known)
+    near = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
+    if not near:
+        # A word at the beginning of a name, else anywhere in it, as ``rms`` is in ``rms_error``.
+        words = [(re.split(r"[^0-9A-Za-z]+", one), one) for one in known]
+        near = [one for found, one in words if found[0] == word] or [one for found, one in words if word in found[1:]]
     return f", did you mean '{near[0]}'?" if near else ""
-
-
-def _first_with_word(word: str, names: Sequence[str]) -> list[str]:
-    """Return the first name that has a word at its beginning, else anywhere, as ``rms`` is in ``rms_error``."""
-    words = [(re.split(r"[^0-9A-Za-z]+", name), name) for name in names]
-    return [name for found, name in words if found[0] == word] or [name for found, name in words if word in found[1:]]
 
 
 def first_twice(names: Iterable[str]) -> str | None:

@@ -64,6 +64,7 @@ def hash_of(arrays: tuple[NDArray[np.float64], ...]) -> str:
     """Return the hash of arrays, with one NaN for all."""
     found = hashlib.sha256()
     for values in arrays:
+        # Little-endian on every computer.
         found.update(np.where(np.isnan(values), np.nan, values).astype("<f8").tobytes())
     return found.hexdigest()[:16]
 

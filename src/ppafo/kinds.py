@@ -100,7 +100,9 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
         problems = []
         for point in _entry_points(self.group, tuple(sys.path)):
             try:
-                self._check_name(point)
+                if point.name in self._own:
+                    name = f"{self.word} '{one_line(point.name)}' of {_package(point)}"
+                    raise KindError(f"{name} has the name of one of ppafo's own; it needs another name")
                 if point.name not in self._kinds:
                     self._kinds[point.name] = self._load(point)
             except KindError as error:
@@ -118,20 +120,15 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
             with _with_working_folder():
                 return self._load(point)
         points = [point for point in _entry_points(self.group, tuple(sys.path)) if point.name == name]
+        # One entry found twice on the search path is no conflict.
         if len({(point.value, _package(point)) for point in points}) > 1:
             packages = ", ".join(sorted({_package(point) for point in points}))
             raise KindError(f"{self.word} '{one_line(name)}' is offered by several packages: {packages}")
+        # All are loaded, so that a message can name what there is.
         if not points:
             self.load_all()
             return None
         return self._load(points[0])
-
-    def _check_name(self, point: "EntryPoint") -> None:
-        if point.name in self._own:
-            raise KindError(
-                f"{self.word} '{one_line(point.name)}' of {_package(point)} has the name of one of ppafo's own; "
-                "it needs another name"
-            )
 
     def _load(self, point: "EntryPoint") -> Kind:
         where = f"{self.word} '{one_line(point.name)}' of {_package(point)}"
@@ -202,6 +199,7 @@ def _entry_points(group: str, _path: tuple[str, ...]) -> tuple["EntryPoint", ...
     """Entry points of a group for a search path, in the order of their names."""
     from importlib.metadata import entry_points
 
+    # The path is part of the key, as it may grow while the program runs.
     found = entry_points(group=group)
     return tuple(sorted(found, key=lambda point: (point.name, point.value)))
 

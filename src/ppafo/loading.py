@@ -42,6 +42,7 @@ def load_scenario(
     changes in its device is changed in this one. ScenarioError, ParameterError or DataError for anything that cannot be
     used.
     """
+    # Vanes first: the code of walks is loaded for a walk only.
     name, path = str(name_or_path), Path(name_or_path)
     if name in of_vanes.list_scenarios():
         return of_vanes.load_scenario(name, overrides, parameter_set)
@@ -115,6 +116,7 @@ def json_schema() -> dict[str, Any]:
     forms = {"vane": schema.json_schema(), "walk": of_walks.json_schema()}
     parts: dict[str, Any] = {}
     for name, form in forms.items():
+        # Both have definitions of the same names: each gets the name of its form before it.
         own = json.loads(json.dumps(form).replace('"#/$defs/', f'"#/$defs/{name}.'))
         inner = own.pop("$defs")
         parts |= {name: own} | {f"{name}.{part}": described for part, described in inner.items()}

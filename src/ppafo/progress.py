@@ -69,7 +69,11 @@ class ProgressLine:
         if self._stream.isatty():
             self._stream.write(f"\r\x1b[Kppafo: {progress.line()}")
             self._open = True
-        elif self._is_due(progress):
+            self._stream.flush()
+            return
+        # In a file a line now and then is enough: when something new begins or ends, else every so often.
+        is_late = self._clock() - self._written >= _BETWEEN_LINES
+        if is_late or progress.is_complete or progress.activity != self._activity:
             self._stream.write(f"ppafo: {progress.line()}\n")
             self._written, self._activity = self._clock(), progress.activity
         self._stream.flush()
@@ -79,10 +83,6 @@ class ProgressLine:
         if self._open:
             self._stream.write("\n")
             self._open = False
-
-    def _is_due(self, progress: Progress) -> bool:
-        is_late = self._clock() - self._written >= _BETWEEN_LINES
-        return is_late or progress.is_complete or progress.activity != self._activity
 
 
 def time_text(seconds: float) -> str:

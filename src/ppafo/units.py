@@ -160,7 +160,8 @@ def conversion(unit: str, si_unit: str) -> tuple[Decimal, Decimal, bool]:
     given, kind = _parse_unit(unit)
     wanted, _ = _parse_unit(si_unit)
     if given.dimensions != wanted.dimensions:
-        raise UnitError(f"{_quote_unit(unit)} does not fit: {_describe_unit(si_unit)}")
+        given_text = f"unit '{unit}'" if unit else "a number without a unit"
+        raise UnitError(f"{given_text} does not fit: {_describe_unit(si_unit)}")
     _check_kind(unit, kind, si_unit)
     counts_from_atmosphere = kind == "g" and si_unit == _LEVEL
     if wanted.scale == 1 and wanted.offset == 0:
@@ -189,10 +190,6 @@ def _describe_unit(si_unit: str) -> str:
     if si_unit == "rad":
         return "an angle is needed, for example '75 deg' or '1.3 rad'"
     return f"a unit like '{si_unit}' is needed" if si_unit else "a plain number without a unit is needed"
-
-
-def _quote_unit(unit: str) -> str:
-    return f"unit '{unit}'" if unit else "a number without a unit"
 
 
 @functools.lru_cache(maxsize=512)
@@ -236,19 +233,13 @@ def unit_by_pint(unit: str) -> ParsedUnit:
 
 def split_pressure_kind(unit: str) -> tuple[str, str]:
     """Return a unit in its normal spelling without ``_g``, ``_a`` or ``_d`` at its end, and that letter."""
-    normal = _normal(unit)
-    pressure = _PRESSURE_KIND.fullmatch(normal)
-    return (pressure[1], pressure[2]) if pressure else (normal, "")
-
-
-def _normal(unit: str) -> str:
-    """Return the unit in the one spelling that the grammar knows, or refuse it."""
     normal = unit.replace("**", "^").translate(_SPELLINGS)
     normal = re.sub(r" *([/()^]) *", r"\1", normal.strip(" "))
     normal = re.sub(r" +", " ", normal)
     if normal and (len(normal) > _LONGEST_UNIT or _EXPRESSION.fullmatch(normal) is None):
         raise UnitError(f"{_quote(unit)} is not a unit; write it like 'mm^2', 'N m s/rad' or 'm^3/(s Pa)'")
-    return normal
+    pressure = _PRESSURE_KIND.fullmatch(normal)
+    return (pressure[1], pressure[2]) if pressure else (normal, "")
 
 
 def _unknown_unit(name: str) -> UnitError:

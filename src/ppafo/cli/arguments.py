@@ -60,6 +60,7 @@ def counting_number(text: str) -> int:
 
 
 def _number_from(text: str, least: int) -> int:
+    # As people group digits; isdecimal alone would take the digits of any script.
     digits = text.replace("_", "").replace(",", "")
     is_usable = digits.isascii() and digits.isdecimal() and len(digits) <= _MAXIMUM_DIGITS
     if not is_usable or int(digits) < least:

@@ -102,6 +102,7 @@ def _help_by_parameter(verb: Callable[..., Any], names: Sequence[str]) -> dict[s
     found: dict[str, str] = {}
     latest = ""
     for line in (inspect.getdoc(verb) or "").splitlines():
+        # Only names of parameters: a sentence of the docstring may have a colon too.
         begun = _PARAMETER.fullmatch(line)
         if begun is not None and begun[1] in names:
             latest = begun[1]
@@ -151,14 +152,18 @@ def option_of(parameter: inspect.Parameter, reading: Reading) -> str:
     return f"--{parameter.name.strip('_').replace('_', '-')}"
 
 
-def add_parameters(parser: argparse.ArgumentParser, command: Command) -> None:
-    """Add the parameters of a verb, ``--list`` where there is one, ``--json`` and ``--out`` to the parser."""
+def add_parameters(parser: argparse.ArgumentParser, command: Command, is_listing: bool = False) -> None:
+    """Add the parameters of a verb, ``--list`` where there is one, ``--json`` and ``--out`` to the parser.
+
+    A line with ``--list``, which ``is_listing`` says, needs none of them.
+    """
     verb = command.function()
     readings = list(parameters_of(verb))
     names = [parameter.name for parameter, _ in readings]
     helps = _help_by_parameter(verb, names)
     for parameter, reading in readings:
-        _add_parameter(parser, parameter, reading, helps.get(parameter.name, reading.word.help), command.lists)
+        said = helps.get(parameter.name, reading.word.help)
+        _add_parameter(parser, parameter, reading, said, command.lists, is_listing)
     if command.lists:
         parser.add_argument("--list", action="store_true", help="list what comes with the package")
     if OUT in names:
@@ -169,7 +174,12 @@ def add_parameters(parser: argparse.ArgumentParser, command: Command) -> None:
 
 
 def _add_parameter(
-    parser: argparse.ArgumentParser, parameter: inspect.Parameter, reading: Reading, said: str, lists: bool
+    parser: argparse.ArgumentParser,
+    parameter: inspect.Parameter,
+    reading: Reading,
+    said: str,
+    lists: bool,
+    is_listing: bool,
 ) -> None:
     word, is_required = reading.word, parameter.default is inspect.Parameter.empty
     default = None if is_required else parameter.default
@@ -190,13 +200,13 @@ def _add_parameter(
     options |= {"metavar": word.metavar, "type": word.read, "choices": reading.choices}
     if not option:
         if reading.is_repeated:
-            options["nargs"] = "+" if is_required else "*"
+            options["nargs"] = "+" if is_required and not is_listing else "*"
         # With --list the word may be missing; without it ``run`` refuses that.
         elif not is_required or lists:
             options["nargs"] = "?"
         parser.add_argument(parameter.name, **options)
         return
-    options["required"] = is_required
+    options["required"] = is_required and not is_listing
     if reading.is_repeated:
         # A list, because argparse cannot append to a tuple, which a verb may have as its default.
         options |= {"action": "append", "default": list(default or ())}
@@ -212,9 +222,9 @@ def run(parsed: argparse.Namespace, name: str, command: Command) -> int:
     verb = command.function()
     parameters = inspect.signature(verb).parameters
     values = {each: getattr(parsed, each) for each in parameters if each != PROGRESS}
-    for each, value in values.items():
-        if command.lists and value is None and parameters[each].default is inspect.Parameter.empty:
-            noun = reading_of_name(verb, each).metavar.lower()
+    for parameter, reading in parameters_of(verb):
+        if command.lists and values[parameter.name] is None and parameter.default is inspect.Parameter.empty:
+            noun = reading.word.metavar.lower()
             raise UsageError(f"no {noun} was given; 'ppafo {name} --list' shows what there is")
     folder = None
     if OUT not in parameters:
@@ -226,11 +236,6 @@ def run(parsed: argparse.Namespace, name: str, command: Command) -> int:
     with output.progress_line() as progress:
         found = verb(**values, **({PROGRESS: progress} if PROGRESS in parameters else {}))
     return output.deliver(found, parsed.json, folder, name, has_written=OUT in parameters)
-
-
-def reading_of_name(verb: Callable[..., Any], name: str) -> Word:
-    """Return the word of one parameter."""
-    return next(reading.word for parameter, reading in parameters_of(verb) if parameter.name == name)
 
 
 def _list(command: Command, as_json: bool) -> int:
@@ -320,22 +325,13 @@ def check_options(words: Sequence[str], parser: CommandParser) -> None:
         name = word.partition("=")[0]
         if name in RENAMED and name not in known and RENAMED[name] in known:
             raise UsageError(f"{name} is now called {RENAMED[name]}")
-        if _looks_like_option(word) and not any(_stands_for(name, option) for option in known):
-            raise UsageError(
-                f"there is no option '{name}'{_nearest_option(name, known)}; available: {', '.join(known)}"
-            )
-
-
-def _nearest_option(name: str, known: Sequence[str]) -> str:
-    """Return the hint; the dashes, which all have in common, would make strangers look alike."""
-    hint = nearest_name(name.strip("-"), [option.removeprefix("--") for option in known if option.startswith("--")])
-    return hint.replace("'", "'--", 1)
-
-
-def _looks_like_option(word: str) -> bool:
-    """Tell whether argparse takes a word for an option: a dash alone, numbers and words with a space are values."""
-    is_number = _NEGATIVE_NUMBER.fullmatch(word) is not None
-    return word.startswith("-") and len(word) > 1 and " " not in word and not is_number
+        # As argparse has it: a dash alone, numbers and words with a space are values.
+        is_value = not word.startswith("-") or len(word) == 1 or " " in word or _NEGATIVE_NUMBER.fullmatch(word)
+        if not is_value and not any(_stands_for(name, option) for option in known):
+            # Without the dashes, which all have in common and which would make strangers look alike.
+            bare = [option.removeprefix("--") for option in known if option.startswith("--")]
+            hint = nearest_name(name.strip("-"), bare).replace("'", "'--", 1)
+            raise UsageError(f"there is no option '{name}'{hint}; available: {', '.join(known)}")
 
 
 def _stands_for(name: str, option: str) -> bool:

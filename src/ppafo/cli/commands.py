@@ -12,6 +12,14 @@ from ppafo.kinds import Kinds, is_installed, package_of
 
 _ANALYSES, _BENCH, _DEVICE = "ppafo.cli.verbs.analyses", "ppafo.cli.verbs.bench", "ppafo.cli.verbs.device"
 _TOOLS, _WALKING = "ppafo.cli.verbs.tools", "ppafo.cli.verbs.walking"
+_SETS, _GAITS = f"{_DEVICE}:sets_list", f"{_WALKING}:gait_list"
+_STUDIES = "ppafo.studies.loading:STUDY_FILES", "ppafo.analyses.sweep.solve:studies_of_the_package"
+
+
+def _of_scenario(verb: str) -> Command:
+    """Return a command that takes scenarios and walks by name."""
+    return Command(verb, listing="ppafo.cli.simulate:list_descriptions", listed="scenario")
+
 
 _EVERY: dict[str, dict[str, Command | Group]] = {
     "the paper": {
@@ -22,17 +30,15 @@ _EVERY: dict[str, dict[str, Command | Group]] = {
         ),
     },
     "your device": {
-        "new": Command("ppafo.cli.new:new"),
-        "simulate": Command(
-            "ppafo.cli.simulate:simulate", listing="ppafo.cli.simulate:list_descriptions", listed="scenario"
-        ),
-        "workbench": Command("ppafo.page.commands:workbench"),
+        "new": Command("ppafo.cli.new:new", listing="ppafo.cli.new:list_kinds", listed="kind"),
+        "simulate": _of_scenario("ppafo.cli.simulate:simulate"),
+        "workbench": _of_scenario("ppafo.page.commands:workbench"),
         "sets": Group(
             "list, show and audit parameter sets; list real parts",
             {
                 "list": Command(f"{_DEVICE}:sets_list"),
-                "show": Command(f"{_DEVICE}:sets_show"),
-                "audit": Command(f"{_DEVICE}:sets_audit"),
+                "show": Command(f"{_DEVICE}:sets_show", listing=_SETS),
+                "audit": Command(f"{_DEVICE}:sets_audit", listing=_SETS),
                 "parts": Command(f"{_DEVICE}:sets_parts"),
             },
         ),
@@ -46,19 +52,15 @@ _EVERY: dict[str, dict[str, Command | Group]] = {
             },
         ),
         "identify": Command(f"{_BENCH}:identify"),
-        "validate": Command(f"{_BENCH}:validate"),
+        "validate": Command(f"{_BENCH}:validate", listing=_SETS),
     },
     "decide": {
-        "sweep": Command(
-            f"{_ANALYSES}:sweep",
-            library="ppafo.studies.loading:STUDY_FILES",
-            listing="ppafo.analyses.sweep.solve:studies_of_the_package",
-        ),
-        "compare": Command(f"{_ANALYSES}:compare"),
-        "sensitivity": Command(f"{_ANALYSES}:sensitivity"),
-        "find": Command(f"{_ANALYSES}:find"),
+        "sweep": Command(f"{_ANALYSES}:sweep", *_STUDIES),
+        "compare": _of_scenario(f"{_ANALYSES}:compare"),
+        "sensitivity": Command(f"{_ANALYSES}:sensitivity", *_STUDIES),
+        "find": _of_scenario(f"{_ANALYSES}:find"),
         "tune": Command(f"{_ANALYSES}:tune", library="ppafo.analyses.tune.problem:TUNING"),
-        "linearise": Command(f"{_ANALYSES}:linearise"),
+        "linearise": _of_scenario(f"{_ANALYSES}:linearise"),
         "design": Command(f"{_ANALYSES}:design", library="ppafo.analyses.design.loading:FILE"),
         "bottle": Command(f"{_ANALYSES}:bottle", library="ppafo.parameters.bottles.bottle:FILE"),
     },
@@ -67,9 +69,9 @@ _EVERY: dict[str, dict[str, Command | Group]] = {
             "list, show and import gaits",
             {
                 "list": Command(f"{_WALKING}:gait_list"),
-                "show": Command(f"{_WALKING}:gait_show"),
+                "show": Command(f"{_WALKING}:gait_show", listing=_GAITS),
                 "import": Command(f"{_WALKING}:gait_import"),
-                "record": Command(f"{_WALKING}:gait_record"),
+                "record": Command(f"{_WALKING}:gait_record", listing=_GAITS),
             },
         ),
         "walk": Command(
@@ -83,15 +85,15 @@ _EVERY: dict[str, dict[str, Command | Group]] = {
         "export": Group(
             "write a scenario or a walk for other tools: C, an FMU, OpenSim, firmware; figures of a result",
             {
-                "c": Command(f"{_TOOLS}:export_c"),
-                "controller": Command("ppafo.processor.commands:export_controller"),
-                "firmware": Command("ppafo.processor.commands:export_firmware"),
-                "fmu": Command(f"{_TOOLS}:export_fmu"),
-                "opensim": Command("ppafo.cli.opensim:export_opensim"),
+                "c": _of_scenario(f"{_TOOLS}:export_c"),
+                "controller": _of_scenario("ppafo.processor.commands:export_controller"),
+                "firmware": _of_scenario("ppafo.processor.commands:export_firmware"),
+                "fmu": _of_scenario(f"{_TOOLS}:export_fmu"),
+                "opensim": Command("ppafo.cli.opensim:export_opensim", library="ppafo.walking.loading:FILE"),
                 "figure": Command("ppafo.cli.figure:export_figure"),
             },
         ),
-        "hil": Command("ppafo.cli.hil:hil"),
+        "hil": _of_scenario("ppafo.cli.hil:hil"),
         "doctor": Command("ppafo.cli.doctor:doctor"),
     },
 }

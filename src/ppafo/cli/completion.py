@@ -57,6 +57,7 @@ def _words(command: Command) -> list[str]:
     found = sorted(option for option in parser.options() if option.startswith("--"))
     if command.library:
         found += kind_at(command.library).names()
+    # Private, but argparse tells it nowhere else.
     for action in parser._actions:
         found += map(str, action.choices or ())
         found += kind_at(_NAMES[action.metavar])() if action.metavar in _NAMES else ()

@@ -137,10 +137,10 @@ def models_text(document: dict[str, Any]) -> str:
     lines.append(f"programs: {len(document['programs'])}, {_megabytes(document['size'])}")
     if document["made_from_programs"]:
         lines.append(f"texts of programs and their forms for pages: {_megabytes(document['made_from_programs'])}")
-    lines += [
-        f"  {item['name']}  {_megabytes(item['size']):>8}  last used {_days(item['unused_days'])}"
-        for item in document["programs"]
-    ]
+    for item in document["programs"]:
+        days = item["unused_days"]
+        ago = "today" if days < 1.0 else f"{days:.0f} day{'' if int(days + 0.5) == 1 else 's'} ago"
+        lines.append(f"  {item['name']}  {_megabytes(item['size']):>8}  last used {ago}")
     lines += [f"left out for a day: {name}: {why}" for name, why in document["left_out"].items()]
     limits = f"{document['kept_unused_days']:.0f} days unused, or above {_megabytes(document['most_bytes'])} in all"
     return "\n".join([*lines, f"removed by themselves: after {limits}"])
@@ -148,7 +148,3 @@ def models_text(document: dict[str, Any]) -> str:
 
 def _megabytes(size: int) -> str:
     return f"{size / 1e6:.1f} MB"
-
-
-def _days(days: float) -> str:
-    return "today" if days < 1.0 else f"{days:.0f} day{'' if int(days + 0.5) == 1 else 's'} ago"

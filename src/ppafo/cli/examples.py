@@ -42,6 +42,7 @@ def _contents(folder: Traversable, path: PurePosixPath) -> list[tuple[PurePosixP
     for item in folder.iterdir():
         if item.is_file():
             found.append((path / item.name, item.read_bytes()))
+        # A script of an example that was run where it is leaves one.
         elif item.name != "__pycache__":
             found += _contents(item, path / item.name)
     return found

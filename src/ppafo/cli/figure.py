@@ -24,6 +24,7 @@ def export_figure(folder: Folder, *, out: File | None = None) -> Said:
     if out is not None and out.suffix.removeprefix(".") not in FIGURE_FORMATS:
         allowed = ", ".join(f".{name}" for name in FIGURE_FORMATS)
         raise DataError(f"--out {out}: the name must end in one of {allowed}")
+    # Before anything is read or drawn.
     if out is not None:
         output.check_new_file(out)
     from ppafo.analyses.stored_figures import draw_folder, names_in, what_is_there

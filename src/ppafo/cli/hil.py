@@ -44,6 +44,7 @@ def hil(
         raise ScenarioError(
             f"'{chosen.name}' is a walk, and the wire carries no forces under the foot: give a scenario"
         )
+    # Before the first sample: a folder that is refused must not cost a run with a bench.
     folder = out if out is not None else Path("out") / f"{chosen.name}-hil"
     with output.blame_out_option():
         check_result_folder(folder)

@@ -68,22 +68,21 @@ def build_parser(words: Sequence[str]) -> CommandParser:
             continue
         command = COMMANDS.get(name) or Command("", found=OTHERS[name])
         if isinstance(command, Group):
-            _add_group(subparsers.add_parser(name, description=_sentence(command.summary)), name, command, chosen[1:2])
+            group = subparsers.add_parser(name, description=_sentence(command.summary))
+            actions = group.add_subparsers(dest="action", metavar="ACTION", required=True)
+            for action, member in command.actions.items():
+                summary = member.summary
+                subparser = actions.add_parser(action, help=summary, description=_sentence(summary))
+                if action in chosen[1:2]:
+                    _add_command(subparser, f"{name} {action}", member, words)
         else:
-            _add_command(subparsers.add_parser(name, description=_sentence(command.summary)), name, command)
+            described = subparsers.add_parser(name, description=_sentence(command.summary))
+            _add_command(described, name, command, words)
     return parser
 
 
-def _add_group(parser: argparse.ArgumentParser, name: str, group: Group, chosen: Sequence[str]) -> None:
-    actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
-    for action, command in group.actions.items():
-        subparser = actions.add_parser(action, help=command.summary, description=_sentence(command.summary))
-        if action in chosen:
-            _add_command(subparser, f"{name} {action}", command)
-
-
-def _add_command(parser: argparse.ArgumentParser, name: str, command: Command) -> None:
-    add_parameters(parser, command)
+def _add_command(parser: argparse.ArgumentParser, name: str, command: Command, words: Sequence[str]) -> None:
+    add_parameters(parser, command, is_listing="--list" in words)
     parser.set_defaults(run=partial(run, name=name, command=command))
 
 
@@ -113,6 +112,7 @@ def _run(words: list[str]) -> int:
             return _complete(words[1:])
         check_words(words)
         parser = build_parser(words)
+        # Before argparse, which would complain of what is missing first.
         check_options(words, parser)
         parsed, unknown = parser.parse_known_args(words)
         if unknown:

@@ -130,6 +130,18 @@ def new(
     return Said(f"written: {path}; next: {command}", document)
 
 
+def list_kinds() -> list[dict[str, str]]:
+    """Return what each word for KIND stands for, and the files of the package that ``--from`` copies."""
+    from importlib import resources
+
+    rows = []
+    for kind, one in KINDS.items():
+        files = resources.files("ppafo").joinpath(*one.shipped.split("/")).iterdir()
+        names = sorted(Path(file.name).stem for file in files if file.name.endswith(_SUFFIX))
+        rows.append({"name": kind, "noun": one.noun, "shipped": ", ".join(names)})
+    return [*rows, {"name": EXAMPLE, "noun": "files of a how-to page", "shipped": "see 'ppafo new example'"}]
+
+
 def _content(kind: str, source: str | None, name: str, path: Path) -> str:
     """Return the text of the new file: the template or the source, under the new name."""
     from importlib import resources
@@ -142,6 +154,7 @@ def _content(kind: str, source: str | None, name: str, path: Path) -> str:
     content = (templates / f"{kind}{_SUFFIX}").read_bytes() if source is None else files.read(source)
     files.parse(content, source or f"template of a {kind}")
     text = content.decode("utf-8")
+    # A name below a table is that of something else.
     table = _FIRST_TABLE.search(text)
     named = _NAME_LINE.search(text, 0, table.start() if table else len(text))
     if named is None:
@@ -150,6 +163,7 @@ def _content(kind: str, source: str | None, name: str, path: Path) -> str:
     if kind == "set" and source is not None:
         # What the copy changes is shown by 'ppafo sets audit'; what the source changed is not its matter.
         parent = source if source in files.names() else os.path.relpath(source, path.parent)
+        # A text in JSON is one in TOML too.
         rest = f"\nparent = {json.dumps(parent, ensure_ascii=False)}{_PARENT_LINE.sub('', rest, count=1)}"
     text = f'{head}name = "{name}"{rest}'
     # A file of the package shows in its first lines how it is run.

@@ -66,6 +66,7 @@ def _next(out: Path, file: str) -> str:
 def _recorded(path: Path, side: Side, mass: float | None, out: Path) -> Said:
     from ppafo.exports.opensim import files_of_recording
 
+    # Known once the files are made, and said after that.
     missing: list[str] = []
 
     def make() -> dict[str, bytes]:

@@ -128,6 +128,7 @@ def said_files(said: Said) -> dict[str, bytes]:
 def print_result(text: str, document: Mapping[str, Any], as_json: bool) -> None:
     """Print the text, or the document as JSON; ends quietly where the reader has gone, as in ``... | head``."""
     with printing():
+        # A terminal without a character shows its number, where Python would end with an error.
         shown = json_text(document) if as_json else text
         encoding = sys.stdout.encoding or "utf-8"
         print(shown.encode(encoding, "backslashreplace").decode(encoding), flush=True)

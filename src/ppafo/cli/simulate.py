@@ -38,7 +38,13 @@ def simulate(scenario: Scenario, *, check: bool = False, overrides: Overrides = 
 
     result = simulate(chosen)
     checked = result.check() if check and result.status.is_completed else None
-    error = _error(result) if checked is None else checked.error
+    from ppafo.simulation.scenario import worn_kind
+
+    error = None if checked is None else checked.error
+    # A vane alone runs again in milliseconds; of a walk the error is estimated by its check only.
+    if checked is None and result.status.is_completed and worn_kind(chosen) is None:
+        error = result.error()
+    # Before anything else imports Matplotlib, so that it comes without what it does for others.
     from ppafo.report.drawing import load_drawing
 
     load_drawing()
@@ -67,13 +73,6 @@ def simulate(scenario: Scenario, *, check: bool = False, overrides: Overrides = 
         exit_code=EXIT_GOOD if is_good else EXIT_CHECK_FAILED,
         aside="" if result.status.is_completed else f"{chosen.name}: {result.status.message}",
     )
-
-
-def _error(result: "Result") -> "ErrorEstimate | None":
-    """Return the estimated error of a vane alone, which runs again in milliseconds; a walk's is in its check."""
-    from ppafo.simulation.scenario import worn_kind
-
-    return result.error() if result.status.is_completed and worn_kind(result.scenario) is None else None
 
 
 def _finding(result: "Result", check: "Check | None") -> "Finding[None]":

@@ -37,6 +37,7 @@ def plain(value: Any) -> Any:
 
 
 def _plain_leaf(value: Any) -> str | bool | int | float | None:
+    # Before whole numbers, which True and False are in Python.
     if value is None or isinstance(value, str | bool):
         return value
     if isinstance(value, numbers.Integral):

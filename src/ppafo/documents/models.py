@@ -35,21 +35,16 @@ def all_problems(details: list[ErrorDetails], model: type[BaseModel]) -> str:
     spots = {item["loc"]: (_spot(model, item["loc"]), item) for item in details if item["loc"] not in above}
     of_values = {spot.path: (spot, item) for spot, item in reversed(spots.values()) if not is_gap(item)}
     ordered = sorted(reversed(of_values.values()), key=lambda found: found[1]["type"] != "extra_forbidden")
-    said = [_sentence(spot, item, model) for spot, item in ordered[:_MAXIMUM_SAID]]
+    said = []
+    for spot, item in ordered[:_MAXIMUM_SAID]:
+        is_unknown = item["type"] == "extra_forbidden"
+        said.append(_unknown_key(spot, model) if is_unknown else _SENTENCES.get(item["type"], _any_other)(spot, item))
     if len(ordered) > _MAXIMUM_SAID:
         said.append(f"and {len(ordered) - _MAXIMUM_SAID} more like these")
     gaps = [f"{spot.path}{_GAPS[item['type']]}" for spot, item in spots.values() if is_gap(item)]
     if gaps:
         said.append(said_missing(gaps))
     return "; ".join(said)
-
-
-def _sentence(spot: "_Spot", detail: ErrorDetails, model: type[BaseModel]) -> str:
-    if detail["type"] == "extra_forbidden":
-        return _unknown_key(spot, model)
-    if detail["type"] == "string_type":
-        return f"{spot.path} = {quote(detail['input'])} must be a text in quotation marks"
-    return _SENTENCES.get(detail["type"], _any_other)(spot, detail)
 
 
 def quote(value: object) -> str:
@@ -90,15 +85,13 @@ def _kinds(node: Any) -> dict[str, Any]:
 
 def _below(node: Any, part: str) -> Any:
     """Return the type of what a table has at a key, or a table or list by names or numbers at any; None if unknown."""
-    if _is_model(node):
-        field = node.model_fields.get(part)
-        return None if field is None else _required_type(field.annotation)
-    members = [item for item in get_args(node) if item is not Ellipsis]
-    return members[-1] if members else None
-
-
-def _required_type(annotation: Any) -> Any:
-    """Return the type of a value that is there, for one that may be left out as ``X | None``."""
+    if not _is_model(node):
+        members = [item for item in get_args(node) if item is not Ellipsis]
+        return members[-1] if members else None
+    if part not in node.model_fields:
+        return None
+    annotation = node.model_fields[part].annotation
+    # What may be left out, as X | None, is an X where it is there.
     members = [item for item in get_args(annotation) if item is not type(None)]
     return members[0] if get_origin(annotation) in (Union, UnionType) and len(members) == 1 else annotation
 
@@ -169,6 +162,9 @@ def _not_a_table(spot: _Spot, detail: ErrorDetails) -> str:
 
 
 def _any_other(spot: _Spot, detail: ErrorDetails) -> str:
+    """Say what pydantic says, in our words: "Input should be less than 5" becomes "must be less than 5"."""
+    if detail["type"] == "string_type":
+        return f"{spot.path} = {quote(detail['input'])} must be a text in quotation marks"
     _, wanted, must = detail["msg"].partition(" should ")
     said = f"must {must}" if wanted else f"must be {detail['msg']}"
     return f"{spot.path} = {quote(detail['input'])}: {one_line(said)}"

@@ -66,9 +66,11 @@ class TomlKind:
             raise self.error(f"{file}: is not a text file in UTF-8 (byte {error.start})") from error
         if not text.strip():
             raise self.error(f"{file}: is empty; 'ppafo doctor --schema {self.schema}' prints its format")
+        # Before the parser, whose time grows with the square of the dots.
         if _DEEP_KEY.search(text):
             raise self.error(f"{file}: {_TOO_DEEP}")
         try:
+            # A copy, since overrides are written into a document and the parsed one is kept.
             document = copy.deepcopy(_document(text))
         except tomllib.TOMLDecodeError as error:
             raise self.error(f"{file}: is not valid TOML: {one_line(error)}") from error
@@ -104,6 +106,7 @@ def label(file: str) -> str:
 
 
 def _exists(path: Path) -> bool:
+    # A name may be too long for any file system, or have a null byte.
     try:
         return path.exists()
     except (OSError, ValueError):

@@ -411,6 +411,7 @@ class ScenarioEpisodes:
 
     def _one(self, generator: np.random.Generator) -> tuple[list[float], float]:
         drawn = [
+            # A seed is drawn as all numbers are, and has to be whole.
             float(np.floor(generator.uniform(*ends))) if path == _SEED else generator.uniform(*ends)
             for path, ends in self.ranges.items()
         ]
@@ -425,6 +426,7 @@ class ScenarioEpisodes:
             if episode_program(batch) == (self.program, self.clock):
                 columns.parameters[:, left[members]] = batch.parameters
                 columns.states[:, left[members]] = batch.states
+                # What is left has another program or clock, cannot go with the others, and is drawn again.
                 left = np.where(np.isin(np.arange(left.size), members), -1, left) if members.size else left
         return left[left >= 0], reason
 
@@ -441,12 +443,14 @@ def scenario_episodes(base: Scenario, randomise: bool, vary: Ranges, targets: tu
     if randomise:
         ranges, gauge = intervals_of(base)
         varies = ATMOSPHERE_PATH in {*ranges, *vary}
+        # Where the atmosphere varies as well, a gauge pressure keeps its distance from it.
         atmosphere = base.device.supply.atmospheric_pressure
         gauge = gauge - set(vary) if varies else set()
         ranges |= {path: (ranges[path][0] - atmosphere, ranges[path][1] - atmosphere) for path in gauge}
         for path, ends in vary.items():
             place, ranges[path] = _range(base, path, ends, varies)
             gauge |= {path} if place.is_gauge else set()
+        # Each episode has noise of its own, unless the caller says how the seed varies.
         ranges.setdefault(_SEED, (0.0, float(LARGEST_SEED)))
     batch = batch_of(plan_run(base))
     program, clock = episode_program(batch)
@@ -468,6 +472,7 @@ def intervals_of(base: Scenario) -> tuple[dict[str, tuple[float, float]], set[st
     for path, entry in parameter_set.numbers.items():
         own = chosen_path(path, base)
         if entry.uncertainty and own in known:
+            # The upper end in the unit of the entry, so that a gauge pressure is converted as its value is.
             above = entry.model_copy(update={"value": entry.value + entry.uncertainty})
             ends = [entry_in_si(item, declared[path], atmosphere) for item in (entry, above)]
             value, half = number_at(base, own), ends[1] - ends[0]
@@ -551,4 +556,5 @@ def walk_episodes(configuration: Scenario, randomise: bool, seconds: float) -> W
     batch = batch_of(plan_walk(commanded))
     program, clock = episode_program(batch)
     plain = Columns(batch.parameters, batch.states, np.array([numbers(goal)]).T)
+    # Nothing is recorded between two samples: an agent sees what is observed.
     return WalkEpisodes(configuration, commanded, program, replace(clock, record_every=0), randomise, plain)

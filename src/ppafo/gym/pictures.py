@@ -38,6 +38,7 @@ def picture(trail: Sequence[tuple[float, float, float]], unit: str, period: floa
         grid["angle"].tick_params(labelbottom=False)
         grid["error"].set_xlabel("Time (s)")
         canvas.draw()
+        # Without transparency, and a copy, since the canvas owns its buffer.
         return np.asarray(canvas.buffer_rgba())[:, :, :3].copy()
 
 

@@ -105,4 +105,5 @@ def packed_once(content: bytes) -> str:
 
 def packed(content: bytes) -> str:
     """Return bytes as a page holds them: compressed, in base 85; no such text can end the element that it is in."""
+    # Without the time of packing: the same content gives the same page.
     return base64.b85encode(gzip.compress(content, 9, mtime=0)).decode("ascii")

@@ -110,6 +110,7 @@ def computed_opening(
         apart = np.sqrt(np.mean((found.traces[lead] - course[:, None]) ** 2, axis=0))
         if max(all_changes := [*moved, _share(apart, span)]) > LEAST_CHANGE:
             changes[entry["key"]] = all_changes
+    # As many points as a picture of some hundred pixels shows.
     thin = slice(None, None, max(1, len(base.times) // _PLACES))
     return {
         "key": _key(module, given, named),
@@ -144,6 +145,7 @@ def first_settings(openings: Sequence[Mapping[str, Any]], programs: Sequence[Map
     rank = {origin: place for place, origin in enumerate(_RANKED)}
     largest: dict[str, float] = {}
     for opening in openings:
+        # Two settings with one effect to the last digit are one slider: the better known comes first.
         same: dict[tuple[float, ...], str] = {}
         for key, change in sorted(opening["changes"].items(), key=lambda item: rank.get(origins.get(item[0], ""), 99)):
             if key in origins and same.setdefault(tuple(change), key) == key:

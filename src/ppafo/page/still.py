@@ -92,8 +92,10 @@ def _colours(programs: Sequence[Mapping[str, Any]]) -> list[str]:
 def _ticks(values: Sequence[float]) -> list[float]:
     """Round numbers that enclose some values, five to ten of them."""
     low, high = min(values), max(values)
+    # A level line has no height of its own.
     size = (high - low) / 8.0 or 1.0
     decade = 10.0 ** math.floor(math.log10(size))
+    # The small share lets a size that is a round number but for rounding be one.
     step = next(step * decade for step in _STEPS if step * decade >= size * (1.0 - 1e-9))
     first, last = math.floor(low / step + 1e-9), math.ceil(high / step - 1e-9)
     return [step * number for number in range(first, max(last, first + 1) + 1)]

@@ -70,7 +70,7 @@ class Simulated:
 def program_content(item: Simulated, module: str, intervals: Mapping[str, Interval]) -> dict[str, Any]:
     """Return what the page knows of a scenario; ``module`` is the element that holds its program."""
     described = item.module.description
-    gauge = _gauge_texts(item.scenario, described["settings"])
+    gauge, keys = _gauge_texts(item.scenario, described["settings"]), {one["key"] for one in described["settings"]}
     # The file of a scenario or walk with the overrides in it; overrides of the device stay overrides.
     declared = OF_A_VANE
     if described["kind"] == "walk":
@@ -108,20 +108,19 @@ def program_content(item: Simulated, module: str, intervals: Mapping[str, Interv
         + _relations_of_files(described),
         "channels": [_shown(entry) for entry in described["channels"] if entry["name"] != "time"],
         "metrics": [_shown(entry) for entry in described["metrics"]],
-        "sustained": _sustained({entry["key"] for entry in described["settings"]}),
+        # Only of an actuator that makes its torque of a pressure so.
+        "sustained": dict(_SUSTAINED) if keys >= set(_SUSTAINED.values()) else None,
         "module": module,
     }
 
 
-def _sustained(keys: set[str]) -> dict[str, str] | None:
-    """The settings of which the torques are made that the supplies sustain, of an actuator that makes them so."""
-    torque = {
-        "factor": "actuator.torque_constant",
-        "raised": "supply.pressure",
-        "lowered": "supply.dorsiflexion_pressure",
-        "zero": ATMOSPHERE_PATH,
-    }
-    return torque if keys >= set(torque.values()) else None
+_SUSTAINED = {
+    "factor": "actuator.torque_constant",
+    "raised": "supply.pressure",
+    "lowered": "supply.dorsiflexion_pressure",
+    "zero": ATMOSPHERE_PATH,
+}
+"""The settings of which the torques are made that the supplies sustain."""
 
 
 def usual_changes(scenario: Scenario) -> dict[str, str]:
@@ -244,6 +243,7 @@ def _slider(entry: Mapping[str, Any]) -> Interval:
     else:
         end = _nice(2.5 * abs(value)) if value else (high if high is not None and high <= 1.0 else 1.0)
         begin = -end if value < 0.0 else 0.0
+    # A slider to a bound that is not allowed ends a hundredth of its way before it.
     is_small = low is not None and (not entry["is_minimum_allowed"] or 0.0 < low < end / 100.0)
     if entry["kept"] == "above zero" or (low is not None and low >= begin and is_small):
         begin = max(begin, (low or 0.0) + (end - (low or 0.0)) / 100.0)
@@ -293,25 +293,22 @@ def _scales(shown: Iterable[tuple[str, str]]) -> dict[str, list[dict[str, Any]]]
     wanted: dict[str, dict[str, None]] = {}
     for si, unit in sorted(shown):
         wanted.setdefault(si, {}).update(dict.fromkeys((unit, *_UNITS.get(si, ()), si)))
-    return {si: [_scale(unit, si) for unit in units if _fits(unit, si)] for si, units in wanted.items()}
-
-
-def _scale(unit: str, si: str) -> dict[str, Any]:
-    scale, offset, is_gauge = conversion(_typed(unit, si), si)
-    return {"unit": unit, "scale": str(scale), "offset": str(offset), "isGauge": is_gauge}
+    scales: dict[str, list[dict[str, Any]]] = {}
+    for si, units in wanted.items():
+        scales[si] = []
+        for unit in units:
+            try:
+                scale, offset, is_gauge = conversion(_typed(unit, si), si)
+            except UnitError:
+                # A unit that is shown and cannot be typed for this quantity.
+                continue
+            scales[si].append({"unit": unit, "scale": str(scale), "offset": str(offset), "isGauge": is_gauge})
+    return scales
 
 
 def _typed(unit: str, si: str) -> str:
     """The unit as it is typed; differences of pressure are shown without their ending."""
     return f"{unit}_d" if si == _DIFFERENCE and not unit.endswith("_d") else unit
-
-
-def _fits(unit: str, si: str) -> bool:
-    try:
-        conversion(_typed(unit, si), si)
-    except UnitError:
-        return False
-    return True
 
 
 TITLE = "The powered ankle-foot orthosis, live"
@@ -354,22 +351,19 @@ def live_part(scenarios: "Sequence[str | Scenario]") -> LivePart | None:
 
     Of scenarios with one name only the first is in it.
     """
+    # Backwards, so that of two with one name the first stays.
     named = {item if isinstance(item, str) else item.name: item for item in reversed(scenarios)}
     try:
         content, modules, _ = _content(list(reversed(named.values())), (), "block")
     except PpafoError:
         return None
-    differences = [_difference(item) for item in named.values() if isinstance(item, Scenario)]
-    return LivePart(policy_of_block(), block_of(content, modules), max(differences, default=""))
-
-
-def _difference(scenario: Scenario) -> str:
-    """A sentence where a configuration of a page begins shorter than the scenario is; empty where it does not."""
-    shorter = usual_changes(scenario).get("run.duration", "")
-    if not shorter or scenario.run.duration <= float(shorter.removesuffix(" s")):
-        return ""
-    whole = f"{scenario.run.duration:g} s"
-    return f"It begins with {shorter} of the {whole} above: lengthen run.duration to compare the numbers."
+    remark = ""
+    for item in named.values():
+        shorter = usual_values(item).get("run.duration") if isinstance(item, Scenario) else None
+        if isinstance(item, Scenario) and shorter is not None and shorter < item.run.duration:
+            part = f"{shorter:g} s of the {item.run.duration:g} s above"
+            remark = max(remark, f"It begins with {part}: lengthen run.duration to compare the numbers.")
+    return LivePart(policy_of_block(), block_of(content, modules), remark)
 
 
 def _content(
@@ -386,7 +380,11 @@ def _content(
         if scenario.name in found:
             raise ScenarioError(f"two scenarios are called '{scenario.name}'; a workbench distinguishes them by name")
         found[scenario.name] = scenario
-    simulated = [Simulated(scenario, module_of(scenario), _label(scenario)) for scenario in loaded]
+    simulated = []
+    for scenario in loaded:
+        spoken = scenario.name.replace("-", " ").replace("_", " ")
+        label = _LABELS.get(scenario.name, spoken[:1].upper() + spoken[1:])
+        simulated.append(Simulated(scenario, module_of(scenario), label))
     intervals = known_intervals()
     names: dict[str, str] = {}
     programs = []
@@ -407,14 +405,11 @@ def _content(
             openings.append(opening_of(one.scenario, one.module, usual_values(one.scenario), tab["claims"]))
         shown = [described[item["program"]] for item in tab["start"]]
         tab["first"] = first_settings(openings, shown)
-        tab["questions"] = [one for one in tab["questions"] if any(_takes(program, one) for program in shown)]
+        # A question is asked where one of the programs has all the settings that it changes.
+        taken = [{one["key"] for one in program["settings"] if one["kept"] != "zero"} for program in shown]
+        tab["questions"] = [one for one in tab["questions"] if any(set(one["changes"]) <= keys for keys in taken)]
         stills.append(still_of(tab, openings, shown))
     return content, {name: text for text, name in names.items()}, stills[0]
-
-
-def _takes(program: Mapping[str, Any], question: Mapping[str, Any]) -> bool:
-    """Whether a program has all the settings that a question changes."""
-    return set(question["changes"]) <= {one["key"] for one in program["settings"] if one["kept"] != "zero"}
 
 
 def openings_of(names: Iterable[str]) -> dict[str, dict[str, Any]]:
@@ -436,11 +431,6 @@ def known_intervals() -> Mapping[str, Interval]:
     """
     described = json.loads(files("ppafo.page").joinpath("intervals.json").read_text(encoding="utf-8"))
     return {path: (low, high) for path, (low, high) in described.items()}
-
-
-def _label(scenario: Scenario) -> str:
-    words_of_name = scenario.name.replace("-", " ").replace("_", " ")
-    return _LABELS.get(scenario.name, words_of_name[:1].upper() + words_of_name[1:])
 
 
 def _tabs(simulated: Sequence[Simulated]) -> list[dict[str, Any]]:

@@ -49,6 +49,7 @@ _NAMED = ("gas mass", "part mass", "body length", "duration", "fraction")
 _OF_UNIT = {si: quantity for quantity, (si, _) in QUANTITIES.items() if quantity not in _NAMED}
 
 
+# Metrics and channels write Pa for a level; of the quantities in kg the plain one is meant.
 _OF_UNIT |= {"Pa": "pressure", "kg": "mass"}
 
 
@@ -66,12 +67,8 @@ def display_unit(quantity: str) -> str:
 
 
 def axis_unit(quantity: str) -> str:
-    """Return the unit in which a quantity is shown, as the label of an axis writes it."""
-    return typeset_unit(display_unit(quantity))
-
-
-def typeset_unit(unit: str) -> str:
-    """Return a unit as the label of an axis writes it, with its exponents raised."""
+    """Return the unit in which a quantity is shown, as the label of an axis writes it: with raised exponents."""
+    unit = display_unit(quantity)
     words = {"psi_g": "psig", "mm^2": "mm$^2$", "cm^3": "cm$^3$", "degC": "°C"}
     return words.get(unit, unit.replace("m^2", "m$^2$").replace("m^3", "m$^3$").replace("s^2", "s$^2$"))
 
@@ -90,11 +87,13 @@ def rounded_text(value: float, quantity: str, digits: int) -> str:
 
 def display_difference(value: float, quantity: str) -> float:
     """Return a difference of two values in SI in the unit in which it is shown."""
+    # The zero of gauge pressures and of degrees Celsius falls out.
     return display_value(value, quantity) - display_value(0.0, quantity)
 
 
 def display_values(values: Floats, quantity: str) -> Floats:
     """Return values in SI (any shape) in the unit in which they are shown."""
+    # Units are affine, so that two values decide all.
     zero, one = display_value(0.0, quantity), display_value(1.0, quantity)
     return values if (zero, one) == (0.0, 1.0) else zero + (one - zero) * values
 

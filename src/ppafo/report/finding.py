@@ -5,6 +5,7 @@ A ``Finding`` is all that an analysis returns; text, JSON, page, figures and fol
 
 import html
 import math
+import re
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -45,23 +46,27 @@ class Column:
     @property
     def texts(self) -> list[str]:
         """The cells as text: numbers in the shown unit and form, whole plain ones with commas, a dash for nothing."""
-        return [self._text(value) for value in self.values]
-
-    def _text(self, value: Cell) -> str:
-        if isinstance(value, str):
-            return value
-        if value is None or (isinstance(value, float) and math.isnan(value)):
-            return NOTHING
-        if isinstance(value, Interval):
-            return self.kind.change_interval(value) if self.is_change else self.kind.interval(value)
-        if isinstance(value, int) and not self.kind.quantity:
-            return f"{value:,}"
-        return self.kind.change_number(value, self.kind.form) if self.is_change else self.kind.number(value)
+        kind, texts = self.kind, []
+        for value in self.values:
+            if isinstance(value, str):
+                text = value
+            elif value is None or (isinstance(value, float) and math.isnan(value)):
+                text = NOTHING
+            elif isinstance(value, Interval):
+                text = kind.change_interval(value) if self.is_change else kind.interval(value)
+            # A count; a whole number of some quantity is shown in its unit and form.
+            elif isinstance(value, int) and not kind.quantity:
+                text = f"{value:,}"
+            else:
+                text = kind.change_number(value, kind.form) if self.is_change else kind.number(value)
+            texts.append(text)
+        return texts
 
 
 def columns_of(titles: Sequence[str | tuple[str, Kind]], rows: Iterable[Sequence[Cell]]) -> list[Column]:
     """Return the columns of some rows, each with a title, or with a title and the kind of its numbers."""
     pairs = [(title, PLAIN) if isinstance(title, str) else title for title in titles]
+    # Without a row there still are titles.
     cells = list(zip(*rows, strict=True)) or [()] * len(pairs)
     return [Column(title, values, kind) for (title, kind), values in zip(pairs, cells, strict=True)]
 
@@ -168,8 +173,9 @@ class Finding(Generic[T_co]):
         return f"<{self.kicker}: {self.title}>"
 
     def _repr_html_(self) -> str:
-        """Return the page, which a notebook shows."""
-        return notebook_of(self)
+        """Return the page as a frame, which a notebook shows."""
+        page = html.escape(files_of(self)[REPORT].decode())
+        return f'<iframe srcdoc="{page}" width="100%" height="700" style="border: 0"></iframe>'
 
     def to_dict(self) -> dict[str, Any]:
         """Return what ``--json`` prints, as plain data in SI."""
@@ -194,6 +200,7 @@ class Finding(Generic[T_co]):
 
 MARK = "*"
 REPORT = "report.html"
+_UNIT = re.compile(r"\([^(]*\)$")
 FORMATS = ("png", "svg")
 _ORIGINS = {
     "simulated": "Every run is of the model; nothing on this page was measured.",
@@ -204,13 +211,13 @@ _ORIGINS = {
 
 def text_of(finding: Finding[Any]) -> str:
     """Return what is said first and every part that is no mere detail of the page."""
-    blocks = ["\n".join(finding.said), *(_part_text(part) for part in finding.parts if not part.is_detail)]
+    blocks = ["\n".join(finding.said)]
+    for part in finding.parts:
+        if not part.is_detail:
+            body = [*part.said, *_table_lines(part), *part.remarks, *([part.code] if part.code else [])]
+            # A heading over nothing is left out, and a part of the page alone, a figure, has no text.
+            blocks.append("\n".join([part.heading, *body] if part.heading and body else body))
     return "\n\n".join(block for block in blocks if block)
-
-
-def _part_text(part: Part) -> str:
-    body = [*part.said, *_table_lines(part), *part.remarks, *([part.code] if part.code else [])]
-    return "\n".join([part.heading, *body] if part.heading and body else body)
 
 
 def _table_lines(part: Part) -> list[str]:
@@ -235,7 +242,13 @@ def page_of(finding: Finding[Any], drawn: Mapping[str, bytes]) -> bytes:
         "parts": [
             (
                 part,
-                [_unbroken_unit(column.head) for column in part.columns] if part.has_head else [],
+                # A unit in brackets at the end of a title is not broken over two lines.
+                [
+                    _UNIT.sub(lambda unit: unit[0].replace(" ", "\N{NO-BREAK SPACE}"), column.head)
+                    for column in part.columns
+                ]
+                if part.has_head
+                else [],
                 inline_figure(drawn[part.name]) if part.name else "",
             )
             for part in finding.parts
@@ -245,12 +258,6 @@ def page_of(finding: Finding[Any], drawn: Mapping[str, bytes]) -> bytes:
         "live": None if finding.live is None else finding.live(),
     }
     return render_page("finding.html.jinja", values).encode()
-
-
-def _unbroken_unit(title: str) -> str:
-    """Return the title of a column whose unit, at its end, is not broken over two lines."""
-    words, bracket, unit = title.rpartition("(")
-    return words + bracket + unit.replace(" ", "\N{NO-BREAK SPACE}") if bracket and title.endswith(")") else title
 
 
 def files_of(finding: Finding[Any]) -> dict[str, bytes]:
@@ -266,9 +273,3 @@ def files_of(finding: Finding[Any]) -> dict[str, bytes]:
         f"{finding.name}.txt": f"{text_of(finding)}\n".encode(),
         REPORT: page_of(finding, {name: forms.get("svg") or forms["gif"] for name, forms in drawn.items()}),
     }
-
-
-def notebook_of(finding: Finding[Any]) -> str:
-    """Return the page of a finding as a frame, which a notebook shows."""
-    page = files_of(finding)[REPORT].decode()
-    return f'<iframe srcdoc="{html.escape(page)}" width="100%" height="700" style="border: 0"></iframe>'

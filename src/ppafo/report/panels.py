@@ -87,9 +87,11 @@ SHAPES: Mapping[str, Callable[..., Any]] = {
     "upright": lambda axes, mark, x, y: axes.vlines(x, y[0], y[1], color=mark.colour, label=mark.label, **mark.style),
     "level": lambda axes, mark, _x, y: axes.axhline(y, color=mark.colour, label=mark.label, **mark.style),
     "at": lambda axes, mark, x, _y: axes.axvline(x, color=mark.colour, label=mark.label, **mark.style),
+    # Cells and points by the thousand are kept as pixels: as shapes they would make files of many megabytes.
     "map": lambda axes, mark, x, y: axes.pcolormesh(
         x, y, mark.to, shading="nearest", rasterized=True, cmap="cividis", **mark.style
     ),
+    "text": lambda axes, mark, x, y: axes.text(x, y, mark.label, color=mark.colour, **mark.style),
     "points": lambda axes, mark, x, y: axes.scatter(
         x, y, c=mark.to, s=9, linewidths=0, cmap="cividis", rasterized=True, **mark.style
     ),
@@ -98,7 +100,7 @@ SHAPES: Mapping[str, Callable[..., Any]] = {
 
 ``line``, ``bars`` (edges and counts), ``reach`` (points with the half width ``to``), ``band`` (between two rows of y),
 ``span`` and ``strip`` (between two x, two y), ``upright`` (from one y to another), ``level`` and ``at`` (a line across
-or upright), ``map`` and ``points`` (coloured by ``to``).
+or upright), ``text`` (its name, written there), ``map`` and ``points`` (coloured by ``to``).
 """
 
 
@@ -119,10 +121,12 @@ def draw_panels(
 
     rows = max(1, -(-len(panels) // across))
     heights = [max((panel.tall for panel in panels[across * row :][:across]), default=1.0) for row in range(rows)]
+    # About 15 letters of this size go on an inch.
     notes = textwrap.wrap(note, round(15.0 * size[0] * across))
     below = _LINE * len(notes)
     width, height = size[0] * across + 0.3, size[1] * sum(heights) + 0.4 + below
     with house_style():
+        # A legend above all panels makes the room in which the kind stands beside it.
         above = 0.0 if any(panel.legend == "figure" for panel in panels) else _TOP
         rect = (0.0, below / height, 1.0, 1.0 - (above + below) / height)
         figure = Figure(figsize=(width, height), layout=ConstrainedLayoutEngine(w_pad=0.1, h_pad=0.08, rect=rect))
@@ -136,6 +140,7 @@ def draw_panels(
                 upper.tick_params(labelbottom=False)
                 upper.set_xlabel("")
         _share_scales(figure, [(axes, panel, each) for axes, panel, each in zip(grid, panels, drawn, strict=False)])
+        # Names and messages come from files: a dollar sign in them begins no formula.
         if title:
             figure.suptitle(title, x=0.01, ha="left", fontsize=11, wrap=True, parse_math=False)
         if notes:
@@ -158,7 +163,8 @@ def _draw(axes: "Axes", panel: Panel) -> Any:
     axes.set_xlabel(panel.x.axis)
     axes.set_ylabel(panel.y.axis if not panel.shares_x else panel.y.axis_unit if panel.title else "")
     axes.set_title(panel.title or (panel.y.axis if panel.shares_x else ""))
-    if panel.legend and any(mark.label for mark in panel.marks):
+    # A text carries its words itself.
+    if panel.legend and any(mark.label for mark in panel.marks if mark.shape != "text"):
         if panel.legend == "above":
             label_lines(axes)
         elif panel.legend == "figure":
@@ -166,6 +172,7 @@ def _draw(axes: "Axes", panel: Panel) -> Any:
             axes.figure.legend(*names, loc="outside upper left", ncols=3, columnspacing=1.4, handlelength=1.4)
         else:
             axes.legend(loc="best", frameon=True, framealpha=0.85, edgecolor="none", handlelength=1.2)
+    # Last, so that it can undo what Matplotlib chose.
     if panel.then is not None:
         panel.then(axes)
     return mapped
@@ -178,6 +185,7 @@ def _share_scales(figure: "Figure", drawn: list[tuple["Axes", Panel, Any]]) -> N
         if scale is None:
             continue
         limits = np.array([each.get_clim() for _, _, each in members], dtype=np.float64)
+        # A panel of nothing but failed runs has no limits.
         limits = limits[np.isfinite(limits).all(axis=1)]
         for _, _, each in members if limits.size else ():
             each.set_clim(float(limits[:, 0].min()), float(limits[:, 1].max()))

@@ -85,6 +85,7 @@ _SETTINGS: Any = MappingProxyType(
         "legend.fontsize": 9.0,
         "figure.facecolor": "white",
         "savefig.dpi": RESOLUTION,
+        # Letters as outlines, as a page fetches no font; ids that are the same every time.
         "svg.fonttype": "path",
         "svg.hashsalt": "ppafo",
     }
@@ -97,6 +98,7 @@ def house_style() -> Iterator[None]:
     import matplotlib
 
     with matplotlib.rc_context():
+        # Settings of the user's own file would change figures from computer to computer.
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(_SETTINGS)
         yield
@@ -104,21 +106,22 @@ def house_style() -> Iterator[None]:
 
 def render_figure(figure: "Figure", file_formats: Iterable[str]) -> dict[str, bytes]:
     """Return file contents by format (``png``, ``svg``, ``pdf``); the same figure gives the same bytes."""
-    with house_style():
-        return {file_format: _encode_figure(figure, file_format) for file_format in file_formats}
-
-
-def _encode_figure(figure: "Figure", file_format: str) -> bytes:
-    buffer = io.BytesIO()
+    # A date would give the same figure other bytes every second.
     undated: dict[str, Any] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
-    figure.savefig(buffer, format=file_format, metadata=undated.get(file_format))
-    return buffer.getvalue()
+    files = {}
+    with house_style():
+        for file_format in file_formats:
+            buffer = io.BytesIO()
+            figure.savefig(buffer, format=file_format, metadata=undated.get(file_format))
+            files[file_format] = buffer.getvalue()
+    return files
 
 
 def mark_kind(figure: "Figure", kind: RecordingKind) -> None:
     """Say at the top right of a figure that what it shows is simulated or synthetic; nothing where it was measured."""
     if kind == "measured":
         return
+    # In inches from the edge, as figures have many heights.
     inch = 1.0 / figure.get_figheight()
     figure.text(0.972, 1.0 - 0.12 * inch, kind, ha="right", va="top", color=GREY, fontsize=9, style="italic")
 

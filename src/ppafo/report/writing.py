@@ -34,6 +34,7 @@ _PATH = re.compile(r"\b[a-z_]+(?:\.[a-z0-9_]+)+\b")
 
 def typeset(text: str) -> str:
     """Return a plain text with superscripts and indices, signs, quotation marks, and psig instead of psi_g."""
+    # Powers of ten first: their sign is no minus sign of a number.
     text = _POWER_OF_TEN.sub(lambda found: f" {_TIMES} 10{str(int(found[1])).translate(_SUPERSCRIPTS)}", text)
     text = _EXPONENT.sub(lambda found: found[1].translate(_SUPERSCRIPTS), text)
     text = _INDEX.sub(lambda found: found[1] + found[2].translate(_SUBSCRIPTS), text)
@@ -82,19 +83,18 @@ def format_reported_quantity(value: float, unit: str) -> str:
 
 def align_columns(rows: Sequence[Sequence[str]], left: int = 1) -> list[str]:
     """Return rows of texts as lines of aligned columns: the first ``left`` to the left, all others to the right."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return ["  ".join(_pad_row(row, widths, left)).rstrip() for row in rows]
-
-
-def _pad_row(row: Sequence[str], widths: Sequence[int], left: int) -> list[str]:
-    cells = zip(row, widths, strict=True)
-    return [f"{cell:<{width}}" if place < left else f"{cell:>{width}}" for place, (cell, width) in enumerate(cells)]
+    columns = []
+    for place, column in enumerate(zip(*rows, strict=True)):
+        width = max(map(len, column))
+        columns.append([f"{cell:<{width}}" if place < left else f"{cell:>{width}}" for cell in column])
+    return ["  ".join(cells).rstrip() for cells in zip(*columns, strict=True)]
 
 
 def render_page(template: str, values: Mapping[str, Any], package: str = "ppafo.report") -> str:
     """Return a template of a package filled with values; texts are escaped, a value that is missing is an error."""
     from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 
+    # A page of an analysis includes the style sheet, which all pages share.
     packages = dict.fromkeys((package, "ppafo.report"))
     environment = Environment(
         loader=ChoiceLoader([PackageLoader(name) for name in packages]),

@@ -55,7 +55,9 @@ def test_sixteen_rows_have_six_verdicts(reproduction: Reproduction) -> None:
     counts = verdict_counts(reproduction.claims)
     assert tuple(counts.values()) == (2, 3, 6, 1, 3, 1)
     assert reproduction.json_document()["counts"] == counts
-    assert count_sentence(reproduction.claims).startswith("16 claims: 2 consistent, 3 inconsistent as reported, 6 met")
+    assert count_sentence([claim.verdict for claim in reproduction.claims]).startswith(
+        "16 claims: 2 consistent, 3 inconsistent as reported, 6 met"
+    )
 
 
 def test_every_statement_that_needs_a_measurement_is_in_the_one_row_that_is_not_testable(

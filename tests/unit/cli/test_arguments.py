@@ -1,5 +1,6 @@
 """Words that the command line does not understand, and output that nobody can take."""
 
+import json
 import os
 import re
 import subprocess
@@ -9,10 +10,33 @@ from pathlib import Path
 import pytest
 
 from ppafo.cli.arguments import whole_number
+from ppafo.cli.command_line import Group, parameters_of
 from ppafo.cli.commands import COMMANDS
 from ppafo.cli.main import main
 
 FULL = Path("/dev/full")
+SHIPPED = {"SCENARIO", "STUDY", "SET", "GAIT", "WALK", "TUNING", "DESIGN", "BOTTLE", "KIND"}
+"""Words of the help for names of something that comes with the package."""
+
+
+def test_every_command_that_begins_with_a_shipped_name_has_list() -> None:
+    every = {name: one.actions if isinstance(one, Group) else {"": one} for name, one in COMMANDS.items()}
+    lacking = [
+        f"{name} {action}".strip()
+        for name, actions in every.items()
+        for action, command in actions.items()
+        for _, reading in list(parameters_of(command.function()))[:1]
+        if reading.word.metavar in SHIPPED and not command.lists
+    ]
+    assert lacking == []
+
+
+@pytest.mark.parametrize("words", [["find"], ["validate"], ["export", "c"], ["gait", "record"], ["new"]], ids=" ".join)
+def test_list_needs_nothing_of_what_the_command_needs(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([*words, "--list", "--json"]) == 0
+    (listed,) = json.loads(capsys.readouterr().out).values()
+    assert all(row["name"] for row in listed)
+    assert main(words) == 2
 
 
 def test_without_a_command_it_says_where_to_start(capsys: pytest.CaptureFixture[str]) -> None:

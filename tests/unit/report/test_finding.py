@@ -62,6 +62,7 @@ def test_every_shape_can_be_drawn() -> None:
         "at": Mark("at", 1.0),
         "map": Mark("map", x, x[:2], [x, x]),
         "points": Mark("points", x, x, x),
+        "text": Mark("text", 1.0, 1.0, label="words"),
     }
     assert set(given) == set(SHAPES)
     panels = [Panel(Kind("x"), Kind("y"), [mark], scale=Kind("z")) for mark in (given["map"], given["points"])]

@@ -22,7 +22,6 @@ from ppafo.analyses.reproduce.claim import (
     Observation,
     Verdict,
     count_sentence,
-    count_words,
     load_reported,
     verdict_counts,
 )
@@ -142,37 +141,55 @@ _TASK_METRICS = (
 
 def reproduction_page(reproduction: Reproduction, drawn: Mapping[str, bytes]) -> str:
     """Return the page as HTML; ``drawn`` has SVG files by the names of the figures, which become part of the page."""
-    reported = reproduction.printed_findings
     groups: dict[tuple[str, ...], list[AssumedValue]] = {}
     for value in reproduction.assumed:
         groups.setdefault(value.used_by, []).append(value)
+    # What all experiments rest on comes first.
     ordered = sorted(groups.items(), key=lambda item: -len(item[0]))
-    results = (reproduction.step, reproduction.solenoid, reproduction.proportional)
+    solenoid, proportional = reproduction.solenoid.metrics, reproduction.proportional.metrics
+    results = (reproduction.solenoid, reproduction.proportional, reproduction.step)
     steps = sorted({1e3 * float(result.engine["step"]) for result in results})
+    changed = [word for override in reproduction.overrides for word in ("--set", override)]
+    counts = verdict_counts(reproduction.claims).items()
+    severities = {"error": "contradictions", "warning": "remarks", "note": "notes"}
     values = {
-        **_summary(reproduction),
+        "paper": load_parameter_set(reproduction.printed_set).citation,
+        "nothing_confirmed": NOTHING_CONFIRMED,
+        "count_sentence": count_sentence([claim.verdict for claim in reproduction.claims]),
+        "counts": [(name, VERDICTS[name], _SYMBOLS[name], MEANINGS[name], count) for name, count in counts],
+        "claims": reproduction.claims,
+        "words": VERDICTS,
+        "symbols": _SYMBOLS,
+        "not_published": [(entry.statement, entry.where) for entry in map(paper_entries().get, NOT_PUBLISHED) if entry],
+        "not_read": NOT_READ,
+        "overrides": reproduction.overrides,
+        "step_observations": reproduction.step_observations,
+        "torque_observations": reproduction.torque_observations,
         "printed_set": reproduction.printed_set,
         "completed_set": reproduction.completed_set,
-        "contradictions": _of_severity(reported, "error"),
-        "remarks": _of_severity(reported, "warning"),
-        "notes": _of_severity(reported, "note"),
+        **{
+            name: [finding for finding in reproduction.printed_findings if finding.severity == severity]
+            for severity, name in severities.items()
+        },
         "kept": [finding for finding in reproduction.completed_findings if finding.severity != "note"],
-        **_synthetic(reproduction, drawn.get(IDENTIFICATION_FIGURE)),
-        "readings_of_u": [(row.name, *_reading_texts(row)) for row in reproduction.readings_of_u],
+        **_synthetic(reproduction.synthetic, drawn.get(IDENTIFICATION_FIGURE)),
+        "readings_of_u": _reading_rows(reproduction.readings_of_u),
         "result_on_u": result_on_u(reproduction.readings_of_u) if reproduction.readings_of_u else (),
         "within_reach": f"{WITHIN_REACH:g}",
         "device_figure": inline_figure(drawn[DEVICE_FIGURE]),
         "step_figure": inline_figure(drawn[STEP_FIGURE]),
         "torque_figure": inline_figure(drawn[TORQUE_FIGURE]),
-        "task_rows": _task_rows(reproduction.solenoid.metrics, reproduction.proportional.metrics),
+        "task_rows": [
+            (solenoid[name].summary, _metric_text(solenoid[name]), _metric_text(proportional[name]))
+            for name in _TASK_METRICS
+            if name in solenoid and name in proportional
+        ],
         "ceiling": f"{holding_torque(reproduction.solenoid):.1f}",
         "assumed_groups": [(_users(users), values) for users, values in ordered],
         "versions": ", ".join(f"{name} {version}" for name, version in reproduction.step.versions.items()),
         "steps": f"{steps[0]:g} ms" if len(steps) == 1 else f"{steps[0]:g} to {steps[-1]:g} ms",
-        "live": live_part(
-            [result.scenario for result in (reproduction.solenoid, reproduction.proportional, reproduction.step)]
-        ),
-        "command": shlex.join(_command(reproduction.overrides)),
+        "live": live_part([result.scenario for result in results]),
+        "command": shlex.join(["ppafo", "reproduce", "--out", "out/reproduce", *changed]),
     }
     return render_page(TEMPLATE, values, "ppafo.analyses.reproduce")
 
@@ -183,61 +200,16 @@ def holding_torque(result: Result) -> float:
     return device.actuator.torque_constant * (device.supply.pressure - device.supply.atmospheric_pressure)
 
 
-def _summary(reproduction: Reproduction) -> dict[str, Any]:
-    citation = load_parameter_set(reproduction.printed_set).citation
-    counts = verdict_counts(reproduction.claims)
-    return {
-        "paper": citation,
-        "nothing_confirmed": NOTHING_CONFIRMED,
-        "count_sentence": count_sentence(reproduction.claims),
-        "counts": [
-            (verdict, VERDICTS[verdict], _SYMBOLS[verdict], MEANINGS[verdict], count)
-            for verdict, count in counts.items()
-        ],
-        "claims": [_claim_row(claim) for claim in reproduction.claims],
-        "not_published": [(entry.statement, entry.where) for entry in map(paper_entries().get, NOT_PUBLISHED) if entry],
-        "not_read": NOT_READ,
-        "missed": [claim.id for claim in reproduction.missed],
-        "overrides": reproduction.overrides,
-        "step_observations": reproduction.step_observations,
-        "torque_observations": reproduction.torque_observations,
-    }
+def _reading_rows(rows: Sequence[InterpretationOfU]) -> list[tuple[str, str, str, str]]:
+    return [(row.name, f"{row.error:.0f} %", f"{row.gas:.0f} %", f"{row.error_within_reach:.0f} %") for row in rows]
 
 
-def _claim_row(claim: Claim) -> dict[str, Any]:
-    return {
-        "id": claim.id,
-        "statement": claim.statement,
-        "source": claim.source,
-        "paper": claim.published,
-        "ours": claim.ours,
-        "verdict": claim.verdict,
-        "word": VERDICTS[claim.verdict],
-        "symbol": _SYMBOLS[claim.verdict],
-        "note": claim.note,
-    }
-
-
-def _reading_texts(row: InterpretationOfU) -> tuple[str, str, str]:
-    return f"{row.error:.0f} %", f"{row.gas:.0f} %", f"{row.error_within_reach:.0f} %"
-
-
-def _of_severity(findings: Sequence[AuditFinding], severity: str) -> list[AuditFinding]:
-    return [finding for finding in findings if finding.severity == severity]
-
-
-def _task_rows(solenoid: Mapping[str, Metric], proportional: Mapping[str, Metric]) -> list[tuple[str, str, str]]:
-    """Return meaning and both values of each metric of the task that both runs have."""
-    rows = []
-    for name in _TASK_METRICS:
-        if name in solenoid and name in proportional:
-            both = [metric_level(metrics[name].value, metrics[name].unit) for metrics in (solenoid, proportional)]
-            first, second = (quantity(value, unit, 3) for value, unit in both)
-            rows.append((solenoid[name].summary, first, second))
-    return rows
+def _metric_text(metric: Metric) -> str:
+    return quantity(*metric_level(metric.value, metric.unit), 3)
 
 
 def _users(names: tuple[str, ...]) -> str:
+    """Return whose assumptions a group is, as its heading says it."""
     if set(names) == set(_EXPERIMENTS):
         return "All experiments"
     if set(names) == {SOLENOID, PROPORTIONAL}:
@@ -245,18 +217,12 @@ def _users(names: tuple[str, ...]) -> str:
     return sentence(" and ".join(_EXPERIMENTS.get(name, name) for name in names)).rstrip(".")
 
 
-def _command(overrides: Sequence[str]) -> list[str]:
-    changed = [word for override in overrides for word in ("--set", override)]
-    return ["ppafo", "reproduce", "--out", "out/reproduce", *changed]
-
-
-def _synthetic(reproduction: Reproduction, figure: bytes | None) -> dict[str, Any]:
+def _synthetic(evidence: SyntheticEvidence | NoEvidence, figure: bytes | None) -> dict[str, Any]:
     """Return what the template needs of the synthetic measurements; without them only why there are none."""
-    evidence = reproduction.synthetic
     if isinstance(evidence, NoEvidence):
         return {"synthetic": None, "no_synthetic": evidence.reason}
-    decay = evidence.decay
     reported = load_reported()
+    slope = -evidence.decay["friction.viscous_damping"].value / reported.in_si("foot_plate.inertia")
     return {
         "no_synthetic": "",
         "synthetic": {
@@ -264,8 +230,8 @@ def _synthetic(reproduction: Reproduction, figure: bytes | None) -> dict[str, An
             "preset": BENCH_PRESET,
             "task_preset": TASK_PRESET,
             "seed": RIG_SEED,
-            "slope": f"{-decay['friction.viscous_damping'].value / reported.in_si('foot_plate.inertia'):.1f}",
-            "reported_slope": f"{reported.number('reported.velocity_over_acceleration'):g}",
+            "slope": f"{slope:.1f}",
+            "reported_slope": f"{reported.entry('reported.velocity_over_acceleration').value:g}",
         },
     }
 
@@ -277,6 +243,7 @@ TORQUE_FIGURE = "figure-8-torque-task"
 _HEAD = ("claim", "paper", "ours", "verdict")
 _PAPER = "'ppafo reproduce' without --study makes the page of these claims, with sources, figures and assumptions."
 _STUDIES_HEAD = ("study", "claim", "published", "ours", "verdict")
+_DETAILS_HEAD = ("claim", "statement and source", "agrees", "rests on", "note")
 _RULE = (
     "'Ours' is computed anew whenever this is run. "
     + " ".join(f"{VERDICTS[verdict].capitalize()}: {meaning}." for verdict, meaning in MEANINGS.items())
@@ -293,18 +260,20 @@ def finding_of_studies(solved: Studies) -> Finding[Studies]:
     """Return the table of studies; a claim of another publication that is not met is a result, no failure."""
     reproduction = solved.reproduction
     rows: list[Sequence[Cell]] = [] if reproduction is None else [(SEED, *row) for row in _paper_rows(reproduction)]
+    details = [] if reproduction is None else [Part(f"{SEED}: the paper", said=(_PAPER,), is_detail=True)]
     for study in solved.studies:
-        rows += [
-            (
-                study.publication.name,
-                item.claim.entry.id,
-                # A number that only own arithmetic on published ones gives.
-                item.published or (f"{item.claim.entry.own} (own sum)" if item.claim.entry.own else None),
-                item.ours,
-                VERDICTS[item.verdict],
-            )
-            for item in study.claims
-        ]
+        told: list[Sequence[Cell]] = []
+        for item in study.claims:
+            entry = item.claim.entry
+            # A number that only own arithmetic on published ones gives.
+            published = item.published or (f"{entry.own} (own sum)" if entry.own else None)
+            rows.append((study.publication.name, entry.id, published, item.ours, VERDICTS[item.verdict]))
+            stated = f"{entry.statement} ({item.claim.source})"
+            agrees = _agrees(entry.at_least, entry.at_most, entry.unit)
+            told.append((entry.id, stated, agrees, "; ".join(entry.assumed) or None, item.note or None))
+        heading, said = f"{study.publication.name}: {study.publication.title}", (study.publication.citation,)
+        columns = columns_of(_DETAILS_HEAD, told)
+        details.append(Part(heading, columns, said, left=len(_DETAILS_HEAD), is_detail=True))
     name = solved.studies[0].publication.name
     return Finding(
         name="claims",
@@ -314,12 +283,11 @@ def finding_of_studies(solved: Studies) -> Finding[Studies]:
         parts=(
             Part(
                 columns=columns_of(_STUDIES_HEAD, rows),
-                remarks=("", count_words(solved.verdicts)),
+                remarks=("", count_sentence(solved.verdicts)),
                 left=len(_STUDIES_HEAD),
             ),
             Part("How to read it", said=(_RULE,), is_detail=True),
-            *([] if reproduction is None else [Part(f"{SEED}: the paper", said=(_PAPER,), is_detail=True)]),
-            *(_study_part(study) for study in solved.studies),
+            *details,
         ),
         found=solved,
         passed=reproduction is None or not reproduction.missed,
@@ -327,41 +295,16 @@ def finding_of_studies(solved: Studies) -> Finding[Studies]:
     )
 
 
-def _study_part(study: Study) -> Part:
-    """Return what each claim of a publication says, where it stands, what it rests on, and why its verdict."""
-    head = ("claim", "statement and source", "agrees", "rests on", "note")
-    rows = [
-        (
-            item.claim.entry.id,
-            f"{item.claim.entry.statement} ({item.claim.source})",
-            _agrees(item.claim.entry.at_least, item.claim.entry.at_most, item.claim.entry.unit),
-            "; ".join(item.claim.entry.assumed) or None,
-            item.note or None,
-        )
-        for item in study.claims
-    ]
-    heading = f"{study.publication.name}: {study.publication.title}"
-    return Part(heading, columns_of(head, rows), (study.publication.citation,), left=len(head), is_detail=True)
-
-
 def _agrees(low: float | None, high: float | None, unit: str) -> str | None:
     """Return the range that agrees with a claim, in words."""
-    if low is not None and high is not None:
-        return f"{low:g} to {high:g} {unit}".rstrip()
     if low is None and high is None:
         return None
-    return f"at least {low:g} {unit}".rstrip() if high is None else f"at most {high:g} {unit}".rstrip()
+    ends = f"{low:g} to {high:g}" if low is not None and high is not None else ""
+    return f"{ends or (f'at most {high:g}' if low is None else f'at least {low:g}')} {unit}".rstrip()
 
 
-def _paper_rows(reproduction: Reproduction) -> tuple[tuple[str | None, ...], ...]:
-    return tuple((claim.id, claim.published, claim.ours, VERDICTS[claim.verdict]) for claim in reproduction.claims)
-
-
-def _readings_part(rows: Sequence[InterpretationOfU]) -> Part:
-    """Return what each meaning of U makes of the comparison."""
-    head = ("U is", "RMS error less by", "CO2 less by", f"error less by at {WITHIN_REACH:g} N m")
-    cells = [(row.name, *_reading_texts(row)) for row in rows]
-    return Part(columns=columns_of(head, cells), remarks=("", *result_on_u(rows)))
+def _paper_rows(reproduction: Reproduction) -> list[tuple[str, str, str, str]]:
+    return [(claim.id, claim.published, claim.ours, VERDICTS[claim.verdict]) for claim in reproduction.claims]
 
 
 def result_on_u(rows: Sequence[InterpretationOfU]) -> tuple[str, ...]:
@@ -369,6 +312,7 @@ def result_on_u(rows: Sequence[InterpretationOfU]) -> tuple[str, ...]:
     entries = paper_entries()
     error, saving = entries["torque_rms_improvement"], entries["co2_saving"]
     low, high, least = error.at_least or 0.0, error.at_most or 0.0, saving.at_least or 0.0
+    # The first reading is the opening itself, the others are voltages.
     opening, *volts = rows
     is_opening_alone = low <= opening.error <= high and not any(low <= row.error <= high for row in volts)
     is_beyond_reach = not any(low <= row.error_within_reach <= high for row in rows)
@@ -382,72 +326,60 @@ def finding_of(reproduction: Reproduction) -> Finding[Reproduction]:
 
     Without the simulated test bench there is no figure 3.
     """
+    said, missed, rows = [NOTHING_CONFIRMED], reproduction.missed, reproduction.readings_of_u
+    if reproduction.overrides:
+        words = f"not the paper's device: values changed with --set {', '.join(reproduction.overrides)}"
+        said.append(f"{words}; the verdicts compare it with the paper all the same")
+    # On the page a claim has its window in its note; at the command line only what misses it is said.
+    remarks = [
+        f"missed: {claim.id} is outside {claim.window[0]:g} to {claim.window[1]:g} {claim.unit}"
+        for claim in missed
+        if claim.window is not None
+    ]
+    claims = Part(
+        columns=columns_of(_HEAD, _paper_rows(reproduction)),
+        remarks=("", count_sentence([claim.verdict for claim in reproduction.claims]), *remarks),
+        left=len(_HEAD),
+    )
+    head = ("U is", "RMS error less by", "CO2 less by", f"error less by at {WITHIN_REACH:g} N m")
+    of_u = [Part(columns=columns_of(head, _reading_rows(rows)), remarks=("", *result_on_u(rows)))] if rows else []
     runs = (reproduction.step, reproduction.solenoid, reproduction.proportional)
     return Finding(
         name="claims",
         kicker="Reproduction",
         title="The paper's claims",
-        said=(NOTHING_CONFIRMED, *_override_remarks(reproduction.overrides)),
-        parts=(
-            Part(
-                columns=columns_of(_HEAD, _paper_rows(reproduction)),
-                remarks=("", count_sentence(reproduction.claims), *_missed_claims(reproduction)),
-                left=len(_HEAD),
-            ),
-            *([_readings_part(reproduction.readings_of_u)] if reproduction.readings_of_u else []),
-            *_figures(reproduction),
-        ),
+        said=said,
+        parts=(claims, *of_u, *_figures(reproduction)),
         found=reproduction,
-        passed=not reproduction.missed or bool(reproduction.overrides),
+        # A changed device may leave the windows of the paper: that is a result, no failure.
+        passed=not missed or bool(reproduction.overrides),
         files={f"{run.scenario.name}.csv": partial(marked_csv_bytes, run.recording) for run in runs},
         command="reproduce",
         page=lambda drawn: reproduction_page(reproduction, drawn).encode(),
     )
 
 
-def _override_remarks(overrides: tuple[str, ...]) -> tuple[str, ...]:
-    """Return whose device the verdicts are about, where something was changed."""
-    if not overrides:
-        return ()
-    words = f"not the paper's device: values changed with --set {', '.join(overrides)}"
-    return (f"{words}; the verdicts compare it with the paper all the same",)
-
-
-def _missed_claims(reproduction: Reproduction) -> list[str]:
-    return [
-        f"missed: {claim.id} is outside {claim.window[0]:g} to {claim.window[1]:g} {claim.unit}"
-        for claim in reproduction.missed
-        if claim.window is not None
-    ]
-
-
 def _figures(reproduction: Reproduction) -> list[Part]:
-    drawn: dict[str, Callable[[], Drawing]] = {
-        DEVICE_FIGURE: device_figure,
-        STEP_FIGURE: partial(_step_figure, reproduction),
-        TORQUE_FIGURE: partial(_torque_figure, reproduction),
-    }
-    evidence = reproduction.synthetic
-    if not isinstance(evidence, NoEvidence):
-        drawn[IDENTIFICATION_FIGURE] = partial(synthetic_figure_3, evidence.torque, evidence.decay)
-    return [Part(name=name, draw=draw, is_detail=True) for name, draw in drawn.items()]
-
-
-def _step_figure(reproduction: Reproduction) -> "Drawing":
+    """Return the figures of the page, each drawn where it is wanted."""
     supply = reproduction.step.scenario.device.supply
     levels = Levels(supply.pressure, supply.atmospheric_pressure)
-    evidence = reproduction.synthetic
-    measured = None if isinstance(evidence, NoEvidence) else evidence.step
-    return step_response_figure(reproduction.step.recording, levels, reproduction.step_events, measured)
-
-
-def _torque_figure(reproduction: Reproduction) -> "Drawing":
-    stated = {claim.id: claim.paper for claim in reproduction.claims}
-    evidence = reproduction.synthetic
-    return torque_task_figure(
-        reproduction.solenoid.recording,
-        reproduction.proportional.recording,
-        holding_torque(reproduction.solenoid),
-        (stated["co2_solenoid"] or 0.0, stated["co2_proportional"] or 0.0),
-        None if isinstance(evidence, NoEvidence) else (evidence.solenoid, evidence.proportional),
-    )
+    stated = {claim.id: claim.paper or 0.0 for claim in reproduction.claims}
+    # Without the bench figures 7 and 8 have the simulation alone.
+    step, tasks, found = None, None, reproduction.synthetic
+    if not isinstance(found, NoEvidence):
+        step, tasks = found.step, (found.solenoid, found.proportional)
+    drawn: dict[str, Callable[[], Drawing]] = {
+        DEVICE_FIGURE: device_figure,
+        STEP_FIGURE: partial(step_response_figure, reproduction.step.recording, levels, reproduction.step_events, step),
+        TORQUE_FIGURE: partial(
+            torque_task_figure,
+            reproduction.solenoid.recording,
+            reproduction.proportional.recording,
+            holding_torque(reproduction.solenoid),
+            (stated["co2_solenoid"], stated["co2_proportional"]),
+            tasks,
+        ),
+    }
+    if not isinstance(found, NoEvidence):
+        drawn[IDENTIFICATION_FIGURE] = partial(synthetic_figure_3, found.torque, found.decay)
+    return [Part(name=name, draw=draw, is_detail=True) for name, draw in drawn.items()]

@@ -13,7 +13,7 @@ from ppafo.identification.source import Source
 from ppafo.parameters import ParameterSet, load_device, load_parameter_set
 from ppafo.parameters import apply_overrides as apply_to_set
 from ppafo.parameters.parameter_set import SOURCE as OVERRIDE
-from ppafo.parameters.parameter_set import Entry, number_text
+from ppafo.parameters.parameter_set import number_text
 from ppafo.rig import record
 from ppafo.signals import Recording
 from ppafo.simulation.declaration import quantities
@@ -60,36 +60,28 @@ def assumed_values(scenarios: Mapping[str, Scenario]) -> tuple[AssumedValue, ...
             for item in scenario.assumptions
         ]
         settled = {item.path for item in own} | _without_effect(scenario, in_force)
-        from_set = [
-            AssumedValue(path, summaries[path], number_text(entry), entry.origin, *_reason(entry), (name,))
-            for path, entry in in_force.numbers.items()
-            if path not in settled
-            and entry.origin in _NOT_OF_THE_PAPER
-            and not (entry.source == OVERRIDE and of_file.numbers.get(path) == entry)
-        ]
-        for value in [*own, *from_set]:
+        for path, entry in in_force.numbers.items():
+            is_set_here = entry.source == OVERRIDE
+            of_the_file = is_set_here and of_file.numbers.get(path) == entry
+            if path not in settled and entry.origin in _NOT_OF_THE_PAPER and not of_the_file:
+                # What was set for this run says what it replaces.
+                reason, source = (f"set for this run; {entry.note}", "") if is_set_here else (entry.note, entry.source)
+                meaning, text = summaries[path], number_text(entry)
+                own.append(AssumedValue(path, meaning, text, entry.origin, reason, source, (name,)))
+        for value in own:
             key = (value.path, value.value, value.reason)
             earlier = merged.get(key)
             merged[key] = value if earlier is None else replace(earlier, used_by=(*earlier.used_by, name))
     return tuple(merged.values())
 
 
-def values_used_by(values: Sequence[AssumedValue], *names: str) -> tuple[AssumedValue, ...]:
-    """Return the values that at least one of the named experiments uses."""
-    return tuple(value for value in values if set(names) & set(value.used_by))
-
-
 def _without_effect(scenario: Scenario, parameter_set: ParameterSet) -> set[str]:
     """Return the paths of the set that the run does not use."""
+    # Reported results are what a run is compared with; of two valves one is in the device.
     reported = {path for path in parameter_set.numbers if path.startswith("reported.")}
     valve = f"valves.{scenario.origin.valve}."
     others = {path for path in parameter_set.numbers if path.startswith("valves.") and not path.startswith(valve)}
     return reported | others | (_ONLY_FOR_A_FREE_VANE if isinstance(scenario.motion, PrescribedMotion) else frozenset())
-
-
-def _reason(entry: Entry) -> tuple[str, str]:
-    """Return reason and source; what was set for this run says what it replaces."""
-    return (f"set for this run; {entry.note}", "") if entry.source == OVERRIDE else (entry.note, entry.source)
 
 
 PLANTED_SET = "ppafo2011"
@@ -139,6 +131,7 @@ def synthetic_evidence(
             solenoid=recorded["solenoid"],
             proportional=recorded["proportional"],
         )
+    # No claim rests on a recording: without them the figures show less, and the report says why.
     except (SimulationError, DataError) as error:
         return NoEvidence(str(error))
 
@@ -146,6 +139,7 @@ def synthetic_evidence(
 @cache
 def bench_figure() -> tuple[BenchResult, BenchResult]:
     """Identify torque constant and damping as figure 3 does, from synthetic recordings; SimulationError."""
+    # Kept: it takes seconds, and no override reaches it.
     inertia = FreeDecaySettings(inertia=load_device(PLANTED_SET).foot_plate.inertia)
     torque, decay = (
         Source(record(experiment, BENCH_PRESET, RIG_SEED, PLANTED_SET).recording)

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar, get_args
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import ParameterError
@@ -11,9 +11,11 @@ from ppafo.model.orifice import isentropic_flow_function
 from ppafo.parameters import ParameterSet, load_parameter_set
 from ppafo.parameters.audit.evidence import Evidence, Interval, digits
 from ppafo.parameters.device import Gas
+from ppafo.parameters.parameter_set import Entry
 from ppafo.parameters.publications.publication import paper_entries
 from ppafo.report.writing import format_reported_quantity, quantity
 
+T = TypeVar("T")
 Verdict = Literal[
     "consistent",
     "inconsistent_as_reported",
@@ -22,14 +24,7 @@ Verdict = Literal[
     "undetermined",
     "not_testable",
 ]
-VERDICTS: dict[Verdict, str] = {
-    "consistent": "consistent",
-    "inconsistent_as_reported": "inconsistent as reported",
-    "met_by_fitted_settings": "met by fitted settings",
-    "plausible": "plausible",
-    "undetermined": "undetermined",
-    "not_testable": "not testable",
-}
+VERDICTS: dict[Verdict, str] = {verdict: verdict.replace("_", " ") for verdict in get_args(Verdict)}
 """Every verdict in words. Only the first two follow from reported numbers alone."""
 MEANINGS: dict[Verdict, str] = {
     "consistent": "the reported numbers agree with each other",
@@ -53,12 +48,12 @@ class Claim:
 
     id: str
     statement: str
-    paper: float | None
-    value: float | None
-    unit: str
     verdict: Verdict
     source: str
     note: str
+    paper: float | None = None
+    value: float | None = None
+    unit: str = "-"
     assumptions: tuple[str, ...] = ()
     window: tuple[float, float] | None = None
     words: str = ""
@@ -84,20 +79,15 @@ class Claim:
 
     def document(self) -> dict[str, Any]:
         """Return the claim as plain data for ``claims.json``."""
-        return {
-            "id": self.id,
-            "statement": self.statement,
-            "paper": self.paper,
-            "words": self.words,
-            "value": self.value,
-            "found": self.found,
-            "range": None if self.range is None else list(self.range),
-            "unit": self.unit,
-            "verdict": self.verdict,
-            "assumptions": list(self.assumptions),
-            "source": self.source,
-            "note": self.note,
-        }
+        values = {name: getattr(self, name) for name in _DOCUMENT}
+        return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
+
+
+_DOCUMENT = (
+    *("id", "statement", "paper", "words", "value", "found", "range", "unit"),
+    *("verdict", "assumptions", "source", "note"),
+)
+"""What ``claims.json`` has of a claim, in its order."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,18 +137,14 @@ def told_claim(
 ) -> Claim:
     """Return the claim on what the text tells, statement by statement, of a recording."""
     missing = [item.id for item in observations if not item.holds]
-    note = "Each statement with its numbers is listed below."
-    if missing:
-        note = f"Not shown: {', '.join(missing)}."
+    not_shown = f"Not shown: {', '.join(missing)}."
     return Claim(
         id=identifier,
         statement=statement,
-        paper=None,
         value=float(len(observations) - len(missing)),
-        unit="-",
         verdict="undetermined" if missing else "met_by_fitted_settings",
         source="; ".join(dict.fromkeys(item.source for item in observations)),
-        note=note,
+        note=not_shown if missing else "Each statement with its numbers is listed below.",
         assumptions=assumptions,
         words=f"{len(observations)} statements",
         found=f"{len(observations) - len(missing)} shown",
@@ -176,13 +162,8 @@ def verdict_counts(claims: Sequence[Claim]) -> dict[Verdict, int]:
     return {verdict: sum(claim.verdict == verdict for claim in claims) for verdict in VERDICTS}
 
 
-def count_sentence(claims: Sequence[Claim]) -> str:
+def count_sentence(verdicts: Sequence[Verdict]) -> str:
     """Return how many claims have each verdict, for example ``16 claims: 2 consistent, 3 inconsistent as reported``."""
-    return count_words([claim.verdict for claim in claims])
-
-
-def count_words(verdicts: Sequence[Verdict]) -> str:
-    """Return the same of verdicts alone."""
     found = ", ".join(f"{count} {words}" for key, words in VERDICTS.items() if (count := verdicts.count(key)))
     return f"{len(verdicts)} claims: {found}"
 
@@ -197,57 +178,39 @@ class Reported:
     parameter_set: ParameterSet
     evidence: Evidence
 
-    def number(self, path: str) -> float:
-        """Return the number as reported, in its reported unit."""
-        return self._entry_of(path)[0]
-
-    def unit(self, path: str) -> str:
-        """Return the reported unit, ``-`` for a plain number."""
-        return self._entry_of(path)[1] or "-"
-
-    def source(self, path: str) -> str:
-        """Return where the paper prints it."""
-        self._entry_of(path)
-        return self.parameter_set.numbers[path].source
+    def entry(self, path: str) -> Entry:
+        """Return the entry at a path: number and unit as reported, and where the paper prints it."""
+        return self._known(path, self.parameter_set.numbers.get(path))
 
     def quotation(self, path: str) -> str:
         """Return number and unit for a sentence, for example ``8.4 g m^2``."""
-        number, unit = self._entry_of(path)
-        return f"{number:g} {unit}".rstrip()
+        entry = self.entry(path)
+        return f"{entry.value:g} {entry.unit}".rstrip()
 
     def in_si(self, path: str) -> float:
         """Return the value in SI units."""
-        value = self.evidence.number(path)
-        if value is None:
-            raise self._lack(path)
-        return value
+        return self._known(path, self.evidence.number(path))
 
     def in_reported_unit(self, path: str, value: float) -> float:
         """Return an SI value in the unit in which the paper prints the quantity at a path (a unit without offset)."""
-        return value * self.number(path) / self.in_si(path)
+        return value * self.entry(path).value / self.in_si(path)
+
+    def text(self, path: str, value: float, digits: int = 4) -> str:
+        """Return a value in the reported unit of a path as it is shown."""
+        return quantity(value, self.entry(path).unit or "-", digits)
 
     def range(self, path: str) -> Interval:
         """Return the range in SI that the reported digits leave open, without sign."""
-        interval = self.evidence.magnitude(path)
-        if interval is None:
-            raise self._lack(path)
-        return interval
+        return self._known(path, self.evidence.magnitude(path))
 
     def gas(self) -> Gas:
         """Return the reported gas."""
-        gas = self.evidence.gas()
-        if gas is None:
-            raise self._lack("gas")
-        return gas
+        return self._known("gas", self.evidence.gas())
 
-    def _entry_of(self, path: str) -> tuple[float, str]:
-        entry = self.parameter_set.numbers.get(path)
-        if entry is None:
-            raise self._lack(path)
-        return entry.value, entry.unit
-
-    def _lack(self, path: str) -> ParameterError:
-        return ParameterError(f"{self.parameter_set.file}: '{path}' is missing; the claims of the paper need it")
+    def _known(self, path: str, value: T | None) -> T:
+        if value is None:
+            raise ParameterError(f"{self.parameter_set.file}: '{path}' is missing; the claims of the paper need it")
+        return value
 
 
 def load_reported() -> Reported:
@@ -283,18 +246,16 @@ def _orifice_constants(reported: Reported) -> Claim:
         "reported.subsonic_flow_constant": subsonic_flow_constant(k, constant, temperature),
         "reported.critical_pressure_ratio": 1.0 / critical_pressure_ratio(k),
     }
+    # The reported digits leave a range open; what is computed from the gas does not.
     holds = all(reported.range(path).meets(Interval(value, value)) for path, value in found.items())
     return Claim(
         id="orifice_constants",
         statement="C1, C2 and the critical pressure ratio follow from k, molar mass and temperature of the gas.",
-        paper=None,
-        value=None,
-        unit="-",
         verdict=_verdict(holds),
-        source=", ".join(reported.source(path) for path in found),
+        source=", ".join(reported.entry(path).source for path in found),
         note="To the reported digits, with the exponent (k + 1)/(k - 1) under the root of C1 and not the reported one.",
         words=", ".join(reported.quotation(path) for path in found),
-        found=", ".join(quantity(value, reported.unit(path)) for path, value in found.items()),
+        found=", ".join(reported.text(path, value) for path, value in found.items()),
     )
 
 
@@ -308,6 +269,7 @@ def _step_percentages() -> Claim:
     errors = [entries[f"step_rms_{name}"].published or 0.0 for name in STEP_ERRORS]
     percents = [entries[f"step_percent_{name}"].published or 0.0 for name in STEP_ERRORS]
     ranges = list(STEP_ERRORS.values())
+    # Both numbers are rounded: their ranges have to meet.
     holds = all(
         Interval(*(100.0 * end / full for end in digits(error))).meets(digits(percent))
         for error, full, percent in zip(errors, ranges, percents, strict=True)
@@ -316,8 +278,6 @@ def _step_percentages() -> Claim:
     return Claim(
         id="step_percentages",
         statement="The errors of the step response in percent of the full ranges of 110 deg, 55 psi and 110 psi.",
-        paper=None,
-        value=None,
         unit="%",
         verdict=_verdict(holds),
         source=entries["step_percent_position"].where,
@@ -337,56 +297,57 @@ _RATES = {
 def _damping_and_friction(reported: Reported) -> Claim:
     """Compare damping and dynamic friction with inertia times the reported rates: one inertia decides both."""
     inertia = reported.range(_INERTIA)
+    # The slope of acceleration over velocity is reported with its sign, the damping without.
     rates = {path: abs(reported.in_si(rate)) for path, rate in _RATES.items()}
     holds = all(inertia.times(reported.range(rate)).meets(reported.range(path)) for path, rate in _RATES.items())
     found = {path: reported.in_reported_unit(path, reported.in_si(_INERTIA) * rate) for path, rate in rates.items()}
     needed = [reported.in_reported_unit(_INERTIA, reported.in_si(path) / rate) for path, rate in rates.items()]
-    unit = reported.unit(_INERTIA)
+    unit = reported.entry(_INERTIA).unit
     return Claim(
         id="damping_and_friction",
         statement=f"Damping and dynamic friction are the inertia, {reported.quotation(_INERTIA)}, "
         "times measured rates.",
-        paper=None,
-        value=None,
-        unit="-",
         verdict=_verdict(holds),
-        source=reported.source("friction.viscous_damping"),
+        source=reported.entry("friction.viscous_damping").source,
         note="The products hold to the reported digits."
         if holds
         else f"The reported products need inertias of {' and '.join(f'{value:.2g}' for value in needed)} {unit}: "
         f"one slip, a factor of ten in the inertia, explains both, so that it counts once.",
         words=", ".join(reported.quotation(path) for path in found),
-        found=", ".join(quantity(value, reported.unit(path), 3) for path, value in found.items()),
+        found=", ".join(reported.text(path, value, 3) for path, value in found.items()),
     )
 
 
 def _discharge_coefficient(reported: Reported) -> Claim:
     """Compare the reported Cd with what the reported flow needs through each reported area; equation (6)."""
-    found, passed, held = [], [], []
+    found, passed, held, gas = [], [], [], reported.gas()
+    choked = choked_flow_constant(gas.heat_capacity_ratio, gas.specific_gas_constant, gas.temperature)
     for valve in ("solenoid", "proportional"):
         coefficient, area = f"valves.{valve}.discharge_coefficient", f"valves.{valve}.area"
         flow = f"reported.valves.{valve}.mass_flow"
-        per_area = _flow_per_area(reported, f"reported.valves.{valve}.flow_pressure")
+        # Flow of Cd A = 1 m^2 into the atmosphere [kg/(s m^2)]; equations (6), (7).
+        pressure = reported.in_si(f"reported.valves.{valve}.flow_pressure")
+        psi = isentropic_flow_function(min(STANDARD_ATMOSPHERE / pressure, 1.0), gas.heat_capacity_ratio)
+        per_area = choked * pressure * psi
+        # The product Cd A follows from the flow; each area asks for a coefficient of its own.
         needed = reported.range(flow).over(reported.range(area)).over(Interval(per_area, per_area))
         held.append(needed.meets(reported.range(coefficient)))
         found.append(reported.in_si(flow) / (per_area * reported.in_si(area)))
         passed.append(1e3 * reported.in_si(coefficient) * reported.in_si(area) * per_area)
-    flow, pressure = (reported.quotation(f"reported.valves.solenoid.{name}") for name in ("mass_flow", "flow_pressure"))
+    stated = [reported.quotation(f"reported.valves.solenoid.{name}") for name in ("mass_flow", "flow_pressure")]
     areas = " and ".join(reported.quotation(f"valves.{valve}.area") for valve in ("solenoid", "proportional"))
     path = "valves.solenoid.discharge_coefficient"
     return Claim(
         id="discharge_coefficient",
-        statement=f"One discharge coefficient gives {flow} at {pressure} through {areas}.",
-        paper=reported.number(path),
-        value=None,
-        unit="-",
+        statement=f"One discharge coefficient gives {' at '.join(stated)} through {areas}.",
+        paper=reported.entry(path).value,
         verdict=_verdict(all(held)),
-        source=reported.source(path),
+        source=reported.entry(path).source,
         note="Agrees to the reported digits."
         if all(held)
-        else f"No one coefficient gives the same flow through both areas; {reported.number(path):g} passes "
+        else f"No one coefficient gives the same flow through both areas; {reported.entry(path).value:g} passes "
         f"{' and '.join(f'{value:.3g}' for value in passed)} g/s. It is a plain number: the reported unit "
-        f"{reported.unit(path)} does not fit equation (6).",
+        f"{reported.entry(path).unit} does not fit equation (6).",
         assumptions=(
             f"supply.atmospheric_pressure = {STANDARD_ATMOSPHERE:g} Pa_a: not reported; the standard atmosphere",
             "the measured flow leaves into the atmosphere through one opening of the reported area",
@@ -402,31 +363,23 @@ _VANE_EFFICIENCY = Interval(0.7, 0.9)
 def _swept_volume(reported: Reported) -> Claim:
     """Compare the volume per angle with the torque constant over the efficiency of vanes: virtual work."""
     path, constant = "actuator.volume_per_angle", "actuator.torque_constant"
+    # Work at the shaft is efficiency times the work of the gas: k dtheta dp = eta V dtheta dp.
     needed = reported.range(constant).over(_VANE_EFFICIENCY)
     low, high = (reported.in_reported_unit(path, end) for end in needed)
     efficiency = reported.in_si(constant) / reported.in_si(path)
     return Claim(
         id="swept_volume",
         statement="The vane has this displacement per radian, from the data sheet of the actuator.",
-        paper=reported.number(path),
-        value=None,
-        unit=reported.unit(path),
+        paper=reported.entry(path).value,
+        unit=reported.entry(path).unit,
         verdict=_verdict(needed.meets(reported.range(path))),
-        source=reported.source(path),
+        source=reported.entry(path).source,
         note=f"Virtual work with the reported torque constant. {reported.quotation(path)} would give the shaft "
         f"{100.0 * efficiency:.0f} % of the gas's work. Equation (5) is negative beyond 90 deg; figure 7 goes to 130.",
         assumptions=("a torque efficiency of 70 to 90 %, as vane actuators in general",),
         range=(low, high),
-        found=f"{low:.0f} to {high:.0f} {reported.unit(path)}",
+        found=f"{low:.0f} to {high:.0f} {reported.entry(path).unit}",
     )
-
-
-def _flow_per_area(reported: Reported, pressure_path: str) -> float:
-    """Flow of Cd A = 1 m^2 into the atmosphere [kg/(s m^2)]; equations (6), (7)."""
-    gas, pressure = reported.gas(), reported.in_si(pressure_path)
-    k = gas.heat_capacity_ratio
-    psi = isentropic_flow_function(min(STANDARD_ATMOSPHERE / pressure, 1.0), k)
-    return choked_flow_constant(k, gas.specific_gas_constant, gas.temperature) * pressure * psi
 
 
 NOT_PUBLISHED = (
@@ -447,9 +400,6 @@ def not_published_claim() -> Claim:
         id="not_published",
         statement="Torque constant, static friction, leak, the four RMS errors of the step response with what explains "
         "them (dynamics beyond the model, temperature), and size and weight of the proportional valve.",
-        paper=None,
-        value=None,
-        unit="-",
         verdict="not_testable",
         source="sections 'Identification', 'PPAFO Model Validation' and 'Discussion'",
         note="The recordings are not published, nor masses or sizes. That the procedures return known values is tested "

@@ -38,6 +38,7 @@ def uneven_course(cadence: float) -> WalkingCourse:
     """Strides whose times vary as people's do, about a cadence [1/s] of steps."""
     generator = np.random.default_rng(SEED)
     paces = cadence / (1.0 + VARIATION * np.clip(generator.standard_normal(UNEVEN_STRIDES), -2.0, 2.0))
+    # Each stride is a segment of its own, since a segment has one pace.
     strides = (Segment("walk", {"cadence": pace, "strides": 1.0}) for pace in paces.tolist())
     begin = (Segment("start", {"strides": 1.0}), Segment("walk", {"strides": 6.0}))
     return WalkingCourse("uneven", "Strides of uneven time.", (*begin, *strides), "uneven")
@@ -52,6 +53,7 @@ def timed_events(configuration: Scenario, minutes: float) -> Mapping[str, EventE
             configuration, run=replace(configuration.run, duration=min(longest, 60.0 * minutes), output_interval=1.0e-3)
         )
     )
+    # The states themselves: what the controller takes for an event is no channel of a recording.
     outcome = run_batch(batch_of(run))
     rows = row_numbers(run.program.state_rows())
     if outcome.states[rows["result.failure_time"], 0] < NEVER_FAILED or not np.isfinite(outcome.states).all():

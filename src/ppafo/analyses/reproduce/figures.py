@@ -1,14 +1,18 @@
 """Figures 7 and 8 of the paper: the step response and the torque task, simulated, beside synthetic measurements."""
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from functools import partial
+from operator import methodcaller
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ppafo.analyses.reproduce.step_response import Levels, StepEvents
 from ppafo.constants import GRAMS_PER_KILOGRAM, PASCALS_PER_PSI
+from ppafo.report.kind import TIME, Kind
+from ppafo.report.panels import Mark, Panel, draw_panels
 from ppafo.report.style import (
     ACTUAL,
+    BLACK,
     CHAMBER_1,
     CHAMBER_2,
     EXPERIMENT,
@@ -17,10 +21,6 @@ from ppafo.report.style import (
     REFERENCE,
     SOLENOID,
     Look,
-    Margins,
-    figure_of_panels,
-    house_style,
-    mark_kind,
 )
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
@@ -30,12 +30,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _MILLISECONDS = 1.0e3
-_DOTTED = (0, (1, 2))
-_STEP_SIZE, _TASK_SIZE = (7.6, 7.4), (7.6, 10.4)
-_STEP_MARGINS = Margins(left=0.68, right=0.15, top=0.5, bottom=0.82, row_gap=0.34, column_gap=0.78)
-_TASK_MARGINS = Margins(left=0.68, right=0.15, top=0.42, bottom=1.75, row_gap=0.36)
-"""Inches."""
-_STEP_HEIGHTS, _TASK_HEIGHTS = (3.0, 1.0, 3.0, 1.0), (3.0, 0.9, 3.0, 0.9, 1.6, 1.8)
+_AFTER_STEP = Kind("Time after the step", "ms")
 _SHOWN_BEFORE_STEP = 0.03
 """Fraction of the time axis before the step, so that a rise within the first milliseconds does not hide in the axis."""
 _SHOWN_AFTER_STOP = 0.8
@@ -44,23 +39,16 @@ _ENLARGED = 40.0
 """First milliseconds after the step that are shown enlarged."""
 _BIN = 3.0
 """Milliseconds over which the band of a measurement reaches from its least to its largest reading."""
-
-
-class _Panel(NamedTuple):
-    """One panel of figure 7: its name, unit and look, and its room for the first milliseconds (x, y, width, height)."""
-
-    name: str
-    unit: str
-    look: Look
-    inset: tuple[float, float, float, float] | None
-
-
-_PANELS = (
-    _Panel(name="Vane angle", unit="deg", look=ACTUAL, inset=(0.66, 0.26, 0.31, 0.34)),
-    _Panel(name="Pressure difference, $P_1 - P_2$", unit="psi", look=ACTUAL, inset=(0.69, 0.14, 0.29, 0.34)),
-    _Panel(name="Chamber 1 (plantarflexion), $P_1$", unit="psig", look=CHAMBER_1, inset=(0.3, 0.12, 0.34, 0.34)),
-    _Panel(name="Chamber 2 (dorsiflexion), $P_2$", unit="psig", look=CHAMBER_2, inset=(0.69, 0.3, 0.29, 0.4)),
+_CURVES = (
+    ("Vane angle", "deg", ACTUAL.colour, (0.66, 0.26, 0.31, 0.34)),
+    ("Pressure difference, $P_1 - P_2$", "psi", ACTUAL.colour, (0.69, 0.14, 0.29, 0.34)),
+    ("Chamber 1 (plantarflexion), $P_1$", "psig", CHAMBER_1.colour, (0.3, 0.12, 0.34, 0.34)),
+    ("Chamber 2 (dorsiflexion), $P_2$", "psig", CHAMBER_2.colour, (0.69, 0.3, 0.29, 0.4)),
 )
+"""Panels of figure 7: name, unit, colour, and the room for the first milliseconds (x, y, width, height of the axes)."""
+_EVENT: dict[str, Any] = {"linewidth": 0.8, "linestyle": (0, (4, 3)), "alpha": 0.7, "zorder": 0.5}
+_LEVEL: dict[str, Any] = {"linewidth": 0.9, "linestyle": (0, (1, 2)), "zorder": 0.9}
+_WORDS: dict[str, Any] = {"fontsize": 8.5, "va": "center"}
 
 
 def step_response_figure(
@@ -71,33 +59,43 @@ def step_response_figure(
     ``synthetic`` is a measurement on the simulated bench: a thin line and the band of its readings; below each panel
     stands what it differs from the model.
     """
-    with house_style():
-        rows, heights = (2, (1.0, 1.0)) if synthetic is None else (4, _STEP_HEIGHTS)
-        size = (_STEP_SIZE[0], 5.8) if synthetic is None else _STEP_SIZE
-        figure, grid = figure_of_panels(size, _STEP_MARGINS, rows=rows, columns=2, heights=heights)
-        each = rows // 2
-        panels = [grid[each * row][column] for row in (0, 1) for column in (0, 1)]
-        last = _MILLISECONDS * _last_time(recording, events)
-        for letter, axes, panel, values in zip("ABCD", panels, _PANELS, _curves(recording, levels), strict=True):
-            axes.plot(_MILLISECONDS * recording.time, values, color=panel.look.colour, label="model", zorder=3)
-            axes.set_title(f"$\\bf{{{letter}}}$   {panel.name}", fontsize=10.5)
-            axes.set_ylabel(panel.unit)
-            axes.margins(y=0.06)
-        for axes in grid[-1]:
-            axes.set_xlabel("Time after the step (ms)")
-        panels[0].set_xlim(-_SHOWN_BEFORE_STEP * last, last)
-        if synthetic is not None:
-            differences = [grid[each * row + 1][column] for row in (0, 1) for column in (0, 1)]
-            _add_measurement(panels, differences, recording, synthetic, levels)
-        for axes, panel in zip(panels, _PANELS, strict=True):
-            if panel.inset is not None:
-                _enlarge(axes, panel.inset)
-        if events is not None:
-            _mark([axes for row in grid for axes in row], panels[0], events)
-        handles, names = panels[0].get_legend_handles_labels()
-        figure.legend(handles, names, loc="lower right", ncols=3, bbox_to_anchor=(0.985, 0.0))
-        mark_kind(figure, recording.kind if synthetic is None else synthetic.kind)
-        return figure
+    end, marked, named = _MILLISECONDS * float(recording.time[-1]), [], []
+    if events is not None:
+        breakaway, stop = _MILLISECONDS * events.breakaway_time, _MILLISECONDS * events.stop_time
+        end = min(end, stop * (1.0 + _SHOWN_AFTER_STOP))
+        marked = [Mark("at", x=time, colour=GREY, style=_EVENT) for time in (breakaway, stop)]
+        # Angles at which nothing else is drawn there.
+        for time, angle, words in ((breakaway, 120.0, "vane breaks away"), (stop, 25.0, "vane at rest")):
+            named.append(Mark("text", time + 0.015 * end, angle, label=words, colour=GREY, style=_WORDS))
+    ends = -_SHOWN_BEFORE_STEP * end, end
+    upper: list[Panel] = []
+    lower: list[Panel] = []
+    for letter, (name, unit, colour, place), values, measured in zip(
+        "ABCD",
+        _CURVES,
+        _curves(recording, levels),
+        [None] * len(_CURVES) if synthetic is None else _curves(synthetic, levels),
+        strict=True,
+    ):
+        model = Mark("line", _MILLISECONDS * recording.time, values, label="model", colour=colour, style={"zorder": 3})
+        marks, then = [model, *marked, *named], partial(_enlarge, place, ends)
+        if synthetic is not None and measured is not None:
+            times = _MILLISECONDS * synthetic.time
+            marks[1:1] = _measurement(times, measured)
+            apart = measured - np.interp(synthetic.time, recording.time, values)
+            differences = [
+                Mark("line", times, apart, colour=EXPERIMENT.colour, style={"linewidth": 0.9}),
+                Mark("level", y=0.0, colour=colour, style={"linewidth": 1.0}),
+                *marked,
+            ]
+            kind, title = Kind(unit=f"Δ {unit.replace('psig', 'psi')}"), "Measurement less model"
+            limit = methodcaller("set_xlim", *ends)
+            lower.append(Panel(_AFTER_STEP, kind, differences, title, then=limit, tall=0.85, shares_x=True))
+        legend, title = "" if upper else "figure", f"$\\bf{{{letter}}}$   {name}"
+        upper.append(Panel(_AFTER_STEP, Kind(unit=unit), marks, title, None, legend, then, 2.3, shares_x=True))
+        named = []
+    panels = [*upper[:2], *lower[:2], *upper[2:], *lower[2:]]
+    return draw_panels(panels, 2, (3.65, 1.0), kind=(synthetic or recording).kind)
 
 
 def _curves(recording: Recording, levels: Levels) -> tuple[Floats, ...]:
@@ -107,39 +105,29 @@ def _curves(recording: Recording, levels: Levels) -> tuple[Floats, ...]:
     return (np.degrees(recording["angle"]), (first - second) / PASCALS_PER_PSI, *gauge)
 
 
-def _last_time(recording: Recording, events: StepEvents | None) -> float:
-    last = float(recording.time[-1])
-    return last if events is None else min(last, events.stop_time * (1.0 + _SHOWN_AFTER_STOP))
-
-
-def _add_measurement(
-    panels: "Sequence[Axes]", differences: "Sequence[Axes]", model: Recording, synthetic: Recording, levels: Levels
-) -> None:
-    """Draw a measurement as a line with the band of its readings, and below it what it differs from the model."""
-    times = _MILLISECONDS * synthetic.time
+def _measurement(times: Floats, values: Floats) -> list[Mark]:
+    """Return a measurement over times [ms] as a line, with the band of its readings."""
     first = np.flatnonzero(np.diff(np.floor(times / _BIN), prepend=-np.inf) > 0.0)
-    curves = zip(_PANELS, _curves(synthetic, levels), _curves(model, levels), strict=True)
-    for axes, below, (panel, values, expected) in zip(panels, differences, curves, strict=True):
-        low, high = np.minimum.reduceat(values, first), np.maximum.reduceat(values, first)
-        axes.fill_between(
-            times[first] + 0.5 * _BIN, low, high, color=EXPERIMENT.colour, alpha=0.3, linewidth=0.0, zorder=1
-        )
-        axes.plot(times, values, color=EXPERIMENT.colour, linewidth=0.8, zorder=2, label="synthetic measurement")
-        apart = values - np.interp(synthetic.time, model.time, expected)
-        below.plot(times, apart, color=EXPERIMENT.colour, linewidth=0.9)
-        below.axhline(0.0, color=panel.look.colour, linewidth=1.0)
-        below.set_ylabel(f"Δ {panel.unit.replace('psig', 'psi')}")
-        below.locator_params(axis="y", nbins=4)
+    ends = np.minimum.reduceat(values, first), np.maximum.reduceat(values, first)
+    thin = {"linewidth": 0.8, "zorder": 2}
+    return [
+        Mark("line", times, values, label="synthetic measurement", colour=EXPERIMENT.colour, style=thin),
+        Mark("band", times[first] + 0.5 * _BIN, ends, colour=EXPERIMENT.colour, style={"alpha": 0.3, "zorder": 1}),
+    ]
 
 
-def _enlarge(axes: "Axes", place: tuple[float, float, float, float]) -> None:
-    """Show the first milliseconds of a panel enlarged, inside it."""
+def _enlarge(place: tuple[float, float, float, float], ends: tuple[float, float], axes: "Axes") -> None:
+    """Show a panel between two times [ms], and its first milliseconds enlarged inside it."""
+    axes.margins(y=0.06)
+    axes.set_xlim(*ends)
     inset = axes.inset_axes(place)
     for line in axes.lines:
         times, values = (np.asarray(data, dtype=np.float64) for data in line.get_data())
-        shown = times <= _ENLARGED
-        (copied,) = inset.plot(times[shown], values[shown], color=line.get_color(), zorder=line.get_zorder())
-        copied.set_linewidth(line.get_linewidth())
+        early = times <= _ENLARGED
+        # The upright line of an event, at one time, is no curve.
+        if times[0] < times[-1]:
+            (copied,) = inset.plot(times[early], values[early], color=line.get_color(), zorder=line.get_zorder())
+            copied.set_linewidth(line.get_linewidth())
     inset.margins(y=0.08)
     inset.set_xlim(-0.05 * _ENLARGED, _ENLARGED)
     inset.tick_params(labelsize=7.0, length=2.0)
@@ -148,25 +136,7 @@ def _enlarge(axes: "Axes", place: tuple[float, float, float, float]) -> None:
     inset.set_title(f"first {_ENLARGED:.0f} ms", fontsize=7.5, color=GREY, loc="center", pad=2.0)
 
 
-def _mark(every: "Sequence[Axes]", named: "Axes", events: StepEvents) -> None:
-    """Mark breakaway and stop in every panel, and name them in one."""
-    for axes in every:
-        for time in (events.breakaway_time, events.stop_time):
-            axes.axvline(_MILLISECONDS * time, color=GREY, linewidth=0.8, linestyle=(0, (4, 3)), alpha=0.7, zorder=0.5)
-    for time, name, height in (
-        (events.breakaway_time, "vane breaks away", 0.93),
-        (events.stop_time, "vane at rest", 0.07),
-    ):
-        named.annotate(
-            name,
-            (_MILLISECONDS * time, height),
-            xycoords=("data", "axes fraction"),
-            xytext=(4, 0),
-            textcoords="offset points",
-            va="center",
-            fontsize=8.5,
-            color=GREY,
-        )
+_TORQUE, _GAS = Kind(unit="N m"), Kind("CO$_2$", "kg", "gas mass")
 
 
 def torque_task_figure(
@@ -182,131 +152,95 @@ def torque_task_figure(
     valves and for the proportional valve [g]. ``synthetic`` is the same task on the simulated bench, with the one and
     with the other.
     """
-    runs = (solenoid, proportional)
-    with house_style():
-        figure, rows = figure_of_panels(_TASK_SIZE, _TASK_MARGINS, rows=len(_TASK_HEIGHTS), heights=_TASK_HEIGHTS)
-        grid = [axes for (axes,) in rows]
-        for place, recording, title, look in (
-            (0, solenoid, "Solenoid valves, on or off", SOLENOID),
-            (2, proportional, "Proportional valve", PROPORTIONAL),
-        ):
-            measured = None if synthetic is None else synthetic[place // 2]
-            _torque(grid[place], recording, title, look, ceiling, measured)
-        _states(grid[1], solenoid)
-        grid[3].plot(proportional.time, proportional["command"], color=PROPORTIONAL.colour)
-        grid[3].set_ylim(-0.08 if proportional["command"].min() >= 0.0 else -1.1, 1.08)
-        grid[3].set_ylabel("Opening")
-        for recording, look in zip(runs, (SOLENOID, PROPORTIONAL), strict=True):
-            grid[4].plot(recording.time, recording["reference"] - recording["torque"], color=look.colour)
-        grid[4].axhline(0.0, color=GREY, linewidth=0.8)
-        grid[4].set_title("Error: reference less torque, both valves")
-        grid[4].set_ylabel("Error (N m)")
-        _gas(grid[5], runs, gas_in_paper)
-        grid[5].set_xlabel("Time (s)")
-        grid[5].set_xlim(float(solenoid.time[0]), float(solenoid.time[-1]))
-        limits = [axes.get_ylim() for axes in (grid[0], grid[2])]
-        for axes in (grid[0], grid[2]):
-            axes.set_ylim(min(low for low, _ in limits), max(high for _, high in limits))
-        width, height = _TASK_SIZE
-        left, right = _TASK_MARGINS.left + 0.35, _TASK_MARGINS.right
-        _whereabouts(
-            figure.add_axes((left / width, 0.34 / height, (width - left - right) / width, 0.56 / height)), runs
+    runs = ((solenoid, SOLENOID, "solenoid"), (proportional, PROPORTIONAL, "proportional"))
+    torques, gas, at_end = [], [], []
+    errors = [Mark("level", y=0.0, colour=GREY, style={"linewidth": 0.8})]
+    for (run, look, name), stated, bench in zip(runs, gas_in_paper, synthetic or (None, None), strict=True):
+        torques.append(_torque_marks(run, look, ceiling, bench))
+        errors.append(Mark("line", run.time, run["reference"] - run["torque"], colour=look.colour))
+        supplied = run["supplied_mass"]
+        said = f"{name}: {GRAMS_PER_KILOGRAM * supplied[-1]:.2f} g simulated, {stated:g} g in the paper (dotted)"
+        gas.append(Mark("line", run.time, supplied, label=said, colour=look.colour))
+        gas.append(Mark("level", y=stated / GRAMS_PER_KILOGRAM, colour=look.colour, style=_LEVEL))
+        at_end += _end_marks(1.0 if run is solenoid else 0.0, run, look)
+    most = GRAMS_PER_KILOGRAM * max(float(run["supplied_mass"][-1]) for run, _, _ in runs)
+    drawn = [mark.y for marks in torques for mark in marks]
+    low, high = min(float(np.min(values)) for values in drawn), max(float(np.max(values)) for values in drawn)
+    air, least = 0.05 * (high - low), -0.08 if proportional["command"].min() >= 0.0 else -1.1
+    opening = Mark("line", proportional.time, proportional["command"], colour=PROPORTIONAL.colour)
+    torque_limits = {"ylim": (low - air, high + air)}
+    chambers = {"ylim": (0.0, 2.0), "yticks": (0.5, 1.5), "yticklabels": ("2", "1")}
+    # Room above for the names, which say the amounts.
+    gas_limits = {"ylim": (0.0, 1.9 * max(most, *gas_in_paper))}
+    panels = [
+        Panel(
+            TIME,
+            kind,
+            marks,
+            title,
+            legend=legend,
+            then=methodcaller("set", xlim=(float(solenoid.time[0]), float(solenoid.time[-1])), **limits),
+            tall=tall,
+            shares_x=True,
         )
-        mark_kind(figure, solenoid.kind)
-        return figure
+        for kind, marks, title, legend, tall, limits in (
+            (_TORQUE, torques[0], "Torque with solenoid valves, on or off", "inside", 2.3, torque_limits),
+            (Kind(), _filling_marks(solenoid), "Chamber that the solenoid valves fill", "", 0.7, chambers),
+            (_TORQUE, torques[1], "Torque with the proportional valve", "inside", 2.3, torque_limits),
+            (Kind(), [opening], "Opening of the proportional valve", "", 0.7, {"ylim": (least, 1.08)}),
+            (_TORQUE, errors, "Error: reference less torque, both valves", "", 1.3, {}),
+            (_GAS, gas, "CO$_2$ taken from the supply", "inside", 1.7, gas_limits),
+        )
+    ]
+    # Room to the right of the longer bar for the amounts.
+    ends = {"xlim": (0.0, 2.95 * most), "yticks": (1.0, 0.0), "yticklabels": [name for _, _, name in runs]}
+    then = methodcaller("set", **ends)
+    panels.append(Panel(_GAS, Kind(), at_end, "Where that gas is at the end", then=then, tall=0.75))
+    return draw_panels(panels, 1, (7.3, 1.0), kind=solenoid.kind)
 
 
-def _torque(
-    axes: "Axes", recording: Recording, title: str, look: Look, ceiling: float, synthetic: Recording | None
-) -> None:
-    axes.axhline(ceiling, color=GREY, linewidth=0.9, linestyle=_DOTTED, zorder=0.9)
-    axes.plot(
-        recording.time, recording["reference"], REFERENCE.line, color=REFERENCE.colour, linewidth=1.3, label="reference"
-    )
+def _torque_marks(recording: Recording, look: Look, ceiling: float, synthetic: Recording | None) -> list[Mark]:
+    """Return reference, torque and what the supply can hold, over the broad torque of a synthetic experiment."""
+    time, dashed = recording.time, {"linestyle": REFERENCE.line, "linewidth": 1.3}
+    held = f"maximum that the supply can hold: {ceiling:.1f} N m"
+    marks = [
+        Mark("line", time, recording["reference"], label="reference", colour=REFERENCE.colour, style=dashed),
+        Mark("level", y=ceiling, label=held, colour=GREY, style=_LEVEL),
+        Mark("line", time, recording["torque"], label="torque, simulated", colour=look.colour),
+    ]
     if synthetic is not None:
-        axes.plot(
-            synthetic.time,
-            synthetic["torque"],
-            color=EXPERIMENT.colour,
-            linewidth=2.6,
-            alpha=0.45,
-            label="torque, synthetic experiment",
-        )
-    axes.plot(recording.time, recording["torque"], look.line, color=look.colour, label="torque, simulated")
-    axes.set_title(title)
-    axes.set_ylabel("Torque (N m)")
-    axes.annotate(
-        f"maximum that the supply can hold: {ceiling:.1f} N m",
-        (1.0, ceiling),
-        xycoords=("axes fraction", "data"),
-        xytext=(-2, -4),
-        textcoords="offset points",
-        ha="right",
-        va="top",
-        fontsize=8.5,
-        color=GREY,
-    )
-    axes.legend(loc="lower right")
+        named: dict[str, Any] = {"label": "torque, synthetic experiment", "colour": EXPERIMENT.colour}
+        broad = {"linewidth": 2.6, "alpha": 0.45}
+        marks.insert(2, Mark("line", synthetic.time, synthetic["torque"], style=broad, **named))
+    return marks
 
 
-def _states(axes: "Axes", recording: Recording) -> None:
-    """Show which of the two valves is on, as bars in the colour of the chamber that it fills."""
+def _filling_marks(recording: Recording) -> list[Mark]:
+    """Return when each of the two valves is on, as bars in the colour of the chamber that it fills."""
+    marks = []
     for row, valve, look in ((1, 1.0, CHAMBER_1), (0, -1.0, CHAMBER_2)):
-        is_on = np.concatenate(([False], np.sign(recording["command"][:-1]) == valve, [False]))
-        edges = recording.time[np.flatnonzero(np.diff(is_on))]
-        spans = [(float(start), float(end - start)) for start, end in zip(edges[::2], edges[1::2], strict=True)]
-        axes.broken_barh(spans, (row + 0.12, 0.76), color=look.colour, linewidth=0.0)
-    axes.set_ylim(0.0, 2.0)
-    axes.set_yticks((0.5, 1.5), ("2 fills", "1 fills"))
-    axes.tick_params(axis="y", length=0.0, labelsize=8.5)
-    axes.grid(visible=False)
-    axes.set_ylabel("Chamber", labelpad=14.0)
+        is_on = np.sign(recording["command"]) == valve
+        # A command holds until the next sample, so that a bar reaches to the first sample at which the valve is off.
+        held = is_on | np.concatenate(([False], is_on[:-1]))
+        edges = np.full((2, is_on.size), [[row + 0.12], [row + 0.88]])
+        marks.append(Mark("band", recording.time, edges, colour=look.colour, style={"where": held, "alpha": 1.0}))
+    return marks
 
 
-def _gas(axes: "Axes", runs: tuple[Recording, Recording], in_paper: tuple[float, float]) -> None:
-    for recording, name, look, stated in zip(
-        runs, ("solenoid valves", "proportional valve"), (SOLENOID, PROPORTIONAL), in_paper, strict=True
-    ):
-        supplied = GRAMS_PER_KILOGRAM * recording["supplied_mass"]
-        axes.plot(recording.time, supplied, color=look.colour)
-        axes.axhline(stated, color=look.colour, linewidth=0.9, linestyle=_DOTTED, zorder=0.9)
-        axes.annotate(
-            f"{name}: {supplied[-1]:.2f} g simulated, {stated:g} g in the paper (dotted)",
-            (1.0, max(float(supplied[-1]), stated)),
-            xycoords=("axes fraction", "data"),
-            xytext=(-2, 4),
-            textcoords="offset points",
-            ha="right",
-            va="bottom",
-            fontsize=8.5,
-            color=look.colour,
-        )
-    axes.set_title("Gas taken from the supply")
-    axes.set_ylabel("CO$_2$ (g)")
-    axes.set_ylim(0.0, 1.3 * max(in_paper[0], GRAMS_PER_KILOGRAM * float(runs[0]["supplied_mass"][-1])))
-
-
-def _whereabouts(axes: "Axes", runs: tuple[Recording, Recording]) -> None:
-    """Show where the supplied gas is at the end: in the chambers, or let out; and what of it leaked past the vane."""
-    for row, (recording, look) in enumerate(zip(runs, (SOLENOID, PROPORTIONAL), strict=True)):
-        supplied, vented, leaked = (
-            GRAMS_PER_KILOGRAM * float(recording[name][-1]) for name in ("supplied_mass", "vented_mass", "leaked_mass")
-        )
-        filled = supplied - vented
-        axes.barh(1 - row, filled, height=0.5, color=look.colour)
-        axes.barh(1 - row, vented, left=filled, height=0.5, color=look.colour, alpha=0.35)
-        axes.barh(1 - row - 0.36, leaked, left=supplied - leaked, height=0.1, color=GREY)
-        axes.text(
-            supplied,
-            1 - row,
-            f"  {filled:.2f} g in the chambers, {vented:.2f} g vented (pale); {leaked:.2f} g leaked (grey)",
-            va="center",
-            fontsize=8.0,
-        )
-    axes.set_yticks((1, 0), ("solenoid", "proportional"), fontsize=8.5)
-    axes.set_ylim(-0.55, 1.45)
-    axes.set_xlim(0.0, 2.7 * GRAMS_PER_KILOGRAM * max(float(item["supplied_mass"][-1]) for item in runs))
-    axes.set_xticks([])
-    axes.spines["bottom"].set_visible(False)
-    axes.grid(visible=False)
-    axes.set_title("Where that gas is at the end", fontsize=10.5)
+def _end_marks(height: float, run: Recording, look: Look) -> list[Mark]:
+    """Return where the supplied gas is at the end: in the chambers, or vented; below it what leaked past the vane."""
+    supplied, vented, leaked = (float(run[name][-1]) for name in ("supplied_mass", "vented_mass", "leaked_mass"))
+    bars = (
+        (0.0, supplied - vented, height, 0.25, look.colour, 1.0),
+        (supplied - vented, supplied, height, 0.25, look.colour, 0.35),
+        (supplied - leaked, supplied, height - 0.36, 0.05, GREY, 1.0),
+    )
+    inside, out, past = (f"{GRAMS_PER_KILOGRAM * mass:.2f} g" for mass in (supplied - vented, vented, leaked))
+    said = f"  {inside} in the chambers, {out} vented (pale); {past} leaked (grey)"
+    return [
+        Mark("text", supplied, height, label=said, colour=BLACK, style=_WORDS),
+        *(
+            Mark("band", (low, high), ((y - half,) * 2, (y + half,) * 2), colour=colour, style={"alpha": alpha})
+            for low, high, y, half, colour, alpha in bars
+        ),
+    ]

@@ -36,18 +36,14 @@ Values = Mapping[str, str | float]
 
 @dataclass(frozen=True, slots=True)
 class Computation:
-    """How a number comes about: what it is, its SI unit, its arguments with their SI units, and the function."""
+    """How a number comes about: its SI unit, its arguments with their SI units, and the function."""
 
-    summary: str
     unit: str
     arguments: Mapping[str, str]
     compute: Callable[[Values], float]
 
 
-def _pressure(values: Values) -> float:
-    return float(values["pressure"])
-
-
+# Several claims rest on one walk, which takes seconds.
 @lru_cache(maxsize=16)
 def _walked(name: str, overrides: tuple[str, ...]) -> WalkResult:
     """Return a shipped walk; SimulationError where it does not reach its end with help."""
@@ -62,15 +58,10 @@ def _nondisabled(name: str, values: Values) -> WalkResult:
     return _walked(name, (KEEPS_GAIT, *held))
 
 
-def _work_of_a_stride(result: WalkResult) -> float:
-    """Return the net work [J] of the actuator torque on the ankle, mean over the strides with help."""
-    return integral_of_a_stride(result, result.recording["torque"])
-
-
 def held_torque(values: Values) -> float:
     """Torque [N m] that a gauge pressure holds at rest: torque constant times pressure. Equation (2)."""
     constant = load_device(DEVICE).actuator.torque_constant
-    return constant * (_pressure(values) - STANDARD_ATMOSPHERE)
+    return constant * (float(values["pressure"]) - STANDARD_ATMOSPHERE)
 
 
 def share_of_healthy_moment(values: Values) -> float:
@@ -87,7 +78,8 @@ def swept_volume(_values: Values) -> float:
 
 def walking_torque(values: Values) -> float:
     """Largest torque [N m] of the mean stride of the walk 'solenoid' at a supply pressure."""
-    overrides = (f"supply.pressure={_pressure(values)!r} Pa_a",)
+    # As repr, so that the walk has this very number.
+    overrides = (f"supply.pressure={float(values['pressure'])!r} Pa_a",)
     return float(_walked(PAIR, overrides).averages["torque"].mean.max())
 
 
@@ -104,14 +96,19 @@ def recycling_saving(values: Values) -> float:
 
 
 def recycling_work(values: Values) -> float:
-    """Net work of a stride with the valve between the chambers over event-based control's [-]."""
-    plain, recycling = (_work_of_a_stride(_nondisabled(name, values)) for name in (PAIR, RECYCLING))
+    """Net work of the actuator on the ankle in a stride with the valve between the chambers, over event-based [-].
+
+    Work is a mean over the strides with help.
+    """
+    walks = (_nondisabled(name, values) for name in (PAIR, RECYCLING))
+    plain, recycling = (integral_of_a_stride(result, result.recording["torque"]) for result in walks)
     return recycling / plain
 
 
 def event_reduction(wearer: str, _values: Values) -> float:
     """Share [-] by which state estimation lowers the error of event times of one wearer, against thresholds."""
     configuration = load_walk(PAIR, WEARERS[wearer])
+    # Two steps a stride.
     course = uneven_course(2.0 / walk_of(configuration).gait.stride_time)
     errors = []
     for timing in ("thresholds", "estimated"):
@@ -123,44 +120,15 @@ def event_reduction(wearer: str, _values: Values) -> float:
 
 _OF_PRESSURE, _OF_RECYCLING = {"pressure": "Pa_a"}, {"holding_time": "s"}
 COMPUTATIONS: dict[str, Computation] = {
-    "held_torque": Computation("torque constant times gauge pressure", "N m", _OF_PRESSURE, held_torque),
-    "share_of_healthy_moment": Computation(
-        "the same over the largest ankle moment of the built-in gait", "1", _OF_PRESSURE, share_of_healthy_moment
-    ),
-    "swept_volume": Computation("displacement of the chambers per radian", "m^3/rad", {}, swept_volume),
-    "walking_torque": Computation(
-        "largest torque of the mean stride of the walk 'solenoid'", "N m", _OF_PRESSURE, walking_torque
-    ),
-    "dorsiflexor_share": Computation(
-        "moment of the dorsiflexors of a nondisabled wearer with the device over that without",
-        "1",
-        {},
-        dorsiflexor_share,
-    ),
-    "recycling_saving": Computation(
-        "gas of a stride saved by 'solenoid-recycling' against 'solenoid', nondisabled wearer",
-        "1",
-        _OF_RECYCLING,
-        recycling_saving,
-    ),
-    "recycling_work": Computation(
-        "net work of a stride with 'solenoid-recycling' over that with 'solenoid', nondisabled wearer",
-        "1",
-        _OF_RECYCLING,
-        recycling_work,
-    ),
-    "healthy_event_reduction": Computation(
-        "error of event times less with state estimation than with thresholds, nondisabled wearer, uneven strides",
-        "1",
-        {},
-        partial(event_reduction, "healthy"),
-    ),
-    "impaired_event_reduction": Computation(
-        "error of event times less with state estimation than with thresholds, drop foot, uneven strides",
-        "1",
-        {},
-        partial(event_reduction, "impaired"),
-    ),
+    "held_torque": Computation("N m", _OF_PRESSURE, held_torque),
+    "share_of_healthy_moment": Computation("1", _OF_PRESSURE, share_of_healthy_moment),
+    "swept_volume": Computation("m^3/rad", {}, swept_volume),
+    "walking_torque": Computation("N m", _OF_PRESSURE, walking_torque),
+    "dorsiflexor_share": Computation("1", {}, dorsiflexor_share),
+    "recycling_saving": Computation("1", _OF_RECYCLING, recycling_saving),
+    "recycling_work": Computation("1", _OF_RECYCLING, recycling_work),
+    "healthy_event_reduction": Computation("1", {}, partial(event_reduction, "healthy")),
+    "impaired_event_reduction": Computation("1", {}, partial(event_reduction, "impaired")),
 }
 
 
@@ -172,12 +140,6 @@ class PublishedClaim:
     computation: Computation | None
     arguments: Mapping[str, str | float]
     source: str
-
-    def value(self) -> float | None:
-        """Return our number in the unit of the claim, None where nothing is computed; SimulationError if it fails."""
-        if self.computation is None:
-            return None
-        return from_si(self.computation.compute(self.arguments), self.entry.unit, self.computation.unit)
 
 
 @dataclass(frozen=True, slots=True)
@@ -210,10 +172,12 @@ def _checked(entry: ClaimEntry, citation: str, file: str) -> PublishedClaim:
         raise ScenarioError(f"{place}.computation: there is no '{entry.computation}'{hint}; available: {known}")
     if entry.at_least is None and entry.at_most is None:
         raise ScenarioError(f"{place}: give at_least or at_most, or both: what agrees with the claim")
+    # A side that the file leaves open.
     low = -math.inf if entry.at_least is None else entry.at_least
     high = math.inf if entry.at_most is None else entry.at_most
     if low > high:
         raise ScenarioError(f"{place}: at_least = {low:g} lies above at_most = {high:g}: no number agrees")
+    # What is published has to agree with itself: else the range was typed wrongly.
     if entry.published is not None and not low <= entry.published <= high:
         name, limit = ("at_least", low) if entry.published < low else ("at_most", high)
         raise ScenarioError(
@@ -221,11 +185,13 @@ def _checked(entry: ClaimEntry, citation: str, file: str) -> PublishedClaim:
         )
     computation = COMPUTATIONS[entry.computation]
     with refused_as(ScenarioError, f"{place}.unit", UnitError):
+        # Only for what it raises: here the place in the file is known.
         from_si(1.0, entry.unit, computation.unit)
     return PublishedClaim(entry, computation, _arguments(entry, computation, place), source)
 
 
 def _arguments(entry: ClaimEntry, computation: Computation, place: str) -> dict[str, str | float]:
+    """Return the arguments of a claim in SI: those that its computation takes, all of them and no other."""
     wanted = ", ".join(computation.arguments)
     for name in entry.arguments:
         if name not in computation.arguments:
@@ -235,30 +201,17 @@ def _arguments(entry: ClaimEntry, computation: Computation, place: str) -> dict[
     for name, unit in computation.arguments.items():
         if name not in entry.arguments:
             raise ScenarioError(f"{place}.arguments: '{name}' is missing; {entry.computation} takes {wanted}")
-        values[name] = _argument(entry.arguments[name], unit, f"{place}.arguments.{name}")
+        key, text = f"{place}.arguments.{name}", entry.arguments[name]
+        with refused_as(ScenarioError, key, UnitError):
+            value = values[name] = parse_quantity(text, unit)
+        # An absolute pressure and a time: neither lies below 0.
+        if not 0.0 <= value < math.inf:
+            raise ScenarioError(f"{key} = '{text}': must be at least 0 {unit} and finite")
     return values
-
-
-def _argument(text: str, unit: str, place: str) -> str | float:
-    with refused_as(ScenarioError, place, UnitError):
-        value = parse_quantity(text, unit)
-    # An absolute pressure and a time: neither lies below 0.
-    if not 0.0 <= value < math.inf:
-        raise ScenarioError(f"{place} = '{text}': must be at least 0 {unit} and finite")
-    return value
 
 
 SEED, ALL = PAPER, "all"
 """The study of the paper that this package is made from, and all studies one after the other."""
-_WORDS = {
-    ALL: "every study, one table",
-}
-
-
-def published_text(entry: ClaimEntry) -> str:
-    """Return what is published as it is shown, with its direction; empty where only own arithmetic is."""
-    number = "" if entry.published is None else format_reported_quantity(entry.published, entry.unit or "-")
-    return f"up to {number}" if number and entry.direction == "maximum" else entry.words or number
 
 
 @dataclass(frozen=True, slots=True)
@@ -271,9 +224,10 @@ class JudgedClaim:
 
     @property
     def published(self) -> str:
-        """What is published, as it is shown."""
+        """What is published as it is shown, with its direction; empty where only own arithmetic is."""
         entry = self.claim.entry
-        return published_text(entry)
+        number = "" if entry.published is None else format_reported_quantity(entry.published, entry.unit or "-")
+        return f"up to {number}" if number and entry.direction == "maximum" else entry.words or number
 
     @property
     def ours(self) -> str:
@@ -324,8 +278,8 @@ def study_names() -> tuple[str, ...]:
 
 def list_studies() -> list[dict[str, Any]]:
     """Return name and subject of every study."""
-    words = {name: read_publication(name)[0].title for name in FILE.names()}
-    return [{"name": name, "title": ({**_WORDS, **words})[name]} for name in study_names()]
+    words = {name: read_publication(name)[0].title for name in FILE.names()} | {ALL: "every study, one table"}
+    return [{"name": name, "title": words[name]} for name in study_names()]
 
 
 def check_study(study: str, overrides: Sequence[str]) -> None:
@@ -340,26 +294,25 @@ def check_study(study: str, overrides: Sequence[str]) -> None:
 
 def run_studies(study: str, report: Report) -> tuple[Study, ...]:
     """Return one study, or all but the paper's, with every claim judged; ScenarioError, SimulationError."""
-    names = study_names()[1:-1] if study == ALL else (study,)
-    return tuple(_run(load_publication(name), report) for name in names)
+    studies = []
+    for name in study_names()[1:-1] if study == ALL else (study,):
+        publication, claims = load_publication(name), []
+        for claim in publication.claims:
+            report(Progress(f"{publication.name}: {claim.entry.id}"))
+            claims.append(judge(claim))
+        studies.append(Study(publication, tuple(claims)))
+    return tuple(studies)
 
 
 def judge(claim: PublishedClaim) -> JudgedClaim:
     """Return a claim with our number and the verdict; SimulationError where a walk fails."""
-    value, entry = claim.value(), claim.entry
-    if value is None:
+    entry, computation = claim.entry, claim.computation
+    if computation is None:
         return JudgedClaim(claim, None, "not_testable")
+    value = from_si(computation.compute(claim.arguments), entry.unit, computation.unit)
     low = entry.at_least is None or value >= entry.at_least
     high = entry.at_most is None or value <= entry.at_most
     # A model with assumptions that does not agree is no evidence against what was measured.
     holds: Verdict = "plausible" if entry.assumed else "consistent"
     parts: Verdict = "undetermined" if entry.assumed else "inconsistent_as_reported"
     return JudgedClaim(claim, value, holds if low and high else parts)
-
-
-def _run(publication: Publication, report: Report) -> Study:
-    claims = []
-    for claim in publication.claims:
-        report(Progress(f"{publication.name}: {claim.entry.id}"))
-        claims.append(judge(claim))
-    return Study(publication, tuple(claims))

@@ -1,7 +1,6 @@
 """Runs the paper's experiments and judges what the paper claims of them."""
 
 from collections.abc import Sequence
-from typing import Any
 
 from ppafo.analyses.reproduce.answer import (
     PROPORTIONAL,
@@ -12,7 +11,7 @@ from ppafo.analyses.reproduce.answer import (
     finding_of,
     finding_of_studies,
 )
-from ppafo.analyses.reproduce.bench import assumed_values, synthetic_evidence, values_used_by
+from ppafo.analyses.reproduce.bench import assumed_values, synthetic_evidence
 from ppafo.analyses.reproduce.claim import arithmetic_claims, load_reported, not_published_claim, told_claim
 from ppafo.analyses.reproduce.publication import ALL, SEED, check_study, run_studies
 from ppafo.analyses.reproduce.step_response import Levels, step_events, step_observations
@@ -71,6 +70,7 @@ def reproduce(
     SimulationError where a run diverges, ScenarioError for a study that is none.
     """
     report = progress or report_nothing
+    # Before anything runs, which takes long.
     check_study(study, overrides)
     if study == SEED:
         return finding_of(reproduce_paper(overrides, report))
@@ -81,8 +81,13 @@ def reproduce(
 def reproduce_paper(overrides: Sequence[str] = (), report: Report = report_nothing) -> Reproduction:
     """Return what came of the paper's own experiments."""
     scenarios = _scenarios(overrides)
-    runs = {name: _run(scenario, report) for name, scenario in scenarios.items()}
-    step, solenoid, proportional = (runs[name] for name in EXPERIMENTS)
+    runs: list[Result] = []
+    for name in EXPERIMENTS:
+        report(Progress(f"simulating {name}"))
+        runs.append(simulate(scenarios[name]))
+        if not runs[-1].status.is_completed:
+            raise SimulationError(f"{name}: {runs[-1].status.message}")
+    step, solenoid, proportional = runs
     report(Progress("measuring on the simulated test bench (synthetic)"))
     # The rig records with the overrides of the simulations.
     meant = {name: scenario.origin.overrides for name, scenario in scenarios.items()}
@@ -92,7 +97,8 @@ def reproduce_paper(overrides: Sequence[str] = (), report: Report = report_nothi
     reported = load_reported()
     completed = load_parameter_set(step.scenario.origin.parameter_set)
     assumed = assumed_values(scenarios)
-    of_step, of_task = values_used_by(assumed, STEP), values_used_by(assumed, SOLENOID, PROPORTIONAL)
+    of_step = tuple(value.sentence() for value in assumed if STEP in value.used_by)
+    of_task = tuple(value.sentence() for value in assumed if {SOLENOID, PROPORTIONAL} & set(value.used_by))
     events, supply = step_events(step.recording), step.scenario.device.supply
     levels = Levels(supply.pressure, supply.atmospheric_pressure)
     step_told = tuple(step_observations(step.recording, levels, events))
@@ -105,14 +111,14 @@ def reproduce_paper(overrides: Sequence[str] = (), report: Report = report_nothi
             "figure_7_words",
             "What the text tells of the pressures and the angle of the step response.",
             step_told,
-            tuple(value.sentence() for value in of_step),
+            of_step,
         ),
         *torque_task_claims(phased, proportional, of_task),
         told_claim(
             "oscillation_words",
             "What the text tells of the oscillation with both valves.",
             torque_told,
-            tuple(value.sentence() for value in of_task),
+            of_task,
         ),
         *control_claims(solenoid, proportional, phased),
         not_published_claim(),
@@ -140,6 +146,7 @@ def _scenarios(overrides: Sequence[str]) -> dict[str, Scenario]:
     """Return the experiments, each with the overrides that are meant for it."""
     meant: dict[str, list[str]] = {name: [] for name in EXPERIMENTS}
     given = override_set(overrides, ScenarioError)
+    # Kinds come first, outer ones before inner ones: they decide which numbers there are.
     kinds = [path for path in given if path.endswith(".kind")]
     for path in sorted(given, key=lambda path: (path not in kinds, path.count("."), path)):
         override = str(given[path])
@@ -150,22 +157,13 @@ def _scenarios(overrides: Sequence[str]) -> dict[str, Scenario]:
         known = tuple(dict.fromkeys(known for item in documents.values() for known in scenario_paths(item)))
         if path not in known and not is_of_device(path) and not chosen_by(path, kinds):
             raise unknown_value(override, known, f"{', '.join(EXPERIMENTS)} have")
-        having = [name for name, document in documents.items() if _has(document, path)]
+        # A scenario that has a section for the value; the device is in all of them.
+        section = path.rpartition(".")[0]
+        having = [
+            name
+            for name, document in documents.items()
+            if (not section or value_at(document, section) is not None) and path in scenario_paths(document)
+        ]
         for name in having or EXPERIMENTS:
             meant[name].append(override)
     return {name: load_scenario(name, chosen) for name, chosen in meant.items()}
-
-
-def _has(document: dict[str, Any], path: str) -> bool:
-    """Tell whether a scenario has a section of its own for the value at a path."""
-    section = path.rpartition(".")[0]
-    has_section = not section or value_at(document, section) is not None
-    return has_section and path in scenario_paths(document)
-
-
-def _run(scenario: Scenario, report: Report) -> Result:
-    report(Progress(f"simulating {scenario.name}"))
-    result = simulate(scenario)
-    if not result.status.is_completed:
-        raise SimulationError(f"{scenario.name}: {result.status.message}")
-    return result

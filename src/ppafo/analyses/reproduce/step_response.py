@@ -68,9 +68,11 @@ def step_events(recording: Recording, resolution: float = RESOLUTION) -> StepEve
     travel = abs(float(angle[-1] - angle[0]))
     if travel < _SMALLEST_TRAVEL:
         return None
+    # The last sample at rest, not the first in motion.
     breakaway = int(np.flatnonzero(np.abs(angle - angle[0]) > resolution * travel)[0]) - 1
     away = np.flatnonzero(np.abs(angle - angle[-1]) > resolution * travel)
     stop = int(away[-1]) + 1
+    # Without a sample of rest at either end, and of motion between, nothing can be told.
     if stop >= len(recording) - 1 or stop - breakaway < 2 or breakaway < 1:
         return None
     return StepEvents(breakaway, stop, float(recording.time[breakaway]), float(recording.time[stop]))
@@ -78,15 +80,10 @@ def step_events(recording: Recording, resolution: float = RESOLUTION) -> StepEve
 
 def step_observations(recording: Recording, levels: Levels, events: StepEvents | None) -> list[Observation]:
     """Return each sentence of the text with whether the recording shows it; none holds where the vane does not move."""
-    found = []
-    for identifier, judge, beyond in _SAID:
-        holds, evidence, difference = False, "the vane does not move from rest to rest", ""
-        if events is not None:
-            step = _Step(recording, levels, events)
-            holds, evidence = judge(step)
-            difference = "" if beyond is None else beyond(step)
-        found.append(observation(identifier, holds, evidence, difference))
-    return found
+    if events is None:
+        return [observation(identifier, False, "the vane does not move from rest to rest") for identifier in _SAID]
+    step = _Step(recording, levels, events)
+    return [observation(identifier, *judge(step)) for identifier, judge in _SAID.items()]
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,23 +103,8 @@ class _Step:
     def standing(self, name: str) -> Floats:
         return self.recording[name][: self.events.breakaway + 1]
 
-    def moving(self, name: str) -> Floats:
-        return self.recording[name][self.events.breakaway : self.events.stop + 1]
-
     def at_stop(self, name: str) -> Floats:
         return self.recording[name][self.events.stop :]
-
-    def peak_and_lowest(self) -> tuple[int, int]:
-        """Samples at which pressure 1 peaks while the vane sets off, and is lowest from there to the stop."""
-        pressure, angle = self.recording["pressure_1"], self.recording["angle"]
-        gone = np.abs(angle - angle[0]) > _SETS_OFF * np.abs(angle[-1] - angle[0])
-        peak = int(np.argmax(pressure[: int(np.argmax(gone)) + 1]))
-        return peak, peak + int(np.argmin(pressure[peak : self.events.stop + 1]))
-
-    def largest_rise(self, name: str) -> float:
-        """Largest rise above an earlier value, while the vane moves."""
-        moving = self.moving(name)
-        return float(np.max(moving - np.minimum.accumulate(moving)))
 
     def is_same(self, pressure: float, other: float) -> bool:
         return bool(abs(pressure - other) < _SAME * self.levels.range)
@@ -132,41 +114,6 @@ class _Step:
         return bool(pressure[-1] > pressure[0] and fallen_back < _SAME * self.levels.range)
 
 
-def _fills_early(step: _Step) -> str:
-    """Chamber 1 stands at the supply before the vane leaves: then it is chamber 2 that decides when."""
-    before = step.standing("pressure_1")
-    full = int(np.argmax(before > step.levels.supply - _SAME * step.levels.range))
-    waits = step.recording.time[step.events.breakaway] - step.recording.time[full]
-    if before[full] <= step.levels.supply - _SAME * step.levels.range or waits < _NOTABLE_TIME:
-        return ""
-    return (
-        f"it reaches the supply pressure after {step.milliseconds(full)} already, so small is the volume at the stop, "
-        "and what starts the vane is the falling pressure in chamber 2"
-    )
-
-
-def _rises_in_motion(step: _Step) -> str:
-    """The text has pressure 1 fall from breakaway to the stop."""
-    pressure, (peak, lowest) = step.recording["pressure_1"], step.peak_and_lowest()
-    late = float(pressure[peak] - pressure[step.events.breakaway])
-    again = float(pressure[step.events.stop] - pressure[lowest])
-    said = []
-    if late >= _SAME * step.levels.range:
-        said.append(
-            f"from breakaway it goes on rising by {late / PASCALS_PER_PSI:.1f} psi, until {step.milliseconds(peak)}"
-        )
-    if again >= _SAME * step.levels.range:
-        said.append(f"it rises again by {again / PASCALS_PER_PSI:.1f} psi before the stop")
-    return ", and ".join(said)
-
-
-def _more_than_slows(step: _Step) -> str:
-    rise = step.largest_rise("pressure_2")
-    if rise < _SAME * step.levels.range:
-        return ""
-    return f"it does more than slow: it rises by {rise / PASCALS_PER_PSI:.1f} psi"
-
-
 def _turns(step: _Step) -> tuple[bool, str]:
     start, end = (float(np.degrees(step.recording["angle"][index])) for index in (0, -1))
     holds = abs(start - _FIRST_ANGLE) < _SAME_ANGLE and abs(end - _LAST_ANGLE) < _SAME_ANGLE
@@ -174,23 +121,45 @@ def _turns(step: _Step) -> tuple[bool, str]:
     return holds, f"from {start:.1f} to {end:.1f} deg in {taken:.0f} ms"
 
 
-def _rises(step: _Step) -> tuple[bool, str]:
-    before, breakaway = step.standing("pressure_1"), step.events.breakaway
-    holds = step.only_rises(before) and before[-1] - before[0] > _CLEAR * step.levels.range
-    fraction = (before[-1] - step.levels.atmosphere) / step.levels.range
+def _rises(step: _Step) -> tuple[bool, str, str]:
+    before, breakaway, levels = step.standing("pressure_1"), step.events.breakaway, step.levels
+    holds = step.only_rises(before) and before[-1] - before[0] > _CLEAR * levels.range
+    fraction = (before[-1] - levels.atmosphere) / levels.range
     has_torque = "torque" in step.recording
     torque = f", at a torque of {step.recording['torque'][breakaway]:.2f} N m" if has_torque else ""
-    return bool(holds), (
+    evidence = (
         f"from {step.gauge(before[0])} to {step.gauge(before[-1])} psig, {100.0 * fraction:.0f} % of the supply; "
         f"the vane breaks away after {step.milliseconds(breakaway)}{torque}"
     )
+    # Chamber 1 stands at the supply before the vane leaves: then it is chamber 2 that decides when.
+    is_full = before > levels.supply - _SAME * levels.range
+    full = int(np.argmax(is_full))
+    waits = step.recording.time[breakaway] - step.recording.time[full]
+    difference = (
+        f"it reaches the supply pressure after {step.milliseconds(full)} already, so small is the volume at the stop, "
+        "and what starts the vane is the falling pressure in chamber 2"
+    )
+    return bool(holds), evidence, difference if is_full[full] and waits >= _NOTABLE_TIME else ""
 
 
-def _falls_in_motion(step: _Step) -> tuple[bool, str]:
-    pressure, (peak, lowest) = step.recording["pressure_1"], step.peak_and_lowest()
+def _falls_in_motion(step: _Step) -> tuple[bool, str, str]:
+    """Pressure 1 falls from its peak, while the vane sets off, to its lowest; the text has it fall to the stop."""
+    pressure, angle = step.recording["pressure_1"], step.recording["angle"]
+    # Chamber 1 still fills while the vane sets off, so that the peak lies behind breakaway.
+    gone = np.abs(angle - angle[0]) > _SETS_OFF * np.abs(angle[-1] - angle[0])
+    peak = int(np.argmax(pressure[: int(np.argmax(gone)) + 1]))
+    lowest = peak + int(np.argmin(pressure[peak : step.events.stop + 1]))
     first, last = float(pressure[peak]), float(pressure[lowest])
     holds = first - last > _CLEAR * step.levels.range
-    return holds, f"from {step.gauge(first)} psig down to {step.gauge(last)} psig at {step.milliseconds(lowest)}"
+    evidence = f"from {step.gauge(first)} psig down to {step.gauge(last)} psig at {step.milliseconds(lowest)}"
+    late, again = first - float(pressure[step.events.breakaway]), float(pressure[step.events.stop]) - last
+    differences = []
+    if late >= _SAME * step.levels.range:
+        rise = f"{late / PASCALS_PER_PSI:.1f} psi, until {step.milliseconds(peak)}"
+        differences.append(f"from breakaway it goes on rising by {rise}")
+    if again >= _SAME * step.levels.range:
+        differences.append(f"it rises again by {again / PASCALS_PER_PSI:.1f} psi before the stop")
+    return holds, evidence, ", and ".join(differences)
 
 
 def _to_supply(step: _Step) -> tuple[bool, str]:
@@ -208,22 +177,25 @@ def _falls(step: _Step) -> tuple[bool, str]:
     return holds, f"from {step.gauge(before[0])} to {step.gauge(before[-1])} psig until breakaway"
 
 
-def _slows(step: _Step) -> tuple[bool, str]:
+def _slows(step: _Step) -> tuple[bool, str, str]:
     """The slowest fall in motion lies between two steeper ones; gas that only vents would fall ever more slowly.
 
     Gas that is compressed far above what it was does not slow its fall: it rises.
     """
-    rate = -np.diff(step.recording["pressure_2"]) / np.diff(step.recording.time)
-    start, end = step.events.breakaway, step.events.stop
+    pressure, (start, end) = step.recording["pressure_2"], (step.events.breakaway, step.events.stop)
+    rate = -np.diff(pressure) / np.diff(step.recording.time)
     slowest = start + int(np.argmin(rate[start:end]))
     before, after = float(np.max(rate[: slowest + 1])), float(np.max(rate[slowest:]))
-    holds = rate[slowest] <= _SLOWED * min(before, after) and step.largest_rise("pressure_2") <= _LARGEST_RISE
+    moving = pressure[start : end + 1]
+    rise = float(np.max(moving - np.minimum.accumulate(moving)))
+    # The rate is that of falling, so that a rise is negative and slower than any fall.
+    holds = rate[slowest] <= _SLOWED * min(before, after) and rise <= _LARGEST_RISE
     first, least, last = (value / (1e3 * PASCALS_PER_PSI) for value in (before, rate[slowest], after))
-    at = step.milliseconds(slowest)
     slowed = f"rises by {-least:.2f} psi/ms" if least < 0.0 else f"falls by {least:.2f} psi/ms"
-    return bool(
-        holds
-    ), f"falls by {first:.2f} psi/ms at first, {slowed} at {at}, falls by up to {last:.1f} psi/ms later"
+    said = (f"falls by {first:.2f} psi/ms at first", f"{slowed} at {step.milliseconds(slowest)}")
+    difference = f"it does more than slow: it rises by {rise / PASCALS_PER_PSI:.1f} psi"
+    evidence = f"{', '.join(said)}, falls by up to {last:.1f} psi/ms later"
+    return bool(holds), evidence, difference if rise >= _SAME * step.levels.range else ""
 
 
 def _to_atmosphere(step: _Step) -> tuple[bool, str]:
@@ -232,23 +204,20 @@ def _to_atmosphere(step: _Step) -> tuple[bool, str]:
 
 
 def _builds_up(step: _Step) -> tuple[bool, str]:
-    difference = step.recording["pressure_1"] - step.recording["pressure_2"]
-    change = float(difference[-1] - difference[0])
-    first, last = (float(difference[index]) / PASCALS_PER_PSI for index in (0, -1))
-    return abs(
-        change - 2.0 * step.levels.range
-    ) < 2.0 * _SAME * step.levels.range, f"from {first:.1f} to {last:.1f} psi"
+    first, last = (float(step.recording["pressure_1"][at] - step.recording["pressure_2"][at]) for at in (0, -1))
+    # From full pressure one way to full pressure the other way: the range twice.
+    holds = abs(last - first - 2.0 * step.levels.range) < 2.0 * _SAME * step.levels.range
+    return holds, f"from {first / PASCALS_PER_PSI:.1f} to {last / PASCALS_PER_PSI:.1f} psi"
 
 
-_Judge = Callable[[_Step], tuple[bool, str]]
-_SAID: tuple[tuple[str, _Judge, Callable[[_Step], str] | None], ...] = (
-    ("vane_turns_through_its_range", _turns, None),
-    ("pressure_1_rises_until_breakaway", _rises, _fills_early),
-    ("pressure_1_falls_in_motion", _falls_in_motion, _rises_in_motion),
-    ("pressure_1_goes_to_supply", _to_supply, None),
-    ("pressure_2_falls_from_supply", _falls, None),
-    ("pressure_2_slows_in_motion", _slows, _more_than_slows),
-    ("pressure_2_goes_to_atmosphere", _to_atmosphere, None),
-    ("difference_builds_up", _builds_up, None),
-)
-"""What the text says, by its entry, how that is judged, and what says what the recording shows beyond it."""
+_SAID: dict[str, Callable[[_Step], tuple[bool, str] | tuple[bool, str, str]]] = {
+    "vane_turns_through_its_range": _turns,
+    "pressure_1_rises_until_breakaway": _rises,
+    "pressure_1_falls_in_motion": _falls_in_motion,
+    "pressure_1_goes_to_supply": _to_supply,
+    "pressure_2_falls_from_supply": _falls,
+    "pressure_2_slows_in_motion": _slows,
+    "pressure_2_goes_to_atmosphere": _to_atmosphere,
+    "difference_builds_up": _builds_up,
+}
+"""What the text says, by its entry, and what judges it: whether it holds, the numbers, and what is seen beyond it."""

@@ -4,12 +4,11 @@ The task starts in a tie: the error is exactly 0, and the decisions of the solen
 pair runs once for each phase, with either valve first.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ppafo.analyses.reproduce.bench import AssumedValue
 from ppafo.analyses.reproduce.claim import Claim, Observation, Verdict, observation, stated_claim
 from ppafo.constants import GRAMS_PER_KILOGRAM
 from ppafo.errors import ParameterError, ScenarioError, SimulationError
@@ -61,6 +60,8 @@ def phased_runs(solenoid: Result) -> PhasedRuns:
 
 
 def _has_phase(scenario: Scenario) -> bool:
+    # Two runs are joined by their pressures, which are the whole state only of a locked vane at constant temperature
+    # without lines; and a tie is only where reference and torque both begin at 0.
     reference, period = scenario.reference, scenario.controller.period
     return (
         scenario.controller.kind == "on_off"
@@ -81,6 +82,7 @@ def _with_first_valve(scenario: Scenario, tie: float) -> Iterator[tuple[float, f
     period, whole = scenario.controller.period, scenario.run.duration
     ramp = scenario.reference.settings
     slope = ramp["level"] / ramp["ramp_time"]
+    # A constant reference just off 0 calls one valve at once and holds it on.
     same = {**ramp, "start_level": tie, "level": tie}
     held = simulate(
         replace(
@@ -101,19 +103,20 @@ def _with_first_valve(scenario: Scenario, tie: float) -> Iterator[tuple[float, f
             )
         )
         before = slope * held.time[: last + 1] - held["torque"][: last + 1]
+        # Mean squares of both parts, each with its time.
         square = phase * float(np.mean(before**2)) + (whole - phase) * rest.metrics["rms_error"].value ** 2
         gas = float(held["supplied_mass"][last]) + rest.metrics["gas_supplied"].value
         yield float(np.sqrt(square / whole)), GRAMS_PER_KILOGRAM * gas
 
 
-def torque_task_claims(runs: PhasedRuns, proportional: Result, assumed: Sequence[AssumedValue]) -> list[Claim]:
+def torque_task_claims(runs: PhasedRuns, proportional: Result, rests_on: tuple[str, ...]) -> list[Claim]:
     """Return the claims on tracking error and gas over all phases; gas is what the supply gave.
 
     Each median has the window that the task as completed here has to meet. Without decimals: the range over the phases
     is wider than any.
     """
-    error, gas = proportional.metrics["rms_error"].value, _gas(proportional)
-    rests_on = tuple(value.sentence() for value in assumed)
+    error = proportional.metrics["rms_error"].value
+    gas = GRAMS_PER_KILOGRAM * proportional.metrics["gas_supplied"].value
     over = f"Median and range of {runs.count} runs over the unknown phase of the decisions, either valve first."
 
     def claim(identifier: str, values: Floats, decimals: int, note: str) -> Claim:
@@ -142,11 +145,6 @@ def torque_task_claims(runs: PhasedRuns, proportional: Result, assumed: Sequence
     ]
 
 
-def _gas(run: Result) -> float:
-    """Gas that the supply gave [g]."""
-    return GRAMS_PER_KILOGRAM * run.metrics["gas_supplied"].value
-
-
 READINGS_OF_U = (("the opening, -1 to 1", 1.0), ("volts, 5 open the valve", 5.0), ("volts, 10 open the valve", 10.0))
 """What U of equation (13) may be, and the U that opens the proportional valve fully."""
 _GAINS = ("proportional_gain", "integral_gain", "derivative_gain")
@@ -171,6 +169,7 @@ def readings_of_u(solenoid: Result, proportional: Result) -> tuple[Interpretatio
         return ()
 
     def better(full: float, level: float | None) -> tuple[float, float]:
+        # Volts times a gain for volts give the same opening.
         gains = {**spool.controller.settings, **{name: spool.controller.settings[name] / full for name in _GAINS}}
         both = [pair, replace(spool, controller=replace(spool.controller, settings=gains))]
         if level is not None:
@@ -266,6 +265,7 @@ def _with(run: Result, overrides: tuple[str, ...]) -> float | str:
     """Return the RMS error [N m] of a run's task with another law, or why there is none."""
     origin = run.scenario.origin
     try:
+        # Another law takes nothing that was set for this one.
         own = [override for override in origin.overrides if not override.startswith("controller.")]
         return simulate(load_scenario(run.scenario.name, [*own, *overrides])).metrics["rms_error"].value
     except (ParameterError, ScenarioError, SimulationError) as error:
@@ -279,6 +279,7 @@ def _limited_by_switching(solenoid: Result, runs: PhasedRuns) -> Claim:
         return stated_claim(entry.id, None, "undetermined", f"{entry.note} {faster}.")
     less = _PERCENT * (1.0 - faster / runs.errors)
     median, low, high = (float(end) for end in (np.median(less), less.min(), less.max()))
+    # In every phase, not in the middle one alone.
     verdict: Verdict = "plausible" if entry.at_least is not None and low >= entry.at_least else "undetermined"
     found = f"{median:.0f} % less error at 100 Hz" + (f" ({low:.0f} to {high:.0f})" if high > low else "")
     claim = stated_claim(entry.id, median, verdict, entry.note, ("the torque task as completed here",), None, found)

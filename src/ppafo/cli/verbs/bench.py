@@ -80,6 +80,7 @@ def rig_record(
         raise DataError(f"--out {out}: must end in .csv")
     from ppafo.storage.files import check_files_can_be_added
 
+    # What a bench did cannot be recorded a second time.
     with output.blame_out_option():
         check_files_can_be_added(out.parent, [out.name])
     from ppafo.exports.hil.loop import stop_by_interrupt

@@ -195,9 +195,12 @@ def synthetic_figure_3(torque: BenchResult, decay: BenchResult) -> "Figure":
 
 def _figure(panels: tuple[Panel, ...], kinds: tuple[RecordingKind, ...]) -> "Figure":
     from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
 
     with house_style():
-        figure = Figure(figsize=_SIZE, layout="constrained")
+        # The strip above the panels is left to the kind of the recordings, clear of titles and legends.
+        layout = ConstrainedLayoutEngine(rect=(0.0, 0.0, 1.0, 0.94))
+        figure = Figure(figsize=_SIZE, layout=layout)
         row = figure.subplots(1, len(panels), squeeze=False)[0]
         for letter, axes, panel in zip("AB", row, panels, strict=False):
             _draw(axes, letter, panel)

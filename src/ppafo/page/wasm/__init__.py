@@ -69,7 +69,7 @@ import math
 import re
 import sys
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -93,9 +93,9 @@ from ppafo.exports.c_library.files import (
 from ppafo.exports.c_library.program import COUNTS, IN_PARTS, TOGETHER, WHOLE, ExportedProgram, c_text, outline_of
 from ppafo.parameters import ParameterSet, apply_overrides, load_parameter_set
 from ppafo.parameters.device import Device
-from ppafo.parameters.graph import ATMOSPHERE_PATH, Graph, Term, itself
+from ppafo.parameters.graph import ATMOSPHERE_PATH, itself
 from ppafo.parameters.overrides import one_path, split_override
-from ppafo.parameters.parameter_set import SOURCE, Entry, atmospheric_pressure, entry_in_si
+from ppafo.parameters.parameter_set import SOURCE, atmospheric_pressure, entry_in_si
 from ppafo.report.display_units import display_unit, quantity_of_unit
 from ppafo.simulation.declaration import SEED, value_at
 from ppafo.simulation.loading import set_name
@@ -114,26 +114,20 @@ _CHANGED = {**_TASK, "origin": "changed"}
 _DEFAULT = {**_TASK, "origin": "default"}
 
 
-@dataclass(frozen=True, slots=True)
-class _File:
-    """What was read: the document, where relative paths begin, overrides on top, and the reasons for assumptions."""
-
-    document: Mapping[str, Any]
-    folder: Path
-    overrides: Sequence[str]
-    assumed: Mapping[str, str]
-
-
 def description_of(item: Scenario, library: Library) -> dict[str, Any]:
     """The description of the module of a scenario or a walk, as the beginning of this file has it."""
-    file = _file_of_scenario(item)
     keys = {setting.name: setting.path for setting in library.settings}
-    origins, follows, kept = _origins(file, item.device, library), _follows(library.links), _kept(library)
+    origins, kept = _origins(item, library), _kept(library)
+    # Settings that have the number of another until they are changed by themselves.
+    follows = {path: found[0].sources[0] for path, found in library.links.items() if found[0].is_same}
     # Settings that rules make of others until they are changed by themselves; a rule has the name of its function.
     made = {
         path: {
             "terms": [
-                {"rule": f"{_module(term)}.{term.function.__name__}", "sources": list(term.sources)}
+                {
+                    "rule": f"{term.function.__module__.rpartition('.')[2]}.{term.function.__name__}",
+                    "sources": list(term.sources),
+                }
                 for term in found[0].terms
             ],
             "gap": found[0].gap,
@@ -148,8 +142,8 @@ def description_of(item: Scenario, library: Library) -> dict[str, Any]:
         "title": library.description,
         "version": __version__,
         "kind": "scenario" if worn_kind(item) is None else "walk",
-        "document": dict(file.document),
-        "overrides": list(file.overrides),
+        "document": dict(item.origin.content),
+        "overrides": list(item.origin.overrides),
         "settings": [
             {
                 **_setting(setting, atmosphere),
@@ -173,12 +167,6 @@ def description_of(item: Scenario, library: Library) -> dict[str, Any]:
             for rule in library.relations
         ],
     }
-
-
-def _file_of_scenario(scenario: Scenario) -> _File:
-    origin = scenario.origin
-    folder = Path() if origin.file is None else Path(origin.file).parent
-    return _File(origin.content, folder, origin.overrides, {item.path: item.note for item in scenario.assumptions})
 
 
 def _kept(library: Library) -> dict[str, str]:
@@ -238,10 +226,11 @@ def display_of(unit: str, atmosphere: float, kilograms: str = "mass", is_absolut
     return {"unit": shown, "factor": to_si(1.0, shown, unit) - zero, "zero": zero}
 
 
-def _origins(file: _File, device: Device, library: Library) -> dict[str, dict[str, Any]]:
+def _origins(scenario: Scenario, library: Library) -> dict[str, dict[str, Any]]:
     """Where the value of each setting comes from, by path."""
-    parameter_set = _parameter_set(file, device)
-    changed = {c_identifier(one_path(split_override(text).typed, device.valve_name)) for text in file.overrides}
+    origin, device, parameter_set = scenario.origin, scenario.device, _parameter_set(scenario)
+    assumed = {item.path: item.note for item in scenario.assumptions}
+    changed = {c_identifier(one_path(split_override(text).typed, device.valve_name)) for text in origin.overrides}
     found: dict[str, dict[str, Any]] = {}
     for item in library.settings:
         if item.name in changed:
@@ -249,10 +238,11 @@ def _origins(file: _File, device: Device, library: Library) -> dict[str, dict[st
         elif is_of_device(item.path):
             found[item.path] = dict(_of_set(parameter_set, device, item))
         else:
-            is_given = value_at(file.document, item.path) is not None or item.path in (*TIMES, LOCKED_ANGLE)
+            # Times and the angle of a locked vane have no key of their own in every file, and are the task's anyway.
+            is_given = value_at(origin.content, item.path) is not None or item.path in (*TIMES, LOCKED_ANGLE)
             found[item.path] = dict(_TASK if is_given else _DEFAULT)
-        if item.path in file.assumed and item.name not in changed:
-            found[item.path] |= {"origin": "assumed", "note": file.assumed[item.path]}
+        if item.path in assumed and item.name not in changed:
+            found[item.path] |= {"origin": "assumed", "note": assumed[item.path]}
     return found
 
 
@@ -270,38 +260,27 @@ def _of_set(parameter_set: ParameterSet | None, device: Device, item: Setting) -
         return _CHANGED
     if entry.source == SOURCE:
         return _TASK
-    return {"origin": entry.origin, "source": entry.source, "note": entry.note, "half_width": _half_width(entry, item)}
-
-
-def _half_width(entry: Entry, item: Setting) -> float | None:
-    """Half of the interval of a value, in SI."""
-    if entry.uncertainty is None:
-        return None
-    unit, si = entry.unit, item.quantity.unit
+    unit, si, half = entry.unit, item.quantity.unit, None
     if si == "Pa_a":
+        # Half of an interval is a difference, also of a level.
         unit, si = f"{unit[:-2]}_d", "Pa_d"
-    return to_si(entry.uncertainty, unit, si)
+    if entry.uncertainty is not None:
+        half = to_si(entry.uncertainty, unit, si)
+    return {"origin": entry.origin, "source": entry.source, "note": entry.note, "half_width": half}
 
 
-def _parameter_set(file: _File, device: Device) -> ParameterSet | None:
+def _parameter_set(scenario: Scenario) -> ParameterSet | None:
     """The set of the device with all overrides; None where it cannot be read any more."""
-    section: Mapping[str, Any] = file.document.get("device", {})
-    own = [text for text in file.overrides if is_of_device(split_override(text).typed)]
+    origin, device = scenario.origin, scenario.device
+    section: Mapping[str, Any] = origin.content.get("device", {})
+    folder = Path() if origin.file is None else Path(origin.file).parent
+    own = [text for text in origin.overrides if is_of_device(split_override(text).typed)]
     try:
-        found = load_parameter_set(set_name(section.get("set", device.name), file.folder))
+        found = load_parameter_set(set_name(section.get("set", device.name), folder))
         of_file = apply_overrides(found, section.get("overrides", ()), device.valve_name)
         return apply_overrides(of_file, own, device.valve_name)
     except PpafoError:
         return None
-
-
-def _follows(links: Graph) -> dict[str, str]:
-    """Settings that have the number of another until they are changed by themselves."""
-    return {path: found[0].sources[0] for path, found in links.items() if found[0].is_same}
-
-
-def _module(term: Term) -> str:
-    return term.function.__module__.rpartition(".")[2]
 
 
 LANES = 8
@@ -355,9 +334,21 @@ def source_of(library: Library) -> str:
 def _unit(library: Library, functions: str) -> str:
     """The translation unit around functions."""
     program, names = library.program, [item.name for item in library.settings]
+    given = [f"given[SETTING_{name.upper()}] = settings->{name};" for name in names]
+    arrays = ", ".join(f"array_of({name}, {count}, 0, 0)" for name, count in _ARRAYS.items())
+    prepare = ("double given[SETTINGS];", *given, f"prepare({arrays});")
+    refused = [_REFUSED.format(condition, name.upper()) for condition, name in conditions_of_program(library)]
     words = {
         **run_words(library),
-        **_array_words(library),
+        "settings_type": "run_settings",
+        "state_count": str(len(program.state_places)),
+        "parameter_count": str(len(program.parameter_places)),
+        "count_count": str(len(COUNTS)),
+        "prepare": "\n".join(f"    {line}" for line in prepare),
+        "needs_other": _COUNT.sub(lambda found: f"counts[COUNT_{found[1].upper()}]", "\n".join(refused)),
+    }
+    words |= {
+        "prepared_run": filled(template(__name__, "prepared_run.c"), words),
         "functions": functions,
         "lanes": str(LANES),
         "go_on": _chosen_loop(program, ""),
@@ -376,27 +367,6 @@ _ARRAYS = {
     "prepared->counts": "COUNTS",
 }
 """What the function from settings to the numbers of a run is handed, and how many there are of each."""
-
-
-def _array_words(library: Library) -> dict[str, str]:
-    """Marks of what makes arrays of the numbers of a run from its settings."""
-    program = library.program
-    given = [f"given[SETTING_{item.name.upper()}] = settings->{item.name};" for item in library.settings]
-    arrays = ", ".join(f"array_of({name}, {count}, 0, 0)" for name, count in _ARRAYS.items())
-    lines = ("double given[SETTINGS];", *given, f"prepare({arrays});")
-    words = {
-        **run_words(library),
-        "settings_type": "run_settings",
-        "state_count": str(len(program.state_places)),
-        "parameter_count": str(len(program.parameter_places)),
-        "count_count": str(len(COUNTS)),
-        "prepare": "\n".join(f"    {line}" for line in lines),
-        "needs_other": _COUNT.sub(
-            lambda found: f"counts[COUNT_{found[1].upper()}]",
-            "\n".join(_REFUSED.format(condition, name.upper()) for condition, name in conditions_of_program(library)),
-        ),
-    }
-    return {**words, "prepared_run": filled(template(__name__, "prepared_run.c"), words)}
 
 
 def _chosen_loop(program: ExportedProgram, ending: str) -> str:
