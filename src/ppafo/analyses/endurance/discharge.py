@@ -74,11 +74,6 @@ def smallest_mass_when_warm(bottle: Bottle, draw: Draw) -> float:
     return high
 
 
-def frozen_below(bottle: Bottle) -> float:
-    """Return the temperature [K] at which the liquid freezes, or below which the table knows nothing of the gas."""
-    return bottle.fluid.table.temperatures[0]
-
-
 def ending(bottle: Bottle, draw: Draw, mass: float, content: BottleContent, stopped_by: Stop) -> Ending:
     """Return the ending for what stopped a run: the supply pressure, the cold end of the table, or the time.
 
@@ -279,7 +274,9 @@ def solve_stretch(bottle: Bottle, draw: Draw, start: float, end: float, values: 
         return [*inside, flow, now.outflow_power, now.room_heat]
 
     def kelvins_above_freezing(_time: float, y: Floats) -> float:
-        return content_of(bottle, float(y[0]), float(y[1])).temperature - frozen_below(bottle) - _ABOVE_FREEZING
+        # The liquid freezes where its table begins; below, the table knows nothing of the gas either.
+        freezing = bottle.fluid.table.temperatures[0]
+        return content_of(bottle, float(y[0]), float(y[1])).temperature - freezing - _ABOVE_FREEZING
 
     def to_spare(_time: float, y: Floats) -> float:
         content = content_of(bottle, float(y[0]), float(y[1]))

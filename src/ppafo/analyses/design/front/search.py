@@ -19,11 +19,12 @@ from pydantic import Field
 
 from ppafo.documents.models import StrictTable
 from ppafo.progress import Progress, Report, report_nothing
+from ppafo.signals.recording import Floats
 
-Floats = NDArray[np.float64]
 Choices = NDArray[np.int64]
 MAXIMUM_SHOWN = 12
 _CHUNK = 512
+"""Points compared with all others at once: the matrix of who dominates whom then stays in the cache."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -285,7 +286,15 @@ def search_front(
         population, standing = population.with_more(children), standing.with_more(value)
         best = survivors(standing, settings.population)
         population, standing = population.at(best), standing.at(best)
-        found, worth = _add_children(found, worth, children, value)
+        good = value.is_feasible
+        found, worth = found.with_more(children.at(good)), worth.with_more(value.at(good))
+        # Equal points do not dominate each other: without this one design would fill the front with its copies.
+        _, once = np.unique(worth.objectives, axis=0, return_index=True)
+        once.sort()
+        found, worth = found.at(once), worth.at(once)
+        keep = non_dominated(worth)
+        found, worth = found.at(keep), worth.at(keep)
+        # No design of the first sample kept the constraints: the first that do give the box.
         if box is None:
             box = _box(worth)
         growth.append((growth[-1][0] + len(children), _dominated_fraction(worth, box)))
@@ -314,6 +323,7 @@ def vary(population: Candidates, choices: int, random: np.random.Generator) -> C
     scale = random.uniform(*SCALES, size=(count, 1))
     moved = population.places[first] + scale * (population.places[second] - population.places[third])
     crossed = random.random((count, variables)) < CROSSED
+    # At least one variable of every child is a changed one, else it might be its parent again.
     if variables:
         crossed[np.arange(count), random.integers(variables, size=count)] = True
     places = np.where(crossed, reflect(moved), population.places)
@@ -328,17 +338,6 @@ def reflect(places: Floats) -> Floats:
     return np.where(turned > 1.0, 2.0 - turned, turned)
 
 
-def _add_children(found: Candidates, worth: Worth, children: Candidates, value: Worth) -> tuple[Candidates, Worth]:
-    """Return all that no other dominates so far, each point once."""
-    good = value.is_feasible
-    found, worth = found.with_more(children.at(good)), worth.with_more(value.at(good))
-    _, once = np.unique(worth.objectives, axis=0, return_index=True)
-    once.sort()
-    found, worth = found.at(once), worth.at(once)
-    keep = non_dominated(worth)
-    return found.at(keep), worth.at(keep)
-
-
 def _box(worth: Worth) -> tuple[Floats, Floats] | None:
     """Return the best values and the worst ones of all designs that satisfy the constraints; None where none does."""
     good = worth.objectives[worth.is_feasible]
@@ -346,6 +345,7 @@ def _box(worth: Worth) -> tuple[Floats, Floats] | None:
         return None
     lowest, highest = good.min(axis=0), good.max(axis=0)
     span = np.where(highest > lowest, highest - lowest, np.maximum(np.abs(highest), 1.0))
+    # A hundredth beyond the worst values, so that a design at the edge of the box still counts.
     return lowest, lowest + 1.01 * span
 
 

@@ -7,7 +7,6 @@ import pytest
 
 from ppafo.analyses.design.front.search import (
     Candidates,
-    Floats,
     SearchTable,
     Worth,
     crowding,
@@ -24,6 +23,7 @@ from ppafo.analyses.design.front.search import (
     survivors,
     survivors_of_many,
 )
+from ppafo.signals.recording import Floats
 
 pytestmark = pytest.mark.thorough
 
