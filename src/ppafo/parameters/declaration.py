@@ -5,6 +5,7 @@ The schema, the conversion to SI, the messages and the table of ``ppafo sets sho
 """
 
 import functools
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from types import MappingProxyType
@@ -119,3 +120,10 @@ def _declare(valve_kinds: Iterable[tuple[str, str]], actuator_kind: str, species
 
 def _at(section: str, quantity: Quantity) -> Quantity:
     return replace(quantity, name=f"{section}.{quantity.name}")
+
+
+def limits_text(quantity: Quantity) -> str:
+    """Return the limits of a declaration with their unit as a message states them: ``at least 0 and at most 1 m``."""
+    lower = f"{'at least' if quantity.minimum_allowed else 'more than'} {quantity.minimum:g}"
+    upper = f" and at most {quantity.maximum:g}" if math.isfinite(quantity.maximum) else ""
+    return f"{lower}{upper} {'' if quantity.unit == '1' else quantity.unit}".rstrip()

@@ -17,7 +17,7 @@ from ppafo.loading import load_scenario, placed
 from ppafo.metrics import METRICS
 from ppafo.model.catalog import find_effects
 from ppafo.model.declaration import Quantity
-from ppafo.parameters.declaration import AREA_FORM, SONIC_FORM, is_within
+from ppafo.parameters.declaration import AREA_FORM, SONIC_FORM, is_within, limits_text
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.parts import Part, load_catalogue
 from ppafo.parameters.parts.catalogue import DEFAULT
@@ -145,9 +145,7 @@ def _variable(path: str, table: VariableTable, quantity: Quantity, atmosphere: f
         with refused_as(StudyError, f"{place}: '{text}'", UnitError):
             value = parse_quantity(text, unit, atmosphere)
         if not is_within(value, quantity):
-            lower = f"{'at least' if quantity.minimum_allowed else 'more than'} {quantity.minimum:g}"
-            most = f"{quantity.maximum:g} {unit}".rstrip()
-            raise StudyError(f"{place}: '{text}': must be {lower} and at most {most}")
+            raise StudyError(f"{place}: '{text}': must be {limits_text(quantity)}")
         numbers.append(value)
     lowest, highest = min(numbers), max(numbers)
     if not table.values and numbers[0] >= numbers[1]:
