@@ -9,8 +9,8 @@ from typing import Any
 from ppafo.errors import ParameterError, nearest_name
 from ppafo.parameters.parts import Catalogue, Part, load_catalogue
 from ppafo.parameters.parts.catalogue import DEFAULT
+from ppafo.report import finding
 from ppafo.report.finding import Finding, columns_of, facts
-from ppafo.report.finding import Part as Section
 from ppafo.report.kind import Kind
 
 
@@ -69,7 +69,7 @@ def parts(part: str | None = None, catalogue: str | Path = DEFAULT) -> Finding[P
             rows = [
                 (item.name, item.title, item.full_mass, check or "-", unknown or "-") for item, check, unknown in lists
             ]
-            sections.append(Section(group.capitalize(), columns_of(_HEAD, rows), left=len(_HEAD)))
+            sections.append(finding.Part(group.capitalize(), columns_of(_HEAD, rows), left=len(_HEAD)))
     else:
         kind = f", {chosen.kind}" if chosen.kind else ""
         said = [f"{chosen.name}: {chosen.title} ({chosen.group}{kind})", *filter(None, (chosen.document, chosen.note))]
@@ -80,7 +80,7 @@ def parts(part: str | None = None, catalogue: str | Path = DEFAULT) -> Finding[P
         remarks = [f"{name}: {figure.note}" for name, figure in chosen.figures.items() if figure.note]
         remarks += [f"not known: {', '.join(chosen.unknown)}"] if chosen.unknown else []
         head = ("figure", "value", "origin", "source")
-        sections = [Section(columns=columns_of(head, figures), remarks=remarks, left=4)]
+        sections = [finding.Part(columns=columns_of(head, figures), remarks=remarks, left=4)]
     return Finding(
         name="parts",
         kicker="Parts",
@@ -92,7 +92,7 @@ def parts(part: str | None = None, catalogue: str | Path = DEFAULT) -> Finding[P
     )
 
 
-def doubts_sections(doubtful: Iterable[tuple[Part, str]]) -> list[Section]:
+def parts_to_check(doubtful: Iterable[tuple[Part, str]]) -> list[finding.Part]:
     """Return which figures of parts are quoted or assumed, a row for each part; the page has the reasons too."""
     pairs = tuple(doubtful)
     if not pairs:
@@ -108,8 +108,8 @@ def doubts_sections(doubtful: Iterable[tuple[Part, str]]) -> list[Section]:
         "quoted from a document that was not itself consulted, or assumed; 'ppafo sets parts PART' gives the reasons"
     )
     return [
-        Section("Check before buying", facts((name, ", ".join(each)) for name, each in by_part.items()), [where]),
-        Section("Why these figures are uncertain", remarks=reasons, is_detail=True),
+        finding.Part("Check before buying", facts((name, ", ".join(each)) for name, each in by_part.items()), [where]),
+        finding.Part("Why these figures are uncertain", remarks=reasons, is_detail=True),
     ]
 
 
@@ -120,6 +120,6 @@ def doubts_data(doubtful: Iterable[tuple[Part, str]]) -> list[dict[str, Any]]:
     ]
 
 
-def titles_section(parts: Iterable[Part]) -> Section:
+def part_titles(parts: Iterable[Part]) -> finding.Part:
     """Return maker and model of parts, each once, for the page."""
-    return Section("Parts", facts({part.name: part.title for part in parts}.items()), is_detail=True)
+    return finding.Part("Parts", facts({part.name: part.title for part in parts}.items()), is_detail=True)

@@ -12,11 +12,11 @@ import numpy as np
 from ppafo.analyses.design.front.problem import GAS, OBJECTIVES, SEARCHED_STREAMS, DesignProblem
 from ppafo.analyses.design.front.search import PATIENCE
 from ppafo.analyses.design.looks import COLOURS, RING
-from ppafo.analyses.parts.solve import doubts_data, doubts_sections, titles_section
+from ppafo.analyses.parts.solve import doubts_data, part_titles, parts_to_check
 from ppafo.parameters.parts import Part
+from ppafo.report import finding
 from ppafo.report.display_units import quantity_of_unit
 from ppafo.report.finding import Cell, Column, Finding, columns_of
-from ppafo.report.finding import Part as Section
 from ppafo.report.kind import Kind
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import BLACK, GREY
@@ -239,15 +239,15 @@ def finding_of(design: Design) -> Finding[Design]:
         title=problem.name,
         said=(problem.description,) if problem.description else (),
         parts=(
-            Section("The front", said=[front], is_detail=True),
-            Section(
+            finding.Part("The front", said=[front], is_detail=True),
+            finding.Part(
                 "Designs",
                 _columns(design, points),
                 marked=[row for row, place in enumerate(design.shown) if place == design.knee],
                 left=2,
             ),
-            Section(remarks=_remarks(design)),
-            Section(
+            finding.Part(remarks=_remarks(design)),
+            finding.Part(
                 "Error, gas and mass",
                 panels=lambda: design_panels(design),
                 name="front",
@@ -257,16 +257,16 @@ def finding_of(design: Design) -> Finding[Design]:
                 is_detail=True,
             ),
             *_suggestion(design),
-            Section("Method", columns_of(titles, tasks), remarks=(_MEANS, again), is_detail=True),
-            *doubts_sections(design.doubtful),
-            titles_section(part for point in points for part in (point.valve, point.actuator)),
+            finding.Part("Method", columns_of(titles, tasks), remarks=(_MEANS, again), is_detail=True),
+            *parts_to_check(design.doubtful),
+            part_titles(part for point in points for part in (point.valve, point.actuator)),
         ),
         found=design,
         files={"front.csv": lambda: front_table(design).encode()},
     )
 
 
-def _suggestion(design: Design) -> Iterator[Section]:
+def _suggestion(design: Design) -> Iterator[finding.Part]:
     """Yield the suggestion as it ran once more in each task, with its figure and the command that repeats it."""
     for number, rerun in enumerate(design.suggested, 1):
         found = rerun.result.metrics
@@ -274,12 +274,12 @@ def _suggestion(design: Design) -> Iterator[Section]:
             OBJECTIVES["error"].text(found[design.problem.error].value),
             OBJECTIVES["gas"].text(found[GAS].value),
         )
-        yield Section(
+        yield finding.Part(
             "The suggestion, run once more" if number == 1 else "",
             remarks=[f"in '{rerun.task}': error {error}, gas {gas}; this command repeats the run"],
             code=rerun.command,
         )
-        yield Section(
+        yield finding.Part(
             f"The run in '{rerun.task}'",
             name="suggested" if number == 1 else f"suggested-{number}",
             caption=f"The suggestion in the task '{rerun.task}'.",

@@ -22,14 +22,14 @@ from ppafo.analyses.design.profile.search import (
 from ppafo.analyses.endurance.discharge import TIME_IS_UP
 from ppafo.analyses.endurance.draw import draw_of_numbers
 from ppafo.analyses.endurance.solve import follow_bottle
-from ppafo.analyses.parts.solve import doubts_data, doubts_sections, titles_section
+from ppafo.analyses.parts.solve import doubts_data, part_titles, parts_to_check
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.errors import ParameterError
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle, scaled_entries
 from ppafo.parameters.parts import Part
 from ppafo.progress import Progress, Report, report_nothing
+from ppafo.report import finding
 from ppafo.report.finding import Cell, Finding, columns_of
-from ppafo.report.finding import Part as Section
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import BLACK, GREY, REFERENCE
@@ -289,7 +289,7 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
         said=(*([problem.description] if problem.description else []), wanted),
         parts=(
             *_tables(sizing),
-            Section(
+            finding.Part(
                 remarks=(
                     suggestion_sentence(sizing),
                     *(f"{item.valve.name}: {item.remark}" for item in sizing.valves if item.remark),
@@ -297,7 +297,7 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
                     f"{sizing.runs:,} runs in {sizing.seconds:.0f} s; {failures}",
                 )
             ),
-            Section(
+            finding.Part(
                 "Error and gas over pressure",
                 panels=lambda: pressure_panels(sizing),
                 name="profile",
@@ -306,7 +306,7 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
                 size=(4.5, 3.3),
                 is_detail=True,
             ),
-            Section(
+            finding.Part(
                 "The torque",
                 panels=lambda: [torque_panel(sizing)],
                 name="torque",
@@ -314,9 +314,9 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
                 size=(9.0, 3.0),
                 is_detail=True,
             ),
-            *doubts_sections(sizing.doubtful),
-            Section("How to read it", said=(*_READING, *method), is_detail=True),
-            titles_section([item.valve for item in sizing.valves]),
+            *parts_to_check(sizing.doubtful),
+            finding.Part("How to read it", said=(*_READING, *method), is_detail=True),
+            part_titles([item.valve for item in sizing.valves]),
         ),
         found=sizing,
         passed=sizing.choice is not None,
@@ -324,7 +324,7 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
     )
 
 
-def _tables(sizing: Sizing) -> tuple[Section, Section]:
+def _tables(sizing: Sizing) -> tuple[finding.Part, finding.Part]:
     """Return a row for each valve, and the margins and gains of those that work."""
     rows: list[tuple[Cell, ...]] = []
     margins: list[tuple[Cell, ...]] = []
@@ -351,8 +351,8 @@ def _tables(sizing: Sizing) -> tuple[Section, Section]:
     head: list[str | tuple[str, Kind]] = ["valve", *((f"{name} margin", fraction) for name in _MARGINS), "gains"]
     chosen = () if sizing.suggested is None else (sizing.suggested,)
     return (
-        Section("Valves", columns_of(_HEAD, rows), marked=chosen),
-        Section("Margins" if margins else "", columns_of(head, margins), marked=marked),
+        finding.Part("Valves", columns_of(_HEAD, rows), marked=chosen),
+        finding.Part("Margins" if margins else "", columns_of(head, margins), marked=marked),
     )
 
 

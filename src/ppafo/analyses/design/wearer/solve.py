@@ -16,7 +16,7 @@ import numpy as np
 from ppafo.analyses.design.wearer.electrical import Electrical, electrical_of, electrical_sentences
 from ppafo.analyses.endurance.answer import Endurance
 from ppafo.analyses.endurance.solve import endurance_of_walk
-from ppafo.analyses.parts.solve import doubts_data, doubts_sections, titles_section
+from ppafo.analyses.parts.solve import doubts_data, part_titles, parts_to_check
 from ppafo.constants import PASCALS_PER_PSI, STANDARD_ATMOSPHERE
 from ppafo.control.walking.assistance import ASSISTANCE_QUANTITIES
 from ppafo.errors import ScenarioError, StudyError
@@ -25,8 +25,8 @@ from ppafo.model.plant_faults import SHUT_OFF
 from ppafo.parameters.declaration import ACTUATOR, ORIFICE
 from ppafo.parameters.parts import Part, load_catalogue
 from ppafo.progress import Progress, Report
+from ppafo.report import finding
 from ppafo.report.finding import Finding, columns_of, facts
-from ppafo.report.finding import Part as Section
 from ppafo.report.kind import Kind
 from ppafo.version import __version__
 from ppafo.walking.bottle import WALKED, minutes_text
@@ -458,25 +458,25 @@ def finding_of(sizing: WearerSizing) -> Finding[WearerSizing]:
         (one.valve.name, one.actuator.name, one.torque, one.flow, one.mass)
         for one in sorted(sizing.tried, key=lambda one: -one.torque)
     ]
-    tried = Section("What was walked with", columns_of(_HEAD, rows), left=2, is_detail=device is not None)
+    tried = finding.Part("What was walked with", columns_of(_HEAD, rows), left=2, is_detail=device is not None)
     stature = f"{wish.height:.4g} m{' (assumed: give --stature)' if wish.stature is None else ''}"
     sections = (
-        (Section(remarks=("no device of the catalogue has this; give up one of:", *sizing.instead)), tried)
+        (finding.Part(remarks=("no device of the catalogue has this; give up one of:", *sizing.instead)), tried)
         if device is None
-        else (*_sections(wish, device), tried, *doubts_sections(sizing.doubtful), titles_section(sizing.parts))
+        else (*_sections(wish, device), tried, *parts_to_check(sizing.doubtful), part_titles(sizing.parts))
     )
     return Finding(
         name="design",
         kicker="From a wearer to a device",
         title="The device",
         said=(f"a wearer of {wish.mass:.4g} kg and {stature}; {_wished(wish)}",),
-        parts=(*sections, Section("How to read it", said=_READING, is_detail=True)),
+        parts=(*sections, finding.Part("How to read it", said=_READING, is_detail=True)),
         found=sizing,
         passed=device is not None,
     )
 
 
-def _sections(wish: Wish, device: Device) -> tuple[Section, ...]:
+def _sections(wish: Wish, device: Device) -> tuple[finding.Part, ...]:
     walked = device.walked
     share = device.torque / wish.torque
     # A walk on a bottle may end at nine tenths of the request, so how far it fell short is said.
@@ -501,7 +501,7 @@ def _sections(wish: Wish, device: Device) -> tuple[Section, ...]:
     caption, draw = _CAPTION.format(wished=wanted, lasts=lasts), partial(bottle_figure, walked)
     masses = ((name, _MASS.text(mass, ".0f")) for name, mass in device.masses.items())
     return (
-        Section("The walk on its bottle", facts(rows), remarks=remarks, code=device.command),
-        Section("What it weighs", facts(masses)),
-        Section("The bottle over the walk", name="bottle", caption=caption, draw=draw, is_detail=True),
+        finding.Part("The walk on its bottle", facts(rows), remarks=remarks, code=device.command),
+        finding.Part("What it weighs", facts(masses)),
+        finding.Part("The bottle over the walk", name="bottle", caption=caption, draw=draw, is_detail=True),
     )
