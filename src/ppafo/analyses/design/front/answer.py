@@ -89,11 +89,11 @@ class Design:
     suggested: tuple[Rerun, ...] = ()
 
     @property
-    def doubtful(self) -> tuple[tuple[Part, str], ...]:
-        """Figures that are quoted or assumed, of the parts on the front and of those that every design carries."""
+    def parts(self) -> list[Part]:
+        """The parts on the front and those that every design carries."""
         used = {part.name for point in self.front for part in (point.valve, point.actuator)}
         used |= {part.name for part in self.problem.carried}
-        return tuple((part, name) for part in self.problem.parts if part.name in used for name in part.doubtful)
+        return [part for part in self.problem.parts if part.name in used]
 
     def json_document(self) -> dict[str, Any]:
         """Return the front and how it was found as plain data in SI."""
@@ -137,7 +137,7 @@ class Design:
                 "settled": self.settled,
                 "hypervolume": [{"designs": count, "share": fraction} for count, fraction in self.growth],
             },
-            "doubtful": doubts_data(self.doubtful),
+            "doubtful": doubts_data(self.parts),
             "versions": {"ppafo": __version__},
         }
 
@@ -258,7 +258,7 @@ def finding_of(design: Design) -> Finding[Design]:
             ),
             *_suggestion(design),
             finding.Part("Method", columns_of(titles, tasks), remarks=(_MEANS, again), is_detail=True),
-            *parts_to_check(design.doubtful),
+            *parts_to_check(design.parts),
             part_titles(part for point in points for part in (point.valve, point.actuator)),
         ),
         found=design,

@@ -112,13 +112,10 @@ class Sizing:
         return None if self.suggested is None else self.valves[self.suggested]
 
     @property
-    def doubtful(self) -> tuple[tuple[Part, str], ...]:
-        """Figures that are quoted or assumed, of the parts that the result rests on."""
-        problem = self.problem
+    def parts(self) -> tuple[Part, ...]:
+        """The parts that the result rests on, each once."""
         parts = [item.valve for item in self.valves] + [item.bottle for item in self.valves if item.bottle is not None]
-        parts += problem.carried
-        once = {(part.group, part.name): part for part in parts}.values()
-        return tuple((part, name) for part in once for name in part.doubtful)
+        return tuple({(part.group, part.name): part for part in (*parts, *self.problem.carried)}.values())
 
     def json_document(self) -> dict[str, Any]:
         """Return the valves and the suggestion as plain data in SI."""
@@ -167,7 +164,7 @@ class Sizing:
             "noise_streams": self.streams,
             "runs": self.runs,
             "failures": [{"reason": reason, "runs": count} for reason, count in self.failures.items()],
-            "doubtful": doubts_data(self.doubtful),
+            "doubtful": doubts_data(self.parts),
             "versions": {"ppafo": __version__},
         }
 
@@ -314,7 +311,7 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
                 size=(9.0, 3.0),
                 is_detail=True,
             ),
-            *parts_to_check(sizing.doubtful),
+            *parts_to_check(sizing.parts),
             finding.Part("How to read it", said=(*_READING, *method), is_detail=True),
             part_titles([item.valve for item in sizing.valves]),
         ),
