@@ -219,6 +219,7 @@ def kind_of_comments(comments: Iterable[str]) -> RecordingKind:
 
 def _table(header: list[str], rows: Iterable[list[str]], skipped: int) -> Floats:
     """Return the numbers below the header, row by row: the texts of a large file take many times its room."""
+    # Blank lines may only follow the last row: one between rows is a sample that was lost.
     numbers, blank = array("d"), None
     for line, row in enumerate(rows, start=skipped + 2):
         if not row:
@@ -233,6 +234,7 @@ def _table(header: list[str], rows: Iterable[list[str]], skipped: int) -> Floats
             values = [float(cell) for cell in row]
         except ValueError as error:
             raise _no_number(header, row, line) from error
+        # All cells at once, as one by one costs more than reading the numbers.
         whole = "".join(row)
         if not whole.isascii() or _UNDERSCORE in whole or not all(map(math.isfinite, values)):
             raise _no_number(header, row, line)

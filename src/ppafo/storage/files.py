@@ -83,6 +83,7 @@ def replace_folder(folder: Path, contents: Mapping[str, bytes]) -> None:
             for name, content in contents.items():
                 (aside / name).parent.mkdir(parents=True, exist_ok=True)
                 (aside / name).write_bytes(content)
+            # The last moment at which an interrupt leaves the folder as it was.
             interrupts.check()
             _swap(aside, target)
         finally:
@@ -197,6 +198,7 @@ def _exchange(one: Path, other: Path) -> bool:
 
 def _sibling(target: Path, purpose: str) -> Path:
     """Return a path beside ``target``, on the same disk, that nothing has yet."""
+    # Beside it, as a rename is one step on one disk only; with a random part, as two commands may write at once.
     return target.with_name(f".{target.name}.{purpose}-{secrets.token_hex(4)}")
 
 

@@ -285,6 +285,7 @@ def _with_direction(recording: Recording, wanted: MappedDirection) -> Recording:
     sums = np.concatenate(([0.0], np.cumsum(recording[wanted.of])))
     times = np.concatenate(([0.0], np.cumsum(time)))
     here = np.arange(time.size)
+    # At least the sample itself on either side, where the window is shorter than a sample.
     first = np.minimum(np.searchsorted(time, time - 0.5 * window), here)
     last = np.maximum(np.searchsorted(time, time + 0.5 * window, side="right"), here + 1)
     before, after = here - first + 1, last - here

@@ -87,6 +87,7 @@ def netcdf_bytes(recording: Recording, scenario: Mapping[str, Any] | None = None
     import h5netcdf
 
     buffer = io.BytesIO()
+    # Nothing in the file depends on when it was made, so that equal recordings are equal bytes.
     with h5netcdf.File(buffer, "w") as file:
         file.dimensions = {TIME: len(recording)}
         file.attrs.update(global_attributes(recording, scenario))
@@ -182,6 +183,7 @@ def _check_chunks(name: str, variable: Any) -> None:
     most = chunks[0] * variable.dtype.itemsize + _CHECKSUM_ROOM
     for number in range(count):
         stored = variable.id.get_chunk_info(number)
+        # Unpacked here, with a limit, before the library takes as much memory as a damaged chunk asks for.
         unpacker = zlib.decompressobj()
         packed = b"" if variable.compression is None else variable.id.read_direct_chunk(stored.chunk_offset)[1]
         try:

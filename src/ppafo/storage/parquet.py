@@ -49,6 +49,7 @@ def parquet_bytes(table: "pa.Table") -> bytes:
     """
     import pyarrow.parquet as pq
 
+    # Bytes of one significance are alike from row to row, and texts are few that repeat.
     floats = [field.name for field in table.schema if str(field.type) in _FLOATING]
     texts = [field.name for field in table.schema if str(field.type).startswith("dictionary")]
     buffer = io.BytesIO()

@@ -130,6 +130,7 @@ class DiskFolder:
 
     def tidy(self) -> None:
         """Remove files that were being written when a process was killed: a younger one may belong to another."""
+        # By age and not by process: the folder may be shared by machines that cannot see each other's processes.
         latest = time.time() - _LONGEST_WRITING
         for path in self.folder.rglob(f"*{LEFT_ASIDE}*"):
             with contextlib.suppress(OSError):

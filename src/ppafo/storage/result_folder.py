@@ -108,6 +108,7 @@ def check_owned_folder(folder: Path, kind: FolderKind, kept: Mapping[str, bytes]
     Files that are ``kept`` as they are, such as one that grows from run to run, may have been changed.
     """
     is_folder = os.path.isdir(folder)  # noqa: PTH112  # Path.is_dir raises where no file can have the name
+    # A link to nowhere is there too, and would be replaced by a folder.
     if not is_folder and os.path.lexists(folder):
         raise DataError(f"{folder}: is a file; a {kind.noun} needs a folder")
     present = {entry.name for entry in _listed(folder)} if is_folder else set()
@@ -126,6 +127,7 @@ def _check_own(folder: Path, kind: FolderKind, kept: Mapping[str, bytes], presen
             f"{folder / kind.mark}: states no hashes of its files, as earlier versions of ppafo did not; remove the "
             "folder yourself, or choose another one"
         )
+    # Before hashes are compared: a file of somebody else's is the likelier and the clearer reason.
     foreign = sorted(_foreign(folder, {*hashes, kind.mark}))
     if foreign:
         raise DataError(

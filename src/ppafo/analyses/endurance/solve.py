@@ -98,6 +98,7 @@ def endurance_of_walk(result: WalkResult, bottle: str | Path | None = None) -> E
     course.
     """
     gas = walk_gas(result)
+    # A walk that takes no gas lasts for ever on any bottle.
     return None if gas.gas_per_stride <= 0.0 else endurance_of_walk_gas(gas, bottle, WITHOUT_REST)
 
 
@@ -117,6 +118,7 @@ def endurance_of_walk_gas(
     # Of a wearer whose strides no gait sets the time walked counts them, by the mean stride at the set pressure.
     if not walk_of(carried).is_led:
         life = replace(life, repeats=life.walked / at_set_pressure.stride_time)
+    # A bottle may end before the first stride does.
     strides = max(life.repeats, 1.0e-9)
     stride_time, mass = life.walked / strides, life.course.regulated / strides
     before = Kind("", "kg", "gas mass", ".3g").text(at_set_pressure.mass_per_stride)

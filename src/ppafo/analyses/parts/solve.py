@@ -61,6 +61,7 @@ def parts(part: str | None = None, catalogue: str | Path = DEFAULT) -> Finding[P
         )
     chosen = None if part is None else named[part]
     if chosen is None:
+        # Notes are written over several lines of a file: how they were broken there means nothing.
         notes = "\n".join(textwrap.wrap(" ".join(loaded.notes.split()), _WIDTH))
         said = [f"{loaded.name}: {loaded.title}", *([notes] if notes else [])]
         sections = []
@@ -97,6 +98,7 @@ def parts_to_check(parts: Iterable[Part]) -> list[finding.Part]:
     pairs = [(part, name) for part in parts for name in part.doubtful]
     if not pairs:
         return []
+    # A row for each part, since a person orders parts; a reason for each figure, since each has its own.
     by_part: dict[str, list[str]] = {}
     reasons = []
     for part, name in pairs:

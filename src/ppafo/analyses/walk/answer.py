@@ -312,6 +312,7 @@ def comparison_table(comparison: Comparison) -> list[Column]:
 
 def strides_csv(result: WalkResult) -> bytes:
     """Return the numbers of each whole stride; the start of each is the sample right after its heel strike."""
+    # The last strike begins a stride that the end of the walk cuts off: it has no numbers.
     count = result.strides["gas"].size
     columns = {"stride [-]": np.arange(1.0, count + 1.0), "start [s]": result.recording.time[result.starts[:count]]}
     columns |= {f"{name} [{item.unit}]": result.strides[name] for name, item in PER_STRIDE.items()}
@@ -321,6 +322,7 @@ def strides_csv(result: WalkResult) -> bytes:
 
 def mean_stride_csv(result: WalkResult) -> bytes:
     """Return mean and standard deviation over strides of each channel, at every percent of the stride."""
+    # Without a whole stride the file has its head alone.
     columns = {"phase [-]": PHASES} if result.averages else {"phase [-]": PHASES[:0]}
     for name, curves in result.averages.items():
         columns[f"{name} [{curves.unit}]"] = curves.mean
@@ -351,6 +353,7 @@ def walk_with_and_without(
     for bad input; a walk that diverges is a finding that has not passed.
     """
     chosen = configuration
+    # The options of the command line belong to a file: a scenario that was built has all of it already.
     if not isinstance(chosen, Scenario):
         check_duration_once(overrides, minutes)
         chosen = load_walk(chosen, overrides, gait, course, bottle)

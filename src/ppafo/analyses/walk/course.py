@@ -80,6 +80,7 @@ def _facts(worn: WalkResult, supply: SupplyCourse) -> list[tuple[str, str]]:
         ("coldest gas at the device", _WARMTH.text(float(values["gas_temperature"].min()))),
         ("seat free of ice, at least", _SHARE.text(float(values["seat_open"].min()))),
     ]
+    # The third stride is the first in which the controller knows the stride time.
     if peaks.size > 3:
         third, last = (_TORQUE.text(float(peak)) for peak in (peaks[2], peaks[-1]))
         rows.append(("peak torque of a stride", f"{third} in the third, {last} in the last"))
@@ -232,8 +233,10 @@ def trust_remark(configuration: Scenario) -> str:
         return f"gait '{gait.name}' has no walking speed: how far its strides can be scaled is not known"
     given = [item.values["speed"] for item in course.segments if "speed" in item.values]
     recorded = gait.walking_speed or 0.0
+    # A cadence counts steps of both feet; the speed goes with its square, as the walk ratio is constant.
     ratios = [0.5 * item.values["cadence"] * gait.stride_time for item in course.segments if "cadence" in item.values]
     speeds = [*given, *(recorded * ratio * ratio for ratio in ratios)]
+    # A speed at the edge, written in another unit, is not beyond it.
     far = sorted({f"{speed:.2g}" for speed in speeds if not low - 1.0e-9 <= speed <= high + 1.0e-9})
     if not far:
         return ""

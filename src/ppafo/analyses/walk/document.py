@@ -82,6 +82,7 @@ def toes(height: float | None) -> float | str | None:
 
 def metrics_table(rows: Sequence[Row], columns: Sequence[tuple[str, Mapping[str, float | str | None]]]) -> list[Column]:
     """Return a row for each number that one of the columns has: title and values [SI]; each column has its head."""
+    # A number that no walk of the table has would be a row of dashes.
     shown = [row for row in rows if any(values.get(row[0]) is not None for _, values in columns)]
     cells = (number_texts(row, (values.get(row[0]) for _, values in columns)) for row in shown)
     return columns_of(["", *(head for head, _ in columns)], cells)

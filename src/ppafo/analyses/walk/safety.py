@@ -63,6 +63,7 @@ def safety_remarks(worn: WalkResult) -> list[str]:
 
 def over_time_parts(worn: WalkResult) -> tuple[Part, ...]:
     """Return the walk over time, where something happened in it."""
+    # A figure of an even walk shows nothing that the mean stride does not.
     if not worn.events and not failures(worn.scenario):
         return ()
     draw = partial(over_time_figure, worn)

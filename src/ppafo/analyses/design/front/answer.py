@@ -200,6 +200,7 @@ def _scale(set_scale: "Callable[[str], None]", axis: "Axis", values: Floats) -> 
 
     if not (values.min() > 0.0 and values.max() > _LOGARITHMIC_FROM * values.min()):
         return
+    # Powers of ten alone on a long axis, 1, 2 and 5 on a short one, which might have a single tick else.
     set_scale("log")
     is_long = np.log10(values.max() / values.min()) > _MAXIMUM_TICKS_OF_ONE_DECADE
     axis.set_major_locator(LogLocator(subs=(1.0,) if is_long else (1.0, 2.0, 5.0)))

@@ -151,6 +151,7 @@ class Evaluation:
             for scenario in task.scenarios.values():
                 found = moving_together(scenario, {path: chosen[path] for path in SUPPLIES if path in chosen})
                 for path in SUPPLIES[:2]:
+                    # One pressure may follow the other: all are asked for, not the variables alone.
                     highest = np.maximum(highest, found.get(path, number_at(scenario, path)))
         total += np.asarray(np.maximum(0.0, highest / ratings - 1.0))
         return np.where(np.isfinite(objectives).all(axis=1) & np.isfinite(total), total, np.inf)
@@ -262,6 +263,7 @@ def _standing(evaluation: Evaluation, front: Front) -> tuple[Candidates, Judged]
     stand = (
         np.flatnonzero(non_dominated(worth) & worth.is_feasible) if evaluation.seeds.size else np.arange(len(chosen))
     )
+    # By error, then gas, then mass: ``lexsort`` takes the last key first.
     order = stand[np.lexsort(worth.objectives[stand].T[::-1])]
     tasks = tuple({name: values[:, order] for name, values in task.items()} for task in judged.tasks)
     return chosen.at(order), Judged(worth.at(order), tasks, judged.error[:, order], judged.gas[:, order])

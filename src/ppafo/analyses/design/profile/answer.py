@@ -380,6 +380,7 @@ def size_for_profile(problem: SizingProblem, threads: int | None = None, report:
         report(Progress(f"trying {valve.name}", place, len(problem.valves), 0, 0, passed, "valves"))
         sized.append(_size_valve(trials, valve))
     good = [place for place, item in enumerate(sized) if item.works and item.mass is not None]
+    # Of valves with the same bottle and mass the one at the lowest pressure.
     suggested = min(good, key=lambda place: (sized[place].mass, sized[place].pressure), default=None)
     recording = None
     if suggested is not None:

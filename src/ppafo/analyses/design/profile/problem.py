@@ -122,6 +122,7 @@ def choose_knots(time: Floats, torque: Floats) -> tuple[Floats, Floats]:
     Between the last sample and the next repetition there is nothing to choose.
     """
     chosen = [0, time.size - 1]
+    # Greedy, not best: a profile has few features, and each knot takes away what is worst.
     while len(chosen) < min(KNOTS, time.size):
         between = np.interp(time, time[chosen], torque[chosen])
         worst = int(np.argmax(np.abs(between - torque)))
