@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from importlib import resources
 from pathlib import Path
 from types import GenericAlias
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field
 
@@ -33,9 +33,6 @@ from ppafo.parameters.parameter_set import (
     chosen_valve,
 )
 from ppafo.units import check_unit
-
-if TYPE_CHECKING:  # few devices have a measured actuator
-    from ppafo.model.actuators.table import Table
 
 # A dotted path names a valve: a dot or a blank in its name would make it another path.
 _VALVE_NAME = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$")]
@@ -217,20 +214,17 @@ def _load_kinds(document: dict[str, Any]) -> None:
     find_effects(f"{SECTION}.{name}" for name in (effects if isinstance(effects, dict) else ()))
 
 
-def _read_table(actuator: Any, folder: Path) -> "Table | None":
-    """Return what the file of an actuator holds; None for a kind without one."""
-    declared = None if actuator is None else ACTUATORS[actuator.kind].model.table
-    if declared is None:
-        return None
-    # Few devices have a measured actuator.
-    from ppafo.model.actuators.table import Table
-    from ppafo.parameters.actuator_table import read_actuator_table
-
-    return read_actuator_table(folder / actuator.file) if declared is Table else None
-
-
 def _flatten(parsed: Any, file: str, folder: Path) -> ParameterSet:
     leaves = dict(_leaves(parsed, ""))
+    actuator, measured = parsed.actuator, None
+    # Few devices have a measured actuator, so what reads its file is loaded late.
+    if actuator is not None and ACTUATORS[actuator.kind].model.table is not None:
+        from ppafo.model.actuators.table import Table
+        from ppafo.parameters.actuator_table import read_actuator_table
+
+        # A file of another form, of another package's kind, has no reader here.
+        if ACTUATORS[actuator.kind].model.table is Table:
+            measured = read_actuator_table(folder / actuator.file)
     return ParameterSet(
         file=file,
         name=parsed.name,
@@ -241,9 +235,9 @@ def _flatten(parsed: Any, file: str, folder: Path) -> ParameterSet:
         parent=beside(parsed.parent, folder, list_sets()) if parsed.parent else "",
         default_valve=parsed.default_valve,
         valve_kinds={name: valve.kind for name, valve in parsed.valves.items()},
-        actuator_kind=VANE if parsed.actuator is None else parsed.actuator.kind,
-        actuator_file=getattr(parsed.actuator, "file", ""),
-        actuator_table=_read_table(parsed.actuator, folder),
+        actuator_kind=VANE if actuator is None else actuator.kind,
+        actuator_file=getattr(actuator, "file", ""),
+        actuator_table=measured,
         numbers={path: leaf for path, leaf in leaves.items() if isinstance(leaf, Entry)},
         texts={path: leaf for path, leaf in leaves.items() if isinstance(leaf, TextEntry)},
         flags={path: leaf for path, leaf in leaves.items() if isinstance(leaf, FlagEntry)},

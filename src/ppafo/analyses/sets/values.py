@@ -41,6 +41,15 @@ def shown_values(parameter_set: ParameterSet) -> Finding[dict[str, Any]]:
         year = f" ({citation['year']})" if citation["year"] else ""
         doi = f" doi:{citation['doi']}" if citation["doi"] else ""
         cited = f"{authors}{citation['title']}{year}.{doi} {citation['note']}".strip()
+    rows = []
+    for value in document["values"]:
+        number = value["value"]
+        # A flag is a number to Python: it is asked for first.
+        written = str(number).lower() if isinstance(number, bool) else number
+        written = written if isinstance(written, str) else f"{number:.6g}"
+        if value.get("uncertainty") is not None:
+            written += f" +- {value['uncertainty']:.3g}"
+        rows.append((value["path"], written, value.get("unit", ""), value["origin"], value["source"]))
     valves = ", ".join(f"{name} ({kind})" for name, kind in document["valves"].items())
     return Finding(
         name=document["name"],
@@ -51,7 +60,7 @@ def shown_values(parameter_set: ParameterSet) -> Finding[dict[str, Any]]:
             Part(said=_wrapped(cited)),
             Part(said=[f"valves: {valves}; default {document['default_valve']}; actuator: {document['actuator']}"]),
             Part(
-                columns=columns_of(_COLUMNS, map(_cells, document["values"])),
+                columns=columns_of(_COLUMNS, rows),
                 remarks=[
                     text
                     for value in document["values"]
@@ -70,12 +79,3 @@ def shown_values(parameter_set: ParameterSet) -> Finding[dict[str, Any]]:
 
 def _wrapped(text: str) -> list[str]:
     return textwrap.wrap(text, _WIDTH)
-
-
-def _cells(value: dict[str, Any]) -> tuple[str, ...]:
-    number = value["value"]
-    is_number = not isinstance(number, str | bool)
-    written = f"{number:.6g}" if is_number else str(number).lower() if isinstance(number, bool) else number
-    if value.get("uncertainty") is not None:
-        written += f" +- {value['uncertainty']:.3g}"
-    return (value["path"], written, value.get("unit", ""), value["origin"], value["source"])

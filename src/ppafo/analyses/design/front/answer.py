@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ppafo.analyses.design.front.problem import GAS, OBJECTIVES, SEARCHED_STREAMS, DesignProblem
+from ppafo.analyses.design.front.problem import GAS, OBJECTIVES, DesignProblem
 from ppafo.analyses.design.front.search import PATIENCE
 from ppafo.analyses.design.looks import COLOURS, RING
+from ppafo.analyses.design.trials import STREAMS
 from ppafo.analyses.parts.solve import doubts_data, part_titles, parts_to_check
 from ppafo.parameters.parts import Part
 from ppafo.report import finding
@@ -336,7 +337,7 @@ def _remarks(design: Design) -> list[str]:
     if design.streams:
         fallen = f"; {design.fallen} that were good in the first streams alone are left out" if design.fallen else ""
         remarks.append(
-            f"sensors are noisy: every design was tried in the same {SEARCHED_STREAMS} noise streams, keeping the "
+            f"sensors are noisy: every design was tried in the same {STREAMS} noise streams, keeping the "
             f"constraints in each; error and gas above are means over {design.streams} new ones, in which the front "
             f"was made again{fallen}. Error from noise is the standard deviation from one stream to another"
         )

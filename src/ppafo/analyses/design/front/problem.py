@@ -381,7 +381,3 @@ def _constraints(document: DesignFile, tasks: Sequence[Task], file: str) -> tupl
             )
         found.append(Constraint(_OWN_NAMES.get(name, name), units[name], least, most))
     return tuple(found)
-
-
-SEARCHED_STREAMS, FRESH_STREAMS = 16, 64
-"""Noise streams over which every candidate of a noisy task is judged, and those, all new, over which a front is."""

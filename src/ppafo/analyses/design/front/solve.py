@@ -12,11 +12,9 @@ from numpy.typing import NDArray
 from ppafo.analyses.design.front.answer import Design, DesignPoint, Rerun
 from ppafo.analyses.design.front.problem import (
     DEAD_VOLUME,
-    FRESH_STREAMS,
     GAS,
     OBJECTIVES,
     OWN,
-    SEARCHED_STREAMS,
     SIZE,
     DesignProblem,
     Task,
@@ -30,7 +28,7 @@ from ppafo.analyses.design.front.search import (
     representatives,
     search_front,
 )
-from ppafo.analyses.design.trials import run_trials
+from ppafo.analyses.design.trials import STREAMS, run_trials
 from ppafo.errors import ScenarioError, StudyError
 from ppafo.parameters.graph import ATMOSPHERE_PATH, PRESSURE_PATH, SECOND_PRESSURE_PATH
 from ppafo.parameters.overrides import over
@@ -46,6 +44,8 @@ from ppafo.studies.sampling import NOISE, with_noise
 Members = NDArray[np.intp]
 SUPPLIES = (PRESSURE_PATH, SECOND_PRESSURE_PATH, ATMOSPHERE_PATH)
 """What decides about the pressures that parts must stand."""
+FRESH_STREAMS = 64
+"""Noise streams, all new, over which a front is judged: what was chosen in the searched ones was lucky there too."""
 _MAXIMUM_REASONS = 20
 """Reasons of failed runs that are kept: each names its own moment, so they are nearly as many as the runs."""
 
@@ -77,7 +77,7 @@ class Evaluation:
         self.runs = 0
         self.failed = 0
         self.reasons: dict[str, str] = {}
-        self.seeds = noise_streams(problem, 0, SEARCHED_STREAMS)
+        self.seeds = noise_streams(problem, 0, STREAMS)
         self._threads = threads
         own = (item.name for item in problem.constraints if item.name not in OBJECTIVES)
         self._metrics = tuple(dict.fromkeys([problem.error, GAS, *own]))
@@ -95,7 +95,13 @@ class Evaluation:
             np.sum([weight * found[name] for weight, found in zip(weights, metrics, strict=True)], axis=0)
             for name in (problem.error, GAS)
         )
-        objectives = np.stack([error.mean(axis=0), gas.mean(axis=0), self.masses(candidates)], axis=1)
+        valves = np.array([item.valve.full_mass for item in problem.combinations])
+        actuators = np.array([item.actuator.full_mass for item in problem.combinations])
+        size = values_of(problem, candidates).get(SIZE, np.ones(len(candidates)))
+        fixed = problem.other_mass + sum(part.full_mass for part in problem.carried)
+        # All that is carried; an actuator that is scaled has its part's mass times the scale.
+        mass = valves[candidates.choice] + size * actuators[candidates.choice] + fixed
+        objectives = np.stack([error.mean(axis=0), gas.mean(axis=0), mass], axis=1)
         worth = Worth(objectives, self._violation(candidates, objectives, metrics))
         return Judged(worth, metrics, error, gas)
 
@@ -116,15 +122,6 @@ class Evaluation:
             for reason in outcome.reasons[: _MAXIMUM_REASONS - len(self.reasons)]:
                 self.reasons.setdefault(reason, task.name)
         return found
-
-    def masses(self, candidates: Candidates) -> Floats:
-        """Return the mass [kg] (candidates,) of all that is carried."""
-        problem = self.problem
-        valves = np.array([item.valve.full_mass for item in problem.combinations])
-        actuators = np.array([item.actuator.full_mass for item in problem.combinations])
-        size = values_of(problem, candidates).get(SIZE, np.ones(len(candidates)))
-        fixed = problem.other_mass + sum(part.full_mass for part in problem.carried)
-        return np.asarray(valves[candidates.choice] + size * actuators[candidates.choice] + fixed)
 
     def _violation(self, candidates: Candidates, objectives: Floats, metrics: Sequence[Mapping[str, Floats]]) -> Floats:
         total = np.zeros(len(candidates))
@@ -258,7 +255,7 @@ def _standing(evaluation: Evaluation, front: Front) -> tuple[Candidates, Judged]
     The search chose what was good in its own streams, by luck too; of the new ones the front is made again.
     """
     chosen = front.candidates
-    judged = evaluation.judge(chosen, noise_streams(evaluation.problem, SEARCHED_STREAMS, FRESH_STREAMS))
+    judged = evaluation.judge(chosen, noise_streams(evaluation.problem, STREAMS, FRESH_STREAMS))
     worth = judged.worth
     stand = (
         np.flatnonzero(non_dominated(worth) & worth.is_feasible) if evaluation.seeds.size else np.arange(len(chosen))
