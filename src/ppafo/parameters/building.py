@@ -235,7 +235,7 @@ def both_forms(parameter_set: ParameterSet, section: str) -> tuple[str, ...]:
 
 
 def _uses_sonic_form(parameter_set: ParameterSet, section: str) -> bool:
-    """Tell which form an orifice is given in; both at once would be two answers to one question."""
+    """Tell which form an orifice is given in; both at once would contradict each other."""
     both = both_forms(parameter_set, section)
     if both:
         wanted = either(f"{section}.{both[0]}")

@@ -97,7 +97,7 @@ def quantities(
     valve_kinds: Mapping[str, str], actuator_kind: str = VANE.name, species: str = ""
 ) -> Mapping[str, Quantity]:
     """Return every number's declaration by path, for a set with such valves, by name, such an actuator and a gas."""
-    # Effects are part of the key: those of another package may be loaded between two calls.
+    # Effects are part of the key: another package's may be loaded between two calls.
     return _by_path(tuple(valve_kinds.items()), actuator_kind, species, device_effects())
 
 

@@ -278,7 +278,7 @@ def read_trc(path: str | Path) -> MarkerTable:
         line = lines[3]
         cells = [cell.strip() for cell in line.split("\t")]
         if len(cells) < 3 or cells[1].lower() != "time":
-            raise DataError("line 4: must begin with 'Frame#', 'Time' and the names of markers, parted by tabs")
+            raise DataError("line 4: must begin with 'Frame#', 'Time' and the names of markers, separated by tabs")
         names = [name for name in cells[2:] if name]
         twice = first_twice(names)
         if twice is not None or not names:
@@ -318,7 +318,7 @@ def opensim_recording(
     """Return a recording of a walk in OpenSim's names, zero and signs, and the channels that need ``body_mass`` [kg].
 
     Moment and force per mass become the body's; without a body mass they are left out and named. DataError for
-    that of a neuromuscular gait model.
+    a neuromuscular gait model.
     """
     if "other_hip_angle" in recording.names:
         raise DataError(

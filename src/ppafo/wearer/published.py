@@ -1,7 +1,7 @@
 """The wearer of H. Geyer and H. Herr: body, muscles, ends of joints and ground, and how the walker starts.
 
 IEEE Trans. Neural Syst. Rehabil. Eng. 18 (2010) 263, doi:10.1109/TNSRE.2010.2047592: tables and appendix. An adult of
-80 kg and 1.8 m; angles are printed in degrees there and are in rad here.
+80 kg and 1.8 m; angles are in degrees there and in rad here.
 """
 
 import math
@@ -40,7 +40,7 @@ BODY = Body(
     heel=0.04,
     gravity=GRAVITY,
 )
-"""Trunk with head and arms, and segments of a leg; mass centres are printed from the distal end."""
+"""Trunk with head and arms, and segments of a leg; mass centres are reported from the distal end."""
 
 MASS = BODY.trunk.mass + 2.0 * (BODY.thigh.mass + BODY.shank.mass + BODY.foot.mass)
 WEIGHT = MASS * GRAVITY

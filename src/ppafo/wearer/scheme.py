@@ -125,7 +125,7 @@ class FootEnd(NamedTuple):
 class BodyEnd(NamedTuple):
     """A wearer after a step, and what was felt and acted at its begin.
 
-    ``due`` is 1 where the nerves are sampled, ``work`` is that of the muscles [J].
+    ``due`` is 1 where the nerves are sampled, ``work`` is the muscles' [J].
     """
 
     after: Walker

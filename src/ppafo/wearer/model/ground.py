@@ -76,7 +76,7 @@ def contact(
     sticks = point.sticks > 0.5 or point.touches < 0.5
     away = cosine * (x - anchor) + sine * (y - anchor_height)
     held = -ground.stiffness_along * (away + abs(away) * speed / ground.relaxing)
-    # Friction that jumped with the sign of the speed would make a resting point chatter from step to step.
+    # Friction that jumped with the sign of the speed would make a resting point go back and forth from step to step.
     quick = max(abs(speed), ground.rest_speed)
     slides = ground.sliding * normal / quick
     lets_go = sticks and abs(held) > ground.sticking * normal

@@ -21,7 +21,7 @@ LEAST_HEAT = 1.0
 """W/kg of muscle, which a muscle at rest gives off."""
 
 FASTER = 2.5
-"""Largest velocity of fast fibres in that of slow ones."""
+"""Largest velocity of fast fibres over the slow fibres' largest velocity."""
 
 ROOTS = 10
 

@@ -54,7 +54,7 @@ class Fibre(NamedTuple):
 class Lever(NamedTuple):
     """How a muscle passes a joint: lever [m], angles where it is largest and where the muscle is at rest [rad], share.
 
-    The share [-] is that of its way that its fibres, which lie askew, take.
+    The share [-] is how much of its way the fibres take, which are pennate.
     """
 
     lever: float

@@ -45,13 +45,13 @@ Members = NDArray[np.intp]
 SUPPLIES = (PRESSURE_PATH, SECOND_PRESSURE_PATH, ATMOSPHERE_PATH)
 """What decides about the pressures that parts must stand."""
 FRESH_STREAMS = 64
-"""Noise streams, all new, over which a front is judged: what was chosen in the searched ones was lucky there too."""
+"""Noise streams, all new, over which a front is assessed: what was chosen in the searched ones was lucky there too."""
 _MAXIMUM_REASONS = 20
 """Reasons of failed runs that are kept: each names its own moment, so they are nearly as many as the runs."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Judged:
+class Assessed:
     """What candidates are worth over all streams of noise, and what each task says of them.
 
     ``tasks`` has the metrics (streams, candidates) by name for each task, ``error`` and ``gas`` (streams, candidates)
@@ -84,9 +84,9 @@ class Evaluation:
 
     def __call__(self, candidates: Candidates) -> Worth:
         """Return objectives (error [N m], gas [kg], mass [kg]) and the violation of the constraints."""
-        return self.judge(candidates, self.seeds).worth
+        return self.assess(candidates, self.seeds).worth
 
-    def judge(self, candidates: Candidates, seeds: Floats) -> Judged:
+    def assess(self, candidates: Candidates, seeds: Floats) -> Assessed:
         """Return what candidates are worth over streams of noise: means of error and gas, constraints kept in each."""
         problem = self.problem
         metrics = tuple(self.metrics(task, candidates, seeds) for task in problem.tasks)
@@ -103,7 +103,7 @@ class Evaluation:
         mass = valves[candidates.choice] + size * actuators[candidates.choice] + fixed
         objectives = np.stack([error.mean(axis=0), gas.mean(axis=0), mass], axis=1)
         worth = Worth(objectives, self._violation(candidates, objectives, metrics))
-        return Judged(worth, metrics, error, gas)
+        return Assessed(worth, metrics, error, gas)
 
     def metrics(self, task: Task, candidates: Candidates, seeds: Floats) -> dict[str, Floats]:
         """Return the metrics (streams, candidates) of a task by name; nan where a run failed."""
@@ -206,13 +206,13 @@ def find_front(problem: DesignProblem, threads: int | None = None, report: Repor
             f"{problem.file}: none of {front.growth[-1][0]} designs satisfies the constraints ({names}); relax them, "
             "widen the variables or name other parts, and check that every task has these metrics"
         )
-    candidates, judged = _standing(evaluation, front)
+    candidates, assessed = _standing(evaluation, front)
     if len(candidates) == 0:
         raise StudyError(
             f"{problem.file}: none of {len(front.candidates)} designs of the front keeps the constraints in "
             f"{FRESH_STREAMS} new streams of sensor noise; relax them"
         )
-    points = _points(problem, candidates, judged)
+    points = _points(problem, candidates, assessed)
     table = np.array([point.objectives for point in points])
     suggested = candidates.at(np.array([knee(table)]))
     return Design(
@@ -249,36 +249,36 @@ def _run_again(problem: DesignProblem, task: Task, chosen: Candidates) -> Rerun:
     return Rerun(task.name, f"ppafo simulate {origin.file} {sets}", simulate(origin.file or "", overrides))
 
 
-def _standing(evaluation: Evaluation, front: Front) -> tuple[Candidates, Judged]:
-    """Return the designs of a front in order of error, as they are judged; with noise over streams that are new.
+def _standing(evaluation: Evaluation, front: Front) -> tuple[Candidates, Assessed]:
+    """Return the designs of a front in order of error, as they are assessed; with noise over streams that are new.
 
     The search chose what was good in its own streams, by luck too; of the new ones the front is made again.
     """
     chosen = front.candidates
-    judged = evaluation.judge(chosen, noise_streams(evaluation.problem, STREAMS, FRESH_STREAMS))
-    worth = judged.worth
+    assessed = evaluation.assess(chosen, noise_streams(evaluation.problem, STREAMS, FRESH_STREAMS))
+    worth = assessed.worth
     stand = (
         np.flatnonzero(non_dominated(worth) & worth.is_feasible) if evaluation.seeds.size else np.arange(len(chosen))
     )
     # By error, then gas, then mass: ``lexsort`` takes the last key first.
     order = stand[np.lexsort(worth.objectives[stand].T[::-1])]
-    tasks = tuple({name: values[:, order] for name, values in task.items()} for task in judged.tasks)
-    return chosen.at(order), Judged(worth.at(order), tasks, judged.error[:, order], judged.gas[:, order])
+    tasks = tuple({name: values[:, order] for name, values in task.items()} for task in assessed.tasks)
+    return chosen.at(order), Assessed(worth.at(order), tasks, assessed.error[:, order], assessed.gas[:, order])
 
 
-def _points(problem: DesignProblem, candidates: Candidates, judged: Judged) -> tuple[DesignPoint, ...]:
+def _points(problem: DesignProblem, candidates: Candidates, assessed: Assessed) -> tuple[DesignPoint, ...]:
     """Return designs with what each task reports of each, and the numbers that mean something for its kind of valve."""
-    numbers, is_noisy = values_of(problem, candidates), len(judged.error) > 1
+    numbers, is_noisy = values_of(problem, candidates), len(assessed.error) > 1
     means = {
         task.name: (found[problem.error].mean(axis=0), found[GAS].mean(axis=0))
-        for task, found in zip(problem.tasks, judged.tasks, strict=True)
+        for task, found in zip(problem.tasks, assessed.tasks, strict=True)
     }
     points = []
     for row, choice in enumerate(candidates.choice.tolist()):
         valve, actuator = problem.combinations[choice].valve, problem.combinations[choice].actuator
         paths = [item.path for item in problem.variables if not item.kinds or valve.kind in item.kinds]
-        error, gas, mass = judged.worth.objectives[row].tolist()
-        spread = [float(series[:, row].std(ddof=1)) for series in (judged.error, judged.gas)] if is_noisy else None
+        error, gas, mass = assessed.worth.objectives[row].tolist()
+        spread = [float(series[:, row].std(ddof=1)) for series in (assessed.error, assessed.gas)] if is_noisy else None
         points.append(
             DesignPoint(
                 valve,

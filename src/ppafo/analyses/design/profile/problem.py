@@ -1,4 +1,4 @@
-"""A design file with a profile: the torque as a table that the lanes follow, and the problem in SI units."""
+"""A design file with a profile: the torque as a table that a run follows, and the problem in SI units."""
 
 import math
 from dataclasses import dataclass

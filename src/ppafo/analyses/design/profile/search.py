@@ -1,6 +1,6 @@
 """Which supply pressures a valve can do a task with, what it takes there, and what limits it.
 
-Each pressure is tried with many gains, and some openings, of one valve at once on the lanes. Nothing is taken for
+Each pressure is tried with many gains, and some openings, of one valve at once. Nothing is taken for
 granted about how the error depends on the pressure.
 """
 
