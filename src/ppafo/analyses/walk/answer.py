@@ -244,13 +244,22 @@ def finding_of(comparison: Comparison) -> Finding[WalkPair]:
         if configuration.origin.overrides
         else "",
     )
-    walks = {"with the device": worn, "without": bare}
-    pictures = (
-        ("The leg", "legs", _LEGS, partial(frames_figure, comparison)),
-        ("", "legs-moving", _MOVING, partial(animation, comparison)),
-        ("What the device does in each phase", "gait-phases", _PHASES, partial(strip_figure, worn)),
-        ("The mean stride", "mean-stride", _MEAN, partial(walk_figure, walks)),
-    )
+    if walked.course is not None:
+        pictures = course_pictures(comparison)
+    else:
+        walks = {"with the device": worn, "without": bare}
+        shown = (
+            ("The leg", "legs", _LEGS, partial(frames_figure, comparison)),
+            ("", "legs-moving", _MOVING, partial(animation, comparison)),
+            ("What the device does in each phase", "gait-phases", _PHASES, partial(strip_figure, worn)),
+            ("The mean stride", "mean-stride", _MEAN, partial(walk_figure, walks)),
+        )
+        # Of a mean stride there is nothing to draw where a walk has none.
+        drawn = shown if worn.averages and bare.averages else ()
+        pictures = (
+            *over_time_parts(worn),
+            *(Part(head, name=name, caption=caption, draw=draw, is_detail=True) for head, name, caption, draw in drawn),
+        )
     return Finding(
         name="walk",
         kicker=f"A walk of {float(worn.recording.time[-1]) / 60.0:.3g} min",
@@ -262,16 +271,7 @@ def finding_of(comparison: Comparison) -> Finding[WalkPair]:
             Part(columns=comparison_table(comparison), remarks=[text for text in remarks if text]),
             *bottle_parts(worn),
             Part("How to read it", said=(_EXPLAINED, _LIMITS), is_detail=True),
-            *(over_time_parts(worn) if walked.course is None else ()),
-            *(
-                course_pictures(comparison)
-                if walked.course is not None
-                else (
-                    Part(heading, name=name, caption=caption, draw=draw, is_detail=True)
-                    for heading, name, caption, draw in pictures
-                    if worn.averages and bare.averages
-                )
-            ),
+            *pictures,
             Part("What is assumed" if assumed else "", columns_of(("value", "why"), assumed), left=2, is_detail=True),
         ),
         found=WalkPair(comparison),
