@@ -106,20 +106,6 @@ def non_dominated(worth: Worth) -> NDArray[np.bool_]:
     return kept
 
 
-def ranks(worth: Worth) -> NDArray[np.int64]:
-    """Return the rank (points,): 0 for the points that none dominates, 1 for those that only these dominate, ..."""
-    matrix = dominance(worth, worth)
-    counts = matrix.sum(axis=0)
-    found = np.full(counts.size, -1, dtype=np.int64)
-    rank = 0
-    while np.any(found < 0):
-        front = (found < 0) & (counts == 0)
-        found[front] = rank
-        counts = counts - matrix[front].sum(axis=0)
-        rank += 1
-    return found
-
-
 def crowding(objectives: Floats) -> Floats:
     """Return the crowding distance (points,) [-]: how far apart a point's neighbours are; infinite at the ends."""
     count = objectives.shape[0]
@@ -134,16 +120,21 @@ def crowding(objectives: Floats) -> Floats:
 
 
 def survivors(worth: Worth, count: int) -> NDArray[np.intp]:
-    """Return the places of the ``count`` best points: lower ranks first, then the less crowded of the last front."""
-    rank = ranks(worth)
-    order = np.empty(0, dtype=np.intp)
-    for value in range(int(rank.max()) + 1):
-        front = np.flatnonzero(rank == value)
-        if order.size + front.size > count:
+    """Return the places of the ``count`` best points: front by front, then the less crowded of the last front.
+
+    Fronts are taken away one after the other, so that of very many points all are never compared with all.
+    """
+    left = np.arange(worth.violation.size)
+    chosen = np.empty(0, dtype=np.intp)
+    while chosen.size < count and left.size:
+        is_front = non_dominated(worth.at(left))
+        front = left[is_front]
+        if chosen.size + front.size > count:
             apart = crowding(np.nan_to_num(worth.objectives[front]))
             front = front[np.argsort(-apart, kind="stable")]
-        order = np.concatenate([order, front])[:count]
-    return order
+        chosen = np.concatenate([chosen, front])[:count]
+        left = left[~is_front]
+    return chosen
 
 
 def hypervolume(points: Floats, reference: Floats) -> float:
@@ -156,37 +147,24 @@ def hypervolume(points: Floats, reference: Floats) -> float:
     if inside.size == 0:
         return 0.0
     ordered = inside[inside[:, 2].argsort(kind="stable")]
-    heights = [*ordered[:, 2].tolist(), float(reference[2])]
-    stairs = _Staircase(float(reference[0]), float(reference[1]))
+    right, top, last = reference.tolist()
+    # The staircase: points of the plane of which none dominates another, so that x grows and y falls.
+    xs: list[float] = []
+    ys: list[float] = []
     volume = area = 0.0
-    for (x, y, height), above in zip(ordered.tolist(), heights[1:], strict=True):
-        area += stairs.add(x, y)
+    for (x, y, height), above in zip(ordered.tolist(), [*ordered[1:, 2].tolist(), last], strict=True):
+        place = bisect_left(xs, x)
+        level = ys[place - 1] if place else top
+        if level > y and not (place < len(xs) and xs[place] == x and ys[place] <= y):
+            # What it dominates and no point before it did; the points that it dominates leave the staircase.
+            gained, start, end = 0.0, x, place
+            while end < len(xs) and ys[end] >= y:
+                gained += (xs[end] - start) * (level - y)
+                start, level, end = xs[end], ys[end], end + 1
+            area += gained + ((xs[end] if end < len(xs) else right) - start) * (level - y)
+            xs[place:end], ys[place:end] = [x], [y]
         volume += area * (above - height)
     return volume
-
-
-class _Staircase:
-    """Points of a plane of which none dominates another: x grows, y falls."""
-
-    def __init__(self, right: float, top: float) -> None:
-        self._right, self._top = right, top
-        self._x: list[float] = []
-        self._y: list[float] = []
-
-    def add(self, x: float, y: float) -> float:
-        """Add a point and return the area that it dominates and no point before it did."""
-        place = bisect_left(self._x, x)
-        left_height = self._y[place - 1] if place else self._top
-        if left_height <= y or (place < len(self._x) and self._x[place] == x and self._y[place] <= y):
-            return 0.0
-        area, start, height, end = 0.0, x, left_height, place
-        while end < len(self._x) and self._y[end] >= y:
-            area += (self._x[end] - start) * (height - y)
-            start, height, end = self._x[end], self._y[end], end + 1
-        stop = self._x[end] if end < len(self._x) else self._right
-        area += (stop - start) * (height - y)
-        self._x[place:end], self._y[place:end] = [x], [y]
-        return area
 
 
 def fractions(objectives: Floats) -> Floats:
@@ -274,7 +252,7 @@ def search_front(
     random = np.random.default_rng(settings.seed)
     found = evenly_spread(settings.screening, choices, variables, settings.seed)
     worth = evaluate(found)
-    best = survivors_of_many(worth, settings.population)
+    best = survivors(worth, settings.population)
     population, standing = found.at(best), worth.at(best)
     box = _box(worth)
     keep = non_dominated(worth) & worth.is_feasible
@@ -303,17 +281,6 @@ def search_front(
         most = settings.screening + settings.generations * settings.population
         progress(Progress(f"hypervolume {fraction:.2f}", designs, most, elapsed=elapsed, noun="designs"))
     return Front(found, worth, tuple(growth), _has_settled(growth, settings.tolerance))
-
-
-def survivors_of_many(worth: Worth, count: int) -> NDArray[np.intp]:
-    """Return the places of the ``count`` best points of very many, front by front, without comparing all with all."""
-    left = np.arange(worth.violation.size)
-    chosen = np.empty(0, dtype=np.intp)
-    while chosen.size < count and left.size:
-        front = non_dominated(worth.at(left))
-        chosen = np.concatenate([chosen, left[front]])
-        left = left[~front]
-    return chosen[survivors(worth.at(chosen), count)]
 
 
 def vary(population: Candidates, choices: int, random: np.random.Generator) -> Candidates:
