@@ -49,4 +49,4 @@ def run_trials(
         reasons += result.reasons.values()
         parts.append({name: result.metrics[name].reshape(streams, size) for name in metrics})
     found = {name: np.concatenate([part[name] for part in parts], axis=1) for name in metrics}
-    return Outcome(found, streams * count, failed, reasons)
+    return Outcome(metrics=found, runs=streams * count, failed=failed, reasons=reasons)
