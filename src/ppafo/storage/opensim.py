@@ -34,7 +34,7 @@ _COUNT = re.compile(r"(nRows|nColumns|datarows|datacolumns)\s*(?:=|\s)\s*(\S+)",
 _DEGREES = re.compile(r"inDegrees\s*=\s*(\w+)", re.IGNORECASE)
 _SENTENCE = re.compile(r"angles are in (degrees|radians)", re.IGNORECASE)
 _LONGEST_SHOWN = 40
-_GAPS, _UNSEEN = ("nan",), ("", "nan")
+GAPS, _UNSEEN = ("nan",), ("", "nan")
 """What stands for a gap in a table, and for a marker that was not seen."""
 _KINDS: tuple[RecordingKind, ...] = ("simulated", "synthetic")
 
@@ -69,21 +69,12 @@ class _Header:
     is_old: bool
 
 
-def read_opensim(path: str | Path) -> OpenSimTable:
+def read_opensim(path: str | Path, gaps: Sequence[str] = ()) -> OpenSimTable:
     """Return the table in a ``.mot`` or ``.sto`` file; DataError names file, line and column of what is wrong.
 
     A count of columns in the header that all rows contradict, and last rows that repeat a time, are mended; remarks say
-    so.
+    so. A cell with one of the texts in ``gaps`` is NaN, to fill or to refuse; without them it is refused here.
     """
-    return _read(path, ())
-
-
-def read_opensim_with_gaps(path: str | Path) -> OpenSimTable:
-    """Return the table as ``read_opensim`` does, with NaN where a cell says so, to fill or to refuse."""
-    return _read(path, _GAPS)
-
-
-def _read(path: str | Path, gaps: Sequence[str]) -> OpenSimTable:
     try:
         lines = _text_lines(path)
         header = _header(lines)
