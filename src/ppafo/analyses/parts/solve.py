@@ -93,9 +93,9 @@ def parts(part: str | None = None, catalogue: str | Path = DEFAULT) -> Finding[P
     )
 
 
-def parts_to_check(parts: Iterable[Part]) -> list[finding.Part]:
+def parts_to_check(doubtful: Iterable[tuple[Part, str]]) -> list[finding.Part]:
     """Return which figures of parts are quoted or assumed, a row for each part; the page has the reasons too."""
-    pairs = [(part, name) for part in parts for name in part.doubtful]
+    pairs = tuple(doubtful)
     if not pairs:
         return []
     # A row for each part, since a person orders parts; a reason for each figure, since each has its own.
@@ -115,12 +115,10 @@ def parts_to_check(parts: Iterable[Part]) -> list[finding.Part]:
     ]
 
 
-def doubts_data(parts: Iterable[Part]) -> list[dict[str, Any]]:
-    """Return figures of parts that are quoted or assumed as they were given, with their parts."""
+def doubts_data(doubtful: Iterable[tuple[Part, str]]) -> list[dict[str, Any]]:
+    """Return figures that are quoted or assumed as they were given, with their parts."""
     return [
-        {"part": part.name, "figure": name, **part.figures[name].model_dump(mode="json")}
-        for part in parts
-        for name in part.doubtful
+        {"part": part.name, "figure": name, **part.figures[name].model_dump(mode="json")} for part, name in doubtful
     ]
 
 

@@ -90,11 +90,11 @@ class Design:
     suggested: tuple[Rerun, ...] = ()
 
     @property
-    def parts(self) -> list[Part]:
-        """The parts on the front and those that every design carries."""
+    def doubtful(self) -> tuple[tuple[Part, str], ...]:
+        """Figures that are quoted or assumed, of the parts on the front and of those that every design carries."""
         used = {part.name for point in self.front for part in (point.valve, point.actuator)}
         used |= {part.name for part in self.problem.carried}
-        return [part for part in self.problem.parts if part.name in used]
+        return tuple((part, name) for part in self.problem.parts if part.name in used for name in part.doubtful)
 
     def json_document(self) -> dict[str, Any]:
         """Return the front and how it was found as plain data in SI."""
@@ -138,7 +138,7 @@ class Design:
                 "settled": self.settled,
                 "hypervolume": [{"designs": count, "share": fraction} for count, fraction in self.growth],
             },
-            "doubtful": doubts_data(self.parts),
+            "doubtful": doubts_data(self.doubtful),
             "versions": {"ppafo": __version__},
         }
 
@@ -260,7 +260,7 @@ def finding_of(design: Design) -> Finding[Design]:
             ),
             *_suggestion(design),
             finding.Part("Method", columns_of(titles, tasks), remarks=(_MEANS, again), is_detail=True),
-            *parts_to_check(design.parts),
+            *parts_to_check(design.doubtful),
             part_titles(part for point in points for part in (point.valve, point.actuator)),
         ),
         found=design,

@@ -112,10 +112,11 @@ class Sizing:
         return None if self.suggested is None else self.valves[self.suggested]
 
     @property
-    def parts(self) -> tuple[Part, ...]:
-        """The parts that the result rests on, each once."""
+    def doubtful(self) -> tuple[tuple[Part, str], ...]:
+        """Figures that are quoted or assumed, of the parts that the result rests on."""
         parts = [item.valve for item in self.valves] + [item.bottle for item in self.valves if item.bottle is not None]
-        return tuple({(part.group, part.name): part for part in (*parts, *self.problem.carried)}.values())
+        once = {(part.group, part.name): part for part in (*parts, *self.problem.carried)}.values()
+        return tuple((part, name) for part in once for name in part.doubtful)
 
     def json_document(self) -> dict[str, Any]:
         """Return the valves and the suggestion as plain data in SI."""
@@ -164,7 +165,7 @@ class Sizing:
             "noise_streams": self.streams,
             "runs": self.runs,
             "failures": [{"reason": reason, "runs": count} for reason, count in self.failures.items()],
-            "doubtful": doubts_data(self.parts),
+            "doubtful": doubts_data(self.doubtful),
             "versions": {"ppafo": __version__},
         }
 
@@ -311,7 +312,7 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
                 size=(9.0, 3.0),
                 is_detail=True,
             ),
-            *parts_to_check(sizing.parts),
+            *parts_to_check(sizing.doubtful),
             finding.Part("How to read it", said=(*_READING, *method), is_detail=True),
             part_titles([item.valve for item in sizing.valves]),
         ),

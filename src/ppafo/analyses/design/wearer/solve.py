@@ -144,6 +144,11 @@ class WearerSizing:
             return []
         return [device.tried.valve, device.tried.actuator, device.bottle, device.electrical.cell]
 
+    @property
+    def doubtful(self) -> list[tuple[Part, str]]:
+        """Figures of these parts that are quoted or assumed."""
+        return [(part, name) for part in self.parts for name in part.doubtful]
+
     def json_document(self) -> dict[str, Any]:
         """Return the device and all that was tried as plain data in SI."""
         wish, device = self.wish, self.device
@@ -185,7 +190,7 @@ class WearerSizing:
                 {"valve": one.valve.name, "actuator": one.actuator.name, "torque": one.torque, "flow": one.flow}
                 for one in self.tried
             ],
-            "check_before_buying": doubts_data(self.parts),
+            "check_before_buying": doubts_data(self.doubtful),
         }
 
 
@@ -458,7 +463,7 @@ def finding_of(sizing: WearerSizing) -> Finding[WearerSizing]:
     sections = (
         (finding.Part(remarks=("no device of the catalogue has this; give up one of:", *sizing.instead)), tried)
         if device is None
-        else (*_sections(wish, device), tried, *parts_to_check(sizing.parts), part_titles(sizing.parts))
+        else (*_sections(wish, device), tried, *parts_to_check(sizing.doubtful), part_titles(sizing.parts))
     )
     return Finding(
         name="design",
