@@ -10,10 +10,8 @@ from collections import Counter
 from collections.abc import Sequence
 from itertools import pairwise, product
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ppafo.documents.regular_file import MAXIMUM_BYTES_TYPED, decoded, read_regular_file
 from ppafo.documents.toml_text import label
@@ -28,9 +26,8 @@ from ppafo.model.actuators.table import (
     Rise,
     Table,
 )
+from ppafo.signals.recording import Floats
 from ppafo.units import number_text, to_si
-
-Floats = NDArray[np.float64]
 
 COLUMNS = {"angle": "rad", "pressure": "Pa_a", "volume_1": "m^3", "volume_2": "m^3"}
 LARGEST = {"angle": 10.0, "pressure": 1.0e7, "volume_1": 1.0, "volume_2": 1.0}
@@ -64,17 +61,28 @@ def table_of(columns: dict[str, Floats], file: str) -> Table:
     volumes = [volume[order].reshape(angles.size, pressures.size) for volume in given]
     for number, volume in enumerate(volumes, 1):
         _check_volume(volume, angles, pressures, f"volume_{number}", file)
+    shares = (angles - angles[0]) / (angles[-1] - angles[0])
     bends = (angles[2:-2] - angles[0]) / (angles[-1] - angles[0])
-    made = [_chamber(volume, angles, pressures, bends) for volume in volumes]
-    for number, chamber in enumerate(made, 1):
-        _check_curves(chamber, bends, angles, f"volume_{number}", file)
+    nothing = Curve((0.0,) * 4, (0.0,) * BENDS)
+    made = []
+    for number, volume in enumerate(volumes, 1):
+        rises = [
+            Rise(float(lower), float(upper - lower), _curve(volume[:, place + 1] - volume[:, place], shares, bends))
+            for place, (lower, upper) in enumerate(pairwise(pressures))
+        ]
+        # Compiled code has room for a fixed number of stretches and bends: what is beyond is never come to.
+        rises += [Rise(NEVER, 1.0, nothing)] * (RISES - len(rises))
+        made.append(Chamber(_curve(volume[:, 0], shares, bends), tuple(rises)))
+        _check_curves(made[-1], bends, angles, f"volume_{number}", file)
+    # An actuator with one chamber: the other is nothing but its dead volume.
+    made.append(Chamber(nothing, tuple(rise._replace(gain=nothing) for rise in made[0].rises)))
     return Table(
         first_angle=float(angles[0]),
         last_angle=float(angles[-1]),
         per_angle=1.0 / float(angles[-1] - angles[0]),
-        bends=_padded(bends, BENDS, NEVER),
+        bends=(*bends.tolist(), *[NEVER] * (BENDS - bends.size)),
         chamber_1=made[0],
-        chamber_2=made[1] if len(made) > 1 else _none_like(made[0]),
+        chamber_2=made[1],
     )
 
 
@@ -93,10 +101,10 @@ def _columns(text: str, file: str) -> dict[str, Floats]:
     if "," not in header and (other := next((sign for sign in ";\t" if sign in header), "")):
         shown = "tabs" if other == "\t" else "semicolons"
         raise ParameterError(f"{file}: its columns are separated by {shown}; commas are needed")
-    names, units = _header([_bare(cell) for cell in header.split(",")], file)
+    names, units = _header([cell.strip().strip('"') for cell in header.split(",")], file)
     rows: list[list[float]] = []
     for number, line in lines[1:]:
-        cells = [_bare(cell) for cell in line.split(",")]
+        cells = [cell.strip().strip('"') for cell in line.split(",")]
         if len(cells) != len(names):
             raise ParameterError(f"{file}, line {number}: has {len(cells)} values, the header has {len(names)}")
         rows.append([_number(cell, name, f"{file}, line {number}") for cell, name in zip(cells, names, strict=True)])
@@ -142,21 +150,18 @@ def _header(cells: Sequence[str], file: str) -> tuple[list[str], list[str]]:
     return names, units
 
 
-def _bare(cell: str) -> str:
-    return cell.strip().strip('"')
-
-
-_EXAMPLES = {"angle": "deg", "pressure": "kPa_g", "volume_1": "mL", "volume_2": "mL"}
-
-
 def _number(cell: str, name: str, where: str) -> float:
     try:
+        # A longer text is no number that anybody wrote.
         value = float(number_text(cell)) if len(cell) <= _SHOWN else math.nan
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
         raise ParameterError(f"{where}: {name} = '{one_line(cell)[:_SHOWN]}' is not a finite number")
     return value
+
+
+_EXAMPLES = {"angle": "deg", "pressure": "kPa_g", "volume_1": "mL", "volume_2": "mL"}
 
 
 def _check_grid(columns: dict[str, Floats], angles: Floats, pressures: Floats, file: str) -> None:
@@ -230,38 +235,14 @@ def _check_curves(chamber: Chamber, bends: Floats, angles: Floats, name: str, fi
             )
 
 
-def _chamber(volume: Floats, angles: Floats, pressures: Floats, bends: Floats) -> Chamber:
-    """Return the curves of a chamber from its volumes (angles, pressures)."""
-    shares = (angles - angles[0]) / (angles[-1] - angles[0])
-    rises = [
-        Rise(float(lower), float(upper - lower), _curve(volume[:, place + 1] - volume[:, place], shares, bends))
-        for place, (lower, upper) in enumerate(pairwise(pressures))
-    ]
-    rises += [_no_rise()] * (RISES - len(rises))
-    return Chamber(_curve(volume[:, 0], shares, bends), tuple(rises))
-
-
 def _curve(values: Floats, shares: Floats, bends: Floats) -> Curve:
     """Return the spline through some values that is one cubic over its first two and last two stretches."""
-    found = np.linalg.solve(_basis(shares, bends)[:, : values.size], values)
-    powers = _padded(found[: min(4, values.size)], 4, 0.0)
-    return Curve(powers, _padded(found[4:], BENDS, 0.0))
+    found = np.linalg.solve(_basis(shares, bends)[:, : values.size], values).tolist()
+    powers, cubes = found[:4], found[4:]
+    return Curve((*powers, *[0.0] * (4 - len(powers))), (*cubes, *[0.0] * (BENDS - len(cubes))))
 
 
 def _basis(shares: Floats, bends: Floats) -> Floats:
     """Values (shares, functions) of the powers and of what begins at each bend."""
     powers = shares[:, None] ** np.arange(4)
     return np.hstack([powers, np.maximum(shares[:, None] - bends, 0.0) ** 3])
-
-
-def _padded(values: Any, length: int, rest: float) -> tuple[float, ...]:
-    return (*(float(value) for value in values), *([rest] * (length - len(values))))
-
-
-def _no_rise() -> Rise:
-    return Rise(NEVER, 1.0, Curve((0.0,) * 4, (0.0,) * BENDS))
-
-
-def _none_like(chamber: Chamber) -> Chamber:
-    """Return a chamber that is nothing but its dead volume."""
-    return Chamber(_no_rise().gain, tuple(rise._replace(gain=_no_rise().gain) for rise in chamber.rises))

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -41,9 +41,6 @@ from ppafo.parameters.parameter_set import (
 )
 from ppafo.parameters.plant import shape_and_growth
 
-if TYPE_CHECKING:  # few devices have a measured actuator
-    from ppafo.model.actuators.table import Table
-
 _SAME = 1.0e-9
 """Angles [rad] this near are one, written in two ways."""
 _COVERED = 1.01
@@ -60,26 +57,41 @@ def build_device(parameter_set: ParameterSet, valve: str | None = None, links: G
     links = links_of_set(parameter_set) if links is None else links
     parameter_set = with_second_pressure(parameter_set)
     _check_complete(parameter_set, name)
-    reader = _reader(parameter_set)
+    reader, kind = _reader(parameter_set), parameter_set.valve_kinds[name]
+    relieving = parameter_set.flags.get(declaration.RELIEVING_PATH)
+
     device = Device(
         name=parameter_set.name,
         gas=Gas(_species(parameter_set), **_section(reader, "gas", declaration.GAS)),
         actuator=_actuator(parameter_set, reader),
         friction=Friction(**_section(reader, "friction", declaration.FRICTION)),
         foot_plate=FootPlate(**_section(reader, "foot_plate", declaration.FOOT_PLATE)),
-        supply=Supply(**_section(reader, "supply", declaration.SUPPLY), relieving=_is_relieving(parameter_set)),
-        valve=_valve(parameter_set, reader, name),
+        supply=Supply(
+            **_section(reader, "supply", declaration.SUPPLY), relieving=relieving is not None and relieving.value
+        ),
+        valve=Valve(
+            kind=kind,
+            settings={
+                item.name: _given_or_default(parameter_set, reader, f"valves.{name}", item)
+                for item in VALVES[kind].quantities
+            },
+            orifice=_orifice(parameter_set, reader, f"valves.{name}"),
+        ),
         flow=Flow(**_section(reader, "flow", declaration.FLOW)),
         valve_name=name,
         effects=_effects(parameter_set, reader),
         links=links,
     )
-    _check_consistent(parameter_set, device)
-    return device if device.actuator.kind == VANE else _with_means(device)
-
-
-def _with_means(device: Device) -> Device:
-    """Return the device with what a vane of its mean size would have."""
+    is_beyond, line = beyond_pressures(device)
+    if is_beyond:
+        raise ParameterError(f"{parameter_set.file}: actuator: {line(0)}")
+    for path, relation, other, holds in consistency(device):
+        if not holds:
+            given, limit = number_text(parameter_set.numbers[path]), number_text(parameter_set.numbers[other])
+            raise ParameterError(f"{parameter_set.file}: {path} = {given} must be {relation} {other} = {limit}")
+    if device.actuator.kind == VANE:
+        return device
+    # An actuator of another kind has what a vane of its mean size would have, for whatever is made for a vane.
     growth, (is_bad, line) = growth_and_problem(device)
     if is_bad:
         raise ParameterError(f"{device.name}: {line(0)}")
@@ -114,6 +126,7 @@ def _actuator(parameter_set: ParameterSet, read: Callable[[str], float]) -> Actu
         settings={} if kind.name == VANE else {item.name: given[item.name] for item in kind.quantities},
         table=parameter_set.actuator_table,
     )
+    # Stops in the wrong order are refused by name later, with the other rules between two numbers.
     if actuator.angle_min < actuator.angle_max and (problem := actuator_problem(actuator)):
         raise ParameterError(f"{parameter_set.file}: actuator: {problem}")
     return actuator
@@ -127,12 +140,10 @@ def actuator_problem(actuator: Actuator) -> str:
         dead_volume_1=actuator.dead_volume_1,
         dead_volume_2=actuator.dead_volume_2,
     )
-    return ACTUATORS[actuator.kind].problem(actuator, stops) or _outside(actuator.table, stops)
-
-
-def _outside(table: "Table | None", stops: Range) -> str:
-    """Return what is wrong where the stops are beyond the angles that were measured."""
-    if table is None or (table.first_angle <= stops.angle_min + _SAME and stops.angle_max <= table.last_angle + _SAME):
+    problem, table = ACTUATORS[actuator.kind].problem(actuator, stops), actuator.table
+    if problem or table is None:
+        return problem
+    if table.first_angle <= stops.angle_min + _SAME and stops.angle_max <= table.last_angle + _SAME:
         return ""
     measured, wanted = (
         f"{math.degrees(low):.4g} to {math.degrees(high):.4g} deg"
@@ -176,19 +187,11 @@ def _reader(parameter_set: ParameterSet) -> Callable[[str], float]:
         given = f"{parameter_set.file}: {path} = {number_text(entry)}"
         with refused_as(ParameterError, given, UnitError):
             value = entry_in_si(entry, declared[path], atmosphere)
-        _check_range(given, value, declared[path])
+        if not declaration.is_within(value, declared[path]):
+            raise ParameterError(f"{given}: {range_rule(declared[path], declaration.limits_text(declared[path]))}")
         return value
 
     return read
-
-
-def _check_range(given: str, value: float, quantity: Quantity) -> None:
-    if declaration.is_within(value, quantity):
-        return
-    lower = f"{'at least' if quantity.minimum_allowed else 'more than'} {quantity.minimum:g}"
-    upper = f" and at most {quantity.maximum:g}" if math.isfinite(quantity.maximum) else ""
-    unit = f" {quantity.unit}".rstrip()
-    raise ParameterError(f"{given}: {range_rule(quantity, f'{lower}{upper}{unit}')}")
 
 
 def _section(read: Callable[[str], float], section: str, members: Iterable[Quantity]) -> dict[str, float]:
@@ -206,24 +209,10 @@ def _species(parameter_set: ParameterSet) -> str:
     return name
 
 
-def _is_relieving(parameter_set: ParameterSet) -> bool:
-    entry = parameter_set.flags.get(declaration.RELIEVING_PATH)
-    return entry is not None and entry.value
-
-
 def _orifice(parameter_set: ParameterSet, read: Callable[[str], float], section: str) -> Orifice | SonicOrifice:
     if _uses_sonic_form(parameter_set, section):
         return SonicOrifice(**_section(read, section, declaration.SONIC_FORM))
     return Orifice(**_section(read, section, declaration.AREA_FORM))
-
-
-def _valve(parameter_set: ParameterSet, read: Callable[[str], float], name: str) -> Valve:
-    kind = parameter_set.valve_kinds[name]
-    section = f"valves.{name}"
-    settings = {
-        quantity.name: _given_or_default(parameter_set, read, section, quantity) for quantity in VALVES[kind].quantities
-    }
-    return Valve(kind, _orifice(parameter_set, read, section), settings)
 
 
 def _effects(parameter_set: ParameterSet, read: Callable[[str], float]) -> dict[str, dict[str, float]]:
@@ -246,7 +235,7 @@ def both_forms(parameter_set: ParameterSet, section: str) -> tuple[str, ...]:
 
 
 def _uses_sonic_form(parameter_set: ParameterSet, section: str) -> bool:
-    """Tell which form an orifice is given in; both at once would be two answers to one question."""
+    """Tell which form an orifice is given in; both at once would contradict each other."""
     both = both_forms(parameter_set, section)
     if both:
         wanted = either(f"{section}.{both[0]}")
@@ -290,13 +279,3 @@ def consistency(device: Device) -> tuple[tuple[str, str, str, bool], ...]:
         ("supply.pressure", "at least", ATMOSPHERE_PATH, supply.pressure >= atmosphere),
         ("supply.dorsiflexion_pressure", "at least", ATMOSPHERE_PATH, supply.dorsiflexion_pressure >= atmosphere),
     )
-
-
-def _check_consistent(parameter_set: ParameterSet, device: Device) -> None:
-    is_beyond, line = beyond_pressures(device)
-    if is_beyond:
-        raise ParameterError(f"{parameter_set.file}: actuator: {line(0)}")
-    for path, relation, other, holds in consistency(device):
-        if not holds:
-            given, limit = number_text(parameter_set.numbers[path]), number_text(parameter_set.numbers[other])
-            raise ParameterError(f"{parameter_set.file}: {path} = {given} must be {relation} {other} = {limit}")

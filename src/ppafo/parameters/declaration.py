@@ -4,8 +4,8 @@ The schema, the conversion to SI, the messages and the table of ``ppafo sets sho
 ``Pa_a`` (a level, absolute in SI). Limits are wide: they exclude slips of the pen and what no solver could handle.
 """
 
-import functools
-from collections.abc import Iterable, Iterator, Mapping
+import math
+from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
 
@@ -97,25 +97,24 @@ def quantities(
     valve_kinds: Mapping[str, str], actuator_kind: str = VANE.name, species: str = ""
 ) -> Mapping[str, Quantity]:
     """Return every number's declaration by path, for a set with such valves, by name, such an actuator and a gas."""
+    # Effects are part of the key: another package's may be loaded between two calls.
     return _by_path(tuple(valve_kinds.items()), actuator_kind, species, device_effects())
 
 
-@functools.lru_cache(maxsize=32)
 def _by_path(
-    valve_kinds: tuple[tuple[str, str], ...], actuator_kind: str, species: str, _effects: tuple[Effect, ...]
+    valve_kinds: tuple[tuple[str, str], ...], actuator_kind: str, species: str, effects: tuple[Effect, ...]
 ) -> Mapping[str, Quantity]:
-    return MappingProxyType({quantity.name: quantity for quantity in _declare(valve_kinds, actuator_kind, species)})
-
-
-def _declare(valve_kinds: Iterable[tuple[str, str]], actuator_kind: str, species: str) -> Iterator[Quantity]:
-    for section in SECTIONS:
-        yield from (_at(section, member) for member in members(section, actuator_kind))
-    for effect in device_effects():
-        yield from (_at(effect.section, member) for member in effect.quantities_in(species))
+    sections = [(section, members(section, actuator_kind)) for section in SECTIONS]
+    sections += [(effect.section, effect.quantities_in(species)) for effect in effects]
     for name, kind in valve_kinds:
-        yield from (_at(f"valves.{name}", member) for member in ORIFICE + VALVES[kind].quantities)
-        yield from (_at(f"reported.valves.{name}", member) for member in REPORTED_OF_A_VALVE)
+        sections.append((f"valves.{name}", ORIFICE + VALVES[kind].quantities))
+        sections.append((f"reported.valves.{name}", REPORTED_OF_A_VALVE))
+    declared = (replace(item, name=f"{section}.{item.name}") for section, items in sections for item in items)
+    return MappingProxyType({quantity.name: quantity for quantity in declared})
 
 
-def _at(section: str, quantity: Quantity) -> Quantity:
-    return replace(quantity, name=f"{section}.{quantity.name}")
+def limits_text(quantity: Quantity) -> str:
+    """Return the limits of a declaration with their unit as a message states them: ``at least 0 and at most 1 m``."""
+    lower = f"{'at least' if quantity.minimum_allowed else 'more than'} {quantity.minimum:g}"
+    upper = f" and at most {quantity.maximum:g}" if math.isfinite(quantity.maximum) else ""
+    return f"{lower}{upper} {'' if quantity.unit == '1' else quantity.unit}".rstrip()

@@ -119,6 +119,7 @@ class Supply:
     @property
     def has_one_pressure(self) -> bool:
         """Whether both regulators are set to one pressure, so that a change of the first is one of both."""
+        # Two texts of one pressure in two units differ in the last bits.
         return math.isclose(self.pressure, self.dorsiflexion_pressure, rel_tol=SAME_PRESSURE)
 
 

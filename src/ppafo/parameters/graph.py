@@ -143,6 +143,7 @@ def _holds(path: str, link: Follows, present: Callable[[str], Any]) -> bool:
     number, followed = present(path), link.number(present)
     if link.when_set:
         return bool(np.all(np.isclose(number, followed, rtol=SAME_PRESSURE, atol=0.0)))
+    # Exactly: what follows was computed by this same link.
     return bool(np.all(number == followed))
 
 

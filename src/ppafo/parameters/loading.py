@@ -3,11 +3,11 @@
 import functools
 import json
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from importlib import resources
 from pathlib import Path
 from types import GenericAlias
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field
 
@@ -34,9 +34,6 @@ from ppafo.parameters.parameter_set import (
 )
 from ppafo.units import check_unit
 
-if TYPE_CHECKING:  # few devices have a measured actuator
-    from ppafo.model.actuators.table import Table
-
 # A dotted path names a valve: a dot or a blank in its name would make it another path.
 _VALVE_NAME = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$")]
 
@@ -46,24 +43,13 @@ def _by_name(model: Any) -> Any:
     return Annotated[GenericAlias(dict, (_VALVE_NAME, model)), named]
 
 
-def _fields(quantities: tuple[Quantity, ...]) -> dict[str, Any]:
-    return {quantity.name: optional(Entry, f"{quantity.summary} [{quantity.unit or '-'}]") for quantity in quantities}
-
-
 def _section(name: str, quantities: tuple[Quantity, ...], extra: dict[str, Any] | None = None) -> Any:
-    return table(name, _fields(quantities) | (extra or {}))
+    fields = {item.name: optional(Entry, f"{item.summary} [{item.unit or '-'}]") for item in quantities}
+    return table(name, fields | (extra or {}))
 
 
 def _capital(kind: str) -> str:
     return re.sub(r"[^A-Za-z0-9_]", "_", kind.capitalize())
-
-
-def _valve_section(kind: str) -> Any:
-    return _section(
-        f"{_capital(kind)}Valve",
-        declaration.ORIFICE + VALVES[kind].quantities,
-        {"kind": (Literal[kind], Field(description=VALVES[kind].summary))},
-    )
 
 
 def _actuator_section(kind: str) -> Any:
@@ -146,10 +132,15 @@ def _parameter_file(_kinds: Any) -> type[BaseModel]:
         "accepted": (list[Accepted], Field(default_factory=list, description="contradictions kept for a reason")),
     }
     fields |= {name: optional(model, f"section {name}") for name, model in _sections().items()}
-    fields["valves"] = (
-        _by_name(one_of([_valve_section(kind) for kind in VALVES.loaded()])),
-        Field(min_length=1, description="valves by name"),
-    )
+    valves = [
+        _section(
+            f"{_capital(kind)}Valve",
+            declaration.ORIFICE + VALVES[kind].quantities,
+            {"kind": (Literal[kind], Field(description=VALVES[kind].summary))},
+        )
+        for kind in VALVES.loaded()
+    ]
+    fields["valves"] = (_by_name(one_of(valves)), Field(min_length=1, description="valves by name"))
     return table("ParameterFile", fields)
 
 
@@ -192,49 +183,48 @@ def parse_parameter_set(content: bytes, file: str, folder: Path | None = None) -
     Where its actuator has a file, that is looked for from ``folder``. ParameterError for one that is not usable.
     """
     document = _FILE.parse(content, file)
-    _find_valves(document)
-    _find_actuator(document)
-    effects = document.get(SECTION)
-    find_effects(f"{SECTION}.{name}" for name in (effects if isinstance(effects, dict) else ()))
+    _load_kinds(document)
     parsed: Any = validate(parameter_file(), document, file, ParameterError, whole_parameter_file)
     parameter_set = _flatten(parsed, file, folder or Path())
-    _check(parameter_set)
+    chosen_valve(parameter_set, None)
+    declared = parameter_set.declarations()
+    for path, entry in parameter_set.numbers.items():
+        # Only what is reported of a valve by name can be undeclared: the layout of the file knows all other paths.
+        if path not in declared:
+            valve = path.split(".")[2]
+            hint = nearest_name(valve, parameter_set.valve_kinds)
+            raise ParameterError(f"{parameter_set.file}: {path}: there is no valve '{valve}'{hint}")
+        with refused_as(ParameterError, f"{parameter_set.file}: {path}.unit", UnitError):
+            check_unit(entry.unit)
     return parameter_set
 
 
-def _find_valves(document: dict[str, Any]) -> None:
-    """Load the kinds of valves that a set names, other packages' too."""
-    valves = document.get("valves")
+def _load_kinds(document: dict[str, Any]) -> None:
+    """Load the valves, the actuator and the effects that a set names, other packages' too, before it is checked.
+
+    An actuator without a kind is a vane.
+    """
+    valves, actuator, effects = (document.get(name) for name in ("valves", "actuator", SECTION))
     for valve in valves.values() if isinstance(valves, dict) else ():
         kind = valve.get("kind") if isinstance(valve, dict) else None
         if isinstance(kind, str):
             VALVES.get(kind)
-
-
-def _find_actuator(document: dict[str, Any]) -> None:
-    """Say that an actuator without a kind is a vane, and load its kind."""
-    actuator = document.get("actuator")
-    if not isinstance(actuator, dict):
-        return
-    kind = actuator.setdefault("kind", VANE)
-    if isinstance(kind, str):
-        ACTUATORS.get(kind)
-
-
-def _read_table(actuator: Any, folder: Path) -> "Table | None":
-    """Return what the file of an actuator holds; None for a kind without one."""
-    declared = None if actuator is None else ACTUATORS[actuator.kind].model.table
-    if declared is None:
-        return None
-    # Few devices have a measured actuator.
-    from ppafo.model.actuators.table import Table
-    from ppafo.parameters.actuator_table import read_actuator_table
-
-    return read_actuator_table(folder / actuator.file) if declared is Table else None
+    if isinstance(actuator, dict) and isinstance(actuator.setdefault("kind", VANE), str):
+        ACTUATORS.get(actuator["kind"])
+    find_effects(f"{SECTION}.{name}" for name in (effects if isinstance(effects, dict) else ()))
 
 
 def _flatten(parsed: Any, file: str, folder: Path) -> ParameterSet:
     leaves = dict(_leaves(parsed, ""))
+    actuator, measured = parsed.actuator, None
+    # Few devices have a measured actuator, so what reads its file is loaded late.
+    if actuator is not None and ACTUATORS[actuator.kind].model.table is not None:
+        from ppafo.model.actuators.table import Table
+        from ppafo.parameters.actuator_table import read_actuator_table
+
+        # A file of another form, of another package's kind, has no reader here.
+        if ACTUATORS[actuator.kind].model.table is Table:
+            measured = read_actuator_table(folder / actuator.file)
     return ParameterSet(
         file=file,
         name=parsed.name,
@@ -245,9 +235,9 @@ def _flatten(parsed: Any, file: str, folder: Path) -> ParameterSet:
         parent=beside(parsed.parent, folder, list_sets()) if parsed.parent else "",
         default_valve=parsed.default_valve,
         valve_kinds={name: valve.kind for name, valve in parsed.valves.items()},
-        actuator_kind=VANE if parsed.actuator is None else parsed.actuator.kind,
-        actuator_file=getattr(parsed.actuator, "file", ""),
-        actuator_table=_read_table(parsed.actuator, folder),
+        actuator_kind=VANE if actuator is None else actuator.kind,
+        actuator_file=getattr(actuator, "file", ""),
+        actuator_table=measured,
         numbers={path: leaf for path, leaf in leaves.items() if isinstance(leaf, Entry)},
         texts={path: leaf for path, leaf in leaves.items() if isinstance(leaf, TextEntry)},
         flags={path: leaf for path, leaf in leaves.items() if isinstance(leaf, FlagEntry)},
@@ -265,19 +255,6 @@ def _leaves(node: object, path: str) -> Iterator[tuple[str, object]]:
         yield from _leaves(child, f"{path}.{name}" if path else name)
 
 
-def _check(parameter_set: ParameterSet) -> None:
-    """Refuse units that do not exist and names of valves that the set does not have."""
-    chosen_valve(parameter_set, None)
-    declared = parameter_set.declarations()
-    for path, entry in parameter_set.numbers.items():
-        if path not in declared:
-            valve = path.split(".")[2]
-            hint = nearest_name(valve, parameter_set.valve_kinds)
-            raise ParameterError(f"{parameter_set.file}: {path}: there is no valve '{valve}'{hint}")
-        with refused_as(ParameterError, f"{parameter_set.file}: {path}.unit", UnitError):
-            check_unit(entry.unit)
-
-
 def parameter_set_toml(parameter_set: ParameterSet) -> str:
     """Return the TOML text of a set: head, citation, every value with its provenance, accepted contradictions."""
     return "\n".join(_lines(parameter_set)) + "\n"
@@ -292,77 +269,42 @@ def _lines(parameter_set: ParameterSet) -> Iterator[str]:
         "parent": parameter_set.parent,
         "notes": parameter_set.notes,
     }
-    yield "schema_version = 1"
-    yield from (f"{key} = {_text(value)}" for key, value in head.items() if value)
+    yield from _assignments({"schema_version": 1, **{key: value for key, value in head.items() if value}})
     if parameter_set.citation is not None:
-        yield from _citation(parameter_set.citation)
+        yield from ("", "[citation]", *_assignments(parameter_set.citation.model_dump(exclude_defaults=True)))
     if parameter_set.actuator_kind != VANE:
-        yield from _actuator(parameter_set)
-    for path, entry in _sorted_entries(parameter_set):
-        valve = path.split(".")[1] if path.startswith("valves.") else None
-        if valve is not None and path == _first_path(parameter_set, valve):
+        file = {"file": parameter_set.actuator_file} if parameter_set.actuator_file else {}
+        yield from ("", "[actuator]", *_assignments({"kind": parameter_set.actuator_kind, **file}))
+    # Section by section, in the order in which the sections first occur.
+    entries = parameter_set.entries()
+    sections = list(dict.fromkeys(path.rpartition(".")[0] for path in entries))
+    begun = set()
+    for path in sorted(entries, key=lambda path: sections.index(path.rpartition(".")[0])):
+        valve = path.split(".")[1] if path.startswith("valves.") else ""
+        if valve and valve not in begun:
+            begun.add(valve)
             yield from _valve(parameter_set, valve)
-        yield from ("", f"[{path}]", *_entry(entry))
+        yield from ("", f"[{path}]", *_assignments(entries[path].model_dump(exclude_defaults=True)))
+    # A valve of which nothing but its kind is known has a table all the same.
     for valve in parameter_set.valve_kinds:
-        if _first_path(parameter_set, valve) is None:
+        if valve not in begun:
             yield from _valve(parameter_set, valve)
     for finding, reason in parameter_set.accepted.items():
-        yield from ("", "[[accepted]]", f"finding = {_text(finding)}", f"reason = {_text(reason)}")
-
-
-def _actuator(parameter_set: ParameterSet) -> Iterator[str]:
-    yield from ("", "[actuator]", f"kind = {_text(parameter_set.actuator_kind)}")
-    if parameter_set.actuator_file:
-        yield f"file = {_text(parameter_set.actuator_file)}"
+        yield from ("", "[[accepted]]", *_assignments({"finding": finding, "reason": reason}))
 
 
 def _valve(parameter_set: ParameterSet, valve: str) -> Iterator[str]:
-    yield from ("", f"[valves.{valve}]", f"kind = {_text(parameter_set.valve_kinds[valve])}")
+    yield from ("", f"[valves.{valve}]", *_assignments({"kind": parameter_set.valve_kinds[valve]}))
 
 
-def _first_path(parameter_set: ParameterSet, valve: str) -> str | None:
-    paths = (path for path, _ in _sorted_entries(parameter_set))
-    return next((path for path in paths if path.startswith(f"valves.{valve}.")), None)
-
-
-def _sorted_entries(parameter_set: ParameterSet) -> list[tuple[str, Entry | TextEntry | FlagEntry]]:
-    """Return the values section by section, in the order in which the sections first occur."""
-    entries = parameter_set.entries()
-    sections = list(dict.fromkeys(path.rpartition(".")[0] for path in entries))
-    return sorted(entries.items(), key=lambda item: sections.index(item[0].rpartition(".")[0]))
-
-
-def _entry(entry: Entry | TextEntry | FlagEntry) -> Iterator[str]:
-    if isinstance(entry, Entry):
-        yield f"value = {float(entry.value)!r}"
-        yield f"unit = {_text(entry.unit)}"
-    elif isinstance(entry, FlagEntry):
-        yield f"value = {_flag(entry.value)}"
-    else:
-        yield f"value = {_text(entry.value)}"
-    yield f"origin = {_text(entry.origin)}"
-    yield f"source = {_text(entry.source)}"
-    if entry.note:
-        yield f"note = {_text(entry.note)}"
-    if isinstance(entry, Entry) and entry.uncertainty is not None:
-        yield f"uncertainty = {float(entry.uncertainty)!r}"
-    if isinstance(entry, Entry) and entry.key:
-        yield f"key = {_text(entry.key)}"
-
-
-def _citation(citation: Citation) -> Iterator[str]:
-    yield from ("", "[citation]", f"title = {_text(citation.title)}")
-    if citation.authors:
-        yield f"authors = [{', '.join(map(_text, citation.authors))}]"
-    if citation.year is not None:
-        yield f"year = {citation.year}"
-    yield from (f"{key} = {_text(value)}" for key, value in (("doi", citation.doi), ("note", citation.note)) if value)
-
-
-def _flag(value: bool) -> str:
-    return "true" if value else "false"
-
-
-def _text(text: str) -> str:
-    """Return a basic string of TOML; what JSON escapes is escaped in the same way there, but for DEL."""
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+def _assignments(values: Mapping[str, Any]) -> Iterator[str]:
+    """Yield a line of TOML for each value: a text, a number, a flag or a list of texts."""
+    for key, value in values.items():
+        if isinstance(value, float):
+            text = repr(float(value))
+        elif isinstance(value, bool):
+            text = str(value).lower()
+        else:
+            # What JSON escapes in a text is escaped in the same way in TOML, but for DEL.
+            text = json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+        yield f"{key} = {text}"

@@ -50,6 +50,7 @@ def override_set(
     values have two paths. An ``error`` where a value is given twice or in two forms names both overrides.
     """
     found: dict[str, Given] = {}
+    # Sorted, so that of two messages the same one comes in any order.
     for override in sorted(overrides):
         given = split_override(override, error)
         path = one_path((same or {}).get(given.typed, given.typed), valve)

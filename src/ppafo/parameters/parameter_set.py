@@ -304,10 +304,13 @@ def _with_number(parameter_set: ParameterSet, order: _Order) -> ParameterSet:
     find_effects([path])
     declared = parameter_set.declarations()
     if path not in declared:
+        # So that the hint knows the values of effects that no set of this run has named.
         EFFECTS.load_own()
         declared = parameter_set.declarations()
         allowed = [order.typed_path(known) for known in (*declared, SPECIES_PATH, RELIEVING_PATH)]
-        hint = nearest_name(given.typed, allowed) or f"; for example {', '.join(_neighbours(given.typed, allowed))}"
+        # Nothing is spelt alike: values of the same section stand for what there is.
+        near = [name for name in allowed if name.startswith(f"{given.typed.partition('.')[0]}.")] or allowed
+        hint = nearest_name(given.typed, allowed) or f"; for example {', '.join(near[:6])}"
         raise order.refusal(f"{parameter_set.file} has no value '{given.typed}'{hint}")
     try:
         value, unit = split_quantity(given.text)
@@ -355,8 +358,3 @@ def _before(parameter_set: ParameterSet, path: str) -> str:
     """Return what stood at the path, so that an override never hides the value it replaces."""
     entry = parameter_set.entries().get(path)
     return f"the set has {entry_text(entry)} ({entry.origin}: {entry.source})" if entry else "the set has no value"
-
-
-def _neighbours(path: str, allowed: list[str]) -> list[str]:
-    section = path.partition(".")[0]
-    return [name for name in allowed if name.startswith(f"{section}.")][:6] or allowed[:6]

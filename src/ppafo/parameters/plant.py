@@ -171,6 +171,7 @@ def effect_rows(device: Device, others: Sections = _NO_SECTIONS) -> tuple[Any, .
 def effect_row(effect: Effect, device: Device, others: Sections = _NO_SECTIONS) -> Any:
     """Return the row of an effect for a device, whether it is on or not; numbers are arrays (runs,) where they vary."""
     settings, names, prepare = settings_of(device, effect, others), _names(device.actuator.kind), effect.prepare
+    # Most effects compute with their settings as they are.
     if prepare is None:
         return effect.parameters(*settings.values())
     given = [_number(device, section, name) for section, inner in names.items() for name in inner]

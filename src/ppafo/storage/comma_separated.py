@@ -20,11 +20,10 @@ from pathlib import Path
 import numpy as np
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.documents.regular_file import decoded
 from ppafo.errors import DataError, UnitError, first_twice, nearest_name, one_line, refused_as
 from ppafo.signals import CHANNELS, Channel, Recording, RecordingKind
 from ppafo.signals.recording import BETWEEN, PLAIN_NUMBER, TIME, TIME_UNIT, Between, Floats
-from ppafo.storage.files import read_bytes, write_file
+from ppafo.storage.files import read_bytes, text_of, write_file
 
 _OTHERS = (
     (";", "semicolons", 'delimiter = "semicolon", and decimal = "comma" if numbers have decimal commas'),
@@ -67,7 +66,13 @@ def parse_header(cells: list[str]) -> list[Column]:
                 f"the header must name columns as 'name [unit]', separated by commas; '{one_line(shown)}' is not one"
                 f"{remedy or ('' if cell.strip() else '; does the line end with a comma?')}"
             )
-        columns.append(Column(match[1], match[2], _between(match[3], match[1])))
+        name, unit, word = match[1], match[2], match[3]
+        # Time itself does nothing between its samples.
+        between = next((known for known in BETWEEN if word == known and name != TIME), None)
+        if word and between is None:
+            hint = nearest_name(word, BETWEEN)
+            raise DataError(f"column '{name}': behind its unit may stand {' or '.join(BETWEEN)}, not '{word}'{hint}")
+        columns.append(Column(name, unit, between))
     names = [column.name for column in columns]
     if names[0] != TIME:
         raise DataError(f"the first column must be '{TIME} [{TIME_UNIT}]', it is '{names[0]}'")
@@ -75,17 +80,6 @@ def parse_header(cells: list[str]) -> list[Column]:
     if twice is not None:
         raise DataError(f"there are two columns '{twice}'")
     return columns
-
-
-def _between(word: str, name: str) -> Between | None:
-    """Return what stands behind the unit of a column, None for nothing."""
-    for known in BETWEEN:
-        if word == known and name != TIME:
-            return known
-    if word:
-        hint = nearest_name(word, BETWEEN)
-        raise DataError(f"column '{name}': behind its unit may stand {' or '.join(BETWEEN)}, not '{word}'{hint}")
-    return None
 
 
 def check_clock(time: Floats, lines: Sequence[int]) -> None:
@@ -164,17 +158,13 @@ def csv_bytes(recording: Recording) -> bytes:
     """Return the bare table of a recording; its label and its kind are not in it."""
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
-    writer.writerow(
-        [f"{TIME} [{TIME_UNIT}]", *(_heading(name, channel) for name, channel in recording.channels.items())]
-    )
+    named = recording.channels.items()
+    heads = (f"{name} [{channel.unit}] {channel.between or ''}".rstrip() for name, channel in named)
+    writer.writerow([f"{TIME} [{TIME_UNIT}]", *heads])
     columns = [recording.time, *(recording[name] for name in recording.names)]
     rows = map(",".join, zip(*(map(repr, column.tolist()) for column in columns), strict=True))
     buffer.writelines(f"{row}\n" for row in rows)
     return buffer.getvalue().encode()
-
-
-def _heading(name: str, channel: Channel) -> str:
-    return f"{name} [{channel.unit}] {channel.between or ''}".rstrip()
 
 
 def read_csv(path: str | Path, label: str | None = None, atmosphere: float = STANDARD_ATMOSPHERE) -> Recording:
@@ -182,9 +172,14 @@ def read_csv(path: str | Path, label: str | None = None, atmosphere: float = STA
 
     Gauge pressure counts from ``atmosphere`` [Pa absolute]. DataError for a file that is not usable.
     """
-    lines = _lines(path)
-    first = next((number for number, line in enumerate(lines) if not line.startswith("#")), len(lines))
+    content = read_bytes(path)
     try:
+        text = text_of(content, remedy='; a column map with encoding = "latin-1" reads that')
+        # Whoever writes a table ends its last line: one without an end is a file that was cut off in a number.
+        if not text.endswith(("\n", "\r")):
+            raise DataError("the last line has no end: the file is cut off, or lacks its final line break")
+        lines = text.splitlines()
+        first = next((number for number, line in enumerate(lines) if not line.startswith("#")), len(lines))
         rows = csv.reader(islice(lines, first, None), strict=True)
         header = next(rows, [])
         if not header and not any(lines[first:]):
@@ -222,22 +217,9 @@ def kind_of_comments(comments: Iterable[str]) -> RecordingKind:
     return named[0] if named else "measured"
 
 
-def _lines(path: str | Path) -> list[str]:
-    content = read_bytes(path)
-    try:
-        text = decoded(content)
-    except UnicodeDecodeError as error:
-        remedy = 'a column map with encoding = "latin-1" reads that'
-        raise DataError(f"{path}: is not a text file in UTF-8 (byte {error.start}); {remedy}") from error
-    if "\0" in text:
-        raise DataError(f"{path}: is not a text file (byte {text.index(chr(0))} is zero)")
-    if not text.endswith(("\n", "\r")):
-        raise DataError(f"{path}: the last line has no end: the file is cut off, or lacks its final line break")
-    return text.splitlines()
-
-
 def _table(header: list[str], rows: Iterable[list[str]], skipped: int) -> Floats:
     """Return the numbers below the header, row by row: the texts of a large file take many times its room."""
+    # Blank lines may only follow the last row: one between rows is a sample that was lost.
     numbers, blank = array("d"), None
     for line, row in enumerate(rows, start=skipped + 2):
         if not row:
@@ -252,6 +234,7 @@ def _table(header: list[str], rows: Iterable[list[str]], skipped: int) -> Floats
             values = [float(cell) for cell in row]
         except ValueError as error:
             raise _no_number(header, row, line) from error
+        # All cells at once, as one by one costs more than reading the numbers.
         whole = "".join(row)
         if not whole.isascii() or _UNDERSCORE in whole or not all(map(math.isfinite, values)):
             raise _no_number(header, row, line)

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from ppafo import interrupts
-from ppafo.documents.regular_file import read_regular_file
+from ppafo.documents.regular_file import decoded, read_regular_file
 from ppafo.errors import DataError, reason
 
 LEFT_ASIDE = ".writing-"
@@ -31,6 +31,18 @@ def read_bytes(path: str | Path, maximum: int = MAXIMUM_BYTES_RECORDED) -> bytes
     if not content:
         raise DataError(f"{path}: is empty")
     return content
+
+
+def text_of(content: bytes, encoding: str = "utf-8", remedy: str = "") -> str:
+    """Return the text in the bytes of a file; DataError, with a remedy, where it is none in this encoding."""
+    try:
+        text = decoded(content) if encoding == "utf-8" else content.decode(encoding)
+    except UnicodeDecodeError as error:
+        raise DataError(f"is not a text file in UTF-8 (byte {error.start}){remedy}") from error
+    # Latin-1 reads any bytes as a text: a zero gives away what is none.
+    if "\0" in text:
+        raise DataError(f"is not a text file (byte {text.index(chr(0))} is zero)")
+    return text
 
 
 def write_file(path: str | Path, content: bytes) -> Path:
@@ -71,6 +83,7 @@ def replace_folder(folder: Path, contents: Mapping[str, bytes]) -> None:
             for name, content in contents.items():
                 (aside / name).parent.mkdir(parents=True, exist_ok=True)
                 (aside / name).write_bytes(content)
+            # The last moment at which an interrupt leaves the folder as it was.
             interrupts.check()
             _swap(aside, target)
         finally:
@@ -185,6 +198,7 @@ def _exchange(one: Path, other: Path) -> bool:
 
 def _sibling(target: Path, purpose: str) -> Path:
     """Return a path beside ``target``, on the same disk, that nothing has yet."""
+    # Beside it, as a rename is one step on one disk only; with a random part, as two commands may write at once.
     return target.with_name(f".{target.name}.{purpose}-{secrets.token_hex(4)}")
 
 

@@ -7,8 +7,7 @@ import csv
 import math
 import re
 from array import array
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
 from importlib import resources
 from itertools import chain, islice
 from pathlib import Path
@@ -19,13 +18,12 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.models import StrictTable, Text, make_schema, read_model
-from ppafo.documents.regular_file import decoded
 from ppafo.documents.toml_text import TomlKind
 from ppafo.errors import DataError, UnitError, nearest_name, one_line, refused_as
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import PLAIN_NUMBER, TIME, TIME_UNIT, Between, Floats
 from ppafo.storage.comma_separated import SPLIT_NUMBERS, Column, check_clock, in_si, kind_of_comments
-from ppafo.storage.files import read_bytes
+from ppafo.storage.files import read_bytes, text_of
 
 Thousands = Literal["point", "comma", "apostrophe", "blank"]
 
@@ -128,7 +126,7 @@ def read_foreign(
     with refused_as(DataError, path, DataError):
         if Path(path).suffix.lower() == ".nc":
             raise DataError("is a NetCDF file, which names its own channels and units: read it without a column map")
-        lines = _lines(content, columns.encoding)
+        lines = text_of(content, columns.encoding, '; give encoding = "latin-1" if it is that').splitlines()
         if TIME not in columns.channels:
             raise DataError(f"the column map has no channel '{TIME}'")
         names, first, rows = _rows(lines, columns)
@@ -137,44 +135,46 @@ def read_foreign(
             name: place for name, item in columns.channels.items() if (place := _place(name, item, names, first)) >= 0
         }
         titles = {name: names[place] if names else str(place + 1) for name, place in places.items()}
-        table = _Table(array("q"), {name: array("d") for name in places})
+        # Row by row, so that no cell of a large file is kept as a text.
+        numbers, found = {name: array("d") for name in places}, array("q")
         for line, row in rows:
             if len(row) != width:
                 remedy = f"; {SPLIT_NUMBERS}" if columns.delimiter == "comma" and len(row) == 2 * width else ""
                 raise DataError(f"line {line} has {len(row)} values for {width} columns{remedy}")
-            table.lines.append(line)
+            found.append(line)
             for name, place in places.items():
                 thousands = columns.channels[name].thousands
-                table.numbers[name].append(_number(row[place], thousands, columns.decimal, titles[name], line))
+                numbers[name].append(_number(row[place], thousands, columns.decimal, titles[name], line))
         channels = {
-            name: _constant(name, item, len(table.lines), atmosphere)
-            if item.constant is not None
-            else _convert(name, item, np.array(table.numbers[name]), atmosphere)
+            name: _channel(name, item, np.array(numbers.get(name, ())), len(found), atmosphere)
             for name, item in columns.channels.items()
         }
         time = channels.pop(TIME).values
-        check_clock(time, table.lines)
+        check_clock(time, found)
         # A synthetic recording stays one through a column map.
         kind = kind_of_comments(line for line in lines if line.startswith(_COMMENT))
         recording = Recording(label or one_line(Path(path).stem), time, channels, kind)
         return recording if columns.direction is None else _with_direction(recording, columns.direction)
 
 
-@dataclass(frozen=True, slots=True)
-class _Table:
-    """The columns that a map asks for, as numbers by channel, and the line of each row in the file.
-
-    Row by row, so that no cell of a large file is kept as a text.
-    """
-
-    lines: "array[int]"
-    numbers: dict[str, "array[float]"]
-
-
 def _rows(lines: list[str], columns: ColumnMap) -> tuple[list[str], list[str], Rows]:
     """Return the names of the columns (none without a header), the first row of numbers, and all rows of text."""
-    numbered = islice(enumerate(lines, start=1), columns.skip_lines, None)
-    cells = ((number, row) for number, row in _split(numbered, columns.delimiter) if row)
+
+    def split() -> Rows:
+        for number, line in islice(enumerate(lines, start=1), columns.skip_lines, None):
+            if not line.strip() or line.startswith(_COMMENT):
+                continue
+            if columns.delimiter == "whitespace":
+                row = line.split()
+            else:
+                try:
+                    row = next(csv.reader([line], delimiter=_DELIMITERS[columns.delimiter], strict=True))
+                except csv.Error as error:
+                    raise DataError(f"line {number} cannot be read: {error}") from error
+            if row:
+                yield number, row
+
+    cells = split()
     head = next(cells, None)
     if head is None:
         raise DataError("has no rows" if columns.skip_lines == 0 else f"has no rows after {columns.skip_lines} lines")
@@ -184,31 +184,6 @@ def _rows(lines: list[str], columns: ColumnMap) -> tuple[list[str], list[str], R
     if first is None:
         raise DataError("has no rows of numbers")
     return names, first[1], chain([first], rows)
-
-
-def _lines(content: bytes, encoding: str) -> list[str]:
-    try:
-        text = decoded(content) if encoding == "utf-8" else content.decode(encoding)
-    except UnicodeDecodeError as error:
-        raise DataError(
-            f'is not text in UTF-8 (byte {error.start}); give encoding = "latin-1" if it is that'
-        ) from error
-    if "\0" in text:
-        raise DataError(f"is not a text file (byte {text.index(chr(0))} is zero)")
-    return text.splitlines()
-
-
-def _split(lines: Iterable[tuple[int, str]], delimiter: str) -> Rows:
-    for number, line in lines:
-        if not line.strip() or line.startswith(_COMMENT):
-            continue
-        if delimiter == "whitespace":
-            yield number, line.split()
-            continue
-        try:
-            yield number, next(csv.reader([line], delimiter=_DELIMITERS[delimiter], strict=True))
-        except csv.Error as error:
-            raise DataError(f"line {number} cannot be read: {error}") from error
 
 
 def _other_delimiter(cells: list[str], is_there: Callable[[list[str]], bool]) -> str:
@@ -248,16 +223,6 @@ def _place(name: str, item: MappedChannel, names: list[str], first: list[str]) -
     return places[0] - 1
 
 
-def _constant(name: str, item: MappedChannel, count: int, atmosphere: float) -> Channel:
-    from ppafo.units import split_quantity
-
-    text = str(item.constant)
-    with refused_as(DataError, f"channel '{name}', constant = {text!r}", UnitError):
-        value, unit = split_quantity(text)
-    column = Column(name, unit or PLAIN_NUMBER)
-    return Channel(in_si(column, np.full(count, value), atmosphere), column.si_unit, item.between)
-
-
 def _number(cell: str, thousands: str | None, decimal: str, column: str, line: int) -> float:
     text = cell.strip()
     if thousands is not None:
@@ -288,10 +253,15 @@ def _without_groups(text: str, thousands: str, column: str, line: int) -> str:
     return grouped.group().replace(mark, "") + text[grouped.end() :]
 
 
-def _convert(name: str, item: MappedChannel, numbers: Floats, atmosphere: float) -> Channel:
-    """Return the channel in SI; the quantity that it is multiplied by brings its own unit."""
+def _channel(name: str, item: MappedChannel, numbers: Floats, count: int, atmosphere: float) -> Channel:
+    """Return a channel in SI, a constant one too; the quantity that it is multiplied by brings its own unit."""
     from ppafo.units import split_quantity
 
+    if item.constant is not None:
+        with refused_as(DataError, f"channel '{name}', constant = {item.constant!r}", UnitError):
+            value, unit = split_quantity(item.constant)
+        column = Column(name, unit or PLAIN_NUMBER)
+        return Channel(in_si(column, np.full(count, value), atmosphere), column.si_unit, item.between)
     values, unit = item.sign * (item.factor * numbers + item.offset), item.unit
     if item.times is not None:
         with refused_as(DataError, f"channel '{name}', times = {item.times!r}", UnitError):
@@ -315,6 +285,7 @@ def _with_direction(recording: Recording, wanted: MappedDirection) -> Recording:
     sums = np.concatenate(([0.0], np.cumsum(recording[wanted.of])))
     times = np.concatenate(([0.0], np.cumsum(time)))
     here = np.arange(time.size)
+    # At least the sample itself on either side, where the window is shorter than a sample.
     first = np.minimum(np.searchsorted(time, time - 0.5 * window), here)
     last = np.maximum(np.searchsorted(time, time + 0.5 * window, side="right"), here + 1)
     before, after = here - first + 1, last - here

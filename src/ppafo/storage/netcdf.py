@@ -15,7 +15,7 @@ import numpy as np
 
 from ppafo.errors import DataError, one_line
 from ppafo.signals import CHANNELS, Channel, Recording, recording_kind
-from ppafo.signals.recording import PLAIN_NUMBER, TIME, TIME_UNIT, Floats
+from ppafo.signals.recording import PLAIN_NUMBER, TIME, TIME_UNIT
 from ppafo.storage.files import read_bytes, write_file
 
 if TYPE_CHECKING:
@@ -87,6 +87,7 @@ def netcdf_bytes(recording: Recording, scenario: Mapping[str, Any] | None = None
     import h5netcdf
 
     buffer = io.BytesIO()
+    # Nothing in the file depends on when it was made, so that equal recordings are equal bytes.
     with h5netcdf.File(buffer, "w") as file:
         file.dimensions = {TIME: len(recording)}
         file.attrs.update(global_attributes(recording, scenario))
@@ -123,7 +124,14 @@ def _recording(content: bytes, path: str | Path) -> Recording:
         for name, variable in variables.items():
             if variable.size != variables[TIME].size:
                 raise DataError(f"'{name}' has {variable.size} values for {variables[TIME].size} times")
-            _check_filters(name, variable)
+            # What is not stored plain or by the common filters is refused: gzip within gzip grows without limit.
+            properties = variable.id.get_create_plist()
+            filters = [properties.get_filter(number)[0] for number in range(properties.get_nfilters())]
+            after = filters[filters.index(_GZIP) + 1 :] if _GZIP in filters else []
+            if not set(filters) <= _FILTERS or not set(after) <= {_FLETCHER}:
+                raise DataError(
+                    f"'{name}' is compressed in a way that is not supported; save it with gzip, or uncompressed"
+                )
             wanted += variable.size * _BYTES_OF_A_NUMBER
             if variable.chunks is not None:
                 wanted += math.prod(variable.chunks) * variable.dtype.itemsize
@@ -162,15 +170,6 @@ def _own_variables(file: Any) -> dict[str, Any]:
     return variables
 
 
-def _check_filters(name: str, variable: Any) -> None:
-    """Refuse what is not stored plain or by the common filters; gzip within gzip grows without limit."""
-    properties = variable.id.get_create_plist()
-    filters = [properties.get_filter(number)[0] for number in range(properties.get_nfilters())]
-    after = filters[filters.index(_GZIP) + 1 :] if _GZIP in filters else []
-    if not set(filters) <= _FILTERS or not set(after) <= {_FLETCHER}:
-        raise DataError(f"'{name}' is compressed in a way that is not supported; save it with gzip, or uncompressed")
-
-
 def _check_chunks(name: str, variable: Any) -> None:
     """Refuse values that nobody wrote, and chunks that unpack to more than they say."""
     size, chunks = variable.size, variable.chunks
@@ -184,6 +183,7 @@ def _check_chunks(name: str, variable: Any) -> None:
     most = chunks[0] * variable.dtype.itemsize + _CHECKSUM_ROOM
     for number in range(count):
         stored = variable.id.get_chunk_info(number)
+        # Unpacked here, with a limit, before the library takes as much memory as a damaged chunk asks for.
         unpacker = zlib.decompressobj()
         packed = b"" if variable.compression is None else variable.id.read_direct_chunk(stored.chunk_offset)[1]
         try:
@@ -202,20 +202,10 @@ def _channel(name: str, variable: Any) -> Channel:
     for key in _GAPS:
         if key in variable.attrs and np.isin(values, np.asarray(variable.attrs[key], dtype=np.float64)).any():
             raise DataError(f"'{name}' has gaps ('{key}'); fill them or cut the file there")
-    _check_valid(name, values, variable.attrs)
-    # The channel itself refuses a word that is none.
-    between: Any = _attribute(variable, _BETWEEN) or None
-    # The unit that ``channel_attributes`` wrote as this text.
-    text = _attribute(variable, "units")
-    return Channel(values, PLAIN_NUMBER if text == _PLAIN_NUMBER_IN_NETCDF else text, between)
-
-
-def _check_valid(name: str, values: Floats, attributes: Mapping[str, Any]) -> None:
-    """Refuse values that are outside the limits which the file states for them."""
     for key, count in _LIMITS.items():
-        if key not in attributes:
+        if key not in variable.attrs:
             continue
-        limits = np.atleast_1d(np.asarray(attributes[key], dtype=np.float64))
+        limits = np.atleast_1d(np.asarray(variable.attrs[key], dtype=np.float64))
         if limits.size != count:
             raise DataError(f"'{name}': its attribute '{key}' has {limits.size} numbers, it must have {count}")
         is_below, is_above = values < limits[0], values > limits[-1]
@@ -226,6 +216,11 @@ def _check_valid(name: str, values: Floats, attributes: Mapping[str, Any]) -> No
                 f"'{name}' has {outside.size} values that are not valid ('{key}'), the first {values[first]:g} at row "
                 f"{first + 1}; correct them, cut the file there, or correct the attribute"
             )
+    # The channel itself refuses a word that is none.
+    between: Any = _attribute(variable, _BETWEEN) or None
+    # The unit that ``channel_attributes`` wrote as this text.
+    text = _attribute(variable, "units")
+    return Channel(values, PLAIN_NUMBER if text == _PLAIN_NUMBER_IN_NETCDF else text, between)
 
 
 def _attribute(place: Any, name: str) -> str:

@@ -16,18 +16,17 @@ do channels without a counterpart.
 
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from ppafo.constants import STANDARD_GRAVITY
-from ppafo.documents.regular_file import decoded
 from ppafo.errors import DataError, first_twice, one_line
 from ppafo.signals import Channel, Recording, RecordingKind
 from ppafo.signals.recording import TIME, Floats
-from ppafo.storage.files import read_bytes, write_file
+from ppafo.storage.files import read_bytes, text_of, write_file
 
 _END = "endheader"
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
@@ -35,6 +34,8 @@ _COUNT = re.compile(r"(nRows|nColumns|datarows|datacolumns)\s*(?:=|\s)\s*(\S+)",
 _DEGREES = re.compile(r"inDegrees\s*=\s*(\w+)", re.IGNORECASE)
 _SENTENCE = re.compile(r"angles are in (degrees|radians)", re.IGNORECASE)
 _LONGEST_SHOWN = 40
+GAPS, _UNSEEN = ("nan",), ("", "nan")
+"""What stands for a gap in a table, and for a marker that was not seen."""
 _KINDS: tuple[RecordingKind, ...] = ("simulated", "synthetic")
 
 
@@ -68,26 +69,14 @@ class _Header:
     is_old: bool
 
 
-def read_opensim(path: str | Path) -> OpenSimTable:
+def read_opensim(path: str | Path, gaps: Sequence[str] = ()) -> OpenSimTable:
     """Return the table in a ``.mot`` or ``.sto`` file; DataError names file, line and column of what is wrong.
 
     A count of columns in the header that all rows contradict, and last rows that repeat a time, are mended; remarks say
-    so.
+    so. A cell with one of the texts in ``gaps`` is NaN, to fill or to refuse; without them it is refused here.
     """
-    return _read(path, _number)
-
-
-def read_opensim_with_gaps(path: str | Path) -> OpenSimTable:
-    """Return the table as ``read_opensim`` does, with NaN where a cell says so, to fill or to refuse."""
-    return _read(path, _number_or_gap)
-
-
-Cell = Callable[[str, int, str], float]
-
-
-def _read(path: str | Path, cell: Cell) -> OpenSimTable:
     try:
-        lines = text_lines(read_bytes(path))
+        lines = _text_lines(path)
         header = _header(lines)
         number, labels = _labels(lines, header)
         # The numbers, row by row; blank lines may only follow the last row.
@@ -110,10 +99,18 @@ def _read(path: str | Path, cell: Cell) -> OpenSimTable:
                 raise DataError(f"line {first + index} has {len(cells)} values for {len(labels)} columns")
             table[index, 0] = _number(cells[0], first + index, labels[0])
             pairs = zip(cells[1:], labels[1:], strict=True)
-            table[index, 1:] = [cell(text, first + index, label) for text, label in pairs]
-        values, remarks = _without_repeats(table)
+            table[index, 1:] = [_number(text, first + index, label, gaps) for text, label in pairs]
+        # Last rows that repeat a time, as some tools write them, are dropped.
+        kept, remarks = count, []
+        while kept > 1 and table[kept - 1, 0] == table[kept - 2, 0]:
+            kept -= 1
+        if kept < count:
+            rows = "the last row repeats" if kept == count - 1 else f"the last {count - kept} rows repeat"
+            was = "was" if kept == count - 1 else "were"
+            remarks.append(f"{rows} the time {table[-1, 0]:g} s and {was} dropped")
+        values = table[:kept]
         time = values[:, 0]
-        _check_clock(time, number + 1)
+        _check_clock(time, range(first, first + kept))
         if header.width is not None and header.width != len(labels):
             said = (
                 f"the header states {header.width} columns, labels and every row have {len(labels)}, which were taken"
@@ -125,29 +122,6 @@ def _read(path: str | Path, cell: Cell) -> OpenSimTable:
     return OpenSimTable(
         header.name, time, columns, header.in_degrees, number + 1, tuple(remarks), header.kind, header.is_old
     )
-
-
-def _without_repeats(values: Floats) -> tuple[Floats, list[str]]:
-    """Return the rows without last ones that repeat a time, as some tools write them, and a remark on these."""
-    kept = len(values)
-    while kept > 1 and values[kept - 1, 0] == values[kept - 2, 0]:
-        kept -= 1
-    dropped = len(values) - kept
-    if dropped == 0:
-        return values, []
-    rows = "the last row repeats" if dropped == 1 else f"the last {dropped} rows repeat"
-    return values[:kept], [f"{rows} the time {values[-1, 0]:g} s and {'was' if dropped == 1 else 'were'} dropped"]
-
-
-def text_lines(content: bytes) -> list[str]:
-    """Return the lines of a text file in UTF-8, with any line ends; DataError where it is none."""
-    try:
-        text = decoded(content)
-    except UnicodeDecodeError as error:
-        raise DataError(f"is not a text file in UTF-8 (byte {error.start})") from error
-    if "\0" in text:
-        raise DataError(f"is not a text file (byte {text.index(chr(0))} is zero)")
-    return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
 
 
 def _header(lines: list[str]) -> _Header:
@@ -163,7 +137,11 @@ def _header(lines: list[str]) -> _Header:
             if not (text.isascii() and text.isdigit() and len(text) < 12):
                 raise DataError(f"line {number}: {match[1]} is {one_line(text)[:_LONGEST_SHOWN]!r}, not a whole number")
             counts[match[1].lower()] = int(text)
-        said = _states_degrees(line, number)
+        key, sentence = _DEGREES.match(line.strip()), _SENTENCE.search(line)
+        if key is not None and key[1].lower() not in ("yes", "no"):
+            raise DataError(f"line {number}: inDegrees is {one_line(key[1])[:_LONGEST_SHOWN]!r}; it is 'yes' or 'no'")
+        said = None if sentence is None else sentence[1].lower() == "degrees"
+        said = said if key is None else key[1].lower() == "yes"
         if said is not None and in_degrees is not None and said != in_degrees:
             raise DataError(f"line {number}: the header states degrees and radians; correct the one that is wrong")
         in_degrees = in_degrees if said is None else said
@@ -178,22 +156,13 @@ def _header(lines: list[str]) -> _Header:
     )
 
 
-def _states_degrees(line: str, number: int) -> bool | None:
-    match = _DEGREES.match(line.strip())
-    if match is not None:
-        word = match[1].lower()
-        if word not in ("yes", "no"):
-            raise DataError(f"line {number}: inDegrees is {one_line(match[1])[:_LONGEST_SHOWN]!r}; it is 'yes' or 'no'")
-        return word == "yes"
-    sentence = _SENTENCE.search(line)
-    return None if sentence is None else sentence[1].lower() == "degrees"
-
-
 def _labels(lines: list[str], header: _Header) -> tuple[int, list[str]]:
     """Return the number of the line of labels (from 1) and the labels."""
     for number in range(header.end + 2, len(lines) + 1):
         if lines[number - 1].strip():
-            labels = _cells(lines[number - 1])
+            # Labels may hold blanks where tabs separate them.
+            line = lines[number - 1]
+            labels = [cell.strip() for cell in line.strip().split("\t")] if "\t" in line else line.split()
             if labels[0].lower() != TIME:
                 first = one_line(labels[0])[:_LONGEST_SHOWN]
                 raise DataError(f"line {number}: the first column must be '{TIME}', it is {first!r}")
@@ -206,14 +175,10 @@ def _labels(lines: list[str], header: _Header) -> tuple[int, list[str]]:
     raise DataError(f"has nothing after '{_END}': the file is cut off")
 
 
-def _cells(line: str) -> list[str]:
-    """Return the cells of a line; labels may hold blanks where tabs part them."""
-    if "\t" in line:
-        return [cell.strip() for cell in line.strip().split("\t")]
-    return line.split()
-
-
-def _number(cell: str, line: int, label: str) -> float:
+def _number(cell: str, line: int, label: str, gaps: Sequence[str] = ()) -> float:
+    """Return the number in a cell, NaN for one of the texts that stand for a gap."""
+    if cell.lower() in gaps:
+        return float("nan")
     value = float(cell) if _NUMBER.fullmatch(cell) else float("nan")
     if not np.isfinite(value):
         shown = one_line(cell)[:_LONGEST_SHOWN]
@@ -223,16 +188,18 @@ def _number(cell: str, line: int, label: str) -> float:
     return value
 
 
-def _number_or_gap(cell: str, line: int, label: str) -> float:
-    return float("nan") if cell.lower() == "nan" else _number(cell, line, label)
-
-
-def _check_clock(time: Floats, first_line: int) -> None:
+def _check_clock(time: Floats, lines: Sequence[int]) -> None:
+    """Refuse a time [s] that does not grow from row to row; ``lines`` are the lines of the rows in the file."""
     stalled = np.flatnonzero(np.diff(time) <= 0.0)
     if stalled.size:
         index = int(stalled[0]) + 1
         word = "stands still" if time[index] == time[index - 1] else "goes backwards"
-        raise DataError(f"line {first_line + index}: the clock {word}: {time[index]:g} s follows {time[index - 1]:g} s")
+        raise DataError(f"line {lines[index]}: the clock {word}: {time[index]:g} s follows {time[index - 1]:g} s")
+
+
+def _text_lines(path: str | Path) -> list[str]:
+    """Return the lines of a file, with any line ends."""
+    return text_of(read_bytes(path)).replace("\r\n", "\n").replace("\r", "\n").split("\n")
 
 
 _SIGNS = (
@@ -289,7 +256,7 @@ class MarkerTable:
 def read_trc(path: str | Path) -> MarkerTable:
     """Return the markers in a ``.trc`` file; DataError names file, line and what is wrong."""
     try:
-        lines = text_lines(read_bytes(path))
+        lines = _text_lines(path)
         if not lines[0].startswith(_FIRST) or len(lines) <= _HEAD_LINES:
             raise DataError(
                 f"is not a .trc file: its first line begins with '{_FIRST}', and five lines come before rows"
@@ -302,51 +269,32 @@ def read_trc(path: str | Path) -> MarkerTable:
         line = lines[3]
         cells = [cell.strip() for cell in line.split("\t")]
         if len(cells) < 3 or cells[1].lower() != "time":
-            raise DataError("line 4: must begin with 'Frame#', 'Time' and the names of markers, parted by tabs")
+            raise DataError("line 4: must begin with 'Frame#', 'Time' and the names of markers, separated by tabs")
         names = [name for name in cells[2:] if name]
         twice = first_twice(names)
         if twice is not None or not names:
             what = "no marker" if twice is None else f"two markers {one_line(twice)[:_LONGEST_SHOWN]!r}"
             raise DataError(f"line 4: names {what}; every marker needs a name of its own")
-        rows = [(number, line) for number, line in enumerate(lines[_HEAD_LINES:], _HEAD_LINES + 1) if line.strip()]
-        values = np.array([_marker_row(line, number, len(names)) for number, line in rows]).reshape(
-            -1, 1 + 3 * len(names)
-        )
-        _check_frames(values[:, 0], [number for number, _ in rows])
+        labels = [f"{axis} of {name}" for name in names for axis in "XYZ"]
+        rows, wanted = [], 2 + len(labels)
+        numbers = [number for number, line in enumerate(lines, 1) if number > _HEAD_LINES and line.strip()]
+        for number in numbers:
+            line = lines[number - 1]
+            cells = [cell.strip() for cell in line.split("\t")] if "\t" in line else line.split()
+            if len(cells) > wanted and any(cells[wanted:]):
+                raise DataError(f"line {number} has {len(cells)} values for {wanted} columns")
+            # Cells that are not there belong to markers that were not seen.
+            cells = [*cells, *[""] * (wanted - len(cells))][:wanted]
+            place = zip(cells[2:], labels, strict=True)
+            rows.append([_number(cells[1], number, TIME), *(_number(one, number, of, _UNSEEN) for one, of in place)])
+        if not rows:
+            raise DataError("has no rows")
+        values = np.array(rows)
+        _check_clock(values[:, 0], numbers)
     except DataError as error:
         raise DataError(f"{path}: {error}".replace(f"{path}: {path}:", f"{path}:")) from error
     markers = {name: values[:, 1 + 3 * place : 4 + 3 * place].T for place, name in enumerate(names)}
     return MarkerTable(values[:, 0], markers, unit)
-
-
-def _marker_row(line: str, number: int, markers: int) -> list[float]:
-    """Return time and coordinates of a row; cells that are not there belong to markers that were not seen."""
-    cells = [cell.strip() for cell in line.split("\t")] if "\t" in line else line.split()
-    wanted = 2 + 3 * markers
-    if len(cells) > wanted and any(cells[wanted:]):
-        raise DataError(f"line {number} has {len(cells)} values for {wanted} columns")
-    cells = [*cells, *[""] * (wanted - len(cells))][:wanted]
-    return [_marker_number(cells[1], number, is_time=True), *(_marker_number(cell, number) for cell in cells[2:])]
-
-
-def _marker_number(cell: str, number: int, is_time: bool = False) -> float:
-    if not is_time and cell.lower() in ("", "nan"):
-        return float("nan")
-    value = float(cell) if _NUMBER.fullmatch(cell) else float("nan")
-    if not np.isfinite(value):
-        raise DataError(f"line {number}: {one_line(cell)[:_LONGEST_SHOWN]!r} is not a number, or not a finite one")
-    return value
-
-
-def _check_frames(time: Floats, lines: list[int]) -> None:
-    if time.size == 0:
-        raise DataError("has no rows")
-    stalled = np.flatnonzero(np.diff(time) <= 0.0)
-    if stalled.size:
-        index = int(stalled[0]) + 1
-        raise DataError(
-            f"line {lines[index]}: the time {time[index]:g} s follows {time[index - 1]:g} s; it must increase"
-        )
 
 
 _ANGLES = {"ankle_angle": "{}", "angle": "{}", "healthy_angle": "healthy_{}"}
@@ -361,39 +309,31 @@ def opensim_recording(
     """Return a recording of a walk in OpenSim's names, zero and signs, and the channels that need ``body_mass`` [kg].
 
     Moment and force per mass become the body's; without a body mass they are left out and named. DataError for
-    that of a neuromuscular gait model.
+    a neuromuscular gait model.
     """
     if "other_hip_angle" in recording.names:
         raise DataError(
             f"{recording.label}: a neuromuscular gait model walks on two legs, which has no form of OpenSim yet"
         )
-    foot = side[0]
-    missing = tuple(name for name in _PER_MASS if name in recording.names and _is_per_mass(recording, name))
-    missing = missing if body_mass is None else ()
+    foot, ankle, mass = side[0], f"ankle_angle_{side[0]}", body_mass or 0.0
+    units = {name: recording.unit(name) for name in recording.names}
+    per_mass = [name for name in _PER_MASS if units.get(name) in ("N m/kg", "-", "N/kg")]
+    missing = tuple(per_mass) if body_mass is None else ()
     channels = {}
-    for name in recording.names:
-        if name not in missing:
-            renamed, channel = _rename(recording, name, foot, body_mass or 0.0)
-            channels[renamed] = channel
+    for name, unit in units.items():
+        values = recording[name]
+        if name in missing:
+            continue
+        if name in _ANGLES and unit == "rad":
+            channels[_ANGLES[name].format(ankle)] = Channel(0.5 * math.pi - values, unit)
+        elif name in _REVERSED:
+            factor = mass if unit == "N m/kg" else 1.0
+            channels[_REVERSED[name].format(ankle)] = Channel(-factor * values, unit.removesuffix("/kg"))
+        elif name == "vertical_force":
+            factor = {"-": mass * STANDARD_GRAVITY, "N/kg": mass}.get(unit, 1.0)
+            channels[f"ground_force_{foot}_vy"] = Channel(factor * values, "N")
+        else:
+            channels[f"{name}_{foot}" if name in _KEPT else name] = Channel(values, unit)
     if {"heel_force", "toe_force"} <= set(recording.names):
         channels[f"ground_force_{foot}_vy"] = Channel(recording["heel_force"] + recording["toe_force"], "N")
     return Recording(recording.label, recording.time, channels, recording.kind), missing
-
-
-def _is_per_mass(recording: Recording, name: str) -> bool:
-    return recording.unit(name) in ("N m/kg", "-", "N/kg")
-
-
-def _rename(recording: Recording, name: str, foot: str, body_mass: float) -> tuple[str, Channel]:
-    """Return name and values of a channel as OpenSim has them."""
-    values, unit = recording[name], recording.unit(name)
-    ankle = f"ankle_angle_{foot}"
-    if name in _ANGLES and unit == "rad":
-        return _ANGLES[name].format(ankle), Channel(0.5 * math.pi - values, unit)
-    if name in _REVERSED:
-        factor = body_mass if unit == "N m/kg" else 1.0
-        return _REVERSED[name].format(ankle), Channel(-factor * values, "N m" if unit == "N m/kg" else unit)
-    if name == "vertical_force":
-        factor = {"-": body_mass * STANDARD_GRAVITY, "N/kg": body_mass}.get(unit, 1.0)
-        return f"ground_force_{foot}_vy", Channel(factor * values, "N")
-    return (f"{name}_{foot}" if name in _KEPT else name), Channel(values, unit)

@@ -49,6 +49,7 @@ def parquet_bytes(table: "pa.Table") -> bytes:
     """
     import pyarrow.parquet as pq
 
+    # Bytes of one significance are alike from row to row, and texts are few that repeat.
     floats = [field.name for field in table.schema if str(field.type) in _FLOATING]
     texts = [field.name for field in table.schema if str(field.type).startswith("dictionary")]
     buffer = io.BytesIO()
@@ -71,7 +72,11 @@ def read_parquet(file: io.BufferedIOBase, name: str, columns: Sequence[str] | No
 
     try:
         with file, pq.ParquetFile(file, page_checksum_verification=True) as opened:
-            _check_size(opened.metadata, name)
+            # Counted before memory is taken: a column of one constant takes no room in the file.
+            groups = (opened.metadata.row_group(number) for number in range(opened.metadata.num_row_groups))
+            values = sum(group.column(place).num_values for group in groups for place in range(group.num_columns))
+            if values > _MAXIMUM_VALUES:
+                raise DataError(f"{name}: has {values:,} values, more than any table of a study")
             return opened.read(columns=None if columns is None else list(columns))
     except (pa.ArrowException, OSError, ValueError) as error:
         raise DataError(f"{name}: is not a whole Parquet file: {one_line(error)[:120]}") from error
@@ -93,17 +98,6 @@ def matrix_of(column: "pa.ChunkedArray") -> "np.ndarray[Any, Any]":
     """Return a column of lists of one length as a matrix, a row for each list."""
     values = column.combine_chunks().flatten().to_numpy(zero_copy_only=False)
     return np.asarray(values.reshape(len(column), -1))
-
-
-def _check_size(metadata: Any, name: str) -> None:
-    """Refuse, before memory is taken, a table of more values than any of ours: a constant takes no room in the file."""
-    values = sum(
-        metadata.row_group(group).column(column).num_values
-        for group in range(metadata.num_row_groups)
-        for column in range(metadata.row_group(group).num_columns)
-    )
-    if values > _MAXIMUM_VALUES:
-        raise DataError(f"{name}: has {values:,} values, more than any table of a study")
 
 
 def as_numpy(table: "pa.Table") -> dict[str, "np.ndarray[Any, Any]"]:

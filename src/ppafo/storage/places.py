@@ -72,9 +72,19 @@ def read_document(place: Place, name: str) -> Any:
 
 
 def place_at(address: str | Path) -> Place:
-    """Return the folder at a path or an address such as ``s3://bucket/study``."""
+    """Return the folder at a path or an address such as ``s3://bucket/study``; DataError where it cannot be opened."""
     text = str(address)
-    return _remote(text) if _ADDRESS_MARK in text else DiskFolder(Path(text).absolute())
+    if _ADDRESS_MARK not in text:
+        return DiskFolder(Path(text).absolute())
+    try:
+        from fsspec.core import url_to_fs
+    except ModuleNotFoundError as error:
+        raise DataError(f"{text}: an address needs the extra 'cluster': pip install 'ppafo[cluster]'") from error
+    try:
+        system, root = url_to_fs(text)
+    except (ValueError, ImportError, OSError) as error:
+        raise DataError(f"{text}: cannot be opened: {' '.join(str(error).split())}") from error
+    return RemoteFolder(text.rstrip("/"), system, str(root).rstrip("/"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,6 +130,7 @@ class DiskFolder:
 
     def tidy(self) -> None:
         """Remove files that were being written when a process was killed: a younger one may belong to another."""
+        # By age and not by process: the folder may be shared by machines that cannot see each other's processes.
         latest = time.time() - _LONGEST_WRITING
         for path in self.folder.rglob(f"*{LEFT_ASIDE}*"):
             with contextlib.suppress(OSError):
@@ -164,15 +175,3 @@ class RemoteFolder:
 
     def tidy(self) -> None:
         """Do nothing: nothing is left aside."""
-
-
-def _remote(address: str) -> RemoteFolder:
-    try:
-        from fsspec.core import url_to_fs
-    except ModuleNotFoundError as error:
-        raise DataError(f"{address}: an address needs the extra 'cluster': pip install 'ppafo[cluster]'") from error
-    try:
-        system, root = url_to_fs(address)
-    except (ValueError, ImportError, OSError) as error:
-        raise DataError(f"{address}: cannot be opened: {' '.join(str(error).split())}") from error
-    return RemoteFolder(address.rstrip("/"), system, str(root).rstrip("/"))

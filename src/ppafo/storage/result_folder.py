@@ -33,12 +33,12 @@ _NAMED = 3
 class FolderKind:
     """What a command writes: what messages call it, the file by which it is recognised, the hashes of all others.
 
-    ``hashes_of(folder)`` gives the hashes that the mark states, by name; DataError where the mark is somebody else's.
+    ``document_of(folder)`` reads the mark, which states the hashes by name; DataError where it is somebody else's.
     """
 
     noun: str
     mark: str
-    hashes_of: Callable[[Path], Mapping[str, str]]
+    document_of: Callable[[Path], Mapping[str, Any]]
 
 
 MARK = "ppafo.json"
@@ -52,28 +52,14 @@ NOTHING_KEPT: Mapping[str, bytes] = MappingProxyType({})
 
 
 def marked_folder(command: str) -> FolderKind:
-    """Return the kind of folder that a command writes which marks it by ``MARK``.
+    """Return the kind of folder that a command writes which marks it by ``MARK``."""
 
-    Its hashes are a DataError where another command wrote the folder.
-    """
-
-    def hashes_of(folder: Path) -> Mapping[str, str]:
+    def document_of(folder: Path) -> Any:
         if marking_command(folder) != command:
             raise DataError(f"{folder}: is not a result of 'ppafo {command}' (see {MARK}); choose another folder")
-        return _stated(folder / MARK, read_json(folder / MARK))
+        return read_json(folder / MARK)
 
-    return FolderKind(f"result of 'ppafo {command}'", MARK, hashes_of)
-
-
-def _stated(mark: Path, document: Mapping[str, Any]) -> Mapping[str, str]:
-    """Return the hashes of files that a mark states; DataError for one of a version that stated none."""
-    hashes = document.get(_HASHES)
-    if not isinstance(hashes, dict):
-        raise DataError(
-            f"{mark}: states no hashes of its files, as earlier versions of ppafo did not; remove the folder yourself, "
-            "or choose another one"
-        )
-    return hashes
+    return FolderKind(f"result of 'ppafo {command}'", MARK, document_of)
 
 
 def marking_command(folder: Path) -> str:
@@ -121,11 +107,39 @@ def check_owned_folder(folder: Path, kind: FolderKind, kept: Mapping[str, bytes]
 
     Files that are ``kept`` as they are, such as one that grows from run to run, may have been changed.
     """
-    if os.path.isdir(folder):  # noqa: PTH112  # Path.is_dir raises where no file can have the name
-        _check_own(folder, kind, kept)
-    elif os.path.lexists(folder):
+    is_folder = os.path.isdir(folder)  # noqa: PTH112  # Path.is_dir raises where no file can have the name
+    # A link to nowhere is there too, and would be replaced by a folder.
+    if not is_folder and os.path.lexists(folder):
         raise DataError(f"{folder}: is a file; a {kind.noun} needs a folder")
+    present = {entry.name for entry in _listed(folder)} if is_folder else set()
+    if present:
+        _check_own(folder, kind, kept, present)
     check_folder_can_be_replaced(folder)
+
+
+def _check_own(folder: Path, kind: FolderKind, kept: Mapping[str, bytes], present: Collection[str]) -> None:
+    """Refuse a folder that is not empty, unless all in it is as an earlier result of this kind left it."""
+    if kind.mark not in present:
+        raise DataError(f"{folder}: is not empty and not a {kind.noun} (it has no {kind.mark}); choose another folder")
+    hashes = kind.document_of(folder).get(_HASHES)
+    if not isinstance(hashes, dict):
+        raise DataError(
+            f"{folder / kind.mark}: states no hashes of its files, as earlier versions of ppafo did not; remove the "
+            "folder yourself, or choose another one"
+        )
+    # Before hashes are compared: a file of somebody else's is the likelier and the clearer reason.
+    foreign = sorted(_foreign(folder, {*hashes, kind.mark}))
+    if foreign:
+        raise DataError(
+            f"{folder}: contains files that are not part of its {kind.noun} ({_some(foreign)}); move them or use "
+            "another folder"
+        )
+    changed = sorted(name for name, stated in hashes.items() if _is_changed(folder / name, stated, kept.get(name)))
+    if changed:
+        raise DataError(
+            f"{folder}: contains files that were changed since its {kind.noun} was written ({_some(changed)}); move "
+            "them or use another folder"
+        )
 
 
 def write_owned_folder(folder: Path, contents: Mapping[str, bytes], kind: FolderKind) -> None:
@@ -140,27 +154,6 @@ def read_json(path: Path) -> Any:
         return json_document(read_bytes(path, _MAXIMUM_BYTES_WRITTEN))
     except ValueError as error:
         raise DataError(f"{path}: is not JSON: {one_line(error)}") from error
-
-
-def _check_own(folder: Path, kind: FolderKind, kept: Mapping[str, bytes]) -> None:
-    present = {entry.name for entry in _listed(folder)}
-    if not present:
-        return
-    if kind.mark not in present:
-        raise DataError(f"{folder}: is not empty and not a {kind.noun} (it has no {kind.mark}); choose another folder")
-    hashes = kind.hashes_of(folder)
-    foreign = sorted(_foreign(folder, {*hashes, kind.mark}))
-    if foreign:
-        raise DataError(
-            f"{folder}: contains files that are not part of its {kind.noun} ({_some(foreign)}); move them or use "
-            "another folder"
-        )
-    changed = sorted(name for name, stated in hashes.items() if _is_changed(folder / name, stated, kept.get(name)))
-    if changed:
-        raise DataError(
-            f"{folder}: contains files that were changed since its {kind.noun} was written ({_some(changed)}); move "
-            "them or use another folder"
-        )
 
 
 def _some(names: Sequence[str]) -> str:
@@ -276,11 +269,7 @@ def read_document(folder: str | Path) -> dict[str, Any]:
     return document
 
 
-def _hashes_of(folder: Path) -> Mapping[str, str]:
-    return _stated(folder / RUN_FILE, read_document(folder))
-
-
-_RESULT = FolderKind("ppafo result", RUN_FILE, _hashes_of)
+_RESULT = FolderKind("ppafo result", RUN_FILE, read_document)
 
 
 WALK_RECORDING = "recording.nc"

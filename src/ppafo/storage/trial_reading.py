@@ -44,6 +44,7 @@ def check_can_be_read(path: Path, module: str, function: str, library: str) -> N
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     # -P: nothing of the working folder is imported
     words = [sys.executable, "-P", "-c", _TRIAL, module, function, library, str(path)]
+    # A slow disk must not pass for a damaged file, nor a busy computer.
     limit = _MAXIMUM_SECONDS + path.stat().st_size / _BYTES_PER_SECOND
     nothing = subprocess.DEVNULL
     try:

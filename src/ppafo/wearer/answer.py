@@ -1,18 +1,17 @@
 """A walk of a neuromuscular gait model: with the device and with it off, until a fall where there is one."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ppafo.analyses.walk.course import bottle_data, bottle_parts, bottle_remark
-from ppafo.analyses.walk.document import walk_data
+from ppafo.analyses.walk.document import Row, metrics_table, walk_data
 from ppafo.analyses.walk.safety import over_time_parts, safety_remarks
 from ppafo.documents.json_text import plain
 from ppafo.gait.document import load_gait
 from ppafo.metrics.strides import SETTLING
-from ppafo.report.display_units import rounded_text, title_with_unit
-from ppafo.report.finding import Cell, Column, Finding, Part, columns_of
+from ppafo.report.finding import Column, Finding, Part, columns_of
 from ppafo.report.kind import Kind
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import BLUE, GREY, VERMILION
@@ -22,15 +21,12 @@ from ppafo.walking.motion import person_remarks, walk_of
 from ppafo.walking.result import REACTING_WALK_FORMAT, WalkResult
 from ppafo.walking.strides import PHASES
 from ppafo.walking.walk import Comparison
-from ppafo.wearer.settings import ReactingWearer, wearer_of_walk
+from ppafo.wearer.settings import wearer_of_walk
 from ppafo.wearer.way import EDGE, met_by
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 SCHEMA_VERSION = 2
 
-ROWS = (
+ROWS: tuple[Row, ...] = (
     ("walked_time", "Walked until the end or a fall", "time", 1),
     ("strides", "Whole strides", "", 0),
     ("walking_speed", "Speed", "velocity", 2),
@@ -117,7 +113,14 @@ def reacting_finding(comparison: Comparison) -> Finding[ReactingPair]:
     worn, bare = comparison.with_device, comparison.without_device
     scenario = worn.scenario
     wearer = wearer_of_walk(walk_of(scenario))
-    remarks = [*person_remarks(scenario), *weak_remarks(wearer), *fall_remarks(comparison)]
+    remarks = [*person_remarks(scenario)]
+    changed = [
+        f"{name.removesuffix('_strength')} {100.0 * value:.3g} %"
+        for name, value in wearer.settings.items()
+        if name.endswith("_strength") and value != 1.0
+    ]
+    remarks += [f"strength of the left leg: {', '.join(changed)}"] if changed else []
+    remarks += fall_remarks(comparison)
     remarks += [] if worn.supply is None else [bottle_remark(worn)]
     remarks += safety_remarks(worn)
     stays = worn.metrics["stays_up"].value > 0.5
@@ -135,7 +138,22 @@ def reacting_finding(comparison: Comparison) -> Finding[ReactingPair]:
             *_likeness_part(comparison),
             Part("How to read it", said=(_EXPLAINED, _EFFORT, _LIMITS), is_detail=True),
             *over_time_parts(worn),
-            *_curves(comparison),
+            *(
+                [
+                    Part(
+                        "The mean stride",
+                        panels=lambda: stride_panels(comparison),
+                        name="mean-stride",
+                        caption=_CURVES,
+                        across=3,
+                        size=(3.1, 2.5),
+                        title=f"{scenario.name}: {wearer.name}, neuromuscular",
+                        is_detail=True,
+                    )
+                ]
+                if worn.averages
+                else []
+            ),
         ),
         found=ReactingPair(comparison),
         passed=comparison.is_completed and stays and worn.is_helped,
@@ -205,16 +223,6 @@ def _likeness_part(comparison: Comparison) -> tuple[Part, ...]:
     return (Part("Compared with a measured gait", columns_of(head, rows), (_LIKENESS,), is_detail=True),)
 
 
-def weak_remarks(wearer: ReactingWearer) -> list[str]:
-    """Return a line on the muscles that are weaker or stronger than in the wearer's file."""
-    changed = [
-        f"{name.removesuffix('_strength')} {100.0 * value:.3g} %"
-        for name, value in wearer.settings.items()
-        if name.endswith("_strength") and value != 1.0
-    ]
-    return [f"strength of the left leg: {', '.join(changed)}"] if changed else []
-
-
 def fall_remarks(comparison: Comparison) -> list[str]:
     """Return who falls, with the device and without."""
     found = []
@@ -236,23 +244,16 @@ def fall_remarks(comparison: Comparison) -> list[str]:
 
 def reacting_table(comparison: Comparison) -> list[Column]:
     """Return a row for each number, with the device and with it off."""
-    columns = (comparison.with_device.metrics, comparison.without_device.metrics)
-    rows: list[tuple[Cell, ...]] = []
-    for name, title, quantity, digits in ROWS:
-        if not any(name in metrics for metrics in columns):
-            continue
-        head = title_with_unit(title, quantity) if quantity else title
-        found = (metrics.get(name) for metrics in columns)
-        rows.append((head, *(None if one is None else rounded_text(one.value, quantity, digits) for one in found)))
-    return columns_of(("", "with", "device off"), rows)
+    walks = (("with", comparison.with_device), ("device off", comparison.without_device))
+    return metrics_table(
+        ROWS, [(head, {name: one.value for name, one in walked.metrics.items()}) for head, walked in walks]
+    )
 
 
 def _way_part(comparison: Comparison) -> tuple[Part, ...]:
     """Return what was walked on each stretch of the way, with the device and without; nothing on level ground."""
-    stretches = [
-        item for item in wearer_of_walk(walk_of(comparison.with_device.scenario)).stretches if item.kind == "walk"
-    ]
-    met = [item for item in wearer_of_walk(walk_of(comparison.with_device.scenario)).stretches if not item.is_plain]
+    way = wearer_of_walk(walk_of(comparison.with_device.scenario)).stretches
+    stretches, met = [item for item in way if item.kind == "walk"], [item for item in way if not item.is_plain]
     if not met:
         return ()
     head = ["On the way", "from (m)", "strides with", "lowest toes (cm)", "strides off", "lowest toes (cm)"]
@@ -268,24 +269,6 @@ def _way_part(comparison: Comparison) -> tuple[Part, ...]:
             cells += [str(int(on_it.sum())), f"{100.0 * float(toes.min()):.1f}" if toes.size else None]
         rows.append((", ".join([*own, stretch.title]), f"{stretch.start:.2f}", *cells))
     return (Part(columns=columns_of(head, rows)),)
-
-
-def _curves(comparison: Comparison) -> tuple[Part, ...]:
-    if not comparison.with_device.averages:
-        return ()
-    scenario = comparison.with_device.scenario
-    return (
-        Part(
-            "The mean stride",
-            panels=lambda: stride_panels(comparison),
-            name="mean-stride",
-            caption=_CURVES,
-            across=3,
-            size=(3.1, 2.5),
-            title=f"{scenario.name}: {wearer_of_walk(walk_of(scenario)).name}, neuromuscular",
-            is_detail=True,
-        ),
-    )
 
 
 def stride_panels(comparison: Comparison) -> list[Panel]:
@@ -304,9 +287,8 @@ def stride_panels(comparison: Comparison) -> list[Panel]:
                 band = (curves.mean - curves.deviation, curves.mean + curves.deviation)
                 marks.append(Mark("line", percent, curves.mean, (), "" if panels else label, colour))
                 marks.append(Mark("band", percent, band, colour=colour, style={"alpha": 0.2}))
-        panels.append(Panel(stride, kind, marks, legend="" if panels else "inside", then=_whole_stride, shares_x=True))
+        legend = "" if panels else "inside"
+        panels.append(
+            Panel(stride, kind, marks, legend=legend, then=lambda axes: axes.set_xlim(0.0, 100.0), shares_x=True)
+        )
     return panels
-
-
-def _whole_stride(axes: "Axes") -> None:
-    axes.set_xlim(0.0, 100.0)

@@ -149,6 +149,7 @@ def find_wearer(name_or_path: str | Path = PUBLISHED) -> WearerFile:
     speed = _number(document, "start_speed", "m/s", SLOWEST_START, FASTEST_START, file)
     left, right = (_leg(document, side) for side in ("left", "right"))
     left_gains, right_gains = (
+        # The later replaces the earlier: published, the wearer's on whom it is based, of that one's leg, of this one's.
         {**dict.fromkeys(NOT_PUBLISHED, 0.0), **base["gains"], **_leg(base, side)["gains"], **leg["gains"]}
         for side, leg in (("left", left), ("right", right))
     )

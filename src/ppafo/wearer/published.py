@@ -1,7 +1,7 @@
 """The wearer of H. Geyer and H. Herr: body, muscles, ends of joints and ground, and how the walker starts.
 
 IEEE Trans. Neural Syst. Rehabil. Eng. 18 (2010) 263, doi:10.1109/TNSRE.2010.2047592: tables and appendix. An adult of
-80 kg and 1.8 m; angles are printed in degrees there and are in rad here.
+80 kg and 1.8 m; angles are in degrees there and in rad here.
 """
 
 import math
@@ -40,7 +40,7 @@ BODY = Body(
     heel=0.04,
     gravity=GRAVITY,
 )
-"""Trunk with head and arms, and segments of a leg; mass centres are printed from the distal end."""
+"""Trunk with head and arms, and segments of a leg; mass centres are reported from the distal end."""
 
 MASS = BODY.trunk.mass + 2.0 * (BODY.thigh.mass + BODY.shank.mass + BODY.foot.mass)
 WEIGHT = MASS * GRAVITY
@@ -126,6 +126,7 @@ def with_size(wearer: Wearer, lengths: Any, masses: Any) -> Wearer:
 
 
 def _muscles_with_size(muscles: Muscles, lengths: Any, masses: Any) -> Muscles:
+    # Velocities are in optimum lengths a second: they grow with the lengths by themselves.
     changed: dict[str, Any] = {}
     for name, own in muscles._asdict().items():
         if isinstance(own, Muscle):
@@ -182,6 +183,7 @@ def start_of(wearer: Wearer, speed: float) -> Walker:
     right = limb_of(Joints(math.radians(90.0), math.radians(175.0), math.radians(140.0)), START_LEAN)
     body = wearer.body
     ankle = -body.thigh.length * math.cos(left.thigh) - body.shank.length * math.cos(left.shank)
+    # Heel or ball, whichever is lower.
     lowest = ankle + min(-body.heel * math.sin(left.foot), body.foot.length * math.sin(left.foot))
     still = Limb(0.0, 0.0, 0.0)
     rates = Pose(x=speed, y=0.0, lean=0.0, left=still, right=still)
@@ -218,6 +220,7 @@ def _leg_at_start(muscles: Muscles, angles: Joints) -> LegState:
 
 def first_answer() -> Answer:
     """What the reflexes order at the start: the least, with the left leg in stance and the right one in swing."""
+    # The least stimulation that a muscle falls to.
     least = Stimulation._make([0.01] * 7)
     return Answer(to_left=least, to_right=least, left=Gait(1.0, 0.3, START_LEAN), right=Gait(0.0, 0.0, START_LEAN))
 

@@ -108,6 +108,7 @@ def ankle_moments(wearer: Wearer, record: Mapping[str, Floats], angles: Joints) 
         [[record[f"walker.left.fibres.{name}.{field}"] for field in Fibre._fields] for name in Fibres._fields]
     )
     found = np.empty(fibres.shape[-1])
+    # Sample by sample with the function that the engine runs, which takes floats alone: no second form of the muscles.
     for sample, (own, ankle, knee, hip, rate) in enumerate(
         zip(
             np.moveaxis(fibres, -1, 0).tolist(),
@@ -154,6 +155,7 @@ def reacting_metrics(
     found: dict[str, Metric] = {}
     for kind in OF_WEARER:
         value = float(kind.read(readings))
+        # Without a whole stride a mean has no value, and the metric is left out.
         if math.isfinite(value):
             found[kind.name] = Metric(value, kind.unit, kind.summary)
     for name, item in PER_STRIDE.items():
@@ -175,6 +177,7 @@ def reacting_result(
     """The result of a neuromuscular gait model, until the end or a fall."""
     fall_time = float(record[FELL][-1])
     stands = record[FELL] < 0.0
+    # A recording has a sample at least.
     stands[0] = True
     time, rows = time[stands], {path: values[stands] for path, values in record.items()}
     recording = recording_of_reacting(

@@ -125,7 +125,7 @@ class FootEnd(NamedTuple):
 class BodyEnd(NamedTuple):
     """A wearer after a step, and what was felt and acted at its begin.
 
-    ``due`` is 1 where the nerves are sampled, ``work`` is that of the muscles [J].
+    ``due`` is 1 where the nerves are sampled, ``work`` is the muscles' [J].
     """
 
     after: Walker
@@ -148,6 +148,7 @@ def assist_of(plant: PlantParameters, share: DeviceShare, state: PlantState, hel
     """What the device does to the ankle: torque of both pressures, friction and damping of the vane, its inertia."""
     pressure_1, pressure_2 = held_pressures(held, state)
     torque = actuator_torque(pressure_1, pressure_2, plant.torque_constant)
+    # Friction as damping, torque over rate: implicit, it cannot turn the rate round within a step.
     friction = friction_in_motion(plant.dynamic_torque, state.angular_velocity, pressure_1, pressure_2)
     damping = share.viscous_damping + friction / max(abs(state.angular_velocity), CREEP)
     return Assist(torque, damping, share.inertia)
@@ -180,6 +181,7 @@ def next_body(
     step: float,
 ) -> BodyEnd:
     """The wearer after a step [s] with what the device does to the left ankle; one who has fallen lies still."""
+    # A step of no length leaves everything where it is, without a branch in compiled code.
     moving = 0.0 if walk.fall_time >= 0.0 else step
     push = push_now(walk.pushed, step)
     ordered = reflexes.ordered
@@ -214,6 +216,7 @@ def ankle_of(
     """The ankle to which the body led a leg, as far as the vane can follow."""
     angle = joints(limb, lean).ankle
     rate = rates_of_joints(limb_rates, lean_rate).ankle
+    # The ends of the body's own ankle are soft: it may turn farther than the vane can.
     reached = clamp_angle(plant, angle)
     return AnkleStep(reached, rate if fall_time < 0.0 and reached == angle else 0.0)
 
@@ -273,6 +276,7 @@ def advance_reacting(
     load = (heel + ball) / wearer.weight
     # The ankle in front of the hip grows in the swing and falls in stance.
     forward = wearer.body.thigh.length * limb_rates.thigh + wearer.body.shank.length * limb_rates.shank > 0.0
+    # Toes count while the swinging leg passes the standing one, where they are lowest and stumbling is likely.
     watched = stood and forward and abs(foot.place) < PASSING * leg
     passed = walk.clearance < NO_CLEARANCE
     strikes = stood and passed and load > LOADED and foot.place >= PASSING * leg
@@ -283,9 +287,11 @@ def advance_reacting(
     turned = after.angle - before.angle
     follows = follow_rate * step / (1.0 + follow_rate * step)
     since = 0.0 if strikes else walk.since + step
+    # Negated, so that a height that is no number is a fall too.
     falls = stood and not (pose.y - footing(wearer.way, pose.x).height > FALLEN * leg)
     work = 0.5 * (given + walk.external_torque) * turned if contact == TOE and stood else 0.0
     positive_work = max(work, 0.0)
+    # The first strike ends no whole stride: the walk began within one.
     stride_time = walk.since if strikes and walk.strides > 0.5 else walk.stride_time
     muscle_work = walk.muscle_work + (body.work if stood else 0.0)
     toes_first = (1.0 if touches_first else 0.0) if strikes else walk.toes_first

@@ -224,5 +224,6 @@ def read_reacting(
     own |= {f"right_{name}": value for name, value in file.right_gains._asdict().items()}
     own |= {START_SPEED.name: file.speed}
     read = REACTIONS if course is None else tuple(item for item in REACTIONS if item not in OF_THE_WAY)
+    # The file's numbers are the defaults of the settings, so that a walk file or an override changes any of them.
     numbers = tuple(replace(item, default=own.get(item.name, item.default)) for item in read)
     return ReactingWearer(file, wearer_of(file), reading.section("wearer", numbers), course)

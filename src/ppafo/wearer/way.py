@@ -69,6 +69,7 @@ def met_by(stretches: Sequence[Stretch], hip: float) -> str:
         return ""
     if last.kind == "walk" and last is met[-1]:
         return f"on the {last.title}"
+    # A foot that is still on what was met, or has just left it, may have stumbled over it.
     beyond = hip - last.start
     return f"on the {last.title}" if beyond < REACH else f"{beyond:.1f} m after the {last.title}"
 
@@ -135,6 +136,7 @@ def way_of(stretches: Sequence[Stretch]) -> Way:
         if stretch.kind == "push":
             pushes.append(Push(stretch.start, values["force"], values["duration"]))
         elif stretch.kind == "step":
+            # Times the inverse: a number that an export writes down knows no division by a plain one.
             pieces.append(_piece(pieces[-1], stretch.start, values["height"] * (1.0 / EDGE)))
             if after is None or after.kind != "walk":
                 pieces.append(_piece(pieces[-1], stretch.start + EDGE, slope))
@@ -153,5 +155,6 @@ def way_of(stretches: Sequence[Stretch]) -> Way:
 
 
 def _piece(before: Piece, start: Any, slope: Any) -> Piece:
+    # A sum with a negative factor, as such numbers know no difference either.
     height = before.height + before.slope * (start + -1.0 * before.start)
     return Piece(start=start, height=height, slope=slope, cosine=1.0 / np.sqrt(1.0 + slope * slope))

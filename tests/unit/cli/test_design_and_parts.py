@@ -127,8 +127,7 @@ def test_an_interrupted_study_writes_nothing_and_ends_with_130(
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    module = f"ppafo.analyses.design.{'front.solve' if way == 'front' else 'profile.search'}"
-    monkeypatch.setattr(f"{module}.run_ensemble", interrupted)
+    monkeypatch.setattr("ppafo.analyses.design.trials.run_ensemble", interrupted)
     file = folder / ("design.toml" if way == "front" else "sizing.toml")
     assert main(["design", str(file), "--out", str(folder / "out")]) == 130
     assert not (folder / "out").exists()

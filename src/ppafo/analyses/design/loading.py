@@ -20,6 +20,7 @@ def read_design_file(name_or_path: str | Path) -> tuple[DesignFile | SizingFile,
     file = label(str(name_or_path))
     document = FILE.parse(FILE.read(name_or_path), file)
     known = {*DesignFile.model_fields, *SizingFile.model_fields}
+    # Both layouts would refuse it, each for what only the other has: say what decides between them.
     if document.keys() <= known - {"profile", "task"}:
         raise StudyError(
             f"{file}: says neither which torque is wanted nor in which tasks; write a table [profile] with time and "

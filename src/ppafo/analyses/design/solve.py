@@ -40,6 +40,7 @@ def design(
     wished = {"mass": mass, "torque": torque, "pressure": pressure, "minutes": minutes}
     report = progress or report_nothing
     if problem is None:
+        # A stature may be left out, so it is not among them.
         missing = [f"--{name}" for name, value in wished.items() if value is None]
         if len(missing) == len(wished) and stature is None:
             raise StudyError(f"no design was given: name one, give a .toml file, or for a wearer {FOR_A_WEARER}")
@@ -54,6 +55,7 @@ def design(
     chosen = load_design(problem, seed) if isinstance(problem, str | Path) else problem
     if isinstance(chosen, SizingProblem):
         return profile.finding_of(size_for_profile(chosen, threads, report))
+    # A file has taken the seed as it was loaded.
     if seed is not None and chosen is problem:
         chosen = with_seed(chosen, seed)
     return front.finding_of(find_front(chosen, threads, report))

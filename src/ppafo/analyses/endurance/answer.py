@@ -164,38 +164,35 @@ def endurance_panels(found: Endurance) -> list[Panel]:
     recording, bottle = found.discharge.recording, found.bottle
     time, needed = recording.time, bottle.regulator.set_pressure + bottle.regulator.pressure_margin
     dotted, dashed = ({"linestyle": style, "linewidth": 1.2} for style in (":", "--"))
-    gases = (("bottle_mass", "total gas", BLUE), ("liquid_mass", "liquid", GREEN))
-    shown: list[tuple[Kind, list[Mark]]] = [
-        (
-            _WARMTH,
-            [
-                Mark("level", (), bottle.room_temperature, (), "room", GREY, dotted),
-                Mark("line", time, recording["wall_temperature"], (), "wall", ORANGE),
-                Mark("line", time, recording["bottle_temperature"], (), "content", BLUE),
-            ],
-        ),
-        (
-            _PRESSURE,
-            [
-                Mark("level", (), needed, (), "needed", VERMILION, dashed),
-                Mark("line", time, recording["bottle_pressure"], (), "bottle", BLUE),
-            ],
-        ),
-        (
-            _MASS,
-            [Mark("line", time, recording[name], (), label, look) for name, label, look in gases if name in recording],
-        ),
-    ]
+    lines = (
+        (_WARMTH, "wall_temperature", "wall", ORANGE),
+        (_WARMTH, "bottle_temperature", "content", BLUE),
+        (_PRESSURE, "bottle_pressure", "bottle", BLUE),
+        (_MASS, "bottle_mass", "total gas", BLUE),
+        (_MASS, "liquid_mass", "liquid", GREEN),
+    )
+    marks: dict[Kind, list[Mark]] = {
+        _WARMTH: [Mark("level", (), bottle.room_temperature, (), "room", GREY, dotted)],
+        _PRESSURE: [Mark("level", (), needed, (), "needed", VERMILION, dashed)],
+        _MASS: [],
+    }
+    for kind, name, label, look in lines:
+        if name in recording:
+            marks[kind].append(Mark("line", time, recording[name], (), label, look))
     end = float(_DURATION.values(time[-1]))
     return [
-        Panel(_DURATION, kind, marks, then=lambda axes: axes.set_xlim(0.0, end), shares_x=True) for kind, marks in shown
+        Panel(_DURATION, kind, each, then=lambda axes: axes.set_xlim(0.0, end), shares_x=True)
+        for kind, each in marks.items()
     ]
 
 
 def _facts(found: Endurance) -> list[tuple[str, str]]:
     """Return name and value of everything that a reader wants first."""
     course, draw = found.discharge, found.draw
-    recording = course.recording
+    recording, bottle, room = course.recording, found.bottle, found.bottle.room_temperature
+    # What warms the gas of the full bottle to the room's temperature behind the regulator.
+    content = bottle_content(bottle.fluid.table, bottle.mass, bottle.volume, room)
+    heat = heat_to_warm(bottle.fluid.table, content, room, bottle.regulator.set_pressure)
     rows = [
         ("run time", f"{minutes_text(course.walking_time)} of walking, {minutes_text(course.total_time)} in total"),
         ("strides", strides_text(course.strides)),
@@ -209,7 +206,7 @@ def _facts(found: Endurance) -> list[tuple[str, str]]:
             f"{_MASS.text(draw.mass_per_stride)} a stride, {_FLOW.text(draw.mean_flow)}, largest "
             f"{_FLOW.text(draw.peak_flow)}",
         ),
-        ("heat that it lacks", _lacking_heat(found)),
+        ("heat that it lacks", f"{heat * draw.mean_flow:.3g} W, {heat / 1000.0:.3g} kJ/kg, at the start"),
         ("lowest temperature of the fluid", _WARMTH.text(float(np.min(recording["bottle_temperature"])))),
         ("pressure at the end", _PRESSURE.text(float(recording["bottle_pressure"][-1]))),
     ]
@@ -218,11 +215,3 @@ def _facts(found: Endurance) -> list[tuple[str, str]]:
         left = f"no, {_MASS.text(float(recording['liquid_mass'][-1]))} left"
         rows.append(("liquid used up", f"after {minutes_text(float(recording.time[dry[0]]))}" if dry.size else left))
     return rows
-
-
-def _lacking_heat(found: Endurance) -> str:
-    """Return what warms the gas of the full bottle to the room's temperature behind the regulator."""
-    bottle, room = found.bottle, found.bottle.room_temperature
-    content = bottle_content(bottle.fluid.table, bottle.mass, bottle.volume, room)
-    heat = heat_to_warm(bottle.fluid.table, content, room, bottle.regulator.set_pressure)
-    return f"{heat * found.draw.mean_flow:.3g} W, {heat / 1000.0:.3g} kJ/kg, at the start"

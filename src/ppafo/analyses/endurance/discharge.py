@@ -64,6 +64,7 @@ def smallest_mass_when_warm(bottle: Bottle, draw: Draw) -> float:
     """Return the mass of gas [kg] with which the bottle, at room temperature, just holds the supply pressure."""
     table, room = bottle.fluid.table, bottle.room_temperature
     low, high = 0.0, min(bottle.mass, bottle.volume * densest_gas(table, room))
+    # Halved until nothing is left to halve: the reserve grows with the mass, though not smoothly where liquid begins.
     for _ in range(60):
         middle = 0.5 * (low + high)
         pressure = bottle_content(table, middle, bottle.volume, room).pressure
@@ -72,11 +73,6 @@ def smallest_mass_when_warm(bottle: Bottle, draw: Draw) -> float:
         else:
             high = middle
     return high
-
-
-def frozen_below(bottle: Bottle) -> float:
-    """Return the temperature [K] at which the liquid freezes, or below which the table knows nothing of the gas."""
-    return bottle.fluid.table.temperatures[0]
 
 
 def ending(bottle: Bottle, draw: Draw, mass: float, content: BottleContent, stopped_by: Stop) -> Ending:
@@ -95,9 +91,11 @@ def ending(bottle: Bottle, draw: Draw, mass: float, content: BottleContent, stop
         cold = "the liquid begins to freeze (dry ice)" if has_liquid(bottle.fluid.table) else "the gas is too cold"
         return Ending("frozen", f"{cold}, and the property table ends here; {left}, {warm}", mass, usable)
     to_spare = pressure_reserve(bottle.regulator, content.pressure, draw.peak_flow) / bottle.regulator.set_pressure
+    # Both reserves are fractions, so that the smaller one says what went short first.
     is_pressure = to_spare <= flow_limit(bottle, content.pressure, content.temperature) / draw.peak_flow - 1.0
     short = "maintain the supply pressure" if is_pressure else "drive the largest flow through the regulator"
     why = f"its pressure is too low to {short}"
+    # What a warm bottle would still give decides between the two: cold is mended by waiting, empty is not.
     if usable > _NEXT_TO_NOTHING * bottle.mass:
         return Ending("too cold", f"the bottle is too cold: {why}; {left}, {warm}", mass, usable)
     return Ending("empty", f"the bottle is empty: {why}, and would be also when warm; {left}", mass, usable)
@@ -191,6 +189,7 @@ def discharge(bottle: Bottle, draw: Draw, schedule: Schedule) -> Discharge:
     time, values, walking = 0.0, start, True
     reason: Stop | None = None
     while reason is None:
+        # Walking and resting take turns; without a rest all of it is one stretch.
         length = schedule.longest if schedule.rest == 0.0 else (schedule.walk if walking else schedule.rest)
         end = min(time + length, schedule.longest)
         stretch = solve_stretch(bottle, draw, time, end, values, walking)
@@ -237,6 +236,7 @@ def _recording(bottle: Bottle, stretches: Sequence[Stretch]) -> Recording:
     """Return the course at evenly spaced times, and exactly at its end."""
     times = np.linspace(0.0, stretches[-1].end, SAMPLES)
     ends = np.array([stretch.end for stretch in stretches])
+    # The last time may be beyond the last end by rounding.
     places = np.minimum(np.searchsorted(ends, times, side="left"), len(stretches) - 1)
     rows = np.array([stretches[place].solution(time) for place, time in zip(places, times, strict=True)])
     contents = [content_of(bottle, float(row[0]), float(row[1])) for row in rows]
@@ -279,12 +279,15 @@ def solve_stretch(bottle: Bottle, draw: Draw, start: float, end: float, values: 
         return [*inside, flow, now.outflow_power, now.room_heat]
 
     def kelvins_above_freezing(_time: float, y: Floats) -> float:
-        return content_of(bottle, float(y[0]), float(y[1])).temperature - frozen_below(bottle) - _ABOVE_FREEZING
+        # The liquid freezes where its table begins; below, the table knows nothing of the gas either.
+        freezing = bottle.fluid.table.temperatures[0]
+        return content_of(bottle, float(y[0]), float(y[1])).temperature - freezing - _ABOVE_FREEZING
 
     def to_spare(_time: float, y: Floats) -> float:
         content = content_of(bottle, float(y[0]), float(y[1]))
         return reserve(bottle, draw, content.pressure, content.temperature)
 
+    # A stretch may begin without a reserve, and the solver finds crossings only.
     if walking and to_spare(start, values) <= 0.0:
         return Stretch(start, start, flow, lambda _times: values, values, "supply")
     events: list[Any] = [kelvins_above_freezing, *([to_spare] if walking else [])]

@@ -67,6 +67,7 @@ def draw_of_recording(recording: Recording, stride_time: float | None) -> Draw:
     if "supplied_mass" not in recording:
         raise DataError(f"{recording.label}: has no channel 'supplied_mass'; available: {', '.join(recording.names)}")
     supplied = _gas_use(recording)
+    # Not the last value alone: a recording may begin in the middle of a walk.
     gain = float(supplied[-1] - supplied[0])
     if recording.duration <= 0.0 or gain <= 0.0:
         raise DataError(f"{recording.label}: no gas was taken from the supply, so a bottle would never be empty")
@@ -96,6 +97,7 @@ def largest_flow(recording: Recording) -> float:
     """Return the largest flow [kg/s], averaged over the window or over a recording that is shorter."""
     window = min(PEAK_WINDOW, recording.duration)
     starts = recording.time[recording.time <= recording.time[-1] - window]
+    # The last window need not begin at a sample.
     starts = np.append(starts, recording.time[-1] - window)
     ends = np.interp(starts + window, recording.time, _gas_use(recording))
     begins = np.interp(starts, recording.time, _gas_use(recording))

@@ -1,7 +1,7 @@
 """How long one bottle lasts for a gas use; for several uses side by side."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from ppafo.analyses.endurance.answer import Endurance, Endurances, finding_of, finding_of_several
@@ -21,7 +21,6 @@ from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, Bottle, load_bottle
 from ppafo.report.finding import Finding
 from ppafo.report.kind import Kind
 from ppafo.signals import Recording
-from ppafo.simulation.scenario import Scenario
 from ppafo.storage.result_folder import read_recording
 from ppafo.walking import WalkResult
 from ppafo.walking.bottle import Schedule
@@ -62,19 +61,33 @@ def endurance(
     if walk is not None and rest is None:
         raise ParameterError("--walk: is the time between two rests: give --rest too, or --longest for the whole time")
     schedule = Schedule(_BETWEEN_RESTS if walk is None else walk, rest or 0.0, longest)
-    chosen = _Bottle(bottle, tuple(overrides))
+    named, changed = PAPER_BOTTLE if bottle is None else bottle, tuple(overrides)
     if gas_per_stride is not None:
         draw = draw_of_numbers(gas_per_stride, _STRIDE_TIME if stride_time is None else stride_time, peak_flow)
-        return finding_of(follow_bottle(chosen.load(), draw, schedule))
+        return finding_of(follow_bottle(load_bottle(named, changed), draw, schedule))
     if peak_flow is not None:
         raise ParameterError("--peak-flow belongs to --gas-per-stride; a recording has its own largest flow")
-    names = [_name(use) for use in given]
-    if len(set(names)) < len(names):
-        raise ParameterError("the same recording is given twice")
-    found = {
-        name: _endurance_of_use(use, stride_time, chosen, schedule) for name, use in zip(names, given, strict=True)
+    uses = {
+        use.label if isinstance(use, Recording) else use.scenario.name if isinstance(use, WalkResult) else str(use): use
+        for use in given
     }
-    return finding_of(found[names[0]]) if len(found) == 1 else finding_of_several(Endurances(found))
+    if len(uses) < len(given):
+        raise ParameterError("the same recording is given twice")
+    found = {}
+    for name, use in uses.items():
+        gas = walk_gas(use) if isinstance(use, WalkResult) else None
+        if isinstance(use, str | Path) and is_walk_folder(Path(use)):
+            gas = read_walk_gas(Path(use))
+        if gas is None:
+            full = load_bottle(named, changed)
+            recording = use if isinstance(use, Recording) else read_recording(Path(str(use)))
+            found[name] = follow_bottle(full, draw_of_recording(recording, stride_time), schedule)
+            continue
+        if stride_time is not None:
+            stride = f"its whole course '{gas.course}'" if gas.course else "one stride of its walk"
+            raise ParameterError(f"--stride-time: a stride of {name} is {stride}; omit --stride-time")
+        found[name] = endurance_of_walk_gas(gas, bottle, schedule, changed)
+    return finding_of(*found.values()) if len(found) == 1 else finding_of_several(Endurances(found))
 
 
 def endurance_of_walk(result: WalkResult, bottle: str | Path | None = None) -> Endurance | None:
@@ -85,6 +98,7 @@ def endurance_of_walk(result: WalkResult, bottle: str | Path | None = None) -> E
     course.
     """
     gas = walk_gas(result)
+    # A walk that takes no gas lasts for ever on any bottle.
     return None if gas.gas_per_stride <= 0.0 else endurance_of_walk_gas(gas, bottle, WITHOUT_REST)
 
 
@@ -97,23 +111,18 @@ def endurance_of_walk_gas(
         raise DataError(f"{gas.name}: its folder does not say what was walked; write the walk again")
     own = walk_of(gas.scenario).bottle
     carried = on_bottle(gas.scenario, PAPER_BOTTLE if bottle is None and own is None else bottle, overrides)
-    found = _walked_to_its_end(carried, at_set_pressure, schedule)
-    return replace(found, is_of_course=bool(gas.course))
-
-
-def _walked_to_its_end(carried: Scenario, at_set_pressure: Draw, schedule: Schedule) -> Endurance:
-    """Return how long the bottle of a walk lasts; ``at_set_pressure`` is the draw of the same walk at room warmth."""
     supply = walk_of(carried).bottle
     assert supply is not None, "a walk on a bottle"
     check_schedule(schedule)
     life = bottle_life(carried, schedule)
-    if not walk_of(carried).is_led:  # whose strides no gait sets
+    # Of a wearer whose strides no gait sets the time walked counts them, by the mean stride at the set pressure.
+    if not walk_of(carried).is_led:
         life = replace(life, repeats=life.walked / at_set_pressure.stride_time)
+    # A bottle may end before the first stride does.
     strides = max(life.repeats, 1.0e-9)
-    stride_time = life.walked / strides
-    mass = life.course.regulated / strides
-    of_walk = Kind("", "kg", "gas mass", ".3g").text(at_set_pressure.mass_per_stride)
-    origin = f"{at_set_pressure.origin} on the bottle, mean over its strides ({of_walk} before, at the set pressure)"
+    stride_time, mass = life.walked / strides, life.course.regulated / strides
+    before = Kind("", "kg", "gas mass", ".3g").text(at_set_pressure.mass_per_stride)
+    origin = f"{at_set_pressure.origin} on the bottle, mean over its strides ({before} before, at the set pressure)"
     taken = Draw(mass, stride_time, max(at_set_pressure.peak_flow, mass / stride_time), origin)
     usable = supply.mass - smallest_mass_when_warm(supply.bottle, taken)
     return Endurance(
@@ -122,18 +131,8 @@ def _walked_to_its_end(carried: Scenario, at_set_pressure: Draw, schedule: Sched
         schedule=schedule,
         discharge=discharge_of_life(life, taken),
         strides_when_warm=usable / taken.mass_per_stride,
+        is_of_course=bool(gas.course),
     )
-
-
-@dataclass(frozen=True, slots=True)
-class _Bottle:
-    """The bottle that was named, if any, and what is set of it."""
-
-    name: str | Path | None
-    overrides: tuple[str, ...]
-
-    def load(self) -> Bottle:
-        return load_bottle(PAPER_BOTTLE if self.name is None else self.name, self.overrides)
 
 
 def follow_bottle(bottle: Bottle, draw: Draw, schedule: Schedule) -> Endurance:
@@ -146,24 +145,3 @@ def follow_bottle(bottle: Bottle, draw: Draw, schedule: Schedule) -> Endurance:
         discharge=discharge(bottle, draw, schedule),
         strides_when_warm=usable / draw.mass_per_stride,
     )
-
-
-def _name(use: GasUse) -> str:
-    if isinstance(use, Recording):
-        return use.label
-    return use.scenario.name if isinstance(use, WalkResult) else str(use)
-
-
-def _endurance_of_use(use: GasUse, stride_time: float | None, chosen: _Bottle, schedule: Schedule) -> Endurance:
-    gas = walk_gas(use) if isinstance(use, WalkResult) else None
-    if isinstance(use, str | Path) and is_walk_folder(Path(use)):
-        gas = read_walk_gas(Path(use))
-    if gas is not None:
-        stride = f"its whole course '{gas.course}'" if gas.course else "one stride of its walk"
-        if stride_time is not None:
-            raise ParameterError(f"--stride-time: a stride of {_name(use)} is {stride}; omit --stride-time")
-        return endurance_of_walk_gas(gas, chosen.name, schedule, chosen.overrides)
-    bottle = chosen.load()
-    recording = use if isinstance(use, Recording) else read_recording(Path(str(use)))
-    draw = draw_of_recording(recording, stride_time)
-    return follow_bottle(bottle, draw, schedule)

@@ -9,8 +9,8 @@ from typing import Any
 from ppafo.errors import ParameterError, nearest_name
 from ppafo.parameters.parts import Catalogue, Part, load_catalogue
 from ppafo.parameters.parts.catalogue import DEFAULT
+from ppafo.report import finding
 from ppafo.report.finding import Finding, columns_of, facts
-from ppafo.report.finding import Part as Section
 from ppafo.report.kind import Kind
 
 
@@ -24,7 +24,24 @@ class Parts:
     def json_document(self) -> dict[str, Any]:
         """Return every figure of the parts, with its origin and source, as plain data."""
         chosen = self.catalogue.parts if self.part is None else (self.part,)
-        return {"catalogue": self.catalogue.name, "parts": [_part_data(item) for item in chosen]}
+        return {
+            "catalogue": self.catalogue.name,
+            "parts": [
+                {
+                    "name": part.name,
+                    "group": part.group,
+                    "kind": part.kind or None,
+                    "maker": part.maker,
+                    "model": part.model,
+                    "document": part.document,
+                    "note": part.note,
+                    "figures": {name: figure.model_dump(mode="json") for name, figure in part.figures.items()},
+                    "values": dict(part.values),
+                    "unknown": list(part.unknown),
+                }
+                for part in chosen
+            ],
+        }
 
 
 _WIDTH = 110
@@ -44,16 +61,27 @@ def parts(part: str | None = None, catalogue: str | Path = DEFAULT) -> Finding[P
         )
     chosen = None if part is None else named[part]
     if chosen is None:
+        # Notes are written over several lines of a file: how they were broken there means nothing.
         notes = "\n".join(textwrap.wrap(" ".join(loaded.notes.split()), _WIDTH))
         said = [f"{loaded.name}: {loaded.title}", *([notes] if notes else [])]
-        sections = [
-            Section(group.capitalize(), columns_of(_HEAD, map(_row, parts.values())), left=len(_HEAD))
-            for group, parts in loaded.groups.items()
-        ]
+        sections = []
+        for group, members in loaded.groups.items():
+            lists = ((item, ", ".join(item.doubtful), ", ".join(item.unknown)) for item in members.values())
+            rows = [
+                (item.name, item.title, item.full_mass, check or "-", unknown or "-") for item, check, unknown in lists
+            ]
+            sections.append(finding.Part(group.capitalize(), columns_of(_HEAD, rows), left=len(_HEAD)))
     else:
         kind = f", {chosen.kind}" if chosen.kind else ""
         said = [f"{chosen.name}: {chosen.title} ({chosen.group}{kind})", *filter(None, (chosen.document, chosen.note))]
-        sections = [_figures(chosen)]
+        figures = [
+            (name, f"{figure.value:.4g} {figure.unit}".rstrip(), figure.origin, figure.source)
+            for name, figure in chosen.figures.items()
+        ]
+        remarks = [f"{name}: {figure.note}" for name, figure in chosen.figures.items() if figure.note]
+        remarks += [f"not known: {', '.join(chosen.unknown)}"] if chosen.unknown else []
+        head = ("figure", "value", "origin", "source")
+        sections = [finding.Part(columns=columns_of(head, figures), remarks=remarks, left=4)]
     return Finding(
         name="parts",
         kicker="Parts",
@@ -65,68 +93,35 @@ def parts(part: str | None = None, catalogue: str | Path = DEFAULT) -> Finding[P
     )
 
 
-def doubts_sections(doubtful: Iterable[tuple[Part, str]]) -> list[Section]:
+def parts_to_check(doubtful: Iterable[tuple[Part, str]]) -> list[finding.Part]:
     """Return which figures of parts are quoted or assumed, a row for each part; the page has the reasons too."""
     pairs = tuple(doubtful)
     if not pairs:
         return []
+    # A row for each part, since a person orders parts; a reason for each figure, since each has its own.
     by_part: dict[str, list[str]] = {}
+    reasons = []
     for part, name in pairs:
-        by_part.setdefault(part.name, []).append(f"{name.replace('_', ' ')} ({part.figures[name].origin})")
+        figure, words = part.figures[name], name.replace("_", " ")
+        by_part.setdefault(part.name, []).append(f"{words} ({figure.origin})")
+        value = f"{figure.value:g} {figure.unit}".rstrip()
+        reasons.append(f"{part.name}: {words} {value} is {figure.origin}: {figure.note or figure.source}")
     where = (
         "quoted from a document that was not itself consulted, or assumed; 'ppafo sets parts PART' gives the reasons"
     )
     return [
-        Section("Check before buying", facts((name, ", ".join(each)) for name, each in by_part.items()), [where]),
-        Section("Why these figures are uncertain", remarks=[_reason(*pair) for pair in pairs], is_detail=True),
+        finding.Part("Check before buying", facts((name, ", ".join(each)) for name, each in by_part.items()), [where]),
+        finding.Part("Why these figures are uncertain", remarks=reasons, is_detail=True),
     ]
 
 
 def doubts_data(doubtful: Iterable[tuple[Part, str]]) -> list[dict[str, Any]]:
     """Return figures that are quoted or assumed as they were given, with their parts."""
-    return [{"part": part.name, "figure": name, **_figure_data(part, name)} for part, name in doubtful]
-
-
-def titles_section(parts: Iterable[Part]) -> Section:
-    """Return maker and model of parts, each once, for the page."""
-    return Section("Parts", facts({part.name: part.title for part in parts}.items()), is_detail=True)
-
-
-def _reason(part: Part, name: str) -> str:
-    figure = part.figures[name]
-    value = f"{figure.value:g} {figure.unit}".rstrip()
-    return f"{part.name}: {name.replace('_', ' ')} {value} is {figure.origin}: {figure.note or figure.source}"
-
-
-def _row(part: Part) -> tuple[str | float, ...]:
-    return part.name, part.title, part.full_mass, ", ".join(part.doubtful) or "-", ", ".join(part.unknown) or "-"
-
-
-def _figures(part: Part) -> Section:
-    rows = [
-        (name, f"{figure.value:.4g} {figure.unit}".rstrip(), figure.origin, figure.source)
-        for name, figure in part.figures.items()
+    return [
+        {"part": part.name, "figure": name, **part.figures[name].model_dump(mode="json")} for part, name in doubtful
     ]
-    notes = [f"{name}: {figure.note}" for name, figure in part.figures.items() if figure.note]
-    notes += [f"not known: {', '.join(part.unknown)}"] if part.unknown else []
-    return Section(columns=columns_of(("figure", "value", "origin", "source"), rows), remarks=notes, left=4)
 
 
-def _part_data(part: Part) -> dict[str, Any]:
-    return {
-        "name": part.name,
-        "group": part.group,
-        "kind": part.kind or None,
-        "maker": part.maker,
-        "model": part.model,
-        "document": part.document,
-        "note": part.note,
-        "figures": {name: _figure_data(part, name) for name in part.figures},
-        "values": dict(part.values),
-        "unknown": list(part.unknown),
-    }
-
-
-def _figure_data(part: Part, name: str) -> dict[str, Any]:
-    figure: dict[str, Any] = part.figures[name].model_dump(mode="json")
-    return figure
+def part_titles(parts: Iterable[Part]) -> finding.Part:
+    """Return maker and model of parts, each once, for the page."""
+    return finding.Part("Parts", facts({part.name: part.title for part in parts}.items()), is_detail=True)

@@ -25,18 +25,40 @@ def audited(
     Where ``is_whole`` is false, findings that concern no changed value of a set with a parent or overrides are counted.
     """
     sets = [apply_overrides(load_parameter_set(name), overrides) for name in names]
-    parents = [_parent(parameter_set, parent) for parameter_set in sets]
+    # Each is compared with the set that was given, else with the one that its file names, if it names any.
+    parents: list[ParameterSet | None] = []
+    for one in sets:
+        with refused_as(ParameterError, "--parent" if parent else f"{one.file}: parent", ParameterError):
+            parents.append(load_parameter_set(parent or one.parent) if parent or one.parent else None)
     found = [(one, audit(one, other)) for one, other in zip(sets, parents, strict=True)]
-    documents = [_document(*one, other, overrides) for one, other in zip(found, parents, strict=True)]
+    documents = [
+        {
+            "set": one.name,
+            "overrides": list(overrides),
+            "counts": _counts(findings),
+            "findings": [finding.document() for finding in findings],
+            "parent": None if other is None else other.name,
+            "changes": [] if other is None else [asdict(change) for change in changes(one, other)],
+        }
+        for (one, findings), other in zip(found, parents, strict=True)
+    ]
     compares = parents[0] is not None or bool(overrides)
     is_one = len(found) == 1
-    changed = changed_paths(sets[0], parents[0]) if is_one and compares and not is_whole else None
+    if is_one:
+        changed = changed_paths(sets[0], parents[0]) if compares and not is_whole else None
+        parts = [*_changes(documents[0]), *_parts(*found[0], changed)]
+    else:
+        # A row for each finding and a column for each set, with how serious it is there.
+        verdicts = [{one.id: "accepted" if one.accepted else one.severity for one in findings} for _, findings in found]
+        head = ["finding", *(one.name for one in sets)]
+        ids = dict.fromkeys(name for verdict in verdicts for name in verdict)
+        parts = [Part(columns=columns_of(head, ([name, *(each.get(name) for each in verdicts)] for name in ids)))]
     return Report(
         name=f"audit-{sets[0].name}" if is_one else "audit",
         kicker="Audit",
         title=", ".join(one.name for one in sets),
         said=(),
-        parts=[_changes_part(documents[0]), *_parts(*found[0], changed)] if is_one else [_table(found)],
+        parts=parts,
         found=documents[0] if is_one else {"sets": documents},
         passed=not any(_counts(findings)["error"] for _, findings in found),
         kind="measured",
@@ -44,71 +66,42 @@ def audited(
     )
 
 
-def _parent(parameter_set: ParameterSet, given: str | None) -> ParameterSet | None:
-    """Return the set to compare with: the one given, else the one that the file names, if it names any."""
-    name = given or parameter_set.parent
-    if not name:
-        return None
-    with refused_as(ParameterError, "--parent" if given else f"{parameter_set.file}: parent", ParameterError):
-        return load_parameter_set(name)
-
-
-def _changes_part(document: dict[str, Any]) -> Part:
+def _changes(document: dict[str, Any]) -> list[Part]:
+    """Return what a set changes of its parent, nothing without one."""
     name, parent, changed = document["set"], document["parent"], document["changes"]
     if parent is None:
-        return Part()
+        return []
     count = f"{len(changed)} value{'' if len(changed) == 1 else 's'}" if changed else "nothing"
     rows = [(one["path"], one["before"] or None, one["after"] or None, one["origin"]) for one in changed]
     heads = ("value", parent, name, "origin")
-    return Part(said=[f"{name} changes {count} of its parent {parent}"], columns=columns_of(heads, rows), left=4)
-
-
-def _document(
-    parameter_set: ParameterSet, findings: list[Finding], parent: ParameterSet | None, overrides: Sequence[str]
-) -> dict[str, Any]:
-    return {
-        "set": parameter_set.name,
-        "overrides": list(overrides),
-        "counts": _counts(findings),
-        "findings": [finding.document() for finding in findings],
-        "parent": None if parent is None else parent.name,
-        "changes": [] if parent is None else [asdict(change) for change in changes(parameter_set, parent)],
-    }
+    return [Part(said=[f"{name} changes {count} of its parent {parent}"], columns=columns_of(heads, rows), left=4)]
 
 
 def _counts(findings: list[Finding]) -> dict[str, int]:
     return {severity: sum(finding.severity == severity for finding in findings) for severity in _SEVERITIES}
 
 
-def _table(found: list[tuple[ParameterSet, list[Finding]]]) -> Part:
-    """Return a row for each finding and a column for each set, with how serious it is there."""
-    columns = [{finding.id: _verdict(finding) for finding in findings} for _, findings in found]
-    names = dict.fromkeys(name for column in columns for name in column)
-    head = ["finding", *(parameter_set.name for parameter_set, _ in found)]
-    return Part(columns=columns_of(head, ([name, *(column.get(name) for column in columns)] for name in names)))
-
-
-def _verdict(finding: Finding) -> str:
-    return "accepted" if finding.accepted else finding.severity
-
-
 def _parts(parameter_set: ParameterSet, findings: list[Finding], changed: frozenset[str] | None) -> list[Part]:
     """Return the errors and what concerns a ``changed`` value, all findings for None, then how many there are."""
-    shown = [one for one in findings if one.severity == "error" or _concerns(one, changed)]
+    shown = [
+        one
+        for one in findings
+        if changed is None
+        or one.severity == "error"
+        or not one.values
+        or any(value.path in changed for value in one.values)
+    ]
     summary = ", ".join(f"{n} {severity}{'' if n == 1 else 's'}" for severity, n in _counts(findings).items())
     left = len(findings) - len(shown)
     rest = f"; {left} of them concern{'s' if left == 1 else ''} no changed value: --all" if left else ""
     return [*(Part(said=_lines(one)) for one in shown), Part(said=[f"{parameter_set.name}: {summary}{rest}"])]
 
 
-def _concerns(finding: Finding, changed: frozenset[str] | None) -> bool:
-    return changed is None or not finding.values or any(value.path in changed for value in finding.values)
-
-
 def _lines(finding: Finding) -> list[str]:
     lines = [f"{finding.severity}: {finding.title} [{finding.id}]"]
     lines += [
-        f"{_INDENT}{value.path} = {_format_value(value.value)} {value.unit} ({value.origin})"
+        f"{_INDENT}{value.path} = {value.value if isinstance(value.value, str) else f'{value.value:.6g}'} {value.unit} "
+        f"({value.origin})"
         for value in finding.values
     ]
     lines += textwrap.wrap(finding.paragraph, _WIDTH, initial_indent=_INDENT, subsequent_indent=_INDENT)
@@ -116,7 +109,3 @@ def _lines(finding: Finding) -> list[str]:
         accepted = f"Accepted by the set: {finding.accepted}"
         lines += textwrap.wrap(accepted, _WIDTH, initial_indent=_INDENT, subsequent_indent=_INDENT)
     return lines
-
-
-def _format_value(value: Any) -> str:
-    return value if isinstance(value, str) else f"{value:.6g}"

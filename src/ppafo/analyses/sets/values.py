@@ -14,7 +14,8 @@ _COLUMNS = ("path", "value", "unit", "origin", "source")
 def values_document(parameter_set: ParameterSet) -> dict[str, Any]:
     """Return every value of a set with its source, as plain data."""
     citation = parameter_set.citation
-    entries = sorted(parameter_set.entries().items(), key=_section_order)
+    # By section only, so that within a section texts come first and numbers as they are declared.
+    entries = sorted(parameter_set.entries().items(), key=lambda item: _SECTIONS.index(item[0].partition(".")[0]))
     return {
         "name": parameter_set.name,
         "title": parameter_set.title,
@@ -30,15 +31,25 @@ def values_document(parameter_set: ParameterSet) -> dict[str, Any]:
     }
 
 
-def _section_order(item: tuple[str, object]) -> int:
-    """Sort by section only, so that within a section texts come first and numbers as they are declared."""
-    return _SECTIONS.index(item[0].partition(".")[0])
-
-
 def shown_values(parameter_set: ParameterSet) -> Finding[dict[str, Any]]:
     """Return every value of a set with its source, in words and one table."""
     document = values_document(parameter_set)
     notes, citation = document["notes"], document["citation"]
+    cited = ""
+    if citation is not None:
+        authors = f"{', '.join(citation['authors'])}: " if citation["authors"] else ""
+        year = f" ({citation['year']})" if citation["year"] else ""
+        doi = f" doi:{citation['doi']}" if citation["doi"] else ""
+        cited = f"{authors}{citation['title']}{year}.{doi} {citation['note']}".strip()
+    rows = []
+    for value in document["values"]:
+        number = value["value"]
+        # A flag is a number to Python: it is asked for first.
+        written = str(number).lower() if isinstance(number, bool) else number
+        written = written if isinstance(written, str) else f"{number:.6g}"
+        if value.get("uncertainty") is not None:
+            written += f" +- {value['uncertainty']:.3g}"
+        rows.append((value["path"], written, value.get("unit", ""), value["origin"], value["source"]))
     valves = ", ".join(f"{name} ({kind})" for name, kind in document["valves"].items())
     return Finding(
         name=document["name"],
@@ -46,11 +57,16 @@ def shown_values(parameter_set: ParameterSet) -> Finding[dict[str, Any]]:
         title=document["title"],
         said=[f"{document['name']}: {document['title']}", *_wrapped(notes)],
         parts=[
-            Part(said=[] if citation is None else _wrapped(_citation(citation))),
+            Part(said=_wrapped(cited)),
             Part(said=[f"valves: {valves}; default {document['default_valve']}; actuator: {document['actuator']}"]),
             Part(
-                columns=columns_of(_COLUMNS, map(_cells, document["values"])),
-                remarks=[text for value in document["values"] for text in _wrapped(_note(value))],
+                columns=columns_of(_COLUMNS, rows),
+                remarks=[
+                    text
+                    for value in document["values"]
+                    if value["note"]
+                    for text in _wrapped(f"{value['path']}: {value['note']}")
+                ],
                 left=len(_COLUMNS),
             ),
             *(Part(said=_wrapped(f"accepted: {name}: {why}")) for name, why in document["accepted"].items()),
@@ -63,23 +79,3 @@ def shown_values(parameter_set: ParameterSet) -> Finding[dict[str, Any]]:
 
 def _wrapped(text: str) -> list[str]:
     return textwrap.wrap(text, _WIDTH)
-
-
-def _note(value: dict[str, Any]) -> str:
-    return f"{value['path']}: {value['note']}" if value["note"] else ""
-
-
-def _citation(citation: dict[str, Any]) -> str:
-    authors = ", ".join(citation["authors"])
-    year = f" ({citation['year']})" if citation["year"] else ""
-    doi = f" doi:{citation['doi']}" if citation["doi"] else ""
-    return f"{authors}{': ' if authors else ''}{citation['title']}{year}.{doi} {citation['note']}".strip()
-
-
-def _cells(value: dict[str, Any]) -> tuple[str, ...]:
-    number = value["value"]
-    is_number = not isinstance(number, str | bool)
-    written = f"{number:.6g}" if is_number else str(number).lower() if isinstance(number, bool) else number
-    if value.get("uncertainty") is not None:
-        written += f" +- {value['uncertainty']:.3g}"
-    return (value["path"], written, value.get("unit", ""), value["origin"], value["source"])

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from ppafo.analyses.walk.course import (
-    WOULD_DRAG,
     bottle_data,
     bottle_files,
     bottle_parts,
@@ -20,16 +19,23 @@ from ppafo.analyses.walk.course import (
     course_pictures,
     trust_remark,
 )
-from ppafo.analyses.walk.document import versions, walk_data, walk_document
+from ppafo.analyses.walk.document import (
+    Row,
+    csv_of,
+    metrics_table,
+    number_texts,
+    toes,
+    versions,
+    walk_data,
+    walk_document,
+)
 from ppafo.analyses.walk.safety import over_time_parts, safety_remarks
 from ppafo.documents.json_text import plain
 from ppafo.kinds import kind_at
-from ppafo.metrics import Metric
 from ppafo.metrics.strides import PER_STRIDE
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE
 from ppafo.progress import Progress, Report, report_nothing
-from ppafo.report.display_units import rounded_text, title_with_unit
-from ppafo.report.finding import Cell, Column, Finding, Part, columns_of
+from ppafo.report.finding import Column, Finding, Part, columns_of
 from ppafo.report.live_parts import live_part
 from ppafo.signals.recording import Floats
 from ppafo.simulation.scenario import UNITS, Scenario
@@ -107,19 +113,19 @@ def wearers_finding(population: Population) -> Finding[Wearers]:
     configuration = population.scenario
     tables = {**population.outcomes, **population.traits}
     rows = []
-    for name, (title, quantity, digits) in SHOWN.items():
-        cells: list[Cell] = [rounded_text(value, quantity, digits) for value in _values(tables[name]).tolist()]
-        rows.append((title_with_unit(title, quantity), *(cells or [None] * len(QUANTILES))))
-    stopped = f"safe state: the controllers of {population.vented} wearers vented both chambers permanently"
-    paused = (
-        f"less help: the controllers of {population.paused} wearers lifted the foot only, or paused, for some strides"
-    )
-    remarks = [
-        *person_remarks(configuration),
-        *[stopped] * bool(population.vented),
-        *[paused] * bool(population.paused),
-        *[population.message] * bool(population.diverged),
-    ]
+    for name, shown in SHOWN.items():
+        values = np.quantile(tables[name], QUANTILES).tolist() if tables[name].size else [None] * len(QUANTILES)
+        rows.append(number_texts((name, *shown), values))
+    remarks = [*person_remarks(configuration)]
+    if population.vented:
+        remarks.append(f"safe state: the controllers of {population.vented} wearers vented both chambers permanently")
+    if population.paused:
+        remarks.append(
+            f"less help: the controllers of {population.paused} wearers lifted the foot only, or paused, for some "
+            "strides"
+        )
+    if population.diverged:
+        remarks.append(population.message)
     draw = partial(population_figure, population)
     figure = Part("The wearers", name="wearers", caption=_WEARERS_CAPTION, draw=draw, is_detail=True)
     return Finding(
@@ -142,7 +148,7 @@ def wearers_csv(population: Population) -> bytes:
     """Return one line for each wearer, in SI units."""
     columns = {f"{name} [{item.unit}]": population.traits[name] for name, item in TRAITS.items()}
     columns |= {f"{name} [{item.unit}]": population.outcomes[name] for name, item in OUTCOMES.items()}
-    return _csv(columns)
+    return csv_of({head: values.tolist() for head, values in columns.items()})
 
 
 def quantiles(table: Mapping[str, Floats], numbers: Mapping[str, Number]) -> dict[str, dict[str, object]]:
@@ -152,14 +158,12 @@ def quantiles(table: Mapping[str, Floats], numbers: Mapping[str, Number]) -> dic
             "unit": item.unit,
             "summary": item.summary,
             "mean": float(table[name].mean()) if table[name].size else None,
-            "quantiles": dict(zip(map(str, QUANTILES), _values(table[name]).tolist(), strict=False)),
+            "quantiles": dict(zip(map(str, QUANTILES), np.quantile(table[name], QUANTILES).tolist(), strict=True))
+            if table[name].size
+            else {},
         }
         for name, item in numbers.items()
     }
-
-
-def _values(values: Floats) -> Floats:
-    return np.quantile(values, QUANTILES) if values.size else np.zeros(0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -182,9 +186,7 @@ class WalkPair:
 
 
 SCHEMA_VERSION = 1
-_HEAD = ("", "with", "without", "healthy")
-_VENTED = "less help"
-_ROWS = (
+_ROWS: tuple[Row, ...] = (
     ("body_mass", "Body mass of the wearer", "mass", 1),
     ("gas", "Gas per stride", "gas mass", 3),
     ("total_gas", "Gas of the whole walk", "gas mass", 2),
@@ -224,25 +226,52 @@ _LIMITS = (
 def finding_of(comparison: Comparison) -> Finding[WalkPair]:
     """Return a walk with and without the device; one that diverged has numbers, no pictures, and has not passed."""
     worn, bare = comparison.with_device, comparison.without_device
-    configuration, walked = worn.scenario, walk_of(worn.scenario)
+    configuration, walked, gait = worn.scenario, walk_of(worn.scenario), walk_of(worn.scenario).gait
     strides = f"{worn.metrics['strides'].value:.0f} strides" if "strides" in worn.metrics else "no strides"
     along = "" if walked.course is None else f", course {walked.course.name}"
-    remarks = [*person_remarks(configuration), _bottle(worn), *safety_remarks(worn), trust_remark(configuration)]
+    bottle = "" if worn.supply is None else bottle_remark(worn)
+    if worn.supply is None and "gas" in worn.metrics and worn.metrics["gas"].value > 0.0:
+        on_it = f"walk on it, --bottle {PAPER_BOTTLE}"
+        bottle = f"how long a bottle lasts: {on_it}; here its supply pressure stays as it is set"
+    remarks = [*person_remarks(configuration), bottle, *safety_remarks(worn), trust_remark(configuration)]
     remarks += [f"{item.scenario.name}: {item.status.message}" for item in (worn, bare) if not item.status.is_completed]
     assumed = [(item.path, item.note) for item in configuration.assumptions]
+    set_up = (
+        configuration.description,
+        f"device '{configuration.device.name}', gait '{gait.name}'{f' ({gait.title})' if gait.title else ''}",
+        law_of(configuration).summary,
+        f"values changed for this walk: {', '.join(configuration.origin.overrides)}"
+        if configuration.origin.overrides
+        else "",
+    )
+    if walked.course is not None:
+        pictures = course_pictures(comparison)
+    else:
+        walks = {"with the device": worn, "without": bare}
+        shown = (
+            ("The leg", "legs", _LEGS, partial(frames_figure, comparison)),
+            ("", "legs-moving", _MOVING, partial(animation, comparison)),
+            ("What the device does in each phase", "gait-phases", _PHASES, partial(strip_figure, worn)),
+            ("The mean stride", "mean-stride", _MEAN, partial(walk_figure, walks)),
+        )
+        # Of a mean stride there is nothing to draw where a walk has none.
+        drawn = shown if worn.averages and bare.averages else ()
+        pictures = (
+            *over_time_parts(worn),
+            *(Part(head, name=name, caption=caption, draw=draw, is_detail=True) for head, name, caption, draw in drawn),
+        )
     return Finding(
         name="walk",
         kicker=f"A walk of {float(worn.recording.time[-1]) / 60.0:.3g} min",
         title=f"Walking with {configuration.name}",
-        said=(f"{configuration.name}: {worn.status.kind}, {strides} of {walked.gait.name}{along}",),
+        said=(f"{configuration.name}: {worn.status.kind}, {strides} of {gait.name}{along}",),
         parts=(
-            Part(said=_set_up(comparison), is_detail=True),
+            Part(said=[text for text in set_up if text], is_detail=True),
             *course_parts(comparison),
             Part(columns=comparison_table(comparison), remarks=[text for text in remarks if text]),
             *bottle_parts(worn),
             Part("How to read it", said=(_EXPLAINED, _LIMITS), is_detail=True),
-            *(over_time_parts(worn) if walked.course is None else ()),
-            *(course_pictures(comparison) if walked.course is not None else _pictures(comparison)),
+            *pictures,
             Part("What is assumed" if assumed else "", columns_of(("value", "why"), assumed), left=2, is_detail=True),
         ),
         found=WalkPair(comparison),
@@ -262,97 +291,43 @@ def finding_of(comparison: Comparison) -> Finding[WalkPair]:
     )
 
 
-def _set_up(comparison: Comparison) -> tuple[str, ...]:
-    configuration = comparison.with_device.scenario
-    gait, title = walk_of(configuration).gait.name, walk_of(configuration).gait.title
-    changed = (
-        f"values changed for this walk: {', '.join(configuration.origin.overrides)}"
-        if configuration.origin.overrides
-        else ""
-    )
-    worn = f"device '{configuration.device.name}', gait '{gait}'{f' ({title})' if title else ''}"
-    return tuple(text for text in (configuration.description, worn, law_of(configuration).summary, changed) if text)
-
-
 def comparison_table(comparison: Comparison) -> list[Column]:
     """Return a row for each number: with the device, without it, and of a healthy ankle.
 
     Strides with less help have a column of their own, where there are any.
     """
-    healthy = dict(comparison.healthy)
-    if "positive_push_off_work" in healthy:
-        healthy["push_off_share"] = Metric(1.0, "-", "")
     worn, bare = comparison.with_device, comparison.without_device
-    person = {"body_mass": Metric(walk_of(worn.scenario).wearer.body_mass, "kg", "who walks")}
-    vented = (worn.vented_metrics,) if worn.vented_metrics else ()
-    columns = tuple(person | dict(metrics) for metrics in (worn.metrics, *vented, bare.metrics, healthy))
-    head = (*_HEAD[:2], *(_VENTED,) * len(vented), *_HEAD[2:])
-    rows = [
-        (
-            title_with_unit(title, quantity),
-            *(
-                None
-                if one is None
-                else WOULD_DRAG
-                if name == "lowest_toes" and one.value < 0.0
-                else rounded_text(one.value, quantity, digits)
-                for one in (metrics.get(name) for metrics in columns)
-            ),
-        )
-        for name, title, quantity, digits in _ROWS
-        if any(name in metrics for metrics in columns)
-    ]
-    return columns_of(head, rows)
-
-
-def _pictures(comparison: Comparison) -> list[Part]:
-    worn, bare = comparison.with_device, comparison.without_device
-    if not (worn.averages and bare.averages):
-        return []
-    walks = {"with the device": worn, "without": bare}
-    shown = (
-        ("The leg", "legs", _LEGS, partial(frames_figure, comparison)),
-        ("", "legs-moving", _MOVING, partial(animation, comparison)),
-        ("What the device does in each phase", "gait-phases", _PHASES, partial(strip_figure, worn)),
-        ("The mean stride", "mean-stride", _MEAN, partial(walk_figure, walks)),
-    )
-    return [
-        Part(heading, name=name, caption=caption, draw=draw, is_detail=True) for heading, name, caption, draw in shown
-    ]
-
-
-def _bottle(worn: WalkResult) -> str:
-    """Return how long the bottle of the walk lasts and what ended it, or how to see that; empty without gas."""
-    if worn.supply is not None:
-        return bottle_remark(worn)
-    gas = worn.metrics.get("gas")
-    if gas is None or gas.value <= 0.0:
-        return ""
-    return f"how long a bottle lasts: walk on it, --bottle {PAPER_BOTTLE}; here its supply pressure stays as it is set"
+    walked = [("with", worn.metrics), ("less help", worn.vented_metrics), ("without", bare.metrics)]
+    walked = [(head, metrics) for head, metrics in walked if metrics or head != "less help"]
+    columns: list[tuple[str, dict[str, float | str | None]]] = []
+    for head, metrics in (*walked, ("healthy", comparison.healthy)):
+        values: dict[str, float | str | None] = {"body_mass": walk_of(worn.scenario).wearer.body_mass}
+        values |= {name: toes(one.value) if name == "lowest_toes" else one.value for name, one in metrics.items()}
+        columns.append((head, values))
+    # The positive work of a healthy ankle is what the device's is a share of.
+    if "positive_push_off_work" in comparison.healthy:
+        columns[-1][1]["push_off_share"] = 1.0
+    return metrics_table(_ROWS, columns)
 
 
 def strides_csv(result: WalkResult) -> bytes:
     """Return the numbers of each whole stride; the start of each is the sample right after its heel strike."""
+    # The last strike begins a stride that the end of the walk cuts off: it has no numbers.
     count = result.strides["gas"].size
     columns = {"stride [-]": np.arange(1.0, count + 1.0), "start [s]": result.recording.time[result.starts[:count]]}
     columns |= {f"{name} [{item.unit}]": result.strides[name] for name, item in PER_STRIDE.items()}
     columns["helped [-]"] = result.helped.astype(np.float64)
-    return _csv(columns)
+    return csv_of({head: values.tolist() for head, values in columns.items()})
 
 
 def mean_stride_csv(result: WalkResult) -> bytes:
     """Return mean and standard deviation over strides of each channel, at every percent of the stride."""
+    # Without a whole stride the file has its head alone.
     columns = {"phase [-]": PHASES} if result.averages else {"phase [-]": PHASES[:0]}
     for name, curves in result.averages.items():
         columns[f"{name} [{curves.unit}]"] = curves.mean
         columns[f"{name}_deviation [{curves.unit}]"] = curves.deviation
-    return _csv(columns)
-
-
-def _csv(columns: Mapping[str, Floats]) -> bytes:
-    lines = ["# simulated: a model's own output, not measured", ",".join(columns)]
-    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
-    return ("\n".join([*lines, *(",".join(map(repr, row)) for row in rows)]) + "\n").encode()
+    return csv_of({head: values.tolist() for head, values in columns.items()})
 
 
 _LONG = 12.0
@@ -378,6 +353,7 @@ def walk_with_and_without(
     for bad input; a walk that diverges is a finding that has not passed.
     """
     chosen = configuration
+    # The options of the command line belong to a file: a scenario that was built has all of it already.
     if not isinstance(chosen, Scenario):
         check_duration_once(overrides, minutes)
         chosen = load_walk(chosen, overrides, gait, course, bottle)

@@ -1,16 +1,17 @@
 """What a walk on a course or on its bottle adds: tables, remarks, data, files, pictures."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, fields
 from functools import partial
 from typing import Any
 
 import numpy as np
 
+from ppafo.analyses.walk.document import Row, csv_of, number_texts, toes
 from ppafo.errors import DataError
 from ppafo.gait.gait import speed_range
-from ppafo.report.display_units import rounded_text
-from ppafo.report.finding import Part, columns_of, facts
+from ppafo.report.display_units import QUANTITIES
+from ppafo.report.finding import Column, Part, facts
 from ppafo.report.kind import Kind
 from ppafo.simulation.scenario import Scenario
 from ppafo.storage.comma_separated import marked_csv_bytes
@@ -58,32 +59,28 @@ def bottle_remark(worn: WalkResult) -> str:
     return f"bottle {supply.supply.bottle.name}: {ended}{supply.ending.message}"
 
 
-def _walked(worn: WalkResult, seconds: float) -> str:
-    """Return how many strides were walked in a time [s], as ``ppafo bottle`` counts; of a course the whole ones."""
-    motion = walk_of(worn.scenario)
-    if motion.course is not None or not motion.is_led:
-        return f"after {worn.helped.size} whole strides"
-    return (
-        f"{strides_text(seconds / motion.gait.stride_time)} strides, {worn.helped.size} of them whole between strikes"
-    )
-
-
 def _facts(worn: WalkResult, supply: SupplyCourse) -> list[tuple[str, str]]:
-    values, peaks = supply.values, peak_torques(worn)
+    values, peaks, motion = supply.values, peak_torques(worn), walk_of(worn.scenario)
     bottle, balance = supply.supply.bottle, supply.balance
     end = {name: float(series[-1]) for name, series in values.items()}
     liquid = f", {_GAS.text(end['liquid_mass'])} of it liquid" if "liquid_mass" in values else ""
     full = _GAS.text(supply.supply.mass)
+    walked = f"after {worn.helped.size} whole strides"
+    # Strides of a gait that is prescribed are counted by time, as ``ppafo bottle`` counts them.
+    if motion.course is None and motion.is_led:
+        strides = strides_text(supply.ending.time / motion.gait.stride_time)
+        walked = f"{strides} strides, {worn.helped.size} of them whole between strikes"
     rows = [
         ("bottle", f"{bottle.title}, with {full} at {_WARMTH.text(supply.supply.temperature)}"),
         ("what ended it", supply.ending.message),
-        ("when", f"{_DURATION.text(supply.ending.time)}, {_walked(worn, supply.ending.time)}"),
+        ("when", f"{_DURATION.text(supply.ending.time)}, {walked}"),
         ("gas used", f"{_GAS.text(balance.left_bottle)}, left {_GAS.text(end['bottle_mass'])}{liquid}"),
         ("bottle at the end", f"{_WARMTH.text(end['bottle_temperature'])}, {_PRESSURE.text(end['bottle_pressure'])}"),
         ("coldest gas behind the regulator", _WARMTH.text(float(values["outlet_temperature"].min()))),
         ("coldest gas at the device", _WARMTH.text(float(values["gas_temperature"].min()))),
         ("seat free of ice, at least", _SHARE.text(float(values["seat_open"].min()))),
     ]
+    # The third stride is the first in which the controller knows the stride time.
     if peaks.size > 3:
         third, last = (_TORQUE.text(float(peak)) for peak in (peaks[2], peaks[-1]))
         rows.append(("peak torque of a stride", f"{third} in the third, {last} in the last"))
@@ -114,22 +111,18 @@ def bottle_files(worn: WalkResult) -> dict[str, Callable[[], bytes]]:
 
 _DURATION, _TORQUE, _GAS = (Kind(quantity=name, form=".3g") for name in ("duration", "torque", "gas mass"))
 _SHARE, _WARMTH, _PRESSURE = (Kind(quantity=name, form=".0f") for name in ("fraction", "temperature", "pressure"))
-_HEAD = (
-    "Segment",
-    "from (s)",
-    "to (s)",
-    "strides",
-    "helped",
-    "gas (g)",
-    "work (J)",
-    "lowest toes (cm)",
-    "... without (cm)",
-    "push, heel loaded (N m)",
-    "less help at (s)",
+_NUMBERS: tuple[Row, ...] = (
+    ("start", "from", "time", 1),
+    ("end", "to", "time", 1),
+    ("strides", "strides", "", 0),
+    ("helped", "helped", "", 0),
+    ("gas", "gas", "gas mass", 2),
+    ("net_push_off_work", "work", "energy", 1),
+    ("lowest_toes", "lowest toes", "body length", 1),
+    ("without", "... without", "body length", 1),
+    ("flat_push", "push, heel loaded", "torque", 1),
+    ("safe_time", "less help at", "time", 2),
 )
-WOULD_DRAG = "would drag"
-"""What is said of toes that would be in the ground."""
-_WHOLE, _PART = "whole course", "as far as walked"
 _COURSE = "The course over time. Grey: every other segment. 'Without' is the same course without a device."
 _EXPLAINED = (
     "A stride counts for the segment in which its foot strikes; it is helped where the controller neither lifts only "
@@ -151,75 +144,51 @@ def course_parts(comparison: Comparison) -> tuple[Part, ...]:
     worn, bare = comparison.with_device, comparison.without_device
     if walk_of(worn.scenario).course is None:
         return ()
-    without = {segment.start: segment for segment in bare.segments}
-    rows = [_row(segment, without.get(segment.start)) for segment in worn.segments]
-    table = columns_of(_HEAD, (*rows, _whole(comparison)))
+    without = {segment.start: segment.lowest_toes for segment in bare.segments}
+    rows = [asdict(segment) | {"without": without.get(segment.start)} for segment in worn.segments]
+    numbers: dict[str, float] = {name: item.value for name, item in worn.metrics.items()}
+    bare_toes = bare.metrics.get("course_lowest_toes")
+    is_whole = is_whole_course(numbers["course_time"], numbers["course_planned_time"])
+    rows.append(
+        {
+            "title": "whole course" if is_whole else "as far as walked",
+            "start": 0.0,
+            "end": numbers["course_time"],
+            "strides": numbers["course_strides"],
+            "helped": sum(segment.helped for segment in worn.segments),
+            "gas": numbers["course_gas"],
+            "net_push_off_work": numbers["course_work"],
+            "lowest_toes": numbers.get("course_lowest_toes"),
+            "without": None if bare_toes is None else bare_toes.value,
+            "flat_push": numbers["course_flat_push"],
+            "safe_time": numbers.get("safe_state_time"),
+        }
+    )
+    rows = [row | {name: toes(row[name]) for name in ("lowest_toes", "without")} for row in rows]
+    table = [Column("Segment", [row["title"] for row in rows])]
+    for number in _NUMBERS:
+        head, *cells = number_texts(number, (row[number[0]] for row in rows))
+        table.append(Column(str(head), cells))
     means = (
-        f"The numbers below are means over the {worn.metrics['steady_strides'].value:.0f} of "
-        f"{worn.metrics['course_strides'].value:.0f} strides that are at an even speed on level ground."
+        f"The numbers below are means over the {numbers['steady_strides']:.0f} of {numbers['course_strides']:.0f} "
+        "strides that are at an even speed on level ground."
     )
     return (
-        Part(columns=table, marked=(len(rows),)),
+        Part(columns=table, marked=(len(rows) - 1,)),
         Part("How to read the course", said=_EXPLAINED, is_detail=True),
         Part(said=(means,)),
     )
 
 
-def _row(segment: SegmentResult, bare: SegmentResult | None) -> tuple[str | None, ...]:
-    return (
-        segment.title,
-        f"{segment.start:.1f}",
-        f"{segment.end:.1f}",
-        f"{segment.strides}",
-        f"{segment.helped}",
-        _text(segment.gas, "gas mass", 2),
-        _text(segment.net_push_off_work, "energy", 1),
-        _toes(segment.lowest_toes),
-        _toes(None if bare is None else bare.lowest_toes),
-        _text(segment.flat_push, "torque", 1),
-        _text(segment.safe_time, "time", 2),
-    )
-
-
-def _whole(comparison: Comparison) -> tuple[str | None, ...]:
-    worn, bare = comparison.with_device, comparison.without_device
-    numbers = {name: item.value for name, item in worn.metrics.items()}
-    toes = bare.metrics.get("course_lowest_toes")
-    is_whole = is_whole_course(numbers["course_time"], numbers["course_planned_time"])
-    return (
-        _WHOLE if is_whole else _PART,
-        "0.0",
-        f"{numbers['course_time']:.1f}",
-        f"{numbers['course_strides']:.0f}",
-        f"{sum(segment.helped for segment in worn.segments)}",
-        _text(numbers["course_gas"], "gas mass", 2),
-        _text(numbers["course_work"], "energy", 1),
-        _toes(numbers.get("course_lowest_toes")),
-        _toes(None if toes is None else toes.value),
-        _text(numbers["course_flat_push"], "torque", 1),
-        _text(numbers.get("safe_state_time"), "time", 2),
-    )
-
-
-def _toes(height: float | None) -> str | None:
-    """Return how high the toes are [cm]; of toes below the ground only that they would drag."""
-    return WOULD_DRAG if height is not None and height < 0.0 else _text(height, "body length", 1)
-
-
-def _text(value: float | None, quantity: str, digits: int) -> str | None:
-    """Return a cell, without the sign of a number that is rounded to zero."""
-    return None if value is None else rounded_text(value, quantity, digits)
-
-
 def course_pictures(comparison: Comparison) -> tuple[Part, ...]:
     """Return the course over time, and the mean of its even strides where there are any."""
     worn, bare = comparison.with_device, comparison.without_device
-    over_time = partial(course_figure, worn, bare)
     mean = partial(walk_figure, {"with the device": worn, "without": bare})
-    course = Part("The course", name="course", caption=_COURSE, draw=over_time, is_detail=True)
-    if not (worn.averages and bare.averages):
-        return (course,)
-    return course, Part("The mean stride", name="mean-stride", caption=_MEAN, draw=mean, is_detail=True)
+    pictures = (
+        Part("The course", name="course", caption=_COURSE, draw=partial(course_figure, worn, bare), is_detail=True),
+        Part("The mean stride", name="mean-stride", caption=_MEAN, draw=mean, is_detail=True),
+    )
+    return pictures if worn.averages and bare.averages else pictures[:1]
 
 
 def course_files(comparison: Comparison) -> dict[str, Callable[[], bytes]]:
@@ -232,28 +201,12 @@ def course_files(comparison: Comparison) -> dict[str, Callable[[], bytes]]:
     }
 
 
-_UNITS = {
-    "start": "s",
-    "end": "s",
-    "strides": "-",
-    "helped": "-",
-    "gas": "kg",
-    "net_push_off_work": "J",
-    "lowest_toes": "m",
-    "flat_push": "N m",
-    "safe_time": "s",
-}
-
-
-def segments_csv(segments: tuple[SegmentResult, ...]) -> bytes:
+def segments_csv(segments: Sequence[SegmentResult]) -> bytes:
     """Return one line for each segment, in SI units; a cell is empty where there is nothing to say."""
+    units = {name: QUANTITIES[quantity][0] if quantity else "-" for name, _, quantity, _ in _NUMBERS}
     names = [field.name for field in fields(SegmentResult) if field.name != "title"]
-    lines = ["# simulated: a model's own output, not measured"]
-    lines.append(",".join(f"{name} [{_UNITS[name]}]" if name in _UNITS else name for name in names))
-    for segment in segments:
-        cells = (getattr(segment, name) for name in names)
-        lines.append(",".join("" if cell is None else cell if isinstance(cell, str) else repr(cell) for cell in cells))
-    return ("\n".join(lines) + "\n").encode()
+    heads = [f"{name} [{units[name]}]" if name in units else name for name in names]
+    return csv_of({head: [getattr(one, name) for one in segments] for head, name in zip(heads, names, strict=True)})
 
 
 def course_data(comparison: Comparison) -> dict[str, Any]:
@@ -280,8 +233,10 @@ def trust_remark(configuration: Scenario) -> str:
         return f"gait '{gait.name}' has no walking speed: how far its strides can be scaled is not known"
     given = [item.values["speed"] for item in course.segments if "speed" in item.values]
     recorded = gait.walking_speed or 0.0
+    # A cadence counts steps of both feet; the speed goes with its square, as the walk ratio is constant.
     ratios = [0.5 * item.values["cadence"] * gait.stride_time for item in course.segments if "cadence" in item.values]
     speeds = [*given, *(recorded * ratio * ratio for ratio in ratios)]
+    # A speed at the edge, written in another unit, is not beyond it.
     far = sorted({f"{speed:.2g}" for speed in speeds if not low - 1.0e-9 <= speed <= high + 1.0e-9})
     if not far:
         return ""

@@ -1,11 +1,14 @@
-"""A walk as data: its set-up in SI units, and what ``walk.json`` says of every walk, whoever walks."""
+"""A walk as data and in rows: what ``walk.json`` and the tables say of every walk, whoever walks."""
 
 import platform
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from ppafo.documents.json_text import plain
+from ppafo.report.display_units import rounded_text, title_with_unit
+from ppafo.report.finding import Column, columns_of
 from ppafo.simulation.scenario import UNITS, Scenario
 from ppafo.version import __version__
 from ppafo.walking.motion import walk_of
@@ -61,3 +64,39 @@ def walk_document(scenario: Scenario) -> dict[str, Any]:
         "overrides": list(origin.overrides),
         "content": origin.content,
     }
+
+
+Row = tuple[str, str, str, int]
+"""Name of a number, title, kind of quantity and digits behind the point, as a table of a walk shows it."""
+WOULD_DRAG = "would drag"
+"""What is said of toes that would be in the ground."""
+
+
+def number_texts(row: Row, values: Iterable[float | str | None]) -> tuple[str | None, ...]:
+    """Return the title with its unit, and values [SI] as text; a text and None stay what they are."""
+    _, title, quantity, digits = row
+    texts = (one if one is None or isinstance(one, str) else rounded_text(one, quantity, digits) for one in values)
+    return (title_with_unit(title, quantity), *texts)
+
+
+def toes(height: float | None) -> float | str | None:
+    """Return how high the toes are over the ground [m]; of toes below it only that they would drag."""
+    return WOULD_DRAG if height is not None and height < 0.0 else height
+
+
+def metrics_table(rows: Sequence[Row], columns: Sequence[tuple[str, Mapping[str, float | str | None]]]) -> list[Column]:
+    """Return a row for each number that one of the columns has: title and values [SI]; each column has its head."""
+    # A number that no walk of the table has would be a row of dashes.
+    shown = [row for row in rows if any(values.get(row[0]) is not None for _, values in columns)]
+    cells = (number_texts(row, (values.get(row[0]) for _, values in columns)) for row in shown)
+    return columns_of(["", *(head for head, _ in columns)], cells)
+
+
+def csv_of(columns: Mapping[str, Iterable[Any]]) -> bytes:
+    """Return simulated columns as comma-separated text; a cell is empty where there is nothing to say."""
+    lines = ["# simulated: a model's own output, not measured", ",".join(columns)]
+    lines += [
+        ",".join("" if cell is None else cell if isinstance(cell, str) else repr(cell) for cell in row)
+        for row in zip(*columns.values(), strict=True)
+    ]
+    return ("\n".join(lines) + "\n").encode()

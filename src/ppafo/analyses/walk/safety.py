@@ -7,7 +7,6 @@ from ppafo.control.walking.assistance import PEAKS
 from ppafo.report.display_units import display_value
 from ppafo.report.finding import Part
 from ppafo.report.kind import Kind
-from ppafo.simulation.scenario import Scenario
 from ppafo.walking.events import event_lines
 from ppafo.walking.figures.over_time import failures, over_time_figure
 from ppafo.walking.motion import walk_of
@@ -24,57 +23,47 @@ _FAR_ABOVE = 2.0
 
 def safety_remarks(worn: WalkResult) -> list[str]:
     """Return what is fitted, torques above the limit, pressures far above the supply, pauses, stop, strides helped."""
-    fitted = [*_shut_off_line(worn.scenario), *_limit_line(worn.scenario), *_pressure_lines(worn)]
-    if not worn.events:
-        return fitted
-    helped, strides = int(worn.helped.sum()), worn.helped.size
-    counted = (
-        [f"help in {helped} of {strides} strides{'' if worn.is_helped else ': fewer than half'}"] if strides else []
-    )
-    return [*fitted, *event_lines(worn.events), *counted]
-
-
-def _shut_off_line(scenario: Scenario) -> list[str]:
-    """Return what a fitted shut-off valve weighs and takes."""
-    given = walk_of(scenario).shut_off
-    if not given:
-        return []
-    mass, power = 1.0e3 * float(given["mass"]), float(given["power"])
-    return [f"shut-off valve: {mass:.0f} g, {power:.2g} W as long as the device helps ({60.0 * power:.0f} J a minute)"]
-
-
-def _limit_line(scenario: Scenario) -> list[str]:
-    """Return which peaks of the desired torque are above the limit of the controller, which requests no more."""
+    scenario, supply = worn.scenario, worn.scenario.device.supply
+    remarks = []
+    fitted = walk_of(scenario).shut_off
+    if fitted:
+        mass, power = 1.0e3 * float(fitted["mass"]), float(fitted["power"])
+        remarks.append(
+            f"shut-off valve: {mass:.0f} g, {power:.2g} W as long as the device helps ({60.0 * power:.0f} J a minute)"
+        )
+    # Peaks of the desired torque above the limit of the controller, which requests no more.
     settings = scenario.controller.settings
     limit = settings.get("largest_torque", math.inf)
     cut = [f"controller.{name} = {_TORQUE.text(settings[name])}" for name in PEAKS if settings.get(name, 0.0) > limit]
-    if not cut:
-        return []
-    shown = _TORQUE.text(limit)
-    return [f"{', '.join(cut)}: no more than controller.largest_torque = {shown} is requested; set that higher too"]
-
-
-def _pressure_lines(worn: WalkResult) -> list[str]:
-    """Return each chamber whose pressure comes far above its supply, as where the foot drives the vane to its end."""
-    supply = worn.scenario.device.supply
-    lines = []
+    if cut:
+        shown = _TORQUE.text(limit)
+        remarks.append(
+            f"{', '.join(cut)}: no more than controller.largest_torque = {shown} is requested; set that higher too"
+        )
+    # Where the foot drives the vane to its end, it compresses a chamber far above its supply.
     for channel, words, given in (
         ("pressure_1", "chamber 1", supply.pressure),
         ("pressure_2", "chamber 2", supply.dorsiflexion_pressure),
     ):
         largest = float(worn.recording[channel].max()) if channel in worn.recording else 0.0
-        if not largest > _FAR_ABOVE * given:
-            continue
-        reached, fed = (display_value(value, "pressure", supply.atmospheric_pressure) for value in (largest, given))
-        lines.append(
-            f"the pressure in {words} reaches {reached:.0f} psi_g, and its supply is set to {fed:.0f} psi_g: actuator, "
-            "valves and tubing must withstand that"
-        )
-    return lines
+        if largest > _FAR_ABOVE * given:
+            reached, fed = (display_value(value, "pressure", supply.atmospheric_pressure) for value in (largest, given))
+            remarks.append(
+                f"the pressure in {words} reaches {reached:.0f} psi_g, and its supply is set to {fed:.0f} psi_g: "
+                "actuator, valves and tubing must withstand that"
+            )
+    if not worn.events:
+        return remarks
+    helped, strides = int(worn.helped.sum()), worn.helped.size
+    remarks += event_lines(worn.events)
+    if strides:
+        remarks.append(f"help in {helped} of {strides} strides{'' if worn.is_helped else ': fewer than half'}")
+    return remarks
 
 
 def over_time_parts(worn: WalkResult) -> tuple[Part, ...]:
     """Return the walk over time, where something happened in it."""
+    # A figure of an even walk shows nothing that the mean stride does not.
     if not worn.events and not failures(worn.scenario):
         return ()
     draw = partial(over_time_figure, worn)

@@ -57,11 +57,21 @@ def audit(parameter_set: ParameterSet, parent: ParameterSet | None = None) -> li
         parent = load_parameter_set(parameter_set.parent)
     evidence = Evidence(parameter_set, parameter_set.declarations())
     found = [finding for check in CHECKS.values() for finding in check(evidence)]
-    changed = overridden_paths(parameter_set)
+    changed, ids = overridden_paths(parameter_set), {finding.id for finding in found}
     judged = [_judge(finding, parameter_set, changed, parent) for finding in found]
     # With overrides a finding may be gone for that reason alone: its acceptance is not idle.
-    if not changed:
-        judged += _idle_reasons(parameter_set, {finding.id for finding in found})
+    idle = {} if changed else {name: why for name, why in parameter_set.accepted.items() if name not in ids}
+    judged += [
+        Finding(
+            id="idle-acceptance",
+            severity="warning",
+            title=f"the set accepts '{name}', which does not exist",
+            values=(),
+            sides=(),
+            paragraph=f"There is no finding '{name}'. Remove the entry from the set; its reason is: {why}",
+        )
+        for name, why in idle.items()
+    ]
     return sorted(judged, key=lambda finding: _ORDER[finding.severity])
 
 
@@ -82,16 +92,3 @@ def _judge(
         return finding
     severity = "warning" if finding.severity == "error" else finding.severity
     return replace(finding, severity=severity, accepted=reason)
-
-
-def _idle_reasons(parameter_set: ParameterSet, found: set[str]) -> Iterator[Finding]:
-    for identifier, reason in parameter_set.accepted.items():
-        if identifier not in found:
-            yield Finding(
-                id="idle-acceptance",
-                severity="warning",
-                title=f"the set accepts '{identifier}', which does not exist",
-                values=(),
-                sides=(),
-                paragraph=f"There is no finding '{identifier}'. Remove the entry from the set; its reason is: {reason}",
-            )

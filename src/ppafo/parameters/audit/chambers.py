@@ -38,31 +38,27 @@ def check_virtual_work(evidence: Evidence) -> Iterator[Finding]:
             ),
         )
     elif abs(found[1] / found[0] - 1.0) > _TOLERANCE:
-        yield _contradiction(evidence, *found)
-
-
-def _contradiction(evidence: Evidence, torque_constant: float, volume_per_angle: float) -> Finding:
-    gas_paths, gas_sides, gas_text = _gas_use(evidence, torque_constant, volume_per_angle)
-    return Finding(
-        id=_ID,
-        severity="warning",
-        title="torque constant and displacement per radian differ, against virtual work",
-        values=evidence.values_of(_TORQUE_CONSTANT, _VOLUME_PER_ANGLE, _EFFICIENCY, *gas_paths),
-        sides=(
-            Side("torque constant", torque_constant, "m^3"),
-            Side("displacement per radian", volume_per_angle, "m^3/rad"),
-            *gas_sides,
-        ),
-        paragraph=(
-            f"A frictionless vane that turns by dtheta does the work T dtheta = (P1 - P2) dV, so that the torque "
-            f"constant {1e6 * torque_constant:.4g} cm^3 and the displacement per radian "
-            f"{1e6 * volume_per_angle:.4g} cm^3/rad "
-            f"should be one number; the displacement is {volume_per_angle / torque_constant:.2g} times the torque "
-            "constant."
-            f"{gas_text} Measure the volume of gas that a full turn displaces; until then energy and "
-            f"efficiency figures are uncertain by the same factor."
-        ),
-    )
+        torque_constant, volume_per_angle = found
+        gas_paths, gas_sides, gas_text = _gas_use(evidence, torque_constant, volume_per_angle)
+        yield Finding(
+            id=_ID,
+            severity="warning",
+            title="torque constant and displacement per radian differ, against virtual work",
+            values=evidence.values_of(_TORQUE_CONSTANT, _VOLUME_PER_ANGLE, _EFFICIENCY, *gas_paths),
+            sides=(
+                Side("torque constant", torque_constant, "m^3"),
+                Side("displacement per radian", volume_per_angle, "m^3/rad"),
+                *gas_sides,
+            ),
+            paragraph=(
+                f"A frictionless vane that turns by dtheta does the work T dtheta = (P1 - P2) dV, so that the torque "
+                f"constant {1e6 * torque_constant:.4g} cm^3 and the displacement per radian "
+                f"{1e6 * volume_per_angle:.4g} cm^3/rad should be one number; the displacement is "
+                f"{volume_per_angle / torque_constant:.2g} times the torque constant.{gas_text} Measure the volume of "
+                "gas that a full turn displaces; until then energy and efficiency figures are uncertain by the same "
+                "factor."
+            ),
+        )
 
 
 def _gas_use(

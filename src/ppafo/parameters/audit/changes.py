@@ -1,7 +1,7 @@
 """Changes of a parameter set against the set that it began as: value by value, whatever the unit."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ppafo.errors import UnitError
@@ -26,33 +26,25 @@ def changes(parameter_set: ParameterSet, parent: ParameterSet) -> list[Change]:
 
     Numbers are compared in SI, so that a value in another unit is the same value; sources and notes do not count.
     """
-    return [*_choices(parameter_set, parent), *_values(parameter_set, parent)]
-
-
-def _choices(parameter_set: ParameterSet, parent: ParameterSet) -> Iterator[Change]:
-    after, before = _chosen(parameter_set), _chosen(parent)
+    kinds, old_kinds = _chosen(parameter_set), _chosen(parent)
+    found = [
+        Change(path, old_kinds.get(path, ""), kinds.get(path, ""), "")
+        for path in dict.fromkeys((*kinds, *old_kinds))
+        if kinds.get(path) != old_kinds.get(path)
+    ]
+    after, before = parameter_set.entries(), parent.entries()
     for path in dict.fromkeys((*after, *before)):
-        if after.get(path) != before.get(path):
-            yield Change(path, before.get(path, ""), after.get(path, ""), "")
+        new, old = after.get(path), before.get(path)
+        if new is None or old is None or not _is_same(path, parameter_set, parent):
+            was = "" if old is None else entry_text(old)
+            found.append(Change(path, was, *(("", "") if new is None else (entry_text(new), new.origin))))
+    return found
 
 
 def _chosen(parameter_set: ParameterSet) -> Mapping[str, str]:
     kinds = {f"valves.{name}.kind": kind for name, kind in parameter_set.valve_kinds.items()}
     actuator = {"actuator.kind": parameter_set.actuator_kind, "actuator.file": parameter_set.actuator_file}
     return {"default_valve": parameter_set.default_valve, **actuator, **kinds}
-
-
-def _values(parameter_set: ParameterSet, parent: ParameterSet) -> Iterator[Change]:
-    after, before = parameter_set.entries(), parent.entries()
-    for path in dict.fromkeys((*after, *before)):
-        new, old = after.get(path), before.get(path)
-        if new is None or old is None or not _is_same(path, parameter_set, parent):
-            yield Change(
-                path,
-                "" if old is None else entry_text(old),
-                "" if new is None else entry_text(new),
-                "" if new is None else new.origin,
-            )
 
 
 def _is_same(path: str, parameter_set: ParameterSet, parent: ParameterSet) -> bool:

@@ -14,7 +14,7 @@ from ppafo.model.plant import chamber_1_volume
 from ppafo.parameters.declaration import alternatives, is_within
 from ppafo.parameters.device import Gas
 from ppafo.parameters.graph import ATMOSPHERE_PATH
-from ppafo.parameters.parameter_set import Entry, ParameterSet, atmospheric_pressure, number_in_si
+from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure, number_in_si
 from ppafo.units import from_si
 
 Severity = Literal["error", "warning", "note"]
@@ -121,7 +121,8 @@ class Evidence:
         if value is None or entry is None or entry.value == 0.0:
             return None
         # Below 1: the digits of "2" leave open 1.5 to 2.5, and never 0 or another sign.
-        relative = min(reported_half_width(entry) / abs(entry.value), 0.99)
+        half_width = _half_digit(entry.value) if entry.uncertainty is None else entry.uncertainty
+        relative = min(half_width / abs(entry.value), 0.99)
         return Interval(abs(value) * (1.0 - relative), abs(value) * (1.0 + relative))
 
     def in_set_unit(self, path: str, value: float) -> str:
@@ -156,8 +157,14 @@ class Evidence:
 
     def angle_range(self) -> tuple[str, float, str, float] | None:
         """Return path and value [rad] of the smallest and the largest angle in use: reported ones, else the stops."""
-        low_path = self._first("reported.smallest_angle", "actuator.angle_min")
-        high_path = self._first("reported.largest_angle", "actuator.angle_max")
+        numbers = self.parameter_set.numbers
+        low_path, high_path = (
+            reported if reported in numbers else stop
+            for reported, stop in (
+                ("reported.smallest_angle", "actuator.angle_min"),
+                ("reported.largest_angle", "actuator.angle_max"),
+            )
+        )
         found = self.numbers(low_path, high_path)
         return None if found is None else (low_path, found[0], high_path, found[1])
 
@@ -171,14 +178,6 @@ class Evidence:
         found = self.numbers("actuator.volume_per_angle", "actuator.angle_min")
         dead_volume = self.number("actuator.dead_volume_1") or 0.0
         return None if found is None else chamber_1_volume(angle, found[1], found[0], dead_volume)
-
-    def _first(self, preferred: str, other: str) -> str:
-        return preferred if preferred in self.parameter_set.numbers else other
-
-
-def reported_half_width(entry: Entry) -> float:
-    """Return half a unit of the last reported digit, or the stated uncertainty, in the entry's unit."""
-    return _half_digit(entry.value) if entry.uncertainty is None else entry.uncertainty
 
 
 def digits(value: float) -> Interval:

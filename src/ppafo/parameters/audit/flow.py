@@ -177,30 +177,26 @@ def check_choked_flow(evidence: Evidence) -> Iterator[Finding]:
         "reported.critical_pressure_ratio": 1.0 / critical_pressure_ratio(k),
     }
     for path, value in expected.items():
-        yield from _constant(evidence, path, value)
+        reported, digits = evidence.number(path), evidence.magnitude(path)
+        if reported is None or digits is None:
+            continue
+        holds = digits.low * (1.0 - _ROUNDING) <= value <= digits.high * (1.0 + _ROUNDING)
+        quantity = evidence.declared[path]
+        verdict = "agree to the reported digits" if holds else f"differ by {100.0 * (reported / value - 1.0):+.2g} %"
+        remedy = "" if holds else f" Would be consistent with {value:.5g}, or with other gas data."
+        yield Finding(
+            id=path.rpartition(".")[2].replace("_", "-"),
+            severity="note" if holds else "error",
+            title=f"{quantity.summary} {'follows' if holds else 'does not follow'} from the gas data",
+            values=evidence.values_of(path, *GAS_PATHS),
+            sides=(Side("reported", reported, quantity.unit), Side("from the gas data", value, quantity.unit)),
+            paragraph=(
+                f"Reported is {evidence.in_set_unit(path, reported)}; the gas data give {value:.5g} "
+                f"{quantity.unit}".rstrip()
+                + f". The two {verdict}.{remedy}"
+            ),
+        )
     yield from _exponent(evidence, gas)
-
-
-def _constant(evidence: Evidence, path: str, expected: float) -> Iterator[Finding]:
-    reported, digits = evidence.number(path), evidence.magnitude(path)
-    if reported is None or digits is None:
-        return
-    holds = digits.low * (1.0 - _ROUNDING) <= expected <= digits.high * (1.0 + _ROUNDING)
-    quantity = evidence.declared[path]
-    verdict = "agree to the reported digits" if holds else f"differ by {100.0 * (reported / expected - 1.0):+.2g} %"
-    remedy = "" if holds else f" Would be consistent with {expected:.5g}, or with other gas data."
-    yield Finding(
-        id=path.rpartition(".")[2].replace("_", "-"),
-        severity="note" if holds else "error",
-        title=f"{quantity.summary} {'follows' if holds else 'does not follow'} from the gas data",
-        values=evidence.values_of(path, *GAS_PATHS),
-        sides=(Side("reported", reported, quantity.unit), Side("from the gas data", expected, quantity.unit)),
-        paragraph=(
-            f"Reported is {evidence.in_set_unit(path, reported)}; the gas data give {expected:.5g} "
-            f"{quantity.unit}".rstrip()
-            + f". The two {verdict}.{remedy}"
-        ),
-    )
 
 
 def _exponent(evidence: Evidence, gas: Gas) -> Iterator[Finding]:
@@ -220,6 +216,10 @@ def _exponent(evidence: Evidence, gas: Gas) -> Iterator[Finding]:
         return
     # C1 is the root of a power: half the difference of exponents is left.
     literal = correct * (2.0 / (k + 1.0)) ** (0.5 * (exponent - right))
+    reported, agreement = evidence.number(_C1), ""
+    if reported is not None:
+        nearer = "second" if abs(reported - correct) < abs(reported - literal) else "first"
+        agreement = f", and the reported C1 of {reported:.4g} s/m is the {nearer} of the two"
     yield Finding(
         id="choked-flow-exponent",
         severity="error",
@@ -228,18 +228,10 @@ def _exponent(evidence: Evidence, gas: Gas) -> Iterator[Finding]:
         sides=(Side("C1 with the reported exponent", literal, "s/m"), Side("C1 with (k+1)/(k-1)", correct, "s/m")),
         paragraph=(
             f"The reported exponent {formula} is {exponent:.4g} and gives C1 = {literal:.4g} s/m; the exponent "
-            f"(k + 1)/(k - 1) = {right:.4g} gives {correct:.4g} s/m{_agreement(evidence, literal, correct)}. "
+            f"(k + 1)/(k - 1) = {right:.4g} gives {correct:.4g} s/m{agreement}. "
             f"Would be consistent with the exponent (k + 1)/(k - 1)."
         ),
     )
-
-
-def _agreement(evidence: Evidence, literal: float, correct: float) -> str:
-    reported = evidence.number(_C1)
-    if reported is None:
-        return ""
-    nearer = "second" if abs(reported - correct) < abs(reported - literal) else "first"
-    return f", and the reported C1 of {reported:.4g} s/m is the {nearer} of the two"
 
 
 # Do the reported flows follow from discharge coefficient and area? Equations (6) and (7).
@@ -350,39 +342,35 @@ def _check_shared_coefficient(evidence: Evidence, flows: list[_ValveFlow]) -> It
 
 def check_sonic_flow(evidence: Evidence) -> Iterator[Finding]:
     """Yield an error for each valve whose reported flow its sonic conductance does not pass."""
+    gas = evidence.gas()
     for name in evidence.parameter_set.valve_kinds:
-        yield from _valve(evidence, name)
-
-
-def _valve(evidence: Evidence, name: str) -> Iterator[Finding]:
-    valve, entry = f"valves.{name}", f"reported.valves.{name}"
-    size, flow = f"{valve}.sonic_conductance", f"{entry}.mass_flow"
-    paths = (size, f"{valve}.critical_ratio", flow, f"{entry}.flow_pressure")
-    gas, found = evidence.gas(), evidence.numbers(*paths)
-    reported, given = evidence.magnitude(flow), evidence.magnitude(size)
-    if gas is None or found is None or reported is None or given is None or min(found) <= 0.0 or found[1] >= 1.0:
-        return
-    conductance, critical_ratio, measured, pressure = found
-    psi = iso6358_flow_function(min(evidence.atmosphere() / pressure, 1.0), critical_ratio)
-    per_size = sonic_conductance_mass(1.0, gas.specific_gas_constant, gas.temperature) * pressure * psi
-    room = Interval(per_size * (1.0 - _MODEL), per_size * (1.0 + _MODEL))
-    if per_size <= 0.0 or given.times(room).meets(reported):
-        return
-    predicted, needed = conductance * per_size, measured / per_size
-    yield Finding(
-        id=f"flow-of-{name}",
-        severity="error",
-        title=f"the reported flow of valve '{name}' does not follow from its sonic conductance",
-        values=evidence.values_of(*paths),
-        sides=(
-            Side("reported flow", measured, "kg/s"),
-            Side("flow of the sonic conductance", predicted, "kg/s"),
-            Side("sonic conductance that gives the reported flow", needed, "m^3/(s Pa)"),
-        ),
-        paragraph=(
-            f"Fully open the valve '{name}' passes {evidence.in_set_unit(flow, predicted)} by its sonic conductance, "
-            f"reported is {evidence.in_set_unit(flow, measured)}: a factor {predicted / measured:.3g}. Would be "
-            "consistent with a "
-            f"sonic conductance of {evidence.in_set_unit(size, needed)}, or with the other flow."
-        ),
-    )
+        valve, entry = f"valves.{name}", f"reported.valves.{name}"
+        size, flow = f"{valve}.sonic_conductance", f"{entry}.mass_flow"
+        paths = (size, f"{valve}.critical_ratio", flow, f"{entry}.flow_pressure")
+        found, reported, given = evidence.numbers(*paths), evidence.magnitude(flow), evidence.magnitude(size)
+        if gas is None or found is None or reported is None or given is None or min(found) <= 0.0 or found[1] >= 1.0:
+            continue
+        conductance, critical_ratio, measured, pressure = found
+        psi = iso6358_flow_function(min(evidence.atmosphere() / pressure, 1.0), critical_ratio)
+        per_size = sonic_conductance_mass(1.0, gas.specific_gas_constant, gas.temperature) * pressure * psi
+        room = Interval(per_size * (1.0 - _MODEL), per_size * (1.0 + _MODEL))
+        if per_size <= 0.0 or given.times(room).meets(reported):
+            continue
+        predicted, needed = conductance * per_size, measured / per_size
+        yield Finding(
+            id=f"flow-of-{name}",
+            severity="error",
+            title=f"the reported flow of valve '{name}' does not follow from its sonic conductance",
+            values=evidence.values_of(*paths),
+            sides=(
+                Side("reported flow", measured, "kg/s"),
+                Side("flow of the sonic conductance", predicted, "kg/s"),
+                Side("sonic conductance that gives the reported flow", needed, "m^3/(s Pa)"),
+            ),
+            paragraph=(
+                f"Fully open the valve '{name}' passes {evidence.in_set_unit(flow, predicted)} by its sonic "
+                f"conductance, reported is {evidence.in_set_unit(flow, measured)}: a factor "
+                f"{predicted / measured:.3g}. Would be consistent with a sonic conductance of "
+                f"{evidence.in_set_unit(size, needed)}, or with the other flow."
+            ),
+        )

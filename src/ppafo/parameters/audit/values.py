@@ -5,11 +5,12 @@ from collections.abc import Iterator
 
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
 from ppafo.errors import UnitError
+from ppafo.model.declaration import Quantity
 from ppafo.model.effects.second_virial import SECOND_VIRIAL
 from ppafo.model.gas import SPECIES
 from ppafo.parameters.audit.evidence import Evidence, Finding, Side
 from ppafo.parameters.declaration import is_within
-from ppafo.parameters.parameter_set import entry_in_si, number_in_si, number_text
+from ppafo.parameters.parameter_set import Entry, entry_in_si, number_in_si, number_text
 from ppafo.parameters.publications.publication import FILE, read_publication
 from ppafo.units import to_si
 
@@ -57,17 +58,24 @@ def _stated_numbers(name: str) -> dict[str, tuple[float, str]]:
 
 # Does every value have the dimension that its equation needs?
 
-_NEEDS_PLAIN = "a plain number"
-
 
 def check_dimensions(evidence: Evidence) -> Iterator[Finding]:
     """Yield one finding for values of a foreign dimension, and one for each whose unit belongs to its inverse."""
-    refused = dict(_refusals(evidence))
-    inverted = [path for path in refused if _fits_inverse(evidence, path)]
-    for path in inverted:
-        entry, quantity = evidence.parameter_set.numbers[path], evidence.declared[path]
-        inverse_unit = _inverse_unit(quantity.unit)
-        value = to_si(entry.value, entry.unit, inverse_unit)
+    foreign = []
+    for path, entry in evidence.parameter_set.numbers.items():
+        quantity = evidence.declared[path]
+        unit = quantity.unit
+        inverse_unit = f"1/({unit})" if " " in unit or "/" in unit else f"1/{unit}"
+        if _fits(entry, quantity, evidence.atmosphere()):
+            continue
+        try:
+            value = to_si(entry.value, entry.unit, inverse_unit)
+        except UnitError:
+            value = 0.0
+        # What is 0 has no inverse, whatever its unit.
+        if value == 0.0:
+            foreign.append(path)
+            continue
         name = path.rpartition(".")[2].replace("_", "-")
         yield Finding(
             id=f"{name}-upside-down",
@@ -82,50 +90,33 @@ def check_dimensions(evidence: Evidence) -> Iterator[Finding]:
                 f"number: taken literally it would be {1.0 / value:.3g} {quantity.unit}."
             ),
         )
-    foreign = [path for path in refused if path not in inverted]
     if foreign:
-        yield _foreign(evidence, foreign)
+        numbers, declared = evidence.parameter_set.numbers, evidence.declared
+        described = "; ".join(
+            f"{path} = {number_text(numbers[path])}, where {declared[path].unit or 'a plain number'} is needed "
+            f"({declared[path].summary})"
+            for path in foreign
+        )
+        yield Finding(
+            id="dimensions",
+            severity="error",
+            title="values whose unit does not fit their equation",
+            values=evidence.values_of(*foreign),
+            sides=tuple(Side(path, evidence.number(path) or 0.0, "as given, base units") for path in foreign),
+            paragraph=(
+                f"{described}. Give the same number in the unit that is needed, if only the unit was "
+                f"misreported; the other checks use the number as it stands."
+            ),
+        )
 
 
-def _refusals(evidence: Evidence) -> Iterator[tuple[str, str]]:
-    for path, entry in evidence.parameter_set.numbers.items():
-        try:
-            entry_in_si(entry, evidence.declared[path], evidence.atmosphere())
-        except UnitError as error:
-            yield path, str(error)
-
-
-def _fits_inverse(evidence: Evidence, path: str) -> bool:
-    entry = evidence.parameter_set.numbers[path]
+def _fits(entry: Entry, quantity: Quantity, atmosphere: float) -> bool:
+    """Tell whether an entry has the dimension of its declaration."""
     try:
-        return to_si(entry.value, entry.unit, _inverse_unit(evidence.declared[path].unit)) != 0.0
+        entry_in_si(entry, quantity, atmosphere)
     except UnitError:
         return False
-
-
-def _inverse_unit(unit: str) -> str:
-    return f"1/({unit})" if " " in unit or "/" in unit else f"1/{unit}"
-
-
-def _foreign(evidence: Evidence, paths: list[str]) -> Finding:
-    described = "; ".join(_mismatch(evidence, path) for path in paths)
-    return Finding(
-        id="dimensions",
-        severity="error",
-        title="values whose unit does not fit their equation",
-        values=evidence.values_of(*paths),
-        sides=tuple(Side(path, evidence.number(path) or 0.0, "as given, base units") for path in paths),
-        paragraph=(
-            f"{described}. Give the same number in the unit that is needed, if only the unit was "
-            f"misreported; the other checks use the number as it stands."
-        ),
-    )
-
-
-def _mismatch(evidence: Evidence, path: str) -> str:
-    needed = evidence.declared[path].unit or _NEEDS_PLAIN
-    entry = evidence.parameter_set.numbers[path]
-    return f"{path} = {number_text(entry)}, where {needed} is needed ({evidence.declared[path].summary})"
+    return True
 
 
 # Is every value within the limits of its declaration, which any device keeps?

@@ -34,7 +34,7 @@ from ppafo.model.source import (
     liquid_density,
     pressure_reserve,
 )
-from ppafo.parameters.declaration import is_within
+from ppafo.parameters.declaration import is_within, limits_text
 from ppafo.parameters.overrides import Forms, other_forms, override_set
 from ppafo.parameters.parameter_set import Entry, TextEntry
 from ppafo.parameters.parts import Part, load_catalogue
@@ -96,21 +96,21 @@ def scaled_entries(part: Part, paper: Mapping[str, Entry]) -> dict[str, Entry]:
     content, empty = part.values["content"], part.values["empty_mass"]
     # The same density of filling: content over the paper's, and the volume with it.
     ratio = 1000.0 * content / paper["bottle.gas_mass"].value
+    volume, wall = paper["bottle.volume"].value * ratio, _WALL * empty
     found = {
-        "bottle.gas_mass": _entry(1000.0 * content, "g", f"catalogue of parts, {part.name}"),
-        "bottle.volume": _entry(paper["bottle.volume"].value * ratio, "cm^3", "filled as densely as the paper's"),
-        "bottle.wall_heat_capacity": _entry(_WALL * empty, "J/K", "its empty mass, at 885 J/(kg K) as the paper's"),
+        "bottle.gas_mass": (1000.0 * content, "g", f"catalogue of parts, {part.name}"),
+        "bottle.volume": (volume, "cm^3", "filled as densely as the paper's"),
+        "bottle.wall_heat_capacity": (wall, "J/K", "its empty mass, at 885 J/(kg K) as the paper's"),
     }
     # Heat passes surfaces: of similar bodies they grow with the two thirds power of the volume.
     surface = ratio ** (2.0 / 3.0)
     for path in _SURFACES:
-        given = paper[path]
-        found[path] = _entry(given.value * surface, given.unit, "the paper's bottle, with the surface of its fluid")
-    return dict(paper) | found
-
-
-def _entry(value: float, unit: str, source: str) -> Entry:
-    return Entry(value=value, unit=unit, origin="derived", source=source)
+        scaled = paper[path].value * surface
+        found[path] = (scaled, paper[path].unit, "the paper's bottle, with the surface of its fluid")
+    return dict(paper) | {
+        path: Entry(value=value, unit=unit, origin="derived", source=source)
+        for path, (value, unit, source) in found.items()
+    }
 
 
 PAPER_BOTTLE = "paper-co2-9oz"
@@ -196,11 +196,6 @@ WARMING = (*(f"regulator.{item.name}" for item in BODY), *(f"hose.{item.name}" f
 """Values that warm the gas on its way; a file without them has the paper's bottle's."""
 
 
-def _section(name: str) -> Any:
-    fields = {item.name: optional(Entry, f"{item.summary} [{item.unit or '-'}]") for item in SECTIONS[name]}
-    return table(f"{name.capitalize()}OfABottle", fields)
-
-
 @functools.cache
 def bottle_file() -> type[BaseModel]:
     """Return the layout of a file of a bottle."""
@@ -211,12 +206,10 @@ def bottle_file() -> type[BaseModel]:
         "notes": (str, ""),
         "gas": (TextEntry, Field(description="name of the fluid, which needs a property table")),
     }
-    fields |= {
-        name: optional(_section(name), f"section {name}")
-        if name == _MAY_LACK
-        else (_section(name), Field(description=f"section {name}"))
-        for name in SECTIONS
-    }
+    for name, members in SECTIONS.items():
+        own = {item.name: optional(Entry, f"{item.summary} [{item.unit or '-'}]") for item in members}
+        section, described = table(f"{name.capitalize()}OfABottle", own), f"section {name}"
+        fields[name] = optional(section, described) if name == _MAY_LACK else (section, Field(description=described))
     return table("BottleFile", fields)
 
 
@@ -273,7 +266,10 @@ def load_bottle(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Bott
     """
     # A bottle file has its own walls and regulator; a part of the same name has only a content and a mass.
     part = None if str(name_or_path) in FILE.names() else bottle_parts().get(str(name_or_path))
-    _check_name(name_or_path)
+    name, known = label(str(name_or_path)), (*FILE.names(), *bottle_parts())
+    if not (name in known or Path(name_or_path).suffix == ".toml" or "/" in name):
+        hint = nearest_name(name, known)
+        raise ParameterError(f"there is no bottle '{name}'{hint}; available: {', '.join(known)}, or give a .toml file")
     # A part has no file of its own: the paper's bottle gives what a catalogue does not say.
     parsed, file = read_model(FILE, bottle_file(), name_or_path if part is None else PAPER_BOTTLE)
     # A file without regulator and hose values has the paper's.
@@ -290,17 +286,6 @@ def load_bottle(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Bott
         kept = {name: entry for name, entry in found.items() if name not in other_forms(path, FILLS)}
         found = kept | {path: Entry(value=value, unit=unit, origin="assumed", source="override")}
     return _build(parsed, found, file)
-
-
-def _check_name(name_or_path: str | Path) -> None:
-    """Refuse a name that neither a bottle nor a part has, with the nearest of both."""
-    name, path = label(str(name_or_path)), Path(name_or_path)
-    known = (*FILE.names(), *bottle_parts())
-    if name in known or path.suffix == ".toml" or "/" in name:
-        return
-    raise ParameterError(
-        f"there is no bottle '{name}'{nearest_name(name, known)}; available: {', '.join(known)}, or give a .toml file"
-    )
 
 
 def _given(parsed: Any) -> dict[str, Entry]:
@@ -321,8 +306,15 @@ def _build(parsed: Any, entries: Mapping[str, Entry], file: str) -> Bottle:
     missing = [path for path in NEEDED if path not in entries]
     if missing:
         raise ParameterError(f"{file}: {said_missing(missing)}")
-    values = {path: _in_si(path, entry, file) for path, entry in entries.items()}
-    fluid = _fluid(parsed.gas.value, file)
+    values = {}
+    for path, entry in entries.items():
+        given = f"{file}: {path} = {format_quantity(entry.value, entry.unit)}"
+        with refused_as(ParameterError, given, UnitError):
+            values[path] = to_si(entry.value, entry.unit, PATHS[path].unit)
+        if not (math.isfinite(values[path]) and is_within(values[path], PATHS[path])):
+            raise ParameterError(f"{given}: {range_rule(PATHS[path], limits_text(PATHS[path]))}")
+    with refused_as(ParameterError, f"{file}: gas = '{parsed.gas.value}'", ParameterError):
+        fluid = load_fluid(parsed.gas.value)
     bottle = Bottle(
         name=parsed.name,
         title=parsed.title,
@@ -345,23 +337,6 @@ def _build(parsed: Any, entries: Mapping[str, Entry], file: str) -> Bottle:
     )
     _check_content(bottle, file)
     return bottle
-
-
-def _fluid(name: str, file: str) -> Fluid:
-    with refused_as(ParameterError, f"{file}: gas = '{name}'", ParameterError):
-        return load_fluid(name)
-
-
-def _in_si(path: str, entry: Entry, file: str) -> float:
-    quantity = PATHS[path]
-    given = f"{file}: {path} = {format_quantity(entry.value, entry.unit)}"
-    with refused_as(ParameterError, given, UnitError):
-        value = to_si(entry.value, entry.unit, quantity.unit)
-    if not (math.isfinite(value) and is_within(value, quantity)):
-        lower = f"{'at least' if quantity.minimum_allowed else 'more than'} {quantity.minimum:g}"
-        upper = f" and at most {quantity.maximum:g}" if math.isfinite(quantity.maximum) else ""
-        raise ParameterError(f"{given}: {range_rule(quantity, f'{lower}{upper} {quantity.unit}'.rstrip())}")
-    return value
 
 
 def _mass_of_fill(values: Mapping[str, float], fluid: Fluid, file: str) -> float:

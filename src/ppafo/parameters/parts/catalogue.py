@@ -1,6 +1,5 @@
 """The catalogue of parts: layout of its file, real parts with figures of data sheets, and how it is read."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import resources
@@ -16,7 +15,7 @@ from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, UnitError, nearest_name, refused_as
 from ppafo.model.catalog import VALVES
 from ppafo.model.declaration import Quantity
-from ppafo.parameters.declaration import ACTUATOR, AREA_FORM, ORIFICE, SONIC_FORM, is_within
+from ppafo.parameters.declaration import ACTUATOR, AREA_FORM, ORIFICE, SONIC_FORM, is_within, limits_text
 from ppafo.units import to_si
 
 MASS = Quantity("mass", "kg", "mass of the part, of both valves for a pair", minimum=0.0, maximum=100.0)
@@ -130,7 +129,10 @@ class Part:
         return {f"valve.{name}": number for name, number in (orifice | settings | own).items()}
 
 
-_TITLES = {"valves": "Valve", "actuators": "Actuator", "regulators": "Regulator", "bottles": "Bottle"} | {
+_TITLES = {
+    "actuators": "Actuator",
+    "regulators": "Regulator",
+    "bottles": "Bottle",
     "processors": "Processor",
     "batteries": "Battery",
 }
@@ -151,12 +153,6 @@ def _part_table(title: str, group: str, quantities: tuple[Quantity, ...], extra:
     return table(title, fields | (extra or {}))
 
 
-def _valve_table(kind: str) -> Any:
-    # Each kind of valve has a table of its own, so that a figure of another kind is refused by name.
-    own = {"kind": (Literal[kind], Field(description=VALVES[kind].summary))}
-    return _part_table(f"{kind.capitalize()}ValvePart", "valves", figures_of("valves", kind), own)
-
-
 def _catalogue_file() -> type[BaseModel]:
     fields: dict[str, Any] = {
         "schema_version": (Literal[1], Field(description="version of this layout")),
@@ -165,11 +161,17 @@ def _catalogue_file() -> type[BaseModel]:
         "notes": (str, ""),
     }
     for group, quantities in GROUPS.items():
-        parts = (
-            one_of([_valve_table(kind) for kind in VALVES])
-            if group == "valves"
-            else _part_table(_TITLES[group], group, quantities)
-        )
+        if group == "valves":
+            # Each kind of valve has a table of its own, so that a figure of another kind is refused by name.
+            kinds = {kind: (Literal[kind], Field(description=VALVES[kind].summary)) for kind in VALVES}
+            parts = one_of(
+                [
+                    _part_table(f"{kind.capitalize()}ValvePart", group, figures_of(group, kind), {"kind": own})
+                    for kind, own in kinds.items()
+                ]
+            )
+        else:
+            parts = _part_table(_TITLES[group], group, quantities)
         fields[group] = (GenericAlias(dict, (str, parts)), Field(default_factory=dict, description=f"{group} by name"))
     return table("CatalogueFile", fields)
 
@@ -243,48 +245,30 @@ def _part(file: str, group: str, name: str, parsed: Any) -> Part:
     declared = {item.name: item for item in figures_of(group, kind)}
     figures = {key: figure for key in declared if isinstance(figure := getattr(parsed, key), Figure)}
     place = f"{file}: {group}.{name}"
-    _check_unknown(place, parsed.unknown, figures, declared)
-    if group == "valves":
-        _check_orifice(place, figures)
-    values = {key: _in_si(f"{place}.{key}", figure, declared[key]) for key, figure in figures.items()}
-    return Part(
-        name, group, kind, parsed.maker, parsed.model, parsed.document, parsed.note, figures, values, parsed.unknown
-    )
-
-
-def _check_unknown(
-    place: str, unknown: tuple[str, ...], figures: Mapping[str, Figure], declared: Mapping[str, Quantity]
-) -> None:
-    for key in unknown:
+    for key in parsed.unknown:
         if key not in declared:
             hint = nearest_name(key, declared)
             raise ParameterError(f"{place}.unknown: there is no figure '{key}'{hint}; available: {', '.join(declared)}")
         if key in figures:
             raise ParameterError(f"{place}.unknown: '{key}' is given in the same part")
-
-
-def _check_orifice(place: str, figures: Mapping[str, Figure]) -> None:
-    """Refuse a valve that has not exactly one of the two forms of an orifice, whole."""
     given = [[item.name for item in form if item.name in figures] for form in (AREA_FORM, SONIC_FORM)]
-    # Half a form is as unusable as two forms at once.
-    if sorted(map(len, given)) != [0, 2]:
+    # Half a form of an orifice is as unusable as two forms at once.
+    if group == "valves" and sorted(map(len, given)) != [0, 2]:
         raise ParameterError(
             f"{place}: needs either area and discharge_coefficient or sonic_conductance and critical_ratio, "
             f"it has {', '.join(given[0] + given[1]) or 'none of them'}"
         )
-
-
-def _in_si(place: str, figure: Figure, quantity: Quantity) -> float:
-    # A guess without its reason cannot be checked by the next reader.
-    if figure.origin in _NEEDS_A_REASON and not figure.note.strip():
-        raise ParameterError(f"{place}.note is missing: a figure that is {figure.origin} needs its reason")
-    with refused_as(ParameterError, f"{place} = {figure.value:g} {figure.unit}", UnitError):
-        # Data sheets give gauge pressures at sea level.
-        value = to_si(figure.value, figure.unit, quantity.unit, STANDARD_ATMOSPHERE)
-    if not is_within(value, quantity):
-        limits = [f"{'at least' if quantity.minimum_allowed else 'more than'} {quantity.minimum:g}"]
-        limits += [f"at most {quantity.maximum:g}"] if math.isfinite(quantity.maximum) else []
-        raise ParameterError(
-            f"{place} = {figure.value:g} {figure.unit}: must be {' and '.join(limits)} {quantity.unit}".rstrip()
-        )
-    return value
+    values = {}
+    for key, figure in figures.items():
+        shown = f"{place}.{key} = {figure.value:g} {figure.unit}"
+        # A guess without its reason cannot be checked by the next reader.
+        if figure.origin in _NEEDS_A_REASON and not figure.note.strip():
+            raise ParameterError(f"{place}.{key}.note is missing: a figure that is {figure.origin} needs its reason")
+        with refused_as(ParameterError, shown, UnitError):
+            # Data sheets give gauge pressures at sea level.
+            values[key] = to_si(figure.value, figure.unit, declared[key].unit, STANDARD_ATMOSPHERE)
+        if not is_within(values[key], declared[key]):
+            raise ParameterError(f"{shown}: must be {limits_text(declared[key])}")
+    return Part(
+        name, group, kind, parsed.maker, parsed.model, parsed.document, parsed.note, figures, values, parsed.unknown
+    )

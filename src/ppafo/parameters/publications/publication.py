@@ -69,6 +69,7 @@ def read_publication(name_or_path: str | Path) -> tuple[PublicationFile, str]:
     twice = first_twice(entry.id for entry in read.claims)
     if twice is not None:
         raise ScenarioError(f"{file}: claims: '{twice}' is there twice; give each claim a name of its own")
+    # What one field alone cannot say: these are rules between fields.
     for entry in read.claims:
         place = f"{file}: claims.{entry.id}"
         if entry.published is None and not entry.words and not entry.own:

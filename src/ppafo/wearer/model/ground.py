@@ -60,19 +60,23 @@ def contact(
     meets the ground did so within the ``last`` [s], and sticks where it was then.
     """
     sine, cosine = under.sine, under.cosine
+    # The height is measured upright, the springs yield along the normal.
     depth = max((under.height - y) * cosine, 0.0)
     touches = y < under.height
     speed = cosine * speed_x + sine * speed_y
     rise = cosine * speed_y - sine * speed_x
+    # A point that rises faster than the ground relaxes has lost it: no force pulls it back.
     bracket = 1.0 - rise / ground.relaxing
     normal = ground.stiffness * depth * max(bracket, 0.0)
     damping_normal = ground.stiffness * depth / ground.relaxing if bracket > 0.0 else 0.0
+    # It met the ground between two steps, and sticks where it was then: the place must not hang on the step.
     since = min(depth / max(-rise, ground.rest_speed), last)
     anchor = point.anchor if point.touches > 0.5 else x - since * speed_x
     anchor_height = point.anchor_height if point.touches > 0.5 else y - since * speed_y
     sticks = point.sticks > 0.5 or point.touches < 0.5
     away = cosine * (x - anchor) + sine * (y - anchor_height)
     held = -ground.stiffness_along * (away + abs(away) * speed / ground.relaxing)
+    # Friction that jumped with the sign of the speed would make a resting point go back and forth from step to step.
     quick = max(abs(speed), ground.rest_speed)
     slides = ground.sliding * normal / quick
     lets_go = sticks and abs(held) > ground.sticking * normal
@@ -80,6 +84,7 @@ def contact(
     holds = sticks and not lets_go
     along = held if holds else -slides * speed
     damping_along = ground.stiffness_along * abs(away) / ground.relaxing if holds else slides
+    # The normal force that damping takes away also takes friction away, against the way that the point slides.
     drag = 0.0 if holds else -ground.sliding * damping_normal * speed / quick
     return Contact(
         force_x=cosine * along - sine * normal,

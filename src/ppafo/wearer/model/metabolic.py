@@ -21,7 +21,7 @@ LEAST_HEAT = 1.0
 """W/kg of muscle, which a muscle at rest gives off."""
 
 FASTER = 2.5
-"""Largest velocity of fast fibres in that of slow ones."""
+"""Largest velocity of fast fibres over the slow fibres' largest velocity."""
 
 ROOTS = 10
 
@@ -62,6 +62,7 @@ def work_of(muscle: Muscle, fibre: Fibre, stimulation: float) -> Work:
 
 def to_three_fifths(number: float) -> float:
     """A number [-] between 0.001 and 1 to 0.6, by Newton's fifth root from above, the same in all lanes."""
+    # No library's power, as its last bits differ between processors; from above the iteration falls to the root surely.
     root = 1.0
     for _ in range(ROOTS):
         fourth = root * root * root * root
@@ -77,6 +78,7 @@ def umberger_2010(muscle: Muscle, work: Work) -> float:
     """
     fast = 1.0 - muscle.slow
     excess = work.stimulation - work.activation
+    # As published: the stimulation while it is above the activation, else the mean of both.
     active = work.stimulation if excess > 0.0 else work.stimulation - 0.5 * excess
     is_long = work.length > 1.0
     maintenance = (128.0 * fast + 25.0) * to_three_fifths(max(active, 0.001))
@@ -99,6 +101,7 @@ def bhargava_2004(muscle: Muscle, work: Work) -> float:
     sine, cosine = sine_and_cosine_of_turns(0.25 * work.stimulation)
     slow, fast = muscle.slow * sine, (1.0 - muscle.slow) * (1.0 - cosine)
     short = max(work.length, 0.5)
+    # Straight pieces of the published curve: in proportion up to the optimum, to nothing at one and a half times it.
     at_length = short if short < 1.0 else max(3.0 - 2.0 * short, 0.0)
     heat = 40.0 * slow + 133.0 * fast + at_length * (74.0 * slow + 111.0 * fast)
     isometric = work.activation * work.isometric

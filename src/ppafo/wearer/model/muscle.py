@@ -54,7 +54,7 @@ class Fibre(NamedTuple):
 class Lever(NamedTuple):
     """How a muscle passes a joint: lever [m], angles where it is largest and where the muscle is at rest [rad], share.
 
-    The share [-] is that of its way that its fibres, which lie askew, take.
+    The share [-] is how much of its way the fibres take, which are pennate.
     """
 
     lever: float
@@ -66,6 +66,8 @@ class Lever(NamedTuple):
 def bell(length: float) -> float:
     """Isometric force [-] at a length [optimum lengths], exp(ln(0.05) |(l - 1) / w|^3)."""
     away = abs(length - 1.0) / WIDTH
+    # No library's exp: its last bits differ between processors. A Taylor polynomial of a 64th part, squared six times
+    # (``HALVINGS``), has the same bits everywhere; below e^-60 the force is nothing, and the polynomial would be off.
     small = max(AT_WIDTH * away * away * away, -60.0) / 64.0
     series = 0.0
     for term in range(TERMS):
@@ -78,6 +80,7 @@ def bell(length: float) -> float:
 
 def tendon_force(muscle: Muscle, length: float) -> float:
     """Force of the tendon [largest forces], none while it is slack; its length [m]."""
+    # Quadratic, as published: at the strain of 4 % the tendon bears the largest force.
     strain = max(length / muscle.slack - 1.0, 0.0) / TENDON_STRAIN
     return strain * strain
 
@@ -87,6 +90,7 @@ def lengthening(force: float) -> float:
     shortening = (force - 1.0) / (1.0 + CURVATURE * force)
     excess = (force - LARGEST_ECCENTRIC) / (LARGEST_ECCENTRIC - 1.0)
     drawn = (1.0 + excess) / (1.0 - ECCENTRIC_SHAPE * CURVATURE * min(excess, 0.0))
+    # The published curve ends at 1.5 N, at the largest velocity: beyond, it goes on with a small slope.
     drawn = drawn if excess < 0.0 else 1.0 + 0.01 * (force - LARGEST_ECCENTRIC)
     return shortening if force < 1.0 else drawn
 
@@ -119,8 +123,10 @@ def next_fibre(muscle: Muscle, fibre: Fibre, stimulation: float, whole: float, s
     strain = max((whole - fibre.length) / muscle.slack - 1.0, 0.0) / TENDON_STRAIN
     stretched = max(relative - 1.0, 0.0) / WIDTH
     pressed = max(1.0 - WIDTH - relative, 0.0) / (0.5 * WIDTH)
+    # First order, by the rule of the middle: half of the step counts with the new activation.
     activation = fibre.activation + (stimulation - fibre.activation) * step / (EXCITATION_TIME + 0.5 * step)
     isometric = 0.5 * (fibre.activation + activation) * bell(relative) + stretched * stretched
+    # Force balance of tendon, buffer and active element, over the force that the element has standing still.
     borne = (strain * strain + pressed * pressed) / isometric
     speed = muscle.velocity * muscle.optimum
     # How the force that is borne falls with the length of the element: tendon and buffer; the bell is slow beside them.

@@ -108,8 +108,10 @@ def stimulation(
 ) -> Stimulation:
     """Stimulation of a leg; ``trails`` is 1 for the rear leg while both carry, ``other_load`` [body weights]."""
     stands = gait.stands > 0.5
+    # The vasti are inhibited where the knee is nearly straight and still straightens: it would be overextended.
     straightens = felt.knee > gains.knee_stop_angle and felt.knee_rate > 0.0
     stop = gains.knee_stop * (felt.knee - gains.knee_stop_angle) if straightens else 0.0
+    # Muscles of the hip balance the trunk, but only a leg that is loaded can: all is in proportion to the load.
     upright = gains.lean * (balance.lean - gains.lean_reference)
     turns = gains.lean_rate * balance.lean_rate
     load = gains.load_on_hip * felt.load
@@ -119,6 +121,7 @@ def stimulation(
     flexor += gains.lean_at_leaving * (gait.lean_at_leaving - gains.lean_reference)
     soleus = gains.tone + gains.soleus_stretch * max(felt.soleus_stretch, 0.0)
     gastrocnemius = gains.tone + gains.gastrocnemius_stretch * max(felt.gastrocnemius_stretch, 0.0)
+    # A stretched hamstring ends the swing.
     flexor -= gains.hamstring_on_flexor * max(felt.hamstring_length - gains.hamstring_rest, 0.0)
     standing = Stimulation(
         soleus=soleus + gains.soleus_force * felt.soleus,
@@ -159,5 +162,6 @@ def next_gait(gait: Gait, load: float, lean: float, step: float) -> Gait:
     return Gait(
         stands=1.0 if stands else 0.0,
         since=0.0 if touches else gait.since + step,
+        # Held through the swing: the more the trunk leaned as the leg left, the farther forward it has to step.
         lean_at_leaving=lean if leaves else gait.lean_at_leaving,
     )

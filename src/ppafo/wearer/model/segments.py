@@ -264,6 +264,7 @@ class Column(NamedTuple):
 
 def solved(leg: LegMatrix, first: float, second: float, third: float) -> Column:
     """The leg's block times the result is the column given; by Gauss's elimination."""
+    # Without an exchange of rows: the masses on the diagonal keep it away from 0.
     l21, l31 = leg.m21 / leg.m11, leg.m31 / leg.m11
     u22, u23 = leg.m22 - l21 * leg.m12, leg.m23 - l21 * leg.m13
     l32 = (leg.m32 - l31 * leg.m12) / u22
@@ -334,6 +335,7 @@ def accelerations(
     yy = left.yy + right.yy + body.trunk.mass - upward * upward / inertia
     x = left.x + right.x + whirl * sine + push - along * turning / inertia
     y = left.y + right.y + whirl * cosine - body.trunk.mass * body.gravity - upward * turning / inertia
+    # The trunk is eliminated as the legs are: two equations for the hip are left, by Cramer's rule.
     determinant = xx * yy - xy * yx
     hip_x, hip_y = (x * yy - y * xy) / determinant, (y * xx - x * yx) / determinant
     return Pose(

@@ -167,6 +167,7 @@ def pull(muscles: Muscles, fibres: Fibres, angle: Joints, rate: Joints, ahead: f
     back_arm, back_way = arm_and_way(muscles.gastrocnemius_knee, angle.knee)
     vastus_arm, vastus_way = arm_and_way(muscles.vastus_knee, angle.knee)
     ham_arm, ham_way = arm_and_way(muscles.hamstring_knee, angle.knee)
+    # At the hip levers do not depend on the angle, so the way is in proportion to it.
     hip_share = muscles.hamstring_hip.share * muscles.hamstring_hip.lever
     gluteus_share = muscles.gluteus_hip.share * muscles.gluteus_hip.lever
     flexor_share = muscles.flexor_hip.share * muscles.flexor_hip.lever
@@ -177,6 +178,7 @@ def pull(muscles: Muscles, fibres: Fibres, angle: Joints, rate: Joints, ahead: f
     hamstring = whole(muscles.hamstring, ham_way + hip_share * (muscles.hamstring_hip.rest_at - angle.hip))
     gluteus = whole(muscles.gluteus, gluteus_share * (muscles.gluteus_hip.rest_at - angle.hip))
     flexor = whole(muscles.flexor, flexor_share * (angle.hip - muscles.flexor_hip.rest_at))
+    # Forces pull now, at the lengths of now; the fibres move with the lengths halfway through the step, below.
     soleus_force = force(muscles.soleus, fibres.soleus, soleus)
     tibialis_force = force(muscles.tibialis, fibres.tibialis, tibialis)
     calf_force = force(muscles.gastrocnemius, fibres.gastrocnemius, gastrocnemius)
@@ -231,6 +233,7 @@ class End(NamedTuple):
 
 def end_of_joint(stop: Stop, low: float, high: float, angle: float, rate: float) -> End:
     """Soft ends at ``low`` and ``high`` [rad] of a joint, which never pull."""
+    # Both factors may not fall below 0: an end that a joint leaves quickly would pull it back.
     above, below = max(angle - high, 0.0), max(low - angle, 0.0)
     closing = 1.0 + rate / stop.relaxing
     opening = 1.0 - rate / stop.relaxing
@@ -459,6 +462,7 @@ def next_walker(
     pushed = accelerations(
         wearer.body, pose.lean, rates.lean, -left.hip - right.hip, push, freed(left.matrix), freed(right.matrix)
     )
+    # Steps may differ in length: from the middle of the last one to the middle of this one.
     after = moved(halfway, pushed, 0.5 * (walker.last + step))
     left_fibres = next_fibres(wearer.left, walker.left.fibres, to_left, left.pull, step)
     right_fibres = next_fibres(wearer.right, walker.right.fibres, to_right, right.pull, step)
@@ -500,6 +504,7 @@ def answer(
     """The reflexes at a sample, a ``period`` [s] after the last; felt is what has come along the nerves by now."""
     left_gait = next_gait(left, left_felt.load, balance.lean, period)
     right_gait = next_gait(right, right_felt.load, balance.lean, period)
+    # In double support the leg that has stood longer is the rear one, which prepares its swing.
     both = left_gait.stands > 0.5 and right_gait.stands > 0.5
     left_trails = 1.0 if both and left_gait.since > right_gait.since else 0.0
     right_trails = 1.0 if both and right_gait.since > left_gait.since else 0.0

@@ -65,6 +65,7 @@ NOT_PUSHED = Pushed(0.0, 0.0, 0.0)
 
 def footing(way: Way, x: float) -> Footing:
     """The ground under a place x [m]: h = h_0 + s (x - x_0) on its piece, whose slope is s = tan(angle)."""
+    # Chosen number by number, not piece by piece: compiled code and C know choices of numbers alone.
     found = way.pieces[0]
     for piece in way.pieces[1:]:
         begun = x >= piece.start
@@ -81,6 +82,7 @@ def next_push(way: Way, pushed: Pushed, x: float, step: float) -> Pushed:
     """The push after a step [s] that leads the hip to x [m]: one begins as the hip first comes to its place."""
     force, left = pushed.force, max(pushed.left - step, 0.0)
     for push in way.pushes:
+        # By the farthest place so far, so that a hip that swings back and forth over it is pushed once.
         begins = pushed.come < push.place and push.place <= x
         force = push.force if begins else force
         left = push.duration if begins else left

@@ -4,33 +4,30 @@ import csv
 import io
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ppafo.analyses.design.front.problem import GAS, SEARCHED_STREAMS, DesignProblem
-from ppafo.analyses.design.front.search import PATIENCE, Floats
-from ppafo.analyses.parts.solve import doubts_data, doubts_sections, titles_section
+from ppafo.analyses.design.front.problem import GAS, OBJECTIVES, DesignProblem
+from ppafo.analyses.design.front.search import PATIENCE
+from ppafo.analyses.design.looks import COLOURS, RING
+from ppafo.analyses.design.trials import STREAMS
+from ppafo.analyses.parts.solve import doubts_data, part_titles, parts_to_check
 from ppafo.parameters.parts import Part
+from ppafo.report import finding
 from ppafo.report.display_units import quantity_of_unit
-from ppafo.report.finding import Column, Finding, columns_of
-from ppafo.report.finding import Part as Section
+from ppafo.report.finding import Cell, Column, Finding, columns_of
 from ppafo.report.kind import Kind
 from ppafo.report.panels import Mark, Panel
-from ppafo.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILION
+from ppafo.report.style import BLACK, GREY
+from ppafo.signals.recording import Floats
 from ppafo.simulation.simulate import Result
 from ppafo.version import __version__
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
-
-OBJECTIVES_SHOWN = {
-    "error": Kind("Error", "N m", "torque", ".3g"),
-    "gas": Kind("Gas per task", "kg", "gas mass", ".3g"),
-    "mass": Kind("Mass", "kg", "part mass", ".4g"),
-}
-"""What a design is judged by, as a person is shown it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +118,17 @@ class Design:
             "reason": self.reason,
             "shown": list(self.shown),
             "noise_streams": self.streams,
-            "front": [_point_data(point) for point in self.front],
+            "front": [
+                {
+                    "valve": point.valve.name,
+                    "actuator": point.actuator.name,
+                    "numbers": dict(point.numbers),
+                    **dict(zip(OBJECTIVES, point.objectives, strict=True)),
+                    "from_noise": None if point.spread is None else {"error": point.spread[0], "gas": point.spread[1]},
+                    "tasks": {name: {"error": error, "gas": gas} for name, (error, gas) in point.tasks.items()},
+                }
+                for point in self.front
+            ],
             "search": {
                 "designs": self.designs,
                 "runs": self.runs,
@@ -136,12 +143,6 @@ class Design:
         }
 
 
-def objective_table(front: tuple[DesignPoint, ...]) -> Floats:
-    """Return the objectives of designs, (designs, 3)."""
-    return np.array([point.objectives for point in front]).reshape(-1, 3)
-
-
-_COLOURS = (BLUE, VERMILION, GREEN, ORANGE, "#CC79A7", "#56B4E9", BLACK, GREY)
 _MARKERS = ("o", "^", "s", "D", "v", "P")
 _LOGARITHMIC_FROM = 10.0
 _VIEWS = (
@@ -165,36 +166,33 @@ def design_panels(design: Design) -> list[Panel]:
 def _view(design: Design, title: str, x: str, y: str, legend: str) -> Panel:
     places = np.array([[getattr(point, name) for name in (x, y)] for point in design.front])
     pairs = [(point.valve, point.actuator) for point in design.front]
-    # Every valve and every actuator on the front, in the order of the problem.
+    # Looks are given in the order of the problem, so that a valve keeps its colour in all views.
     groups = [(item.valve, item.actuator) for item in design.problem.combinations]
     valves, actuators = (
-        list({group[side].name: group[side].title for group in groups if group[side] in used})
+        {group[side].name: group[side].title for group in groups if group[side] in used}
         for side, used in enumerate(zip(*pairs, strict=True))
     )
-    looks = {name: _COLOURS[number % len(_COLOURS)] for number, name in enumerate(valves)}
+    looks = {name: COLOURS[number % len(COLOURS)] for number, name in enumerate(valves)}
     shapes = {name: _MARKERS[number % len(_MARKERS)] for number, name in enumerate(actuators)}
-    titles = {part.name: part.title for pair in pairs for part in pair}
+
+    def dots(label: str, colour: str, shown: Floats, **style: Any) -> Mark:
+        return Mark("line", shown[:, 0], shown[:, 1], (), label, colour, {"linestyle": "", **style})
+
     marks = []
-    for valve in valves:
-        for actuator in actuators:
-            here = [place for place, pair in enumerate(pairs) if [part.name for part in pair] == [valve, actuator]]
-            dots = {"marker": shapes[actuator], "markersize": 3.2, "markeredgewidth": 0.0, "alpha": 0.75, **_NO_LINE}
-            marks.append(Mark("line", places[here, 0], places[here, 1], (), "", looks[valve], dots))
-    squares, shaped = {"marker": "s", "markersize": 7, **_NO_LINE}, {"markersize": 6, **_NO_LINE}
-    marks += [Mark("line", [], [], (), titles[name], look, squares) for name, look in looks.items()]
-    marks += [Mark("line", [], [], (), titles[name], GREY, {"marker": look, **shaped}) for name, look in shapes.items()]
-    ring = {"marker": "o", "markersize": 13, "markerfacecolor": "none", "markeredgewidth": 1.4, **_NO_LINE}
-    x_knee, y_knee = places[design.knee].tolist()
-    marks.append(Mark("line", x_knee, y_knee, (), "suggested", BLACK, ring))
+    for (valve, look), (actuator, shape) in product(looks.items(), shapes.items()):
+        here = [pair[0].name == valve and pair[1].name == actuator for pair in pairs]
+        small = {"marker": shape, "markersize": 3.2, "markeredgewidth": 0.0, "alpha": 0.75}
+        marks.append(dots("", look, places[here], **small))
+    # Marks without a place name the colours and the shapes in the legend.
+    marks += [dots(valves[name], look, places[:0], marker="s", markersize=7) for name, look in looks.items()]
+    marks += [dots(actuators[name], GREY, places[:0], marker=look, markersize=6) for name, look in shapes.items()]
+    marks.append(dots("suggested", BLACK, places[[design.knee]], **RING | {"markersize": 13}))
 
     def scale(axes: "Axes") -> None:
         _scale(axes.set_xscale, axes.xaxis, places[:, 0])
         _scale(axes.set_yscale, axes.yaxis, places[:, 1])
 
-    return Panel(OBJECTIVES_SHOWN[x], OBJECTIVES_SHOWN[y], marks, title, legend=legend, then=scale)
-
-
-_NO_LINE = {"linestyle": "none"}
+    return Panel(OBJECTIVES[x], OBJECTIVES[y], marks, title, legend=legend, then=scale)
 
 
 def _scale(set_scale: "Callable[[str], None]", axis: "Axis", values: Floats) -> None:
@@ -203,6 +201,7 @@ def _scale(set_scale: "Callable[[str], None]", axis: "Axis", values: Floats) -> 
 
     if not (values.min() > 0.0 and values.max() > _LOGARITHMIC_FROM * values.min()):
         return
+    # Powers of ten alone on a long axis, 1, 2 and 5 on a short one, which might have a single tick else.
     set_scale("log")
     is_long = np.log10(values.max() / values.min()) > _MAXIMUM_TICKS_OF_ONE_DECADE
     axis.set_major_locator(LogLocator(subs=(1.0,) if is_long else (1.0, 2.0, 5.0)))
@@ -242,17 +241,15 @@ def finding_of(design: Design) -> Finding[Design]:
         title=problem.name,
         said=(problem.description,) if problem.description else (),
         parts=(
-            Section("The front", said=[front], is_detail=True),
-            Section(
+            finding.Part("The front", said=[front], is_detail=True),
+            finding.Part(
                 "Designs",
                 _columns(design, points),
                 marked=[row for row, place in enumerate(design.shown) if place == design.knee],
                 left=2,
             ),
-            Section(
-                remarks=(f"suggested: {design.reason}", _search_sentence(design), *_noise(design), *_failures(design))
-            ),
-            Section(
+            finding.Part(remarks=_remarks(design)),
+            finding.Part(
                 "Error, gas and mass",
                 panels=lambda: design_panels(design),
                 name="front",
@@ -262,27 +259,29 @@ def finding_of(design: Design) -> Finding[Design]:
                 is_detail=True,
             ),
             *_suggestion(design),
-            Section("Method", columns_of(titles, tasks), remarks=(_MEANS, again), is_detail=True),
-            *doubts_sections(design.doubtful),
-            titles_section(part for point in points for part in (point.valve, point.actuator)),
+            finding.Part("Method", columns_of(titles, tasks), remarks=(_MEANS, again), is_detail=True),
+            *parts_to_check(design.doubtful),
+            part_titles(part for point in points for part in (point.valve, point.actuator)),
         ),
         found=design,
         files={"front.csv": lambda: front_table(design).encode()},
     )
 
 
-def _suggestion(design: Design) -> Iterator[Section]:
+def _suggestion(design: Design) -> Iterator[finding.Part]:
     """Yield the suggestion as it ran once more in each task, with its figure and the command that repeats it."""
     for number, rerun in enumerate(design.suggested, 1):
         found = rerun.result.metrics
-        error = OBJECTIVES_SHOWN["error"].text(found[design.problem.error].value)
-        gas = OBJECTIVES_SHOWN["gas"].text(found[GAS].value)
-        yield Section(
+        error, gas = (
+            OBJECTIVES["error"].text(found[design.problem.error].value),
+            OBJECTIVES["gas"].text(found[GAS].value),
+        )
+        yield finding.Part(
             "The suggestion, run once more" if number == 1 else "",
             remarks=[f"in '{rerun.task}': error {error}, gas {gas}; this command repeats the run"],
             code=rerun.command,
         )
-        yield Section(
+        yield finding.Part(
             f"The run in '{rerun.task}'",
             name="suggested" if number == 1 else f"suggested-{number}",
             caption=f"The suggestion in the task '{rerun.task}'.",
@@ -306,67 +305,46 @@ def front_table(design: Design) -> str:
 
 def _columns(design: Design, points: list[DesignPoint]) -> list[Column]:
     """Return parts, objectives and chosen numbers; None where a number means nothing for the valve."""
-    error = OBJECTIVES_SHOWN["error"]
-    columns = [Column("valve", [point.valve.name for point in points])]
-    columns.append(Column("actuator", [point.actuator.name for point in points]))
-    for name, kind in OBJECTIVES_SHOWN.items():
-        columns.append(Column(kind.words.lower(), [getattr(point, name) for point in points], kind))
+    titles: list[str | tuple[str, Kind]] = ["valve", "actuator"]
+    titles += [(kind.words.lower(), kind) for kind in OBJECTIVES.values()]
+    rows: list[list[Cell]] = [[point.valve.name, point.actuator.name, *point.objectives] for point in points]
     if design.streams:
-        spread = [None if point.spread is None else point.spread[0] for point in points]
-        columns.append(Column("error from noise", spread, replace(error, form=".2g")))
+        titles.append(("error from noise", replace(OBJECTIVES["error"], form=".2g")))
+        rows = [[*row, point.spread[0] if point.spread else None] for row, point in zip(rows, points, strict=True)]
     for item in design.problem.variables:
         # Its path without the section, with its unit.
         words, quantity = item.path.partition(".")[2].replace("_", " "), quantity_of_unit(item.unit)
         own_unit = "" if quantity or item.unit in ("", "1") else f" ({item.unit})"
-        values = [point.numbers.get(item.path) for point in points]
-        columns.append(Column(f"{words}{own_unit}", values, Kind(quantity=quantity)))
-    return columns
+        titles.append((f"{words}{own_unit}", Kind(quantity=quantity)))
+        rows = [[*row, point.numbers.get(item.path)] for row, point in zip(rows, points, strict=True)]
+    return columns_of(titles, rows)
 
 
-def _search_sentence(design: Design) -> str:
-    tolerance = 100.0 * design.problem.search.tolerance
-    ending = (
-        f"this fraction grew by less than {tolerance:.2g} % over the last {PATIENCE} generations"
+def _remarks(design: Design) -> list[str]:
+    """Return the suggestion, how the search ended, how noise was dealt with, and how many runs failed."""
+    grew = (
+        f"this fraction grew by less than {100.0 * design.problem.search.tolerance:.2g} % over the last {PATIENCE} "
+        "generations"
         if design.settled
         else "this fraction was still growing when the maximum number of generations was reached"
     )
-    return (
+    remarks = [
+        f"suggested: {design.reason}",
         f"{len(design.front):,} of {design.designs:,} designs tried ({design.runs:,} runs, {design.seconds:.0f} s) "
         f"are not dominated by any other; they cover {design.growth[-1][1]:.4f} of the box of the first designs, "
-        f"and {ending}"
-    )
-
-
-def _noise(design: Design) -> list[str]:
-    """Return how noise was dealt with; nothing without it."""
-    if not design.streams:
-        return []
-    fallen = f"; {design.fallen} that were good in the first streams alone are left out" if design.fallen else ""
-    return [
-        f"sensors are noisy: every design was tried in the same {SEARCHED_STREAMS} noise streams, keeping the "
-        f"constraints in each; error and gas above are means over {design.streams} new ones, in which the front was "
-        f"made again{fallen}. Error from noise is the standard deviation from one stream to another"
+        f"and {grew}",
     ]
-
-
-def _failures(design: Design) -> list[str]:
-    if not design.failed:
-        return []
-    reason, task = next(iter(design.failures.items()))
-    return [
-        f"{design.failed:,} of {design.runs:,} runs failed and their designs were left out; the first "
-        f"({task}): {reason}"
-    ]
-
-
-def _point_data(point: DesignPoint) -> dict[str, Any]:
-    return {
-        "valve": point.valve.name,
-        "actuator": point.actuator.name,
-        "numbers": dict(point.numbers),
-        "error": point.error,
-        "gas": point.gas,
-        "mass": point.mass,
-        "from_noise": None if point.spread is None else {"error": point.spread[0], "gas": point.spread[1]},
-        "tasks": {name: {"error": error, "gas": gas} for name, (error, gas) in point.tasks.items()},
-    }
+    if design.streams:
+        fallen = f"; {design.fallen} that were good in the first streams alone are left out" if design.fallen else ""
+        remarks.append(
+            f"sensors are noisy: every design was tried in the same {STREAMS} noise streams, keeping the "
+            f"constraints in each; error and gas above are means over {design.streams} new ones, in which the front "
+            f"was made again{fallen}. Error from noise is the standard deviation from one stream to another"
+        )
+    if design.failed:
+        reason, task = next(iter(design.failures.items()))
+        remarks.append(
+            f"{design.failed:,} of {design.runs:,} runs failed and their designs were left out; the first "
+            f"({task}): {reason}"
+        )
+    return remarks

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from ppafo.analyses.design.front.search import LARGEST_SEED, Floats, SearchTable
+from ppafo.analyses.design.front.search import LARGEST_SEED, SearchTable
 from ppafo.documents.models import NAME, StrictTable, Text, Texts
 from ppafo.documents.toml_text import beside
 from ppafo.errors import StudyError, UnitError, first_twice, nearest_name, refused_as
@@ -17,10 +17,12 @@ from ppafo.loading import load_scenario, placed
 from ppafo.metrics import METRICS
 from ppafo.model.catalog import find_effects
 from ppafo.model.declaration import Quantity
-from ppafo.parameters.declaration import AREA_FORM, SONIC_FORM, is_within
+from ppafo.parameters.declaration import AREA_FORM, SONIC_FORM, is_within, limits_text
 from ppafo.parameters.graph import ATMOSPHERE_PATH
-from ppafo.parameters.parts import Catalogue, Part, load_catalogue
+from ppafo.parameters.parts import Part, load_catalogue
 from ppafo.parameters.parts.catalogue import DEFAULT
+from ppafo.report.kind import Kind
+from ppafo.signals.recording import Floats
 from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.numbers import TIMES, declared_numbers
 from ppafo.simulation.scenario import Scenario
@@ -99,6 +101,7 @@ def read_variables(
     ``scenarios`` has all tasks' by kind of valve.
     """
     everything = [scenario for of_kind in scenarios.values() for scenario in of_kind]
+    # Effects that are switched on by a path of theirs have to be known before the numbers are listed.
     find_effects(tables)
     known = {path: quantity for scenario in everything for path, quantity in declared_numbers(scenario).items()}
     known = {path: quantity for path, quantity in known.items() if path not in _BY_PARTS} | OWN
@@ -137,7 +140,13 @@ def _variable(path: str, table: VariableTable, quantity: Quantity, atmosphere: f
         raise StudyError(
             f"{place}: is a time or rate of the run; list the values to choose from, values = ['500 Hz', '1 kHz']"
         )
-    numbers = [_number(text, quantity, atmosphere, place) for text in table.values or between]
+    numbers, unit = [], "" if quantity.unit == "1" else quantity.unit
+    for text in table.values or between:
+        with refused_as(StudyError, f"{place}: '{text}'", UnitError):
+            value = parse_quantity(text, unit, atmosphere)
+        if not is_within(value, quantity):
+            raise StudyError(f"{place}: '{text}': must be {limits_text(quantity)}")
+        numbers.append(value)
     lowest, highest = min(numbers), max(numbers)
     if not table.values and numbers[0] >= numbers[1]:
         raise StudyError(f"{place}: lowest = '{table.lowest}' must be below highest = '{table.highest}'")
@@ -154,18 +163,12 @@ def _variable(path: str, table: VariableTable, quantity: Quantity, atmosphere: f
     )
 
 
-def _number(text: str, quantity: Quantity, atmosphere: float, place: str) -> float:
-    with refused_as(StudyError, f"{place}: '{text}'", UnitError):
-        value = parse_quantity(text, "" if quantity.unit == "1" else quantity.unit, atmosphere)
-    if not is_within(value, quantity):
-        lower = f"{'at least' if quantity.minimum_allowed else 'more than'} {quantity.minimum:g}"
-        unit = quantity.unit if quantity.unit != "1" else ""
-        raise StudyError(f"{place}: '{text}': must be {lower} and at most {quantity.maximum:g} {unit}".rstrip())
-    return value
-
-
-OBJECTIVES = {"error": "N m", "gas": "kg", "mass": "kg"}
-"""What a design is judged by, all to be small, with the SI unit."""
+OBJECTIVES = {
+    "error": Kind("Error", "N m", "torque", ".3g"),
+    "gas": Kind("Gas per task", "kg", "gas mass", ".3g"),
+    "mass": Kind("Mass", "kg", "part mass", ".4g"),
+}
+"""What a design is judged by, all to be small, as a person is shown it."""
 GAS = "gas_supplied"
 _OWN_NAMES = {"gas": GAS}
 _Names = Annotated[tuple[Text, ...], Field(strict=False, min_length=1)]
@@ -276,23 +279,24 @@ def design_problem(document: DesignFile, file: str, folder: Path, seed: int | No
     ``seed`` replaces the file's. StudyError or ParameterError for what is not usable, in one line.
     """
     catalogue = load_catalogue(beside(document.catalogue, folder))
-    combinations = _combinations(document.parts, catalogue)
-    kinds = sorted({item.valve.kind for item in combinations})
+    valves = [catalogue.part("valves", name) for name in dict.fromkeys(document.parts.valves)]
+    actuators = [catalogue.part("actuators", name) for name in dict.fromkeys(document.parts.actuators)]
+    kinds = sorted({valve.kind for valve in valves})
     weights = sum(table.weight for table in document.task)
     names = [table.name for table in document.task]
     repeated = first_twice(names)
     if repeated is not None:
         raise StudyError(f"{file}: two tasks are named '{repeated}'; give each its own name")
     tasks = tuple(_task(table, kinds, folder, file, weights, document.error) for table in document.task)
-    if document.error not in _errors():
-        hint = nearest_name(document.error, _errors())
+    errors = [name for name, kind in METRICS.items() if kind.unit == OBJECTIVES["error"].unit]
+    if document.error not in errors:
+        hint = nearest_name(document.error, errors)
         raise StudyError(
-            f"{file}: error = '{document.error}' is not an error in N m{hint}; available are {', '.join(_errors())}"
+            f"{file}: error = '{document.error}' is not an error in N m{hint}; available are {', '.join(errors)}"
         )
     if NOISE in document.variables:
         raise StudyError(f"{file}: variables.'{NOISE}': every design meets the same noise, so it cannot be searched")
     by_kind = {kind: [task.scenarios[kind] for task in tasks] for kind in tasks[0].scenarios}
-    valves = [item.valve for item in combinations]
     bottles = [] if document.parts.bottle is None else [catalogue.part("bottles", document.parts.bottle)]
     place = f"{file}: parts.other_mass"
     with refused_as(StudyError, f"{place} = '{document.parts.other_mass}'", UnitError):
@@ -305,11 +309,11 @@ def design_problem(document: DesignFile, file: str, folder: Path, seed: int | No
         file=file,
         error=document.error,
         tasks=tasks,
-        combinations=combinations,
+        combinations=tuple(Combination(*pair) for pair in product(valves, actuators)),
         carried=(*(catalogue.part("regulators", name) for name in document.parts.regulators), *bottles),
         other_mass=other_mass,
         variables=read_variables(document.variables, by_kind, valves, file),
-        constraints=_constraints(document, _atmospheres(document, tasks), file),
+        constraints=_constraints(document, tasks, file),
         search=document.search,
     )
     return problem if seed is None else with_seed(problem, seed)
@@ -320,12 +324,6 @@ def with_seed(problem: DesignProblem, seed: int) -> DesignProblem:
     if not 0 <= seed <= LARGEST_SEED:
         raise StudyError(f"seed = {seed}: must be a whole number from 0 to {LARGEST_SEED}")
     return replace(problem, search=problem.search.model_copy(update={"seed": seed}))
-
-
-def _combinations(parts: PartsTable, catalogue: Catalogue) -> tuple[Combination, ...]:
-    valves = [catalogue.part("valves", name) for name in dict.fromkeys(parts.valves)]
-    actuators = [catalogue.part("actuators", name) for name in dict.fromkeys(parts.actuators)]
-    return tuple(Combination(valve, actuator) for valve, actuator in product(valves, actuators))
 
 
 def _task(table: TaskTable, kinds: Sequence[str], folder: Path, file: str, whole: float, error: str) -> Task:
@@ -354,30 +352,27 @@ def _task(table: TaskTable, kinds: Sequence[str], folder: Path, file: str, whole
     return Task(table.name, scenarios, table.weight / whole)
 
 
-def _errors() -> list[str]:
-    return [name for name, kind in METRICS.items() if kind.unit == OBJECTIVES["error"]]
-
-
-def _atmospheres(document: DesignFile, tasks: Sequence[Task]) -> frozenset[float]:
-    """Return the pressures [Pa absolute] from which gauge pressures of designs count; 0 too where it is searched."""
-    scenarios = [scenario for task in tasks for scenario in task.scenarios.values()]
-    searched = [0.0] if ATMOSPHERE_PATH in document.variables else []
-    return frozenset([*searched, *(scenario.device.supply.atmospheric_pressure for scenario in scenarios)])
-
-
-def _constraints(document: DesignFile, atmospheres: frozenset[float], file: str) -> tuple[Constraint, ...]:
+def _constraints(document: DesignFile, tasks: Sequence[Task], file: str) -> tuple[Constraint, ...]:
     known = [name for name in document.constraints if name in METRICS]
-    units = OBJECTIVES | {name: METRICS[name].unit for name in dict.fromkeys([*METRICS, *known])}
+    units = {name: kind.unit for name, kind in OBJECTIVES.items()}
+    units |= {name: METRICS[name].unit for name in dict.fromkeys([*METRICS, *known])}
+    # Gauge pressures count from the atmosphere, which may differ from task to task; a searched one is not known: 0.
+    searched = [0.0] if ATMOSPHERE_PATH in document.variables else []
+    scenarios = [scenario for task in tasks for scenario in task.scenarios.values()]
+    atmospheres = frozenset([*searched, *(item.device.supply.atmospheric_pressure for item in scenarios)])
     found = []
     for name, table in document.constraints.items():
         place = f"{file}: constraints.{name}"
         if name not in units:
             hint = nearest_name(name, units)
             raise StudyError(f"{place}: there is no such metric{hint}; available: {', '.join(units)}")
-        least, most = (
-            None if text is None else _limit(text, units[name], f"{place}.{key}", atmospheres)
-            for key, text in (("least", table.least), ("most", table.most))
-        )
+        limits: list[float | None] = []
+        for key, text in (("least", table.least), ("most", table.most)):
+            what = f"{place}.{key} = '{text}'"
+            limits.append(None if text is None else common_level(text, units[name], what, atmospheres))
+            if text is not None and limits[-1] is None:
+                raise StudyError(f"{what}: the designs have several atmospheres; give an absolute pressure")
+        least, most = limits
         if least is None and most is None:
             raise StudyError(f"{place}: has no limit; give least, most or both")
         if least is not None and most is not None and least > most:
@@ -386,15 +381,3 @@ def _constraints(document: DesignFile, atmospheres: frozenset[float], file: str)
             )
         found.append(Constraint(_OWN_NAMES.get(name, name), units[name], least, most))
     return tuple(found)
-
-
-def _limit(text: str, unit: str, place: str, atmospheres: frozenset[float]) -> float:
-    what = f"{place} = '{text}'"
-    found = common_level(text, unit, what, atmospheres)
-    if found is None:
-        raise StudyError(f"{what}: the designs have several atmospheres; give an absolute pressure")
-    return found
-
-
-SEARCHED_STREAMS, FRESH_STREAMS = 16, 64
-"""Noise streams over which every candidate of a noisy task is judged, and those, all new, over which a front is."""

@@ -19,11 +19,12 @@ from pydantic import Field
 
 from ppafo.documents.models import StrictTable
 from ppafo.progress import Progress, Report, report_nothing
+from ppafo.signals.recording import Floats
 
-Floats = NDArray[np.float64]
 Choices = NDArray[np.int64]
 MAXIMUM_SHOWN = 12
 _CHUNK = 512
+"""Points compared with all others at once: the matrix of who dominates whom then stays in the cache."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,20 +106,6 @@ def non_dominated(worth: Worth) -> NDArray[np.bool_]:
     return kept
 
 
-def ranks(worth: Worth) -> NDArray[np.int64]:
-    """Return the rank (points,): 0 for the points that none dominates, 1 for those that only these dominate, ..."""
-    matrix = dominance(worth, worth)
-    counts = matrix.sum(axis=0)
-    found = np.full(counts.size, -1, dtype=np.int64)
-    rank = 0
-    while np.any(found < 0):
-        front = (found < 0) & (counts == 0)
-        found[front] = rank
-        counts = counts - matrix[front].sum(axis=0)
-        rank += 1
-    return found
-
-
 def crowding(objectives: Floats) -> Floats:
     """Return the crowding distance (points,) [-]: how far apart a point's neighbours are; infinite at the ends."""
     count = objectives.shape[0]
@@ -133,16 +120,21 @@ def crowding(objectives: Floats) -> Floats:
 
 
 def survivors(worth: Worth, count: int) -> NDArray[np.intp]:
-    """Return the places of the ``count`` best points: lower ranks first, then the less crowded of the last front."""
-    rank = ranks(worth)
-    order = np.empty(0, dtype=np.intp)
-    for value in range(int(rank.max()) + 1):
-        front = np.flatnonzero(rank == value)
-        if order.size + front.size > count:
+    """Return the places of the ``count`` best points: front by front, then the less crowded of the last front.
+
+    Fronts are taken away one after the other, so that of very many points all are never compared with all.
+    """
+    left = np.arange(worth.violation.size)
+    chosen = np.empty(0, dtype=np.intp)
+    while chosen.size < count and left.size:
+        is_front = non_dominated(worth.at(left))
+        front = left[is_front]
+        if chosen.size + front.size > count:
             apart = crowding(np.nan_to_num(worth.objectives[front]))
             front = front[np.argsort(-apart, kind="stable")]
-        order = np.concatenate([order, front])[:count]
-    return order
+        chosen = np.concatenate([chosen, front])[:count]
+        left = left[~is_front]
+    return chosen
 
 
 def hypervolume(points: Floats, reference: Floats) -> float:
@@ -155,37 +147,24 @@ def hypervolume(points: Floats, reference: Floats) -> float:
     if inside.size == 0:
         return 0.0
     ordered = inside[inside[:, 2].argsort(kind="stable")]
-    heights = [*ordered[:, 2].tolist(), float(reference[2])]
-    stairs = _Staircase(float(reference[0]), float(reference[1]))
+    right, top, last = reference.tolist()
+    # The staircase: points of the plane of which none dominates another, so that x grows and y falls.
+    xs: list[float] = []
+    ys: list[float] = []
     volume = area = 0.0
-    for (x, y, height), above in zip(ordered.tolist(), heights[1:], strict=True):
-        area += stairs.add(x, y)
+    for (x, y, height), above in zip(ordered.tolist(), [*ordered[1:, 2].tolist(), last], strict=True):
+        place = bisect_left(xs, x)
+        level = ys[place - 1] if place else top
+        if level > y and not (place < len(xs) and xs[place] == x and ys[place] <= y):
+            # What it dominates and no point before it did; the points that it dominates leave the staircase.
+            gained, start, end = 0.0, x, place
+            while end < len(xs) and ys[end] >= y:
+                gained += (xs[end] - start) * (level - y)
+                start, level, end = xs[end], ys[end], end + 1
+            area += gained + ((xs[end] if end < len(xs) else right) - start) * (level - y)
+            xs[place:end], ys[place:end] = [x], [y]
         volume += area * (above - height)
     return volume
-
-
-class _Staircase:
-    """Points of a plane of which none dominates another: x grows, y falls."""
-
-    def __init__(self, right: float, top: float) -> None:
-        self._right, self._top = right, top
-        self._x: list[float] = []
-        self._y: list[float] = []
-
-    def add(self, x: float, y: float) -> float:
-        """Add a point and return the area that it dominates and no point before it did."""
-        place = bisect_left(self._x, x)
-        left_height = self._y[place - 1] if place else self._top
-        if left_height <= y or (place < len(self._x) and self._x[place] == x and self._y[place] <= y):
-            return 0.0
-        area, start, height, end = 0.0, x, left_height, place
-        while end < len(self._x) and self._y[end] >= y:
-            area += (self._x[end] - start) * (height - y)
-            start, height, end = self._x[end], self._y[end], end + 1
-        stop = self._x[end] if end < len(self._x) else self._right
-        area += (stop - start) * (height - y)
-        self._x[place:end], self._y[place:end] = [x], [y]
-        return area
 
 
 def fractions(objectives: Floats) -> Floats:
@@ -273,7 +252,7 @@ def search_front(
     random = np.random.default_rng(settings.seed)
     found = evenly_spread(settings.screening, choices, variables, settings.seed)
     worth = evaluate(found)
-    best = survivors_of_many(worth, settings.population)
+    best = survivors(worth, settings.population)
     population, standing = found.at(best), worth.at(best)
     box = _box(worth)
     keep = non_dominated(worth) & worth.is_feasible
@@ -285,7 +264,15 @@ def search_front(
         population, standing = population.with_more(children), standing.with_more(value)
         best = survivors(standing, settings.population)
         population, standing = population.at(best), standing.at(best)
-        found, worth = _add_children(found, worth, children, value)
+        good = value.is_feasible
+        found, worth = found.with_more(children.at(good)), worth.with_more(value.at(good))
+        # Equal points do not dominate each other: without this one design would fill the front with its copies.
+        _, once = np.unique(worth.objectives, axis=0, return_index=True)
+        once.sort()
+        found, worth = found.at(once), worth.at(once)
+        keep = non_dominated(worth)
+        found, worth = found.at(keep), worth.at(keep)
+        # No design of the first sample kept the constraints: the first that do give the box.
         if box is None:
             box = _box(worth)
         growth.append((growth[-1][0] + len(children), _dominated_fraction(worth, box)))
@@ -296,17 +283,6 @@ def search_front(
     return Front(found, worth, tuple(growth), _has_settled(growth, settings.tolerance))
 
 
-def survivors_of_many(worth: Worth, count: int) -> NDArray[np.intp]:
-    """Return the places of the ``count`` best points of very many, front by front, without comparing all with all."""
-    left = np.arange(worth.violation.size)
-    chosen = np.empty(0, dtype=np.intp)
-    while chosen.size < count and left.size:
-        front = non_dominated(worth.at(left))
-        chosen = np.concatenate([chosen, left[front]])
-        left = left[~front]
-    return chosen[survivors(worth.at(chosen), count)]
-
-
 def vary(population: Candidates, choices: int, random: np.random.Generator) -> Candidates:
     """Return a child for each candidate: part of it, part of a third one moved along a difference of two others."""
     count, variables = population.places.shape
@@ -314,6 +290,7 @@ def vary(population: Candidates, choices: int, random: np.random.Generator) -> C
     scale = random.uniform(*SCALES, size=(count, 1))
     moved = population.places[first] + scale * (population.places[second] - population.places[third])
     crossed = random.random((count, variables)) < CROSSED
+    # At least one variable of every child is a changed one, else it might be its parent again.
     if variables:
         crossed[np.arange(count), random.integers(variables, size=count)] = True
     places = np.where(crossed, reflect(moved), population.places)
@@ -328,17 +305,6 @@ def reflect(places: Floats) -> Floats:
     return np.where(turned > 1.0, 2.0 - turned, turned)
 
 
-def _add_children(found: Candidates, worth: Worth, children: Candidates, value: Worth) -> tuple[Candidates, Worth]:
-    """Return all that no other dominates so far, each point once."""
-    good = value.is_feasible
-    found, worth = found.with_more(children.at(good)), worth.with_more(value.at(good))
-    _, once = np.unique(worth.objectives, axis=0, return_index=True)
-    once.sort()
-    found, worth = found.at(once), worth.at(once)
-    keep = non_dominated(worth)
-    return found.at(keep), worth.at(keep)
-
-
 def _box(worth: Worth) -> tuple[Floats, Floats] | None:
     """Return the best values and the worst ones of all designs that satisfy the constraints; None where none does."""
     good = worth.objectives[worth.is_feasible]
@@ -346,6 +312,7 @@ def _box(worth: Worth) -> tuple[Floats, Floats] | None:
         return None
     lowest, highest = good.min(axis=0), good.max(axis=0)
     span = np.where(highest > lowest, highest - lowest, np.maximum(np.abs(highest), 1.0))
+    # A hundredth beyond the worst values, so that a design at the edge of the box still counts.
     return lowest, lowest + 1.01 * span
 
 

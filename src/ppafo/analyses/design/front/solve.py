@@ -2,28 +2,25 @@
 
 import shlex
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.analyses.design.front.answer import OBJECTIVES_SHOWN, Design, DesignPoint, Rerun, objective_table
+from ppafo.analyses.design.front.answer import Design, DesignPoint, Rerun
 from ppafo.analyses.design.front.problem import (
     DEAD_VOLUME,
-    FRESH_STREAMS,
     GAS,
     OBJECTIVES,
     OWN,
-    SEARCHED_STREAMS,
     SIZE,
     DesignProblem,
     Task,
 )
 from ppafo.analyses.design.front.search import (
     Candidates,
-    Floats,
     Front,
     Worth,
     knee,
@@ -31,14 +28,14 @@ from ppafo.analyses.design.front.search import (
     representatives,
     search_front,
 )
+from ppafo.analyses.design.trials import STREAMS, run_trials
 from ppafo.errors import ScenarioError, StudyError
 from ppafo.parameters.graph import ATMOSPHERE_PATH, PRESSURE_PATH, SECOND_PRESSURE_PATH
 from ppafo.parameters.overrides import over
-from ppafo.parameters.parts import Part
 from ppafo.progress import Report, report_nothing
 from ppafo.running import simulate
+from ppafo.signals.recording import Floats
 from ppafo.simulation.declaration import PLAIN
-from ppafo.simulation.ensemble import COMPLETED, run_ensemble
 from ppafo.simulation.numbers import TIMES, declared_numbers, moving_together, number_at
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.draws import Uncertainty
@@ -47,13 +44,14 @@ from ppafo.studies.sampling import NOISE, with_noise
 Members = NDArray[np.intp]
 SUPPLIES = (PRESSURE_PATH, SECOND_PRESSURE_PATH, ATMOSPHERE_PATH)
 """What decides about the pressures that parts must stand."""
+FRESH_STREAMS = 64
+"""Noise streams, all new, over which a front is assessed: what was chosen in the searched ones was lucky there too."""
 _MAXIMUM_REASONS = 20
-_CHUNK = 16_384
-"""Runs handed to the lanes at once: enough to fill them, little enough memory."""
+"""Reasons of failed runs that are kept: each names its own moment, so they are nearly as many as the runs."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Judged:
+class Assessed:
     """What candidates are worth over all streams of noise, and what each task says of them.
 
     ``tasks`` has the metrics (streams, candidates) by name for each task, ``error`` and ``gas`` (streams, candidates)
@@ -79,16 +77,16 @@ class Evaluation:
         self.runs = 0
         self.failed = 0
         self.reasons: dict[str, str] = {}
-        self.seeds = noise_streams(problem, 0, SEARCHED_STREAMS)
+        self.seeds = noise_streams(problem, 0, STREAMS)
         self._threads = threads
         own = (item.name for item in problem.constraints if item.name not in OBJECTIVES)
         self._metrics = tuple(dict.fromkeys([problem.error, GAS, *own]))
 
     def __call__(self, candidates: Candidates) -> Worth:
         """Return objectives (error [N m], gas [kg], mass [kg]) and the violation of the constraints."""
-        return self.judge(candidates, self.seeds).worth
+        return self.assess(candidates, self.seeds).worth
 
-    def judge(self, candidates: Candidates, seeds: Floats) -> Judged:
+    def assess(self, candidates: Candidates, seeds: Floats) -> Assessed:
         """Return what candidates are worth over streams of noise: means of error and gas, constraints kept in each."""
         problem = self.problem
         metrics = tuple(self.metrics(task, candidates, seeds) for task in problem.tasks)
@@ -97,57 +95,33 @@ class Evaluation:
             np.sum([weight * found[name] for weight, found in zip(weights, metrics, strict=True)], axis=0)
             for name in (problem.error, GAS)
         )
-        objectives = np.stack([error.mean(axis=0), gas.mean(axis=0), self.masses(candidates)], axis=1)
-        worth = Worth(objectives, self._violation(candidates, objectives, metrics))
-        return Judged(worth, metrics, error, gas)
-
-    def metrics(self, task: Task, candidates: Candidates, seeds: Floats) -> dict[str, Floats]:
-        """Return the metrics (streams, candidates) of a task by name; nan where a run failed."""
-        streams = max(1, seeds.size)
-        found = {name: np.full((streams, len(candidates)), np.nan) for name in self._metrics}
-        for valve, members in self._by_valve(candidates):
-            scenario = task.scenarios[valve.kind]
-            for start in range(0, members.size, max(1, _CHUNK // streams)):
-                part = members[start : start + max(1, _CHUNK // streams)]
-                self._run(task, scenario, candidates.at(part), part, seeds, found)
-        return found
-
-    def masses(self, candidates: Candidates) -> Floats:
-        """Return the mass [kg] (candidates,) of all that is carried."""
-        problem = self.problem
         valves = np.array([item.valve.full_mass for item in problem.combinations])
         actuators = np.array([item.actuator.full_mass for item in problem.combinations])
         size = values_of(problem, candidates).get(SIZE, np.ones(len(candidates)))
         fixed = problem.other_mass + sum(part.full_mass for part in problem.carried)
-        return np.asarray(valves[candidates.choice] + size * actuators[candidates.choice] + fixed)
+        # All that is carried; an actuator that is scaled has its part's mass times the scale.
+        mass = valves[candidates.choice] + size * actuators[candidates.choice] + fixed
+        objectives = np.stack([error.mean(axis=0), gas.mean(axis=0), mass], axis=1)
+        worth = Worth(objectives, self._violation(candidates, objectives, metrics))
+        return Assessed(worth, metrics, error, gas)
 
-    def _by_valve(self, candidates: Candidates) -> list[tuple[Part, Members]]:
-        """Return each valve with its candidates: all of one valve have one kind and one form of orifice."""
+    def metrics(self, task: Task, candidates: Candidates, seeds: Floats) -> dict[str, Floats]:
+        """Return the metrics (streams, candidates) of a task by name; nan where a run failed."""
+        found = {name: np.full((max(1, seeds.size), len(candidates)), np.nan) for name in self._metrics}
         names = np.array([item.valve.name for item in self.problem.combinations])[candidates.choice]
         valves = {item.valve.name: item.valve for item in self.problem.combinations}
-        return [(valves[str(name)], np.flatnonzero(names == name)) for name in np.unique(names)]
-
-    def _run(
-        self,
-        task: Task,
-        scenario: Scenario,
-        candidates: Candidates,
-        members: Members,
-        seeds: Floats,
-        found: dict[str, Floats],
-    ) -> None:
-        columns = design_columns(self.problem, scenario, candidates)
-        streams = max(1, seeds.size)
-        if seeds.size:
-            columns = {path: np.tile(values, streams) for path, values in columns.items()}
-            columns[NOISE] = np.repeat(seeds, members.size)
-        result = run_ensemble(scenario, columns, self._metrics, threads=self._threads)
-        for name, values in result.metrics.items():
-            found[name][:, members] = values.reshape(streams, members.size)
-        self.runs += streams * members.size
-        self.failed += int(np.count_nonzero(result.status != COMPLETED))
-        for reason in list(result.reasons.values())[: _MAXIMUM_REASONS - len(self.reasons)]:
-            self.reasons.setdefault(reason, task.name)
+        # Valve by valve: all runs of one have one kind of valve and one form of orifice, so one program.
+        for name in np.unique(names):
+            scenario, members = task.scenarios[valves[str(name)].kind], np.flatnonzero(names == name)
+            columns = design_columns(self.problem, scenario, candidates.at(members))
+            outcome = run_trials(scenario, columns, self._metrics, seeds, self._threads)
+            for metric, values in outcome.metrics.items():
+                found[metric][:, members] = values
+            self.runs += outcome.runs
+            self.failed += outcome.failed
+            for reason in outcome.reasons[: _MAXIMUM_REASONS - len(self.reasons)]:
+                self.reasons.setdefault(reason, task.name)
+        return found
 
     def _violation(self, candidates: Candidates, objectives: Floats, metrics: Sequence[Mapping[str, Floats]]) -> Floats:
         total = np.zeros(len(candidates))
@@ -174,6 +148,7 @@ class Evaluation:
             for scenario in task.scenarios.values():
                 found = moving_together(scenario, {path: chosen[path] for path in SUPPLIES if path in chosen})
                 for path in SUPPLIES[:2]:
+                    # One pressure may follow the other: all are asked for, not the variables alone.
                     highest = np.maximum(highest, found.get(path, number_at(scenario, path)))
         total += np.asarray(np.maximum(0.0, highest / ratings - 1.0))
         return np.where(np.isfinite(objectives).all(axis=1) & np.isfinite(total), total, np.inf)
@@ -223,15 +198,23 @@ def find_front(problem: DesignProblem, threads: int | None = None, report: Repor
     evaluation = Evaluation(problem, threads)
     front = search_front(evaluation, len(problem.combinations), len(problem.variables), problem.search, report)
     if len(front.candidates) == 0:
-        raise StudyError(_reason_for_no_design(problem, evaluation, front))
-    candidates, judged = _standing(evaluation, front)
+        if evaluation.failed == evaluation.runs:
+            reason = next(iter(evaluation.reasons), "no reason was given")
+            raise StudyError(f"{problem.file}: all {evaluation.runs} runs failed; the first: {reason}")
+        names = ", ".join(item.name for item in problem.constraints) or "the rated pressure of the parts"
+        raise StudyError(
+            f"{problem.file}: none of {front.growth[-1][0]} designs satisfies the constraints ({names}); relax them, "
+            "widen the variables or name other parts, and check that every task has these metrics"
+        )
+    candidates, assessed = _standing(evaluation, front)
     if len(candidates) == 0:
         raise StudyError(
             f"{problem.file}: none of {len(front.candidates)} designs of the front keeps the constraints in "
             f"{FRESH_STREAMS} new streams of sensor noise; relax them"
         )
-    points = _points(evaluation.problem, candidates, judged)
-    table = objective_table(points)
+    points = _points(problem, candidates, assessed)
+    table = np.array([point.objectives for point in points])
+    suggested = candidates.at(np.array([knee(table)]))
     return Design(
         problem=problem,
         front=points,
@@ -247,115 +230,92 @@ def find_front(problem: DesignProblem, threads: int | None = None, report: Repor
         seconds=time.perf_counter() - begun,
         streams=FRESH_STREAMS if evaluation.seeds.size else 0,
         fallen=len(front.candidates) - len(points),
-        suggested=tuple(_run_again(problem, candidates.at(np.array([knee(table)])))),
+        suggested=tuple(_run_again(problem, task, suggested) for task in problem.tasks),
     )
 
 
-def _run_again(problem: DesignProblem, chosen: Candidates) -> Iterator[Rerun]:
-    """Yield one design as its files and the command line have it, in each task."""
-    valve = problem.combinations[int(chosen.choice[0])].valve
-    for task in problem.tasks:
-        scenario = task.scenarios[valve.kind]
-        origin, columns = scenario.origin, design_columns(problem, scenario, chosen)
-        known = {path: item.unit for path, item in declared_numbers(scenario).items()}
-        units = known | {item.path: item.unit for item in problem.variables}
-        texts = [
-            f"{path}={values[0]:.6g} {'' if units[path] in PLAIN else units[path]}".strip()
-            for path, values in columns.items()
-        ]
-        overrides = over(origin.overrides, texts, ScenarioError, valve=origin.valve)
-        sets = " ".join(f"--set {shlex.quote(text)}" for text in overrides)
-        yield Rerun(task.name, f"ppafo simulate {origin.file} {sets}", simulate(origin.file or "", overrides))
+def _run_again(problem: DesignProblem, task: Task, chosen: Candidates) -> Rerun:
+    """Return one design run in a task as its files and the command line have it."""
+    scenario = task.scenarios[problem.combinations[int(chosen.choice[0])].valve.kind]
+    origin, columns = scenario.origin, design_columns(problem, scenario, chosen)
+    known = {path: item.unit for path, item in declared_numbers(scenario).items()}
+    units = known | {item.path: item.unit for item in problem.variables}
+    texts = [
+        f"{path}={values[0]:.6g} {'' if units[path] in PLAIN else units[path]}".strip()
+        for path, values in columns.items()
+    ]
+    overrides = over(origin.overrides, texts, ScenarioError, valve=origin.valve)
+    sets = " ".join(f"--set {shlex.quote(text)}" for text in overrides)
+    return Rerun(task.name, f"ppafo simulate {origin.file} {sets}", simulate(origin.file or "", overrides))
 
 
-def _standing(evaluation: Evaluation, front: Front) -> tuple[Candidates, Judged]:
-    """Return the designs of a front in order of error, as they are judged; with noise over streams that are new.
+def _standing(evaluation: Evaluation, front: Front) -> tuple[Candidates, Assessed]:
+    """Return the designs of a front in order of error, as they are assessed; with noise over streams that are new.
 
     The search chose what was good in its own streams, by luck too; of the new ones the front is made again.
     """
     chosen = front.candidates
-    judged = evaluation.judge(chosen, noise_streams(evaluation.problem, SEARCHED_STREAMS, FRESH_STREAMS))
-    worth = judged.worth
+    assessed = evaluation.assess(chosen, noise_streams(evaluation.problem, STREAMS, FRESH_STREAMS))
+    worth = assessed.worth
     stand = (
         np.flatnonzero(non_dominated(worth) & worth.is_feasible) if evaluation.seeds.size else np.arange(len(chosen))
     )
+    # By error, then gas, then mass: ``lexsort`` takes the last key first.
     order = stand[np.lexsort(worth.objectives[stand].T[::-1])]
-    tasks = tuple({name: values[:, order] for name, values in task.items()} for task in judged.tasks)
-    return chosen.at(order), Judged(worth.at(order), tasks, judged.error[:, order], judged.gas[:, order])
+    tasks = tuple({name: values[:, order] for name, values in task.items()} for task in assessed.tasks)
+    return chosen.at(order), Assessed(worth.at(order), tasks, assessed.error[:, order], assessed.gas[:, order])
 
 
-def _points(problem: DesignProblem, candidates: Candidates, judged: Judged) -> tuple[DesignPoint, ...]:
-    """Return designs with what each task reports of each."""
-    objectives, numbers = judged.worth.objectives, values_of(problem, candidates)
+def _points(problem: DesignProblem, candidates: Candidates, assessed: Assessed) -> tuple[DesignPoint, ...]:
+    """Return designs with what each task reports of each, and the numbers that mean something for its kind of valve."""
+    numbers, is_noisy = values_of(problem, candidates), len(assessed.error) > 1
     means = {
         task.name: (found[problem.error].mean(axis=0), found[GAS].mean(axis=0))
-        for task, found in zip(problem.tasks, judged.tasks, strict=True)
+        for task, found in zip(problem.tasks, assessed.tasks, strict=True)
     }
-    is_noisy = len(judged.error) > 1
-    return tuple(
-        DesignPoint(
-            valve=problem.combinations[int(candidates.choice[row])].valve,
-            actuator=problem.combinations[int(candidates.choice[row])].actuator,
-            numbers={
-                path: float(values[row]) for path, values in numbers.items() if _applies(problem, candidates, row, path)
-            },
-            error=float(objectives[row, 0]),
-            gas=float(objectives[row, 1]),
-            mass=float(objectives[row, 2]),
-            tasks={name: (float(error[row]), float(gas[row])) for name, (error, gas) in means.items()},
-            spread=(float(judged.error[:, row].std(ddof=1)), float(judged.gas[:, row].std(ddof=1)))
-            if is_noisy
-            else None,
+    points = []
+    for row, choice in enumerate(candidates.choice.tolist()):
+        valve, actuator = problem.combinations[choice].valve, problem.combinations[choice].actuator
+        paths = [item.path for item in problem.variables if not item.kinds or valve.kind in item.kinds]
+        error, gas, mass = assessed.worth.objectives[row].tolist()
+        spread = [float(series[:, row].std(ddof=1)) for series in (assessed.error, assessed.gas)] if is_noisy else None
+        points.append(
+            DesignPoint(
+                valve,
+                actuator,
+                {path: float(numbers[path][row]) for path in paths},
+                error,
+                gas,
+                mass,
+                {name: (float(errors[row]), float(gases[row])) for name, (errors, gases) in means.items()},
+                None if spread is None else (spread[0], spread[1]),
+            )
         )
-        for row in range(len(candidates))
-    )
-
-
-def _applies(problem: DesignProblem, candidates: Candidates, row: int, path: str) -> bool:
-    """Tell whether a number means something for the kind of valve of a candidate."""
-    variable = next(item for item in problem.variables if item.path == path)
-    return not variable.kinds or problem.combinations[int(candidates.choice[row])].valve.kind in variable.kinds
+    return tuple(points)
 
 
 def _reason(points: tuple[DesignPoint, ...], place: int) -> str:
     """Return why the knee is suggested, with what the nearest better designs of each objective cost."""
-    chosen = points[place]
+    chosen = points[place].objectives
     said = []
-    for name, index in (("error", 0), ("gas", 1), ("mass", 2)):
-        better = [point for point in points if point.objectives[index] < 0.9 * chosen.objectives[index]]
+    for index, name in enumerate(OBJECTIVES):
+        others = [other for other in range(len(chosen)) if other != index]
+        better = [point.objectives for point in points if point.objectives[index] < 0.9 * chosen[index]]
         if not better:
             said.append(f"no design on the front has 10 % less {name}")
             continue
-        nearest = min(better, key=lambda point: _loss(chosen, point, index))
-        said.append(f"10 % less {name} would cost {_cost(chosen, nearest, index)}")
+        # The nearest has the smallest sum of relative increases of the other objectives.
+        increases = [
+            sum(max(0.0, new[other] / chosen[other] - 1.0) for other in others if chosen[other] > 0.0) for new in better
+        ]
+        nearest = better[increases.index(min(increases))]
+        costs = [
+            f"{kind.change(nearest[other] - chosen[other])} more {words}"
+            for other, (words, kind) in enumerate(OBJECTIVES.items())
+            if other != index and nearest[other] > chosen[other] * (1.0 + 1.0e-3)
+        ]
+        said.append(f"10 % less {name} would cost {' and '.join(costs) or 'almost nothing'}")
     return (
         "it has the smallest sum of error, gas and mass, each as a fraction of its range on the front: any other "
         f"design loses at least as much in some of them as it gains in the others; {'; '.join(said)}"
-    )
-
-
-def _loss(chosen: DesignPoint, other: DesignPoint, index: int) -> float:
-    """Return the sum of relative increases of the other objectives."""
-    pairs = zip(other.objectives, chosen.objectives, strict=True)
-    return sum(max(0.0, new / old - 1.0) for place, (new, old) in enumerate(pairs) if place != index and old > 0.0)
-
-
-def _cost(chosen: DesignPoint, other: DesignPoint, index: int) -> str:
-    pairs = zip(OBJECTIVES_SHOWN.items(), other.objectives, chosen.objectives, strict=True)
-    costs = [
-        f"{kind.change(new - old)} more {name}"
-        for place, ((name, kind), new, old) in enumerate(pairs)
-        if place != index and new > old * (1.0 + 1.0e-3)
-    ]
-    return " and ".join(costs) or "almost nothing"
-
-
-def _reason_for_no_design(problem: DesignProblem, evaluation: Evaluation, front: Front) -> str:
-    if evaluation.failed == evaluation.runs:
-        reason = next(iter(evaluation.reasons), "no reason was given")
-        return f"{problem.file}: all {evaluation.runs} runs failed; the first: {reason}"
-    names = ", ".join(item.name for item in problem.constraints) or "the rated pressure of the parts"
-    return (
-        f"{problem.file}: none of {front.growth[-1][0]} designs satisfies the constraints ({names}); relax them, "
-        "widen the variables or name other parts, and check that every task has these metrics"
     )

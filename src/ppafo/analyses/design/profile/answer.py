@@ -2,17 +2,16 @@
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ppafo.analyses.design.looks import COLOURS, RING
 from ppafo.analyses.design.profile.problem import SizingProblem
 from ppafo.analyses.design.profile.search import (
     LIMITS,
-    Floats,
     Limit,
-    Pressures,
     Trials,
     ceiling,
     flow_margin,
@@ -23,18 +22,19 @@ from ppafo.analyses.design.profile.search import (
 from ppafo.analyses.endurance.discharge import TIME_IS_UP
 from ppafo.analyses.endurance.draw import draw_of_numbers
 from ppafo.analyses.endurance.solve import follow_bottle
-from ppafo.analyses.parts.solve import doubts_data, doubts_sections, titles_section
+from ppafo.analyses.parts.solve import doubts_data, part_titles, parts_to_check
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.errors import ParameterError
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle, scaled_entries
 from ppafo.parameters.parts import Part
 from ppafo.progress import Progress, Report, report_nothing
-from ppafo.report.finding import Finding, columns_of
-from ppafo.report.finding import Part as Section
+from ppafo.report import finding
+from ppafo.report.finding import Cell, Finding, columns_of
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Mark, Panel
-from ppafo.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, REFERENCE, VERMILION
+from ppafo.report.style import BLACK, GREY, REFERENCE
 from ppafo.signals import Recording
+from ppafo.signals.recording import Floats
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.simulate import simulate
 from ppafo.storage.comma_separated import marked_csv_bytes
@@ -114,10 +114,8 @@ class Sizing:
     @property
     def doubtful(self) -> tuple[tuple[Part, str], ...]:
         """Figures that are quoted or assumed, of the parts that the result rests on."""
-        problem = self.problem
         parts = [item.valve for item in self.valves] + [item.bottle for item in self.valves if item.bottle is not None]
-        parts += [*problem.regulators, *([] if problem.actuator is None else [problem.actuator])]
-        once = {(part.group, part.name): part for part in parts}.values()
+        once = {(part.group, part.name): part for part in (*parts, *self.problem.carried)}.values()
         return tuple((part, name) for part in once for name in part.doubtful)
 
     def json_document(self) -> dict[str, Any]:
@@ -145,7 +143,25 @@ class Sizing:
             "largest_error": problem.largest_error,
             "suggested": None if self.choice is None else self.choice.valve.name,
             "summary": suggestion_sentence(self),
-            "valves": [_valve_data(item) for item in self.valves],
+            "valves": [
+                {
+                    "valve": item.valve.name,
+                    "works": item.works,
+                    "pressure": item.pressure,
+                    "lowest_pressure": item.lowest_pressure,
+                    "gains": dict(item.gains),
+                    "error": item.error,
+                    "gas_per_repetition": item.gas,
+                    "gas_in_all": item.gas_in_all,
+                    "bottle": None if item.bottle is None else item.bottle.name,
+                    "mass": item.mass,
+                    "margins": None if item.margins is None else asdict(item.margins),
+                    "limited_by": item.limit,
+                    "limit": LIMITS[item.limit],
+                    "remark": item.remark,
+                }
+                for item in self.valves
+            ],
             "noise_streams": self.streams,
             "runs": self.runs,
             "failures": [{"reason": reason, "runs": count} for reason, count in self.failures.items()],
@@ -158,7 +174,6 @@ _PRESSURE = Kind("Supply pressure", "Pa_a", "pressure", ".3g")
 _TORQUE = Kind("Torque", "N m", "torque", ".3g")
 _GAS = Kind("Gas per repetition", "kg", "gas mass", ".3g")
 _MASS = Kind("Mass", "kg", "part mass")
-_COLOURS = (BLUE, VERMILION, GREEN, ORANGE, "#CC79A7", "#56B4E9")
 _MAXIMUM_OF_LIMIT = 4.0
 _DOTTED = {"marker": ".", "markersize": 4}
 
@@ -172,7 +187,7 @@ def torque_panel(sizing: Sizing) -> Panel:
     recording, choice = sizing.recording, sizing.choice
     if recording is not None and choice is not None:
         label = f"{choice.valve.title} at {_PRESSURE.number(choice.pressure, '.1f')} psig"
-        colour = _COLOURS[sizing.valves.index(choice) % len(_COLOURS)]
+        colour = COLOURS[sizing.valves.index(choice) % len(COLOURS)]
         marks.append(Mark("line", recording.time, recording["torque"], label=label, colour=colour))
     return Panel(TIME, _TORQUE, marks, then=lambda axes: axes.margins(x=0.0))
 
@@ -180,16 +195,15 @@ def torque_panel(sizing: Sizing) -> Panel:
 def pressure_panels(sizing: Sizing) -> list[Panel]:
     """Return error and gas over supply pressure, with a ring at the pressure that was chosen for each valve."""
     limit = sizing.problem.largest_error
-    ring = {"linestyle": "", "marker": "o", "markersize": 9, "markerfacecolor": "none", "markeredgewidth": 1.4}
     errors, gases = [Mark("level", (), limit, colour=BLACK, style={"linewidth": 1.0, "linestyle": "--"})], []
     for number, item in enumerate(sizing.valves):
         pressure, error, gas = item.curve
-        keeps, colour = error <= limit, _COLOURS[number % len(_COLOURS)]
+        keeps, colour = error <= limit, COLOURS[number % len(COLOURS)]
         errors.append(Mark("line", pressure, error, (), item.valve.title, colour, _DOTTED))
         gases.append(Mark("line", pressure[keeps], gas[keeps], colour=colour, style=_DOTTED))
         if item.works:
-            errors.append(Mark("line", [item.pressure], [item.error], colour=colour, style=ring))
-            gases.append(Mark("line", [item.pressure], [item.gas], colour=colour, style=ring))
+            errors.append(Mark("line", [item.pressure], [item.error], colour=colour, style=RING))
+            gases.append(Mark("line", [item.pressure], [item.gas], colour=colour, style=RING))
 
     def set_gas(axes: "Axes") -> None:
         # Valves differ by some per cent: an axis from 0 would lay their curves on each other.
@@ -222,12 +236,6 @@ _HEAD = (
     "limited by",
 )
 _MARGINS = ("error", "torque", "flow", "gas")
-_MARGIN = Kind("", "", "fraction", ".0f")
-_MARGIN_HEAD: tuple[str | tuple[str, Kind], ...] = (
-    "valve",
-    *((f"{name} margin", _MARGIN) for name in _MARGINS),
-    "gains",
-)
 _ORIGINS = {
     "typed": "typed, not measured",
     "measured": "measured",
@@ -250,24 +258,44 @@ _READING = (
 
 def finding_of(sizing: Sizing) -> Finding[Sizing]:
     """Return a sizing study in words, tables and panels; it has not passed where nothing can be suggested."""
-    problem, recording = sizing.problem, sizing.recording
-    marked = () if sizing.suggested is None else (sizing.suggested,)
-    working = [place for place, item in enumerate(sizing.valves) if item.works]
-    margins = [_margin_row(problem, sizing.valves[place]) for place in working]
+    problem, profile, recording = sizing.problem, sizing.problem.profile, sizing.recording
+    table_error = profile.table_error
+    near = f", {profile.knot_times.size} knots, to {_TORQUE.text(table_error)}" if table_error else ""
+    wanted = (
+        f"profile of {TIME.text(profile.period, '.3g')} with up to {_TORQUE.text(profile.largest)} "
+        f"({_ORIGINS[profile.kind]}{near}); {problem.repetitions:.0f} repetitions ({problem.hours:.2g} h), RMS error "
+        f"at most {_TORQUE.text(problem.largest_error)}, {100 * problem.reserve:.0f} % of the gas as reserve"
+    )
+    failed = sum(sizing.failures.values())
+    failures = f"{failed:,} failed; the first: {next(iter(sizing.failures))}" if failed else "none failed"
+    noisy = (
+        f"sensors are noisy: every trial was run in the same {sizing.streams} noise streams; its error is the "
+        "largest of them, its gas the mean"
+    )
+    others = f" with {', '.join(part.title for part in problem.carried)}" if problem.carried else ""
+    method = (
+        f"The mass counts valve and full bottle{others}.",
+        f"{problem.simulated} repetitions of the profile were simulated from the initial state of the scenario; "
+        "error and gas cover all of them, including the first filling of the chambers. Friction, leak, dead volumes "
+        "and sensors are the scenario's; what the data sheet of a valve does not state is taken as ideal.",
+        f"Made with: ppafo design {problem.file}",
+    )
     return Finding(
         name="design",
         kicker="Sizing study",
         title=problem.name,
-        said=(*([problem.description] if problem.description else []), _profile_sentence(problem)),
+        said=(*([problem.description] if problem.description else []), wanted),
         parts=(
-            Section("Valves", columns_of(_HEAD, map(_row, sizing.valves)), marked=marked),
-            Section(
-                "Margins" if margins else "",
-                columns_of(_MARGIN_HEAD, margins),
-                marked=[working.index(place) for place in marked],
+            *_tables(sizing),
+            finding.Part(
+                remarks=(
+                    suggestion_sentence(sizing),
+                    *(f"{item.valve.name}: {item.remark}" for item in sizing.valves if item.remark),
+                    *([noisy] if sizing.streams else []),
+                    f"{sizing.runs:,} runs in {sizing.seconds:.0f} s; {failures}",
+                )
             ),
-            Section(remarks=(suggestion_sentence(sizing), *_remarks(sizing))),
-            Section(
+            finding.Part(
                 "Error and gas over pressure",
                 panels=lambda: pressure_panels(sizing),
                 name="profile",
@@ -276,7 +304,7 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
                 size=(4.5, 3.3),
                 is_detail=True,
             ),
-            Section(
+            finding.Part(
                 "The torque",
                 panels=lambda: [torque_panel(sizing)],
                 name="torque",
@@ -284,9 +312,9 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
                 size=(9.0, 3.0),
                 is_detail=True,
             ),
-            *doubts_sections(sizing.doubtful),
-            Section("How to read it", said=(*_READING, *_method(sizing)), is_detail=True),
-            titles_section([item.valve for item in sizing.valves]),
+            *parts_to_check(sizing.doubtful),
+            finding.Part("How to read it", said=(*_READING, *method), is_detail=True),
+            part_titles([item.valve for item in sizing.valves]),
         ),
         found=sizing,
         passed=sizing.choice is not None,
@@ -294,35 +322,36 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
     )
 
 
-def _profile_sentence(problem: SizingProblem) -> str:
-    profile = problem.profile
-    error = profile.table_error
-    near = f", {profile.knot_times.size} knots, to {_TORQUE.text(error)}" if error else ""
+def _tables(sizing: Sizing) -> tuple[finding.Part, finding.Part]:
+    """Return a row for each valve, and the margins and gains of those that work."""
+    rows: list[tuple[Cell, ...]] = []
+    margins: list[tuple[Cell, ...]] = []
+    marked = []
+    quantities = CONTROLLERS[sizing.problem.scenario.controller.kind].quantities
+    units = {f"controller.{quantity.name}": quantity.unit for quantity in quantities}
+    for item in sizing.valves:
+        name = item.valve.name
+        if not item.works:
+            rows.append((name, None, None, f"{_TORQUE.number(item.error)} at best", *(None,) * 4, item.limit))
+            continue
+        bottle, lowest = "none" if item.bottle is None else item.bottle.name, item.lowest_pressure or item.pressure
+        gas = (item.gas, item.gas_in_all)
+        rows.append((name, item.pressure, lowest, item.error, *gas, bottle, item.mass, item.limit))
+        gains = (
+            f"{path.rpartition('.')[2].replace('_', ' ')} {value:.3g} {units[path]}"
+            for path, value in item.gains.items()
+        )
+        if item is sizing.choice:
+            marked.append(len(margins))
+        of_each = [None if item.margins is None else getattr(item.margins, margin) for margin in _MARGINS]
+        margins.append((name, *of_each, ", ".join(gains) or "none to choose"))
+    fraction = Kind(quantity="fraction", form=".0f")
+    head: list[str | tuple[str, Kind]] = ["valve", *((f"{name} margin", fraction) for name in _MARGINS), "gains"]
+    chosen = () if sizing.suggested is None else (sizing.suggested,)
     return (
-        f"profile of {TIME.text(profile.period, '.3g')} with up to {_TORQUE.text(profile.largest)} "
-        f"({_ORIGINS[profile.kind]}{near}); {problem.repetitions:.0f} repetitions ({problem.hours:.2g} h), RMS error "
-        f"at most {_TORQUE.text(problem.largest_error)}, {100 * problem.reserve:.0f} % of the gas as "
-        "reserve"
+        finding.Part("Valves", columns_of(_HEAD, rows), marked=chosen),
+        finding.Part("Margins" if margins else "", columns_of(head, margins), marked=marked),
     )
-
-
-def _row(item: SizedValve) -> tuple[str | float | None, ...]:
-    if not item.works:
-        error = f"{_TORQUE.number(item.error)} at best"
-        return item.valve.name, None, None, error, None, None, None, None, item.limit
-    bottle = "none" if item.bottle is None else item.bottle.name
-    lowest = item.lowest_pressure or item.pressure
-    return item.valve.name, item.pressure, lowest, item.error, item.gas, item.gas_in_all, bottle, item.mass, item.limit
-
-
-def _margin_row(problem: SizingProblem, item: SizedValve) -> tuple[str | float | None, ...]:
-    margins = [None if item.margins is None else getattr(item.margins, name) for name in _MARGINS]
-    control = problem.scenario.controller
-    units = {f"controller.{quantity.name}": quantity.unit for quantity in CONTROLLERS[control.kind].quantities}
-    gains = [
-        f"{path.rpartition('.')[2].replace('_', ' ')} {value:.3g} {units[path]}" for path, value in item.gains.items()
-    ]
-    return item.valve.name, *margins, ", ".join(gains) or "none to choose"
 
 
 def suggestion_sentence(sizing: Sizing) -> str:
@@ -342,51 +371,6 @@ def suggestion_sentence(sizing: Sizing) -> str:
     )
 
 
-def _remarks(sizing: Sizing) -> list[str]:
-    failed = sum(sizing.failures.values())
-    failures = f"{failed:,} failed; the first: {next(iter(sizing.failures))}" if failed else "none failed"
-    remarks = [f"{item.valve.name}: {item.remark}" for item in sizing.valves if item.remark]
-    if sizing.streams:
-        remarks.append(
-            f"sensors are noisy: every trial was run in the same {sizing.streams} noise streams; its error is the "
-            "largest of them, its gas the mean"
-        )
-    return [*remarks, f"{sizing.runs:,} runs in {sizing.seconds:.0f} s; {failures}"]
-
-
-def _method(sizing: Sizing) -> list[str]:
-    problem = sizing.problem
-    carried = [*problem.regulators, *([] if problem.actuator is None else [problem.actuator])]
-    others = f" with {', '.join(part.title for part in carried)}" if carried else ""
-    return [
-        f"The mass counts valve and full bottle{others}.",
-        f"{problem.simulated} repetitions of the profile were simulated from the initial state of the scenario; "
-        "error and gas cover all of them, including the first filling of the chambers. Friction, leak, dead volumes "
-        "and sensors are the scenario's; what the data sheet of a valve does not state is taken as ideal.",
-        f"Made with: ppafo design {problem.file}",
-    ]
-
-
-def _valve_data(item: SizedValve) -> dict[str, Any]:
-    margins = item.margins
-    return {
-        "valve": item.valve.name,
-        "works": item.works,
-        "pressure": item.pressure,
-        "lowest_pressure": item.lowest_pressure,
-        "gains": dict(item.gains),
-        "error": item.error,
-        "gas_per_repetition": item.gas,
-        "gas_in_all": item.gas_in_all,
-        "bottle": None if item.bottle is None else item.bottle.name,
-        "mass": item.mass,
-        "margins": None if margins is None else {name: getattr(margins, name) for name in _MARGINS},
-        "limited_by": item.limit,
-        "limit": LIMITS[item.limit],
-        "remark": item.remark,
-    }
-
-
 def size_for_profile(problem: SizingProblem, threads: int | None = None, report: Report = report_nothing) -> Sizing:
     """Return the lowest pressure and smallest bottle of each valve for a profile; StudyError where all runs fail."""
     begun = time.perf_counter()
@@ -397,9 +381,14 @@ def size_for_profile(problem: SizingProblem, threads: int | None = None, report:
         report(Progress(f"trying {valve.name}", place, len(problem.valves), 0, 0, passed, "valves"))
         sized.append(_size_valve(trials, valve))
     good = [place for place, item in enumerate(sized) if item.works and item.mass is not None]
+    # Of valves with the same bottle and mass the one at the lowest pressure.
     suggested = min(good, key=lambda place: (sized[place].mass, sized[place].pressure), default=None)
-    choice = None if suggested is None else sized[suggested]
-    recording = None if choice is None else _recording(trials, choice)
+    recording = None
+    if suggested is not None:
+        choice = sized[suggested]
+        columns = trials.columns(choice.valve, np.array([choice.pressure]), np.array([0]), np.ones(1))
+        numbers = {path: float(values[0]) for path, values in columns.items()} | dict(choice.gains)
+        recording = simulate(with_numbers(problem.scenario, numbers)).recording
     return Sizing(
         problem=problem,
         valves=tuple(sized),
@@ -421,114 +410,83 @@ def smallest_bottle(bottles: Sequence[Part], gas: float) -> Part | None:
 def _size_valve(trials: Trials, valve: Part) -> SizedValve:
     problem = trials.problem
     tried = try_pressures(trials, valve)
-    place = _place_in(problem, tried)
+    in_all = tried.trial.gas * problem.repetitions * (1.0 + problem.reserve)
+    bottles = [smallest_bottle(problem.bottles, gas) for gas in in_all.tolist()]
+    # The pressure with the lightest bottle, of these the lowest. Without a bottle it is the lowest that works; where
+    # none works, the one with the smallest error, which is infinite for failed runs: argmin would take nan for it.
+    if tried.first is None:
+        place = int(np.argmin(np.where(np.isnan(tried.trial.error), np.inf, tried.trial.error)))
+    else:
+        full = [np.inf if bottle is None else bottle.full_mass for bottle in bottles]
+        masses = np.where(tried.works, full, np.inf)
+        place = int(np.argmin(masses)) if np.isfinite(masses).any() else tried.first
     pressure, error, gas = (float(series[place]) for series in (tried.pressure, tried.trial.error, tried.trial.gas))
-    gains = int(tried.trial.gains[place])
-    works = tried.first is not None
-    bottle, is_cold = _lasting_bottle(problem, gas, pressure) if works else (None, False)
+    gas_in_all, works = float(in_all[place]), tried.first is not None
+    bottle, is_cold = _lasting_bottle(problem, gas, gas_in_all, pressure) if works else (None, False)
     said = []
     if tried.fails_above is not None:
         said.append(f"at {_PRESSURE.text(tried.fails_above)} the error limit is exceeded again")
-    if highest_pressure(problem, valve) < problem.highest_pressure and tried.first is None:
+    if highest_pressure(problem, valve) < problem.highest_pressure and not works:
         highest = _PRESSURE.text(highest_pressure(problem, valve))
         said.append(f"not tried above {highest}, the rated pressure of its parts")
     if is_cold:
         said.append("a lighter bottle has gas enough and ends before, as it is too cold")
-    if tried.first is not None and bottle is None and _bottle(problem, gas) is None:
+    if works and bottles[place] is None:
         largest = max(problem.bottles, key=lambda item: item.values["content"])
-        lasts = largest.values["content"] / _gas_in_all(problem, gas)
+        lasts = largest.values["content"] / gas_in_all
         said.append(f"no bottle is large enough: {largest.name} lasts for {100 * lasts:.0f} % of the use")
+    used = gas * problem.repetitions
+    margins = None
+    if works:
+        margins = Margins(
+            error=1.0 - error / problem.largest_error,
+            torque=ceiling(problem, pressure) / problem.profile.largest - 1.0,
+            flow=flow_margin(trials, valve, pressure),
+            gas=None if bottle is None or used <= 0.0 else bottle.values["content"] / used - 1.0,
+        )
     return SizedValve(
         valve=valve,
         works=works,
         pressure=pressure,
         lowest_pressure=None if tried.first is None else float(tried.pressure[tried.first]),
-        gains=trials.gain_numbers(gains),
+        gains=trials.gain_numbers(int(tried.trial.gains[place])),
         error=error,
         gas=gas,
-        gas_in_all=_gas_in_all(problem, gas),
+        gas_in_all=gas_in_all,
         bottle=bottle,
-        mass=None if bottle is None else _mass(problem, valve, bottle),
-        margins=_margins(trials, valve, pressure, (error, gas), bottle) if works else None,
+        mass=None if bottle is None else sum(part.full_mass for part in (valve, bottle, *problem.carried)),
+        margins=margins,
         limit=limit_of(trials, valve, tried),
         remark="; ".join(said),
         curve=(tried.pressure, tried.trial.error, tried.trial.gas),
     )
 
 
-def _place_in(problem: SizingProblem, tried: Pressures) -> int:
-    """Return the place of the pressure to choose: that with the lightest bottle, of these the lowest.
-
-    Without a bottle the lowest pressure that works; where none works, the one with the minimum error.
-    """
-    if tried.first is None:
-        return int(np.argmin(np.where(np.isnan(tried.trial.error), np.inf, tried.trial.error)))
-    masses = np.full(tried.pressure.size, np.inf)
-    for place in np.flatnonzero(tried.works).tolist():
-        bottle = _bottle(problem, float(tried.trial.gas[place]))
-        masses[place] = np.inf if bottle is None else bottle.full_mass
-    return int(np.argmin(masses)) if np.isfinite(masses).any() else tried.first
-
-
-def _gas_in_all(problem: SizingProblem, gas: float) -> float:
-    return gas * problem.repetitions * (1.0 + problem.reserve)
-
-
-def _bottle(problem: SizingProblem, gas: float) -> Part | None:
-    return smallest_bottle(problem.bottles, _gas_in_all(problem, gas))
-
-
-def _lasting_bottle(problem: SizingProblem, gas: float, pressure: float) -> tuple[Part | None, bool]:
+def _lasting_bottle(problem: SizingProblem, gas: float, in_all: float, pressure: float) -> tuple[Part | None, bool]:
     """Return the lightest bottle that lasts, mass and heat together, and whether a lighter one only has the gas.
 
-    The profile is repeated without a rest, ``gas`` [kg] each time, behind a regulator set to the ``pressure`` [Pa].
+    The profile is repeated without a rest, ``gas`` [kg] each time and ``in_all`` [kg] with the reserve, behind a
+    regulator set to the ``pressure`` [Pa].
     """
-    enough = [bottle for bottle in problem.bottles if bottle.values["content"] >= _gas_in_all(problem, gas)]
     if gas <= 0.0:
-        return (min(enough, key=lambda bottle: bottle.full_mass, default=None), False)
+        return smallest_bottle(problem.bottles, in_all), False
+    enough = [bottle for bottle in problem.bottles if bottle.values["content"] >= in_all]
     period, paper = problem.profile.period, load_bottle(PAPER_BOTTLE)
     needed = problem.repetitions * period
     # A second more than the use, so that a bottle that lasts is one whose time is up.
     schedule = Schedule(needed + 1.0, 0.0, max(needed, 1.0))
     for place, part in enumerate(sorted(enough, key=lambda bottle: bottle.full_mass)):
-        scaled = scaled_entries(part, paper.entries)
         changes = [
-            f"{path}={scaled[path].value} {scaled[path].unit}"
-            for path in scaled
-            if scaled[path] != paper.entries.get(path)
+            f"{path}={entry.value} {entry.unit}"
+            for path, entry in scaled_entries(part, paper.entries).items()
+            if entry != paper.entries.get(path)
         ]
         full = load_bottle(PAPER_BOTTLE, [*changes, f"regulator.set_pressure={pressure} Pa_a"])
-        draw = draw_of_numbers(gas, period, None)
         try:
-            ended = follow_bottle(full, draw, schedule).discharge.ending.kind
+            ended = follow_bottle(full, draw_of_numbers(gas, period, None), schedule).discharge.ending.kind
         except ParameterError:
+            # Its regulator does not pass the flow even when it is full.
             continue
         if ended == TIME_IS_UP:
             return part, place > 0
     return None, bool(enough)
-
-
-def _mass(problem: SizingProblem, valve: Part, bottle: Part) -> float:
-    parts = [valve, bottle, *problem.regulators, *([] if problem.actuator is None else [problem.actuator])]
-    return sum(part.full_mass for part in parts)
-
-
-def _margins(
-    trials: Trials, valve: Part, pressure: float, outcome: tuple[float, float], bottle: Part | None
-) -> Margins:
-    """Return the margins at a pressure at which an error and a gas per repetition came out."""
-    problem, (error, gas) = trials.problem, outcome
-    used = gas * problem.repetitions
-    return Margins(
-        error=1.0 - error / problem.largest_error,
-        torque=ceiling(problem, pressure) / problem.profile.largest - 1.0,
-        flow=flow_margin(trials, valve, pressure),
-        gas=None if bottle is None or used <= 0.0 else bottle.values["content"] / used - 1.0,
-    )
-
-
-def _recording(trials: Trials, sized: SizedValve) -> Recording:
-    """Return the recording of a sized valve on the profile."""
-    columns = trials.columns(sized.valve, np.array([sized.pressure]), np.array([0]), np.ones(1))
-    numbers = {path: float(values[0]) for path, values in columns.items()} | dict(sized.gains)
-    return simulate(with_numbers(trials.problem.scenario, numbers)).recording

@@ -1,4 +1,4 @@
-"""A design file with a profile: the torque as a table that the lanes follow, and the problem in SI units."""
+"""A design file with a profile: the torque as a table that a run follows, and the problem in SI units."""
 
 import math
 from dataclasses import dataclass
@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from ppafo.control.catalog import CONTROLLERS
@@ -18,13 +17,13 @@ from ppafo.errors import DataError, StudyError, UnitError, refused_as
 from ppafo.loading import reloaded
 from ppafo.parameters.parts import Part, load_catalogue
 from ppafo.parameters.parts.catalogue import DEFAULT
+from ppafo.signals.recording import Floats
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import OPEN_LOOP
 from ppafo.storage.result_folder import read_recording
 from ppafo.units import parse_quantity, split_quantity
 
-Floats = NDArray[np.float64]
 _TORQUE = "N m"
 _ROUNDING = 1.0e-9
 """Fraction of the range of a profile below which a difference is none."""
@@ -95,11 +94,26 @@ def read_profile(table: ProfileTable, folder: Path, file: str) -> TorqueProfile:
     is_typed = bool(table.time or table.torque)
     if is_typed == (table.recording is not None):
         raise StudyError(f"{place}: give either recording, or time and torque")
-    time, torque, kind = _profile_of_table(table, place) if is_typed else _profile_of_recording(table, folder, place)
+    if is_typed:
+        time, torque, kind = *_profile_of_table(table, place), "typed"
+    else:
+        with refused_as(StudyError, f"{place}.recording", DataError):
+            recording = read_recording(folder / str(table.recording))
+            channel: Any = recording[table.channel]
+            unit = recording.unit(table.channel)
+        if unit != _TORQUE:
+            raise StudyError(f"{place}.channel = '{table.channel}' is in '{unit}'; a torque in {_TORQUE} is needed")
+        if len(recording) < 2:
+            raise StudyError(f"{place}.recording: has one sample only; a profile needs two or more")
+        time, torque, kind = recording.time - recording.time[0], table.scale * channel, recording.kind
     if not np.any(torque):
         raise StudyError(f"{place}: is 0 {_TORQUE} throughout; there is nothing to size for")
-    knot_times, knot_values = choose_knots(*_open_end(time, torque))
-    return TorqueProfile(time=time, torque=torque, kind=kind, knot_times=knot_times, knot_values=knot_values)
+    # The last sample is the first of the next repetition. Where the two differ it stays, a moment earlier: the table
+    # then jumps as the profile does.
+    samples = time[:-1], torque[:-1]
+    if torque[-1] != torque[0]:
+        samples = np.append(time[:-1], time[-1] - min(_MOMENT, 0.5 * (time[-1] - time[-2]))), torque
+    return TorqueProfile(time, torque, kind, *choose_knots(*samples))
 
 
 def choose_knots(time: Floats, torque: Floats) -> tuple[Floats, Floats]:
@@ -108,6 +122,7 @@ def choose_knots(time: Floats, torque: Floats) -> tuple[Floats, Floats]:
     Between the last sample and the next repetition there is nothing to choose.
     """
     chosen = [0, time.size - 1]
+    # Greedy, not best: a profile has few features, and each knot takes away what is worst.
     while len(chosen) < min(KNOTS, time.size):
         between = np.interp(time, time[chosen], torque[chosen])
         worst = int(np.argmax(np.abs(between - torque)))
@@ -117,45 +132,23 @@ def choose_knots(time: Floats, torque: Floats) -> tuple[Floats, Floats]:
     return time[chosen], torque[chosen]
 
 
-def _open_end(time: Floats, torque: Floats) -> tuple[Floats, Floats]:
-    """Return the samples without the last one, which is the first of the next repetition.
-
-    Where the two differ, the last one stays, a moment earlier: the table then jumps as the profile does.
-    """
-    if torque[-1] == torque[0]:
-        return time[:-1], torque[:-1]
-    moment = min(_MOMENT, 0.5 * (time[-1] - time[-2]))
-    return np.append(time[:-1], time[-1] - moment), torque
-
-
-def _profile_of_table(table: ProfileTable, place: str) -> tuple[Floats, Floats, str]:
+def _profile_of_table(table: ProfileTable, place: str) -> tuple[Floats, Floats]:
     if len(table.time) != len(table.torque) or len(table.time) < 2:
         raise StudyError(
             f"{place}: time has {len(table.time)} and torque {len(table.torque)} entries; give as many of each, "
             f"two or more"
         )
-    time = np.array([_number(text, "s", f"{place}.time") for text in table.time])
-    torque = table.scale * np.array([_number(text, _TORQUE, f"{place}.torque") for text in table.torque])
+    series = []
+    for texts, unit, name in ((table.time, "s", "time"), (table.torque, _TORQUE, "torque")):
+        numbers = []
+        for text in texts:
+            with refused_as(StudyError, f"{place}.{name}: '{text}'", UnitError):
+                numbers.append(parse_quantity(text, unit))
+        series.append(np.array(numbers))
+    time, torque = series
     if time[0] != 0.0 or np.any(np.diff(time) <= 0.0):
         raise StudyError(f"{place}.time: must begin with '0 s' and grow from entry to entry")
-    return time, torque, "typed"
-
-
-def _profile_of_recording(table: ProfileTable, folder: Path, place: str) -> tuple[Floats, Floats, str]:
-    with refused_as(StudyError, f"{place}.recording", DataError):
-        recording = read_recording(folder / str(table.recording))
-        torque: Any = recording[table.channel]
-        unit = recording.unit(table.channel)
-    if unit != _TORQUE:
-        raise StudyError(f"{place}.channel = '{table.channel}' is in '{unit}'; a torque in {_TORQUE} is needed")
-    if len(recording) < 2:
-        raise StudyError(f"{place}.recording: has one sample only; a profile needs two or more")
-    return recording.time - recording.time[0], table.scale * torque, recording.kind
-
-
-def _number(text: str, unit: str, place: str) -> float:
-    with refused_as(StudyError, f"{place}: '{text}'", UnitError):
-        return parse_quantity(text, unit)
+    return time, table.scale * torque
 
 
 _Names = Annotated[tuple[Text, ...], Field(strict=False, min_length=1)]
@@ -262,6 +255,11 @@ class SizingProblem:
         return own if self.actuator is None else self.actuator.values["torque_constant"]
 
     @property
+    def carried(self) -> tuple[Part, ...]:
+        """The parts that are carried beside valve and bottle."""
+        return self.regulators if self.actuator is None else (*self.regulators, self.actuator)
+
+    @property
     def hours(self) -> float:
         """Time that the repetitions take without a pause [h]."""
         return self.repetitions * self.profile.period / _SECONDS_PER_HOUR
@@ -285,6 +283,18 @@ def sizing_problem(document: SizingFile, file: str, folder: Path) -> SizingProbl
     quantities = CONTROLLERS[scenario.controller.kind].quantities
     gains = tuple(f"controller.{item.name}" for item in quantities if "(N m" in item.unit)
     lowest, highest = _pressures(document, scenario, file)
+    use = document.use
+    if (use.repetitions is None) == (use.hours is None):
+        raise StudyError(f"{file}: use: give either repetitions or hours")
+    hours = _SECONDS_PER_HOUR * float(use.hours or 0.0)
+    limit = document.limits.rms_error
+    try:
+        relative = split_quantity(limit)[1] in ("%", "percent")
+        largest_error = parse_quantity(limit, "") * profile.largest if relative else parse_quantity(limit, _TORQUE)
+    except UnitError as error:
+        raise StudyError(f"{file}: limits.rms_error = '{limit}': {error}; write '0.5 N m' or '5 %'") from error
+    if largest_error <= 0.0:
+        raise StudyError(f"{file}: limits.rms_error = '{limit}': must be more than 0")
     return SizingProblem(
         name=document.name,
         description=document.description,
@@ -292,9 +302,9 @@ def sizing_problem(document: SizingFile, file: str, folder: Path) -> SizingProbl
         scenario=scenario,
         profile=profile,
         simulated=document.simulated,
-        repetitions=_repetitions(document.use, profile, file),
-        reserve=document.use.reserve,
-        largest_error=_largest_error(document.limits.rms_error, profile, file),
+        repetitions=float(use.repetitions) if use.repetitions else hours / profile.period,
+        reserve=use.reserve,
+        largest_error=largest_error,
         valves=valves,
         bottles=tuple(catalogue.part("bottles", name) for name in dict.fromkeys(parts.bottles)),
         actuator=None if parts.actuator is None else catalogue.part("actuators", parts.actuator),
@@ -313,15 +323,16 @@ def _scenario(document: SizingFile, profile: TorqueProfile, folder: Path, file: 
     plain.device.check_vane("the size of a device")
     if plain.controller.kind == OPEN_LOOP:
         raise StudyError(f"{file}: scenario '{plain.name}' follows no reference (controller '{OPEN_LOOP}')")
-    grain = _common_multiple(plain.controller.period, plain.run.output_interval)
+    # The least common multiple of both times: the run then ends with a sample of the controller and of the output.
+    a, b = (
+        Fraction(interval).limit_denominator(_LARGEST_DENOMINATOR)
+        for interval in (plain.controller.period, plain.run.output_interval)
+    )
+    least = math.lcm(a.numerator * b.denominator, b.numerator * a.denominator)
+    grain = Fraction(least, a.denominator * b.denominator)
     count = math.ceil(Fraction(document.simulated * profile.period).limit_denominator(_LARGEST_DENOMINATOR) / grain)
     duration = f"run.duration={float(count * grain)!r} s"
     return reloaded(plain, (*profile.overrides(), duration))
-
-
-def _common_multiple(first: float, second: float) -> Fraction:
-    a, b = (Fraction(time).limit_denominator(_LARGEST_DENOMINATOR) for time in (first, second))
-    return Fraction(math.lcm(a.numerator * b.denominator, b.numerator * a.denominator), a.denominator * b.denominator)
 
 
 def _pressures(document: SizingFile, scenario: Scenario, file: str) -> tuple[float, float]:
@@ -338,21 +349,3 @@ def _pressures(document: SizingFile, scenario: Scenario, file: str) -> tuple[flo
             f"pressure.highest = '{document.pressure.highest}'"
         )
     return lowest, highest
-
-
-def _repetitions(use: UseTable, profile: TorqueProfile, file: str) -> float:
-    if (use.repetitions is None) == (use.hours is None):
-        raise StudyError(f"{file}: use: give either repetitions or hours")
-    return float(use.repetitions) if use.repetitions else _SECONDS_PER_HOUR * float(use.hours or 0.0) / profile.period
-
-
-def _largest_error(text: str, profile: TorqueProfile, file: str) -> float:
-    place = f"{file}: limits.rms_error = '{text}'"
-    try:
-        _, unit = split_quantity(text)
-        value = parse_quantity(text, "") * profile.largest if unit in ("%", "percent") else parse_quantity(text, "N m")
-    except UnitError as error:
-        raise StudyError(f"{place}: {error}; write '0.5 N m' or '5 %'") from error
-    if value <= 0.0:
-        raise StudyError(f"{place}: must be more than 0")
-    return value

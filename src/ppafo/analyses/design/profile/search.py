@@ -1,6 +1,6 @@
 """Which supply pressures a valve can do a task with, what it takes there, and what limits it.
 
-Each pressure is tried with many gains, and some openings, of one valve at once on the lanes. Nothing is taken for
+Each pressure is tried with many gains, and some openings, of one valve at once. Nothing is taken for
 granted about how the error depends on the pressure.
 """
 
@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.analyses.design.profile.problem import SizingProblem
+from ppafo.analyses.design.trials import STREAMS, run_trials
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.errors import StudyError
 from ppafo.parameters.parts import Part
-from ppafo.simulation.ensemble import run_ensemble
+from ppafo.signals.recording import Floats
 from ppafo.studies.draws import Uncertainty
 from ppafo.studies.sampling import NOISE
 
@@ -27,13 +28,9 @@ LIMITS: dict[Limit, str] = {
     "pressure": "nothing: the lowest requested pressure suffices",
 }
 """What keeps a valve from working at a lower pressure, or from working at all."""
-Floats = NDArray[np.float64]
 ERROR, GAS = "rms_error", "gas_supplied"
 _OPENINGS = ("valve.area", "valve.sonic_conductance")
-_CHUNK = 16_384
-"""Runs handed to the lanes at once."""
-STREAMS = 16
-"""Noise streams in each of which a limit must be kept, the same for all trials, where sensors are noisy."""
+
 _SEED = 1
 GRID = 17
 """Pressures of a grid."""
@@ -109,15 +106,18 @@ class Trials:
         self.runs = 0
         self.failures: dict[str, int] = {}
         noise = Uncertainty(()).with_noise_of([problem.scenario])
+        # The scenario's own seed plays no part, so that two scenarios are judged in the same noise.
         self.seeds = noise.random_columns(0, STREAMS, _SEED)[NOISE] if noise.has_noise else np.zeros(0)
         self._threads = threads
 
     def run(self, valve: Part, pressure: Floats, gains: NDArray[np.intp], opening: Floats) -> Trial:
         """Return what came of a valve at pressures [Pa absolute], with sets of gains and factors on its opening."""
-        chunk = max(1, _CHUNK // max(1, self.seeds.size))
-        parts = [slice(start, start + chunk) for start in range(0, pressure.size, chunk)]
-        found = [self._run(valve, pressure[part], gains[part], opening[part]) for part in parts]
-        error, gas = (np.concatenate([item[name] for item in found]) for name in (ERROR, GAS))
+        columns = self.columns(valve, pressure, gains, opening)
+        outcome = run_trials(self.problem.scenario, columns, (ERROR, GAS), self.seeds, self._threads)
+        self.runs += outcome.runs
+        for reason in outcome.reasons:
+            self.failures[reason] = self.failures.get(reason, 0) + 1
+        error, gas = outcome.metrics[ERROR].max(axis=0), outcome.metrics[GAS].mean(axis=0)
         return Trial(error, gas / self.problem.simulated, gains)
 
     def best(self, valve: Part, pressure: Floats, opening: float = 1.0) -> Trial:
@@ -142,18 +142,6 @@ class Trials:
         pairs = zip(self.problem.gains, self.gain_sets[number], strict=True)
         return {path: float(factor * settings[path.rpartition(".")[2]]) for path, factor in pairs}
 
-    def _run(self, valve: Part, pressure: Floats, gains: NDArray[np.intp], opening: Floats) -> dict[str, Floats]:
-        columns, streams = self.columns(valve, pressure, gains, opening), max(1, self.seeds.size)
-        if self.seeds.size:
-            columns = {path: np.tile(values, streams) for path, values in columns.items()}
-            columns[NOISE] = np.repeat(self.seeds, pressure.size)
-        result = run_ensemble(self.problem.scenario, columns, (ERROR, GAS), threads=self._threads)
-        self.runs += streams * pressure.size
-        for reason in result.reasons.values():
-            self.failures[reason] = self.failures.get(reason, 0) + 1
-        error, gas = (result.metrics[name].reshape(streams, pressure.size) for name in (ERROR, GAS))
-        return {ERROR: error.max(axis=0), GAS: gas.mean(axis=0)}
-
     def columns(self, valve: Part, pressure: Floats, gains: NDArray[np.intp], opening: Floats) -> dict[str, Floats]:
         """Return the columns of trials in SI: figures of the parts, both supply pressures, gains."""
         problem, count = self.problem, pressure.size
@@ -171,7 +159,7 @@ class Trials:
 
 def highest_pressure(problem: SizingProblem, valve: Part) -> float:
     """Return the highest pressure [Pa absolute] to try: the file's, or what the parts are made for."""
-    parts = [valve, *problem.regulators, *([] if problem.actuator is None else [problem.actuator])]
+    parts = (valve, *problem.carried)
     return min([problem.highest_pressure, *(part.values.get("largest_pressure", np.inf) for part in parts)])
 
 
@@ -187,7 +175,15 @@ def try_pressures(trials: Trials, valve: Part) -> Pressures:
         lower, upper = found.pressure[found.first - 1], found.pressure[found.first]
         # Without both ends, which were tried before.
         finer = _pressures(trials, valve, np.linspace(lower, upper, GRID)[1:-1])
-        found = _merge(found, finer)
+        both = (found, finer)
+        pressure = np.concatenate([one.pressure for one in both])
+        trial = Trial(
+            np.concatenate([one.trial.error for one in both]),
+            np.concatenate([one.trial.gas for one in both]),
+            np.concatenate([one.trial.gains for one in both]),
+        )
+        order = np.argsort(pressure, kind="stable")
+        found = Pressures(pressure[order], trial.at(order), np.concatenate([one.works for one in both])[order])
     return found
 
 
@@ -196,18 +192,6 @@ def _pressures(trials: Trials, valve: Part, pressure: Floats) -> Pressures:
     problem = trials.problem
     works = (trial.error <= problem.largest_error) & (pressure >= peak_pressure(problem))
     return Pressures(pressure, trial, works)
-
-
-def _merge(first: Pressures, second: Pressures) -> Pressures:
-    """Return the pressures of both in order."""
-    pressure = np.concatenate([first.pressure, second.pressure])
-    order = np.argsort(pressure, kind="stable")
-    trial = Trial(
-        np.concatenate([first.trial.error, second.trial.error]),
-        np.concatenate([first.trial.gas, second.trial.gas]),
-        np.concatenate([first.trial.gains, second.trial.gains]),
-    )
-    return Pressures(pressure[order], trial.at(order), np.concatenate([first.works, second.works])[order])
 
 
 def limit_of(trials: Trials, valve: Part, tried: Pressures) -> Limit:
@@ -251,6 +235,7 @@ def peak_pressure(problem: SizingProblem) -> float:
 def cut_error(problem: SizingProblem, pressure: float) -> float:
     """Return the RMS error [N m] that is left if only the torque ceiling at a pressure [Pa] cuts the profile."""
     # The end of a period is its start again and must count once.
+    # Two thousand points: the crest of a push-off, a tenth of a stride, still has two hundred.
     time = np.linspace(0.0, problem.profile.period, 2001)[:-1]
     wanted = problem.profile.at(time)
     most = ceiling(problem, pressure)
@@ -258,7 +243,7 @@ def cut_error(problem: SizingProblem, pressure: float) -> float:
 
 
 def ceiling(problem: SizingProblem, pressure: float) -> float:
-    """Return the largest torque [N m] that a pressure [Pa absolute] can hold; equation (2)."""
+    """Return the largest torque [N m] that a pressure [Pa absolute] can hold; equation (2) of the paper."""
     return problem.torque_constant * (pressure - problem.scenario.device.supply.atmospheric_pressure)
 
 

@@ -44,6 +44,7 @@ def valve_power(valve: Part, command: Floats) -> Floats:
     One coil of a pair is energised while its chamber is filled, none while both vent. A spool takes the power of its
     centre, and what its data sheet states at full stroke in proportion to the stroke beyond.
     """
+    # A command to vent is beyond 1 and no stroke.
     stroke = np.where(command > VENTS_ABOVE, 0.0, np.abs(command))
     idle, full = valve.values.get("idle_power", 0.0), valve.values["power"]
     if valve.kind == "solenoid":
@@ -56,8 +57,10 @@ def electrical_of(
 ) -> Electrical:
     """Return the electrical side of a walk, with as many cells as a time [s] takes; means over the recorded walk."""
     time, power = recording.time, valve_power(valve, recording["command"])
+    # Each sample holds until the next one, as the controller's outputs do.
     length = float(time[-1] - time[0])
     mean = float(np.sum(power[:-1] * np.diff(time)) / length)
+    # A controller without a safe state helps all the time.
     helps = recording["safe_state"] < 0.5 if "safe_state" in recording else np.ones(time.size)
     share = float(np.sum(helps[:-1] * np.diff(time)) / length)
     powers = {"valve": mean, "shut-off valve": shut_off_power * share, "processor": processor.values["power"]}

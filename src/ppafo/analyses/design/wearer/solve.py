@@ -16,17 +16,17 @@ import numpy as np
 from ppafo.analyses.design.wearer.electrical import Electrical, electrical_of, electrical_sentences
 from ppafo.analyses.endurance.answer import Endurance
 from ppafo.analyses.endurance.solve import endurance_of_walk
-from ppafo.analyses.parts.solve import doubts_data, doubts_sections, titles_section
+from ppafo.analyses.parts.solve import doubts_data, part_titles, parts_to_check
 from ppafo.constants import PASCALS_PER_PSI, STANDARD_ATMOSPHERE
 from ppafo.control.walking.assistance import ASSISTANCE_QUANTITIES
 from ppafo.errors import ScenarioError, StudyError
 from ppafo.model.catalog import VALVES
 from ppafo.model.plant_faults import SHUT_OFF
 from ppafo.parameters.declaration import ACTUATOR, ORIFICE
-from ppafo.parameters.parts import Catalogue, Part, load_catalogue
+from ppafo.parameters.parts import Part, load_catalogue
 from ppafo.progress import Progress, Report
+from ppafo.report import finding
 from ppafo.report.finding import Finding, columns_of, facts
-from ppafo.report.finding import Part as Section
 from ppafo.report.kind import Kind
 from ppafo.version import __version__
 from ppafo.walking.bottle import WALKED, minutes_text
@@ -75,6 +75,16 @@ class Wish:
     torque: float
     pressure: float
     seconds: float
+
+    @property
+    def height(self) -> float:
+        """Stature [m], the paper's subject's unless one is given."""
+        return paper_subject().stature if self.stature is None else self.stature
+
+    def at_gauge(self, share: float) -> "Wish":
+        """Return this wish at a share of its gauge pressure, rounded to a tenth of a psi."""
+        gauge = round(share * (self.pressure - STANDARD_ATMOSPHERE) / PASCALS_PER_PSI, 1)
+        return replace(self, pressure=STANDARD_ATMOSPHERE + gauge * PASCALS_PER_PSI)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -206,7 +216,19 @@ def size_for_wearer(wish: Wish, report: Report) -> WearerSizing:
     one, bottle, walked = found
     life = endurance_of_walk(walked)
     assert life is not None, "a walk on a bottle that has a torque took gas"
-    return WearerSizing(wish, tuple(tried), _device(wish, catalogue, one, bottle, walked, life), ())
+    processor, cell = catalogue.part("processors", _PROCESSOR), catalogue.part("batteries", _CELL)
+    electrical = electrical_of(walked.recording, one.valve, _SHUT_OFF["power"], processor, cell, wish.seconds)
+    regulators = [catalogue.part("regulators", name) for name in _REGULATORS]
+    masses = {
+        f"actuator {one.actuator.name}": one.actuator.full_mass,
+        f"valve {one.valve.name}": one.valve.full_mass,
+        f"bottle {bottle.name}, full": bottle.full_mass,
+        **{f"regulator {part.name}": part.full_mass for part in regulators},
+        "shut-off valve": _SHUT_OFF["mass"],
+        f"processor {processor.name}": processor.full_mass,
+        f"battery, {electrical.cells} x {cell.name}": electrical.mass,
+    }
+    return WearerSizing(wish, tuple(tried), Device(one, bottle, walked, life, electrical, masses), ())
 
 
 def _check(wish: Wish) -> None:
@@ -231,22 +253,14 @@ def _check(wish: Wish) -> None:
         )
 
 
-def _wearer(wish: Wish) -> list[str]:
-    return [f"wearer.body_mass={wish.mass:.6g} kg", f"wearer.stature={_stature(wish):.6g} m"]
-
-
-def _stature(wish: Wish) -> float:
-    """Return the stature [m] of the wearer, the paper's subject unless one is given."""
-    return paper_subject().stature if wish.stature is None else wish.stature
-
-
 def _few_strides(wish: Wish, valve: Part, actuator: Part) -> list[Tried]:
     """Return a few strides with a pair of parts; with a torque controller the lowest request that gives the torque."""
     gauge = wish.pressure - STANDARD_ATMOSPHERE
     units = {item.name: item.unit for item in (*ORIFICE, *VALVES[valve.kind].quantities, *ACTUATOR)}
     numbers = {**valve.model_numbers, **{f"actuator.{name}": actuator.values[name] for name in _OF_ACTUATOR}}
     overrides = [
-        *_wearer(wish),
+        f"wearer.body_mass={wish.mass:.6g} kg",
+        f"wearer.stature={wish.height:.6g} m",
         f"supply.pressure={wish.pressure:.7g} Pa_a",
         f"supply.dorsiflexion_pressure={STANDARD_ATMOSPHERE + _DORSIFLEXION * gauge:.7g} Pa_a",
         *(f"{path}={number:.6g} {units[path.partition('.')[2]]}".strip() for path, number in numbers.items()),
@@ -258,7 +272,12 @@ def _few_strides(wish: Wish, valve: Part, actuator: Part) -> list[Tried]:
     best = None
     # Requests that the limit made equal are walked with once.
     for request in dict.fromkeys(requests):
-        chosen = tuple(overrides if request is None else [*overrides, *_requesting(request)])
+        chosen = tuple(overrides)
+        if request is not None:
+            chosen += (f"controller.peak_torque={request:.4g} N m",)
+        # A controller requests no more than its limit, which therefore has to follow.
+        if request is not None and request > _LIMIT:
+            chosen += (f"controller.largest_torque={request:.4g} N m",)
         result = walk(load_walk(WALKS[valve.kind], chosen), _FEW)
         if not result.status.is_completed or not result.is_helped or not result.averages:
             continue
@@ -268,12 +287,6 @@ def _few_strides(wish: Wish, valve: Part, actuator: Part) -> list[Tried]:
         if torque >= wish.torque:
             break
     return [] if best is None else [best]
-
-
-def _requesting(torque: float) -> list[str]:
-    """Return the overrides that request a torque [N m] of a controller, whose limit follows where it would cut it."""
-    peak = f"controller.peak_torque={torque:.4g} N m"
-    return [peak] if torque <= _LIMIT else [peak, f"controller.largest_torque={torque:.4g} N m"]
 
 
 _OF_ACTUATOR = ("torque_constant", "volume_per_angle")
@@ -329,29 +342,22 @@ def _keeps(walked: WalkResult | None, torque: float) -> bool:
     return walked is not None and bool(walked.averages) and walked.averages["torque"].mean.max() >= _KEPT * torque
 
 
-def _device(wish: Wish, catalogue: Catalogue, one: Tried, bottle: Part, walked: WalkResult, life: Endurance) -> Device:
-    processor, cell = catalogue.part("processors", _PROCESSOR), catalogue.part("batteries", _CELL)
-    electrical = electrical_of(walked.recording, one.valve, _SHUT_OFF["power"], processor, cell, wish.seconds)
-    regulators = [catalogue.part("regulators", name) for name in _REGULATORS]
-    masses = {
-        f"actuator {one.actuator.name}": one.actuator.full_mass,
-        f"valve {one.valve.name}": one.valve.full_mass,
-        f"bottle {bottle.name}, full": bottle.full_mass,
-        **{f"regulator {part.name}": part.full_mass for part in regulators},
-        "shut-off valve": _SHUT_OFF["mass"],
-        f"processor {processor.name}": processor.full_mass,
-        f"battery, {electrical.cells} x {cell.name}": electrical.mass,
-    }
-    return Device(one, bottle, walked, life, electrical, masses)
-
-
 def _instead(wish: Wish, tried: list[Tried], bottles: list[Part], report: Report) -> Iterator[str]:
     """Yield what would do instead, each as it walked on the largest bottle: who asks for exactly that gets it."""
     largest = max(bottles, key=lambda bottle: bottle.values["content"])
     if not tried:
         yield "no pair of valve and actuator may have this pressure, or none helps: take another pressure"
         return
-    lower = [(wish, one) for one in tried] + list(_at_less_pressure(wish, tried, report))
+    lower = [(wish, one) for one in tried]
+    # At less pressure the pairs that have the most torque for their gas.
+    thrifty = sorted((one for one in tried if one.flow > 0.0), key=lambda one: -one.torque / one.flow)
+    # Actuators of the same numbers walk alike: one of them is enough.
+    pairs = list({(one.valve.name, one.torque, one.flow): one for one in thrifty}.values())[:_OFFERED]
+    for place, share in enumerate(_LESS_PRESSURE):
+        report(Progress("walking at less pressure", place, len(_LESS_PRESSURE), noun="pressures"))
+        asked = wish.at_gauge(share)
+        if STANDARD_ATMOSPHERE < asked.pressure < wish.pressure:
+            lower += [(asked, again) for one in pairs for again in _few_strides(asked, one.valve, one.actuator)]
     strong = sorted((item for item in lower if item[1].torque >= wish.torque), key=lambda item: item[1].flow)
     weak = sorted((item for item in lower if item[1].torque < wish.torque), key=lambda item: -item[1].torque)
     report(Progress(f"walking on {largest.name}", 0, 0, noun="bottles"))
@@ -411,25 +417,6 @@ def _wished(wish: Wish) -> str:
     return f"{_TORQUE.text(wish.torque)} at {pressure} for {wish.seconds / 60.0:.4g} min"
 
 
-def _at_gauge(wish: Wish, share: float) -> Wish:
-    """Return a wish at a share of its gauge pressure, rounded to a tenth of a psi."""
-    gauge = round(share * (wish.pressure - STANDARD_ATMOSPHERE) / PASCALS_PER_PSI, 1)
-    return replace(wish, pressure=STANDARD_ATMOSPHERE + gauge * PASCALS_PER_PSI)
-
-
-def _at_less_pressure(wish: Wish, tried: list[Tried], report: Report) -> Iterator[tuple[Wish, Tried]]:
-    """Yield a few strides at less pressure, with the pairs that have the most torque for their gas."""
-    thrifty = sorted((one for one in tried if one.flow > 0.0), key=lambda one: -one.torque / one.flow)
-    # Actuators of the same numbers walk alike: one of them is enough.
-    pairs = list({(one.valve.name, one.torque, one.flow): one for one in thrifty}.values())[:_OFFERED]
-    for place, share in enumerate(_LESS_PRESSURE):
-        report(Progress("walking at less pressure", place, len(_LESS_PRESSURE), noun="pressures"))
-        asked = _at_gauge(wish, share)
-        if STANDARD_ATMOSPHERE < asked.pressure < wish.pressure:
-            for one in pairs:
-                yield from ((asked, again) for again in _few_strides(asked, one.valve, one.actuator))
-
-
 def _at_more_pressure(wish: Wish, tried: list[Tried]) -> Iterator[tuple[Wish, Tried]]:
     """Yield what has the torque at more pressure, of the strongest pair of each kind of valve, the lowest first."""
     strongest = [
@@ -437,7 +424,7 @@ def _at_more_pressure(wish: Wish, tried: list[Tried]) -> Iterator[tuple[Wish, Tr
         for kind in dict.fromkeys(one.valve.kind for one in tried)
     ]
     for more in _MORE_PRESSURE:
-        asked = _at_gauge(wish, more)
+        asked = wish.at_gauge(more)
         for one in strongest:
             if min(part.values.get("largest_pressure", np.inf) for part in (one.valve, one.actuator)) < asked.pressure:
                 continue
@@ -471,56 +458,50 @@ def finding_of(sizing: WearerSizing) -> Finding[WearerSizing]:
         (one.valve.name, one.actuator.name, one.torque, one.flow, one.mass)
         for one in sorted(sizing.tried, key=lambda one: -one.torque)
     ]
-    tried = Section("What was walked with", columns_of(_HEAD, rows), left=2, is_detail=device is not None)
-    stature = f"{_stature(wish):.4g} m{' (assumed: give --stature)' if wish.stature is None else ''}"
+    tried = finding.Part("What was walked with", columns_of(_HEAD, rows), left=2, is_detail=device is not None)
+    stature = f"{wish.height:.4g} m{' (assumed: give --stature)' if wish.stature is None else ''}"
     sections = (
-        (Section(remarks=("no device of the catalogue has this; give up one of:", *sizing.instead)), tried)
+        (finding.Part(remarks=("no device of the catalogue has this; give up one of:", *sizing.instead)), tried)
         if device is None
-        else (*_sections(wish, device), tried, *doubts_sections(sizing.doubtful), titles_section(sizing.parts))
+        else (*_sections(wish, device), tried, *parts_to_check(sizing.doubtful), part_titles(sizing.parts))
     )
     return Finding(
         name="design",
         kicker="From a wearer to a device",
         title="The device",
         said=(f"a wearer of {wish.mass:.4g} kg and {stature}; {_wished(wish)}",),
-        parts=(*sections, Section("How to read it", said=_READING, is_detail=True)),
+        parts=(*sections, finding.Part("How to read it", said=_READING, is_detail=True)),
         found=sizing,
         passed=device is not None,
     )
 
 
-def _short(wish: Wish, device: Device) -> str:
-    """Return how far the torque on the bottle is below the requested one, where it is; a walk ends at ``_KEPT``."""
+def _sections(wish: Wish, device: Device) -> tuple[finding.Part, ...]:
+    walked = device.walked
     share = device.torque / wish.torque
-    return f" ({100.0 * share:.0f} % of the request: pressure falls with the bottle)" if share < 1.0 else ""
-
-
-def _sections(wish: Wish, device: Device) -> tuple[Section, ...]:
-    walked, supply = device.walked, device.walked.supply
-    assert supply is not None, "it walked on a bottle"
-    peaks = peak_torques(walked)
+    # A walk on a bottle may end at nine tenths of the request, so how far it fell short is said.
+    short = f" ({100.0 * share:.0f} % of the request: pressure falls with the bottle)" if share < 1.0 else ""
     low, high = (share * walk_of(walked.scenario).gait.body_mass for share in SCALED_MASS)
+    wanted, lasts = f"{wish.seconds / 60.0:.4g} min", minutes_text(device.life.discharge.walking_time)
+    last = _TORQUE.text(float(peak_torques(walked)[-1]))
     rows = (
         ("controller", f"{walked.scenario.controller.kind}, walk '{WALKS[device.tried.valve.kind]}'"),
-        ("lasts", f"{minutes_text(device.life.discharge.walking_time)}, of {wish.seconds / 60.0:.4g} min"),
+        ("lasts", f"{lasts}, of {wanted}"),
         ("then", device.life.discharge.ending.message),
-        ("peak torque", f"{_TORQUE.text(device.torque)} in the mean stride{_short(wish, device)}, "
-         f"{_TORQUE.text(float(peaks[-1]))} in the last"),
+        ("peak torque", f"{_TORQUE.text(device.torque)} in the mean stride{short}, {last} in the last"),
         ("gas", f"{Kind('', 'kg', 'gas mass', '.3g').text(walked.metrics['gas'].value)} a stride"),
         ("mass", _MASS.text(sum(device.masses.values()), ".0f")),
-    )  # fmt: skip
+    )
     remarks = [
         *electrical_sentences(device.electrical),
         who_walks(walk_of(walked.scenario).wearer, walk_of(walked.scenario).gait, "as requested"),
     ]
     if not low <= wish.mass <= high:
         remarks.append(f"the gait is known of {low:.0f} to {high:.0f} kg: beyond, torque and gas are a guess")
-    lasts = device.life.discharge.walking_time
-    caption = _CAPTION.format(wished=f"{wish.seconds / 60.0:.4g} min", lasts=minutes_text(lasts))
+    caption, draw = _CAPTION.format(wished=wanted, lasts=lasts), partial(bottle_figure, walked)
     masses = ((name, _MASS.text(mass, ".0f")) for name, mass in device.masses.items())
-    draw = partial(bottle_figure, walked)
     return (
-        Section("The walk on its bottle", facts(rows), remarks=remarks, code=device.command),
-        Section("What it weighs", facts(masses)),
-        Section("The bottle over the walk", name="bottle", caption=caption, draw=draw, is_detail=True),
+        finding.Part("The walk on its bottle", facts(rows), remarks=remarks, code=device.command),
+        finding.Part("What it weighs", facts(masses)),
+        finding.Part("The bottle over the walk", name="bottle", caption=caption, draw=draw, is_detail=True),
     )

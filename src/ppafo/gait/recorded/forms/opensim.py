@@ -11,7 +11,7 @@ from ppafo.gait.recorded.form import Convention, GaitForm
 from ppafo.gait.recorded.forms.comma_separated import is_plain, plain_names, read_plain_csv
 from ppafo.gait.recorded.mapping import ForceMap, KneeMap, PressureMap, ShankMap, Side, opensim_map
 from ppafo.gait.recorded.table import MotionTable
-from ppafo.storage.opensim import read_opensim_with_gaps
+from ppafo.storage.opensim import GAPS, read_opensim
 
 _CSV = ".csv"
 _STATE = re.compile(r".*/([^/]+)/value")
@@ -33,7 +33,7 @@ def _read(path: str | Path) -> MotionTable:
     if Path(path).suffix.lower() == _CSV:
         plain = read_plain_csv(path)
         return replace(plain, units={name: unit or _unit(name, name, "") for name, unit in plain.units.items()})
-    table = read_opensim_with_gaps(path)
+    table = read_opensim(path, GAPS)
     is_unstated = table.in_degrees is None and table.is_old
     angle = "deg" if is_unstated else {True: "deg", False: "rad", None: ""}[table.in_degrees]
     paths = {match[1]: name for name in table.columns if (match := _STATE.fullmatch(name))}

@@ -7,7 +7,6 @@ import pytest
 
 from ppafo.analyses.design.front.search import (
     Candidates,
-    Floats,
     SearchTable,
     Worth,
     crowding,
@@ -17,13 +16,12 @@ from ppafo.analyses.design.front.search import (
     hypervolume,
     knee,
     non_dominated,
-    ranks,
     reflect,
     representatives,
     search_front,
     survivors,
-    survivors_of_many,
 )
+from ppafo.signals.recording import Floats
 
 pytestmark = pytest.mark.thorough
 
@@ -63,7 +61,7 @@ def naive_ranks(worth: Worth) -> list[int]:
 def test_non_dominated_sorting_agrees_with_brute_force(seed: int, whole: bool) -> None:
     worth = random_worth(seed, 90, whole)
     expected = naive_ranks(worth)
-    assert ranks(worth).tolist() == expected
+    assert [expected[point] for point in survivors(worth, 90).tolist()] == sorted(expected)
     assert non_dominated(worth).tolist() == [rank == 0 for rank in expected]
     pairs = dominance(worth, worth)
     assert all(pairs[a, b] == beats(worth, a, b) for a in range(90) for b in range(90))
@@ -71,13 +69,16 @@ def test_non_dominated_sorting_agrees_with_brute_force(seed: int, whole: bool) -
 
 def test_large_sets_are_sorted_as_small_ones() -> None:
     worth = random_worth(11, 1700)
-    assert non_dominated(worth).tolist() == (ranks(worth) == 0).tolist()
-    assert sorted(survivors_of_many(worth, 100)) == sorted(survivors(worth, 100))
+    best = ~dominance(worth, worth).any(axis=0)
+    assert non_dominated(worth).tolist() == best.tolist()
+    count = int(best.sum())
+    assert sorted(survivors(worth, count)) == np.flatnonzero(best).tolist()
+    assert set(survivors(worth, count + 9).tolist()) > set(np.flatnonzero(best).tolist())
 
 
 def test_a_failed_candidate_beats_nobody() -> None:
     worth = Worth(np.array([[np.nan, np.nan, np.nan], [1.0, 1.0, 1.0], [2.0, 2.0, 2.0]]), np.array([np.inf, 0.0, 3.0]))
-    assert ranks(worth).tolist() == [2, 0, 1]
+    assert survivors(worth, 3).tolist() == [1, 2, 0]
 
 
 def test_the_ends_of_a_front_are_the_least_crowded() -> None:

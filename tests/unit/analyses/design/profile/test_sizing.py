@@ -10,8 +10,8 @@ import jsonschema
 import numpy as np
 import pytest
 
+from ppafo.analyses.design import trials
 from ppafo.analyses.design.loading import json_schema, load_design
-from ppafo.analyses.design.profile import search
 from ppafo.analyses.design.profile.answer import (
     Sizing,
     _lasting_bottle,
@@ -20,12 +20,14 @@ from ppafo.analyses.design.profile.answer import (
     suggestion_sentence,
 )
 from ppafo.analyses.design.profile.problem import choose_knots
-from ppafo.analyses.design.profile.search import Floats, Trials, ceiling, ceiling_pressure, cut_error
+from ppafo.analyses.design.profile.search import Trials, ceiling, ceiling_pressure, cut_error
 from ppafo.analyses.design.solve import design
 from ppafo.control.profiles import KNOTS
 from ppafo.errors import PpafoError
 from ppafo.parameters.parts import load_catalogue
 from ppafo.signals import Channel, Recording
+from ppafo.signals.recording import Floats
+from ppafo.simulation.ensemble import COMPLETED
 from ppafo.storage import write_csv
 
 SHIPPED = Path(__file__).parents[5] / "src" / "ppafo" / "analyses" / "design" / "library" / "push-off.toml"
@@ -262,9 +264,10 @@ def test_a_limit_is_kept_in_every_noise_stream_and_the_seed_of_the_scenario_deci
         seeds = columns["sensors.seed"]
         seen.append(seeds)
         error = np.array([np.random.default_rng(int(seed)).random() for seed in seeds])
-        return SimpleNamespace(metrics={"rms_error": error, "gas_supplied": 2.0 * error}, reasons={})
+        metrics = {"rms_error": error, "gas_supplied": 2.0 * error}
+        return SimpleNamespace(metrics=metrics, status=np.full(error.size, COMPLETED), reasons={})
 
-    monkeypatch.setattr(search, "run_ensemble", run)
+    monkeypatch.setattr(trials, "run_ensemble", run)
     found = []
     for seed in (1, 2):
         noisy = dataclasses.replace(problem.scenario.sensors, pressure_noise=1000.0, seed=seed)
@@ -301,7 +304,8 @@ def test_a_bottle_with_gas_enough_that_gets_too_cold_is_not_suggested() -> None:
     parts = load_catalogue().groups["bottles"]
     bottles = tuple(parts[name] for name in ("pipeline-jacpac-9oz", "co2-20oz"))
     gas, pressure = 0.45e-3, 101325.0 + 50.0 * 6894.757
-    bottle, is_cold = _lasting_bottle(dataclasses.replace(problem, bottles=bottles), gas, pressure)
+    in_all = gas * problem.repetitions * (1.0 + problem.reserve)
+    bottle, is_cold = _lasting_bottle(dataclasses.replace(problem, bottles=bottles), gas, in_all, pressure)
     assert smallest_bottle(bottles, gas * 500.0 * 1.1) is bottles[0], "its gas alone would do"
     assert bottle is bottles[1]
     assert is_cold

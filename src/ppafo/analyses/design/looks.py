@@ -1,0 +1,6 @@
+"""How valves and a suggestion look in the figures of a design: one colour a valve, a ring around what is chosen."""
+
+from ppafo.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILION
+
+COLOURS = (BLUE, VERMILION, GREEN, ORANGE, "#CC79A7", "#56B4E9", BLACK, GREY)
+RING = {"linestyle": "", "marker": "o", "markersize": 9, "markerfacecolor": "none", "markeredgewidth": 1.4}

@@ -1,0 +1,52 @@
+"""Runs of trials in every stream of sensor noise, as many at once as memory allows."""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ppafo.signals.recording import Floats
+from ppafo.simulation.ensemble import COMPLETED, run_ensemble
+from ppafo.simulation.scenario import Scenario
+from ppafo.studies.sampling import NOISE
+
+STREAMS = 16
+"""Noise streams in each of which a limit must be kept, the same for all trials, where sensors are noisy."""
+_AT_ONCE = 16_384
+"""Runs handed over at once: enough to fill the batches of all threads, little enough memory."""
+
+
+class Outcome(NamedTuple):
+    """Metrics (streams, trials) by name, nan where a run failed; runs, how many failed, and a reason for each."""
+
+    metrics: dict[str, Floats]
+    runs: int
+    failed: int
+    reasons: list[str]
+
+
+def run_trials(
+    scenario: Scenario, columns: Mapping[str, Floats], metrics: Sequence[str], seeds: Floats, threads: int | None
+) -> Outcome:
+    """Return what came of trials with columns (trials,) of numbers [SI] by path.
+
+    ``seeds`` (streams,) name the streams of noise, the same for every trial, so that trials differ by what is tried and
+    not by luck; none where no controller receives noise, which counts as one stream.
+    """
+    streams, count = max(1, seeds.size), next(iter(columns.values())).size
+    chunk = max(1, _AT_ONCE // streams)
+    parts: list[dict[str, Floats]] = []
+    reasons: list[str] = []
+    failed = 0
+    for start in range(0, count, chunk):
+        part = {path: values[start : start + chunk] for path, values in columns.items()}
+        size = next(iter(part.values())).size
+        if seeds.size:
+            part = {path: np.tile(values, streams) for path, values in part.items()}
+            part[NOISE] = np.repeat(seeds, size)
+        result = run_ensemble(scenario, part, metrics, threads=threads)
+        failed += int(np.count_nonzero(result.status != COMPLETED))
+        reasons += result.reasons.values()
+        parts.append({name: result.metrics[name].reshape(streams, size) for name in metrics})
+    found = {name: np.concatenate([part[name] for part in parts], axis=1) for name in metrics}
+    return Outcome(metrics=found, runs=streams * count, failed=failed, reasons=reasons)
