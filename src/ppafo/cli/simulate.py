@@ -71,9 +71,7 @@ def simulate(scenario: Scenario, *, check: bool = False, overrides: Overrides = 
 
 def _error(result: "Result") -> "ErrorEstimate | None":
     """Return the estimated error of a vane alone, which runs again in milliseconds; a walk's is in its check."""
-    from ppafo.simulation.scenario import worn_kind
-
-    return result.error() if result.status.is_completed and worn_kind(result.scenario) is None else None
+    return result.error() if result.status.is_completed and not result.scenario.walks else None
 
 
 def _finding(result: "Result", check: "Check | None") -> "Finding[None]":
@@ -116,11 +114,10 @@ def list_descriptions() -> list[dict[str, Any]]:
 
 
 def _text(result: "Result", error: "ErrorEstimate | None", check: "Check | None", folder: Path) -> str:
-    from ppafo.simulation.scenario import worn_kind
 
     checked = [repr(check), ""] if check is not None else [] if error is None else [error.sentence, ""]
     files = ["recording.nc", "recording.csv", "run.json", "figure.png", "figure.svg", "report.html"]
     written = ", ".join(files if check is None else [*files, CHECK_FILE])
     walked = f"'ppafo walk {result.scenario.origin.file}' compares it with no device and with a healthy ankle"
-    beside = [] if worn_kind(result.scenario) is None else [walked]
+    beside = [] if not result.scenario.walks else [walked]
     return "\n".join([str(result), "", *checked, *beside, f"written: {folder} ({written})"])

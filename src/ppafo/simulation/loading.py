@@ -49,7 +49,8 @@ from ppafo.simulation.declaration import (
     quantity_text,
     value_at,
 )
-from ppafo.simulation.motion import read_motion, read_profile
+from ppafo.simulation.motion import read_profile
+from ppafo.simulation.motion_kind import MOTIONS
 from ppafo.simulation.overrides import OverriddenDocument, apply_overrides, device_paths, scenario_paths
 from ppafo.simulation.scenario import (
     Assumption,
@@ -108,6 +109,8 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
     hardware = read_hardware(reading, request, changed.device)
     device = read_device(reading, hardware)
     clock = read_clock(reading)
+    motion = MOTIONS[kind_at(document, "motion")].section
+    assert motion is not None, "walks are built from another layout"
     before = Reading(request.file, request.content)
     scenario = Scenario(
         name=document["name"],
@@ -116,7 +119,7 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
         run=RunSettings(
             clock.duration, clock.step, clock.output_interval, tolerance=reading.number("run.tolerance", ACCURACY)
         ),
-        motion=read_motion(reading, device, clock.duration, clock.step, request.folder),
+        motion=motion.read(reading, device, clock.duration, clock.step, request.folder),
         initial=Initial(*(_initial_pressure(reading, item, device.supply) for item in INITIAL)),
         controller=_control(reading, clock.period),
         reference=_reference(reading),

@@ -1,14 +1,21 @@
-"""What the vane does, read from a scenario and checked against the stops of the device."""
+"""What moves a vane alone, as kinds of motion: locked, free, along a profile, or with the foot of a leg.
 
-from collections.abc import Iterator
+Each kind declares what a file says of it, and how that is read and checked against the stops of the device. What only
+a run or an ensemble of such a motion needs is loaded when it is called.
+"""
+
+from collections.abc import Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
+
+from pydantic import Field
 
 from ppafo.control.catalog import PROFILES
 from ppafo.engine.rows import rebuilt
 from ppafo.errors import DataError, ScenarioError, one_line
+from ppafo.kinds import late
 from ppafo.model.declaration import Quantity
-from ppafo.model.gait import ShankSeries
 from ppafo.parameters.device import Device
 from ppafo.simulation.declaration import (
     ANGLE,
@@ -16,67 +23,211 @@ from ppafo.simulation.declaration import (
     FREE,
     GAIT_SHANK,
     LEG,
+    SUPPLY_LINE,
+    THERMAL,
     Reading,
+    by_path,
     kind_at,
     profile_settings,
+    quantities,
     quantity_text,
     shank_settings,
     value_at,
 )
-from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion, ProfileChoice
+from ppafo.simulation.motion_kind import MotionKind, MotionSection
+from ppafo.simulation.scenario import (
+    OPEN_LOOP,
+    FreeMotion,
+    Leg,
+    PrescribedMotion,
+    ProfileChoice,
+    Scenario,
+    vane_motion,
+)
+from ppafo.simulation.schema import profile_table, quantity_fields, shank_table
 
 MAXIMUM_CHECKED_TIMES = 20_000
 TOLERANCE = 1.0e-9
-_ANGLE_PATH = "motion.angle"
+LOCKED_ANGLE = "motion.angle"
+_PROFILE, _SHANK = "motion.profile", "motion.shank"
 
 
-def read_motion(
-    reading: Reading, device: Device, duration: float, step: float, folder: Path
-) -> FreeMotion | PrescribedMotion:
-    """Return the motion of the vane; every angle [rad] that it prescribes lies between the stops of the device.
+def quantities_of_vane(scenario: Scenario, motion: Mapping[str, Any]) -> dict[str, Quantity]:
+    """Return the declaration of every number of a scenario of a vane, by path.
 
-    ScenarioError where one does not. ``duration`` and ``step`` are in seconds; in ``folder`` relative paths begin.
+    ``motion`` is its motion as a document that names the kinds in it and nothing else.
     """
-    kind = kind_at(reading.document, "motion")
-    if kind == "prescribed":
-        profile = read_profile(reading, "motion.profile", ANGLE_LEVEL)
-        problem = profile_problem(device.name, _stops(device), profile, duration, step)
-        if problem:
-            raise ScenarioError(f"{reading.file}: {problem}")
-        return PrescribedMotion(profile)
-    angle = reading.number(_ANGLE_PATH, ANGLE)
+    document: dict[str, Any] = {"motion": motion, "controller": {"kind": scenario.controller.kind}}
+    # A constant command follows no reference, whatever the scenario has in its place.
+    document |= {} if scenario.controller.kind == OPEN_LOOP else {"reference": {"kind": scenario.reference.kind}}
+    document |= {} if scenario.gas_model is None else {"gas_model": {"kind": THERMAL}}
+    return quantities(document | ({} if scenario.supply_line is None else {SUPPLY_LINE: {}}))
+
+
+def _nothing(_document: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return no paths: a kind without texts or profiles."""
+    return ()
+
+
+def _noise(scenario: Scenario) -> Any:
+    return scenario.sensors.angle_noise + scenario.sensors.pressure_noise
+
+
+def _switches(scenario: Scenario) -> tuple[Any, ...]:
+    return scenario.sensors.flaws
+
+
+_PLAN = late("ppafo.simulation.plan:plan_vane")
+_MEASURED_PRESCRIBED = late("ppafo.simulation.vane_recording:measured_prescribed")
+_OF_ALL_VANES: dict[str, Any] = {
+    "rules": late("ppafo.simulation.ensemble.vane:rules"),
+    "clock": late("ppafo.simulation.ensemble.vane:clock"),
+    "lacks": late("ppafo.simulation.ensemble.vane:lacks"),
+    "switches": _switches,
+    "noise": _noise,
+}
+
+
+def _read_angle(reading: Reading, device: Device) -> float:
+    """Return the angle [rad] of the vane; ScenarioError where it is not between the stops of the device."""
+    angle = reading.number(LOCKED_ANGLE, ANGLE)
     if not (device.actuator.angle_min - TOLERANCE <= angle <= device.actuator.angle_max + TOLERANCE):
-        raise reading.refusal(_ANGLE_PATH, f"must be between the stops of {device.name}, {_range_text(_stops(device))}")
-    if kind == "locked":
-        return PrescribedMotion(ProfileChoice("constant", {"level": angle}), kind)
-    if kind == "leg":
-        numbers = reading.section("motion", LEG)
-        start, rate = numbers.pop("angle"), numbers.pop("angular_velocity")
-        return FreeMotion(start, rate, leg=_read_leg(reading, numbers, folder))
+        raise reading.refusal(
+            LOCKED_ANGLE, f"must be between the stops of {device.name}, {_range_text(_stops(device))}"
+        )
+    return angle
+
+
+def _read_free(reading: Reading, device: Device, _duration: float, _step: float, _folder: Path) -> FreeMotion:
+    _read_angle(reading, device)
     numbers = reading.section("motion", FREE)
     return FreeMotion(numbers["angle"], numbers["angular_velocity"], numbers["external_torque"])
 
 
-def _read_leg(reading: Reading, numbers: dict[str, Any], folder: Path) -> Leg:
-    """Return a leg with these numbers of its foot, whose shank goes along a profile without corners or as in a gait."""
-    section = "motion.shank"
-    kind = kind_at(reading.document, section)
-    shank = ProfileChoice(kind, reading.section(section, shank_settings(kind)))
+FREE_MOTION = MotionKind(
+    name="free",
+    plan=_PLAN,
+    measured=late("ppafo.simulation.vane_recording:measured_free"),
+    quantities=partial(quantities_of_vane, motion={"kind": "free"}),
+    places={},
+    section=MotionSection(
+        summary="the vane moves as the torques demand",
+        quantities=lambda _: by_path("motion", FREE),
+        texts=_nothing,
+        profiles=_nothing,
+        fields=partial(quantity_fields, FREE),
+        read=_read_free,
+    ),
+    **_OF_ALL_VANES,
+)
+"""Equation (1), with a constant external torque."""
+
+
+def _quantities_of_locked(scenario: Scenario) -> dict[str, Quantity]:
+    # Without its kind, for the angle is listed last.
+    return quantities_of_vane(scenario, {}) | {LOCKED_ANGLE: ANGLE}
+
+
+def _read_locked(reading: Reading, device: Device, _duration: float, _step: float, _folder: Path) -> PrescribedMotion:
+    return PrescribedMotion(ProfileChoice("constant", {"level": _read_angle(reading, device)}), "locked")
+
+
+LOCKED_MOTION = MotionKind(
+    name="locked",
+    plan=_PLAN,
+    measured=_MEASURED_PRESCRIBED,
+    quantities=_quantities_of_locked,
+    places={LOCKED_ANGLE: ("motion", "profile", "level")},
+    section=MotionSection(
+        summary="the vane stays at one angle",
+        quantities=lambda _: by_path("motion", (ANGLE,)),
+        texts=_nothing,
+        profiles=_nothing,
+        fields=partial(quantity_fields, (ANGLE,)),
+        read=_read_locked,
+    ),
+    **_OF_ALL_VANES,
+)
+"""A vane on a test bench that is clamped: its profile is constant."""
+
+
+def _quantities_of_prescribed(scenario: Scenario) -> dict[str, Quantity]:
+    path = vane_motion(scenario).path
+    return quantities_of_vane(scenario, {"kind": "prescribed", "profile": {"kind": "" if path is None else path.kind}})
+
+
+def _read_prescribed(reading: Reading, device: Device, duration: float, step: float, _folder: Path) -> PrescribedMotion:
+    profile = read_profile(reading, _PROFILE, ANGLE_LEVEL)
+    problem = profile_problem(device.name, _stops(device), profile, duration, step)
+    if problem:
+        raise ScenarioError(f"{reading.file}: {problem}")
+    return PrescribedMotion(profile)
+
+
+PRESCRIBED_MOTION = MotionKind(
+    name="prescribed",
+    plan=_PLAN,
+    measured=_MEASURED_PRESCRIBED,
+    quantities=_quantities_of_prescribed,
+    places={},
+    section=MotionSection(
+        summary="the angle of the vane is a given function of time",
+        quantities=lambda document: by_path(_PROFILE, profile_settings(kind_at(document, _PROFILE), ANGLE_LEVEL)),
+        texts=lambda _: (f"{_PROFILE}.kind",),
+        profiles=lambda _: (_PROFILE,),
+        fields=lambda: {"profile": (profile_table(ANGLE_LEVEL, "Angle"), Field(description="angle in time"))},
+        read=_read_prescribed,
+    ),
+    **_OF_ALL_VANES,
+)
+"""The ankle goes along a profile whatever the device does."""
+
+
+def _quantities_of_leg(scenario: Scenario) -> dict[str, Quantity]:
+    leg = vane_motion(scenario).leg
+    return quantities_of_vane(scenario, {"kind": "leg", "shank": {"kind": "" if leg is None else leg.shank.kind}})
+
+
+def _declared_of_leg(document: Mapping[str, Any]) -> dict[str, Quantity]:
+    return by_path("motion", LEG) | by_path(_SHANK, shank_settings(kind_at(document, _SHANK)))
+
+
+def _texts_of_leg(document: Mapping[str, Any]) -> tuple[str, ...]:
+    gait = (f"{_SHANK}.gait",) if kind_at(document, _SHANK) == GAIT_SHANK else ()
+    return f"{_SHANK}.kind", *gait
+
+
+def _profiles_of_leg(document: Mapping[str, Any]) -> tuple[str, ...]:
+    return () if kind_at(document, _SHANK) == GAIT_SHANK else (_SHANK,)
+
+
+def _fields_of_leg() -> dict[str, Any]:
+    return quantity_fields(LEG) | {"shank": (shank_table(), Field(description="angle of the shank in time, 0 upright"))}
+
+
+def _read_leg(reading: Reading, device: Device, _duration: float, _step: float, folder: Path) -> FreeMotion:
+    """Return the motion with a leg whose shank goes along a profile without corners or as in a gait."""
+    _read_angle(reading, device)
+    numbers: dict[str, Any] = reading.section("motion", LEG)
+    start = numbers.pop("angle"), numbers.pop("angular_velocity")
+    kind = kind_at(reading.document, _SHANK)
+    shank = ProfileChoice(kind, reading.section(_SHANK, shank_settings(kind)))
     if kind != GAIT_SHANK:
         if not PROFILES[kind].is_smooth:
             smooth = ", ".join([name for name, item in PROFILES.items() if item.is_smooth] + [GAIT_SHANK])
             raise reading.refusal(
-                f"{section}.kind", f"this profile has corners, at which the foot would be struck; use one of {smooth}"
+                f"{_SHANK}.kind", f"this profile has corners, at which the foot would be struck; use one of {smooth}"
             )
-        return Leg(**numbers, shank=shank)
+        return FreeMotion(*start, leg=Leg(**numbers, shank=shank))
     # A vane alone, or on a shank at rest, loads no gaits.
     from ppafo.gait import list_gaits, load_gait, series_of
+    from ppafo.model.gait import ShankSeries
 
-    name = str(value_at(reading.document, f"{section}.gait"))
+    name = str(value_at(reading.document, f"{_SHANK}.gait"))
     try:
         gait = load_gait(name if name in list_gaits() else folder / name)
     except DataError as error:
-        raise reading.refusal(f"{section}.gait", one_line(error)) from error
+        raise reading.refusal(f"{_SHANK}.gait", one_line(error)) from error
     series = ShankSeries(
         frequency=1.0 / gait.stride_time,
         start=shank.start,
@@ -86,7 +237,26 @@ def _read_leg(reading: Reading, numbers: dict[str, Any], folder: Path) -> Leg:
         knee_forward=series_of(gait, "knee_forward"),
         knee_up=series_of(gait, "knee_up"),
     )
-    return Leg(**numbers, shank=shank, gait=gait.name, curves=series)
+    return FreeMotion(*start, leg=Leg(**numbers, shank=shank, gait=gait.name, curves=series))
+
+
+LEG_MOTION = MotionKind(
+    name="leg",
+    plan=late("ppafo.simulation.leg:plan_leg"),
+    measured=late("ppafo.simulation.leg:measured_leg"),
+    quantities=_quantities_of_leg,
+    places={},
+    section=MotionSection(
+        summary="the vane moves a foot that is free, on a shank that is led",
+        quantities=_declared_of_leg,
+        texts=_texts_of_leg,
+        profiles=_profiles_of_leg,
+        fields=_fields_of_leg,
+        read=_read_leg,
+    ),
+    **_OF_ALL_VANES,
+)
+"""Equation (11), without ground."""
 
 
 def read_profile(reading: Reading, section: str, prescribed: Quantity) -> ProfileChoice:
@@ -117,6 +287,7 @@ def _angles(profile: ProfileChoice, duration: float, step: float) -> Iterator[tu
         time = duration * number / count
         angle, rate, acceleration = kind.value(parameters, time)
         yield time, angle
+        # Where a parabola through this time turns: a crest between two times must not escape the check.
         away = -rate / acceleration if acceleration else 0.0
         if 0.0 < away < min(duration / count, duration - time):
             yield time + away, angle + 0.5 * rate * away

@@ -14,17 +14,19 @@ from ppafo.kinds import Kinds, declared_kinds
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MotionKind:
-    """What a motion of a leg that wears the device brings to the runs of its scenarios, as functions of the scenario.
+    """What a motion brings to the runs of its scenarios, as functions of the scenario.
 
     ``plan`` gives the run and what may be wrong with it, as ``plan_runs`` does; ``rules`` which numbers contradict each
     other. Any number may be an array (runs,) in both. ``quantities`` declares the numbers of the scenario beside those
-    of its device, ``places`` says by path which attributes lead to those that are not where all scenarios have them.
+    of its device, ``places`` says by path which attributes lead to those that are not where their path says.
     ``clock(scenario, times)`` gives the clock with other times [s], which may be arrays too, and what is wrong with it.
     ``noise`` is the sum of all levels of noise that its controller receives, ``switches`` are settings that are 0 for
     all runs of a program or for none. ``lacks(scenario, metric)`` says why it has not what a metric needs, an empty
     text where it has it. ``measured(scenario, run, times, rows)`` gives recording and metrics of rows (samples,) by
-    path, and how a run that was completed ended, in words. ``walk`` is what the kinds of walks differ in, a
-    ``walking.kind.WalkKind``.
+    path, and how a run that was completed ended, in words.
+
+    A kind has either a ``section``, which the file of a vane alone has as ``[motion]``, or a ``walk``, what the kinds
+    of walks differ in, a ``walking.kind.WalkKind``: the file of a walk is laid out in another way.
     """
 
     name: str
@@ -37,15 +39,55 @@ class MotionKind:
     noise: Callable[..., Any]
     lacks: Callable[..., str]
     measured: Callable[..., Any]
-    walk: Any
+    section: "MotionSection | None" = None
+    walk: Any = None
+
+
+@dataclass(frozen=True, slots=True)
+class MotionSection:
+    """What ``[motion]`` holds for a kind of motion of a vane alone.
+
+    ``quantities(document)`` declares its numbers by path, and ``texts(document)`` are the paths of its texts, kinds
+    among them; ``profiles(document)`` are sections that name a profile. ``fields()`` are its keys beside the kind, for
+    the layout of the file. ``read(reading, device, duration, step, folder)`` gives the motion; times are in seconds,
+    and in ``folder`` relative paths begin.
+    """
+
+    summary: str
+    quantities: Callable[[Mapping[str, Any]], dict[str, Any]]
+    texts: Callable[[Mapping[str, Any]], tuple[str, ...]]
+    profiles: Callable[[Mapping[str, Any]], tuple[str, ...]]
+    fields: Callable[[], dict[str, Any]]
+    read: Callable[..., Any]
 
 
 WALK, REACT = "walk", "react"
 """The motion of a leg that a gait leads, and the motion of a neuromuscular gait model."""
 
+VANE_MOTIONS = ("free", "locked", "prescribed", "leg")
+"""Motions of a vane alone that this package has."""
+
 _GROUP = "ppafo.motions"
-WALKS: Kinds[MotionKind] = Kinds(_GROUP, "motion", MotionKind, declared_kinds(_GROUP))
-"""Motions of a leg that walks with the device; their files have sections of their own (``walking/declaration.py``)."""
+MOTIONS: Kinds[MotionKind] = Kinds(
+    _GROUP,
+    "motion",
+    MotionKind,
+    {
+        "free": "ppafo.simulation.motion:FREE_MOTION",
+        "locked": "ppafo.simulation.motion:LOCKED_MOTION",
+        "prescribed": "ppafo.simulation.motion:PRESCRIBED_MOTION",
+        "leg": "ppafo.simulation.motion:LEG_MOTION",
+        **declared_kinds(_GROUP),
+    },
+)
+"""Motions of a vane alone, and of a leg that walks with the device, which folders above this one declare."""
+
+
+def is_walk(name: str) -> bool:
+    """Tell whether a kind of motion is a walk; KindError where the kind cannot be used."""
+    kind = MOTIONS.get(name)
+    return kind is not None and kind.walk is not None
+
 
 RENAMED_KEYS = {"wearer.reacts": 'motion.kind = "react" and wearer.name = "{value}"'}
 """Keys of files of the version before, and what to write in their place."""

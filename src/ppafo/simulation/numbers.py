@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.control.controllers import switching
 from ppafo.engine.lanes import Floats
 from ppafo.errors import ScenarioError, nearest_name
 from ppafo.model.catalog import VALVES, device_effects, find_effects
@@ -17,13 +16,12 @@ from ppafo.parameters.device import Device, Orifice, SonicOrifice
 from ppafo.parameters.graph import ATMOSPHERE_PATH, Graph, holding, left, resolved
 from ppafo.parameters.overrides import either, in_two_forms, one_path
 from ppafo.parameters.plant import all_settings
-from ppafo.simulation import declaration
 from ppafo.simulation.clock import Clock, read_clock
-from ppafo.simulation.declaration import SUPPLY_LINE, Reading
+from ppafo.simulation.declaration import TEXTS, Reading
+from ppafo.simulation.motion import LOCKED_ANGLE
 from ppafo.simulation.overrides import apply_overrides
-from ppafo.simulation.scenario import PYTHON_CONTROLLER, FreeMotion, PrescribedMotion, Scenario, worn_kind
+from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario, vane_motion
 
-LOCKED_ANGLE = "motion.angle"
 TIMES = ("run.duration", "run.step", "run.output_interval", "controller.rate", "controller.period")
 """Paths that decide the clock of a run."""
 
@@ -32,7 +30,7 @@ _OF_DEVICE = (*_DEVICE_SECTIONS, "valve", EFFECT_SETTINGS)
 _ORIFICES = {"actuator.leak": ("device", "actuator", "leak"), "valve": ("device", "valve", "orifice")}
 
 _TEXTS = (
-    *declaration.TEXTS,
+    *TEXTS,
     "gas.species",
     "supply.relieving",
     "motion.kind",
@@ -42,7 +40,8 @@ _TEXTS = (
     "motion.shank.kind",
     "motion.shank.gait",
 )
-_OF_LEG = frozenset(item.name for item in declaration.LEG) - {item.name for item in declaration.FREE}
+_HOLDERS = ("settings", "orifice", "leg")
+"""Fields whose numbers are attributes of what has them."""
 _UNIT_OF_TIMES = {"controller.rate": "Hz"}
 
 
@@ -53,12 +52,8 @@ def chosen_path(path: str, scenario: Scenario) -> str:
 
 def declared_numbers(scenario: Scenario) -> dict[str, Quantity]:
     """Return the declaration of every number of a scenario and its device, by path; both forms of an orifice."""
-    worn = worn_kind(scenario)
-    if worn is not None:
-        own: dict[str, Quantity] = worn.quantities(scenario)
-        return device_numbers(scenario.device) | own
-    kinds = declaration.quantities(_kinds(scenario))
-    return device_numbers(scenario.device) | kinds | _angle_of_locked_vane(scenario)
+    own: dict[str, Quantity] = scenario.motion.motion_kind.quantities(scenario)
+    return device_numbers(scenario.device) | own
 
 
 def device_numbers(device: Device) -> dict[str, Quantity]:
@@ -137,44 +132,18 @@ def other_form(device: Device, section: str) -> tuple[str, ...]:
     return tuple(item.name for item in (SONIC_FORM if isinstance(orifice, Orifice) else AREA_FORM))
 
 
-def _kinds(scenario: Scenario) -> dict[str, Any]:
-    """Return a document that names the kinds of the scenario and nothing else; a constant command has no reference."""
-    motion: dict[str, Any] = {"kind": "free"}
-    if isinstance(scenario.motion, FreeMotion) and scenario.motion.leg is not None:
-        motion = {"kind": "leg", "shank": {"kind": scenario.motion.leg.shank.kind}}
-    if isinstance(scenario.motion, PrescribedMotion):
-        is_locked = scenario.motion.kind == "locked"
-        motion = {} if is_locked else {"kind": "prescribed", "profile": {"kind": scenario.motion.profile.kind}}
-    controller = {"kind": scenario.controller.kind}
-    gas: dict[str, Any] = {} if scenario.gas_model is None else {"gas_model": {"kind": declaration.THERMAL}}
-    gas |= {} if scenario.supply_line is None else {SUPPLY_LINE: {}}
-    if scenario.controller.kind == switching.CONSTANT.name:
-        return {"motion": motion, "controller": controller, **gas}
-    return {"motion": motion, "controller": controller, "reference": {"kind": scenario.reference.kind}, **gas}
-
-
-def _angle_of_locked_vane(scenario: Scenario) -> dict[str, Quantity]:
-    return {LOCKED_ANGLE: declaration.ANGLE} if path_of_locked_angle(scenario) == LOCKED_ANGLE else {}
-
-
 def path_of_locked_angle(scenario: Scenario) -> str | None:
     """Return the path of the angle at which a vane stays, None where it moves."""
-    motion = scenario.motion
-    if not isinstance(motion, PrescribedMotion) or motion.profile.kind != "constant":
+    if scenario.walks or vane_motion(scenario).locked_angle is None:
         return None
-    return LOCKED_ANGLE if motion.kind == "locked" else "motion.profile.level"
+    return LOCKED_ANGLE if LOCKED_ANGLE in scenario.motion.motion_kind.places else "motion.profile.level"
 
 
 def _place(path: str, scenario: Scenario) -> tuple[str, ...]:
-    """Return the attributes that lead from the scenario to a number: its path, but for a few of a motion."""
-    section, _, name = path.rpartition(".")
-    worn = worn_kind(scenario)
-    if worn is not None and path in worn.places:
-        return worn.places[path]
-    if path == LOCKED_ANGLE and not isinstance(scenario.motion, FreeMotion):
-        return ("motion", "profile", "level")
-    if section == "motion.shank" or (section == "motion" and name in _OF_LEG):
-        return ("motion", "leg", *path.split(".")[1:])
+    """Return the attributes that lead from the scenario to a number: its path, unless its motion says otherwise."""
+    places = scenario.motion.motion_kind.places
+    if path in places:
+        return places[path]
     parts = tuple(path.split("."))
     return ("device", *parts) if parts[0] in _OF_DEVICE else parts
 
@@ -186,9 +155,13 @@ def _replace_number(node: Any, parts: tuple[str, ...], number: Any) -> Any:
         return {**node, name: inner}
     if name in _names(node):
         return replace(node, **{name: inner})
-    # Among its settings, or in its orifice: there it is an attribute all the same.
-    field = "settings" if name in node.settings else "orifice"
-    return replace(node, **{field: _replace_number(getattr(node, field), parts, number)})
+    # Among its settings, in its orifice or on its leg: there it is an attribute of its own all the same.
+    holder = next(field for field in _HOLDERS if _has(getattr(node, field, None), name))
+    return replace(node, **{holder: _replace_number(getattr(node, holder), parts, number)})
+
+
+def _has(inner: Any, name: str) -> bool:
+    return name in inner if isinstance(inner, Mapping) else hasattr(inner, name)
 
 
 def _names(node: Any) -> frozenset[str]:

@@ -6,15 +6,13 @@ library has them in C.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ppafo.constants import STANDARD_GRAVITY
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.kind import ControllerKind, ProfileKind
 from ppafo.engine.components import GasScheme
-from ppafo.engine.led_leg import GAIT_SHANK, LedLeg
 from ppafo.engine.over_samples import over_samples
 from ppafo.engine.program import NoParameters, Program
 from ppafo.engine.rows import rebuilt
@@ -41,7 +39,6 @@ from ppafo.model.columns import (
 )
 from ppafo.model.effects.kind import Effect
 from ppafo.model.gas import wall_exchange
-from ppafo.model.leg import FootLoad
 from ppafo.model.orifice import ExactOrifice
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, chamber_mass, chamber_volumes
 from ppafo.model.ports import gas_density
@@ -59,16 +56,14 @@ from ppafo.parameters.plant import (
 )
 from ppafo.simulation.scenario import (
     PYTHON_CONTROLLER,
-    FreeMotion,
     GasModel,
-    Leg,
-    PrescribedMotion,
     ProfileChoice,
     Scenario,
-    VaneMotion,
     vane_motion,
-    worn_kind,
 )
+
+if TYPE_CHECKING:
+    from ppafo.engine.led_leg import LedLeg
 
 MAXIMUM_STEPS = 1.0e9
 
@@ -111,7 +106,18 @@ class Components:
     supply_lines: SupplyLines | None
     signal_delay: Any = 0.0
     sections: Mapping[str, Any] = field(default_factory=dict)
-    leg: Leg | None = None
+    leg: "CarriedLeg | None" = None
+
+
+@dataclass(frozen=True, slots=True)
+class CarriedLeg:
+    """A leg on an unconstrained vane: what leads its shank, and what ``put_on(plant)`` makes of a plant without one.
+
+    That is the plant with the foot on it, and the leg as the engine has it.
+    """
+
+    shank: ProfileKind
+    put_on: Callable[[PlantParameters], "tuple[PlantParameters, LedLeg]"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,8 +156,7 @@ def compose_run(
     settings = valve_settings(components.device.valve)
     delay = components.valve.command_delay(settings)
     plant = plant_behind_lines(plant, components.supply_lines)
-    leg = None if components.leg is None else led_leg(plant, components.leg)
-    plant = plant if leg is None else with_load(plant, leg.load)
+    plant, leg = (plant, None) if components.leg is None else components.leg.put_on(plant)
     # After lines and leg: the rule looks at the plant with both.
     steps = rule(plant)
     return Run(
@@ -228,7 +233,7 @@ def _program(components: Components, steps: Steps, walk: WornLeg | None, has_del
         # A broken number of steps to a sample puts samples inside steps.
         samples_inside=bool(first(steps.record_every % 1.0)),
         effects=effects,
-        shank=None if components.leg is None else shank_kind(components.leg),
+        shank=None if components.leg is None else components.leg.shank,
     )
 
 
@@ -237,12 +242,14 @@ def plan_runs(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
 
     All runs of an ensemble must ask for one program: of a valve's and the sensors' settings, each is 0 for all or none.
     """
-    worn = worn_kind(scenario)
-    if worn is not None:
-        planned: tuple[Run, tuple[Problem, ...]] = worn.plan(scenario)
-        return planned
+    planned: tuple[Run, tuple[Problem, ...]] = scenario.motion.motion_kind.plan(scenario)
+    return planned
+
+
+def plan_vane(scenario: Scenario, leg: CarriedLeg | None = None) -> tuple[Run, tuple[Problem, ...]]:
+    """The run of a scenario of a vane alone, with a leg or without, and what may be wrong with it."""
     device, motion, control = scenario.device, vane_motion(scenario), scenario.controller
-    plant = plant_parameters(device, outside_torque(motion))
+    plant = plant_parameters(device, motion.outside_torque)
     law = None if control.kind == PYTHON_CONTROLLER else CONTROLLERS[control.kind]
     numbers, problems = _numbers_of_law(law, scenario, plant.torque_constant)
     components = Components(
@@ -251,14 +258,14 @@ def plan_runs(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         controller=law,
         settings=numbers,
         reference=scenario.reference,
-        path=None if isinstance(motion, FreeMotion) else motion.profile,
+        path=motion.path,
         sensors=sensor_parameters(scenario),
         has_ideal_sensors=has_ideal_sensors(scenario),
         thermal=scenario.gas_model,
         supply_lines=scenario.supply_lines,
         signal_delay=scenario.sensors.delay,
         sections=scenario.effect_sections,
-        leg=motion.leg if isinstance(motion, FreeMotion) else None,
+        leg=leg,
     )
     run = compose_run(
         components, plant, lambda fed: scenario_steps(scenario, fed), lambda fed: initial_state(scenario, fed)
@@ -296,57 +303,6 @@ def scenario_steps(scenario: Scenario, plant: PlantParameters) -> Steps:
 def relative_tolerance(tolerance: float) -> float:
     """Allowed error of a pressure over the one that is allowed by default [-], from ``run.tolerance`` [-]."""
     return tolerance / KEPT_OF_PRESSURE
-
-
-def outside_torque(motion: VaneMotion) -> Any:
-    """Constant torque [N m] that works against plantarflexion beside a leg, which T_2 of equation (11) does below 0."""
-    if not isinstance(motion, FreeMotion):
-        return 0.0
-    return motion.external_torque if motion.leg is None else -motion.leg.ankle_torque
-
-
-def shank_kind(leg: Leg) -> ProfileKind:
-    """What leads the shank of a leg."""
-    return PROFILES[leg.shank.kind] if leg.curves is None else GAIT_SHANK
-
-
-def shank_parameters(leg: Leg) -> Any:
-    """Parameters of what leads the shank of a leg; its settings may be arrays (runs,)."""
-    if leg.curves is None:
-        return profile_parameters(leg.shank)
-    return leg.curves._replace(start=leg.shank.start, toe_lever=leg.toe_lever)
-
-
-def led_leg(plant: PlantParameters, leg: Leg) -> LedLeg:
-    """A leg on a plant that has none yet."""
-    foot = (leg.foot_mass, leg.foot_mass_centre, leg.foot_inertia)
-    return LedLeg(foot_load(plant.inertia, plant.gravity_torque, *foot, leg.shank_length), shank_parameters(leg))
-
-
-def foot_load(
-    inertia: float,
-    gravity_torque: float,
-    foot_mass: float,
-    foot_mass_centre: float,
-    foot_inertia: float,
-    shank_length: float,
-) -> FootLoad:
-    """What turns about the ankle of a leg: J and S of equation (11) with (1), docs/equations.md.
-
-    Inertia [kg m^2] and largest gravity torque [N m] of foot plate and vane, then the foot and the shank as in ``Leg``.
-    """
-    moment = foot_mass * foot_mass_centre
-    return FootLoad(
-        mass_moment=moment + gravity_torque / STANDARD_GRAVITY,
-        inertia=inertia + foot_inertia + moment * foot_mass_centre,
-        shank_length=shank_length,
-        gravity=STANDARD_GRAVITY,
-    )
-
-
-def with_load(plant: PlantParameters, load: FootLoad) -> PlantParameters:
-    """The plant with the inertia of all that turns; the weight of the foot plate is accounted for in the leg."""
-    return plant._replace(inertia=load.inertia, gravity_torque=0.0)
 
 
 def valve_parameters(valve: ValveModel, settings: Any) -> Any:
@@ -437,12 +393,12 @@ def is_adaptive(scenario: Scenario, plant: PlantParameters, step: float) -> Any:
     """
     if scenario.supply_lines is not None or scenario.device.actuator.kind != VANE.name:
         return True
-    motion = scenario.motion
-    if not isinstance(motion, PrescribedMotion) or motion.profile.kind != "constant":
+    angle = vane_motion(scenario).locked_angle
+    if angle is None:
         return True
     # The pressure of gas with an energy balance follows faster, by its heat capacity ratio.
     stiffness = 1.0 if scenario.gas_model is None else scenario.device.gas.heat_capacity_ratio
-    return np.logical_not(is_slow_locked(plant, step, motion.profile.level, stiffness))
+    return np.logical_not(is_slow_locked(plant, step, angle, stiffness))
 
 
 def profile_bounds(choice: ProfileChoice) -> tuple[float, float]:
@@ -456,11 +412,11 @@ def profile_bounds(choice: ProfileChoice) -> tuple[float, float]:
 def initial_state(scenario: Scenario, plant: PlantParameters) -> PlantState:
     """Angle, angular velocity and gas at the start."""
     motion = vane_motion(scenario)
-    if isinstance(motion, FreeMotion):
+    if motion.path is None:
         angle, rate = motion.angle, motion.angular_velocity
     else:
-        path = PROFILES[motion.profile.kind]
-        numbers = [motion.profile.settings[item.name] for item in path.quantities]
+        path = PROFILES[motion.path.kind]
+        numbers = [motion.path.settings[item.name] for item in path.quantities]
         angle, rate, _ = over_runs(lambda *values: path.value(rebuilt(path.parameters, values), 0.0), *numbers)
     pressures = scenario.initial.pressure_1, scenario.initial.pressure_2
     kind = scenario.device.actuator.kind

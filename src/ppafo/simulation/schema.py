@@ -16,6 +16,7 @@ from ppafo.control.kind import ControllerKind
 from ppafo.documents.models import NAME, make_schema, one_of, optional, table
 from ppafo.model.declaration import Quantity
 from ppafo.simulation import declaration
+from ppafo.simulation.motion_kind import MOTIONS, VANE_MOTIONS, MotionKind
 from ppafo.simulation.scenario import LARGEST_SEED
 
 _LONGEST_NAME = 100
@@ -57,7 +58,8 @@ def model_name(name: str) -> str:
     return "".join(part.capitalize() for part in re.split(r"\W|_", name))
 
 
-def _profile(prescribed: Quantity, purpose: str) -> Any:
+def profile_table(prescribed: Quantity, purpose: str) -> Any:
+    """Return the section of a profile; ``purpose`` ends the names of its models."""
     return one_of(
         [
             table(
@@ -69,33 +71,25 @@ def _profile(prescribed: Quantity, purpose: str) -> Any:
     )
 
 
+def motion_kinds() -> dict[str, MotionKind]:
+    """Return the kinds of motion of a vane alone: all of this package, and loaded ones of others."""
+    others = {name: kind for name, kind in MOTIONS.loaded().items() if kind.section is not None}
+    return {name: MOTIONS[name] for name in VANE_MOTIONS} | others
+
+
 def _motion() -> Any:
-    prescribed = {"profile": (_profile(declaration.ANGLE_LEVEL, "Angle"), Field(description="angle in time"))}
+    sections = {name: kind.section for name, kind in motion_kinds().items()}
     return one_of(
         [
-            table(
-                "FreeMotion",
-                kind_field("free", "the vane moves as the torques demand") | quantity_fields(declaration.FREE),
-            ),
-            table(
-                "LockedMotion",
-                kind_field("locked", "the vane stays at one angle") | quantity_fields((declaration.ANGLE,)),
-            ),
-            table(
-                "PrescribedMotion",
-                kind_field("prescribed", "the angle of the vane is a given function of time") | prescribed,
-            ),
-            table(
-                "LegMotion",
-                kind_field("leg", "the vane moves a foot that is free, on a shank that is led")
-                | quantity_fields(declaration.LEG)
-                | {"shank": (_shank(), Field(description="angle of the shank in time, 0 upright"))},
-            ),
+            table(f"{model_name(name)}Motion", kind_field(name, section.summary) | section.fields())
+            for name, section in sections.items()
+            if section is not None
         ]
     )
 
 
-def _shank() -> Any:
+def shank_table() -> Any:
+    """Return the section of the shank of a leg."""
     gait = {"gait": (str, Field(min_length=1, description="name of a gait, or a path relative to this file"))}
     return one_of(
         [
@@ -193,7 +187,8 @@ def scenario_file() -> type[BaseModel]:
 
     A file that names no controller is compared with all of this package.
     """
-    return _scenario_file(tuple(CONTROLLERS.loaded_or_own().items()), tuple(PROFILES.loaded().items()))
+    controllers, profiles = CONTROLLERS.loaded_or_own(), PROFILES.loaded()
+    return _scenario_file(tuple(controllers.items()), tuple(profiles.items()), tuple(motion_kinds()))
 
 
 def whole_scenario_file() -> type[BaseModel]:
@@ -205,7 +200,7 @@ def whole_scenario_file() -> type[BaseModel]:
 @functools.lru_cache(maxsize=4)
 def _scenario_file(*_kinds: Any) -> type[BaseModel]:
     words = tuple(declaration.PRESSURE_WORDS)
-    reference = _profile(declaration.TORQUE_LEVEL, "Reference")
+    reference = profile_table(declaration.TORQUE_LEVEL, "Reference")
     initial = table("Initial", quantity_fields(declaration.INITIAL, words))
     own: dict[str, Any] = {
         "run": (

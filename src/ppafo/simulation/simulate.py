@@ -10,35 +10,18 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from ppafo.control.profiles import CONSTANT
 from ppafo.documents.json_text import plain
-from ppafo.engine.lane_source import SAME_MOMENT
 from ppafo.engine.lanes import BatchResult, Floats, load_program, load_programs
-from ppafo.engine.led_leg import GAIT_SHANK, shank_over_samples
-from ppafo.engine.over_samples import over_samples
-from ppafo.engine.program import place_over_samples
-from ppafo.engine.rows import leaf_paths, rebuilt
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, batch_of, run_together, state_row_numbers
-from ppafo.engine.scheme.actuators import pressures_of, torque_of, volumes_of
+from ppafo.engine.scheme.actuators import pressures_of, volumes_of
 from ppafo.errors import SimulationError
-from ppafo.model.gait import foot_in_gait
-from ppafo.model.gas import energy_per_content
-from ppafo.model.leg import torque_on_foot
-from ppafo.model.plant import gravity_torque, sliding_friction
-from ppafo.model.ports import friction_in_motion
-from ppafo.model.regulator import LineState, line_pressures
-from ppafo.parameters.device import Gas
-from ppafo.signals.recording import Channel, Recording
+from ppafo.signals.recording import Recording
 from ppafo.simulation.accuracy import LARGEST_OF_ANGLE, LARGEST_OF_PRESSURE, MARGIN, ErrorEstimate, finer
 from ppafo.simulation.check import ALLOWED_CHANGE, FINER, MOVE, MOVED_MEASUREMENT, MOVED_START, Check, NumberCheck
-from ppafo.simulation.plan import foot_load, plan_run, profile_values, shank_kind
+from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import (
-    FreeMotion,
-    Leg,
-    PrescribedMotion,
     Scenario,
     scenario_document,
-    worn_kind,
 )
 from ppafo.version import __version__
 
@@ -47,9 +30,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ppafo.metrics.metric import Metric
-
-OPEN_LOOP = "constant"
-"""The controller that follows no reference: its recordings have none, so that no tracking error is made of it."""
 
 REMEDY = (
     "the step may be too long for this device, or a value unrealistic: try a smaller run.step, "
@@ -80,8 +60,8 @@ class Status:
         return self.kind == "completed"
 
 
-Measured = tuple[Recording, "Mapping[str, Metric]"]
-"""The channels of a run, and its metrics."""
+Measured = tuple[Recording, "Mapping[str, Metric]", str]
+"""The channels of a run, its metrics, and how it ended if it was completed, in words."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -105,7 +85,7 @@ class Result:
             raise AttributeError(f"a result has no '{name}'", name=name, obj=self)
         measure = self._measure
         if measure is not None:
-            recording, metrics = measure()
+            recording, metrics, _ = measure()
             # The class is frozen, and these two are only kept, so they are set past it.
             object.__setattr__(self, "recording", recording)
             object.__setattr__(self, "metrics", metrics)
@@ -241,34 +221,28 @@ def result_of(scenario: Scenario, run: Run, outcome: BatchResult) -> Result:
     kept = times.size if status.time is None else max(1, int(np.searchsorted(times, status.time)))
     versions = {"ppafo": __version__, "python": platform.python_version(), "numpy": np.__version__}
     engine = {"step": run.step, "steps": run.step_count, "steps_per_sample": run.steps_per_sample}
-    worn = worn_kind(scenario)
-    if worn is not None:
-        from ppafo.metrics.metric import Metrics
-
-        recording, metrics, ended = worn.measured(scenario, run, times[:kept], _by_path(record[:kept], rows))
+    if scenario.walks:
+        # A walk is measured at once, for its status says how it ended.
+        recording, metrics, ended = _measured(scenario, run, times[:kept], record[:kept], rows)
         status = replace(status, message=ended) if status.is_completed else status
-        return Result(scenario, recording, Metrics(metrics), status, versions, engine)
+        return Result(scenario, recording, metrics, status, versions, engine)
     shown = {path: row for path, row in rows.items() if not path.startswith(_OF_STEPS)}
     # Without __init__ recording and metrics stay unset, so that __getattr__ makes them when first asked for.
     result: Result = object.__new__(Result)
     known = {"scenario": scenario, "status": status, "versions": versions, "engine": engine}
-    measure = partial(_measure, scenario, run, times[:kept], record[:kept], shown)
+    measure = partial(_measured, scenario, run, times[:kept], record[:kept], shown)
     for name, value in {**known, "_measure": measure}.items():
         object.__setattr__(result, name, value)
     return result
 
 
-def _by_path(record: Floats, rows: Mapping[str, int]) -> dict[str, Floats]:
-    """Rows (samples,) of a record (samples, rows), each in one piece."""
-    return {path: np.ascontiguousarray(record[:, row]) for path, row in rows.items()}
-
-
-def _measure(scenario: Scenario, run: Run, times: Floats, record: Floats, rows: Mapping[str, int]) -> Measured:
-    from ppafo.metrics import evaluate
+def _measured(scenario: Scenario, run: Run, times: Floats, record: Floats, rows: Mapping[str, int]) -> "Measured":
+    """Recording and metrics of a record (samples, rows), and how a completed run ended."""
     from ppafo.metrics.metric import Metrics
 
-    recording = _recording(scenario, run, times, _by_path(record, rows))
-    return recording, Metrics(evaluate(recording))
+    by_path = {path: np.ascontiguousarray(record[:, row]) for path, row in rows.items()}
+    recording, metrics, ended = scenario.motion.motion_kind.measured(scenario, run, times, by_path)
+    return recording, Metrics(metrics), ended
 
 
 def _status(outcome: BatchResult, record: Floats, rows: dict[str, int], times: Floats) -> Status:
@@ -286,125 +260,6 @@ def _status(outcome: BatchResult, record: Floats, rows: dict[str, int], times: F
     )
     remedy = TOO_MANY_PARTS if outcome.states[rows["result.too_many_parts"], 0] else REMEDY
     return Status("diverged", time, f"diverged at t = {time:.6g} s (before that: {state}); {remedy}")
-
-
-def _recording(scenario: Scenario, run: Run, times: Floats, rows: Mapping[str, Floats]) -> Recording:
-    angle, rate = rows["state.angle"], rows["state.angular_velocity"]
-    actuator = run.program.actuator
-    pressure_1, pressure_2 = pressures_of(actuator, run.plant, angle, rows["state.mass_1"], rows["state.mass_2"])
-    torque = np.asarray(torque_of(actuator, run.plant, angle, pressure_1, pressure_2))
-    channels = {
-        "angle": (angle, "rad"),
-        "angular_velocity": (rate, "rad/s"),
-        "pressure_1": (pressure_1, "Pa"),
-        "pressure_2": (pressure_2, "Pa"),
-        "torque": (torque, "N m"),
-        "command": (rows["result.command"], "-"),
-        "supplied_mass": (rows["state.supplied_mass"], "kg"),
-        "vented_mass": (rows["state.vented_mass"], "kg"),
-        "leaked_mass": (rows["state.leaked_mass"], "kg"),
-        "external_torque": (_external_torque(scenario, run, times, rows, torque), "N m"),
-        "mass_1": (rows["state.mass_1"], "kg"),
-        "mass_2": (rows["state.mass_2"], "kg"),
-    }
-    if scenario.controller.kind != OPEN_LOOP:
-        # Times of the first samples [s], shape (count,), rounded as the engine does, so that a reference has its bits.
-        steps = np.arange(times.size, dtype=np.float64) * run.record_every
-        whole = np.round(steps)
-        moments: Floats = np.where(np.abs(steps - whole) <= SAME_MOMENT, whole, steps) * run.step
-        channels["reference"] = (profile_values(scenario.reference, moments)[0], "N m")
-    channels |= gas_channels(scenario.device.gas, run, rows)
-    channels |= _leg_channels(run, times, angle)
-    values = {name: Channel(np.asarray(series), unit) for name, (series, unit) in channels.items()}
-    return Recording(scenario.name, times, values, kind="simulated")
-
-
-def _leg_channels(run: Run, times: Floats, angle: Floats) -> dict[str, tuple[Floats, str]]:
-    """Shank and foot of a leg whose shank moves; where a gait leads it, beside the foot that was measured."""
-    kind, leg = run.program.shank, run.leg
-    if kind is None or leg is None or kind is CONSTANT:
-        return {}
-    shank = np.broadcast_to(shank_over_samples(kind, leg.shank, times).angle, times.shape)
-    if kind is not GAIT_SHANK:
-        return {"shank_angle": (shank, "rad"), "foot_angle": (shank - angle + 0.5 * np.pi, "rad")}
-    foot = over_samples(foot_in_gait, leg.shank, times, angle)
-    return {
-        "shank_angle": (shank, "rad"),
-        "foot_angle": (foot.angle, "rad"),
-        "measured_foot_angle": (foot.measured_angle, "rad"),
-        "toe_difference": (foot.toe_difference, "m"),
-    }
-
-
-def gas_channels(gas: Gas, run: Run, rows: Mapping[str, Floats]) -> dict[str, tuple[Floats, str]]:
-    """Return what a run records of its gas beside pressures, in SI with the unit, from rows (samples,) by path.
-
-    Line pressures and the gas through the bottle's regulator where there are lines; true masses, temperatures and
-    energies where the gas has an energy balance.
-    """
-    found: dict[str, tuple[Floats, str]] = {}
-    if run.lines is not None:
-        lines = rebuilt(LineState, [rows[path] for path in leaf_paths(LineState, "line_state")])
-        line_1, line_2 = line_pressures(run.lines.parameters, run.plant.gas_product, lines)
-        found |= {"line_pressure_1": (np.asarray(line_1), "Pa"), "line_pressure_2": (np.asarray(line_2), "Pa")}
-        found["regulated_mass"] = (np.asarray(lines.regulated_mass), "kg")
-    if run.program.has_true_masses:
-        found |= {name: (rows[f"masses.{name}"], "kg") for name in ("mass_1", "mass_2")}
-    if not run.program.is_thermal:
-        return found
-    for chamber in (1, 2):
-        warmth = rows[f"state.mass_{chamber}"] / rows[f"masses.mass_{chamber}"]
-        found[f"temperature_{chamber}"] = (gas.temperature * warmth, "K")
-    per_content = energy_per_content(run.plant.gas_product, gas.heat_capacity_ratio)
-    found["gas_energy"] = (per_content * (rows["state.mass_1"] + rows["state.mass_2"]), "J")
-    for name, row in (("supplied_enthalpy", "supplied"), ("vented_enthalpy", "vented"), ("wall_heat", "heat")):
-        found[name] = (per_content * rows[f"masses.{row}_content"], "J")
-    found["gas_work"] = (rows["masses.gas_work"], "J")
-    return found
-
-
-def _external_torque(scenario: Scenario, run: Run, times: Floats, rows: Mapping[str, Floats], torque: Floats) -> Floats:
-    """T_ex of equation (1) [N m]: of a free vane its constant or what a leg gets, or what keeps one on its path."""
-    plant = run.plant
-    if isinstance(scenario.motion, FreeMotion) and scenario.motion.leg is not None:
-        return _torque_on_leg(scenario.motion.leg, run, times, rows, torque)
-    if not isinstance(scenario.motion, PrescribedMotion):
-        return np.full(times.size, plant.external_torque)
-    acceleration = profile_values(scenario.motion.profile, times)[2]
-    angle, rate = rows["state.angle"], rows["state.angular_velocity"]
-    friction = over_samples(sliding_friction, rate, 1.0) * _sizes_of_friction(run, rows)
-    gravity = gravity_torque(angle, plant.gravity_torque)
-    return np.asarray(torque - gravity - friction - plant.viscous_damping * rate - plant.inertia * acceleration)
-
-
-def _torque_on_leg(leg: Leg, run: Run, times: Floats, rows: Mapping[str, Floats], torque: Floats) -> Floats:
-    """T_ex [N m] by the second row of equation (11): what the foot needs beside T_2. A blow at a stop is not in it."""
-    assert run.leg is not None, "the run has the leg of its scenario"
-    angle, rate, plant = rows["state.angle"], rows["state.angular_velocity"], run.plant
-    foot = foot_load(0.0, 0.0, leg.foot_mass, leg.foot_mass_centre, leg.foot_inertia, leg.shank_length)
-    kind = shank_kind(leg)
-    now = shank_over_samples(kind, run.leg.shank, times)
-    added, needed = (over_samples(torque_on_foot, load, now, angle) for load in (run.leg.load, foot))
-    net = torque + added - plant.external_torque - plant.viscous_damping * rate
-    net -= np.sign(rate) * _sizes_of_friction(run, rows)
-    # A vane at rest is held by friction or a stop.
-    acceleration = np.where(rate != 0.0, net / plant.inertia, 0.0)
-    return np.asarray(foot.inertia * acceleration - needed + plant.external_torque)
-
-
-def _sizes_of_friction(run: Run, rows: Mapping[str, Floats]) -> Floats | float:
-    """Size of the friction torque in motion [N m] at each sample, with the effects of a run."""
-    law = place_over_samples(friction_in_motion, run.program.effects, run.effects)
-    if law is None:
-        return run.plant.dynamic_torque
-    angle, masses = rows["state.angle"], (rows["state.mass_1"], rows["state.mass_2"])
-    pressures = pressures_of(run.program.actuator, run.plant, angle, *masses)
-    states = {
-        name: rebuilt(row, [rows[path] for path in leaf_paths(row, name)])
-        for name, row in run.program.effect_states.items()
-    }
-    sizes: Floats = law(states, run.plant.dynamic_torque, rows["state.angular_velocity"], *pressures)
-    return sizes
 
 
 def compile_models(scenarios: Iterable[Scenario]) -> None:

@@ -21,8 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.simulation.scenario import LARGEST_SEED, Scenario, worn_kind
-from ppafo.simulation.simulate import OPEN_LOOP
+from ppafo.simulation.scenario import LARGEST_SEED, OPEN_LOOP, Scenario
 from ppafo.studies.distributions import Floats, WholeNumbersBetween
 from ppafo.studies.study import Drawn, Sample
 
@@ -177,8 +176,7 @@ def is_noisy(scenarios: Iterable[Scenario], paths: Sequence[str] = ()) -> bool:
 
 def _noise_of(scenario: Scenario) -> Any:
     """Return the summed noise levels of a scenario, which may be an array (runs,)."""
-    worn = worn_kind(scenario)
-    return scenario.sensors.angle_noise + scenario.sensors.pressure_noise if worn is None else worn.noise(scenario)
+    return scenario.motion.motion_kind.noise(scenario)
 
 
 def with_noise(

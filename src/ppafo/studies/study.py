@@ -11,8 +11,7 @@ from ppafo.errors import StudyError, UnitError, first_twice, nearest_name, refus
 from ppafo.loading import reloaded, scenario_or_load
 from ppafo.metrics import METRICS
 from ppafo.simulation.ensemble.running import lacking, offered
-from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.simulate import OPEN_LOOP
+from ppafo.simulation.scenario import OPEN_LOOP, Scenario
 from ppafo.studies import declaration as declared
 from ppafo.studies.distributions import Distribution
 from ppafo.units import parse_quantity

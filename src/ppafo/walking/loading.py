@@ -33,7 +33,7 @@ from ppafo.simulation.loading import (
     read_supply_line,
     scenario_of,
 )
-from ppafo.simulation.motion_kind import WALK, WALKS
+from ppafo.simulation.motion_kind import MOTIONS, WALK
 from ppafo.simulation.numbers import device_number_at
 from ppafo.simulation.overrides import OverriddenDocument, over_layer
 from ppafo.simulation.scenario import (
@@ -164,7 +164,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     if BOTTLE_NAME in instead:
         document.setdefault(BOTTLE, {})["name"] = instead[BOTTLE_NAME]
     reading = Reading(request.file, document, changed.paths)
-    kind = WALKS[kind_at(document, "motion") or WALK]
+    kind = MOTIONS[kind_at(document, "motion") or WALK]
     who: WalkKind = kind.walk
     law = walking_controllers()[kind_at(document, "controller")]
     hardware = read_hardware(reading, request, changed.device)
@@ -187,7 +187,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     links = {path: links for path, links in found.items() if value_at(reading.document, path) is None}
     _check_timing(law, reading)
     motion = WalkMotion(
-        kind=kind,
+        motion_kind=kind,
         gait=walked,
         timing=timing_of(document),
         forces={name: number for name, number in settings.numbers.items() if name in FORCES},

@@ -35,8 +35,7 @@ from ppafo.report.finding import Finding
 from ppafo.simulation.loading import scenario_or_load
 from ppafo.simulation.plan import plan_run, profile_values
 from ppafo.simulation.sampled import run_sampled
-from ppafo.simulation.scenario import FreeMotion, Scenario
-from ppafo.simulation.simulate import OPEN_LOOP
+from ppafo.simulation.scenario import OPEN_LOOP, FreeMotion, Scenario
 from ppafo.translation.plant_rates import (
     PlantRates,
     gas_rates,

@@ -31,8 +31,8 @@ from ppafo.report.finding import Finding
 from ppafo.report.kind import Interval
 from ppafo.simulation.numbers import TIMES, absolute, with_numbers
 from ppafo.simulation.plan import profile_bounds
-from ppafo.simulation.scenario import Scenario, worn_kind
-from ppafo.simulation.simulate import OPEN_LOOP, simulate
+from ppafo.simulation.scenario import OPEN_LOOP, Scenario
+from ppafo.simulation.simulate import simulate
 from ppafo.studies.distributions import Floats, noise_interval
 from ppafo.studies.draws import with_new_noise
 from ppafo.studies.study import with_overrides
@@ -324,7 +324,7 @@ def _ceiling(problem: Problem, gains: Gains, draws: Mapping[str, Floats], runs: 
     base = scenario_with(problem, gains)
     given = {path: column for path, column in absolute(base, draws, problem.gauge).items() if path not in TIMES}
     scenario = with_numbers(base, given)
-    if scenario.controller.kind == OPEN_LOOP or worn_kind(scenario) is not None:
+    if scenario.controller.kind == OPEN_LOOP or scenario.walks:
         return Ceiling(0.0, ())
     known = runs.metrics
     lacking = np.broadcast_to(shortfall(scenario), known[problem.metrics[0]][:1].shape)

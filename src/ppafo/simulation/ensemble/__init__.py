@@ -16,8 +16,8 @@ from ppafo.simulation.accuracy import MARGIN, finer
 from ppafo.simulation.ensemble.planning import EnsemblePlan, plan_ensemble
 from ppafo.simulation.ensemble.running import REFERENCE, Outcome, Request, intervals, offered, samples_of
 from ppafo.simulation.numbers import check_columns
-from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.simulate import OPEN_LOOP, REMEDY
+from ppafo.simulation.scenario import OPEN_LOOP, Scenario
+from ppafo.simulation.simulate import REMEDY
 
 COMPLETED, DIVERGED, REFUSED = 0, 1, 2
 """How a run of an ensemble ended; refused is a combination of values that no run can have."""

@@ -23,8 +23,7 @@ from ppafo.metrics.metric import LED, LED_SHANK, REACTS, REQUEST, STEADY, WALK, 
 from ppafo.model.gas import energy_per_content
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState, TrueMasses
 from ppafo.simulation.sampled import run_in_turn
-from ppafo.simulation.scenario import FreeMotion, Scenario, worn_kind
-from ppafo.simulation.simulate import OPEN_LOOP
+from ppafo.simulation.scenario import Scenario
 
 REFERENCE = "reference"
 _WITH_ENERGY_BALANCE = frozenset({"temperature_1", "temperature_2", *ENERGIES})
@@ -262,16 +261,7 @@ def has_channels(program: Program, kind: MetricKind) -> bool:
 
 def lacking(scenario: Scenario, kind: MetricKind) -> str:
     """Why no run of a scenario has what a metric needs, an empty text where it has."""
-    worn = worn_kind(scenario)
-    if worn is not None:
-        return worn.lacks(scenario, kind)
-    if WALK in kind.needs:
-        return "it needs a walk"
-    motion = scenario.motion
-    if LED_SHANK in kind.needs and not (isinstance(motion, FreeMotion) and motion.leg is not None and motion.leg.gait):
-        return "it needs a leg whose shank follows a gait"
-    is_open = scenario.controller.kind == OPEN_LOOP
-    return "its controller follows no reference" if is_open and REFERENCE in kind.channels else ""
+    return scenario.motion.motion_kind.lacks(scenario, kind)
 
 
 def reacts(scenario: Scenario) -> bool:

@@ -23,8 +23,7 @@ from ppafo.parameters.parts import Catalogue, Part, load_catalogue
 from ppafo.parameters.parts.catalogue import DEFAULT
 from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.numbers import TIMES, declared_numbers
-from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.simulate import OPEN_LOOP
+from ppafo.simulation.scenario import OPEN_LOOP, Scenario
 from ppafo.studies.draws import common_level
 from ppafo.studies.sampling import NOISE
 from ppafo.units import parse_quantity

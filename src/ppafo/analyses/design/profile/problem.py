@@ -19,8 +19,7 @@ from ppafo.loading import reloaded
 from ppafo.parameters.parts import Part, load_catalogue
 from ppafo.parameters.parts.catalogue import DEFAULT
 from ppafo.simulation.loading import load_scenario
-from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.simulate import OPEN_LOOP
+from ppafo.simulation.scenario import OPEN_LOOP, Scenario
 from ppafo.storage.result_folder import read_recording
 from ppafo.units import parse_quantity, split_quantity
 
