@@ -10,8 +10,7 @@ from ppafo.documents.json_text import json_text
 
 if TYPE_CHECKING:
     from ppafo.report.finding import Finding
-    from ppafo.simulation.accuracy import ErrorEstimate
-    from ppafo.simulation.check import Check
+    from ppafo.simulation.check import Check, ErrorEstimate
     from ppafo.simulation.simulate import Result
 
 DEFAULT_FOLDER = Path("out")

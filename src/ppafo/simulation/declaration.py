@@ -41,6 +41,7 @@ PLAIN = ("", "1")
 *RUN, ACCURACY = quantities_of(RunSettings)
 FREE = quantities_of(FreeMotion)
 ANGLE = FREE[0]
+LOCKED_ANGLE = "motion.angle"
 LEG = (*FREE[:2], *quantities_of(Leg))
 FOOT = {item.name: item for item in quantities_of(Leg)}
 SHANK_LEVEL = Quantity("level", "rad", "", None, -10.0, 10.0)

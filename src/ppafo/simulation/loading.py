@@ -49,9 +49,9 @@ from ppafo.simulation.declaration import (
     quantity_text,
     value_at,
 )
-from ppafo.simulation.motion import read_profile
 from ppafo.simulation.motion_kind import MOTIONS
 from ppafo.simulation.overrides import OverriddenDocument, apply_overrides, device_paths, scenario_paths
+from ppafo.simulation.profiles import read_profile
 from ppafo.simulation.scenario import (
     Assumption,
     Control,

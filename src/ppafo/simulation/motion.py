@@ -4,7 +4,7 @@ Each kind declares what a file says of it, and how that is read and checked agai
 a run or an ensemble of such a motion needs is loaded when it is called.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,6 @@ from typing import Any
 from pydantic import Field
 
 from ppafo.control.catalog import PROFILES
-from ppafo.engine.rows import rebuilt
 from ppafo.errors import DataError, ScenarioError, one_line
 from ppafo.kinds import late
 from ppafo.model.declaration import Quantity
@@ -23,6 +22,7 @@ from ppafo.simulation.declaration import (
     FREE,
     GAIT_SHANK,
     LEG,
+    LOCKED_ANGLE,
     SUPPLY_LINE,
     THERMAL,
     Reading,
@@ -30,11 +30,11 @@ from ppafo.simulation.declaration import (
     kind_at,
     profile_settings,
     quantities,
-    quantity_text,
     shank_settings,
     value_at,
 )
 from ppafo.simulation.motion_kind import MotionKind, MotionSection
+from ppafo.simulation.profiles import TOLERANCE, profile_problem, range_text, read_profile, stops_of
 from ppafo.simulation.scenario import (
     OPEN_LOOP,
     FreeMotion,
@@ -46,9 +46,6 @@ from ppafo.simulation.scenario import (
 )
 from ppafo.simulation.schema import profile_table, quantity_fields, shank_table
 
-MAXIMUM_CHECKED_TIMES = 20_000
-TOLERANCE = 1.0e-9
-LOCKED_ANGLE = "motion.angle"
 _PROFILE, _SHANK = "motion.profile", "motion.shank"
 
 
@@ -93,7 +90,7 @@ def _read_angle(reading: Reading, device: Device) -> float:
     angle = reading.number(LOCKED_ANGLE, ANGLE)
     if not (device.actuator.angle_min - TOLERANCE <= angle <= device.actuator.angle_max + TOLERANCE):
         raise reading.refusal(
-            LOCKED_ANGLE, f"must be between the stops of {device.name}, {_range_text(_stops(device))}"
+            LOCKED_ANGLE, f"must be between the stops of {device.name}, {range_text(stops_of(device))}"
         )
     return angle
 
@@ -158,7 +155,7 @@ def _quantities_of_prescribed(scenario: Scenario) -> dict[str, Quantity]:
 
 def _read_prescribed(reading: Reading, device: Device, duration: float, step: float, _folder: Path) -> PrescribedMotion:
     profile = read_profile(reading, _PROFILE, ANGLE_LEVEL)
-    problem = profile_problem(device.name, _stops(device), profile, duration, step)
+    problem = profile_problem(device.name, stops_of(device), profile, duration, step)
     if problem:
         raise ScenarioError(f"{reading.file}: {problem}")
     return PrescribedMotion(profile)
@@ -257,45 +254,3 @@ LEG_MOTION = MotionKind(
     **_OF_ALL_VANES,
 )
 """Equation (11), without ground."""
-
-
-def read_profile(reading: Reading, section: str, prescribed: Quantity) -> ProfileChoice:
-    """Return a function of time with all its settings in SI."""
-    kind = kind_at(reading.document, section)
-    return ProfileChoice(kind, reading.section(section, profile_settings(kind, prescribed)))
-
-
-def profile_problem(
-    device: str, stops: tuple[float, float], profile: ProfileChoice, duration: float, step: float
-) -> str:
-    """Return where a profile leaves the stops [rad] of a device, named by ``device``; an empty text if nowhere."""
-    for time, angle in _angles(profile, duration, step):
-        if not stops[0] - TOLERANCE <= angle <= stops[1] + TOLERANCE:
-            return (
-                f"[motion.profile] leaves the stops of {device}, {_range_text(stops)}: it is at "
-                f"{quantity_text(angle, 'rad')} at {time:.6g} s"
-            )
-    return ""
-
-
-def _angles(profile: ProfileChoice, duration: float, step: float) -> Iterator[tuple[float, float]]:
-    """Yield times and angles [rad]: those that the engine asks for, and the crests between them."""
-    kind = PROFILES[profile.kind]
-    parameters = rebuilt(kind.parameters, [profile.settings[item.name] for item in kind.quantities])
-    count = max(1, min(MAXIMUM_CHECKED_TIMES, round(duration / step)))
-    for number in range(count + 1):
-        time = duration * number / count
-        angle, rate, acceleration = kind.value(parameters, time)
-        yield time, angle
-        # Where a parabola through this time turns: a crest between two times must not escape the check.
-        away = -rate / acceleration if acceleration else 0.0
-        if 0.0 < away < min(duration / count, duration - time):
-            yield time + away, angle + 0.5 * rate * away
-
-
-def _stops(device: Device) -> tuple[float, float]:
-    return device.actuator.angle_min, device.actuator.angle_max
-
-
-def _range_text(stops: tuple[float, float]) -> str:
-    return f"{quantity_text(stops[0], 'rad')} to {quantity_text(stops[1], 'rad')}"

@@ -68,19 +68,8 @@ VANE_MOTIONS = ("free", "locked", "prescribed", "leg")
 """Motions of a vane alone that this package has."""
 
 _GROUP = "ppafo.motions"
-MOTIONS: Kinds[MotionKind] = Kinds(
-    _GROUP,
-    "motion",
-    MotionKind,
-    {
-        "free": "ppafo.simulation.motion:FREE_MOTION",
-        "locked": "ppafo.simulation.motion:LOCKED_MOTION",
-        "prescribed": "ppafo.simulation.motion:PRESCRIBED_MOTION",
-        "leg": "ppafo.simulation.motion:LEG_MOTION",
-        **declared_kinds(_GROUP),
-    },
-)
-"""Motions of a vane alone, and of a leg that walks with the device, which folders above this one declare."""
+MOTIONS: Kinds[MotionKind] = Kinds(_GROUP, "motion", MotionKind, declared_kinds(_GROUP))
+"""Motions of a vane alone, and of a leg that walks with the device."""
 
 
 def is_walk(name: str) -> bool:

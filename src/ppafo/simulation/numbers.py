@@ -17,8 +17,7 @@ from ppafo.parameters.graph import ATMOSPHERE_PATH, Graph, holding, left, resolv
 from ppafo.parameters.overrides import either, in_two_forms, one_path
 from ppafo.parameters.plant import all_settings
 from ppafo.simulation.clock import Clock, read_clock
-from ppafo.simulation.declaration import TEXTS, Reading
-from ppafo.simulation.motion import LOCKED_ANGLE
+from ppafo.simulation.declaration import LOCKED_ANGLE, TEXTS, Reading
 from ppafo.simulation.overrides import apply_overrides
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario, vane_motion
 

@@ -13,7 +13,6 @@ import numpy as np
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.kind import ControllerKind, ProfileKind
 from ppafo.engine.components import GasScheme
-from ppafo.engine.over_samples import over_samples
 from ppafo.engine.program import NoParameters, Program
 from ppafo.engine.rows import rebuilt
 from ppafo.engine.run import Lines, Run, WornLeg
@@ -54,6 +53,7 @@ from ppafo.parameters.plant import (
     plant_parameters,
     valve_settings,
 )
+from ppafo.simulation.profiles import profile_bounds, profile_parameters
 from ppafo.simulation.scenario import (
     PYTHON_CONTROLLER,
     GasModel,
@@ -372,20 +372,6 @@ def controller_parameters(kind: ControllerKind, settings: Mapping[str, Any]) -> 
     return rebuilt(kind.parameters, given)
 
 
-def profile_parameters(choice: ProfileChoice) -> Any:
-    """The NamedTuple of a profile, nested ones filled in the order of its quantities; settings may be arrays."""
-    kind = PROFILES[choice.kind]
-    return rebuilt(kind.parameters, [choice.settings[item.name] for item in kind.quantities])
-
-
-def profile_values(choice: ProfileChoice, times: "np.ndarray[tuple[int], np.dtype[np.float64]]") -> np.ndarray:
-    """Value, rate and second derivative of a profile at times [s], shape (3, times)."""
-    found = np.empty((3, times.size))
-    for row, series in enumerate(over_samples(PROFILES[choice.kind].value, profile_parameters(choice), times)):
-        found[row] = series
-    return found
-
-
 def is_adaptive(scenario: Scenario, plant: PlantParameters, step: float) -> Any:
     """True where the error decides about the parts of a step [s]; not where a held vane's chambers are slow enough.
 
@@ -399,14 +385,6 @@ def is_adaptive(scenario: Scenario, plant: PlantParameters, step: float) -> Any:
     # The pressure of gas with an energy balance follows faster, by its heat capacity ratio.
     stiffness = 1.0 if scenario.gas_model is None else scenario.device.gas.heat_capacity_ratio
     return np.logical_not(is_slow_locked(plant, step, angle, stiffness))
-
-
-def profile_bounds(choice: ProfileChoice) -> tuple[float, float]:
-    """Lowest and highest value of a profile, N m or rad as its levels; arrays (runs,) where its settings are."""
-    kind = PROFILES[choice.kind]
-    numbers = [choice.settings[item.name] for item in kind.quantities]
-    lowest, highest = over_runs(lambda *values: kind.bounds(rebuilt(kind.parameters, values)), *numbers)
-    return lowest, highest
 
 
 def initial_state(scenario: Scenario, plant: PlantParameters) -> PlantState:

@@ -1,6 +1,5 @@
 """One run: its result, how it comes about, and what it determines."""
 
-import math
 import platform
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -13,16 +12,10 @@ import numpy as np
 from ppafo.documents.json_text import plain
 from ppafo.engine.lanes import BatchResult, Floats, load_program, load_programs
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, batch_of, run_together, state_row_numbers
-from ppafo.engine.scheme.actuators import pressures_of, volumes_of
 from ppafo.errors import SimulationError
 from ppafo.signals.recording import Recording
-from ppafo.simulation.accuracy import LARGEST_OF_ANGLE, LARGEST_OF_PRESSURE, MARGIN, ErrorEstimate, finer
-from ppafo.simulation.check import ALLOWED_CHANGE, FINER, MOVE, MOVED_MEASUREMENT, MOVED_START, Check, NumberCheck
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.scenario import (
-    Scenario,
-    scenario_document,
-)
+from ppafo.simulation.scenario import Scenario, scenario_document
 from ppafo.version import __version__
 
 if TYPE_CHECKING:
@@ -30,6 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ppafo.metrics.metric import Metric
+    from ppafo.simulation.check import Check, ErrorEstimate
 
 REMEDY = (
     "the step may be too long for this device, or a value unrealistic: try a smaller run.step, "
@@ -38,12 +32,6 @@ REMEDY = (
 
 _OF_STEPS = ("result.failure_time", "result.too_many_parts", "pace.", "valve_state.", "controller_state.")
 """Rows of the time stepping of which no recording of a vane is made."""
-
-DRAWS = 4
-"""Draws of what moves the measurements of sensors without noise."""
-ALLOWED_PARTING = 1.0e-2
-"""Largest difference of two runs over time that counts as none, as a fraction of the range."""
-_COURSES = {"angle over time": ("angle",), "pressures over time": ("pressure_1", "pressure_2")}
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,43 +105,27 @@ class Result:
         valve = self.scenario.device.valve.kind
         return recording_figure(self.recording, self.scenario.name, remark, atmosphere, valve)
 
-    def error(self) -> ErrorEstimate:
+    def error(self) -> "ErrorEstimate":
         """Return the estimated error [SI] of this run from its steps: it runs again with a sixteenth of it.
 
         SimulationError for a run that diverged.
         """
         if not self.status.is_completed:
             raise SimulationError(f"{self.scenario.name}: the run diverged, so its error cannot be estimated")
-        return _error(self, results_of(self.scenario, [finer(plan_run(self.scenario))])[0])
+        from ppafo.simulation.check import estimated_error, finer
 
-    def check(self) -> Check:
+        return estimated_error(self, results_of(self.scenario, [finer(plan_run(self.scenario))])[0])
+
+    def check(self) -> "Check":
         """Return whether this run can be repeated: with finer steps, and with start and measurements moved.
 
         SimulationError for a run that diverged, and for a Python controller that gives a different run each time.
         """
-        scenario = self.scenario
         if not self.status.is_completed:
-            raise SimulationError(f"{scenario.name}: the run diverged, so there is nothing to check")
-        run = plan_run(scenario)
-        _check_repeatable(self, run)
-        # Highest less lowest pressure [Pa] that the chambers had or are connected to; the atmosphere's if there is one.
-        supply, recording = self.scenario.device.supply, self.recording
-        outside = [supply.pressure, supply.dorsiflexion_pressure, supply.atmospheric_pressure]
-        values = np.concatenate([recording["pressure_1"], recording["pressure_2"], outside])
-        pressures = float(np.ptp(values)) or supply.atmospheric_pressure
-        repeats = _repeats(run, pressures)
-        results = results_of(scenario, [repeat for _, repeat in repeats])
-        found = [(name, repeated) for (name, _), repeated in zip(repeats, results, strict=True)]
-        courses = tuple(_course(name, found, self, pressures) for name in _COURSES)
-        return Check(
-            scenario=scenario.name,
-            metrics=_metrics(self, found, pressures),
-            courses=courses,
-            error=_error(self, results[0]),
-            parts_at=_time_of_parting([repeated for _, repeated in found], self, courses),
-            failed=tuple(dict.fromkeys(name for name, repeated in found if not repeated.status.is_completed)),
-            atmosphere=scenario.device.supply.atmospheric_pressure,
-        )
+            raise SimulationError(f"{self.scenario.name}: the run diverged, so there is nothing to check")
+        from ppafo.simulation.check import checked
+
+        return checked(self, plan_run(self.scenario), partial(results_of, self.scenario))
 
     def to_dict(self) -> dict[str, Any]:
         """Return what ``run.json`` says of a result, beside what storage adds to it, as plain data in SI units."""
@@ -268,170 +240,3 @@ def compile_models(scenarios: Iterable[Scenario]) -> None:
     load_programs(programs)
     for program in programs:
         load_program(program)
-
-
-def _error(result: Result, fine: Result) -> ErrorEstimate:
-    """The estimated error of a result, from the same run with finer steps; inf where that diverged."""
-    if not fine.status.is_completed:
-        return ErrorEstimate(math.inf, math.inf, dict.fromkeys(result.metrics, math.inf))
-    angle, pressure = (
-        MARGIN * float(np.max(_largest_differences(fine.recording, result.recording, names)))
-        for names in _COURSES.values()
-    )
-    changes = {name: abs(_difference(_value(fine, name), _value(result, name))) for name in result.metrics}
-    return ErrorEstimate(angle, pressure, {name: MARGIN * change for name, change in changes.items()})
-
-
-def _check_repeatable(result: Result, run: Run) -> None:
-    """Refuse a Python controller that gives a different run each time: every change would be its own."""
-    controller = result.scenario.controller.custom
-    if controller is None:
-        return
-    again = results_of(result.scenario, [run])[0].recording
-    if not all(np.array_equal(again[name], result.recording[name]) for name in again.names):
-        raise SimulationError(
-            f"{result.scenario.name}: {type(controller).__name__} gives a different run each time, so nothing can be "
-            f"checked; its reset() must forget everything, and its random numbers need a fixed seed"
-        )
-
-
-def _repeats(run: Run, pressures: float) -> list[tuple[str, Run]]:
-    """The runs to compare with, by what is changed in them; moved ones in both directions."""
-    starts = [_start_moved(run, move, apart) for apart in (1.0, -1.0) for move in (MOVE, -MOVE)]
-    repeats = [(FINER, finer(run)), *((MOVED_START, moved) for moved in starts)]
-    if run.program.ideal_sensors:
-        return repeats
-    return [*repeats, *((MOVED_MEASUREMENT, moved) for moved in _measurements_moved(run, pressures))]
-
-
-def _start_moved(run: Run, move: float, apart: float) -> Run:
-    """The run from a little more gas in both chambers, and where the vane is free from a little further on.
-
-    With ``apart`` -1 chamber 2 has a little less instead: a torque that is exactly the wanted one then is so no more.
-    """
-    plant, start = run.plant, run.initial
-    angle = start.angle
-    if run.program.angle is None:
-        shifted = angle + move * (plant.angle_max - plant.angle_min)
-        # A start beyond a stop is no state of the vane.
-        angle = min(max(shifted, plant.angle_min), plant.angle_max)
-    actuator = run.program.actuator
-    pressures = pressures_of(actuator, plant, start.angle, start.mass_1, start.mass_2)
-    before, after = (volumes_of(actuator, plant, at, *pressures) for at in (start.angle, angle))
-    # Mass in proportion to volume keeps the pressure, so that only the move itself changes it.
-    mass_1 = start.mass_1 * after[0] / before[0] * (1.0 + move)
-    mass_2 = start.mass_2 * after[1] / before[1] * (1.0 + apart * move)
-    return replace(run, initial=start._replace(angle=angle, mass_1=mass_1, mass_2=mass_2))
-
-
-def _measurements_moved(run: Run, pressures: float) -> list[Run]:
-    """Runs with a little more noise on each sensor, either way; several draws of it where they have none themselves.
-
-    One draw alone seldom crosses a step of a coarse sensor, which is what matters.
-    """
-    sensors, angles = run.sensors, run.plant.angle_max - run.plant.angle_min
-    draws = 1 if sensors.angle_noise or sensors.pressure_noise else DRAWS
-    return [
-        replace(
-            run,
-            sensors=sensors._replace(
-                angle_noise=sensors.angle_noise + move * angles,
-                pressure_noise=sensors.pressure_noise + move * pressures,
-                seed=sensors.seed + draw,
-            ),
-        )
-        for draw in range(draws)
-        for move in (MOVE, -MOVE)
-    ]
-
-
-def _metrics(result: Result, repeats: list[tuple[str, Result]], pressures: float) -> tuple[NumberCheck, ...]:
-    names = dict.fromkeys(name for one in (result, *(repeat for _, repeat in repeats)) for name in one.metrics)
-    rows = []
-    for name in names:
-        kind = next(one.metrics[name] for one in (result, *(r for _, r in repeats)) if name in one.metrics)
-        value = _value(result, name)
-        changes = _largest((repeat, _difference(_value(repeated, name), value)) for repeat, repeated in repeats)
-        scale = max(abs(value) if math.isfinite(value) else 0.0, _metric_range(result, name, kind.unit, pressures))
-        rows.append(NumberCheck(name, kind.unit, value, ALLOWED_CHANGE * scale, changes, ALLOWED_CHANGE * scale))
-    return tuple(rows)
-
-
-def _value(result: Result, name: str) -> float:
-    return result.metrics[name].value if name in result.metrics else math.nan
-
-
-def _difference(now: float, before: float) -> float:
-    """The change; inf where only one of both is a number."""
-    if math.isfinite(now) and math.isfinite(before):
-        return now - before
-    # Equal infinities and two values that are not known are no change.
-    return 0.0 if now == before or (math.isnan(now) and math.isnan(before)) else math.inf
-
-
-def _largest(changes: Iterable[tuple[str, float]]) -> dict[str, float]:
-    """The largest change of all directions, with its sign, by repeat."""
-    largest: dict[str, float] = {}
-    for name, change in changes:
-        largest[name] = max(largest.get(name, 0.0), change, key=abs)
-    return largest
-
-
-def _metric_range(result: Result, name: str, unit: str, pressures: float) -> float:
-    """Range of the quantity of a metric; 1 for a number of events, 0 for a unit that has none."""
-    scenario, recording = result.scenario, result.recording
-    actuator = scenario.device.actuator
-    angles, torques = actuator.angle_max - actuator.angle_min, abs(actuator.torque_constant) * pressures
-    ranges = {
-        "rad": angles,
-        "rad/s": float(np.max(np.abs(recording["angular_velocity"]))),
-        "Pa": pressures,
-        "N m": torques,
-        "J": torques * angles,
-        "kg": max(_value(result, "gas_supplied"), _largest_content(recording)),
-        "m": float(np.ptp(recording["toe_height"])) if "toe_height" in recording else 0.0,
-        "s": scenario.run.duration,
-        "-": 1.0,
-    }
-    if unit in ranges:
-        return ranges[unit]
-    # A ratio of work and gas is as open as both are; where one is next to nothing, so is what the ratio says.
-    parts = {"mechanical_work": ranges["J"], "gas_supplied": ranges["kg"]}
-    values = {part: abs(_value(result, part)) for part in parts}
-    if not all(value > ALLOWED_CHANGE * parts[part] for part, value in values.items()):
-        return math.inf
-    return abs(_value(result, name)) * max(parts[part] / value for part, value in values.items())
-
-
-def _largest_content(recording: Recording) -> float:
-    """Largest mass [kg] in both chambers; 0 in a walk, which does not record it and takes more than that."""
-    masses = [recording[name] for name in ("mass_1", "mass_2") if name in recording]
-    return float(np.max(sum(masses))) if masses else 0.0
-
-
-def _largest_differences(one: Recording, other: Recording, channels: Iterable[str]) -> Floats:
-    """Largest difference of some channels at each sample that both have."""
-    # A repeat that diverged is shorter.
-    count = min(len(one), len(other))
-    return np.asarray(np.max([np.abs(one[name][:count] - other[name][:count]) for name in channels], axis=0))
-
-
-def _course(name: str, repeats: list[tuple[str, Result]], result: Result, pressures: float) -> NumberCheck:
-    actuator = result.scenario.device.actuator
-    is_angle = name == "angle over time"
-    span, unit = (actuator.angle_max - actuator.angle_min, "rad") if is_angle else (pressures, "Pa")
-    changes = _largest(
-        (repeat, float(np.max(_largest_differences(repeated.recording, result.recording, _COURSES[name]))))
-        for repeat, repeated in repeats
-    )
-    allowed_error = (LARGEST_OF_ANGLE if is_angle else LARGEST_OF_PRESSURE) * span / MARGIN
-    return NumberCheck(name, unit, span, ALLOWED_PARTING * span, changes, allowed_error)
-
-
-def _time_of_parting(repeats: list[Result], result: Result, courses: tuple[NumberCheck, ...]) -> float | None:
-    times = [repeat.status.time for repeat in repeats if repeat.status.time is not None]
-    for course in courses:
-        for repeat in repeats:
-            beyond = _largest_differences(repeat.recording, result.recording, _COURSES[course.name]) > course.allowed
-            times += [float(result.recording.time[np.argmax(beyond)])] if beyond.any() else []
-    return min(times, default=None)

@@ -19,7 +19,7 @@ from ppafo.model.ports import friction_in_motion
 from ppafo.model.regulator import LineState, line_pressures
 from ppafo.parameters.device import Gas
 from ppafo.signals.recording import Channel, Recording
-from ppafo.simulation.plan import profile_values
+from ppafo.simulation.profiles import profile_values
 from ppafo.simulation.scenario import OPEN_LOOP, Scenario, vane_motion
 
 Measured = tuple[Recording, Mapping[str, Metric], str]

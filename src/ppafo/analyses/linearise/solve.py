@@ -33,7 +33,8 @@ from ppafo.model.ports import at_valve, friction_at_rest
 from ppafo.model.valves.proportional import NO_SLEW_LIMIT
 from ppafo.report.finding import Finding
 from ppafo.simulation.loading import scenario_or_load
-from ppafo.simulation.plan import plan_run, profile_values
+from ppafo.simulation.plan import plan_run
+from ppafo.simulation.profiles import profile_values
 from ppafo.simulation.sampled import run_sampled
 from ppafo.simulation.scenario import OPEN_LOOP, FreeMotion, Scenario
 from ppafo.translation.plant_rates import (

@@ -30,7 +30,7 @@ from ppafo.progress import Report
 from ppafo.report.finding import Finding
 from ppafo.report.kind import Interval
 from ppafo.simulation.numbers import TIMES, absolute, with_numbers
-from ppafo.simulation.plan import profile_bounds
+from ppafo.simulation.profiles import profile_bounds
 from ppafo.simulation.scenario import OPEN_LOOP, Scenario
 from ppafo.simulation.simulate import simulate
 from ppafo.studies.distributions import Floats, noise_interval

@@ -11,7 +11,8 @@ from ppafo.exports.c_library.files import Library, Surface, c_identifier, librar
 from ppafo.exports.c_library.program import ExportedProgram
 from ppafo.exports.c_library.walk_preparation import check_can_leave
 from ppafo.model.valves.kind import VENT
-from ppafo.simulation.plan import profile_parameters, step_counts
+from ppafo.simulation.plan import step_counts
+from ppafo.simulation.profiles import profile_parameters
 from ppafo.simulation.scenario import (
     Control,
     FreeMotion,

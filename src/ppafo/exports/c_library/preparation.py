@@ -31,9 +31,8 @@ from ppafo.parameters.device import Device, SonicOrifice
 from ppafo.parameters.graph import Graph, Term
 from ppafo.parameters.plant import SEEN_BY_EFFECTS, area_restriction, effects_of, plant_with, sonic_restriction
 from ppafo.simulation.clock import links_of_times, step_unless_given, step_with_output
-from ppafo.simulation.declaration import SUPPLY_LINE, SUPPLY_LINES, THERMAL, gas_settings, value_at
+from ppafo.simulation.declaration import LOCKED_ANGLE, SUPPLY_LINE, SUPPLY_LINES, THERMAL, gas_settings, value_at
 from ppafo.simulation.leg import foot_load, shank_kind, with_load
-from ppafo.simulation.motion import LOCKED_ANGLE, TOLERANCE
 from ppafo.simulation.numbers import (
     TIMES,
     declared_numbers,
@@ -52,6 +51,7 @@ from ppafo.simulation.plan import (
     step_counts,
     thermal_gas,
 )
+from ppafo.simulation.profiles import TOLERANCE
 from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion, Scenario
 from ppafo.units import parse_quantity
 

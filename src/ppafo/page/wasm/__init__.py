@@ -97,9 +97,8 @@ from ppafo.parameters.graph import ATMOSPHERE_PATH, Graph, Term, itself
 from ppafo.parameters.overrides import one_path, split_override
 from ppafo.parameters.parameter_set import SOURCE, Entry, atmospheric_pressure, entry_in_si
 from ppafo.report.display_units import display_unit, quantity_of_unit
-from ppafo.simulation.declaration import SEED, value_at
+from ppafo.simulation.declaration import LOCKED_ANGLE, SEED, value_at
 from ppafo.simulation.loading import set_name
-from ppafo.simulation.motion import LOCKED_ANGLE
 from ppafo.simulation.numbers import TIMES
 from ppafo.simulation.overrides import is_of_device
 from ppafo.simulation.scenario import Scenario

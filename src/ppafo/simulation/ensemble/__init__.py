@@ -12,7 +12,7 @@ from ppafo.engine.run import TOO_MANY_PARTS
 from ppafo.errors import ScenarioError, nearest_name
 from ppafo.metrics import METRICS
 from ppafo.metrics.metric import MetricKind
-from ppafo.simulation.accuracy import MARGIN, finer
+from ppafo.simulation.check import MARGIN, finer
 from ppafo.simulation.ensemble.planning import EnsemblePlan, plan_ensemble
 from ppafo.simulation.ensemble.running import REFERENCE, Outcome, Request, intervals, offered, samples_of
 from ppafo.simulation.numbers import check_columns

@@ -17,7 +17,7 @@ from ppafo.model.declaration import Quantity, range_rule
 from ppafo.parameters.building import actuator_problem, beyond_pressures, consistency, growth_and_problem
 from ppafo.parameters.device import VANE
 from ppafo.parameters.plant import switches_of
-from ppafo.simulation.accuracy import unchanged
+from ppafo.simulation.check import unchanged
 from ppafo.simulation.clock import Clock
 from ppafo.simulation.declaration import limits, quantity_text
 from ppafo.simulation.motion_kind import MotionKind

@@ -12,7 +12,6 @@ from ppafo.engine.lane_samples import FELL
 from ppafo.engine.lane_samples import REQUEST as REQUEST_ROW
 from ppafo.engine.lane_source import SAME_MOMENT
 from ppafo.engine.lanes import Batch, BatchResult, Floats, add_meters, group_of, meters_of, run_blocks
-from ppafo.engine.led_leg import GAIT_SHANK
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, row_numbers
 from ppafo.engine.run import NEVER_FAILED, Members
@@ -249,7 +248,7 @@ def has_channels(program: Program, kind: MetricKind) -> bool:
         STEADY: not program.takes_course,
         LED: not program.reacts,
         REACTS: program.reacts,
-        LED_SHANK: program.shank is GAIT_SHANK,
+        LED_SHANK: program.is_on_gait,
         REQUEST: REQUEST_ROW in row_numbers(program.state_rows()),
     }
     return (

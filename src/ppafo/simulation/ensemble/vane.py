@@ -9,11 +9,10 @@ from ppafo.errors import ScenarioError
 from ppafo.metrics.metric import LED_SHANK, WALK, MetricKind
 from ppafo.model.columns import Problem, at
 from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, Clock
-from ppafo.simulation.declaration import quantity_text
+from ppafo.simulation.declaration import LOCKED_ANGLE, quantity_text
 from ppafo.simulation.ensemble.running import REFERENCE
-from ppafo.simulation.motion import LOCKED_ANGLE, TOLERANCE, profile_problem
 from ppafo.simulation.numbers import clock_with, path_of_locked_angle, time_texts
-from ppafo.simulation.plan import profile_bounds
+from ppafo.simulation.profiles import TOLERANCE, profile_bounds, profile_problem
 from ppafo.simulation.scenario import OPEN_LOOP, ProfileChoice, Scenario, vane_motion
 
 
