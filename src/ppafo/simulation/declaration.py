@@ -141,18 +141,32 @@ def by_path(section: str, items: Iterable[Quantity]) -> dict[str, Quantity]:
     return {f"{section}.{item.name}": item for item in items}
 
 
-def _section_of(document: Mapping[str, Any]) -> MotionSection | None:
+def section_of(document: Mapping[str, Any]) -> MotionSection | None:
     """Return what ``[motion]`` holds for the kind that a document names, None where that is not known or a walk."""
     kind = MOTIONS.get(kind_at(document, "motion"))
     return None if kind is None else kind.section
 
 
-def quantities(document: Mapping[str, Any]) -> dict[str, Quantity]:
-    """Return the declaration of every number that a document with its kinds can hold, by path."""
-    motion = _section_of(document)
+def motion_quantities(section: MotionSection | None, profile_kind: str) -> dict[str, Quantity]:
+    """Return the declaration of the numbers of a motion by path, whose profile is of a kind."""
+    if section is None:
+        return {}
+    profile = section.profile
+    inner = {} if profile is None else by_path(f"motion.{profile.name}", profile.settings(profile_kind))
+    return by_path("motion", section.numbers) | inner
+
+
+def quantities(document: Mapping[str, Any], of_motion: Mapping[str, Quantity] | None = None) -> dict[str, Quantity]:
+    """Return the declaration of every number that a document with its kinds can hold, by path.
+
+    ``of_motion`` are those of a motion that the document does not name.
+    """
+    if of_motion is None:
+        section = section_of(document)
+        of_motion = motion_quantities(section, kind_at(document, profile_path(section)))
     found = {
         **by_path("run", (*RUN, ACCURACY)),
-        **({} if motion is None else motion.quantities(document)),
+        **of_motion,
         **by_path("initial", INITIAL),
         **by_path("controller", SAMPLING + controller_settings(kind_at(document, "controller"))),
         **by_path("reference", profile_settings(kind_at(document, "reference"), TORQUE_LEVEL)),
@@ -162,11 +176,20 @@ def quantities(document: Mapping[str, Any]) -> dict[str, Quantity]:
     return found | line_paths() if SUPPLY_LINE in document else found
 
 
+def profile_path(section: MotionSection | None) -> str:
+    """Return the path of the profile in the section of a motion, an empty text where it has none."""
+    return "" if section is None or section.profile is None else f"motion.{section.profile.name}"
+
+
 def texts(document: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the paths of every text that a document can hold."""
-    motion = _section_of(document)
-    of_motion = () if motion is None else motion.texts(document)
-    return (*TEXTS, "motion.kind", "controller.kind", "reference.kind", "gas_model.kind", *of_motion)
+    kinds = ("motion.kind", "controller.kind", "reference.kind", "gas_model.kind")
+    section = section_of(document)
+    if section is None or section.profile is None:
+        return (*TEXTS, *kinds)
+    path = profile_path(section)
+    own = section.profile.own.get(kind_at(document, path), ())
+    return (*TEXTS, *kinds, f"{path}.kind", *(f"{path}.{name}" for name in own))
 
 
 def find_kinds(document: Mapping[str, Any], file: str) -> None:
@@ -179,11 +202,19 @@ def find_kinds(document: Mapping[str, Any], file: str) -> None:
     if old is not None:
         said = no_arithmetic(kind_at(document, "controller"), old)
         raise ScenarioError(f"{file}: {ARITHMETIC} = {quote(old)}: {said}")
-    check_known_motion(kind_at(document, "motion"), file)
-    motion = _section_of(document)
-    sections: list[tuple[str, Kinds[Any]]] = [("controller", CONTROLLERS), ("reference", PROFILES)]
-    sections += [] if motion is None else [(section, PROFILES) for section in motion.profiles(document)]
-    for section, kinds in sections:
+    kind = kind_at(document, "motion")
+    with refused_as(ScenarioError, f"{file}: motion.kind", KindError):
+        is_known = not kind or kind in MOTIONS
+    if not is_known:
+        known = tuple(MOTIONS)
+        hint = nearest_name(kind, known)
+        raise ScenarioError(f"{file}: motion.kind = {quote(kind)} is not known{hint}; allowed: {', '.join(known)}")
+    sections: dict[str, Kinds[Any]] = {"controller": CONTROLLERS, "reference": PROFILES}
+    motion = section_of(document)
+    path = profile_path(motion)
+    if motion is not None and motion.profile is not None and kind_at(document, path) not in motion.profile.own:
+        sections[path] = PROFILES
+    for section, kinds in sections.items():
         with refused_as(ScenarioError, f"{file}: {section}.kind", KindError):
             kinds.get(kind_at(document, section))
 
@@ -197,16 +228,6 @@ def no_arithmetic(kind: str, text: object) -> str:
         return f'is no setting any more; leave it out and write controller.kind = "{integer}"'
     known = ", ".join(name for name in CONTROLLERS if name.endswith(ON_CHIP))
     return f"is no setting any more, and '{kind}' has no fixed-point form; controllers that have one: {known}"
-
-
-def check_known_motion(kind: str, file: str) -> None:
-    """Raise ScenarioError for a kind of motion that no scenario has, walks among them; none is an empty text."""
-    with refused_as(ScenarioError, f"{file}: motion.kind", KindError):
-        is_known = not kind or kind in MOTIONS
-    if not is_known:
-        known = tuple(MOTIONS)
-        hint = nearest_name(kind, known)
-        raise ScenarioError(f"{file}: motion.kind = {quote(kind)} is not known{hint}; allowed: {', '.join(known)}")
 
 
 def check_motion_kind(kind: object, place: str) -> None:

@@ -9,8 +9,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from pydantic import Field
-
 from ppafo.control.catalog import PROFILES
 from ppafo.errors import DataError, ScenarioError, one_line
 from ppafo.kinds import late
@@ -26,14 +24,14 @@ from ppafo.simulation.declaration import (
     SUPPLY_LINE,
     THERMAL,
     Reading,
-    by_path,
     kind_at,
+    motion_quantities,
     profile_settings,
     quantities,
     shank_settings,
     value_at,
 )
-from ppafo.simulation.motion_kind import MotionKind, MotionSection
+from ppafo.simulation.motion_kind import MotionKind, MotionSection, ProfileTable
 from ppafo.simulation.profiles import TOLERANCE, profile_problem, range_text, read_profile, stops_of
 from ppafo.simulation.scenario import (
     OPEN_LOOP,
@@ -42,28 +40,26 @@ from ppafo.simulation.scenario import (
     PrescribedMotion,
     ProfileChoice,
     Scenario,
-    vane_motion,
 )
-from ppafo.simulation.schema import profile_table, quantity_fields, shank_table
+from ppafo.simulation.schema import profile_table, shank_table
 
 _PROFILE, _SHANK = "motion.profile", "motion.shank"
 
 
-def quantities_of_vane(scenario: Scenario, motion: Mapping[str, Any]) -> dict[str, Quantity]:
-    """Return the declaration of every number of a scenario of a vane, by path.
+def quantities_of_vane(scenario: Scenario) -> dict[str, Quantity]:
+    """Return the declaration of every number of a scenario of a vane, by path."""
+    section = scenario.motion.motion_kind.section
+    profile = None if section is None or section.profile is None else getattr(scenario.motion, section.profile.name)
+    return _beside(scenario, motion_quantities(section, "" if profile is None else profile.kind))
 
-    ``motion`` is its motion as a document that names the kinds in it and nothing else.
-    """
-    document: dict[str, Any] = {"motion": motion, "controller": {"kind": scenario.controller.kind}}
+
+def _beside(scenario: Scenario, of_motion: Mapping[str, Quantity]) -> dict[str, Quantity]:
+    """Return the declaration of every number of a scenario, given those of its motion."""
+    document: dict[str, Any] = {"controller": {"kind": scenario.controller.kind}}
     # A constant command follows no reference, whatever the scenario has in its place.
     document |= {} if scenario.controller.kind == OPEN_LOOP else {"reference": {"kind": scenario.reference.kind}}
     document |= {} if scenario.gas_model is None else {"gas_model": {"kind": THERMAL}}
-    return quantities(document | ({} if scenario.supply_line is None else {SUPPLY_LINE: {}}))
-
-
-def _nothing(_document: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return no paths: a kind without texts or profiles."""
-    return ()
+    return quantities(document | ({} if scenario.supply_line is None else {SUPPLY_LINE: {}}), of_motion)
 
 
 def _noise(scenario: Scenario) -> Any:
@@ -105,24 +101,17 @@ FREE_MOTION = MotionKind(
     name="free",
     plan=_PLAN,
     measured=late("ppafo.simulation.vane_recording:measured_free"),
-    quantities=partial(quantities_of_vane, motion={"kind": "free"}),
+    quantities=quantities_of_vane,
     places={},
-    section=MotionSection(
-        summary="the vane moves as the torques demand",
-        quantities=lambda _: by_path("motion", FREE),
-        texts=_nothing,
-        profiles=_nothing,
-        fields=partial(quantity_fields, FREE),
-        read=_read_free,
-    ),
+    section=MotionSection("the vane moves as the torques demand", FREE, _read_free),
     **_OF_ALL_VANES,
 )
 """Equation (1), with a constant external torque."""
 
 
 def _quantities_of_locked(scenario: Scenario) -> dict[str, Quantity]:
-    # Without its kind, for the angle is listed last.
-    return quantities_of_vane(scenario, {}) | {LOCKED_ANGLE: ANGLE}
+    # The angle comes last, where numbers of a locked vane are listed.
+    return _beside(scenario, {}) | {LOCKED_ANGLE: ANGLE}
 
 
 def _read_locked(reading: Reading, device: Device, _duration: float, _step: float, _folder: Path) -> PrescribedMotion:
@@ -135,22 +124,10 @@ LOCKED_MOTION = MotionKind(
     measured=_MEASURED_PRESCRIBED,
     quantities=_quantities_of_locked,
     places={LOCKED_ANGLE: ("motion", "profile", "level")},
-    section=MotionSection(
-        summary="the vane stays at one angle",
-        quantities=lambda _: by_path("motion", (ANGLE,)),
-        texts=_nothing,
-        profiles=_nothing,
-        fields=partial(quantity_fields, (ANGLE,)),
-        read=_read_locked,
-    ),
+    section=MotionSection("the vane stays at one angle", (ANGLE,), _read_locked),
     **_OF_ALL_VANES,
 )
 """A vane on a test bench that is clamped: its profile is constant."""
-
-
-def _quantities_of_prescribed(scenario: Scenario) -> dict[str, Quantity]:
-    path = vane_motion(scenario).path
-    return quantities_of_vane(scenario, {"kind": "prescribed", "profile": {"kind": "" if path is None else path.kind}})
 
 
 def _read_prescribed(reading: Reading, device: Device, duration: float, step: float, _folder: Path) -> PrescribedMotion:
@@ -165,41 +142,22 @@ PRESCRIBED_MOTION = MotionKind(
     name="prescribed",
     plan=_PLAN,
     measured=_MEASURED_PRESCRIBED,
-    quantities=_quantities_of_prescribed,
+    quantities=quantities_of_vane,
     places={},
     section=MotionSection(
-        summary="the angle of the vane is a given function of time",
-        quantities=lambda document: by_path(_PROFILE, profile_settings(kind_at(document, _PROFILE), ANGLE_LEVEL)),
-        texts=lambda _: (f"{_PROFILE}.kind",),
-        profiles=lambda _: (_PROFILE,),
-        fields=lambda: {"profile": (profile_table(ANGLE_LEVEL, "Angle"), Field(description="angle in time"))},
-        read=_read_prescribed,
+        "the angle of the vane is a given function of time",
+        (),
+        _read_prescribed,
+        ProfileTable(
+            "profile",
+            "angle in time",
+            partial(profile_settings, prescribed=ANGLE_LEVEL),
+            partial(profile_table, ANGLE_LEVEL, "Angle"),
+        ),
     ),
     **_OF_ALL_VANES,
 )
 """The ankle goes along a profile whatever the device does."""
-
-
-def _quantities_of_leg(scenario: Scenario) -> dict[str, Quantity]:
-    leg = vane_motion(scenario).leg
-    return quantities_of_vane(scenario, {"kind": "leg", "shank": {"kind": "" if leg is None else leg.shank.kind}})
-
-
-def _declared_of_leg(document: Mapping[str, Any]) -> dict[str, Quantity]:
-    return by_path("motion", LEG) | by_path(_SHANK, shank_settings(kind_at(document, _SHANK)))
-
-
-def _texts_of_leg(document: Mapping[str, Any]) -> tuple[str, ...]:
-    gait = (f"{_SHANK}.gait",) if kind_at(document, _SHANK) == GAIT_SHANK else ()
-    return f"{_SHANK}.kind", *gait
-
-
-def _profiles_of_leg(document: Mapping[str, Any]) -> tuple[str, ...]:
-    return () if kind_at(document, _SHANK) == GAIT_SHANK else (_SHANK,)
-
-
-def _fields_of_leg() -> dict[str, Any]:
-    return quantity_fields(LEG) | {"shank": (shank_table(), Field(description="angle of the shank in time, 0 upright"))}
 
 
 def _read_leg(reading: Reading, device: Device, _duration: float, _step: float, folder: Path) -> FreeMotion:
@@ -241,15 +199,19 @@ LEG_MOTION = MotionKind(
     name="leg",
     plan=late("ppafo.simulation.leg:plan_leg"),
     measured=late("ppafo.simulation.leg:measured_leg"),
-    quantities=_quantities_of_leg,
+    quantities=quantities_of_vane,
     places={},
     section=MotionSection(
-        summary="the vane moves a foot that is free, on a shank that is led",
-        quantities=_declared_of_leg,
-        texts=_texts_of_leg,
-        profiles=_profiles_of_leg,
-        fields=_fields_of_leg,
-        read=_read_leg,
+        "the vane moves a foot that is free, on a shank that is led",
+        LEG,
+        _read_leg,
+        ProfileTable(
+            "shank",
+            "angle of the shank in time, 0 upright",
+            shank_settings,
+            shank_table,
+            {GAIT_SHANK: ("gait",)},
+        ),
     ),
     **_OF_ALL_VANES,
 )

@@ -5,11 +5,12 @@ no neuromuscular model.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from ppafo.errors import one_line
 from ppafo.kinds import Kinds, declared_kinds
+from ppafo.model.declaration import Quantity
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,20 +46,31 @@ class MotionKind:
 
 @dataclass(frozen=True, slots=True)
 class MotionSection:
-    """What ``[motion]`` holds for a kind of motion of a vane alone.
+    """What ``[motion]`` holds for a kind of motion of a vane alone: its numbers, and the table of a profile, if any.
 
-    ``quantities(document)`` declares its numbers by path, and ``texts(document)`` are the paths of its texts, kinds
-    among them; ``profiles(document)`` are sections that name a profile. ``fields()`` are its keys beside the kind, for
-    the layout of the file. ``read(reading, device, duration, step, folder)`` gives the motion; times are in seconds,
-    and in ``folder`` relative paths begin.
+    ``read(reading, device, duration, step, folder)`` gives the motion; times are in seconds, and in ``folder`` relative
+    paths begin.
     """
 
     summary: str
-    quantities: Callable[[Mapping[str, Any]], dict[str, Any]]
-    texts: Callable[[Mapping[str, Any]], tuple[str, ...]]
-    profiles: Callable[[Mapping[str, Any]], tuple[str, ...]]
-    fields: Callable[[], dict[str, Any]]
+    numbers: tuple[Quantity, ...]
     read: Callable[..., Any]
+    profile: "ProfileTable | None" = None
+
+
+@dataclass(frozen=True, slots=True)
+class ProfileTable:
+    """A table of ``[motion]`` with the kind of a profile and its settings, an attribute ``name`` of the motion.
+
+    ``settings(kind)`` declares its numbers, ``layout()`` is the model of the table. ``own`` are its kinds that are no
+    profiles, with the texts that each needs.
+    """
+
+    name: str
+    summary: str
+    settings: Callable[[str], tuple[Quantity, ...]]
+    layout: Callable[[], Any]
+    own: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 WALK, REACT = "walk", "react"

@@ -78,14 +78,15 @@ def motion_kinds() -> dict[str, MotionKind]:
 
 
 def _motion() -> Any:
-    sections = {name: kind.section for name, kind in motion_kinds().items()}
-    return one_of(
-        [
-            table(f"{model_name(name)}Motion", kind_field(name, section.summary) | section.fields())
-            for name, section in sections.items()
-            if section is not None
-        ]
-    )
+    models = []
+    for name, kind in motion_kinds().items():
+        assert kind.section is not None, "kinds of motion of a vane"
+        fields = kind_field(name, kind.section.summary) | quantity_fields(kind.section.numbers)
+        profile = kind.section.profile
+        if profile is not None:
+            fields[profile.name] = (profile.layout(), Field(description=profile.summary))
+        models.append(table(f"{model_name(name)}Motion", fields))
+    return one_of(models)
 
 
 def shank_table() -> Any:

@@ -17,10 +17,9 @@ SWAY = """
 from dataclasses import replace
 
 from ppafo.model.declaration import Quantity
-from ppafo.simulation.declaration import by_path
 from ppafo.simulation.motion import PRESCRIBED_MOTION
+from ppafo.simulation.motion_kind import MotionSection
 from ppafo.simulation.scenario import PrescribedMotion, ProfileChoice
-from ppafo.simulation.schema import quantity_fields
 
 SIZE = (Quantity("size", "rad", "largest angle from 90 deg", 0.1, 0.0, 0.5),)
 
@@ -31,22 +30,12 @@ def read(reading, device, duration, step, folder):
     return PrescribedMotion(ProfileChoice("sine", settings), "swaying:SWAY")
 
 
-KIND = replace(
+SWAY = replace(
     PRESCRIBED_MOTION,
     name="sway",
-    quantities=lambda scenario: by_path("motion", SIZE),
     places={"motion.size": ("motion", "profile", "amplitude")},
-    section=replace(
-        PRESCRIBED_MOTION.section,
-        summary="the ankle sways",
-        quantities=lambda document: by_path("motion", SIZE),
-        texts=lambda document: (),
-        profiles=lambda document: (),
-        fields=lambda: quantity_fields(SIZE),
-        read=read,
-    ),
+    section=MotionSection("the ankle sways", SIZE, read),
 )
-SWAY = KIND
 """
 
 
