@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from typing import Any, NamedTuple, get_type_hints
 
-from ppafo.control.controllers import switching as constant_controller
-from ppafo.control.kind import ControllerKind, ProfileKind
+from ppafo.control.kind import OPEN_LOOP, ControllerKind, ProfileKind
 from ppafo.control.profiles import CONSTANT
 from ppafo.engine.components import Feed, GasScheme, LegScheme
 from ppafo.engine.over_samples import called_over_samples, in_columns
@@ -214,7 +213,7 @@ class Program:
     @property
     def has_reference(self) -> bool:
         """True where the controller follows a reference; a constant command follows none."""
-        return self.controller is not constant_controller.CONSTANT
+        return self.controller is None or self.controller.name != OPEN_LOOP
 
     @property
     def follows_reference(self) -> bool:

@@ -19,15 +19,15 @@ from ppafo.model.columns import larger, over_runs, truncated
 from ppafo.model.effects.kind import Moment, State
 from ppafo.model.orifice import ExactOrifice
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, chamber_pressures
-from ppafo.model.regulator import LineState, SupplyLines
 from ppafo.model.sensors import NOTHING_SEEN, GaitSensors, SensorParameters
 
-if TYPE_CHECKING:  # for most runs know no leg, no walk and no fault
+if TYPE_CHECKING:  # for most runs know no leg, no line, no walk and no fault
     from ppafo.engine.led_leg import LedLeg
     from ppafo.engine.scheme.walking import DeviceShare, WalkState
     from ppafo.model.gait import Course, GaitSeries, GaitTiming
     from ppafo.model.leg import LegParameters
     from ppafo.model.plant_faults import PlantFaults, ShutOff
+    from ppafo.model.regulator import LineState, SupplyLines
 
 Members = NDArray[np.intp]
 Floats = NDArray[np.float64]
@@ -102,8 +102,8 @@ class Walk:
 class Lines:
     """What lines behind regulators add to a run; the regulators are set to the supply pressures of the plant."""
 
-    parameters: SupplyLines
-    initial: LineState
+    parameters: "SupplyLines"
+    initial: "LineState"
 
 
 @dataclass(frozen=True, slots=True)

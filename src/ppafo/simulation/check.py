@@ -179,18 +179,6 @@ def _cells(row: NumberCheck, names: list[str], level: Shown, change: Shown) -> l
     return [row.name, f"{value:.4g} {unit}".rstrip(), *changes, "" if row.is_determined else "sensitive"]
 
 
-class Ended(Protocol):
-    """How a run ended, of which this needs to know where it stopped [s]."""
-
-    @property
-    def time(self) -> float | None:
-        """When a run that diverged stopped."""
-
-    @property
-    def is_completed(self) -> bool:
-        """True where it reached the end of the scenario."""
-
-
 class Ran(Protocol):
     """A finished run."""
 
@@ -207,8 +195,8 @@ class Ran(Protocol):
         """Its metrics by name."""
 
     @property
-    def status(self) -> Ended:
-        """How it ended."""
+    def status(self) -> Any:
+        """How it ended, a ``Status``."""
 
 
 Again = Callable[[Sequence[Run]], Sequence[Ran]]
@@ -270,12 +258,17 @@ def checked(result: Ran, run: Run, again: Again) -> Check:
     results = again([repeat for _, repeat in repeats])
     found = [(name, repeated) for (name, _), repeated in zip(repeats, results, strict=True)]
     courses = tuple(_course(name, found, result, pressures) for name in _COURSES)
+    partings = [repeated.status.time for repeated in results if repeated.status.time is not None]
+    for course in courses:
+        for repeated in results:
+            beyond = _largest_differences(repeated.recording, recording, _COURSES[course.name]) > course.allowed
+            partings += [float(recording.time[np.argmax(beyond)])] if beyond.any() else []
     return Check(
         scenario=scenario.name,
         metrics=_metrics(result, found, pressures),
         courses=courses,
         error=estimated_error(result, results[0]),
-        parts_at=_time_of_parting(results, result, courses),
+        parts_at=min(partings, default=None),
         failed=tuple(dict.fromkeys(name for name, repeated in found if not repeated.status.is_completed)),
         atmosphere=supply.atmospheric_pressure,
     )
@@ -400,12 +393,3 @@ def _course(name: str, repeats: list[tuple[str, Ran]], result: Ran, pressures: f
     )
     allowed_error = (LARGEST_OF_ANGLE if is_angle else LARGEST_OF_PRESSURE) * span / MARGIN
     return NumberCheck(name, unit, span, ALLOWED_PARTING * span, changes, allowed_error)
-
-
-def _time_of_parting(repeats: Sequence[Ran], result: Ran, courses: tuple[NumberCheck, ...]) -> float | None:
-    times = [repeat.status.time for repeat in repeats if repeat.status.time is not None]
-    for course in courses:
-        for repeat in repeats:
-            beyond = _largest_differences(repeat.recording, result.recording, _COURSES[course.name]) > course.allowed
-            times += [float(result.recording.time[np.argmax(beyond)])] if beyond.any() else []
-    return min(times, default=None)

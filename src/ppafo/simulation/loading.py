@@ -109,6 +109,7 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
     hardware = read_hardware(reading, request, changed.device)
     device = read_device(reading, hardware)
     clock = read_clock(reading)
+    law = kind_at(document, "controller")
     motion = MOTIONS[kind_at(document, "motion")].section
     assert motion is not None, "walks are built from another layout"
     before = Reading(request.file, request.content)
@@ -121,7 +122,7 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
         ),
         motion=motion.read(reading, device, clock.duration, clock.step, request.folder),
         initial=Initial(*(_initial_pressure(reading, item, device.supply) for item in INITIAL)),
-        controller=_control(reading, clock.period),
+        controller=Control(law, reading.section("controller", controller_settings(law)), clock.period),
         reference=_reference(reading),
         sensors=_sensors(reading, clock),
         assumptions=(*read_assumptions(before, reading, hardware, request.overrides), *assumed_lines(reading)),
@@ -228,11 +229,6 @@ def _reference(reading: Reading) -> ProfileChoice:
     return _NOTHING_TO_FOLLOW
 
 
-def _control(reading: Reading, period: float) -> Control:
-    kind = kind_at(reading.document, "controller")
-    return Control(kind, reading.section("controller", controller_settings(kind)), period)
-
-
 def _sensors(reading: Reading, clock: Clock) -> Sensors:
     values = reading.section("sensors", SENSORS)
     if values["delay"] > clock.duration:
@@ -265,18 +261,15 @@ def read_assumptions(
     for path, note in notes.items():
         value, earlier = _value(reading, hardware, path), _value(before, hardware, path)
         if value is None and earlier is None:
-            raise _unknown(reading, path)
-        if value is not None:
-            assumptions.append(
-                Assumption(path, value, _note(before, path, note, earlier) if path in replaced else note)
+            hint = nearest_name(path, [*scenario_paths(reading.document), *device_paths()])
+            raise ScenarioError(
+                f"{reading.file}: [{_SECTION}] names '{one_line(path)}', which has no value in this scenario{hint}"
             )
+        if value is not None:
+            was = earlier if value_at(before.document, path) is not None else "another value"
+            said = f"set by an override; the scenario has {was}: {note}" if path in replaced else note
+            assumptions.append(Assumption(path, value, said))
     return tuple(assumptions)
-
-
-def _note(before: Reading, path: str, note: str, earlier: str | None) -> str:
-    """Return the note of a value that an override has replaced."""
-    was = earlier if value_at(before.document, path) is not None else "another value"
-    return f"set by an override; the scenario has {was}: {note}"
 
 
 def _value(reading: Reading, hardware: Hardware, path: str) -> str | None:
@@ -301,13 +294,6 @@ def _device_value(hardware: Hardware, path: str) -> str | None:
 
 def _default(quantity: Quantity) -> str | None:
     return None if quantity.default is None else quantity_text(quantity.default, quantity.unit)
-
-
-def _unknown(reading: Reading, path: str) -> ScenarioError:
-    hint = nearest_name(path, [*scenario_paths(reading.document), *device_paths()])
-    return ScenarioError(
-        f"{reading.file}: [{_SECTION}] names '{one_line(path)}', which has no value in this scenario{hint}"
-    )
 
 
 def read_gas_model(reading: Reading) -> GasModel | None:
@@ -437,16 +423,11 @@ def scenario_of(request: ScenarioRequest, layout: Layout) -> Scenario:
     changed = apply_overrides(request.content, request.overrides, request.file, declared)
     declared.find_kinds(changed.document, request.file)
     _refuse(_problems(changed.document, layout), request, layout, changed.document)
-    _check_forms(Reading(request.file, changed.document, changed.paths))
-    return layout.build(request, changed)
-
-
-def _check_forms(reading: Reading) -> None:
-    """Refuse what a document gives in two forms."""
-    paths = [f"{section}.{name}" for section in FORMS for name in value_at(reading.document, section) or ()]
+    paths = [f"{section}.{name}" for section in FORMS for name in value_at(changed.document, section) or ()]
     pair = in_two_forms(paths)
     if pair is not None:
-        raise reading.refusal(pair[1], either(pair[1]))
+        raise Reading(request.file, changed.document, changed.paths).refusal(pair[1], either(pair[1]))
+    return layout.build(request, changed)
 
 
 def _problems(document: dict[str, Any], layout: Layout) -> list[ErrorDetails]:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ppafo.control.catalog import PROFILES
+from ppafo.control.kind import OPEN_LOOP
 from ppafo.errors import DataError, ScenarioError, one_line
 from ppafo.kinds import late
 from ppafo.model.declaration import Quantity
@@ -33,14 +34,7 @@ from ppafo.simulation.declaration import (
 )
 from ppafo.simulation.motion_kind import MotionKind, MotionSection, ProfileTable
 from ppafo.simulation.profiles import TOLERANCE, profile_problem, range_text, read_profile, stops_of
-from ppafo.simulation.scenario import (
-    OPEN_LOOP,
-    FreeMotion,
-    Leg,
-    PrescribedMotion,
-    ProfileChoice,
-    Scenario,
-)
+from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion, ProfileChoice, Scenario
 from ppafo.simulation.schema import profile_table, shank_table
 
 _PROFILE, _SHANK = "motion.profile", "motion.shank"

@@ -15,7 +15,7 @@ from ppafo.control.kind import ControllerKind, ProfileKind
 from ppafo.engine.components import GasScheme
 from ppafo.engine.program import NoParameters, Program
 from ppafo.engine.rows import rebuilt
-from ppafo.engine.run import Lines, Run, WornLeg
+from ppafo.engine.run import Run, WornLeg
 from ppafo.engine.scheme.actuators import volumes_of
 from ppafo.engine.scheme.isothermal_gas import ISOTHERMAL
 from ppafo.engine.scheme.pneumatics import KEPT_OF_PRESSURE, is_slow
@@ -41,7 +41,6 @@ from ppafo.model.gas import wall_exchange
 from ppafo.model.orifice import ExactOrifice
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, chamber_mass, chamber_volumes
 from ppafo.model.ports import gas_density
-from ppafo.model.regulator import LineState, SupplyLines
 from ppafo.model.sensors import SensorParameters
 from ppafo.model.valves.kind import ValveModel
 from ppafo.parameters.device import Device, Gas, Orifice, SonicOrifice
@@ -64,6 +63,7 @@ from ppafo.simulation.scenario import (
 
 if TYPE_CHECKING:
     from ppafo.engine.led_leg import LedLeg
+    from ppafo.model.regulator import SupplyLines
 
 MAXIMUM_STEPS = 1.0e9
 
@@ -103,7 +103,7 @@ class Components:
     sensors: SensorParameters
     has_ideal_sensors: bool
     thermal: GasModel | None
-    supply_lines: SupplyLines | None
+    supply_lines: "SupplyLines | None"
     signal_delay: Any = 0.0
     sections: Mapping[str, Any] = field(default_factory=dict)
     leg: "CarriedLeg | None" = None
@@ -155,21 +155,33 @@ def compose_run(
     """
     settings = valve_settings(components.device.valve)
     delay = components.valve.command_delay(settings)
-    plant = plant_behind_lines(plant, components.supply_lines)
+    # Lines take back what a chamber pushes out, whether or not their regulators do.
+    plant = plant if components.supply_lines is None else plant._replace(relieving=1.0)
     plant, leg = (plant, None) if components.leg is None else components.leg.put_on(plant)
+    lines = None
+    if components.supply_lines is not None:
+        from ppafo.simulation.supply_lines import initial_lines
+
+        lines = initial_lines(plant, components.supply_lines)
+    controller: Any = ()
+    if components.controller is not None:
+        law, given = components.controller, components.settings
+        # The numbers that a plan made have no settings of their names; they come in the order of the law's parameters.
+        numbers = given.values() if law.plan is not None else [given[item.name] for item in law.quantities]
+        controller = rebuilt(law.parameters, numbers)
     # After lines and leg: the rule looks at the plant with both.
     steps = rule(plant)
     return Run(
         program=_program(components, steps, walk, has_delay=first(delay) > 0.0),
         plant=plant,
-        thermal=thermal_parameters(components.thermal, components.device),
+        thermal=NoParameters()
+        if components.thermal is None
+        else thermal_gas(components.thermal, components.device.gas),
         valve_orifice=exact_orifice(components.device.valve.orifice, components.device),
         leak_orifice=exact_orifice(components.device.actuator.leak, components.device),
         initial=start(plant),
         valve=valve_parameters(components.valve, settings),
-        controller=()
-        if components.controller is None
-        else controller_parameters(components.controller, components.settings),
+        controller=controller,
         reference=profile_parameters(components.reference),
         path=() if components.path is None else profile_parameters(components.path),
         sensors=components.sensors,
@@ -182,7 +194,7 @@ def compose_run(
         needs_parts=steps.needs_parts,
         tolerance=steps.tolerance,
         walk=walk,
-        lines=initial_lines(plant, components.supply_lines),
+        lines=lines,
         effects=effect_rows(components.device, components.sections),
         leg=leg,
     )
@@ -251,7 +263,11 @@ def plan_vane(scenario: Scenario, leg: CarriedLeg | None = None) -> tuple[Run, t
     device, motion, control = scenario.device, vane_motion(scenario), scenario.controller
     plant = plant_parameters(device, motion.outside_torque)
     law = None if control.kind == PYTHON_CONTROLLER else CONTROLLERS[control.kind]
-    numbers, problems = _numbers_of_law(law, scenario, plant.torque_constant)
+    numbers: Mapping[str, Any] = control.settings
+    problems: tuple[Problem, ...] = ()
+    if law is not None and law.plan is not None:
+        bounds = profile_bounds(scenario.reference)
+        numbers, problems = law.plan(numbers, control.period, plant.torque_constant, bounds)
     components = Components(
         device=device,
         valve=VALVES[device.valve.kind].choose(first_settings(device.valve)),
@@ -271,16 +287,6 @@ def plan_vane(scenario: Scenario, leg: CarriedLeg | None = None) -> tuple[Run, t
         components, plant, lambda fed: scenario_steps(scenario, fed), lambda fed: initial_state(scenario, fed)
     )
     return run, (too_many_steps(scenario, run.step, run.step_count), *problems)
-
-
-def _numbers_of_law(
-    law: ControllerKind | None, scenario: Scenario, torque_constant: Any
-) -> tuple[Mapping[str, Any], tuple[Problem, ...]]:
-    """Return the numbers of a law by name, which are its settings unless it has a plan, and what may be wrong."""
-    control = scenario.controller
-    if law is None or law.plan is None:
-        return control.settings, ()
-    return law.plan(control.settings, control.period, torque_constant, profile_bounds(scenario.reference))
 
 
 def scenario_steps(scenario: Scenario, plant: PlantParameters) -> Steps:
@@ -327,25 +333,6 @@ def too_many_steps(scenario: Scenario, step: float, step_count: int) -> Problem:
     return step_count > MAXIMUM_STEPS, line
 
 
-def thermal_parameters(walls: GasModel | None, device: Device) -> ThermalParameters | NoParameters:
-    """How the gas takes up heat, where it has an energy balance."""
-    if walls is None:
-        return NoParameters()
-    return thermal_gas(walls, device.gas)
-
-
-def plant_behind_lines(plant: PlantParameters, lines: SupplyLines | None) -> PlantParameters:
-    """The plant behind its lines: these take back what a chamber pushes out, whether or not their regulators do."""
-    return plant if lines is None else plant._replace(relieving=1.0)
-
-
-def initial_lines(plant: PlantParameters, lines: SupplyLines | None) -> Lines | None:
-    """Both lines at the pressures that their regulators are set to, and nothing let through yet; None without lines."""
-    if lines is None:
-        return None
-    return Lines(lines, lines_at_start(plant, lines))
-
-
 def has_ideal_sensors(scenario: Scenario) -> bool:
     """True where the controller sees what is there, without noise or rounding."""
     return not any(first(flaw) for flaw in scenario.sensors.flaws[1:])
@@ -361,15 +348,6 @@ def sensor_parameters(scenario: Scenario) -> SensorParameters:
         pressure_resolution=sensors.pressure_resolution,
         seed=sensors.seed,
     )
-
-
-def controller_parameters(kind: ControllerKind, settings: Mapping[str, Any]) -> Any:
-    """The NamedTuple of a controller, nested ones filled in the order of its quantities; settings may be arrays.
-
-    Of a controller with a plan ``settings`` are the numbers that this made, in their order.
-    """
-    given = settings.values() if kind.plan is not None else [settings[item.name] for item in kind.quantities]
-    return rebuilt(kind.parameters, given)
 
 
 def is_adaptive(scenario: Scenario, plant: PlantParameters, step: float) -> Any:
@@ -485,13 +463,4 @@ def state_with_volumes(
         supplied_mass=0.0,
         vented_mass=0.0,
         leaked_mass=0.0,
-    )
-
-
-def lines_at_start(plant: PlantParameters, lines: SupplyLines) -> LineState:
-    """Both lines at the pressures that their regulators are set to, and nothing let through yet."""
-    return LineState(
-        mass_1=chamber_mass(plant.supply_pressure, lines.volume_1, plant.gas_product),
-        mass_2=chamber_mass(plant.dorsiflexion_pressure, lines.volume_2, plant.gas_product),
-        regulated_mass=0.0,
     )

@@ -7,21 +7,21 @@ an object of your own in charge of the valve.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Protocol
 
 from ppafo.control.kind import PythonController
 from ppafo.documents.json_text import plain
 from ppafo.engine.scheme.pneumatics import KEPT_OF_PRESSURE
 from ppafo.errors import ScenarioError
 from ppafo.model.declaration import Number, attribute_among
-from ppafo.model.regulator import SupplyLines
 from ppafo.parameters.device import Device, Supply
 from ppafo.parameters.graph import Graph
 from ppafo.simulation.motion_kind import MOTIONS, MotionKind
 
+if TYPE_CHECKING:
+    from ppafo.model.regulator import SupplyLines
+
 PYTHON_CONTROLLER = "python"
-OPEN_LOOP = "constant"
-"""The controller that follows no reference: its recordings have none, so that no tracking error is made of it."""
 LARGEST_SEED = 2**32 - 1
 
 UNITS = "SI: kg, m, s, K, mol; angles in rad, pressures in Pa absolute, torques in N m"
@@ -228,8 +228,10 @@ class SupplyLine:
     plantarflexion: RegulatedLine
     dorsiflexion: RegulatedLine
 
-    def row(self, supply: Supply) -> SupplyLines:
+    def row(self, supply: Supply) -> "SupplyLines":
         """Return the lines as the engine has them, with regulators that relieve where the supply's do."""
+        from ppafo.model.regulator import SupplyLines
+
         first, second = self.plantarflexion, self.dorsiflexion
         return SupplyLines(
             droop_1=first.droop,
@@ -347,7 +349,7 @@ class Scenario:
         )
 
     @property
-    def supply_lines(self) -> SupplyLines | None:
+    def supply_lines(self) -> "SupplyLines | None":
         """Regulators and lines as the engine has them, None where supply pressures are constant."""
         return None if self.supply_line is None else self.supply_line.row(self.device.supply)
 

@@ -125,55 +125,34 @@ def controller_table(kinds: Mapping[str, ControllerKind], suffix: str) -> Any:
     )
 
 
-def gas_model_table() -> Any:
-    """Return the section that says how the gas in the chambers behaves."""
-    warm = "the gas warms and cools: energy balance, heat through the walls"
-    return one_of(
-        [
-            table(
-                "IsothermalGas", kind_field(declaration.ISOTHERMAL, "the gas keeps its temperature, as in the paper")
-            ),
-            table("ThermalGas", kind_field(declaration.THERMAL, warm) | quantity_fields(declaration.THERMAL_GAS)),
-        ]
-    )
-
-
-def supply_line_table() -> Any:
-    """Return the section of the regulators and lines that feed the device."""
-    fields = {
+def file_model(name: str, own: dict[str, Any]) -> type[BaseModel]:
+    """Return the model of a file of a scenario: the sections that every one has, and the ones of its kind of motion."""
+    device = {
+        "set": (str, Field(min_length=1, description="name of a parameter set, or a path relative to this file")),
+        "valve": optional(str, "name of one of the set's valves; its default valve unless given"),
+        "overrides": (list[str], Field(default_factory=list, description="such as 'valve.area=12.6mm^2'")),
+    }
+    isothermal = kind_field(declaration.ISOTHERMAL, "the gas keeps its temperature, as in the paper")
+    thermal = kind_field(declaration.THERMAL, "the gas warms and cools: energy balance, heat through the walls")
+    gas = [
+        table("IsothermalGas", isothermal),
+        table("ThermalGas", thermal | quantity_fields(declaration.THERMAL_GAS)),
+    ]
+    lines = {
         line: optional(
             table(f"{model_name(line)}Line", quantity_fields(declaration.line_quantities(line))), f"{line} line"
         )
         for line in declaration.SUPPLY_LINES
     }
-    return table("SupplyLine", fields)
-
-
-def device_fields() -> dict[str, Any]:
-    """Return the fields of a device section."""
-    return {
-        "set": (str, Field(min_length=1, description="name of a parameter set, or a path relative to this file")),
-        "valve": optional(str, "name of one of the set's valves; its default valve unless given"),
-        "overrides": (list[str], Field(default_factory=list, description="such as 'valve.area=12.6mm^2'")),
-    }
-
-
-def _sensors() -> dict[str, Any]:
-    seed = Annotated[int, Field(ge=0, le=LARGEST_SEED)]
-    return quantity_fields(declaration.SENSORS) | {"seed": (seed, Field(1, description=declaration.SEED.summary))}
-
-
-def file_model(name: str, own: dict[str, Any]) -> type[BaseModel]:
-    """Return the model of a file of a scenario: the sections that every one has, and the ones of its kind of motion."""
     fields: dict[str, Any] = {
         "schema_version": (Literal[1], Field(description="version of this layout")),
         "name": (str, Field(pattern=NAME, max_length=_LONGEST_NAME)),
         "description": (str, Field("", description="what this file tries, and why")),
-        "device": (table("Device", device_fields()), Field(description="the hardware")),
+        "device": (table("Device", device), Field(description="the hardware")),
         **own,
-        "gas_model": optional(gas_model_table(), "how the gas in the chambers behaves; isothermal unless given"),
+        "gas_model": optional(one_of(gas), "how the gas in the chambers behaves; isothermal unless given"),
         declaration.SUPPLY_LINE: optional(
-            supply_line_table(), "regulators and lines of the gas; constant pressures unless given"
+            table("SupplyLine", lines), "regulators and lines of the gas; constant pressures unless given"
         ),
         "assumed": (
             dict[str, str],
@@ -202,6 +181,8 @@ def whole_scenario_file() -> type[BaseModel]:
 def _scenario_file(*_kinds: Any) -> type[BaseModel]:
     words = tuple(declaration.PRESSURE_WORDS)
     reference = profile_table(declaration.TORQUE_LEVEL, "Reference")
+    seed = Annotated[int, Field(ge=0, le=LARGEST_SEED)]
+    sensors = quantity_fields(declaration.SENSORS) | {"seed": (seed, Field(1, description=declaration.SEED.summary))}
     initial = table("Initial", quantity_fields(declaration.INITIAL, words))
     own: dict[str, Any] = {
         "run": (
@@ -217,7 +198,7 @@ def _scenario_file(*_kinds: Any) -> type[BaseModel]:
         "reference": optional(
             reference, "torque that the controller follows; only one that follows none, as constant, may leave it out"
         ),
-        "sensors": optional(table("Sensors", _sensors()), "sensors of the controller; ideal unless given"),
+        "sensors": optional(table("Sensors", sensors), "sensors of the controller; ideal unless given"),
     }
     return file_model("ScenarioFile", own)
 

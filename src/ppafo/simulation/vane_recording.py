@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from ppafo.control.kind import OPEN_LOOP
 from ppafo.engine.lane_source import SAME_MOMENT
 from ppafo.engine.lanes import Floats
 from ppafo.engine.over_samples import over_samples
@@ -20,7 +21,7 @@ from ppafo.model.regulator import LineState, line_pressures
 from ppafo.parameters.device import Gas
 from ppafo.signals.recording import Channel, Recording
 from ppafo.simulation.profiles import profile_values
-from ppafo.simulation.scenario import OPEN_LOOP, Scenario, vane_motion
+from ppafo.simulation.scenario import Scenario, vane_motion
 
 Measured = tuple[Recording, Mapping[str, Metric], str]
 """Recording and metrics, and how a completed run ended, in words."""

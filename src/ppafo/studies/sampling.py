@@ -21,7 +21,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.simulation.scenario import LARGEST_SEED, OPEN_LOOP, Scenario
+from ppafo.control.kind import OPEN_LOOP
+from ppafo.simulation.scenario import LARGEST_SEED, Scenario
 from ppafo.studies.distributions import Floats, WholeNumbersBetween
 from ppafo.studies.study import Drawn, Sample
 

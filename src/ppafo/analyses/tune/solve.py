@@ -23,6 +23,7 @@ from ppafo.analyses.tune.answer import (
     keeps,
 )
 from ppafo.analyses.tune.problem import Effort, Gains, Limit, Problem, Spread, Term, load_tuning
+from ppafo.control.kind import OPEN_LOOP
 from ppafo.errors import StudyError
 from ppafo.metrics import METRICS
 from ppafo.parameters.device import VANE
@@ -31,7 +32,7 @@ from ppafo.report.finding import Finding
 from ppafo.report.kind import Interval
 from ppafo.simulation.numbers import TIMES, absolute, with_numbers
 from ppafo.simulation.profiles import profile_bounds
-from ppafo.simulation.scenario import OPEN_LOOP, Scenario
+from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate
 from ppafo.studies.distributions import Floats, noise_interval
 from ppafo.studies.draws import with_new_noise

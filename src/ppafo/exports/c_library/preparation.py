@@ -44,7 +44,6 @@ from ppafo.simulation.numbers import (
 )
 from ppafo.simulation.plan import (
     is_slow_locked,
-    lines_at_start,
     relative_tolerance,
     state_at_start,
     state_with_volumes,
@@ -53,6 +52,7 @@ from ppafo.simulation.plan import (
 )
 from ppafo.simulation.profiles import TOLERANCE
 from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion, Scenario
+from ppafo.simulation.supply_lines import lines_at_start
 from ppafo.units import parse_quantity
 
 FLAWS = ("angle_noise", "pressure_noise", "angle_resolution", "pressure_resolution")

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.control.kind import OPEN_LOOP
 from ppafo.engine.lane_samples import TRACED
 from ppafo.engine.lanes import Floats, load_programs
 from ppafo.engine.run import TOO_MANY_PARTS
@@ -16,7 +17,7 @@ from ppafo.simulation.check import MARGIN, finer
 from ppafo.simulation.ensemble.planning import EnsemblePlan, plan_ensemble
 from ppafo.simulation.ensemble.running import REFERENCE, Outcome, Request, intervals, offered, samples_of
 from ppafo.simulation.numbers import check_columns
-from ppafo.simulation.scenario import OPEN_LOOP, Scenario
+from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import REMEDY
 
 COMPLETED, DIVERGED, REFUSED = 0, 1, 2

@@ -13,7 +13,7 @@ from ppafo.engine.lanes import Batch, Floats
 from ppafo.engine.run import Members, Run, batches_of
 from ppafo.errors import ScenarioError
 from ppafo.model.columns import Problem, at
-from ppafo.model.declaration import Quantity, range_rule
+from ppafo.model.declaration import range_rule
 from ppafo.parameters.building import actuator_problem, beyond_pressures, consistency, growth_and_problem
 from ppafo.parameters.device import VANE
 from ppafo.parameters.plant import switches_of
@@ -81,12 +81,6 @@ def screen_columns(columns: Columns) -> Screen:
     return screen
 
 
-def _within(values: Floats, quantity: Quantity) -> Any:
-    """Which values are finite and keep the limits of their declaration."""
-    above = values >= quantity.minimum if quantity.minimum_allowed else values > quantity.minimum
-    return np.isfinite(values) & above & (values <= quantity.maximum)
-
-
 def _out_of_range(columns: Columns, path: str) -> Problem:
     values, quantity = columns.values[path], columns.declared[path]
     unit = quantity.unit
@@ -99,7 +93,8 @@ def _out_of_range(columns: Columns, path: str) -> Problem:
             return f"{given}: must be a whole number"
         return f"{given}: {range_rule(quantity, limits(quantity, STANDARD_ATMOSPHERE))}"
 
-    is_good = _within(values, quantity)
+    above = values >= quantity.minimum if quantity.minimum_allowed else values > quantity.minimum
+    is_good = np.isfinite(values) & above & (values <= quantity.maximum)
     return ~(is_good & (values == np.floor(values)) if path in _WHOLE else is_good), line
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from ppafo.control.catalog import CONTROLLERS
+from ppafo.control.kind import OPEN_LOOP
 from ppafo.control.profiles import KNOTS
 from ppafo.documents.models import NAME, StrictTable, Text, Texts
 from ppafo.documents.toml_text import beside
@@ -19,7 +20,7 @@ from ppafo.loading import reloaded
 from ppafo.parameters.parts import Part, load_catalogue
 from ppafo.parameters.parts.catalogue import DEFAULT
 from ppafo.simulation.loading import load_scenario
-from ppafo.simulation.scenario import OPEN_LOOP, Scenario
+from ppafo.simulation.scenario import Scenario
 from ppafo.storage.result_folder import read_recording
 from ppafo.units import parse_quantity, split_quantity
 
