@@ -417,10 +417,12 @@ def scenario_of(request: ScenarioRequest, layout: Layout) -> Scenario:
         )
     declared = layout.declared
     declared.find_kinds(request.content, request.file)
+    # What is wrong in the file itself is said as such; what it lacks an override may give.
     if request.overrides:
         wrong = [item for item in _problems(request.content, layout) if not is_gap(item)]
         _refuse(wrong, request, layout, request.content)
     changed = apply_overrides(request.content, request.overrides, request.file, declared)
+    # Overrides may name kinds that the file does not.
     declared.find_kinds(changed.document, request.file)
     _refuse(_problems(changed.document, layout), request, layout, changed.document)
     paths = [f"{section}.{name}" for section in FORMS for name in value_at(changed.document, section) or ()]

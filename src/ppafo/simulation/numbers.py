@@ -81,6 +81,7 @@ def with_numbers(scenario: Scenario, numbers: Mapping[str, Any]) -> Scenario:
     """
     given = {chosen_path(path, scenario): number for path, number in numbers.items()}
     chosen = moving_together(scenario, given)
+    # All links that are left are the scenario's own, for what was given follows nothing any more.
     if given:
         device = replace(scenario.device, links={})
         scenario = replace(scenario, device=device, links=left(scenario.graph, given))
@@ -120,6 +121,7 @@ def _number(node: Any, place: tuple[str, ...]) -> Any:
 
 
 def _inner(node: Any, part: str) -> Any:
+    # A device has settings of the effects that its set names; those of all others are their defaults.
     if part == EFFECT_SETTINGS and isinstance(node, Device):
         return all_settings(node)
     return node[part] if isinstance(node, Mapping) else getattr(node, part)
@@ -152,7 +154,7 @@ def _replace_number(node: Any, parts: tuple[str, ...], number: Any) -> Any:
     inner = _replace_number(_inner(node, name), inside, number) if inside else number
     if isinstance(node, Mapping):
         return {**node, name: inner}
-    if name in _names(node):
+    if any(item.name == name for item in fields(node)):
         return replace(node, **{name: inner})
     # Among its settings, in its orifice or on its leg: there it is an attribute of its own all the same.
     holder = next(field for field in _HOLDERS if _has(getattr(node, field, None), name))
@@ -161,10 +163,6 @@ def _replace_number(node: Any, parts: tuple[str, ...], number: Any) -> Any:
 
 def _has(inner: Any, name: str) -> bool:
     return name in inner if isinstance(inner, Mapping) else hasattr(inner, name)
-
-
-def _names(node: Any) -> frozenset[str]:
-    return frozenset(item.name for item in fields(node))
 
 
 @dataclass(frozen=True, slots=True)

@@ -135,6 +135,7 @@ def _choose_kinds(
 
     A kind whose section is not there remains.
     """
+    # A kind of an outer section decides which sections there are inside it.
     first = sorted(filter(_is_choosing, given), key=lambda path: (path.count("."), path))
     done = set()
     for path in first:

@@ -162,6 +162,7 @@ def _of_one_program(scenario: Scenario, runs: int) -> list[Members]:
     varied_settings += [is_on for is_on in switches_of(scenario.device).values() if isinstance(is_on, np.ndarray)]
     if not varied_settings:
         return [np.arange(runs)]
+    # A bit for each setting: runs with the same bits have the same program.
     patterns: NDArray[np.int64] = np.zeros(runs, dtype=np.int64)
     for setting in varied_settings:
         patterns = 2 * patterns + setting
@@ -201,6 +202,7 @@ def _misshapen(scenario: Scenario) -> tuple[Problem, ...]:
         problem = actuator_problem(alone)
         return f"actuator: {problem}" if problem else ""
 
+    # A kind checks single numbers, so the runs are gone through one by one.
     found = [words(run) for run in range(varied[0].size)]
     return ((np.array([bool(line) for line in found]), lambda run: found[run]),)
 

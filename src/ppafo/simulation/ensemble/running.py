@@ -290,9 +290,9 @@ def _meter_batch(plain: Batch, request: Request) -> _MeteredBatch:
     falls = {FELL} if program.reacts and (late or request.bands) else set[str]()
     traced = sorted({*read_from_traces, *request.bands, *late, *falls})
     every_sample = bool(read_from_traces or (late and (falls or request.bands)))
-    trace_every = 1 if every_sample else stride if request.bands else max(1, samples_of(plain) - 1)
+    trace_every = 1 if every_sample else stride if request.bands else max(1, plain.clock.samples - 1)
     batch = add_meters(plain, [meter for _, meter in meters], traced, trace_every if traced else 0)
-    return _MeteredBatch(batch, available, interval, samples_of(plain), stride if every_sample else 1, late)
+    return _MeteredBatch(batch, available, interval, plain.clock.samples, stride if every_sample else 1, late)
 
 
 def _late_totals(plain: Batch, metrics: Mapping[str, MetricKind]) -> tuple[str, ...]:
@@ -315,14 +315,10 @@ def intervals(batch: Batch) -> Floats:
     return np.asarray(timing.step * batch.clock.record_every)
 
 
-def samples_of(batch: Batch) -> int:
-    """Number of samples of each run of a batch that is not metered yet, the first and the last among them."""
-    return batch.clock.samples
-
-
 def _stride(interval: Floats, request: Request) -> int:
     """Samples between two that are kept."""
     stride = max(1, round(request.every / float(interval[0])))
+    # Runs of one batch may have other steps, but traces are rows of one array.
     if np.abs(stride * interval - request.every).max() > _SAME * request.every:
         raise ScenarioError(
             f"traces every {request.every:.6g} s need an output interval that divides it in every run, not "

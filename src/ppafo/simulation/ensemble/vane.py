@@ -75,6 +75,7 @@ def clock(base: Scenario, times: Mapping[str, Any]) -> tuple[Clock, tuple[Proble
 
     Times are read as those of a file are, once for each combination of them.
     """
+    # Once for each combination: times are read as the texts of a file are, and an ensemble has few of them.
     given = time_texts(base)
     rows, places = np.unique(np.stack(list(times.values()), axis=1), axis=0, return_inverse=True)
     places = places.reshape(-1)
