@@ -274,7 +274,7 @@ def plan_vane(scenario: Scenario, leg: CarriedLeg | None = None) -> tuple[Run, t
         controller=law,
         settings=numbers,
         reference=scenario.reference,
-        path=motion.path,
+        path=motion.profile,
         sensors=sensor_parameters(scenario),
         has_ideal_sensors=has_ideal_sensors(scenario),
         thermal=scenario.gas_model,
@@ -368,11 +368,11 @@ def is_adaptive(scenario: Scenario, plant: PlantParameters, step: float) -> Any:
 def initial_state(scenario: Scenario, plant: PlantParameters) -> PlantState:
     """Angle, angular velocity and gas at the start."""
     motion = vane_motion(scenario)
-    if motion.path is None:
+    if motion.profile is None:
         angle, rate = motion.angle, motion.angular_velocity
     else:
-        path = PROFILES[motion.path.kind]
-        numbers = [motion.path.settings[item.name] for item in path.quantities]
+        path = PROFILES[motion.profile.kind]
+        numbers = [motion.profile.settings[item.name] for item in path.quantities]
         angle, rate, _ = over_runs(lambda *values: path.value(rebuilt(path.parameters, values), 0.0), *numbers)
     pressures = scenario.initial.pressure_1, scenario.initial.pressure_2
     kind = scenario.device.actuator.kind

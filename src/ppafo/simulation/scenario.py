@@ -80,6 +80,8 @@ class FreeMotion:
         float, Number("N m", "constant torque T_ex, above 0 against plantarflexion", 0.0, -1.0e4, 1.0e4)
     ] = 0.0
     leg: Leg | None = None
+    profile: ClassVar[None] = None
+    locked_angle: ClassVar[None] = None
 
     def __getattr__(self, name: str) -> Any:
         """Return a number of the leg by its name."""
@@ -89,14 +91,6 @@ class FreeMotion:
     def motion_kind(self) -> MotionKind:
         """What it brings to the runs of its scenarios."""
         return MOTIONS["free" if self.leg is None else "leg"]
-
-    @property
-    def path(self) -> None:
-        """No profile prescribes the angle."""
-
-    @property
-    def locked_angle(self) -> None:
-        """No angle at which the vane stays."""
 
     @property
     def outside_torque(self) -> Any:
@@ -133,11 +127,6 @@ class PrescribedMotion:
     def motion_kind(self) -> MotionKind:
         """What it brings to the runs of its scenarios."""
         return MOTIONS[self.kind]
-
-    @property
-    def path(self) -> ProfileChoice:
-        """The profile that prescribes the angle [rad]."""
-        return self.profile
 
     @property
     def locked_angle(self) -> Any:

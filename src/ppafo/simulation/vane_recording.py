@@ -35,7 +35,7 @@ def measured_free(scenario: Scenario, run: Run, times: Floats, rows: Mapping[str
 
 def measured_prescribed(scenario: Scenario, run: Run, times: Floats, rows: Mapping[str, Floats]) -> Measured:
     """Return recording and metrics of a vane whose T_ex of equation (1) is what keeps it on its path."""
-    path, plant = vane_motion(scenario).path, run.plant
+    path, plant = vane_motion(scenario).profile, run.plant
     assert path is not None, "the angle is prescribed"
 
     def external_torque(torque: Floats) -> Floats:

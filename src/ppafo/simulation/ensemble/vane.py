@@ -25,7 +25,7 @@ def rules(scenario: Scenario) -> tuple[Problem, ...]:
 def _beyond_the_stops(scenario: Scenario) -> tuple[Problem, ...]:
     """A vane that begins, is held or is to move beyond the stops."""
     actuator, motion = scenario.device.actuator, vane_motion(scenario)
-    profile = ProfileChoice("constant", {"level": motion.angle}) if motion.path is None else motion.path
+    profile = ProfileChoice("constant", {"level": motion.angle}) if motion.profile is None else motion.profile
     lowest, highest = profile_bounds(profile)
     lower, upper = actuator.angle_min - TOLERANCE, actuator.angle_max + TOLERANCE
     outside = np.atleast_1d(np.logical_or(lowest < lower, highest > upper))
