@@ -230,22 +230,13 @@ def _reference(reading: Reading) -> ProfileChoice:
 
 
 def _sensors(reading: Reading, clock: Clock) -> Sensors:
-    values = reading.section("sensors", SENSORS)
+    values: dict[str, Any] = reading.section("sensors", SENSORS)
     if values["delay"] > clock.duration:
         raise reading.refusal("sensors.delay", "must not be longer than run.duration: nothing would ever be measured")
     if values["delay"] / clock.step > MAXIMUM_STEPS_OF_DELAY:
         longest = quantity_text(MAXIMUM_STEPS_OF_DELAY * clock.step, "s")
         raise reading.refusal("sensors.delay", f"must be at most {longest}, {MAXIMUM_STEPS_OF_DELAY:.0e} steps")
-    return Sensors(
-        delay=values["delay"],
-        angle_noise=values["angle_noise"],
-        pressure_noise=values["pressure_noise"],
-        angle_resolution=values["angle_resolution"],
-        pressure_resolution=values["pressure_resolution"],
-        seed=int(reading.number("sensors.seed", SEED)),
-        angle_bandwidth=values["angle_bandwidth"],
-        pressure_bandwidth=values["pressure_bandwidth"],
-    )
+    return Sensors(**values, seed=int(reading.number("sensors.seed", SEED)))
 
 
 def read_assumptions(
