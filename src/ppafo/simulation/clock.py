@@ -77,6 +77,7 @@ def step_with_output(duration: Number, period: Number, output_interval: Number) 
 
 def dividing_step(period: Number, step: Number) -> Number:
     """The largest step [s], up to one that is given, that divides the sample period."""
+    # A quotient that rounding put above a whole number would make the step shorter than what is given.
     found: Number = period / larger(1.0, rounded_up(period / step * (1.0 - _RELATIVE)))
     return found
 

@@ -91,6 +91,7 @@ def with_load(plant: PlantParameters, load: FootLoad) -> PlantParameters:
 def _leg_channels(run: Run, times: Floats, angle: Floats) -> dict[str, tuple[Floats, str]]:
     """Shank and foot of a leg whose shank moves; where a gait leads it, beside the foot that was measured."""
     kind, leg = run.program.shank, run.leg
+    # A shank at rest has one angle, which the scenario says.
     if kind is None or leg is None or kind is CONSTANT:
         return {}
     shank = np.broadcast_to(shank_over_samples(kind, leg.shank, times).angle, times.shape)

@@ -269,6 +269,7 @@ def clock_with(name: str, given: TimeTexts, times: Mapping[str, float]) -> Clock
     document = {section: dict(texts) for section, texts in given.items()}
     for path, value in times.items():
         section, item = path.split(".")
+        # A rate takes the place of a period that the file has, and the reverse.
         if section == "controller":
             document[section] = {}
         document[section][item] = f"{value!r} {_UNIT_OF_TIMES.get(path, 's')}"
@@ -282,6 +283,7 @@ def time_texts(base: Scenario) -> TimeTexts:
         section: {name: value for name, value in document[section].items() if f"{section}.{name}" in TIMES}
         for section in ("run", "controller")
     }
+    # The file speaks for the scenario only as long as nobody has changed its times in Python.
     if read_clock(Reading(base.name, texts)) == clock_of(base):
         return texts
     run = {"duration": base.run.duration, "step": base.run.step, "output_interval": base.run.output_interval}

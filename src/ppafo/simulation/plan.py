@@ -172,6 +172,7 @@ def compose_run(
     # After lines and leg: the rule looks at the plant with both.
     steps = rule(plant)
     return Run(
+        # Of the first run, for all runs of one program have a delay or none has.
         program=_program(components, steps, walk, has_delay=first(delay) > 0.0),
         plant=plant,
         thermal=NoParameters()

@@ -129,6 +129,7 @@ class Outcome:
         """Return the programs that batches need, with their meters."""
         first = {batch.program: batch for batch in batches}
         alone = [Batch(item.program, item.clock, item.parameters[:, :1], item.states[:, :1]) for item in first.values()]
+        # Several are compiled side by side before the first batch runs; a single one as it is met.
         return [_meter_batch(batch, self.request).batch.program for batch in alone] if len(alone) > 1 else []
 
     def run(self, plain: Batch, members: Members, threads: int | None) -> None:
@@ -136,6 +137,7 @@ class Outcome:
         task = _meter_batch(plain, self.request)
         batch = task.batch
         states = np.empty_like(batch.states)
+        # A run that ends at its last sample has there the states with which it ends.
         ends = np.empty_like(states) if task.late_totals else states
         read_from_traces = {name: np.full(members.size, np.nan) for name, kind in task.metrics.items() if kind.traced}
 
@@ -204,6 +206,7 @@ class _MeteredBatch:
         if FELL not in program.traced:
             return np.ones((result.record.shape[0], result.record.shape[2]), dtype=np.bool_)
         stood: NDArray[np.bool_] = result.record[:, program.traced.index(FELL)] < 0.0
+        # The first sample stays in any case, as in the recording of a single run.
         stood[0] = True
         return stood
 
@@ -290,6 +293,7 @@ def _meter_batch(plain: Batch, request: Request) -> _MeteredBatch:
     falls = {FELL} if program.reacts and (late or request.bands) else set[str]()
     traced = sorted({*read_from_traces, *request.bands, *late, *falls})
     every_sample = bool(read_from_traces or (late and (falls or request.bands)))
+    # Totals alone need no more than the first sample and the last.
     trace_every = 1 if every_sample else stride if request.bands else max(1, plain.clock.samples - 1)
     batch = add_meters(plain, [meter for _, meter in meters], traced, trace_every if traced else 0)
     return _MeteredBatch(batch, available, interval, plain.clock.samples, stride if every_sample else 1, late)
