@@ -24,8 +24,6 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.simulation.scenario import worn_kind
-
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from ppafo.engine.run import batch_of
@@ -251,7 +249,7 @@ def at_library(name: str, count: int, seed: int) -> Judged:
 
 
 def _numbers_in_si(base: Scenario, words: Words) -> dict[str, float]:
-    if worn_kind(base) is None:
+    if not base.walks:
         return in_si(base, words)
     declared = {path: quantity for path, (quantity, _) in numbers_of_walk(base).items()}
     zero = base.device.supply.atmospheric_pressure

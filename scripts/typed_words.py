@@ -9,8 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.simulation.scenario import worn_kind
-
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from ppafo.engine.lanes import Batch
@@ -194,7 +192,7 @@ def settings_of(name: str, count: int, seed: int) -> Iterator[dict[str, str]]:
     """Settings of a scenario, the same for every door."""
     draw = random.Random(f"{name} {seed}")
     scenario = load_scenario(name)
-    known = numbers_of(scenario) if worn_kind(scenario) is None else numbers_of_walk(scenario)
+    known = numbers_of(scenario) if not scenario.walks else numbers_of_walk(scenario)
     for _ in range(count):
         paths = drawn_paths(list(known), draw)
         yield {path: words_of(path, *known[path], draw, scenario.device.supply.atmospheric_pressure) for path in paths}

@@ -11,7 +11,7 @@ import importlib.util
 import logging
 import re
 import sys
-from collections.abc import Iterator, Mapping, MutableMapping
+from collections.abc import Callable, Iterator, Mapping, MutableMapping
 from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
@@ -192,6 +192,15 @@ def kind_at(place: str) -> Any:
     """Return what stands at ``module:NAME``, a place in this package."""
     module, _, name = place.partition(":")
     return getattr(importlib.import_module(module), name)
+
+
+def late(place: str) -> Callable[..., Any]:
+    """Return the function at ``module:NAME``, a place in this package, whose module is loaded with the first call."""
+
+    def called(*given: Any) -> Any:
+        return kind_at(place)(*given)
+
+    return called
 
 
 @lru_cache(maxsize=32)

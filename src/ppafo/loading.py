@@ -13,9 +13,9 @@ from ppafo.errors import ScenarioError, nearest_name
 from ppafo.parameters import ParameterSet
 from ppafo.simulation import loading as of_vanes
 from ppafo.simulation import schema
-from ppafo.simulation.declaration import MOTIONS, kind_at
+from ppafo.simulation.declaration import kind_at
 from ppafo.simulation.loading import ScenarioRequest
-from ppafo.simulation.motion_kind import WALKS
+from ppafo.simulation.motion_kind import is_walk
 from ppafo.simulation.overrides import over_layer
 from ppafo.simulation.scenario import Scenario
 
@@ -76,9 +76,7 @@ def _layout(document: Mapping[str, Any]) -> of_vanes.Layout:
     is_older_walk = not any(section in document for section in _OF_A_VANE) and (
         any(section in document for section in _OF_A_LEG) or {"device", "controller"} <= document.keys()
     )
-    motion = kind_at(document, "motion")
-    is_walk = (motion not in MOTIONS and motion in WALKS) or is_older_walk
-    if not is_walk:
+    if not is_walk(kind_at(document, "motion")) and not is_older_walk:
         return of_vanes.VANE
     from ppafo.walking.loading import WALKING
 

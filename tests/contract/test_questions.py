@@ -158,7 +158,7 @@ WORDS = ("torque-task-proportional", "--pressure", "30 psi_g", "--pressure", "60
 @pytest.fixture
 def _installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """The package of the page, as an installer leaves it, with one more command that cannot be loaded."""
-    module, entry_points = block_with(PAGE, "def pressures("), block_with(PAGE, "entry-points.\"ppafo.commands\"")
+    module, entry_points = block_with(PAGE, "def pressures("), block_with(PAGE, 'entry-points."ppafo.commands"')
     write_package(
         tmp_path / "site", "my_analyses.pressures", module, f'{entry_points}broken = "my_analyses.nothing:broken"\n'
     )

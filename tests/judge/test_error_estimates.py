@@ -5,8 +5,7 @@ import pytest
 
 from ppafo.parameters.overrides import over
 from ppafo.running import simulate
-from ppafo.simulation.accuracy import LARGEST_OF_PRESSURE
-from ppafo.simulation.check import FINER
+from ppafo.simulation.check import FINER, LARGEST_OF_PRESSURE
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
 from ppafo.simulation.scenario import Scenario

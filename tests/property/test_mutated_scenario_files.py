@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from ppafo.control.catalog import PROFILES
 from ppafo.errors import PpafoError
 from ppafo.simulation.loading import list_scenarios
-from ppafo.simulation.plan import profile_parameters
+from ppafo.simulation.profiles import profile_parameters
 from ppafo.simulation.scenario import FreeMotion, Scenario
 from tests.scenario_text import parse_scenario
 

@@ -36,11 +36,10 @@ def hil(
     from ppafo.exports.hil.loop import stop_by_interrupt
     from ppafo.exports.hil.run import run_at
     from ppafo.loading import load_scenario
-    from ppafo.simulation.scenario import worn_kind
     from ppafo.storage import check_result_folder
 
     chosen = load_scenario(scenario, overrides)
-    if worn_kind(chosen) is not None:
+    if chosen.walks:
         raise ScenarioError(
             f"'{chosen.name}' is a walk, and the wire carries no forces under the foot: give a scenario"
         )

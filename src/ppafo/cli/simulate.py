@@ -10,8 +10,7 @@ from ppafo.documents.json_text import json_text
 
 if TYPE_CHECKING:
     from ppafo.report.finding import Finding
-    from ppafo.simulation.accuracy import ErrorEstimate
-    from ppafo.simulation.check import Check
+    from ppafo.simulation.check import Check, ErrorEstimate
     from ppafo.simulation.simulate import Result
 
 DEFAULT_FOLDER = Path("out")
@@ -38,11 +37,10 @@ def simulate(scenario: Scenario, *, check: bool = False, overrides: Overrides = 
 
     result = simulate(chosen)
     checked = result.check() if check and result.status.is_completed else None
-    from ppafo.simulation.scenario import worn_kind
 
     error = None if checked is None else checked.error
     # A vane alone runs again in milliseconds; of a walk the error is estimated by its check only.
-    if checked is None and result.status.is_completed and worn_kind(chosen) is None:
+    if checked is None and result.status.is_completed and not chosen.walks:
         error = result.error()
     # Before anything else imports Matplotlib, so that it comes without what it does for others.
     from ppafo.report.drawing import load_drawing
@@ -115,11 +113,10 @@ def list_descriptions() -> list[dict[str, Any]]:
 
 
 def _text(result: "Result", error: "ErrorEstimate | None", check: "Check | None", folder: Path) -> str:
-    from ppafo.simulation.scenario import worn_kind
 
     checked = [repr(check), ""] if check is not None else [] if error is None else [error.sentence, ""]
     files = ["recording.nc", "recording.csv", "run.json", "figure.png", "figure.svg", "report.html"]
     written = ", ".join(files if check is None else [*files, CHECK_FILE])
     walked = f"'ppafo walk {result.scenario.origin.file}' compares it with no device and with a healthy ankle"
-    beside = [] if worn_kind(result.scenario) is None else [walked]
+    beside = [] if not result.scenario.walks else [walked]
     return "\n".join([str(result), "", *checked, *beside, f"written: {folder} ({written})"])

@@ -7,6 +7,9 @@ from typing import Any, Protocol
 from ppafo.model.columns import Problem
 from ppafo.model.declaration import Quantity
 
+OPEN_LOOP = "constant"
+"""The controller that follows no reference: its recordings have none, so that no tracking error is made of it."""
+
 Plan = Callable[[Mapping[str, Any], Any, Any, tuple[Any, Any]], tuple[dict[str, Any], tuple[Problem, ...]]]
 """What makes the numbers of a law from its settings."""
 

@@ -5,13 +5,12 @@ get the whole reference too, which is looked at once before the first sample and
 """
 
 from ppafo.engine.lane_rows import LaneRows, Rows, RunRows, indent
-from ppafo.engine.led_leg import GAIT_SHANK
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, leaves
 from ppafo.engine.scheme.actuators import seen_with_torque, torque_at
 from ppafo.engine.scheme.motion import SAME_INSTANT
 from ppafo.engine.scheme.pneumatics import held_pressures
-from ppafo.model.gait import foot_in_gait
+from ppafo.kinds import kind_at
 from ppafo.model.helping import STOPPED
 from ppafo.model.plant import actuator_torque, chamber_pressures
 from ppafo.model.ports import shown_signals
@@ -346,8 +345,10 @@ def sample_lines(rows: Rows, moment: str) -> list[str]:
     if program.walks:
         groups = ("walk", "controller_state")
         wanted, stride = _of_state(rows, REQUEST), _stride_values(rows)
-    if program.shank is GAIT_SHANK:
+    if program.is_on_gait:
         groups = ("shank",)
+        # By its place, for few vanes carry a leg.
+        foot_in_gait = kind_at("ppafo.model.gait:foot_in_gait")
         on_gait = [f"foot = {add(foot_in_gait)}(shank, {moment} * timing.step, state.angle)"]
         foot = {name: f"foot.{name}" for name in FootSample._fields}
     values |= {"foot": _row(add(FootSample), foot), "stride": _row(add(StrideSample), stride)}

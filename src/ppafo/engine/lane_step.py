@@ -16,7 +16,6 @@ from typing import get_type_hints
 from ppafo.engine.components import Phases, RarePhase
 from ppafo.engine.lane_rows import HANDED, LaneRows, Rows, RunRows, count_lanes, indent
 from ppafo.engine.lane_samples import present_pressures, pressures_of, sense_end
-from ppafo.engine.led_leg import torque_lines
 from ppafo.engine.rows import leaf_paths
 from ppafo.engine.scheme import motion, pneumatics
 from ppafo.engine.source_text import composed_lines
@@ -252,11 +251,20 @@ def finish(rows: Rows) -> list[str]:
     ]
 
 
+def torque_of_leg(rows: Rows, time: str, angle: str) -> list[str]:
+    """Lines that make ``added`` [N m], the torque of a leg on the vane at expressions of time [s] and angle [rad]."""
+    if rows.program.shank is None:
+        return ["added = 0.0"]
+    from ppafo.engine.led_leg import torque_lines  # few vanes carry a leg
+
+    return torque_lines(rows.program, rows.add, time, angle)
+
+
 def move_alone(rows: Rows) -> Phases:
     """Phases that lead to the motion of a vane without ground; few turn, or begin to move."""
     program, add = rows.program, rows.add
     begin = [rows.load("begun"), rows.load("change"), program.gas.add(rows)]
-    torque = torque_lines(program, add, "time + length", "begun.next_angle")
+    torque = torque_of_leg(rows, "time + length", "begun.next_angle")
     slide = f"slid, moved = {add(motion.slide_part)}(plant, fed, begun, added, length)"
     depart = f"moved = {add(motion.depart_part)}(plant, fed, begun, slid, moved, length)"
     return [
@@ -459,7 +467,7 @@ def measure(rows: Rows) -> list[str]:
         hurries = "remaining == 0.0 or result.failure_time <= time"
         lines.append(f"until = remaining if {hurries} else {add(motion.part_length)}(pace, until)")
         if program.angle is None:
-            lines += torque_lines(program, add, "time", "state.angle")
+            lines += torque_of_leg(rows, "time", "state.angle")
             lines.append(f"begun, until = {add(motion.begin_part)}(plant, state, added, until)")
             lines += rows.keep("begun")
     else:

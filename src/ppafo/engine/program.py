@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, NamedTuple, get_type_hints
 
-from ppafo.control.controllers import switching as constant_controller
-from ppafo.control.kind import ControllerKind, ProfileKind
+from ppafo.control.kind import OPEN_LOOP, ControllerKind, ProfileKind
 from ppafo.control.profiles import CONSTANT
 from ppafo.engine.components import Feed, GasScheme, LegScheme
 from ppafo.engine.over_samples import called_over_samples, in_columns
@@ -18,10 +17,10 @@ from ppafo.engine.scheme.motion import FreePart, Pace, PartEnd, PartSlide, Presc
 from ppafo.engine.scheme.pneumatics import HeldChambers, SlopedFlows, StageFlows
 from ppafo.engine.source_text import Collector, SourceCollector
 from ppafo.errors import ProgramError
+from ppafo.kinds import kind_at
 from ppafo.model.actuators.kind import ActuatorModel
 from ppafo.model.actuators.vane import MODEL as VANE
 from ppafo.model.effects.kind import Effect, State, effect_problem, laws_in_order
-from ppafo.model.leg import FootLoad
 from ppafo.model.plant import PlantState
 from ppafo.model.sensors import SensorParameters
 from ppafo.model.valves.kind import ValveModel
@@ -113,9 +112,21 @@ class Program:
             "sensors": SensorParameters,
             **({} if self.leg is None else self.leg.parameters),
             **({} if self.feed is None else self.feed.parameters),
-            **({} if self.shank is None else {"load": FootLoad, "shank": self.shank.parameters}),
+            **self._leg_rows,
             **{effect.name: effect.parameters for effect in self.effects},
         }
+
+    @property
+    def _leg_rows(self) -> dict[str, type]:
+        """Groups of parameter rows of a leg on the vane; by its place, for few vanes carry one."""
+        if self.shank is None:
+            return {}
+        return {"load": kind_at("ppafo.model.leg:FootLoad"), "shank": self.shank.parameters}
+
+    @property
+    def is_on_gait(self) -> bool:
+        """True where a gait leads the shank of a leg, whose knee moves too (``engine/led_leg.py``)."""
+        return self.shank is not None and self.shank.name == "gait"
 
     @property
     def effect_rows(self) -> dict[str, type]:
@@ -202,7 +213,7 @@ class Program:
     @property
     def has_reference(self) -> bool:
         """True where the controller follows a reference; a constant command follows none."""
-        return self.controller is not constant_controller.CONSTANT
+        return self.controller is None or self.controller.name != OPEN_LOOP
 
     @property
     def follows_reference(self) -> bool:

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from ppafo.engine.components import LegScheme
 from ppafo.engine.lane_step import MAXIMUM_PARTS
 from ppafo.engine.lanes import Batch, BatchResult, Clock, load_programs, run_blocks
-from ppafo.engine.led_leg import LedLeg
 from ppafo.engine.program import LaneResult, LaneTiming, NoParameters, Program, composed_with
 from ppafo.engine.rows import leaves, rebuilt, row_numbers, table
 from ppafo.engine.scheme.actuators import pressures_of
@@ -18,16 +17,17 @@ from ppafo.engine.scheme.motion import Pace
 from ppafo.kinds import kind_at
 from ppafo.model.columns import larger, over_runs, truncated
 from ppafo.model.effects.kind import Moment, State
-from ppafo.model.gait import Course, GaitSeries, GaitTiming
-from ppafo.model.leg import LegParameters
 from ppafo.model.orifice import ExactOrifice
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, chamber_pressures
-from ppafo.model.regulator import LineState, SupplyLines
 from ppafo.model.sensors import NOTHING_SEEN, GaitSensors, SensorParameters
 
-if TYPE_CHECKING:  # for most runs know no walk and no fault
+if TYPE_CHECKING:  # for most runs know no leg, no line, no walk and no fault
+    from ppafo.engine.led_leg import LedLeg
     from ppafo.engine.scheme.walking import DeviceShare, WalkState
+    from ppafo.model.gait import Course, GaitSeries, GaitTiming
+    from ppafo.model.leg import LegParameters
     from ppafo.model.plant_faults import PlantFaults, ShutOff
+    from ppafo.model.regulator import LineState, SupplyLines
 
 Members = NDArray[np.intp]
 Floats = NDArray[np.float64]
@@ -66,13 +66,13 @@ class Walk:
     ``failing`` are the faults of the plant and its shut-off valve, None where it has neither.
     """
 
-    leg: LegParameters
+    leg: "LegParameters"
     share: "DeviceShare"
-    gait: GaitSeries
-    timing: GaitTiming
+    gait: "GaitSeries"
+    timing: "GaitTiming"
     sensors: GaitSensors
     initial: "WalkState"
-    course: Course | None = None
+    course: "Course | None" = None
     failing: "tuple[PlantFaults, ShutOff] | None" = None
 
     @property
@@ -102,8 +102,8 @@ class Walk:
 class Lines:
     """What lines behind regulators add to a run; the regulators are set to the supply pressures of the plant."""
 
-    parameters: SupplyLines
-    initial: LineState
+    parameters: "SupplyLines"
+    initial: "LineState"
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,7 +140,7 @@ class Run:
     walk: WornLeg | None = None
     lines: Lines | None = None
     effects: tuple[Any, ...] = ()
-    leg: LedLeg | None = None
+    leg: "LedLeg | None" = None
 
     @property
     def period(self) -> float:

@@ -6,8 +6,8 @@ A number is declared once, as a field of a frozen dataclass or of a NamedTuple:
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cache
+from dataclasses import dataclass, replace
+from functools import cache, partial
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 VALVE_LAG, VALVE_DELAY = "lag of the valve", "dead time of the valve"
@@ -48,24 +48,11 @@ NOMINAL = {
 
 
 @dataclass(frozen=True, slots=True)
-class Number:
-    """What is declared of a field: unit, meaning, default and range, in SI. ``default`` None: it must be given.
+class Quantity:
+    """One parameter of a component: name, unit, meaning, default and range, in SI. ``default`` None: it must be given.
 
     What the default ``follows`` is added to it, in a walk: some of those above.
     """
-
-    unit: str
-    summary: str
-    default: float | None = None
-    minimum: float = -math.inf
-    maximum: float = math.inf
-    minimum_allowed: bool = True
-    follows: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class Quantity:
-    """One parameter of a component by its name; otherwise as ``Number``."""
 
     name: str
     unit: str
@@ -75,6 +62,10 @@ class Quantity:
     maximum: float = math.inf
     minimum_allowed: bool = True
     follows: tuple[str, ...] = ()
+
+
+Number = partial(Quantity, "")
+"""The quantity that is declared of a field, which has its name."""
 
 
 @cache
@@ -88,25 +79,14 @@ def quantities_of(section: type) -> tuple[Quantity, ...]:
         if isinstance(hint, type) and issubclass(hint, tuple):
             found += quantities_of(hint)
         elif (number := number_of(hint)) is not None:
-            found.append(
-                Quantity(
-                    name,
-                    number.unit,
-                    number.summary,
-                    number.default,
-                    number.minimum,
-                    number.maximum,
-                    number.minimum_allowed,
-                    number.follows,
-                )
-            )
+            found.append(replace(number, name=name))
     return tuple(found)
 
 
-def number_of(hint: Any) -> Number | None:
+def number_of(hint: Any) -> Quantity | None:
     """Return what the type of a field declares of a number, None where it declares none."""
     declared = get_args(hint)[1:] if get_origin(hint) is Annotated else ()
-    return next((item for item in declared if isinstance(item, Number)), None)
+    return next((item for item in declared if isinstance(item, Quantity)), None)
 
 
 def attribute_among(section: object, name: str, *fields: str) -> Any:

@@ -22,7 +22,7 @@ from ppafo.report.setting_names import label_of
 from ppafo.report.style import PAGE_LOOKS
 from ppafo.simulation.declaration import OF_A_VANE, PRESSURE_WORDS
 from ppafo.simulation.overrides import apply_overrides, is_of_device
-from ppafo.simulation.scenario import FreeMotion, Scenario, vane_motion, worn_kind
+from ppafo.simulation.scenario import FreeMotion, Scenario, vane_motion
 from ppafo.units import conversion, from_si, parse_quantity, to_si
 from ppafo.version import __version__
 
@@ -87,7 +87,7 @@ def program_content(item: Simulated, module: str, intervals: Mapping[str, Interv
         "kind": described["kind"],
         "label": item.label,
         # With and without the device, a walk takes colours in their order, as its figures do.
-        "look": PAGE_LOOKS.get(item.scenario.device.valve.kind, 0) if worn_kind(item.scenario) is None else 0,
+        "look": PAGE_LOOKS.get(item.scenario.device.valve.kind, 0) if not item.scenario.walks else 0,
         "description": " ".join(described["title"].split()),
         "document": document,
         "usual": usual_changes(item.scenario),
@@ -125,7 +125,7 @@ _SUSTAINED = {
 
 def usual_changes(scenario: Scenario) -> dict[str, str]:
     """Return the changes that a configuration of a page begins with, texts by key: a walk is short."""
-    if worn_kind(scenario) is None:
+    if not scenario.walks:
         return {}
     from ppafo.walking.motion import SHORTEST_STRIDES, walk_of
 
@@ -160,7 +160,7 @@ def _relations_of_files(described: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 def _as_in_files(entry: Mapping[str, Any], item: Scenario) -> dict[str, Any]:
     """A setting with what only Python knows of a walk: its stride and length, and which pressures are absolute."""
-    if worn_kind(item) is not None and entry["key"] in (_FIRST_STRIDE, "run.duration"):
+    if item.walks and entry["key"] in (_FIRST_STRIDE, "run.duration"):
         from ppafo.walking.motion import LONGEST_MINUTES, SHORTEST_STRIDES, walk_of
 
         stride = walk_of(item).gait.stride_time
@@ -441,7 +441,7 @@ def _tabs(simulated: Sequence[Simulated]) -> list[dict[str, Any]]:
 
 
 def _task(scenario: Scenario) -> str:
-    if worn_kind(scenario) is not None:
+    if scenario.walks:
         return _WALK
     motion = vane_motion(scenario)
     if isinstance(motion, FreeMotion):

@@ -7,7 +7,6 @@ from typing import Annotated, Any
 
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
 from ppafo.errors import ParameterError
-from ppafo.model.actuators.table import Table
 from ppafo.model.actuators.vane import SMALLEST_VOLUME
 from ppafo.model.declaration import Number, attribute_among
 from ppafo.model.gas import specific_gas_constant
@@ -58,8 +57,8 @@ class Actuator:
 
     torque_constant [m^3], volume_per_angle [m^3/rad], angle_min and angle_max [rad], dead_volume_1 and dead_volume_2
     [m^3], restitution of the stops [-], leak between the chambers. ``kind`` is its name in the catalogue; one that is
-    no vane has ``settings`` in SI, all of them present, one that was measured its ``table``, and the first two numbers
-    are then means over the range.
+    no vane has ``settings`` in SI, all of them present, one that was measured its ``table``, a
+    ``model.actuators.table.Table``, and the first two numbers are then means over the range.
     """
 
     torque_constant: float
@@ -72,7 +71,7 @@ class Actuator:
     leak: Orifice | SonicOrifice
     kind: str = VANE
     settings: Mapping[str, float] = field(default_factory=dict)
-    table: Table | None = None
+    table: Any = None
 
     def __getattr__(self, name: str) -> Any:
         """Return a setting by its name."""

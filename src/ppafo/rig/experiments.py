@@ -51,7 +51,8 @@ from ppafo.rig.preset import (
 from ppafo.rig.solution import RigRun, sensor_signals, solve_rig
 from ppafo.signals.recording import CHANNELS, Channel, Recording
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
-from ppafo.simulation.plan import exact_orifice, plan_run, profile_values
+from ppafo.simulation.plan import exact_orifice, plan_run
+from ppafo.simulation.profiles import profile_values
 from ppafo.simulation.scenario import UNITS, Scenario
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.files import LEFT_ASIDE, add_files, check_files_can_be_added

@@ -1,17 +1,34 @@
-"""Whether a run can be repeated: it runs again with less error, and with start and measurements moved a little.
+"""How far a run can be trusted: the error of its steps, and whether it comes again.
 
-A loop with coarse sensors or repeated impacts may amplify a difference that is too small to measure into other results.
-Then its metrics are numerically sensitive: they hold for one run among many, and a check says so.
+The error of the time stepping falls with the allowed one, so nearly all of it is in what changes where a run has a
+sixteenth of it. A loop with coarse sensors or repeated impacts may amplify a difference that is too small to measure
+into other results: it runs again with start and measurements moved a little, and metrics that change then are
+numerically sensitive. They hold for one run among many, and a check says so.
 """
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import Any, Protocol
+
+import numpy as np
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.json_text import plain
-from ppafo.simulation.accuracy import ErrorEstimate
+from ppafo.engine.lanes import Floats
+from ppafo.engine.run import Run
+from ppafo.engine.scheme.actuators import pressures_of, volumes_of
+from ppafo.errors import SimulationError
+from ppafo.signals.recording import Recording
+from ppafo.simulation.scenario import Scenario
+
+SHORTER = 4
+"""How many times shorter the steps of a finer run are; its allowed error is smaller by the square."""
+MARGIN = 1.5
+"""Estimated error over the change: it is then above the error in 99 % of drawn runs (docs/evidence.md)."""
+LARGEST_OF_ANGLE, LARGEST_OF_PRESSURE = 2.0e-4, 1.0e-3
+"""Errors over the ranges of angle and pressures that a run keeps to unless it is sensitive."""
 
 MOVE = 1.0e-7
 """How far a start or a measurement is moved, as a fraction of its range."""
@@ -22,6 +39,33 @@ FINER, MOVED_START, MOVED_MEASUREMENT = "finer steps", "start moved", "measureme
 Shown = Callable[[float, str], tuple[float, str]]
 """A value in SI units and its unit, as people are shown them."""
 _MOVES = frozenset({MOVED_START, MOVED_MEASUREMENT})
+
+DRAWS = 4
+"""Draws of what moves the measurements of sensors without noise."""
+ALLOWED_PARTING = 1.0e-2
+"""Largest difference of two runs over time that counts as none, as a fraction of the range."""
+_COURSES = {"angle over time": ("angle",), "pressures over time": ("pressure_1", "pressure_2")}
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorEstimate:
+    """Estimated error of a run from its time stepping: largest over time of the angle [rad] and of a pressure [Pa].
+
+    ``metrics`` has the error of each metric in its SI unit, inf where the finer run has no such number.
+    """
+
+    angle: float
+    pressure: float
+    metrics: Mapping[str, float]
+
+    @property
+    def sentence(self) -> str:
+        """The errors of angle and pressures in the units that people are shown."""
+        from ppafo.report.display_units import metric_change
+
+        shown = (metric_change(self.angle, "rad"), metric_change(self.pressure, "Pa"))
+        angle, pressure = (f"{value:.1e} {unit}" for value, unit in shown)
+        return f"Estimated error of the steps: at most {angle} and {pressure}."
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,3 +177,219 @@ def _cells(row: NumberCheck, names: list[str], level: Shown, change: Shown) -> l
     value, unit = level(row.value, row.unit)
     changes = [f"{change(row.changes[name], row.unit)[0]:+.1e}" if row.changes[name] else "0" for name in names]
     return [row.name, f"{value:.4g} {unit}".rstrip(), *changes, "" if row.is_determined else "sensitive"]
+
+
+class Ran(Protocol):
+    """A finished run."""
+
+    @property
+    def scenario(self) -> Scenario:
+        """What was run."""
+
+    @property
+    def recording(self) -> Recording:
+        """Its channels."""
+
+    @property
+    def metrics(self) -> Mapping[str, Any]:
+        """Its metrics by name."""
+
+    @property
+    def status(self) -> Any:
+        """How it ended, a ``Status``."""
+
+
+Again = Callable[[Sequence[Run]], Sequence[Ran]]
+"""What runs other plans of the same scenario."""
+
+
+def unchanged(run: Run) -> Run:
+    """Return a run as it is planned."""
+    return run
+
+
+def finer(run: Run) -> Run:
+    """Return a run, or an ensemble, with a sixteenth of its allowed error and in steps a quarter as long."""
+    return replace(
+        run,
+        tolerance=run.tolerance / SHORTER**2,
+        step=run.step / SHORTER,
+        step_count=SHORTER * run.step_count,
+        steps_per_sample=SHORTER * run.steps_per_sample,
+        record_every=SHORTER * run.record_every,
+    )
+
+
+def estimated_error(result: Ran, fine: Ran) -> ErrorEstimate:
+    """The estimated error of a result, from the same run with finer steps; inf where that diverged."""
+    if not fine.status.is_completed:
+        return ErrorEstimate(math.inf, math.inf, dict.fromkeys(result.metrics, math.inf))
+    angle, pressure = (
+        MARGIN * float(np.max(_largest_differences(fine.recording, result.recording, names)))
+        for names in _COURSES.values()
+    )
+    changes = {name: abs(_difference(_value(fine, name), _value(result, name))) for name in result.metrics}
+    return ErrorEstimate(angle, pressure, {name: MARGIN * change for name, change in changes.items()})
+
+
+def checked(result: Ran, run: Run, again: Again) -> Check:
+    """Return whether a result can be repeated, from its plan.
+
+    SimulationError for a Python controller that gives a different run each time: every change would be its own.
+    """
+    scenario, recording = result.scenario, result.recording
+    controller = scenario.controller.custom
+    if controller is not None:
+        same = again([run])[0].recording
+        if not all(np.array_equal(same[name], recording[name]) for name in same.names):
+            raise SimulationError(
+                f"{scenario.name}: {type(controller).__name__} gives a different run each time, so nothing can be "
+                f"checked; its reset() must forget everything, and its random numbers need a fixed seed"
+            )
+    # Highest less lowest pressure [Pa] that the chambers had or are connected to; the atmosphere's if there is one.
+    supply = scenario.device.supply
+    outside = [supply.pressure, supply.dorsiflexion_pressure, supply.atmospheric_pressure]
+    values = np.concatenate([recording["pressure_1"], recording["pressure_2"], outside])
+    pressures = float(np.ptp(values)) or supply.atmospheric_pressure
+    starts = [_start_moved(run, move, apart) for apart in (1.0, -1.0) for move in (MOVE, -MOVE)]
+    repeats = [(FINER, finer(run)), *((MOVED_START, moved) for moved in starts)]
+    if not run.program.ideal_sensors:
+        repeats += [(MOVED_MEASUREMENT, moved) for moved in _measurements_moved(run, pressures)]
+    results = again([repeat for _, repeat in repeats])
+    found = [(name, repeated) for (name, _), repeated in zip(repeats, results, strict=True)]
+    courses = tuple(_course(name, found, result, pressures) for name in _COURSES)
+    partings = [repeated.status.time for repeated in results if repeated.status.time is not None]
+    for course in courses:
+        for repeated in results:
+            beyond = _largest_differences(repeated.recording, recording, _COURSES[course.name]) > course.allowed
+            partings += [float(recording.time[np.argmax(beyond)])] if beyond.any() else []
+    return Check(
+        scenario=scenario.name,
+        metrics=_metrics(result, found, pressures),
+        courses=courses,
+        error=estimated_error(result, results[0]),
+        parts_at=min(partings, default=None),
+        failed=tuple(dict.fromkeys(name for name, repeated in found if not repeated.status.is_completed)),
+        atmosphere=supply.atmospheric_pressure,
+    )
+
+
+def _start_moved(run: Run, move: float, apart: float) -> Run:
+    """The run from a little more gas in both chambers, and where the vane is free from a little further on.
+
+    With ``apart`` -1 chamber 2 has a little less instead: a torque that is exactly the wanted one then is so no more.
+    """
+    plant, start = run.plant, run.initial
+    angle = start.angle
+    if run.program.angle is None:
+        shifted = angle + move * (plant.angle_max - plant.angle_min)
+        # A start beyond a stop is no state of the vane.
+        angle = min(max(shifted, plant.angle_min), plant.angle_max)
+    actuator = run.program.actuator
+    pressures = pressures_of(actuator, plant, start.angle, start.mass_1, start.mass_2)
+    before, after = (volumes_of(actuator, plant, at, *pressures) for at in (start.angle, angle))
+    # Mass in proportion to volume keeps the pressure, so that only the move itself changes it.
+    mass_1 = start.mass_1 * after[0] / before[0] * (1.0 + move)
+    mass_2 = start.mass_2 * after[1] / before[1] * (1.0 + apart * move)
+    return replace(run, initial=start._replace(angle=angle, mass_1=mass_1, mass_2=mass_2))
+
+
+def _measurements_moved(run: Run, pressures: float) -> list[Run]:
+    """Runs with a little more noise on each sensor, either way; several draws of it where they have none themselves.
+
+    One draw alone seldom crosses a step of a coarse sensor, which is what matters.
+    """
+    sensors, angles = run.sensors, run.plant.angle_max - run.plant.angle_min
+    draws = 1 if sensors.angle_noise or sensors.pressure_noise else DRAWS
+    return [
+        replace(
+            run,
+            sensors=sensors._replace(
+                angle_noise=sensors.angle_noise + move * angles,
+                pressure_noise=sensors.pressure_noise + move * pressures,
+                seed=sensors.seed + draw,
+            ),
+        )
+        for draw in range(draws)
+        for move in (MOVE, -MOVE)
+    ]
+
+
+def _metrics(result: Ran, repeats: list[tuple[str, Ran]], pressures: float) -> tuple[NumberCheck, ...]:
+    names = dict.fromkeys(name for one in (result, *(repeat for _, repeat in repeats)) for name in one.metrics)
+    rows = []
+    for name in names:
+        kind = next(one.metrics[name] for one in (result, *(r for _, r in repeats)) if name in one.metrics)
+        value = _value(result, name)
+        changes = _largest((repeat, _difference(_value(repeated, name), value)) for repeat, repeated in repeats)
+        scale = max(abs(value) if math.isfinite(value) else 0.0, _metric_range(result, name, kind.unit, pressures))
+        rows.append(NumberCheck(name, kind.unit, value, ALLOWED_CHANGE * scale, changes, ALLOWED_CHANGE * scale))
+    return tuple(rows)
+
+
+def _value(result: Ran, name: str) -> float:
+    return result.metrics[name].value if name in result.metrics else math.nan
+
+
+def _difference(now: float, before: float) -> float:
+    """The change; inf where only one of both is a number."""
+    if math.isfinite(now) and math.isfinite(before):
+        return now - before
+    # Equal infinities and two values that are not known are no change.
+    return 0.0 if now == before or (math.isnan(now) and math.isnan(before)) else math.inf
+
+
+def _largest(changes: Iterable[tuple[str, float]]) -> dict[str, float]:
+    """The largest change of all directions, with its sign, by repeat."""
+    largest: dict[str, float] = {}
+    for name, change in changes:
+        largest[name] = max(largest.get(name, 0.0), change, key=abs)
+    return largest
+
+
+def _metric_range(result: Ran, name: str, unit: str, pressures: float) -> float:
+    """Range of the quantity of a metric; 1 for a number of events, 0 for a unit that has none."""
+    scenario, recording = result.scenario, result.recording
+    actuator = scenario.device.actuator
+    angles, torques = actuator.angle_max - actuator.angle_min, abs(actuator.torque_constant) * pressures
+    # Largest mass in both chambers; a walk does not record it, and takes more than that.
+    masses = [recording[name] for name in ("mass_1", "mass_2") if name in recording]
+    content = float(np.max(sum(masses))) if masses else 0.0
+    ranges = {
+        "rad": angles,
+        "rad/s": float(np.max(np.abs(recording["angular_velocity"]))),
+        "Pa": pressures,
+        "N m": torques,
+        "J": torques * angles,
+        "kg": max(_value(result, "gas_supplied"), content),
+        "m": float(np.ptp(recording["toe_height"])) if "toe_height" in recording else 0.0,
+        "s": scenario.run.duration,
+        "-": 1.0,
+    }
+    if unit in ranges:
+        return ranges[unit]
+    # A ratio of work and gas is as open as both are; where one is next to nothing, so is what the ratio says.
+    parts = {"mechanical_work": ranges["J"], "gas_supplied": ranges["kg"]}
+    values = {part: abs(_value(result, part)) for part in parts}
+    if not all(value > ALLOWED_CHANGE * parts[part] for part, value in values.items()):
+        return math.inf
+    return abs(_value(result, name)) * max(parts[part] / value for part, value in values.items())
+
+
+def _largest_differences(one: Recording, other: Recording, channels: Iterable[str]) -> Floats:
+    """Largest difference of some channels at each sample that both have."""
+    # A repeat that diverged is shorter.
+    count = min(len(one), len(other))
+    return np.asarray(np.max([np.abs(one[name][:count] - other[name][:count]) for name in channels], axis=0))
+
+
+def _course(name: str, repeats: list[tuple[str, Ran]], result: Ran, pressures: float) -> NumberCheck:
+    actuator = result.scenario.device.actuator
+    is_angle = name == "angle over time"
+    span, unit = (actuator.angle_max - actuator.angle_min, "rad") if is_angle else (pressures, "Pa")
+    changes = _largest(
+        (repeat, float(np.max(_largest_differences(repeated.recording, result.recording, _COURSES[name]))))
+        for repeat, repeated in repeats
+    )
+    allowed_error = (LARGEST_OF_ANGLE if is_angle else LARGEST_OF_PRESSURE) * span / MARGIN
+    return NumberCheck(name, unit, span, ALLOWED_PARTING * span, changes, allowed_error)

@@ -37,8 +37,13 @@ def read_clock(reading: Reading) -> Clock:
     ScenarioError where the times contradict each other or make too many steps.
     """
     duration = reading.number(_DURATION_PATH, _DURATION)
-    period = _read_period(reading)
-    step = _read_step(reading, duration, period)
+    if value_at(reading.document, _RATE_PATH) is not None:
+        sampling, period = _RATE_PATH, 1.0 / reading.number(_RATE_PATH, RATE)
+    elif value_at(reading.document, _PERIOD_PATH) is not None:
+        sampling, period = _PERIOD_PATH, reading.number(_PERIOD_PATH, PERIOD)
+    else:
+        raise ScenarioError(f"{reading.file}: '{_RATE_PATH}' is missing: give for example rate = '1 kHz', or a period")
+    step = _read_step(reading, duration, sampling, period)
     output = _read_output(reading, duration, step) or output_unless_given(duration, period, step)
     clock = Clock(duration, dividing_step(period, step), output, period)
     _check_size(reading, clock)
@@ -72,6 +77,7 @@ def step_with_output(duration: Number, period: Number, output_interval: Number) 
 
 def dividing_step(period: Number, step: Number) -> Number:
     """The largest step [s], up to one that is given, that divides the sample period."""
+    # A quotient that rounding put above a whole number would make the step shorter than what is given.
     found: Number = period / larger(1.0, rounded_up(period / step * (1.0 - _RELATIVE)))
     return found
 
@@ -106,23 +112,13 @@ def _check_size(reading: Reading, clock: Clock) -> None:
         )
 
 
-def _read_period(reading: Reading) -> float:
-    """Return the sample period."""
-    rate, period = (value_at(reading.document, path) for path in (_RATE_PATH, _PERIOD_PATH))
-    if rate is not None:
-        return 1.0 / reading.number(_RATE_PATH, RATE)
-    if period is not None:
-        return reading.number(_PERIOD_PATH, PERIOD)
-    raise ScenarioError(f"{reading.file}: '{_RATE_PATH}' is missing: give for example rate = '1 kHz', or a period")
-
-
-def _read_step(reading: Reading, duration: float, period: float) -> float:
+def _read_step(reading: Reading, duration: float, sampling: str, period: float) -> float:
     if value_at(reading.document, _STEP_PATH) is None:
         if value_at(reading.document, _OUTPUT_PATH) is None:
             return step_unless_given(duration, period)
         return step_with_output(duration, period, reading.number(_OUTPUT_PATH, _OUTPUT))
     step = reading.number(_STEP_PATH, _STEP)
-    _not_above(reading, _STEP_PATH, step, _rate_or_period(reading), period)
+    _not_above(reading, _STEP_PATH, step, sampling, period)
     _not_above(reading, _STEP_PATH, step, _DURATION_PATH, duration)
     return step
 
@@ -149,7 +145,3 @@ def _read_output(reading: Reading, duration: float, step: float) -> float | None
 def _not_above(reading: Reading, path: str, value: float, limit_path: str, limit: float) -> None:
     if value > limit * (1.0 + _RELATIVE):
         raise reading.refusal(path, f"must not be above {quantity_text(limit, 's')}, which {limit_path} gives")
-
-
-def _rate_or_period(reading: Reading) -> str:
-    return _PERIOD_PATH if value_at(reading.document, _RATE_PATH) is None else _RATE_PATH

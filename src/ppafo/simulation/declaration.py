@@ -8,7 +8,7 @@ Reading turns a text with a unit into a float in SI, or into one clear line why 
 import functools
 import math
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from importlib import resources
 from typing import Any
@@ -22,7 +22,7 @@ from ppafo.model.declaration import Quantity, quantities_of, range_rule
 from ppafo.model.effects.bandwidth import EFFECT as BANDWIDTH
 from ppafo.parameters.declaration import is_within
 from ppafo.parameters.parameter_set import Entry
-from ppafo.simulation.motion_kind import WALKS
+from ppafo.simulation.motion_kind import MOTIONS, MotionSection, is_walk
 from ppafo.simulation.scenario import (
     FreeMotion,
     GasModel,
@@ -41,6 +41,7 @@ PLAIN = ("", "1")
 *RUN, ACCURACY = quantities_of(RunSettings)
 FREE = quantities_of(FreeMotion)
 ANGLE = FREE[0]
+LOCKED_ANGLE = "motion.angle"
 LEG = (*FREE[:2], *quantities_of(Leg))
 FOOT = {item.name: item for item in quantities_of(Leg)}
 SHANK_LEVEL = Quantity("level", "rad", "", None, -10.0, 10.0)
@@ -76,7 +77,6 @@ SUPPLY_LINES = tuple(item.name for item in fields(SupplyLine))
 
 _REGULATED = quantities_of(RegulatedLine)
 
-MOTIONS = ("free", "locked", "prescribed", "leg")
 RENAMED_MOTIONS = {"led": "prescribed", "held": "locked"}
 """Kinds of motion by their name in an earlier version."""
 SECTIONS = (
@@ -136,35 +136,60 @@ def shank_settings(kind: str) -> tuple[Quantity, ...]:
     return (GAIT_START,) if kind == GAIT_SHANK else profile_settings(kind, SHANK_LEVEL)
 
 
-def quantities(document: Mapping[str, Any]) -> dict[str, Quantity]:
-    """Return the declaration of every number that a document with its kinds can hold, by path."""
-    motion = kind_at(document, "motion")
-    # The settings of a kind of motion; a prescribed one has a profile instead.
-    sections = {
-        "run": (*RUN, ACCURACY),
-        "motion": {"free": FREE, "locked": (ANGLE,), "leg": LEG}.get(motion, ()),
-        "motion.profile": profile_settings(kind_at(document, "motion.profile"), ANGLE_LEVEL)
-        if motion == "prescribed"
-        else (),
-        "motion.shank": shank_settings(kind_at(document, "motion.shank")) if motion == "leg" else (),
-        "initial": INITIAL,
-        "controller": SAMPLING + controller_settings(kind_at(document, "controller")),
-        "reference": profile_settings(kind_at(document, "reference"), TORQUE_LEVEL),
-        "sensors": (*SENSORS, SEED),
-        "gas_model": gas_settings(kind_at(document, "gas_model")),
+def by_path(section: str, items: Iterable[Quantity]) -> dict[str, Quantity]:
+    """Return the declarations of a section by path."""
+    return {f"{section}.{item.name}": item for item in items}
+
+
+def section_of(document: Mapping[str, Any]) -> MotionSection | None:
+    """Return what ``[motion]`` holds for the kind that a document names, None where that is not known or a walk."""
+    kind = MOTIONS.get(kind_at(document, "motion"))
+    return None if kind is None else kind.section
+
+
+def motion_quantities(section: MotionSection | None, profile_kind: str) -> dict[str, Quantity]:
+    """Return the declaration of the numbers of a motion by path, whose profile is of a kind."""
+    if section is None:
+        return {}
+    profile = section.profile
+    inner = {} if profile is None else by_path(f"motion.{profile.name}", profile.settings(profile_kind))
+    return by_path("motion", section.numbers) | inner
+
+
+def quantities(document: Mapping[str, Any], of_motion: Mapping[str, Quantity] | None = None) -> dict[str, Quantity]:
+    """Return the declaration of every number that a document with its kinds can hold, by path.
+
+    ``of_motion`` are those of a motion that the document does not name.
+    """
+    if of_motion is None:
+        section = section_of(document)
+        of_motion = motion_quantities(section, kind_at(document, profile_path(section)))
+    found = {
+        **by_path("run", (*RUN, ACCURACY)),
+        **of_motion,
+        **by_path("initial", INITIAL),
+        **by_path("controller", SAMPLING + controller_settings(kind_at(document, "controller"))),
+        **by_path("reference", profile_settings(kind_at(document, "reference"), TORQUE_LEVEL)),
+        **by_path("sensors", (*SENSORS, SEED)),
+        **by_path("gas_model", gas_settings(kind_at(document, "gas_model"))),
     }
-    found = {f"{section}.{item.name}": item for section, items in sections.items() for item in items}
     return found | line_paths() if SUPPLY_LINE in document else found
+
+
+def profile_path(section: MotionSection | None) -> str:
+    """Return the path of the profile in the section of a motion, an empty text where it has none."""
+    return "" if section is None or section.profile is None else f"motion.{section.profile.name}"
 
 
 def texts(document: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the paths of every text that a document can hold."""
-    kinds = ["motion.kind", "controller.kind", "reference.kind", "gas_model.kind"]
-    motion = kind_at(document, "motion")
-    kinds += ["motion.profile.kind"] if motion == "prescribed" else []
-    kinds += ["motion.shank.kind"] if motion == "leg" else []
-    kinds += ["motion.shank.gait"] if motion == "leg" and kind_at(document, "motion.shank") == GAIT_SHANK else []
-    return (*TEXTS, *kinds)
+    kinds = ("motion.kind", "controller.kind", "reference.kind", "gas_model.kind")
+    section = section_of(document)
+    if section is None or section.profile is None:
+        return (*TEXTS, *kinds)
+    path = profile_path(section)
+    own = section.profile.own.get(kind_at(document, path), ())
+    return (*TEXTS, *kinds, f"{path}.kind", *(f"{path}.{name}" for name in own))
 
 
 def find_kinds(document: Mapping[str, Any], file: str) -> None:
@@ -172,20 +197,24 @@ def find_kinds(document: Mapping[str, Any], file: str) -> None:
 
     ScenarioError where one cannot be loaded or has an old name.
     """
-    sections: tuple[tuple[str, Kinds[Any]], ...] = (
-        ("controller", CONTROLLERS),
-        ("reference", PROFILES),
-        ("motion.profile", PROFILES),
-        *((("motion.shank", PROFILES),) if kind_at(document, "motion.shank") != GAIT_SHANK else ()),
-    )
-    motion = kind_at(document, "motion")
-    check_motion_kind(motion, f"{file}: motion.kind")
+    check_motion_kind(kind_at(document, "motion"), f"{file}: motion.kind")
     old = value_at(document, ARITHMETIC)
     if old is not None:
         said = no_arithmetic(kind_at(document, "controller"), old)
         raise ScenarioError(f"{file}: {ARITHMETIC} = {quote(old)}: {said}")
-    check_known_motion(motion, file)
-    for section, kinds in sections:
+    kind = kind_at(document, "motion")
+    with refused_as(ScenarioError, f"{file}: motion.kind", KindError):
+        is_known = not kind or kind in MOTIONS
+    if not is_known:
+        known = tuple(MOTIONS)
+        hint = nearest_name(kind, known)
+        raise ScenarioError(f"{file}: motion.kind = {quote(kind)} is not known{hint}; allowed: {', '.join(known)}")
+    sections: dict[str, Kinds[Any]] = {"controller": CONTROLLERS, "reference": PROFILES}
+    motion = section_of(document)
+    path = profile_path(motion)
+    if motion is not None and motion.profile is not None and kind_at(document, path) not in motion.profile.own:
+        sections[path] = PROFILES
+    for section, kinds in sections.items():
         with refused_as(ScenarioError, f"{file}: {section}.kind", KindError):
             kinds.get(kind_at(document, section))
 
@@ -201,19 +230,13 @@ def no_arithmetic(kind: str, text: object) -> str:
     return f"is no setting any more, and '{kind}' has no fixed-point form; controllers that have one: {known}"
 
 
-def check_known_motion(kind: str, file: str) -> None:
-    """Raise ScenarioError for a kind of motion that no scenario has, walks among them; none is an empty text."""
-    known = (*MOTIONS, *WALKS)
-    if kind and kind not in known:
-        hint = nearest_name(kind, known)
-        raise ScenarioError(f"{file}: motion.kind = {quote(kind)} is not known{hint}; allowed: {', '.join(known)}")
-
-
 def check_motion_kind(kind: object, place: str) -> None:
     """Raise ScenarioError for an old name, or for the motion of a leg that walks; ``place`` begins the message."""
     if isinstance(kind, str) and kind in RENAMED_MOTIONS:
         raise ScenarioError(f"{place}: the kind of motion '{kind}' is now called '{RENAMED_MOTIONS[kind]}'")
-    if kind in tuple(WALKS):
+    with refused_as(ScenarioError, place, KindError):
+        walks = isinstance(kind, str) and is_walk(kind)
+    if walks:
         raise ScenarioError(
             f"{place}: a walk has a gait and a wearer, and here the motion of a vane alone is needed; 'ppafo new walk' "
             "writes the file of a walk"

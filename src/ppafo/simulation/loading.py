@@ -49,8 +49,9 @@ from ppafo.simulation.declaration import (
     quantity_text,
     value_at,
 )
-from ppafo.simulation.motion import read_motion, read_profile
+from ppafo.simulation.motion_kind import MOTIONS
 from ppafo.simulation.overrides import OverriddenDocument, apply_overrides, device_paths, scenario_paths
+from ppafo.simulation.profiles import read_profile
 from ppafo.simulation.scenario import (
     Assumption,
     Control,
@@ -108,6 +109,9 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
     hardware = read_hardware(reading, request, changed.device)
     device = read_device(reading, hardware)
     clock = read_clock(reading)
+    law = kind_at(document, "controller")
+    motion = MOTIONS[kind_at(document, "motion")].section
+    assert motion is not None, "walks are built from another layout"
     before = Reading(request.file, request.content)
     scenario = Scenario(
         name=document["name"],
@@ -116,9 +120,9 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
         run=RunSettings(
             clock.duration, clock.step, clock.output_interval, tolerance=reading.number("run.tolerance", ACCURACY)
         ),
-        motion=read_motion(reading, device, clock.duration, clock.step, request.folder),
+        motion=motion.read(reading, device, clock.duration, clock.step, request.folder),
         initial=Initial(*(_initial_pressure(reading, item, device.supply) for item in INITIAL)),
-        controller=_control(reading, clock.period),
+        controller=Control(law, reading.section("controller", controller_settings(law)), clock.period),
         reference=_reference(reading),
         sensors=_sensors(reading, clock),
         assumptions=(*read_assumptions(before, reading, hardware, request.overrides), *assumed_lines(reading)),
@@ -225,28 +229,14 @@ def _reference(reading: Reading) -> ProfileChoice:
     return _NOTHING_TO_FOLLOW
 
 
-def _control(reading: Reading, period: float) -> Control:
-    kind = kind_at(reading.document, "controller")
-    return Control(kind, reading.section("controller", controller_settings(kind)), period)
-
-
 def _sensors(reading: Reading, clock: Clock) -> Sensors:
-    values = reading.section("sensors", SENSORS)
+    values: dict[str, Any] = reading.section("sensors", SENSORS)
     if values["delay"] > clock.duration:
         raise reading.refusal("sensors.delay", "must not be longer than run.duration: nothing would ever be measured")
     if values["delay"] / clock.step > MAXIMUM_STEPS_OF_DELAY:
         longest = quantity_text(MAXIMUM_STEPS_OF_DELAY * clock.step, "s")
         raise reading.refusal("sensors.delay", f"must be at most {longest}, {MAXIMUM_STEPS_OF_DELAY:.0e} steps")
-    return Sensors(
-        delay=values["delay"],
-        angle_noise=values["angle_noise"],
-        pressure_noise=values["pressure_noise"],
-        angle_resolution=values["angle_resolution"],
-        pressure_resolution=values["pressure_resolution"],
-        seed=int(reading.number("sensors.seed", SEED)),
-        angle_bandwidth=values["angle_bandwidth"],
-        pressure_bandwidth=values["pressure_bandwidth"],
-    )
+    return Sensors(**values, seed=int(reading.number("sensors.seed", SEED)))
 
 
 def read_assumptions(
@@ -262,18 +252,15 @@ def read_assumptions(
     for path, note in notes.items():
         value, earlier = _value(reading, hardware, path), _value(before, hardware, path)
         if value is None and earlier is None:
-            raise _unknown(reading, path)
-        if value is not None:
-            assumptions.append(
-                Assumption(path, value, _note(before, path, note, earlier) if path in replaced else note)
+            hint = nearest_name(path, [*scenario_paths(reading.document), *device_paths()])
+            raise ScenarioError(
+                f"{reading.file}: [{_SECTION}] names '{one_line(path)}', which has no value in this scenario{hint}"
             )
+        if value is not None:
+            was = earlier if value_at(before.document, path) is not None else "another value"
+            said = f"set by an override; the scenario has {was}: {note}" if path in replaced else note
+            assumptions.append(Assumption(path, value, said))
     return tuple(assumptions)
-
-
-def _note(before: Reading, path: str, note: str, earlier: str | None) -> str:
-    """Return the note of a value that an override has replaced."""
-    was = earlier if value_at(before.document, path) is not None else "another value"
-    return f"set by an override; the scenario has {was}: {note}"
 
 
 def _value(reading: Reading, hardware: Hardware, path: str) -> str | None:
@@ -298,13 +285,6 @@ def _device_value(hardware: Hardware, path: str) -> str | None:
 
 def _default(quantity: Quantity) -> str | None:
     return None if quantity.default is None else quantity_text(quantity.default, quantity.unit)
-
-
-def _unknown(reading: Reading, path: str) -> ScenarioError:
-    hint = nearest_name(path, [*scenario_paths(reading.document), *device_paths()])
-    return ScenarioError(
-        f"{reading.file}: [{_SECTION}] names '{one_line(path)}', which has no value in this scenario{hint}"
-    )
 
 
 def read_gas_model(reading: Reading) -> GasModel | None:
@@ -428,22 +408,19 @@ def scenario_of(request: ScenarioRequest, layout: Layout) -> Scenario:
         )
     declared = layout.declared
     declared.find_kinds(request.content, request.file)
+    # What is wrong in the file itself is said as such; what it lacks an override may give.
     if request.overrides:
         wrong = [item for item in _problems(request.content, layout) if not is_gap(item)]
         _refuse(wrong, request, layout, request.content)
     changed = apply_overrides(request.content, request.overrides, request.file, declared)
+    # Overrides may name kinds that the file does not.
     declared.find_kinds(changed.document, request.file)
     _refuse(_problems(changed.document, layout), request, layout, changed.document)
-    _check_forms(Reading(request.file, changed.document, changed.paths))
-    return layout.build(request, changed)
-
-
-def _check_forms(reading: Reading) -> None:
-    """Refuse what a document gives in two forms."""
-    paths = [f"{section}.{name}" for section in FORMS for name in value_at(reading.document, section) or ()]
+    paths = [f"{section}.{name}" for section in FORMS for name in value_at(changed.document, section) or ()]
     pair = in_two_forms(paths)
     if pair is not None:
-        raise reading.refusal(pair[1], either(pair[1]))
+        raise Reading(request.file, changed.document, changed.paths).refusal(pair[1], either(pair[1]))
+    return layout.build(request, changed)
 
 
 def _problems(document: dict[str, Any], layout: Layout) -> list[ErrorDetails]:

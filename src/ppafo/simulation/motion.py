@@ -1,14 +1,19 @@
-"""What the vane does, read from a scenario and checked against the stops of the device."""
+"""What moves a vane alone, as kinds of motion: locked, free, along a profile, or with the foot of a leg.
 
-from collections.abc import Iterator
+Each kind declares what a file says of it, and how that is read and checked against the stops of the device. What only
+a run or an ensemble of such a motion needs is loaded when it is called.
+"""
+
+from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from ppafo.control.catalog import PROFILES
-from ppafo.engine.rows import rebuilt
+from ppafo.control.kind import OPEN_LOOP
 from ppafo.errors import DataError, ScenarioError, one_line
+from ppafo.kinds import late
 from ppafo.model.declaration import Quantity
-from ppafo.model.gait import ShankSeries
 from ppafo.parameters.device import Device
 from ppafo.simulation.declaration import (
     ANGLE,
@@ -16,67 +21,162 @@ from ppafo.simulation.declaration import (
     FREE,
     GAIT_SHANK,
     LEG,
+    LOCKED_ANGLE,
+    SUPPLY_LINE,
+    THERMAL,
     Reading,
     kind_at,
+    motion_quantities,
     profile_settings,
-    quantity_text,
+    quantities,
     shank_settings,
     value_at,
 )
-from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion, ProfileChoice
+from ppafo.simulation.motion_kind import MotionKind, MotionSection, ProfileTable
+from ppafo.simulation.profiles import TOLERANCE, profile_problem, range_text, read_profile, stops_of
+from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion, ProfileChoice, Scenario
+from ppafo.simulation.schema import profile_table, shank_table
 
-MAXIMUM_CHECKED_TIMES = 20_000
-TOLERANCE = 1.0e-9
-_ANGLE_PATH = "motion.angle"
+_PROFILE, _SHANK = "motion.profile", "motion.shank"
 
 
-def read_motion(
-    reading: Reading, device: Device, duration: float, step: float, folder: Path
-) -> FreeMotion | PrescribedMotion:
-    """Return the motion of the vane; every angle [rad] that it prescribes lies between the stops of the device.
+def quantities_of_vane(scenario: Scenario) -> dict[str, Quantity]:
+    """Return the declaration of every number of a scenario of a vane, by path."""
+    section = scenario.motion.motion_kind.section
+    profile = None if section is None or section.profile is None else getattr(scenario.motion, section.profile.name)
+    return _beside(scenario, motion_quantities(section, "" if profile is None else profile.kind))
 
-    ScenarioError where one does not. ``duration`` and ``step`` are in seconds; in ``folder`` relative paths begin.
-    """
-    kind = kind_at(reading.document, "motion")
-    if kind == "prescribed":
-        profile = read_profile(reading, "motion.profile", ANGLE_LEVEL)
-        problem = profile_problem(device.name, _stops(device), profile, duration, step)
-        if problem:
-            raise ScenarioError(f"{reading.file}: {problem}")
-        return PrescribedMotion(profile)
-    angle = reading.number(_ANGLE_PATH, ANGLE)
+
+def _beside(scenario: Scenario, of_motion: Mapping[str, Quantity]) -> dict[str, Quantity]:
+    """Return the declaration of every number of a scenario, given those of its motion."""
+    document: dict[str, Any] = {"controller": {"kind": scenario.controller.kind}}
+    # A constant command follows no reference, whatever the scenario has in its place.
+    document |= {} if scenario.controller.kind == OPEN_LOOP else {"reference": {"kind": scenario.reference.kind}}
+    document |= {} if scenario.gas_model is None else {"gas_model": {"kind": THERMAL}}
+    return quantities(document | ({} if scenario.supply_line is None else {SUPPLY_LINE: {}}), of_motion)
+
+
+def _noise(scenario: Scenario) -> Any:
+    return scenario.sensors.angle_noise + scenario.sensors.pressure_noise
+
+
+def _switches(scenario: Scenario) -> tuple[Any, ...]:
+    return scenario.sensors.flaws
+
+
+_PLAN = late("ppafo.simulation.plan:plan_vane")
+_MEASURED_PRESCRIBED = late("ppafo.simulation.vane_recording:measured_prescribed")
+_OF_ALL_VANES: dict[str, Any] = {
+    "rules": late("ppafo.simulation.ensemble.vane:rules"),
+    "clock": late("ppafo.simulation.ensemble.vane:clock"),
+    "lacks": late("ppafo.simulation.ensemble.vane:lacks"),
+    "switches": _switches,
+    "noise": _noise,
+}
+
+
+def _read_angle(reading: Reading, device: Device) -> float:
+    """Return the angle [rad] of the vane; ScenarioError where it is not between the stops of the device."""
+    angle = reading.number(LOCKED_ANGLE, ANGLE)
     if not (device.actuator.angle_min - TOLERANCE <= angle <= device.actuator.angle_max + TOLERANCE):
-        raise reading.refusal(_ANGLE_PATH, f"must be between the stops of {device.name}, {_range_text(_stops(device))}")
-    if kind == "locked":
-        return PrescribedMotion(ProfileChoice("constant", {"level": angle}), kind)
-    if kind == "leg":
-        numbers = reading.section("motion", LEG)
-        start, rate = numbers.pop("angle"), numbers.pop("angular_velocity")
-        return FreeMotion(start, rate, leg=_read_leg(reading, numbers, folder))
+        raise reading.refusal(
+            LOCKED_ANGLE, f"must be between the stops of {device.name}, {range_text(stops_of(device))}"
+        )
+    return angle
+
+
+def _read_free(reading: Reading, device: Device, _duration: float, _step: float, _folder: Path) -> FreeMotion:
+    _read_angle(reading, device)
     numbers = reading.section("motion", FREE)
     return FreeMotion(numbers["angle"], numbers["angular_velocity"], numbers["external_torque"])
 
 
-def _read_leg(reading: Reading, numbers: dict[str, Any], folder: Path) -> Leg:
-    """Return a leg with these numbers of its foot, whose shank goes along a profile without corners or as in a gait."""
-    section = "motion.shank"
-    kind = kind_at(reading.document, section)
-    shank = ProfileChoice(kind, reading.section(section, shank_settings(kind)))
+FREE_MOTION = MotionKind(
+    name="free",
+    plan=_PLAN,
+    measured=late("ppafo.simulation.vane_recording:measured_free"),
+    quantities=quantities_of_vane,
+    places={},
+    section=MotionSection("the vane moves as the torques demand", FREE, _read_free),
+    **_OF_ALL_VANES,
+)
+"""Equation (1), with a constant external torque."""
+
+
+def _quantities_of_locked(scenario: Scenario) -> dict[str, Quantity]:
+    # The angle comes last, where numbers of a locked vane are listed.
+    return _beside(scenario, {}) | {LOCKED_ANGLE: ANGLE}
+
+
+def _read_locked(reading: Reading, device: Device, _duration: float, _step: float, _folder: Path) -> PrescribedMotion:
+    return PrescribedMotion(ProfileChoice("constant", {"level": _read_angle(reading, device)}), "locked")
+
+
+LOCKED_MOTION = MotionKind(
+    name="locked",
+    plan=_PLAN,
+    measured=_MEASURED_PRESCRIBED,
+    quantities=_quantities_of_locked,
+    places={LOCKED_ANGLE: ("motion", "profile", "level")},
+    section=MotionSection("the vane stays at one angle", (ANGLE,), _read_locked),
+    **_OF_ALL_VANES,
+)
+"""A vane on a test bench that is clamped: its profile is constant."""
+
+
+def _read_prescribed(reading: Reading, device: Device, duration: float, step: float, _folder: Path) -> PrescribedMotion:
+    profile = read_profile(reading, _PROFILE, ANGLE_LEVEL)
+    problem = profile_problem(device.name, stops_of(device), profile, duration, step)
+    if problem:
+        raise ScenarioError(f"{reading.file}: {problem}")
+    return PrescribedMotion(profile)
+
+
+PRESCRIBED_MOTION = MotionKind(
+    name="prescribed",
+    plan=_PLAN,
+    measured=_MEASURED_PRESCRIBED,
+    quantities=quantities_of_vane,
+    places={},
+    section=MotionSection(
+        "the angle of the vane is a given function of time",
+        (),
+        _read_prescribed,
+        ProfileTable(
+            "profile",
+            "angle in time",
+            partial(profile_settings, prescribed=ANGLE_LEVEL),
+            partial(profile_table, ANGLE_LEVEL, "Angle"),
+        ),
+    ),
+    **_OF_ALL_VANES,
+)
+"""The ankle goes along a profile whatever the device does."""
+
+
+def _read_leg(reading: Reading, device: Device, _duration: float, _step: float, folder: Path) -> FreeMotion:
+    """Return the motion with a leg whose shank goes along a profile without corners or as in a gait."""
+    _read_angle(reading, device)
+    numbers: dict[str, Any] = reading.section("motion", LEG)
+    start = numbers.pop("angle"), numbers.pop("angular_velocity")
+    kind = kind_at(reading.document, _SHANK)
+    shank = ProfileChoice(kind, reading.section(_SHANK, shank_settings(kind)))
     if kind != GAIT_SHANK:
         if not PROFILES[kind].is_smooth:
             smooth = ", ".join([name for name, item in PROFILES.items() if item.is_smooth] + [GAIT_SHANK])
             raise reading.refusal(
-                f"{section}.kind", f"this profile has corners, at which the foot would be struck; use one of {smooth}"
+                f"{_SHANK}.kind", f"this profile has corners, at which the foot would be struck; use one of {smooth}"
             )
-        return Leg(**numbers, shank=shank)
+        return FreeMotion(*start, leg=Leg(**numbers, shank=shank))
     # A vane alone, or on a shank at rest, loads no gaits.
     from ppafo.gait import list_gaits, load_gait, series_of
+    from ppafo.model.gait import ShankSeries
 
-    name = str(value_at(reading.document, f"{section}.gait"))
+    name = str(value_at(reading.document, f"{_SHANK}.gait"))
     try:
         gait = load_gait(name if name in list_gaits() else folder / name)
     except DataError as error:
-        raise reading.refusal(f"{section}.gait", one_line(error)) from error
+        raise reading.refusal(f"{_SHANK}.gait", one_line(error)) from error
     series = ShankSeries(
         frequency=1.0 / gait.stride_time,
         start=shank.start,
@@ -86,45 +186,27 @@ def _read_leg(reading: Reading, numbers: dict[str, Any], folder: Path) -> Leg:
         knee_forward=series_of(gait, "knee_forward"),
         knee_up=series_of(gait, "knee_up"),
     )
-    return Leg(**numbers, shank=shank, gait=gait.name, curves=series)
+    return FreeMotion(*start, leg=Leg(**numbers, shank=shank, gait=gait.name, curves=series))
 
 
-def read_profile(reading: Reading, section: str, prescribed: Quantity) -> ProfileChoice:
-    """Return a function of time with all its settings in SI."""
-    kind = kind_at(reading.document, section)
-    return ProfileChoice(kind, reading.section(section, profile_settings(kind, prescribed)))
-
-
-def profile_problem(
-    device: str, stops: tuple[float, float], profile: ProfileChoice, duration: float, step: float
-) -> str:
-    """Return where a profile leaves the stops [rad] of a device, named by ``device``; an empty text if nowhere."""
-    for time, angle in _angles(profile, duration, step):
-        if not stops[0] - TOLERANCE <= angle <= stops[1] + TOLERANCE:
-            return (
-                f"[motion.profile] leaves the stops of {device}, {_range_text(stops)}: it is at "
-                f"{quantity_text(angle, 'rad')} at {time:.6g} s"
-            )
-    return ""
-
-
-def _angles(profile: ProfileChoice, duration: float, step: float) -> Iterator[tuple[float, float]]:
-    """Yield times and angles [rad]: those that the engine asks for, and the crests between them."""
-    kind = PROFILES[profile.kind]
-    parameters = rebuilt(kind.parameters, [profile.settings[item.name] for item in kind.quantities])
-    count = max(1, min(MAXIMUM_CHECKED_TIMES, round(duration / step)))
-    for number in range(count + 1):
-        time = duration * number / count
-        angle, rate, acceleration = kind.value(parameters, time)
-        yield time, angle
-        away = -rate / acceleration if acceleration else 0.0
-        if 0.0 < away < min(duration / count, duration - time):
-            yield time + away, angle + 0.5 * rate * away
-
-
-def _stops(device: Device) -> tuple[float, float]:
-    return device.actuator.angle_min, device.actuator.angle_max
-
-
-def _range_text(stops: tuple[float, float]) -> str:
-    return f"{quantity_text(stops[0], 'rad')} to {quantity_text(stops[1], 'rad')}"
+LEG_MOTION = MotionKind(
+    name="leg",
+    plan=late("ppafo.simulation.leg:plan_leg"),
+    measured=late("ppafo.simulation.leg:measured_leg"),
+    quantities=quantities_of_vane,
+    places={},
+    section=MotionSection(
+        "the vane moves a foot that is free, on a shank that is led",
+        LEG,
+        _read_leg,
+        ProfileTable(
+            "shank",
+            "angle of the shank in time, 0 upright",
+            shank_settings,
+            shank_table,
+            {GAIT_SHANK: ("gait",)},
+        ),
+    ),
+    **_OF_ALL_VANES,
+)
+"""Equation (11), without ground."""

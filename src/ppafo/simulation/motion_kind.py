@@ -5,26 +5,29 @@ no neuromuscular model.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from ppafo.errors import one_line
 from ppafo.kinds import Kinds, declared_kinds
+from ppafo.model.declaration import Quantity
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MotionKind:
-    """What a motion of a leg that wears the device brings to the runs of its scenarios, as functions of the scenario.
+    """What a motion brings to the runs of its scenarios, as functions of the scenario.
 
     ``plan`` gives the run and what may be wrong with it, as ``plan_runs`` does; ``rules`` which numbers contradict each
     other. Any number may be an array (runs,) in both. ``quantities`` declares the numbers of the scenario beside those
-    of its device, ``places`` says by path which attributes lead to those that are not where all scenarios have them.
+    of its device, ``places`` says by path which attributes lead to those that are not where their path says.
     ``clock(scenario, times)`` gives the clock with other times [s], which may be arrays too, and what is wrong with it.
     ``noise`` is the sum of all levels of noise that its controller receives, ``switches`` are settings that are 0 for
     all runs of a program or for none. ``lacks(scenario, metric)`` says why it has not what a metric needs, an empty
     text where it has it. ``measured(scenario, run, times, rows)`` gives recording and metrics of rows (samples,) by
-    path, and how a run that was completed ended, in words. ``walk`` is what the kinds of walks differ in, a
-    ``walking.kind.WalkKind``.
+    path, and how a run that was completed ended, in words.
+
+    A kind has either a ``section``, which the file of a vane alone has as ``[motion]``, or a ``walk``, what the kinds
+    of walks differ in, a ``walking.kind.WalkKind``: the file of a walk is laid out in another way.
     """
 
     name: str
@@ -37,15 +40,55 @@ class MotionKind:
     noise: Callable[..., Any]
     lacks: Callable[..., str]
     measured: Callable[..., Any]
-    walk: Any
+    section: "MotionSection | None" = None
+    walk: Any = None
+
+
+@dataclass(frozen=True, slots=True)
+class MotionSection:
+    """What ``[motion]`` holds for a kind of motion of a vane alone: its numbers, and the table of a profile, if any.
+
+    ``read(reading, device, duration, step, folder)`` gives the motion; times are in seconds, and in ``folder`` relative
+    paths begin.
+    """
+
+    summary: str
+    numbers: tuple[Quantity, ...]
+    read: Callable[..., Any]
+    profile: "ProfileTable | None" = None
+
+
+@dataclass(frozen=True, slots=True)
+class ProfileTable:
+    """A table of ``[motion]`` with the kind of a profile and its settings, an attribute ``name`` of the motion.
+
+    ``settings(kind)`` declares its numbers, ``layout()`` is the model of the table. ``own`` are its kinds that are no
+    profiles, with the texts that each needs.
+    """
+
+    name: str
+    summary: str
+    settings: Callable[[str], tuple[Quantity, ...]]
+    layout: Callable[[], Any]
+    own: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 WALK, REACT = "walk", "react"
 """The motion of a leg that a gait leads, and the motion of a neuromuscular gait model."""
 
+VANE_MOTIONS = ("free", "locked", "prescribed", "leg")
+"""Motions of a vane alone that this package has."""
+
 _GROUP = "ppafo.motions"
-WALKS: Kinds[MotionKind] = Kinds(_GROUP, "motion", MotionKind, declared_kinds(_GROUP))
-"""Motions of a leg that walks with the device; their files have sections of their own (``walking/declaration.py``)."""
+MOTIONS: Kinds[MotionKind] = Kinds(_GROUP, "motion", MotionKind, declared_kinds(_GROUP))
+"""Motions of a vane alone, and of a leg that walks with the device."""
+
+
+def is_walk(name: str) -> bool:
+    """Tell whether a kind of motion is a walk; KindError where the kind cannot be used."""
+    kind = MOTIONS.get(name)
+    return kind is not None and kind.walk is not None
+
 
 RENAMED_KEYS = {"wearer.reacts": 'motion.kind = "react" and wearer.name = "{value}"'}
 """Keys of files of the version before, and what to write in their place."""

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.control.controllers import switching
 from ppafo.engine.lanes import Floats
 from ppafo.errors import ScenarioError, nearest_name
 from ppafo.model.catalog import VALVES, device_effects, find_effects
@@ -17,13 +16,11 @@ from ppafo.parameters.device import Device, Orifice, SonicOrifice
 from ppafo.parameters.graph import ATMOSPHERE_PATH, Graph, holding, left, resolved
 from ppafo.parameters.overrides import either, in_two_forms, one_path
 from ppafo.parameters.plant import all_settings
-from ppafo.simulation import declaration
 from ppafo.simulation.clock import Clock, read_clock
-from ppafo.simulation.declaration import SUPPLY_LINE, Reading
+from ppafo.simulation.declaration import LOCKED_ANGLE, TEXTS, Reading
 from ppafo.simulation.overrides import apply_overrides
-from ppafo.simulation.scenario import PYTHON_CONTROLLER, FreeMotion, PrescribedMotion, Scenario, worn_kind
+from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario, vane_motion
 
-LOCKED_ANGLE = "motion.angle"
 TIMES = ("run.duration", "run.step", "run.output_interval", "controller.rate", "controller.period")
 """Paths that decide the clock of a run."""
 
@@ -32,7 +29,7 @@ _OF_DEVICE = (*_DEVICE_SECTIONS, "valve", EFFECT_SETTINGS)
 _ORIFICES = {"actuator.leak": ("device", "actuator", "leak"), "valve": ("device", "valve", "orifice")}
 
 _TEXTS = (
-    *declaration.TEXTS,
+    *TEXTS,
     "gas.species",
     "supply.relieving",
     "motion.kind",
@@ -42,7 +39,8 @@ _TEXTS = (
     "motion.shank.kind",
     "motion.shank.gait",
 )
-_OF_LEG = frozenset(item.name for item in declaration.LEG) - {item.name for item in declaration.FREE}
+_HOLDERS = ("settings", "orifice", "leg")
+"""Fields whose numbers are attributes of what has them."""
 _UNIT_OF_TIMES = {"controller.rate": "Hz"}
 
 
@@ -53,12 +51,8 @@ def chosen_path(path: str, scenario: Scenario) -> str:
 
 def declared_numbers(scenario: Scenario) -> dict[str, Quantity]:
     """Return the declaration of every number of a scenario and its device, by path; both forms of an orifice."""
-    worn = worn_kind(scenario)
-    if worn is not None:
-        own: dict[str, Quantity] = worn.quantities(scenario)
-        return device_numbers(scenario.device) | own
-    kinds = declaration.quantities(_kinds(scenario))
-    return device_numbers(scenario.device) | kinds | _angle_of_locked_vane(scenario)
+    own: dict[str, Quantity] = scenario.motion.motion_kind.quantities(scenario)
+    return device_numbers(scenario.device) | own
 
 
 def device_numbers(device: Device) -> dict[str, Quantity]:
@@ -87,6 +81,7 @@ def with_numbers(scenario: Scenario, numbers: Mapping[str, Any]) -> Scenario:
     """
     given = {chosen_path(path, scenario): number for path, number in numbers.items()}
     chosen = moving_together(scenario, given)
+    # All links that are left are the scenario's own, for what was given follows nothing any more.
     if given:
         device = replace(scenario.device, links={})
         scenario = replace(scenario, device=device, links=left(scenario.graph, given))
@@ -126,6 +121,7 @@ def _number(node: Any, place: tuple[str, ...]) -> Any:
 
 
 def _inner(node: Any, part: str) -> Any:
+    # A device has settings of the effects that its set names; those of all others are their defaults.
     if part == EFFECT_SETTINGS and isinstance(node, Device):
         return all_settings(node)
     return node[part] if isinstance(node, Mapping) else getattr(node, part)
@@ -137,44 +133,18 @@ def other_form(device: Device, section: str) -> tuple[str, ...]:
     return tuple(item.name for item in (SONIC_FORM if isinstance(orifice, Orifice) else AREA_FORM))
 
 
-def _kinds(scenario: Scenario) -> dict[str, Any]:
-    """Return a document that names the kinds of the scenario and nothing else; a constant command has no reference."""
-    motion: dict[str, Any] = {"kind": "free"}
-    if isinstance(scenario.motion, FreeMotion) and scenario.motion.leg is not None:
-        motion = {"kind": "leg", "shank": {"kind": scenario.motion.leg.shank.kind}}
-    if isinstance(scenario.motion, PrescribedMotion):
-        is_locked = scenario.motion.kind == "locked"
-        motion = {} if is_locked else {"kind": "prescribed", "profile": {"kind": scenario.motion.profile.kind}}
-    controller = {"kind": scenario.controller.kind}
-    gas: dict[str, Any] = {} if scenario.gas_model is None else {"gas_model": {"kind": declaration.THERMAL}}
-    gas |= {} if scenario.supply_line is None else {SUPPLY_LINE: {}}
-    if scenario.controller.kind == switching.CONSTANT.name:
-        return {"motion": motion, "controller": controller, **gas}
-    return {"motion": motion, "controller": controller, "reference": {"kind": scenario.reference.kind}, **gas}
-
-
-def _angle_of_locked_vane(scenario: Scenario) -> dict[str, Quantity]:
-    return {LOCKED_ANGLE: declaration.ANGLE} if path_of_locked_angle(scenario) == LOCKED_ANGLE else {}
-
-
 def path_of_locked_angle(scenario: Scenario) -> str | None:
     """Return the path of the angle at which a vane stays, None where it moves."""
-    motion = scenario.motion
-    if not isinstance(motion, PrescribedMotion) or motion.profile.kind != "constant":
+    if scenario.walks or vane_motion(scenario).locked_angle is None:
         return None
-    return LOCKED_ANGLE if motion.kind == "locked" else "motion.profile.level"
+    return LOCKED_ANGLE if LOCKED_ANGLE in scenario.motion.motion_kind.places else "motion.profile.level"
 
 
 def _place(path: str, scenario: Scenario) -> tuple[str, ...]:
-    """Return the attributes that lead from the scenario to a number: its path, but for a few of a motion."""
-    section, _, name = path.rpartition(".")
-    worn = worn_kind(scenario)
-    if worn is not None and path in worn.places:
-        return worn.places[path]
-    if path == LOCKED_ANGLE and not isinstance(scenario.motion, FreeMotion):
-        return ("motion", "profile", "level")
-    if section == "motion.shank" or (section == "motion" and name in _OF_LEG):
-        return ("motion", "leg", *path.split(".")[1:])
+    """Return the attributes that lead from the scenario to a number: its path, unless its motion says otherwise."""
+    places = scenario.motion.motion_kind.places
+    if path in places:
+        return places[path]
     parts = tuple(path.split("."))
     return ("device", *parts) if parts[0] in _OF_DEVICE else parts
 
@@ -184,15 +154,15 @@ def _replace_number(node: Any, parts: tuple[str, ...], number: Any) -> Any:
     inner = _replace_number(_inner(node, name), inside, number) if inside else number
     if isinstance(node, Mapping):
         return {**node, name: inner}
-    if name in _names(node):
+    if any(item.name == name for item in fields(node)):
         return replace(node, **{name: inner})
-    # Among its settings, or in its orifice: there it is an attribute all the same.
-    field = "settings" if name in node.settings else "orifice"
-    return replace(node, **{field: _replace_number(getattr(node, field), parts, number)})
+    # Among its settings, in its orifice or on its leg: there it is an attribute of its own all the same.
+    holder = next(field for field in _HOLDERS if _has(getattr(node, field, None), name))
+    return replace(node, **{holder: _replace_number(getattr(node, holder), parts, number)})
 
 
-def _names(node: Any) -> frozenset[str]:
-    return frozenset(item.name for item in fields(node))
+def _has(inner: Any, name: str) -> bool:
+    return name in inner if isinstance(inner, Mapping) else hasattr(inner, name)
 
 
 @dataclass(frozen=True, slots=True)
@@ -299,6 +269,7 @@ def clock_with(name: str, given: TimeTexts, times: Mapping[str, float]) -> Clock
     document = {section: dict(texts) for section, texts in given.items()}
     for path, value in times.items():
         section, item = path.split(".")
+        # A rate takes the place of a period that the file has, and the reverse.
         if section == "controller":
             document[section] = {}
         document[section][item] = f"{value!r} {_UNIT_OF_TIMES.get(path, 's')}"
@@ -312,6 +283,7 @@ def time_texts(base: Scenario) -> TimeTexts:
         section: {name: value for name, value in document[section].items() if f"{section}.{name}" in TIMES}
         for section in ("run", "controller")
     }
+    # The file speaks for the scenario only as long as nobody has changed its times in Python.
     if read_clock(Reading(base.name, texts)) == clock_of(base):
         return texts
     run = {"duration": base.run.duration, "step": base.run.step, "output_interval": base.run.output_interval}

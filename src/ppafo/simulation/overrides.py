@@ -118,14 +118,12 @@ def _is_choosing(path: str) -> bool:
 
 def chosen_by(path: str, choosing: Iterable[str]) -> list[str]:
     """Return the paths that decide whether there is a value at a path, the nearest one last."""
-    found = (chosen for chosen in choosing if chosen != path and path.startswith(_sections(chosen)))
+    found = []
+    for chosen in choosing:
+        own = (f"{chosen.rpartition('.')[0]}.",)
+        begins = (*own, _WEARER) if chosen == _OF_MOTION else own
+        found += [chosen] if chosen != path and path.startswith(begins) else []
     return sorted(found, key=len)
-
-
-def _sections(chosen: str) -> tuple[str, ...]:
-    """Return how the paths begin about which a kind decides."""
-    own = f"{chosen.rpartition('.')[0]}."
-    return (own, _WEARER) if chosen == _OF_MOTION else (own,)
 
 
 def _choose_kinds(
@@ -135,6 +133,7 @@ def _choose_kinds(
 
     A kind whose section is not there remains.
     """
+    # A kind of an outer section decides which sections there are inside it.
     first = sorted(filter(_is_choosing, given), key=lambda path: (path.count("."), path))
     done = set()
     for path in first:
@@ -208,20 +207,22 @@ def _set(document: dict[str, Any], path: str, text: str, file: str, declared: De
         table = table.setdefault(part, {})
         if not isinstance(table, dict):
             raise ScenarioError(f"override '{path}={text}': {file} has no table [{section}]")
-    if name == "kind" and table.get("kind") != text:
-        _drop_settings_of_old_kind(document, section, text, declared)
+    if name == _KIND and table.get(_KIND) != text:
+        # What both kinds have stays as the document gives it.
+        before = _setting_names(document, section, declared)
+        table[_KIND] = text
+        after = _setting_names(document, section, declared)
+        for lost in before - after - _OF_ANY_KIND.get(section, frozenset()):
+            table.pop(lost, None)
     for other in other_forms(path):
         table.pop(other.rpartition(".")[2], None)
-    table[name] = _seed(path, text) if path == _SEED else _with_unit_of_gain(document, path, text, declared)
-
-
-def _drop_settings_of_old_kind(document: dict[str, Any], section: str, kind: str, declared: Declared) -> None:
-    table = value_at(document, section)
-    before = _setting_names(document, section, declared)
-    table["kind"] = kind
-    after = _setting_names(document, section, declared)
-    for name in before - after - _OF_ANY_KIND.get(section, frozenset()):
-        table.pop(name, None)
+    if path != _SEED:
+        table[name] = _with_unit_of_gain(document, path, text, declared)
+        return
+    try:
+        table[name] = int(number_text(text))
+    except ValueError as error:
+        raise ScenarioError(f"override '{path}={text}': must be a whole number") from error
 
 
 def _setting_names(document: dict[str, Any], section: str, declared: Declared) -> frozenset[str]:
@@ -236,10 +237,3 @@ def _with_unit_of_gain(document: dict[str, Any], path: str, text: str, declared:
     quantity = declared.quantities(document).get(path)
     is_gain = quantity is not None and path.startswith("controller.") and "(N m" in quantity.unit
     return f"{text} {quantity.unit}" if quantity is not None and is_gain and _NUMBER.fullmatch(text) else text
-
-
-def _seed(path: str, text: str) -> int:
-    try:
-        return int(number_text(text))
-    except ValueError as error:
-        raise ScenarioError(f"override '{path}={text}': must be a whole number") from error

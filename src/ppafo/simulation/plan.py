@@ -6,19 +6,16 @@ library has them in C.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ppafo.constants import STANDARD_GRAVITY
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.kind import ControllerKind, ProfileKind
 from ppafo.engine.components import GasScheme
-from ppafo.engine.led_leg import GAIT_SHANK, LedLeg
-from ppafo.engine.over_samples import over_samples
 from ppafo.engine.program import NoParameters, Program
 from ppafo.engine.rows import rebuilt
-from ppafo.engine.run import Lines, Run, WornLeg
+from ppafo.engine.run import Run, WornLeg
 from ppafo.engine.scheme.actuators import volumes_of
 from ppafo.engine.scheme.isothermal_gas import ISOTHERMAL
 from ppafo.engine.scheme.pneumatics import KEPT_OF_PRESSURE, is_slow
@@ -41,11 +38,9 @@ from ppafo.model.columns import (
 )
 from ppafo.model.effects.kind import Effect
 from ppafo.model.gas import wall_exchange
-from ppafo.model.leg import FootLoad
 from ppafo.model.orifice import ExactOrifice
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, chamber_mass, chamber_volumes
 from ppafo.model.ports import gas_density
-from ppafo.model.regulator import LineState, SupplyLines
 from ppafo.model.sensors import SensorParameters
 from ppafo.model.valves.kind import ValveModel
 from ppafo.parameters.device import Device, Gas, Orifice, SonicOrifice
@@ -57,18 +52,18 @@ from ppafo.parameters.plant import (
     plant_parameters,
     valve_settings,
 )
+from ppafo.simulation.profiles import profile_bounds, profile_parameters
 from ppafo.simulation.scenario import (
     PYTHON_CONTROLLER,
-    FreeMotion,
     GasModel,
-    Leg,
-    PrescribedMotion,
     ProfileChoice,
     Scenario,
-    VaneMotion,
     vane_motion,
-    worn_kind,
 )
+
+if TYPE_CHECKING:
+    from ppafo.engine.led_leg import LedLeg
+    from ppafo.model.regulator import SupplyLines
 
 MAXIMUM_STEPS = 1.0e9
 
@@ -108,10 +103,21 @@ class Components:
     sensors: SensorParameters
     has_ideal_sensors: bool
     thermal: GasModel | None
-    supply_lines: SupplyLines | None
+    supply_lines: "SupplyLines | None"
     signal_delay: Any = 0.0
     sections: Mapping[str, Any] = field(default_factory=dict)
-    leg: Leg | None = None
+    leg: "CarriedLeg | None" = None
+
+
+@dataclass(frozen=True, slots=True)
+class CarriedLeg:
+    """A leg on an unconstrained vane: what leads its shank, and what ``put_on(plant)`` makes of a plant without one.
+
+    That is the plant with the foot on it, and the leg as the engine has it.
+    """
+
+    shank: ProfileKind
+    put_on: Callable[[PlantParameters], "tuple[PlantParameters, LedLeg]"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,22 +155,34 @@ def compose_run(
     """
     settings = valve_settings(components.device.valve)
     delay = components.valve.command_delay(settings)
-    plant = plant_behind_lines(plant, components.supply_lines)
-    leg = None if components.leg is None else led_leg(plant, components.leg)
-    plant = plant if leg is None else with_load(plant, leg.load)
+    # Lines take back what a chamber pushes out, whether or not their regulators do.
+    plant = plant if components.supply_lines is None else plant._replace(relieving=1.0)
+    plant, leg = (plant, None) if components.leg is None else components.leg.put_on(plant)
+    lines = None
+    if components.supply_lines is not None:
+        from ppafo.simulation.supply_lines import initial_lines
+
+        lines = initial_lines(plant, components.supply_lines)
+    controller: Any = ()
+    if components.controller is not None:
+        law, given = components.controller, components.settings
+        # The numbers that a plan made have no settings of their names; they come in the order of the law's parameters.
+        numbers = given.values() if law.plan is not None else [given[item.name] for item in law.quantities]
+        controller = rebuilt(law.parameters, numbers)
     # After lines and leg: the rule looks at the plant with both.
     steps = rule(plant)
     return Run(
+        # Of the first run, for all runs of one program have a delay or none has.
         program=_program(components, steps, walk, has_delay=first(delay) > 0.0),
         plant=plant,
-        thermal=thermal_parameters(components.thermal, components.device),
+        thermal=NoParameters()
+        if components.thermal is None
+        else thermal_gas(components.thermal, components.device.gas),
         valve_orifice=exact_orifice(components.device.valve.orifice, components.device),
         leak_orifice=exact_orifice(components.device.actuator.leak, components.device),
         initial=start(plant),
         valve=valve_parameters(components.valve, settings),
-        controller=()
-        if components.controller is None
-        else controller_parameters(components.controller, components.settings),
+        controller=controller,
         reference=profile_parameters(components.reference),
         path=() if components.path is None else profile_parameters(components.path),
         sensors=components.sensors,
@@ -177,7 +195,7 @@ def compose_run(
         needs_parts=steps.needs_parts,
         tolerance=steps.tolerance,
         walk=walk,
-        lines=initial_lines(plant, components.supply_lines),
+        lines=lines,
         effects=effect_rows(components.device, components.sections),
         leg=leg,
     )
@@ -228,7 +246,7 @@ def _program(components: Components, steps: Steps, walk: WornLeg | None, has_del
         # A broken number of steps to a sample puts samples inside steps.
         samples_inside=bool(first(steps.record_every % 1.0)),
         effects=effects,
-        shank=None if components.leg is None else shank_kind(components.leg),
+        shank=None if components.leg is None else components.leg.shank,
     )
 
 
@@ -237,43 +255,39 @@ def plan_runs(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
 
     All runs of an ensemble must ask for one program: of a valve's and the sensors' settings, each is 0 for all or none.
     """
-    worn = worn_kind(scenario)
-    if worn is not None:
-        planned: tuple[Run, tuple[Problem, ...]] = worn.plan(scenario)
-        return planned
+    planned: tuple[Run, tuple[Problem, ...]] = scenario.motion.motion_kind.plan(scenario)
+    return planned
+
+
+def plan_vane(scenario: Scenario, leg: CarriedLeg | None = None) -> tuple[Run, tuple[Problem, ...]]:
+    """The run of a scenario of a vane alone, with a leg or without, and what may be wrong with it."""
     device, motion, control = scenario.device, vane_motion(scenario), scenario.controller
-    plant = plant_parameters(device, outside_torque(motion))
+    plant = plant_parameters(device, motion.outside_torque)
     law = None if control.kind == PYTHON_CONTROLLER else CONTROLLERS[control.kind]
-    numbers, problems = _numbers_of_law(law, scenario, plant.torque_constant)
+    numbers: Mapping[str, Any] = control.settings
+    problems: tuple[Problem, ...] = ()
+    if law is not None and law.plan is not None:
+        bounds = profile_bounds(scenario.reference)
+        numbers, problems = law.plan(numbers, control.period, plant.torque_constant, bounds)
     components = Components(
         device=device,
         valve=VALVES[device.valve.kind].choose(first_settings(device.valve)),
         controller=law,
         settings=numbers,
         reference=scenario.reference,
-        path=None if isinstance(motion, FreeMotion) else motion.profile,
+        path=motion.profile,
         sensors=sensor_parameters(scenario),
         has_ideal_sensors=has_ideal_sensors(scenario),
         thermal=scenario.gas_model,
         supply_lines=scenario.supply_lines,
         signal_delay=scenario.sensors.delay,
         sections=scenario.effect_sections,
-        leg=motion.leg if isinstance(motion, FreeMotion) else None,
+        leg=leg,
     )
     run = compose_run(
         components, plant, lambda fed: scenario_steps(scenario, fed), lambda fed: initial_state(scenario, fed)
     )
     return run, (too_many_steps(scenario, run.step, run.step_count), *problems)
-
-
-def _numbers_of_law(
-    law: ControllerKind | None, scenario: Scenario, torque_constant: Any
-) -> tuple[Mapping[str, Any], tuple[Problem, ...]]:
-    """Return the numbers of a law by name, which are its settings unless it has a plan, and what may be wrong."""
-    control = scenario.controller
-    if law is None or law.plan is None:
-        return control.settings, ()
-    return law.plan(control.settings, control.period, torque_constant, profile_bounds(scenario.reference))
 
 
 def scenario_steps(scenario: Scenario, plant: PlantParameters) -> Steps:
@@ -298,57 +312,6 @@ def relative_tolerance(tolerance: float) -> float:
     return tolerance / KEPT_OF_PRESSURE
 
 
-def outside_torque(motion: VaneMotion) -> Any:
-    """Constant torque [N m] that works against plantarflexion beside a leg, which T_2 of equation (11) does below 0."""
-    if not isinstance(motion, FreeMotion):
-        return 0.0
-    return motion.external_torque if motion.leg is None else -motion.leg.ankle_torque
-
-
-def shank_kind(leg: Leg) -> ProfileKind:
-    """What leads the shank of a leg."""
-    return PROFILES[leg.shank.kind] if leg.curves is None else GAIT_SHANK
-
-
-def shank_parameters(leg: Leg) -> Any:
-    """Parameters of what leads the shank of a leg; its settings may be arrays (runs,)."""
-    if leg.curves is None:
-        return profile_parameters(leg.shank)
-    return leg.curves._replace(start=leg.shank.start, toe_lever=leg.toe_lever)
-
-
-def led_leg(plant: PlantParameters, leg: Leg) -> LedLeg:
-    """A leg on a plant that has none yet."""
-    foot = (leg.foot_mass, leg.foot_mass_centre, leg.foot_inertia)
-    return LedLeg(foot_load(plant.inertia, plant.gravity_torque, *foot, leg.shank_length), shank_parameters(leg))
-
-
-def foot_load(
-    inertia: float,
-    gravity_torque: float,
-    foot_mass: float,
-    foot_mass_centre: float,
-    foot_inertia: float,
-    shank_length: float,
-) -> FootLoad:
-    """What turns about the ankle of a leg: J and S of equation (11) with (1), docs/equations.md.
-
-    Inertia [kg m^2] and largest gravity torque [N m] of foot plate and vane, then the foot and the shank as in ``Leg``.
-    """
-    moment = foot_mass * foot_mass_centre
-    return FootLoad(
-        mass_moment=moment + gravity_torque / STANDARD_GRAVITY,
-        inertia=inertia + foot_inertia + moment * foot_mass_centre,
-        shank_length=shank_length,
-        gravity=STANDARD_GRAVITY,
-    )
-
-
-def with_load(plant: PlantParameters, load: FootLoad) -> PlantParameters:
-    """The plant with the inertia of all that turns; the weight of the foot plate is accounted for in the leg."""
-    return plant._replace(inertia=load.inertia, gravity_torque=0.0)
-
-
 def valve_parameters(valve: ValveModel, settings: Any) -> Any:
     """Parameters of a valve from its settings in SI units, a NamedTuple whose numbers may be arrays (runs,)."""
 
@@ -371,25 +334,6 @@ def too_many_steps(scenario: Scenario, step: float, step_count: int) -> Problem:
     return step_count > MAXIMUM_STEPS, line
 
 
-def thermal_parameters(walls: GasModel | None, device: Device) -> ThermalParameters | NoParameters:
-    """How the gas takes up heat, where it has an energy balance."""
-    if walls is None:
-        return NoParameters()
-    return thermal_gas(walls, device.gas)
-
-
-def plant_behind_lines(plant: PlantParameters, lines: SupplyLines | None) -> PlantParameters:
-    """The plant behind its lines: these take back what a chamber pushes out, whether or not their regulators do."""
-    return plant if lines is None else plant._replace(relieving=1.0)
-
-
-def initial_lines(plant: PlantParameters, lines: SupplyLines | None) -> Lines | None:
-    """Both lines at the pressures that their regulators are set to, and nothing let through yet; None without lines."""
-    if lines is None:
-        return None
-    return Lines(lines, lines_at_start(plant, lines))
-
-
 def has_ideal_sensors(scenario: Scenario) -> bool:
     """True where the controller sees what is there, without noise or rounding."""
     return not any(first(flaw) for flaw in scenario.sensors.flaws[1:])
@@ -407,29 +351,6 @@ def sensor_parameters(scenario: Scenario) -> SensorParameters:
     )
 
 
-def controller_parameters(kind: ControllerKind, settings: Mapping[str, Any]) -> Any:
-    """The NamedTuple of a controller, nested ones filled in the order of its quantities; settings may be arrays.
-
-    Of a controller with a plan ``settings`` are the numbers that this made, in their order.
-    """
-    given = settings.values() if kind.plan is not None else [settings[item.name] for item in kind.quantities]
-    return rebuilt(kind.parameters, given)
-
-
-def profile_parameters(choice: ProfileChoice) -> Any:
-    """The NamedTuple of a profile, nested ones filled in the order of its quantities; settings may be arrays."""
-    kind = PROFILES[choice.kind]
-    return rebuilt(kind.parameters, [choice.settings[item.name] for item in kind.quantities])
-
-
-def profile_values(choice: ProfileChoice, times: "np.ndarray[tuple[int], np.dtype[np.float64]]") -> np.ndarray:
-    """Value, rate and second derivative of a profile at times [s], shape (3, times)."""
-    found = np.empty((3, times.size))
-    for row, series in enumerate(over_samples(PROFILES[choice.kind].value, profile_parameters(choice), times)):
-        found[row] = series
-    return found
-
-
 def is_adaptive(scenario: Scenario, plant: PlantParameters, step: float) -> Any:
     """True where the error decides about the parts of a step [s]; not where a held vane's chambers are slow enough.
 
@@ -437,26 +358,18 @@ def is_adaptive(scenario: Scenario, plant: PlantParameters, step: float) -> Any:
     """
     if scenario.supply_lines is not None or scenario.device.actuator.kind != VANE.name:
         return True
-    motion = scenario.motion
-    if not isinstance(motion, PrescribedMotion) or motion.profile.kind != "constant":
+    angle = vane_motion(scenario).locked_angle
+    if angle is None:
         return True
     # The pressure of gas with an energy balance follows faster, by its heat capacity ratio.
     stiffness = 1.0 if scenario.gas_model is None else scenario.device.gas.heat_capacity_ratio
-    return np.logical_not(is_slow_locked(plant, step, motion.profile.level, stiffness))
-
-
-def profile_bounds(choice: ProfileChoice) -> tuple[float, float]:
-    """Lowest and highest value of a profile, N m or rad as its levels; arrays (runs,) where its settings are."""
-    kind = PROFILES[choice.kind]
-    numbers = [choice.settings[item.name] for item in kind.quantities]
-    lowest, highest = over_runs(lambda *values: kind.bounds(rebuilt(kind.parameters, values)), *numbers)
-    return lowest, highest
+    return np.logical_not(is_slow_locked(plant, step, angle, stiffness))
 
 
 def initial_state(scenario: Scenario, plant: PlantParameters) -> PlantState:
     """Angle, angular velocity and gas at the start."""
     motion = vane_motion(scenario)
-    if isinstance(motion, FreeMotion):
+    if motion.profile is None:
         angle, rate = motion.angle, motion.angular_velocity
     else:
         path = PROFILES[motion.profile.kind]
@@ -551,13 +464,4 @@ def state_with_volumes(
         supplied_mass=0.0,
         vented_mass=0.0,
         leaked_mass=0.0,
-    )
-
-
-def lines_at_start(plant: PlantParameters, lines: SupplyLines) -> LineState:
-    """Both lines at the pressures that their regulators are set to, and nothing let through yet."""
-    return LineState(
-        mass_1=chamber_mass(plant.supply_pressure, lines.volume_1, plant.gas_product),
-        mass_2=chamber_mass(plant.dorsiflexion_pressure, lines.volume_2, plant.gas_product),
-        regulated_mass=0.0,
     )

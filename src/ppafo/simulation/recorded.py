@@ -131,6 +131,7 @@ def _path(inputs: RecordedInputs, device: Device, run: Run) -> dict[str, Floats]
     time = inputs.recording.time - inputs.start
     angles = between_stops(inputs.recording[ANGLE], device, inputs.recording.label)
     rates = np.append(np.diff(angles) / np.diff(time), 0.0)
+    # By the middle of a step: rounding may put a sample a little behind the step that begins with it.
     piece = np.maximum(np.searchsorted(time, step_times(run) + 0.5 * run.step, side="right") - 1, 0)
     return {"path.start": time[piece], "path.level": angles[piece], "path.rate": rates[piece]}
 
@@ -210,6 +211,7 @@ def _is_seen(columns: Floats, values: Floats) -> bool:
     if np.linalg.matrix_rank(columns, rtol=_LEAST_RANK) < columns.shape[1]:
         return False
     found = np.linalg.lstsq(columns, values)[0]
+    # A second difference of white noise has the square root of 6 times its standard deviation: 1 + 4 + 1.
     noise = _SPREAD_OF_MEDIAN * float(np.median(np.abs(np.diff(values, n=2)))) / math.sqrt(6.0)
     error = noise * math.sqrt(float(np.linalg.inv(columns.T @ columns)[0, 0]))
     return bool(abs(found[0]) > _SEEN_SLOPE * error + _ROUNDING * float(np.abs(values).max()))

@@ -103,6 +103,7 @@ def _group(batch: Batch, name: str) -> Any:
 def _clip_command(command: object, controller: PythonController, time: float, walks: bool) -> float:
     """The command within -1 to 1; in a walk also the one that vents both chambers."""
     name = type(controller).__name__
+    # A comparison that was meant to be a command is a bool, which Python takes for a whole number.
     if isinstance(command, bool) or not isinstance(command, int | float | np.floating) or not math.isfinite(command):
         raise SimulationError(f"{name}.update returned {command!r} at t = {time:.6g} s; it must return a finite number")
     return VENT if walks and command > VENTS_ABOVE else max(-1.0, min(1.0, float(command)))

@@ -7,18 +7,19 @@ an object of your own in charge of the valve.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Any, Protocol
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Protocol
 
 from ppafo.control.kind import PythonController
 from ppafo.documents.json_text import plain
 from ppafo.engine.scheme.pneumatics import KEPT_OF_PRESSURE
 from ppafo.errors import ScenarioError
 from ppafo.model.declaration import Number, attribute_among
-from ppafo.model.gait import ShankSeries
-from ppafo.model.regulator import SupplyLines
 from ppafo.parameters.device import Device, Supply
 from ppafo.parameters.graph import Graph
-from ppafo.simulation.motion_kind import MotionKind
+from ppafo.simulation.motion_kind import MOTIONS, MotionKind
+
+if TYPE_CHECKING:
+    from ppafo.model.regulator import SupplyLines
 
 PYTHON_CONTROLLER = "python"
 LARGEST_SEED = 2**32 - 1
@@ -45,7 +46,8 @@ class Leg:
     Mass of the foot [kg], from the ankle to its mass centre [m], inertia about that [kg m^2], length of the shank [m],
     from the ankle to the toes [m], which nothing but the height of the toes asks for.
     ``ankle_torque`` [N m] is T_2, positive in plantarflexion. ``shank`` is its angle in time [rad], upright at 0; with
-    the kind ``gait`` a ``gait``'s by its ``curves``, whose knee moves too, from the phase ``start`` [strides] on.
+    the kind ``gait`` a ``gait``'s by its ``curves``, a ``model.gait.ShankSeries``, whose knee moves too, from the phase
+    ``start`` [strides] on.
     Defaults are the paper's subject (after equation (12)), with the mass centre half way along a foot of 0.18 m.
     """
 
@@ -59,7 +61,7 @@ class Leg:
     ]
     shank: ProfileChoice
     gait: str = ""
-    curves: ShankSeries | None = None
+    curves: Any = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +80,22 @@ class FreeMotion:
         float, Number("N m", "constant torque T_ex, above 0 against plantarflexion", 0.0, -1.0e4, 1.0e4)
     ] = 0.0
     leg: Leg | None = None
+    profile: ClassVar[None] = None
+    locked_angle: ClassVar[None] = None
+
+    def __getattr__(self, name: str) -> Any:
+        """Return a number of the leg by its name."""
+        return attribute_among(self, name, "leg")
+
+    @property
+    def motion_kind(self) -> MotionKind:
+        """What it brings to the runs of its scenarios."""
+        return MOTIONS["free" if self.leg is None else "leg"]
+
+    @property
+    def outside_torque(self) -> Any:
+        """Constant torque [N m] against plantarflexion beside a leg, which T_2 of equation (11) does below 0."""
+        return self.external_torque if self.leg is None else -self.leg.ankle_torque
 
     @property
     def label(self) -> str:
@@ -102,6 +120,18 @@ class PrescribedMotion:
 
     profile: ProfileChoice
     kind: str = "prescribed"
+    leg: ClassVar[None] = None
+    outside_torque: ClassVar[float] = 0.0
+
+    @property
+    def motion_kind(self) -> MotionKind:
+        """What it brings to the runs of its scenarios."""
+        return MOTIONS[self.kind]
+
+    @property
+    def locked_angle(self) -> Any:
+        """The angle [rad] at which the vane stays, None where it moves."""
+        return self.profile.level if self.profile.kind == "constant" else None
 
     @property
     def label(self) -> str:
@@ -112,11 +142,11 @@ class PrescribedMotion:
         return f"prescribed, along the profile {self.profile.kind}"
 
 
-class WornMotion(Protocol):
-    """The motion of a leg that wears the device, which a room above this one knows."""
+class Motion(Protocol):
+    """What moves the ankle: a vane alone, or a leg that wears the device, which a package above this one knows."""
 
     @property
-    def kind(self) -> MotionKind:
+    def motion_kind(self) -> MotionKind:
         """What it brings to the runs of its scenarios."""
 
     @property
@@ -187,8 +217,10 @@ class SupplyLine:
     plantarflexion: RegulatedLine
     dorsiflexion: RegulatedLine
 
-    def row(self, supply: Supply) -> SupplyLines:
+    def row(self, supply: Supply) -> "SupplyLines":
         """Return the lines as the engine has them, with regulators that relieve where the supply's do."""
+        from ppafo.model.regulator import SupplyLines
+
         first, second = self.plantarflexion, self.dorsiflexion
         return SupplyLines(
             droop_1=first.droop,
@@ -284,7 +316,7 @@ class Scenario:
     description: str
     device: Device
     run: RunSettings
-    motion: VaneMotion | WornMotion
+    motion: Motion
     initial: Initial
     controller: Control
     reference: ProfileChoice
@@ -306,7 +338,7 @@ class Scenario:
         )
 
     @property
-    def supply_lines(self) -> SupplyLines | None:
+    def supply_lines(self) -> "SupplyLines | None":
         """Regulators and lines as the engine has them, None where supply pressures are constant."""
         return None if self.supply_line is None else self.supply_line.row(self.device.supply)
 
@@ -314,6 +346,11 @@ class Scenario:
     def effect_sections(self) -> dict[str, Any]:
         """Settings of effects beside the device's, by section."""
         return {"sensors": self.sensors}
+
+    @property
+    def walks(self) -> bool:
+        """True where a leg walks with the device, false for a vane alone."""
+        return self.motion.motion_kind.walk is not None
 
     @property
     def graph(self) -> Graph:
@@ -347,12 +384,6 @@ def vane_motion(scenario: Scenario) -> VaneMotion:
     if isinstance(scenario.motion, FreeMotion | PrescribedMotion):
         return scenario.motion
     raise ScenarioError(f"{scenario.name}: is {scenario.motion.label}, and here a scenario without a wearer is needed")
-
-
-def worn_kind(scenario: Scenario) -> MotionKind | None:
-    """What the motion of a leg that wears the device brings, None for a vane alone."""
-    motion = scenario.motion
-    return None if isinstance(motion, FreeMotion | PrescribedMotion) else motion.kind
 
 
 def scenario_document(scenario: Scenario) -> dict[str, Any]:

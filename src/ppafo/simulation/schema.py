@@ -16,6 +16,7 @@ from ppafo.control.kind import ControllerKind
 from ppafo.documents.models import NAME, make_schema, one_of, optional, table
 from ppafo.model.declaration import Quantity
 from ppafo.simulation import declaration
+from ppafo.simulation.motion_kind import MOTIONS, VANE_MOTIONS, MotionKind
 from ppafo.simulation.scenario import LARGEST_SEED
 
 _LONGEST_NAME = 100
@@ -57,7 +58,8 @@ def model_name(name: str) -> str:
     return "".join(part.capitalize() for part in re.split(r"\W|_", name))
 
 
-def _profile(prescribed: Quantity, purpose: str) -> Any:
+def profile_table(prescribed: Quantity, purpose: str) -> Any:
+    """Return the section of a profile; ``purpose`` ends the names of its models."""
     return one_of(
         [
             table(
@@ -69,33 +71,26 @@ def _profile(prescribed: Quantity, purpose: str) -> Any:
     )
 
 
+def motion_kinds() -> dict[str, MotionKind]:
+    """Return the kinds of motion of a vane alone: all of this package, and loaded ones of others."""
+    others = {name: kind for name, kind in MOTIONS.loaded().items() if kind.section is not None}
+    return {name: MOTIONS[name] for name in VANE_MOTIONS} | others
+
+
 def _motion() -> Any:
-    prescribed = {"profile": (_profile(declaration.ANGLE_LEVEL, "Angle"), Field(description="angle in time"))}
-    return one_of(
-        [
-            table(
-                "FreeMotion",
-                kind_field("free", "the vane moves as the torques demand") | quantity_fields(declaration.FREE),
-            ),
-            table(
-                "LockedMotion",
-                kind_field("locked", "the vane stays at one angle") | quantity_fields((declaration.ANGLE,)),
-            ),
-            table(
-                "PrescribedMotion",
-                kind_field("prescribed", "the angle of the vane is a given function of time") | prescribed,
-            ),
-            table(
-                "LegMotion",
-                kind_field("leg", "the vane moves a foot that is free, on a shank that is led")
-                | quantity_fields(declaration.LEG)
-                | {"shank": (_shank(), Field(description="angle of the shank in time, 0 upright"))},
-            ),
-        ]
-    )
+    models = []
+    for name, kind in motion_kinds().items():
+        assert kind.section is not None, "kinds of motion of a vane"
+        fields = kind_field(name, kind.section.summary) | quantity_fields(kind.section.numbers)
+        profile = kind.section.profile
+        if profile is not None:
+            fields[profile.name] = (profile.layout(), Field(description=profile.summary))
+        models.append(table(f"{model_name(name)}Motion", fields))
+    return one_of(models)
 
 
-def _shank() -> Any:
+def shank_table() -> Any:
+    """Return the section of the shank of a leg."""
     gait = {"gait": (str, Field(min_length=1, description="name of a gait, or a path relative to this file"))}
     return one_of(
         [
@@ -130,55 +125,34 @@ def controller_table(kinds: Mapping[str, ControllerKind], suffix: str) -> Any:
     )
 
 
-def gas_model_table() -> Any:
-    """Return the section that says how the gas in the chambers behaves."""
-    warm = "the gas warms and cools: energy balance, heat through the walls"
-    return one_of(
-        [
-            table(
-                "IsothermalGas", kind_field(declaration.ISOTHERMAL, "the gas keeps its temperature, as in the paper")
-            ),
-            table("ThermalGas", kind_field(declaration.THERMAL, warm) | quantity_fields(declaration.THERMAL_GAS)),
-        ]
-    )
-
-
-def supply_line_table() -> Any:
-    """Return the section of the regulators and lines that feed the device."""
-    fields = {
+def file_model(name: str, own: dict[str, Any]) -> type[BaseModel]:
+    """Return the model of a file of a scenario: the sections that every one has, and the ones of its kind of motion."""
+    device = {
+        "set": (str, Field(min_length=1, description="name of a parameter set, or a path relative to this file")),
+        "valve": optional(str, "name of one of the set's valves; its default valve unless given"),
+        "overrides": (list[str], Field(default_factory=list, description="such as 'valve.area=12.6mm^2'")),
+    }
+    isothermal = kind_field(declaration.ISOTHERMAL, "the gas keeps its temperature, as in the paper")
+    thermal = kind_field(declaration.THERMAL, "the gas warms and cools: energy balance, heat through the walls")
+    gas = [
+        table("IsothermalGas", isothermal),
+        table("ThermalGas", thermal | quantity_fields(declaration.THERMAL_GAS)),
+    ]
+    lines = {
         line: optional(
             table(f"{model_name(line)}Line", quantity_fields(declaration.line_quantities(line))), f"{line} line"
         )
         for line in declaration.SUPPLY_LINES
     }
-    return table("SupplyLine", fields)
-
-
-def device_fields() -> dict[str, Any]:
-    """Return the fields of a device section."""
-    return {
-        "set": (str, Field(min_length=1, description="name of a parameter set, or a path relative to this file")),
-        "valve": optional(str, "name of one of the set's valves; its default valve unless given"),
-        "overrides": (list[str], Field(default_factory=list, description="such as 'valve.area=12.6mm^2'")),
-    }
-
-
-def _sensors() -> dict[str, Any]:
-    seed = Annotated[int, Field(ge=0, le=LARGEST_SEED)]
-    return quantity_fields(declaration.SENSORS) | {"seed": (seed, Field(1, description=declaration.SEED.summary))}
-
-
-def file_model(name: str, own: dict[str, Any]) -> type[BaseModel]:
-    """Return the model of a file of a scenario: the sections that every one has, and the ones of its kind of motion."""
     fields: dict[str, Any] = {
         "schema_version": (Literal[1], Field(description="version of this layout")),
         "name": (str, Field(pattern=NAME, max_length=_LONGEST_NAME)),
         "description": (str, Field("", description="what this file tries, and why")),
-        "device": (table("Device", device_fields()), Field(description="the hardware")),
+        "device": (table("Device", device), Field(description="the hardware")),
         **own,
-        "gas_model": optional(gas_model_table(), "how the gas in the chambers behaves; isothermal unless given"),
+        "gas_model": optional(one_of(gas), "how the gas in the chambers behaves; isothermal unless given"),
         declaration.SUPPLY_LINE: optional(
-            supply_line_table(), "regulators and lines of the gas; constant pressures unless given"
+            table("SupplyLine", lines), "regulators and lines of the gas; constant pressures unless given"
         ),
         "assumed": (
             dict[str, str],
@@ -193,7 +167,8 @@ def scenario_file() -> type[BaseModel]:
 
     A file that names no controller is compared with all of this package.
     """
-    return _scenario_file(tuple(CONTROLLERS.loaded_or_own().items()), tuple(PROFILES.loaded().items()))
+    controllers, profiles = CONTROLLERS.loaded_or_own(), PROFILES.loaded()
+    return _scenario_file(tuple(controllers.items()), tuple(profiles.items()), tuple(motion_kinds()))
 
 
 def whole_scenario_file() -> type[BaseModel]:
@@ -205,7 +180,9 @@ def whole_scenario_file() -> type[BaseModel]:
 @functools.lru_cache(maxsize=4)
 def _scenario_file(*_kinds: Any) -> type[BaseModel]:
     words = tuple(declaration.PRESSURE_WORDS)
-    reference = _profile(declaration.TORQUE_LEVEL, "Reference")
+    reference = profile_table(declaration.TORQUE_LEVEL, "Reference")
+    seed = Annotated[int, Field(ge=0, le=LARGEST_SEED)]
+    sensors = quantity_fields(declaration.SENSORS) | {"seed": (seed, Field(1, description=declaration.SEED.summary))}
     initial = table("Initial", quantity_fields(declaration.INITIAL, words))
     own: dict[str, Any] = {
         "run": (
@@ -221,7 +198,7 @@ def _scenario_file(*_kinds: Any) -> type[BaseModel]:
         "reference": optional(
             reference, "torque that the controller follows; only one that follows none, as constant, may leave it out"
         ),
-        "sensors": optional(table("Sensors", _sensors()), "sensors of the controller; ideal unless given"),
+        "sensors": optional(table("Sensors", sensors), "sensors of the controller; ideal unless given"),
     }
     return file_model("ScenarioFile", own)
 

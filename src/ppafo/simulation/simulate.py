@@ -1,6 +1,5 @@
 """One run: its result, how it comes about, and what it determines."""
 
-import math
 import platform
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -10,36 +9,13 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from ppafo.control.profiles import CONSTANT
 from ppafo.documents.json_text import plain
-from ppafo.engine.lane_source import SAME_MOMENT
 from ppafo.engine.lanes import BatchResult, Floats, load_program, load_programs
-from ppafo.engine.led_leg import GAIT_SHANK, shank_over_samples
-from ppafo.engine.over_samples import over_samples
-from ppafo.engine.program import place_over_samples
-from ppafo.engine.rows import leaf_paths, rebuilt
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, batch_of, run_together, state_row_numbers
-from ppafo.engine.scheme.actuators import pressures_of, torque_of, volumes_of
 from ppafo.errors import SimulationError
-from ppafo.model.gait import foot_in_gait
-from ppafo.model.gas import energy_per_content
-from ppafo.model.leg import torque_on_foot
-from ppafo.model.plant import gravity_torque, sliding_friction
-from ppafo.model.ports import friction_in_motion
-from ppafo.model.regulator import LineState, line_pressures
-from ppafo.parameters.device import Gas
-from ppafo.signals.recording import Channel, Recording
-from ppafo.simulation.accuracy import LARGEST_OF_ANGLE, LARGEST_OF_PRESSURE, MARGIN, ErrorEstimate, finer
-from ppafo.simulation.check import ALLOWED_CHANGE, FINER, MOVE, MOVED_MEASUREMENT, MOVED_START, Check, NumberCheck
-from ppafo.simulation.plan import foot_load, plan_run, profile_values, shank_kind
-from ppafo.simulation.scenario import (
-    FreeMotion,
-    Leg,
-    PrescribedMotion,
-    Scenario,
-    scenario_document,
-    worn_kind,
-)
+from ppafo.signals.recording import Recording
+from ppafo.simulation.plan import plan_run
+from ppafo.simulation.scenario import Scenario, scenario_document
 from ppafo.version import __version__
 
 if TYPE_CHECKING:
@@ -47,9 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ppafo.metrics.metric import Metric
-
-OPEN_LOOP = "constant"
-"""The controller that follows no reference: its recordings have none, so that no tracking error is made of it."""
+    from ppafo.simulation.check import Check, ErrorEstimate
 
 REMEDY = (
     "the step may be too long for this device, or a value unrealistic: try a smaller run.step, "
@@ -58,12 +32,6 @@ REMEDY = (
 
 _OF_STEPS = ("result.failure_time", "result.too_many_parts", "pace.", "valve_state.", "controller_state.")
 """Rows of the time stepping of which no recording of a vane is made."""
-
-DRAWS = 4
-"""Draws of what moves the measurements of sensors without noise."""
-ALLOWED_PARTING = 1.0e-2
-"""Largest difference of two runs over time that counts as none, as a fraction of the range."""
-_COURSES = {"angle over time": ("angle",), "pressures over time": ("pressure_1", "pressure_2")}
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,8 +48,8 @@ class Status:
         return self.kind == "completed"
 
 
-Measured = tuple[Recording, "Mapping[str, Metric]"]
-"""The channels of a run, and its metrics."""
+Measured = tuple[Recording, "Mapping[str, Metric]", str]
+"""The channels of a run, its metrics, and how it ended if it was completed, in words."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -105,7 +73,7 @@ class Result:
             raise AttributeError(f"a result has no '{name}'", name=name, obj=self)
         measure = self._measure
         if measure is not None:
-            recording, metrics = measure()
+            recording, metrics, _ = measure()
             # The class is frozen, and these two are only kept, so they are set past it.
             object.__setattr__(self, "recording", recording)
             object.__setattr__(self, "metrics", metrics)
@@ -137,43 +105,27 @@ class Result:
         valve = self.scenario.device.valve.kind
         return recording_figure(self.recording, self.scenario.name, remark, atmosphere, valve)
 
-    def error(self) -> ErrorEstimate:
+    def error(self) -> "ErrorEstimate":
         """Return the estimated error [SI] of this run from its steps: it runs again with a sixteenth of it.
 
         SimulationError for a run that diverged.
         """
         if not self.status.is_completed:
             raise SimulationError(f"{self.scenario.name}: the run diverged, so its error cannot be estimated")
-        return _error(self, results_of(self.scenario, [finer(plan_run(self.scenario))])[0])
+        from ppafo.simulation.check import estimated_error, finer
 
-    def check(self) -> Check:
+        return estimated_error(self, results_of(self.scenario, [finer(plan_run(self.scenario))])[0])
+
+    def check(self) -> "Check":
         """Return whether this run can be repeated: with finer steps, and with start and measurements moved.
 
         SimulationError for a run that diverged, and for a Python controller that gives a different run each time.
         """
-        scenario = self.scenario
         if not self.status.is_completed:
-            raise SimulationError(f"{scenario.name}: the run diverged, so there is nothing to check")
-        run = plan_run(scenario)
-        _check_repeatable(self, run)
-        # Highest less lowest pressure [Pa] that the chambers had or are connected to; the atmosphere's if there is one.
-        supply, recording = self.scenario.device.supply, self.recording
-        outside = [supply.pressure, supply.dorsiflexion_pressure, supply.atmospheric_pressure]
-        values = np.concatenate([recording["pressure_1"], recording["pressure_2"], outside])
-        pressures = float(np.ptp(values)) or supply.atmospheric_pressure
-        repeats = _repeats(run, pressures)
-        results = results_of(scenario, [repeat for _, repeat in repeats])
-        found = [(name, repeated) for (name, _), repeated in zip(repeats, results, strict=True)]
-        courses = tuple(_course(name, found, self, pressures) for name in _COURSES)
-        return Check(
-            scenario=scenario.name,
-            metrics=_metrics(self, found, pressures),
-            courses=courses,
-            error=_error(self, results[0]),
-            parts_at=_time_of_parting([repeated for _, repeated in found], self, courses),
-            failed=tuple(dict.fromkeys(name for name, repeated in found if not repeated.status.is_completed)),
-            atmosphere=scenario.device.supply.atmospheric_pressure,
-        )
+            raise SimulationError(f"{self.scenario.name}: the run diverged, so there is nothing to check")
+        from ppafo.simulation.check import checked
+
+        return checked(self, plan_run(self.scenario), partial(results_of, self.scenario))
 
     def to_dict(self) -> dict[str, Any]:
         """Return what ``run.json`` says of a result, beside what storage adds to it, as plain data in SI units."""
@@ -241,34 +193,28 @@ def result_of(scenario: Scenario, run: Run, outcome: BatchResult) -> Result:
     kept = times.size if status.time is None else max(1, int(np.searchsorted(times, status.time)))
     versions = {"ppafo": __version__, "python": platform.python_version(), "numpy": np.__version__}
     engine = {"step": run.step, "steps": run.step_count, "steps_per_sample": run.steps_per_sample}
-    worn = worn_kind(scenario)
-    if worn is not None:
-        from ppafo.metrics.metric import Metrics
-
-        recording, metrics, ended = worn.measured(scenario, run, times[:kept], _by_path(record[:kept], rows))
+    if scenario.walks:
+        # A walk is measured at once, for its status says how it ended.
+        recording, metrics, ended = _measured(scenario, run, times[:kept], record[:kept], rows)
         status = replace(status, message=ended) if status.is_completed else status
-        return Result(scenario, recording, Metrics(metrics), status, versions, engine)
+        return Result(scenario, recording, metrics, status, versions, engine)
     shown = {path: row for path, row in rows.items() if not path.startswith(_OF_STEPS)}
     # Without __init__ recording and metrics stay unset, so that __getattr__ makes them when first asked for.
     result: Result = object.__new__(Result)
     known = {"scenario": scenario, "status": status, "versions": versions, "engine": engine}
-    measure = partial(_measure, scenario, run, times[:kept], record[:kept], shown)
+    measure = partial(_measured, scenario, run, times[:kept], record[:kept], shown)
     for name, value in {**known, "_measure": measure}.items():
         object.__setattr__(result, name, value)
     return result
 
 
-def _by_path(record: Floats, rows: Mapping[str, int]) -> dict[str, Floats]:
-    """Rows (samples,) of a record (samples, rows), each in one piece."""
-    return {path: np.ascontiguousarray(record[:, row]) for path, row in rows.items()}
-
-
-def _measure(scenario: Scenario, run: Run, times: Floats, record: Floats, rows: Mapping[str, int]) -> Measured:
-    from ppafo.metrics import evaluate
+def _measured(scenario: Scenario, run: Run, times: Floats, record: Floats, rows: Mapping[str, int]) -> "Measured":
+    """Recording and metrics of a record (samples, rows), and how a completed run ended."""
     from ppafo.metrics.metric import Metrics
 
-    recording = _recording(scenario, run, times, _by_path(record, rows))
-    return recording, Metrics(evaluate(recording))
+    by_path = {path: np.ascontiguousarray(record[:, row]) for path, row in rows.items()}
+    recording, metrics, ended = scenario.motion.motion_kind.measured(scenario, run, times, by_path)
+    return recording, Metrics(metrics), ended
 
 
 def _status(outcome: BatchResult, record: Floats, rows: dict[str, int], times: Floats) -> Status:
@@ -288,295 +234,9 @@ def _status(outcome: BatchResult, record: Floats, rows: dict[str, int], times: F
     return Status("diverged", time, f"diverged at t = {time:.6g} s (before that: {state}); {remedy}")
 
 
-def _recording(scenario: Scenario, run: Run, times: Floats, rows: Mapping[str, Floats]) -> Recording:
-    angle, rate = rows["state.angle"], rows["state.angular_velocity"]
-    actuator = run.program.actuator
-    pressure_1, pressure_2 = pressures_of(actuator, run.plant, angle, rows["state.mass_1"], rows["state.mass_2"])
-    torque = np.asarray(torque_of(actuator, run.plant, angle, pressure_1, pressure_2))
-    channels = {
-        "angle": (angle, "rad"),
-        "angular_velocity": (rate, "rad/s"),
-        "pressure_1": (pressure_1, "Pa"),
-        "pressure_2": (pressure_2, "Pa"),
-        "torque": (torque, "N m"),
-        "command": (rows["result.command"], "-"),
-        "supplied_mass": (rows["state.supplied_mass"], "kg"),
-        "vented_mass": (rows["state.vented_mass"], "kg"),
-        "leaked_mass": (rows["state.leaked_mass"], "kg"),
-        "external_torque": (_external_torque(scenario, run, times, rows, torque), "N m"),
-        "mass_1": (rows["state.mass_1"], "kg"),
-        "mass_2": (rows["state.mass_2"], "kg"),
-    }
-    if scenario.controller.kind != OPEN_LOOP:
-        # Times of the first samples [s], shape (count,), rounded as the engine does, so that a reference has its bits.
-        steps = np.arange(times.size, dtype=np.float64) * run.record_every
-        whole = np.round(steps)
-        moments: Floats = np.where(np.abs(steps - whole) <= SAME_MOMENT, whole, steps) * run.step
-        channels["reference"] = (profile_values(scenario.reference, moments)[0], "N m")
-    channels |= gas_channels(scenario.device.gas, run, rows)
-    channels |= _leg_channels(run, times, angle)
-    values = {name: Channel(np.asarray(series), unit) for name, (series, unit) in channels.items()}
-    return Recording(scenario.name, times, values, kind="simulated")
-
-
-def _leg_channels(run: Run, times: Floats, angle: Floats) -> dict[str, tuple[Floats, str]]:
-    """Shank and foot of a leg whose shank moves; where a gait leads it, beside the foot that was measured."""
-    kind, leg = run.program.shank, run.leg
-    if kind is None or leg is None or kind is CONSTANT:
-        return {}
-    shank = np.broadcast_to(shank_over_samples(kind, leg.shank, times).angle, times.shape)
-    if kind is not GAIT_SHANK:
-        return {"shank_angle": (shank, "rad"), "foot_angle": (shank - angle + 0.5 * np.pi, "rad")}
-    foot = over_samples(foot_in_gait, leg.shank, times, angle)
-    return {
-        "shank_angle": (shank, "rad"),
-        "foot_angle": (foot.angle, "rad"),
-        "measured_foot_angle": (foot.measured_angle, "rad"),
-        "toe_difference": (foot.toe_difference, "m"),
-    }
-
-
-def gas_channels(gas: Gas, run: Run, rows: Mapping[str, Floats]) -> dict[str, tuple[Floats, str]]:
-    """Return what a run records of its gas beside pressures, in SI with the unit, from rows (samples,) by path.
-
-    Line pressures and the gas through the bottle's regulator where there are lines; true masses, temperatures and
-    energies where the gas has an energy balance.
-    """
-    found: dict[str, tuple[Floats, str]] = {}
-    if run.lines is not None:
-        lines = rebuilt(LineState, [rows[path] for path in leaf_paths(LineState, "line_state")])
-        line_1, line_2 = line_pressures(run.lines.parameters, run.plant.gas_product, lines)
-        found |= {"line_pressure_1": (np.asarray(line_1), "Pa"), "line_pressure_2": (np.asarray(line_2), "Pa")}
-        found["regulated_mass"] = (np.asarray(lines.regulated_mass), "kg")
-    if run.program.has_true_masses:
-        found |= {name: (rows[f"masses.{name}"], "kg") for name in ("mass_1", "mass_2")}
-    if not run.program.is_thermal:
-        return found
-    for chamber in (1, 2):
-        warmth = rows[f"state.mass_{chamber}"] / rows[f"masses.mass_{chamber}"]
-        found[f"temperature_{chamber}"] = (gas.temperature * warmth, "K")
-    per_content = energy_per_content(run.plant.gas_product, gas.heat_capacity_ratio)
-    found["gas_energy"] = (per_content * (rows["state.mass_1"] + rows["state.mass_2"]), "J")
-    for name, row in (("supplied_enthalpy", "supplied"), ("vented_enthalpy", "vented"), ("wall_heat", "heat")):
-        found[name] = (per_content * rows[f"masses.{row}_content"], "J")
-    found["gas_work"] = (rows["masses.gas_work"], "J")
-    return found
-
-
-def _external_torque(scenario: Scenario, run: Run, times: Floats, rows: Mapping[str, Floats], torque: Floats) -> Floats:
-    """T_ex of equation (1) [N m]: of a free vane its constant or what a leg gets, or what keeps one on its path."""
-    plant = run.plant
-    if isinstance(scenario.motion, FreeMotion) and scenario.motion.leg is not None:
-        return _torque_on_leg(scenario.motion.leg, run, times, rows, torque)
-    if not isinstance(scenario.motion, PrescribedMotion):
-        return np.full(times.size, plant.external_torque)
-    acceleration = profile_values(scenario.motion.profile, times)[2]
-    angle, rate = rows["state.angle"], rows["state.angular_velocity"]
-    friction = over_samples(sliding_friction, rate, 1.0) * _sizes_of_friction(run, rows)
-    gravity = gravity_torque(angle, plant.gravity_torque)
-    return np.asarray(torque - gravity - friction - plant.viscous_damping * rate - plant.inertia * acceleration)
-
-
-def _torque_on_leg(leg: Leg, run: Run, times: Floats, rows: Mapping[str, Floats], torque: Floats) -> Floats:
-    """T_ex [N m] by the second row of equation (11): what the foot needs beside T_2. A blow at a stop is not in it."""
-    assert run.leg is not None, "the run has the leg of its scenario"
-    angle, rate, plant = rows["state.angle"], rows["state.angular_velocity"], run.plant
-    foot = foot_load(0.0, 0.0, leg.foot_mass, leg.foot_mass_centre, leg.foot_inertia, leg.shank_length)
-    kind = shank_kind(leg)
-    now = shank_over_samples(kind, run.leg.shank, times)
-    added, needed = (over_samples(torque_on_foot, load, now, angle) for load in (run.leg.load, foot))
-    net = torque + added - plant.external_torque - plant.viscous_damping * rate
-    net -= np.sign(rate) * _sizes_of_friction(run, rows)
-    # A vane at rest is held by friction or a stop.
-    acceleration = np.where(rate != 0.0, net / plant.inertia, 0.0)
-    return np.asarray(foot.inertia * acceleration - needed + plant.external_torque)
-
-
-def _sizes_of_friction(run: Run, rows: Mapping[str, Floats]) -> Floats | float:
-    """Size of the friction torque in motion [N m] at each sample, with the effects of a run."""
-    law = place_over_samples(friction_in_motion, run.program.effects, run.effects)
-    if law is None:
-        return run.plant.dynamic_torque
-    angle, masses = rows["state.angle"], (rows["state.mass_1"], rows["state.mass_2"])
-    pressures = pressures_of(run.program.actuator, run.plant, angle, *masses)
-    states = {
-        name: rebuilt(row, [rows[path] for path in leaf_paths(row, name)])
-        for name, row in run.program.effect_states.items()
-    }
-    sizes: Floats = law(states, run.plant.dynamic_torque, rows["state.angular_velocity"], *pressures)
-    return sizes
-
-
 def compile_models(scenarios: Iterable[Scenario]) -> None:
     """Compile the models of scenarios into the cache, unless they are there; nothing is run."""
     programs = [plan_run(scenario).program for scenario in scenarios]
     load_programs(programs)
     for program in programs:
         load_program(program)
-
-
-def _error(result: Result, fine: Result) -> ErrorEstimate:
-    """The estimated error of a result, from the same run with finer steps; inf where that diverged."""
-    if not fine.status.is_completed:
-        return ErrorEstimate(math.inf, math.inf, dict.fromkeys(result.metrics, math.inf))
-    angle, pressure = (
-        MARGIN * float(np.max(_largest_differences(fine.recording, result.recording, names)))
-        for names in _COURSES.values()
-    )
-    changes = {name: abs(_difference(_value(fine, name), _value(result, name))) for name in result.metrics}
-    return ErrorEstimate(angle, pressure, {name: MARGIN * change for name, change in changes.items()})
-
-
-def _check_repeatable(result: Result, run: Run) -> None:
-    """Refuse a Python controller that gives a different run each time: every change would be its own."""
-    controller = result.scenario.controller.custom
-    if controller is None:
-        return
-    again = results_of(result.scenario, [run])[0].recording
-    if not all(np.array_equal(again[name], result.recording[name]) for name in again.names):
-        raise SimulationError(
-            f"{result.scenario.name}: {type(controller).__name__} gives a different run each time, so nothing can be "
-            f"checked; its reset() must forget everything, and its random numbers need a fixed seed"
-        )
-
-
-def _repeats(run: Run, pressures: float) -> list[tuple[str, Run]]:
-    """The runs to compare with, by what is changed in them; moved ones in both directions."""
-    starts = [_start_moved(run, move, apart) for apart in (1.0, -1.0) for move in (MOVE, -MOVE)]
-    repeats = [(FINER, finer(run)), *((MOVED_START, moved) for moved in starts)]
-    if run.program.ideal_sensors:
-        return repeats
-    return [*repeats, *((MOVED_MEASUREMENT, moved) for moved in _measurements_moved(run, pressures))]
-
-
-def _start_moved(run: Run, move: float, apart: float) -> Run:
-    """The run from a little more gas in both chambers, and where the vane is free from a little further on.
-
-    With ``apart`` -1 chamber 2 has a little less instead: a torque that is exactly the wanted one then is so no more.
-    """
-    plant, start = run.plant, run.initial
-    angle = start.angle
-    if run.program.angle is None:
-        shifted = angle + move * (plant.angle_max - plant.angle_min)
-        # A start beyond a stop is no state of the vane.
-        angle = min(max(shifted, plant.angle_min), plant.angle_max)
-    actuator = run.program.actuator
-    pressures = pressures_of(actuator, plant, start.angle, start.mass_1, start.mass_2)
-    before, after = (volumes_of(actuator, plant, at, *pressures) for at in (start.angle, angle))
-    # Mass in proportion to volume keeps the pressure, so that only the move itself changes it.
-    mass_1 = start.mass_1 * after[0] / before[0] * (1.0 + move)
-    mass_2 = start.mass_2 * after[1] / before[1] * (1.0 + apart * move)
-    return replace(run, initial=start._replace(angle=angle, mass_1=mass_1, mass_2=mass_2))
-
-
-def _measurements_moved(run: Run, pressures: float) -> list[Run]:
-    """Runs with a little more noise on each sensor, either way; several draws of it where they have none themselves.
-
-    One draw alone seldom crosses a step of a coarse sensor, which is what matters.
-    """
-    sensors, angles = run.sensors, run.plant.angle_max - run.plant.angle_min
-    draws = 1 if sensors.angle_noise or sensors.pressure_noise else DRAWS
-    return [
-        replace(
-            run,
-            sensors=sensors._replace(
-                angle_noise=sensors.angle_noise + move * angles,
-                pressure_noise=sensors.pressure_noise + move * pressures,
-                seed=sensors.seed + draw,
-            ),
-        )
-        for draw in range(draws)
-        for move in (MOVE, -MOVE)
-    ]
-
-
-def _metrics(result: Result, repeats: list[tuple[str, Result]], pressures: float) -> tuple[NumberCheck, ...]:
-    names = dict.fromkeys(name for one in (result, *(repeat for _, repeat in repeats)) for name in one.metrics)
-    rows = []
-    for name in names:
-        kind = next(one.metrics[name] for one in (result, *(r for _, r in repeats)) if name in one.metrics)
-        value = _value(result, name)
-        changes = _largest((repeat, _difference(_value(repeated, name), value)) for repeat, repeated in repeats)
-        scale = max(abs(value) if math.isfinite(value) else 0.0, _metric_range(result, name, kind.unit, pressures))
-        rows.append(NumberCheck(name, kind.unit, value, ALLOWED_CHANGE * scale, changes, ALLOWED_CHANGE * scale))
-    return tuple(rows)
-
-
-def _value(result: Result, name: str) -> float:
-    return result.metrics[name].value if name in result.metrics else math.nan
-
-
-def _difference(now: float, before: float) -> float:
-    """The change; inf where only one of both is a number."""
-    if math.isfinite(now) and math.isfinite(before):
-        return now - before
-    # Equal infinities and two values that are not known are no change.
-    return 0.0 if now == before or (math.isnan(now) and math.isnan(before)) else math.inf
-
-
-def _largest(changes: Iterable[tuple[str, float]]) -> dict[str, float]:
-    """The largest change of all directions, with its sign, by repeat."""
-    largest: dict[str, float] = {}
-    for name, change in changes:
-        largest[name] = max(largest.get(name, 0.0), change, key=abs)
-    return largest
-
-
-def _metric_range(result: Result, name: str, unit: str, pressures: float) -> float:
-    """Range of the quantity of a metric; 1 for a number of events, 0 for a unit that has none."""
-    scenario, recording = result.scenario, result.recording
-    actuator = scenario.device.actuator
-    angles, torques = actuator.angle_max - actuator.angle_min, abs(actuator.torque_constant) * pressures
-    ranges = {
-        "rad": angles,
-        "rad/s": float(np.max(np.abs(recording["angular_velocity"]))),
-        "Pa": pressures,
-        "N m": torques,
-        "J": torques * angles,
-        "kg": max(_value(result, "gas_supplied"), _largest_content(recording)),
-        "m": float(np.ptp(recording["toe_height"])) if "toe_height" in recording else 0.0,
-        "s": scenario.run.duration,
-        "-": 1.0,
-    }
-    if unit in ranges:
-        return ranges[unit]
-    # A ratio of work and gas is as open as both are; where one is next to nothing, so is what the ratio says.
-    parts = {"mechanical_work": ranges["J"], "gas_supplied": ranges["kg"]}
-    values = {part: abs(_value(result, part)) for part in parts}
-    if not all(value > ALLOWED_CHANGE * parts[part] for part, value in values.items()):
-        return math.inf
-    return abs(_value(result, name)) * max(parts[part] / value for part, value in values.items())
-
-
-def _largest_content(recording: Recording) -> float:
-    """Largest mass [kg] in both chambers; 0 in a walk, which does not record it and takes more than that."""
-    masses = [recording[name] for name in ("mass_1", "mass_2") if name in recording]
-    return float(np.max(sum(masses))) if masses else 0.0
-
-
-def _largest_differences(one: Recording, other: Recording, channels: Iterable[str]) -> Floats:
-    """Largest difference of some channels at each sample that both have."""
-    # A repeat that diverged is shorter.
-    count = min(len(one), len(other))
-    return np.asarray(np.max([np.abs(one[name][:count] - other[name][:count]) for name in channels], axis=0))
-
-
-def _course(name: str, repeats: list[tuple[str, Result]], result: Result, pressures: float) -> NumberCheck:
-    actuator = result.scenario.device.actuator
-    is_angle = name == "angle over time"
-    span, unit = (actuator.angle_max - actuator.angle_min, "rad") if is_angle else (pressures, "Pa")
-    changes = _largest(
-        (repeat, float(np.max(_largest_differences(repeated.recording, result.recording, _COURSES[name]))))
-        for repeat, repeated in repeats
-    )
-    allowed_error = (LARGEST_OF_ANGLE if is_angle else LARGEST_OF_PRESSURE) * span / MARGIN
-    return NumberCheck(name, unit, span, ALLOWED_PARTING * span, changes, allowed_error)
-
-
-def _time_of_parting(repeats: list[Result], result: Result, courses: tuple[NumberCheck, ...]) -> float | None:
-    times = [repeat.status.time for repeat in repeats if repeat.status.time is not None]
-    for course in courses:
-        for repeat in repeats:
-            beyond = _largest_differences(repeat.recording, result.recording, _COURSES[course.name]) > course.allowed
-            times += [float(result.recording.time[np.argmax(beyond)])] if beyond.any() else []
-    return min(times, default=None)

@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.simulation.scenario import LARGEST_SEED, Scenario, worn_kind
-from ppafo.simulation.simulate import OPEN_LOOP
+from ppafo.control.kind import OPEN_LOOP
+from ppafo.simulation.scenario import LARGEST_SEED, Scenario
 from ppafo.studies.distributions import Floats, WholeNumbersBetween
 from ppafo.studies.study import Drawn, Sample
 
@@ -163,8 +163,7 @@ def with_noise(
     closed = [item for item in scenarios if item.controller.kind != OPEN_LOOP]
     is_noisy = bool(closed) and any(path in _NOISE_LEVELS for path in paths)
     for item in closed:
-        worn, sensors = worn_kind(item), item.sensors
-        level = sensors.angle_noise + sensors.pressure_noise if worn is None else worn.noise(item)
+        level = item.motion.motion_kind.noise(item)
         is_noisy = is_noisy or bool(np.any(np.asarray(level) > 0.0))
     if NOISE in paths or not is_noisy:
         return drawn, scores

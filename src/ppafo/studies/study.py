@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
+from ppafo.control.kind import OPEN_LOOP
 from ppafo.engine.lane_samples import TRACED
 from ppafo.errors import StudyError, UnitError, first_twice, nearest_name, refused_as
 from ppafo.loading import reloaded, scenario_or_load
 from ppafo.metrics import METRICS
 from ppafo.simulation.ensemble.running import lacking, offered
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.simulate import OPEN_LOOP
 from ppafo.studies import declaration as declared
 from ppafo.studies.distributions import Distribution
 from ppafo.units import parse_quantity

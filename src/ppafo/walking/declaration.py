@@ -19,7 +19,6 @@ from ppafo.errors import KindError, ScenarioError, nearest_name, refused_as
 from ppafo.model.declaration import Quantity
 from ppafo.model.plant_faults import PLANT_FAULTS, SHUT_OFF, PlantFault
 from ppafo.simulation.declaration import (
-    MOTIONS,
     PERIOD,
     RATE,
     SENSORS,
@@ -30,7 +29,7 @@ from ppafo.simulation.declaration import (
     line_paths,
     value_at,
 )
-from ppafo.simulation.motion_kind import RENAMED_KEYS, WALK, WALKS, renamed_key
+from ppafo.simulation.motion_kind import MOTIONS, RENAMED_KEYS, VANE_MOTIONS, WALK, is_walk, renamed_key
 from ppafo.simulation.schema import (
     controller_table,
     file_model,
@@ -175,16 +174,16 @@ def find_kinds(document: Mapping[str, Any], file: str) -> None:
 
 def _check_motion(kind: object, place: str) -> None:
     """Raise ScenarioError for a motion that is not known, or of a vane alone; ``place`` begins the message."""
-    if kind in MOTIONS:
+    if kind in VANE_MOTIONS:
         raise ScenarioError(
             f"{place}: this is the file of a walk, and its motion is '{WALK}'; 'ppafo new scenario' writes the "
             "file of a vane alone"
         )
     with refused_as(ScenarioError, place, KindError):
-        is_known = not kind or str(kind) in WALKS
+        is_known = not kind or is_walk(str(kind))
     if not is_known:
         # The motions of a vane are named too: the file may be meant for one.
-        known = (*MOTIONS, *WALKS)
+        known = tuple(MOTIONS)
         raise ScenarioError(f"{place} is not known{nearest_name(str(kind), known)}; allowed: {', '.join(known)}")
 
 
@@ -301,6 +300,6 @@ def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a walk file."""
     WALKING_CONTROLLERS.load_all()
     CONTROLLERS.load_all()
-    WALKS.load_all()
-    walks = tuple((name, kind_of_walk(name)) for name in WALKS)
+    MOTIONS.load_all()
+    walks = tuple((name, kind_of_walk(name)) for name in MOTIONS if is_walk(name))
     return make_schema(_walk_file(tuple(walking_controllers().items()), walks), "ppafo walk")

@@ -7,7 +7,7 @@ from typing import Any
 from ppafo.errors import KindError
 from ppafo.model.declaration import Quantity
 from ppafo.simulation.declaration import kind_at
-from ppafo.simulation.motion_kind import WALK, WALKS
+from ppafo.simulation.motion_kind import MOTIONS, WALK
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,7 +49,7 @@ class WalkKind:
 
 def kind_of_walk(name: str) -> WalkKind:
     """Return what a kind of motion is as a walk; KindError where it is none."""
-    kind = WALKS.get(name or WALK)
+    kind = MOTIONS.get(name or WALK)
     if kind is None or not isinstance(kind.walk, WalkKind):
         raise KindError(f"motion '{name}' is no walk")
     return kind.walk

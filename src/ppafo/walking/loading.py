@@ -31,7 +31,7 @@ from ppafo.simulation.loading import (
     read_supply_line,
     scenario_of,
 )
-from ppafo.simulation.motion_kind import WALK, WALKS
+from ppafo.simulation.motion_kind import MOTIONS, WALK
 from ppafo.simulation.numbers import device_number_at
 from ppafo.simulation.overrides import OverriddenDocument, over_layer
 from ppafo.simulation.scenario import (
@@ -163,7 +163,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     if BOTTLE_NAME in instead:
         document.setdefault(BOTTLE, {})["name"] = instead[BOTTLE_NAME]
     reading = Reading(request.file, document, changed.paths)
-    kind = WALKS[kind_at(document, "motion") or WALK]
+    kind = MOTIONS[kind_at(document, "motion") or WALK]
     who: WalkKind = kind.walk
     hardware = read_hardware(reading, request, changed.device)
     device = read_device(reading, hardware)
@@ -186,7 +186,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     sensors = reading.section("sensors", WALK_SENSORS)
     faults = {sensor: _fault(reading, sensor) for sensor in FAULTY}
     motion = WalkMotion(
-        kind=kind,
+        motion_kind=kind,
         gait=walked,
         timing=timing_of(document),
         forces={name: sensors[name] for name in FORCES},

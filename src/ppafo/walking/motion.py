@@ -62,7 +62,7 @@ class WalkMotion:
     numbers of wearer, ``forces`` and ``faults``, may be arrays (runs,).
     """
 
-    kind: MotionKind = field(compare=False)
+    motion_kind: MotionKind = field(compare=False)
     gait: Gait
     wearer: Wearer
     timing: str
@@ -84,7 +84,7 @@ class WalkMotion:
     @property
     def who(self) -> WalkKind:
         """What this kind of walk differs in from others."""
-        found: WalkKind = self.kind.walk
+        found: WalkKind = self.motion_kind.walk
         return found
 
     @property
@@ -104,8 +104,9 @@ def check_led(scenario: Scenario, doing: str) -> None:
     """Raise ScenarioError for a body that walks by itself, where ``doing`` needs a gait that is prescribed."""
     motion = walk_of(scenario)
     if not motion.is_led:
+        kind = motion.motion_kind.name
         raise ScenarioError(
-            f"{scenario.name}: {doing} needs a prescribed gait, and motion.kind = '{motion.kind.name}' has none: "
+            f"{scenario.name}: {doing} needs a prescribed gait, and motion.kind = '{kind}' has none: "
             f"set it to '{WALK}' (simulate, walk, find, sweep, sensitivity and tune take both)"
         )
 

@@ -55,7 +55,7 @@ def plan_walk(scenario: Scenario) -> Run:
 
     ScenarioError where it cannot be.
     """
-    planned: tuple[Run, tuple[Problem, ...]] = walk_of(scenario).kind.plan(scenario)
+    planned: tuple[Run, tuple[Problem, ...]] = walk_of(scenario).motion_kind.plan(scenario)
     run, problems = planned
     for is_bad, line in problems:
         if is_bad:

@@ -18,7 +18,8 @@ from ppafo.model.leg import centrifugal_torques, gravity_torques, mass_matrix, p
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.motion_kind import REACT
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario
-from ppafo.simulation.simulate import Status, gas_channels
+from ppafo.simulation.simulate import Status
+from ppafo.simulation.vane_recording import gas_channels
 from ppafo.storage.opensim import opensim_recording, write_opensim
 from ppafo.walking.bottle import UNITS, SupplyCourse
 from ppafo.walking.channels import Channels, actuator_channels, controller_channels, valve_and_ground_channels

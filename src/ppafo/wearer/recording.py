@@ -22,7 +22,8 @@ from ppafo.metrics.wearer import METRICS as OF_WEARER
 from ppafo.signals import Channel, Recording
 from ppafo.signals.meter import WearerSample
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.simulate import Status, gas_channels
+from ppafo.simulation.simulate import Status
+from ppafo.simulation.vane_recording import gas_channels
 from ppafo.walking.bottle import SupplyCourse
 from ppafo.walking.channels import Channels, actuator_channels, controller_channels, valve_and_ground_channels
 from ppafo.walking.events import SAFE_ROW, safety_events

@@ -35,8 +35,8 @@ from ppafo.model.plant import (
 from ppafo.model.regulator import LineState, SupplyLines, line_pressures
 from ppafo.parameters import load_device
 from ppafo.parameters.plant import plant_parameters
-from ppafo.simulation.plan import initial_lines
 from ppafo.simulation.scenario import RegulatedLine, SupplyLine
+from ppafo.simulation.supply_lines import initial_lines
 from ppafo.walking import load_walk
 from ppafo.walking.motion import with_duration
 from ppafo.walking.planning import plan_walk

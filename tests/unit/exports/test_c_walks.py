@@ -24,7 +24,7 @@ from ppafo.exports.c_library import c_library, walk_library
 from ppafo.exports.c_library.files import Setting, c_identifier
 from ppafo.exports.c_library.walk_preparation import settings_of_walk
 from ppafo.loading import load_scenario
-from ppafo.simulation.scenario import Scenario, worn_kind
+from ppafo.simulation.scenario import Scenario
 from ppafo.walking import list_walks, load_walk
 from ppafo.walking.loading import FILE
 from ppafo.walking.motion import walk_of
@@ -268,9 +268,9 @@ def test_what_cannot_leave_is_refused_in_one_line(tmp_path: Path) -> None:
 def test_a_file_is_a_scenario_or_a_walk_by_its_sections(tmp_path: Path) -> None:
     file = tmp_path / "mine.toml"
     file.write_bytes(FILE.read("solenoid"))
-    assert worn_kind(load_scenario(file)) is not None
+    assert load_scenario(file).walks
     file.write_bytes((resources.files("ppafo") / "scenarios" / "step-response.toml").read_bytes())
-    assert worn_kind(load_scenario(file)) is None
+    assert not load_scenario(file).walks
 
 
 def test_a_setting_that_contradicts_another_is_refused_by_name_and_a_flaw_needs_other_functions(tmp_path: Path) -> None:

@@ -14,8 +14,7 @@ from ppafo.model.sensors import Measurement
 from ppafo.parameters.overrides import over
 from ppafo.report.display_units import metric_change
 from ppafo.running import simulate
-from ppafo.simulation.accuracy import ErrorEstimate
-from ppafo.simulation.check import FINER, MOVED_MEASUREMENT, MOVED_START, Check, NumberCheck
+from ppafo.simulation.check import FINER, MOVED_MEASUREMENT, MOVED_START, Check, ErrorEstimate, NumberCheck
 from ppafo.simulation.loading import list_scenarios, load_scenario
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Status

@@ -7,7 +7,7 @@ import pytest
 
 from ppafo.errors import ScenarioError
 from ppafo.loading import load_scenario
-from ppafo.simulation.motion_kind import WALKS
+from ppafo.simulation.motion_kind import MOTIONS
 from ppafo.walking import load_walk, walk
 
 OF_ANOTHER_PACKAGE = """
@@ -22,7 +22,7 @@ SLOW = replace(
 
 
 def test_each_kind_of_walk_has_the_name_by_which_it_is_found() -> None:
-    assert [(WALKS[name].name, WALKS[name].walk.name) for name in ("walk", "react")] == [
+    assert [(MOTIONS[name].name, MOTIONS[name].walk.name) for name in ("walk", "react")] == [
         ("walk", "walk"),
         ("react", "react"),
     ]

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ppafo.analyses.linearise.answer import ON_THE_EDGE, Delays, Edge, LinearModel, Variable, finding_of
+from ppafo.control.kind import OPEN_LOOP
 from ppafo.control.profiles import CONSTANT
 from ppafo.engine.continuous_time import mode_at_rest, torque_on_vane
 from ppafo.engine.lanes import Floats, run_batch
@@ -33,10 +34,10 @@ from ppafo.model.ports import at_valve, friction_at_rest
 from ppafo.model.valves.proportional import NO_SLEW_LIMIT
 from ppafo.report.finding import Finding
 from ppafo.simulation.loading import scenario_or_load
-from ppafo.simulation.plan import plan_run, profile_values
+from ppafo.simulation.plan import plan_run
+from ppafo.simulation.profiles import profile_values
 from ppafo.simulation.sampled import run_sampled
 from ppafo.simulation.scenario import FreeMotion, Scenario
-from ppafo.simulation.simulate import OPEN_LOOP
 from ppafo.translation.plant_rates import (
     gas_rates,
     thermal_gas_rates,

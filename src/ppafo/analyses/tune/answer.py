@@ -15,7 +15,6 @@ from ppafo.report.kind import TIME, Interval, Kind, of_metric
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.setting_names import label_of
 from ppafo.report.style import BLACK, BLUE, COLOURS, GREY, VERMILION
-from ppafo.simulation.scenario import worn_kind
 from ppafo.simulation.simulate import Result
 from ppafo.studies.distributions import fraction_text
 from ppafo.studies.draws import Limit
@@ -151,7 +150,7 @@ def finding_of(
     overrides = over(problem.overrides, problem.lines(after.gains), valve=problem.scenario.device.valve_name)
     said, file = verdict(problem, before, after), problem.scenario.origin.file or problem.scenario.name
     options = " ".join(f'--set "{line}"' for line in overrides)
-    verb = "simulate" if worn_kind(problem.scenario) is None else "walk"
+    verb = "simulate" if not problem.scenario.walks else "walk"
     told = _remarks(problem, after, starts, runs, reached)
     gains = []
     for item in problem.searched:

@@ -22,6 +22,7 @@ from ppafo.analyses.tune.answer import (
     finding_of,
 )
 from ppafo.analyses.tune.problem import Effort, Gains, Problem, Spread, load_tuning
+from ppafo.control.kind import OPEN_LOOP
 from ppafo.errors import StudyError
 from ppafo.metrics import METRICS
 from ppafo.parameters.device import VANE
@@ -29,9 +30,9 @@ from ppafo.progress import Report
 from ppafo.report.finding import Finding
 from ppafo.report.kind import Interval
 from ppafo.simulation.numbers import TIMES, absolute, with_numbers
-from ppafo.simulation.plan import profile_bounds
-from ppafo.simulation.scenario import Scenario, worn_kind
-from ppafo.simulation.simulate import OPEN_LOOP, simulate
+from ppafo.simulation.profiles import profile_bounds
+from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.simulate import simulate
 from ppafo.studies.distributions import Floats, noise_interval
 from ppafo.studies.draws import NOISE_DRAWS, with_new_noise
 from ppafo.studies.study import with_overrides
@@ -295,7 +296,7 @@ def _ceiling(problem: Problem, gains: Gains, draws: Mapping[str, Floats], runs: 
     base = scenario_with(problem, gains)
     given = {path: column for path, column in absolute(base, draws, problem.gauge).items() if path not in TIMES}
     scenario = with_numbers(base, given)
-    if scenario.controller.kind == OPEN_LOOP or worn_kind(scenario) is not None:
+    if scenario.controller.kind == OPEN_LOOP or scenario.walks:
         return Ceiling(0.0, ())
     lacking = np.broadcast_to(shortfall(scenario), runs.failed[:1].shape)
     spread, explained = problem.spread, []

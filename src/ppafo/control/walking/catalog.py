@@ -12,7 +12,7 @@ import functools
 import types
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.controllers import feedback, model_based, switching
@@ -26,7 +26,7 @@ from ppafo.control.walking.safety import SafetyState
 from ppafo.control.walking.timing import FRACTIONAL, THRESHOLDS, ThresholdClock, ThresholdRules, TimingKind
 from ppafo.errors import ScenarioError
 from ppafo.kinds import Kinds
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Number, quantities_of
 from ppafo.model.sensors import GaitMeasurement, Measurement
 
 
@@ -159,8 +159,10 @@ def walking_law(law: ControllerKind, name: str, summary: str, gains: tuple[tuple
 class ProportionalParameters(NamedTuple):
     """Gains on the torque error [1/(N m)] and its integral [1/(N m s)]."""
 
-    torque_gain: float
-    torque_integral_gain: float
+    torque_gain: Annotated[float, Number("1/(N m)", "opening per torque error", 1.3, 0.0, 1.0e3)]
+    torque_integral_gain: Annotated[
+        float, Number("1/(N m s)", "opening per integral of the torque error", 0.2, 0.0, 1.0e3)
+    ]
 
 
 class ProportionalState(NamedTuple):
@@ -194,10 +196,7 @@ PROPORTIONAL = ControllerKind(
     name="proportional",
     summary="Proportional and integral action on the torque error.",
     source="profile of four parameters as in J. Zhang et al., Science 356 (2017) 1280",
-    quantities=(
-        Quantity("torque_gain", "1/(N m)", "opening per torque error", 1.3, 0.0, 1.0e3),
-        Quantity("torque_integral_gain", "1/(N m s)", "opening per integral of the torque error", 0.2, 0.0, 1.0e3),
-    ),
+    quantities=quantities_of(ProportionalParameters),
     parameters=ProportionalParameters,
     initial=ProportionalState(0.0),
     update=proportional_update,

@@ -13,9 +13,8 @@ from typing import Annotated, NamedTuple
 
 from ppafo.control.walking.phases import PhaseRules, PhaseState
 from ppafo.control.walking.timing import (
-    ANCHOR_WEIGHT,
     CLOCK_START,
-    DELAY_QUANTITIES,
+    AnchorWeight,
     Delays,
     GaitClock,
     GaitTime,
@@ -23,7 +22,7 @@ from ppafo.control.walking.timing import (
     next_clock,
     place_in_stride,
 )
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Number, quantities_of
 from ppafo.model.sensors import GaitMeasurement
 
 KNOTS = 32
@@ -47,20 +46,24 @@ class EstimationRules(NamedTuple):
     it, which forces that rise and fall do, and the angle of the swing alone hardly does.
     """
 
-    learning_strides: float
-    relearning: float
-    angle_scale: float
-    force_scale: float
-    largest_misfit: float
-    clock_trust: float
-    estimate_weight: float
+    learning_strides: Annotated[
+        float, Number("1", "good strides in a row from which the stride is learnt", 3.0, 1.0, 100.0)
+    ]
+    relearning: Annotated[float, Number("1", "weight of a later stride in the learnt one", 0.1, 0.0, 1.0)]
+    angle_scale: Annotated[float, Number("rad", "a difference of the angle that counts as one", 0.1, 1.0e-3, 10.0)]
+    force_scale: Annotated[float, Number("N", "a difference of a force that counts as one", 150.0, 1.0, 1.0e5)]
+    largest_misfit: Annotated[
+        float, Number("1", "mean square misfit beyond which nothing is estimated", 1.0, 0.0, 1.0e3)
+    ]
+    clock_trust: Annotated[float, Number("1", "sum of squares that a shift by one knot costs", 4.0, 0.0, 1.0e6)]
+    estimate_weight: Annotated[float, Number("1", "how far an estimate moves the clock, 1 wholly", 0.5, 0.0, 1.0)]
 
 
 class EstimatedRules(NamedTuple):
     """The known delays, how far a detected event moves the clock while nothing is learnt [-], and the estimation."""
 
     delays: Delays
-    anchor_weight: float
+    anchor_weight: AnchorWeight
     estimation: EstimationRules
 
 
@@ -257,17 +260,7 @@ ESTIMATED = TimingKind(
     name="estimated",
     summary="State estimation: a window of angle and forces fitted to a learnt stride by least squares.",
     source="Li, Becker, Shorter, Bretl, Hsiao-Wecksler, IEEE/ASME Trans Mechatronics 16 (2011) 835",
-    quantities=(
-        *DELAY_QUANTITIES,
-        ANCHOR_WEIGHT,
-        Quantity("learning_strides", "1", "good strides in a row from which the stride is learnt", 3.0, 1.0, 100.0),
-        Quantity("relearning", "1", "weight of a later stride in the learnt one", 0.1, 0.0, 1.0),
-        Quantity("angle_scale", "rad", "a difference of the angle that counts as one", 0.1, 1.0e-3, 10.0),
-        Quantity("force_scale", "N", "a difference of a force that counts as one", 150.0, 1.0, 1.0e5),
-        Quantity("largest_misfit", "1", "mean square misfit beyond which nothing is estimated", 1.0, 0.0, 1.0e3),
-        Quantity("clock_trust", "1", "sum of squares that a shift by one knot costs", 4.0, 0.0, 1.0e6),
-        Quantity("estimate_weight", "1", "how far an estimate moves the clock, 1 wholly", 0.5, 0.0, 1.0),
-    ),
+    quantities=quantities_of(EstimatedRules),
     parameters=EstimatedRules,
     initial=START,
     follow=follow,

@@ -5,16 +5,17 @@ Mid-stance: both chambers vented, free motion. Push-off: the plantarflexion side
 the ground, so that its gas does not hold the foot down in the swing. The functional tasks of figure 1A of the paper.
 """
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from ppafo.control.kind import ControllerKind
 from ppafo.control.walking import phases, safety
 from ppafo.control.walking.assistance import timed_phase
-from ppafo.control.walking.fault_checks import SAFETY_QUANTITIES, SafetyRules
-from ppafo.control.walking.phases import PHASE_QUANTITIES, PhaseRules, PhaseState
+from ppafo.control.walking.fault_checks import SafetyRules
+from ppafo.control.walking.observer import NOMINAL_QUANTITIES
+from ppafo.control.walking.phases import PhaseRules, PhaseState
 from ppafo.control.walking.safety import SafetyState
 from ppafo.control.walking.timing import ThresholdClock, ThresholdRules
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Number, quantities_of
 from ppafo.model.helping import PUSH_OFF
 from ppafo.model.sensors import GaitMeasurement
 from ppafo.model.valves.kind import VENT
@@ -23,9 +24,13 @@ from ppafo.model.valves.kind import VENT
 class EventOnOffParameters(NamedTuple):
     """Angle of the lifted foot [rad], band about it [rad], end of push-off [turns], rules of phases, safety, timing."""
 
-    swing_angle: float
-    band: float
-    push_off_end: float
+    swing_angle: Annotated[float, Number("rad", "angle at which the foot is kept in the swing", 1.68, 0.5, 2.5)]
+    band: Annotated[
+        float, Number("rad", "the foot is lifted above the angle plus this, let go below it less this", 0.145, 0.0, 0.5)
+    ]
+    push_off_end: Annotated[
+        float, Number("1", "fraction of the stride time at which the push-off is over", 0.565, 0.1, 1.0)
+    ]
     phases: PhaseRules
     safety: SafetyRules
     timing: ThresholdRules
@@ -68,15 +73,7 @@ EVENT_ON_OFF = ControllerKind(
     name="event_on_off",
     summary="Event-based: dorsiflexion in swing and landing, free in mid-stance, plantarflexion in push-off.",
     source="the paper, figure 1A and section 'PPAFO Hardware': binary, event-based control",
-    quantities=(
-        Quantity("swing_angle", "rad", "angle at which the foot is kept in the swing", 1.68, 0.5, 2.5),
-        Quantity(
-            "band", "rad", "the foot is lifted above the angle plus this, let go below it less this", 0.145, 0.0, 0.5
-        ),
-        Quantity("push_off_end", "1", "fraction of the stride time at which the push-off is over", 0.565, 0.1, 1.0),
-        *PHASE_QUANTITIES,
-        *SAFETY_QUANTITIES,
-    ),
+    quantities=(*quantities_of(EventOnOffParameters), *NOMINAL_QUANTITIES),
     parameters=EventOnOffParameters,
     initial=EventOnOffState(phase=phases.START, clock=ThresholdClock(), safety=safety.START, lifting=0.0),
     update=update,

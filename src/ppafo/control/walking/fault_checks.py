@@ -7,7 +7,7 @@ the heel is detected, and goes on until the toes are, was on the ground long bef
 Flags are joined by ``&`` and ``|``: ``and`` and ``or`` are branches, which keep runs from running side by side.
 """
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from ppafo.control.walking.fault_flags import (
     ANGLE_RANGE,
@@ -24,81 +24,77 @@ from ppafo.control.walking.fault_flags import (
 )
 from ppafo.control.walking.observer import NOMINAL_QUANTITIES, NominalDevice, pressure_above
 from ppafo.control.walking.phases import PhaseState, lifts
-from ppafo.model.declaration import PRESSURE_LAG, VALVE_LAG, Quantity
+from ppafo.model.declaration import PRESSURE_LAG, VALVE_LAG, Number, quantities_of
 from ppafo.model.helping import LANDING, MID_STANCE, PUSH_OFF, SWING
 from ppafo.model.sensors import GaitMeasurement
 
 
 class SafetyRules(NamedTuple):
-    """What readings can be, and how long a contradiction may last; ``declaration.SAFETY_QUANTITIES`` says it of each.
+    """What readings can be, and how long a contradiction may last.
 
     Force [N], angles [rad], times in stride times (``longest_phase``, ``flat_from``, ``flat_to``, ``shortest_swing``)
     or [s], strides, and absolute pressures [Pa]. ``fill_time`` holds for a valve fully open; half open it takes twice
     as long. ``nominal`` is what the observer of the chambers believes of the device.
     """
 
-    lowest_force: float
-    largest_force: float
-    lowest_angle: float
-    highest_angle: float
-    longest_phase: float
-    frozen_time: float
-    most_toe_strides: float
-    flat_from: float
-    flat_to: float
-    lowest_pressure: float
-    highest_pressure: float
-    filled_pressure: float
-    fill_time: float
-    vent_time: float
-    shortest_swing: float
-    resume_strides: float
-    largest_drop: float
-    lowest_flat_angle: float
-    highest_flat_angle: float
-    follow_time: float
-    highest_toe_off_angle: float
+    lowest_force: Annotated[float, Number("N", "a force below this is not a valid reading", -40.0, -1.0e5, 0.0)]
+    largest_force: Annotated[float, Number("N", "a force above this is not a valid reading", 3.0e3, 100.0, 1.0e5)]
+    lowest_angle: Annotated[float, Number("rad", "an angle below this is not a valid reading", 0.3, -10.0, 10.0)]
+    highest_angle: Annotated[float, Number("rad", "an angle above this is not a valid reading", 2.4, -10.0, 10.0)]
+    longest_phase: Annotated[float, Number("1", "longest stance or swing, in stride times", 1.2, 0.3, 20.0)]
+    frozen_time: Annotated[
+        float, Number("s", "a loaded sensor whose reading does not change for longer is frozen", 0.24, 0.01, 5.0)
+    ]
+    most_toe_strides: Annotated[float, Number("1", "strides in a row that may be on the toes alone", 1.0, 0.0, 1.0e6)]
+    flat_from: Annotated[
+        float, Number("1", "from this fraction of a steady stride on, heel and toes are both loaded", 0.16, 0.05, 0.6)
+    ]
+    flat_to: Annotated[float, Number("1", "and until this fraction", 0.24, 0.05, 0.6)]
+    lowest_pressure: Annotated[
+        float, Number("Pa_a", "a chamber pressure below this is not a valid reading", 3.0e4, 0.0, 1.0e5)
+    ]
+    highest_pressure: Annotated[
+        float, Number("Pa_a", "a chamber pressure above this is not a valid reading", 2.0e6, 1.1e5, 1.0e8)
+    ]
+    filled_pressure: Annotated[
+        float, Number("Pa_a", "a filled chamber has a higher pressure, a vented one a lower", 1.25e5, 1.0e4, 1.0e8)
+    ]
+    fill_time: Annotated[
+        float, Number("s", "a chamber is filled when the open valve has fed it for this long", 0.05, 1.0e-3, 10.0)
+    ]
+    vent_time: Annotated[
+        float, Number("s", "both chambers are vented when the valve has vented them for this long", 0.25, 1.0e-3, 10.0)
+    ]
+    shortest_swing: Annotated[
+        float, Number("1", "shortest swing that is seen in a steady stride, fraction of it", 0.25, 0.0, 0.6)
+    ]
+    resume_strides: Annotated[float, Number("1", "good strides in a row after which a pause ends", 2.0, 1.0, 1.0e3)]
+    largest_drop: Annotated[float, Number("N", "no force as large as this is gone within a sample", 300.0, 10.0, 1.0e5)]
+    lowest_flat_angle: Annotated[
+        float, Number("rad", "no ankle has less while the foot must stand flat", 1.22, -10.0, 10.0)
+    ]
+    highest_flat_angle: Annotated[
+        float, Number("rad", "no ankle has more while the foot must stand flat", 1.92, -10.0, 10.0)
+    ]
+    follow_time: Annotated[
+        float,
+        Number(
+            "s",
+            "a pressure follows the valve within this, and the lags of valve and sensor",
+            8.0e-3,
+            0.0,
+            1.0,
+            follows=(VALVE_LAG, PRESSURE_LAG),
+        ),
+    ]
+    highest_toe_off_angle: Annotated[
+        float, Number("rad", "no ankle has more while its toes still carry", 2.06, -10.0, 10.0)
+    ]
     nominal: NominalDevice
 
 
-SAFETY_QUANTITIES = (
-    Quantity("lowest_force", "N", "a force below this is not a valid reading", -40.0, -1.0e5, 0.0),
-    Quantity("largest_force", "N", "a force above this is not a valid reading", 3.0e3, 100.0, 1.0e5),
-    Quantity("lowest_angle", "rad", "an angle below this is not a valid reading", 0.3, -10.0, 10.0),
-    Quantity("highest_angle", "rad", "an angle above this is not a valid reading", 2.4, -10.0, 10.0),
-    Quantity("longest_phase", "1", "longest stance or swing, in stride times", 1.2, 0.3, 20.0),
-    Quantity("frozen_time", "s", "a loaded sensor whose reading does not change for longer is frozen", 0.24, 0.01, 5.0),
-    Quantity("most_toe_strides", "1", "strides in a row that may be on the toes alone", 1.0, 0.0, 1.0e6),
-    Quantity(
-        "flat_from", "1", "from this fraction of a steady stride on, heel and toes are both loaded", 0.16, 0.05, 0.6
-    ),
-    Quantity("flat_to", "1", "and until this fraction", 0.24, 0.05, 0.6),
-    Quantity("lowest_pressure", "Pa_a", "a chamber pressure below this is not a valid reading", 3.0e4, 0.0, 1.0e5),
-    Quantity("highest_pressure", "Pa_a", "a chamber pressure above this is not a valid reading", 2.0e6, 1.1e5, 1.0e8),
-    Quantity(
-        "filled_pressure", "Pa_a", "a filled chamber has a higher pressure, a vented one a lower", 1.25e5, 1.0e4, 1.0e8
-    ),
-    Quantity("fill_time", "s", "a chamber is filled when the open valve has fed it for this long", 0.05, 1.0e-3, 10.0),
-    Quantity(
-        "vent_time", "s", "both chambers are vented when the valve has vented them for this long", 0.25, 1.0e-3, 10.0
-    ),
-    Quantity("shortest_swing", "1", "shortest swing that is seen in a steady stride, fraction of it", 0.25, 0.0, 0.6),
-    Quantity("resume_strides", "1", "good strides in a row after which a pause ends", 2.0, 1.0, 1.0e3),
-    Quantity("largest_drop", "N", "no force as large as this is gone within a sample", 300.0, 10.0, 1.0e5),
-    Quantity("lowest_flat_angle", "rad", "no ankle has less while the foot must stand flat", 1.22, -10.0, 10.0),
-    Quantity("highest_flat_angle", "rad", "no ankle has more while the foot must stand flat", 1.92, -10.0, 10.0),
-    Quantity(
-        "follow_time",
-        "s",
-        "a pressure follows the valve within this, and the lags of valve and sensor",
-        8.0e-3,
-        0.0,
-        1.0,
-        follows=(VALVE_LAG, PRESSURE_LAG),
-    ),
-    Quantity("highest_toe_off_angle", "rad", "no ankle has more while its toes still carry", 2.06, -10.0, 10.0),
-    *NOMINAL_QUANTITIES,
-)
+SAFETY_QUANTITIES = (*quantities_of(SafetyRules), *NOMINAL_QUANTITIES)
+"""What a walk says of the checks, and then of the device that the observer believes."""
 
 
 class LastReadings(NamedTuple):

@@ -28,7 +28,7 @@ from ppafo.control.walking.fault_checks import SafetyRules
 from ppafo.control.walking.phases import PhaseRules, PhaseState
 from ppafo.control.walking.safety import SafetyState
 from ppafo.control.walking.timing import ThresholdClock, ThresholdRules
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Number, quantities_of
 from ppafo.model.helping import PUSH_OFF
 from ppafo.model.sensors import GaitMeasurement
 
@@ -38,9 +38,11 @@ KNOTS = 16
 class LearningRules(NamedTuple):
     """Gain [1/(N m)], fraction of a knot that a stride forgets [-], lead [s]."""
 
-    learning_gain: float
-    forgetting: float
-    lead: float
+    learning_gain: Annotated[
+        float, Number("1/(N m)", "command learnt per mean torque error of a stride", 0.67, 0.0, 1.0e3)
+    ]
+    forgetting: Annotated[float, Number("1", "fraction of what was learnt that a stride forgets", 0.005, 0.0, 1.0)]
+    lead: Annotated[float, Number("s", "time by which the table is read ahead of where it was learnt", 0.02, 0.0, 0.2)]
 
 
 class LearntTable(NamedTuple):
@@ -211,9 +213,7 @@ KIND = ControllerKind(
     source=f"the paper, figure 1A (phases); {feedback.DAMPED_PROPORTIONAL.source}",
     quantities=(
         *with_defaults(feedback.GAIN_QUANTITIES, TUNED),
-        Quantity("learning_gain", "1/(N m)", "command learnt per mean torque error of a stride", 0.67, 0.0, 1.0e3),
-        Quantity("forgetting", "1", "fraction of what was learnt that a stride forgets", 0.005, 0.0, 1.0),
-        Quantity("lead", "s", "time by which the table is read ahead of where it was learnt", 0.02, 0.0, 0.2),
+        *quantities_of(LearningRules),
         *ASSISTING_QUANTITIES,
     ),
     parameters=EventDampedLearningParameters,

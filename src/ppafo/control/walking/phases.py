@@ -5,21 +5,23 @@ lasted (debounce). The time between two heel strikes is followed by a moving ave
 of it, once the heel is off the ground, and ends at the next heel contact: a standing wearer is not pushed.
 """
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Number, quantities_of
 from ppafo.model.helping import LANDING, MID_STANCE, PUSH_OFF, SWING
 
 
 class PhaseRules(NamedTuple):
     """Thresholds [N], debounce [s], first stride time [s], weight of a new stride [-], start of push-off [turns]."""
 
-    load_threshold: float
-    unload_threshold: float
-    debounce: float
-    first_stride_time: float
-    stride_weight: float
-    push_off_start: float
+    load_threshold: Annotated[float, Number("N", "a force sensor counts as loaded above this", 60.0, 1.0, 5.0e3)]
+    unload_threshold: Annotated[float, Number("N", "and as unloaded below this", 30.0, 0.0, 5.0e3)]
+    debounce: Annotated[float, Number("s", "a change of load counts when it has lasted this long", 0.01, 0.0, 0.2)]
+    first_stride_time: Annotated[float, Number("s", "stride time until one has been measured", 1.1, 0.3, 5.0)]
+    stride_weight: Annotated[float, Number("1", "weight of a new stride in the moving average", 0.3, 0.0, 1.0)]
+    push_off_start: Annotated[
+        float, Number("1", "fraction of the stride time at which push-off may begin", 0.4, 0.0, 1.0)
+    ]
 
 
 class Switch(NamedTuple):
@@ -120,11 +122,4 @@ def timed_phase_state(
     )
 
 
-PHASE_QUANTITIES = (
-    Quantity("load_threshold", "N", "a force sensor counts as loaded above this", 60.0, 1.0, 5.0e3),
-    Quantity("unload_threshold", "N", "and as unloaded below this", 30.0, 0.0, 5.0e3),
-    Quantity("debounce", "s", "a change of load counts when it has lasted this long", 0.01, 0.0, 0.2),
-    Quantity("first_stride_time", "s", "stride time until one has been measured", 1.1, 0.3, 5.0),
-    Quantity("stride_weight", "1", "weight of a new stride in the moving average", 0.3, 0.0, 1.0),
-    Quantity("push_off_start", "1", "fraction of the stride time at which push-off may begin", 0.4, 0.0, 1.0),
-)
+PHASE_QUANTITIES = quantities_of(PhaseRules)

@@ -14,10 +14,10 @@ are detected.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 from ppafo.control.walking.phases import PhaseRules, PhaseState
-from ppafo.model.declaration import FORCE_LAG, VALVE_DELAY, Quantity
+from ppafo.model.declaration import FORCE_LAG, VALVE_DELAY, Number, Quantity, quantities_of
 from ppafo.model.helping import LANDING, SWING
 from ppafo.model.sensors import GaitMeasurement
 
@@ -108,12 +108,31 @@ TOES_OFF = 3.0
 class Delays(NamedTuple):
     """How fast the force grows or fades at each event [N/s], and lags of force sensor and valve [s]."""
 
-    heel_loading_rate: float
-    toe_loading_rate: float
-    heel_unloading_rate: float
-    toe_unloading_rate: float
-    sensor_lag: float
-    valve_delay: float
+    heel_loading_rate: Annotated[
+        float, Number("N/s", "how fast the heel is loaded after its strike", 5.6e3, 100.0, 1.0e6)
+    ]
+    toe_loading_rate: Annotated[float, Number("N/s", "how fast the toes are loaded at contact", 4.0e4, 100.0, 1.0e6)]
+    heel_unloading_rate: Annotated[
+        float, Number("N/s", "how fast the load of the heel fades before it rises", 1.3e3, 100.0, 1.0e6)
+    ]
+    toe_unloading_rate: Annotated[
+        float, Number("N/s", "how fast the load of the toes fades before they rise", 7.0e3, 100.0, 1.0e6)
+    ]
+    sensor_lag: Annotated[
+        float,
+        Number(
+            "s",
+            "how late the force sensors follow; from their bandwidth unless given",
+            None,
+            0.0,
+            0.2,
+            follows=(FORCE_LAG,),
+        ),
+    ]
+    valve_delay: Annotated[
+        float,
+        Number("s", "how late the valve follows; its dead time unless given", None, 0.0, 0.2, follows=(VALVE_DELAY,)),
+    ]
 
 
 class Events(NamedTuple):
@@ -376,41 +395,16 @@ def place_in_stride(clock: GaitClock, lead: float, phase: PhaseState) -> GaitTim
     return GaitTime(time, 1.0 if (phase.phase == LANDING) | expected else 0.0)
 
 
-ANCHOR_WEIGHT = Quantity(
-    "anchor_weight", "1", "how far an event after the strike moves the clock, 1 wholly", 0.8, 0.0, 1.0
-)
-
-DELAY_QUANTITIES = (
-    Quantity("heel_loading_rate", "N/s", "how fast the heel is loaded after its strike", 5.6e3, 100.0, 1.0e6),
-    Quantity("toe_loading_rate", "N/s", "how fast the toes are loaded at contact", 4.0e4, 100.0, 1.0e6),
-    Quantity("heel_unloading_rate", "N/s", "how fast the load of the heel fades before it rises", 1.3e3, 100.0, 1.0e6),
-    Quantity("toe_unloading_rate", "N/s", "how fast the load of the toes fades before they rise", 7.0e3, 100.0, 1.0e6),
-    Quantity(
-        "sensor_lag",
-        "s",
-        "how late the force sensors follow; from their bandwidth unless given",
-        None,
-        0.0,
-        0.2,
-        follows=(FORCE_LAG,),
-    ),
-    Quantity(
-        "valve_delay",
-        "s",
-        "how late the valve follows; its dead time unless given",
-        None,
-        0.0,
-        0.2,
-        follows=(VALVE_DELAY,),
-    ),
-)
+AnchorWeight = Annotated[
+    float, Number("1", "how far an event after the strike moves the clock, 1 wholly", 0.8, 0.0, 1.0)
+]
 
 
 class FractionalRules(NamedTuple):
     """The known delays, and how far an event after the strike moves the clock [-]."""
 
     delays: Delays
-    anchor_weight: float
+    anchor_weight: AnchorWeight
 
 
 def follow_fraction(
@@ -435,10 +429,7 @@ FRACTIONAL = TimingKind(
     name="fractional",
     summary="Percent of gait: time since the heel strike over recent stride times, known delays taken off.",
     source="fractional timing, usual in the field; anchored anew at each detected event",
-    quantities=(
-        *DELAY_QUANTITIES,
-        ANCHOR_WEIGHT,
-    ),
+    quantities=quantities_of(FractionalRules),
     parameters=FractionalRules,
     initial=CLOCK_START,
     follow=follow_fraction,

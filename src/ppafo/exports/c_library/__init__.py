@@ -24,7 +24,7 @@ from ppafo.parameters.device import Device
 from ppafo.parameters.graph import Graph
 from ppafo.parameters.plant import effects_of
 from ppafo.simulation.plan import plan_run, step_counts
-from ppafo.simulation.scenario import Control, Scenario, Sensors, worn_kind
+from ppafo.simulation.scenario import Control, Scenario, Sensors
 
 if TYPE_CHECKING:
     from ppafo.simulation.scenario import Scenario
@@ -46,7 +46,7 @@ def c_library(item: Scenario) -> dict[str, bytes]:
 
 def library_of(item: Scenario) -> Library:
     """The library of a scenario or a walk."""
-    return scenario_library(item) if worn_kind(item) is None else walk_library(item)
+    return scenario_library(item) if not item.walks else walk_library(item)
 
 
 def scenario_library(scenario: Scenario) -> Library:

@@ -11,7 +11,8 @@ from ppafo.exports.c_library.files import Library, Surface, c_identifier, librar
 from ppafo.exports.c_library.program import ExportedProgram
 from ppafo.exports.c_library.walk_preparation import check_can_leave
 from ppafo.model.valves.kind import VENT
-from ppafo.simulation.plan import outside_torque, profile_parameters, step_counts
+from ppafo.simulation.plan import step_counts
+from ppafo.simulation.profiles import profile_parameters
 from ppafo.simulation.scenario import (
     Control,
     FreeMotion,
@@ -19,7 +20,6 @@ from ppafo.simulation.scenario import (
     ProfileChoice,
     Scenario,
     Sensors,
-    worn_kind,
 )
 from ppafo.walking.declaration import FORCES
 from ppafo.walking.motion import walk_of
@@ -92,7 +92,7 @@ def plant_of(item: Scenario) -> PlantAlone:
 
     For a walk it is the device on its walking leg, which takes the command alone.
     """
-    chosen = _prescribed_vane(item) if worn_kind(item) is None else _commanded_walk(item)
+    chosen = _prescribed_vane(item) if not item.walks else _commanded_walk(item)
     library, motion = library_of(chosen), chosen.motion
     command, unseen, highest = COMMAND, {"command", "reference"}, 1.0
     further: tuple[Input, ...] = ()
@@ -126,7 +126,7 @@ def plant_of(item: Scenario) -> PlantAlone:
         path = "motion.external_torque" if is_alone else "motion.ankle_torque"
         range_of = next(one.quantity for one in library.settings if one.path == path)
         limits = range_of.minimum, range_of.maximum
-        further = (Input("external_torque", "N m", words, outside_torque(motion), *limits),)
+        further = (Input("external_torque", "N m", words, motion.outside_torque, *limits),)
     else:
         said, command, highest = ON_LEG, WALKING_COMMAND, VENT
     unused = ("sensors.", "motion.profile.", "motion.external_torque", "motion.ankle_torque")

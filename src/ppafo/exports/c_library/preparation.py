@@ -31,10 +31,9 @@ from ppafo.parameters.device import Device, SonicOrifice
 from ppafo.parameters.graph import Graph, Term
 from ppafo.parameters.plant import SEEN_BY_EFFECTS, area_restriction, effects_of, plant_with, sonic_restriction
 from ppafo.simulation.clock import links_of_times, step_unless_given, step_with_output
-from ppafo.simulation.declaration import SUPPLY_LINE, SUPPLY_LINES, THERMAL, gas_settings, value_at
-from ppafo.simulation.motion import TOLERANCE
+from ppafo.simulation.declaration import LOCKED_ANGLE, SUPPLY_LINE, SUPPLY_LINES, THERMAL, gas_settings, value_at
+from ppafo.simulation.leg import foot_load, shank_kind, with_load
 from ppafo.simulation.numbers import (
-    LOCKED_ANGLE,
     TIMES,
     declared_numbers,
     links_that_hold,
@@ -44,18 +43,16 @@ from ppafo.simulation.numbers import (
     time_texts,
 )
 from ppafo.simulation.plan import (
-    foot_load,
     is_slow_locked,
-    lines_at_start,
     relative_tolerance,
-    shank_kind,
     state_at_start,
     state_with_volumes,
     step_counts,
     thermal_gas,
-    with_load,
 )
+from ppafo.simulation.profiles import TOLERANCE
 from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion, Scenario
+from ppafo.simulation.supply_lines import lines_at_start
 from ppafo.units import parse_quantity
 
 FLAWS = ("angle_noise", "pressure_noise", "angle_resolution", "pressure_resolution")

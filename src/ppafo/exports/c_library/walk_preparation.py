@@ -22,7 +22,7 @@ from ppafo.parameters.building import consistency
 from ppafo.parameters.graph import Follows, Graph, Term, holding
 from ppafo.simulation.declaration import RUN, SUPPLY_LINES
 from ppafo.simulation.numbers import device_numbers, number_at
-from ppafo.simulation.plan import profile_parameters
+from ppafo.simulation.profiles import profile_parameters
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.contradictions import PAIRS
 from ppafo.walking.course import flat_foot

@@ -97,11 +97,11 @@ from ppafo.parameters.graph import ATMOSPHERE_PATH, itself
 from ppafo.parameters.overrides import one_path, split_override
 from ppafo.parameters.parameter_set import SOURCE, atmospheric_pressure, entry_in_si
 from ppafo.report.display_units import display_unit, quantity_of_unit
-from ppafo.simulation.declaration import SEED, value_at
+from ppafo.simulation.declaration import LOCKED_ANGLE, SEED, value_at
 from ppafo.simulation.loading import set_name
-from ppafo.simulation.numbers import LOCKED_ANGLE, TIMES
+from ppafo.simulation.numbers import TIMES
 from ppafo.simulation.overrides import is_of_device
-from ppafo.simulation.scenario import Scenario, worn_kind
+from ppafo.simulation.scenario import Scenario
 from ppafo.translation.native import asked, complaint
 from ppafo.units import to_si
 from ppafo.version import __version__
@@ -141,7 +141,7 @@ def description_of(item: Scenario, library: Library) -> dict[str, Any]:
         "name": library.title,
         "title": library.description,
         "version": __version__,
-        "kind": "scenario" if worn_kind(item) is None else "walk",
+        "kind": "scenario" if not item.walks else "walk",
         "document": dict(item.origin.content),
         "overrides": list(item.origin.overrides),
         "settings": [

@@ -6,18 +6,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.control.kind import OPEN_LOOP
 from ppafo.engine.lane_samples import TRACED
 from ppafo.engine.lanes import Floats, load_programs
 from ppafo.engine.run import TOO_MANY_PARTS
 from ppafo.errors import ScenarioError, nearest_name
 from ppafo.metrics import METRICS
-from ppafo.metrics.metric import MetricKind
-from ppafo.simulation.accuracy import MARGIN, finer
+from ppafo.simulation.check import MARGIN, finer
 from ppafo.simulation.ensemble.planning import EnsemblePlan, plan_ensemble
-from ppafo.simulation.ensemble.running import REFERENCE, Outcome, Request, intervals, offered, samples_of
+from ppafo.simulation.ensemble.running import REFERENCE, Outcome, Request, intervals, offered
 from ppafo.simulation.numbers import check_columns
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.simulate import OPEN_LOOP, REMEDY
+from ppafo.simulation.simulate import REMEDY
 
 COMPLETED, DIVERGED, REFUSED = 0, 1, 2
 """How a run of an ensemble ended; refused is a combination of values that no run can have."""
@@ -69,7 +69,10 @@ def run_ensemble(
     What follows a number that varies moves with it, as it does in a file: a gauge pressure with the atmosphere, a
     pressure at the start with the supply which it names, the second regulator with the first.
     """
-    metrics = {name: _metric(base, name) for name in meters}
+    unknown = next((name for name in meters if name not in METRICS), None)
+    if unknown is not None:
+        raise ScenarioError(f"{base.name}: there is no metric '{unknown}'{_hint(unknown, offered(base))}")
+    metrics = {name: METRICS[name] for name in meters}
     for name in bands:
         _check_channel(base, name)
     interval = every or base.run.output_interval
@@ -120,14 +123,8 @@ def _times(plan: EnsemblePlan, every: float) -> Floats:
     """Times of the traces [s], to the end of the longest run; none where nothing is traced."""
     if every == 0.0 or not plan.batches:
         return np.empty(0)
-    longest = max(float((intervals(batch) * (samples_of(batch) - 1)).max()) for _, batch in plan.batches)
+    longest = max(float((intervals(batch) * (batch.clock.samples - 1)).max()) for _, batch in plan.batches)
     return np.arange(int(longest / every * (1.0 + 1.0e-9)) + 1, dtype=np.float64) * every
-
-
-def _metric(base: Scenario, name: str) -> MetricKind:
-    if name not in METRICS:
-        raise ScenarioError(f"{base.name}: there is no metric '{name}'{_hint(name, offered(base))}")
-    return METRICS[name]
 
 
 def _check_channel(base: Scenario, name: str) -> None:

@@ -1,7 +1,7 @@
 """From columns to runs that share one program and one clock; a run whose numbers contradict each other is refused."""
 
 import operator
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, final
 
@@ -13,28 +13,17 @@ from ppafo.engine.lanes import Batch, Floats
 from ppafo.engine.run import Members, Run, batches_of
 from ppafo.errors import ScenarioError
 from ppafo.model.columns import Problem, at
-from ppafo.model.declaration import Quantity, range_rule
+from ppafo.model.declaration import range_rule
 from ppafo.parameters.building import actuator_problem, beyond_pressures, consistency, growth_and_problem
 from ppafo.parameters.device import VANE
 from ppafo.parameters.plant import switches_of
-from ppafo.simulation.accuracy import unchanged
-from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, Clock
+from ppafo.simulation.check import unchanged
+from ppafo.simulation.clock import Clock
 from ppafo.simulation.declaration import limits, quantity_text
-from ppafo.simulation.motion import TOLERANCE, profile_problem
 from ppafo.simulation.motion_kind import MotionKind
-from ppafo.simulation.numbers import (
-    LOCKED_ANGLE,
-    TIMES,
-    Columns,
-    TimeTexts,
-    clock_of,
-    clock_with,
-    path_of_locked_angle,
-    time_texts,
-    varied_scenario,
-)
-from ppafo.simulation.plan import plan_runs, profile_bounds
-from ppafo.simulation.scenario import FreeMotion, ProfileChoice, Scenario, vane_motion, worn_kind
+from ppafo.simulation.numbers import TIMES, Columns, clock_of, varied_scenario
+from ppafo.simulation.plan import plan_runs
+from ppafo.simulation.scenario import Scenario
 
 _WHOLE = ("sensors.seed", "wearer.person")
 
@@ -87,15 +76,9 @@ def screen_columns(columns: Columns) -> Screen:
             screen.refuse(*_out_of_range(screen.columns, path))
     if screen.members.size:
         _read_clocks(screen)
-    for rule in rules_of(worn_kind(columns.base)):
+    for rule in rules_of(columns.base.motion.motion_kind):
         _keep(screen, rule)
     return screen
-
-
-def _within(values: Floats, quantity: Quantity) -> Any:
-    """Which values are finite and keep the limits of their declaration."""
-    above = values >= quantity.minimum if quantity.minimum_allowed else values > quantity.minimum
-    return np.isfinite(values) & above & (values <= quantity.maximum)
 
 
 def _out_of_range(columns: Columns, path: str) -> Problem:
@@ -110,43 +93,21 @@ def _out_of_range(columns: Columns, path: str) -> Problem:
             return f"{given}: must be a whole number"
         return f"{given}: {range_rule(quantity, limits(quantity, STANDARD_ATMOSPHERE))}"
 
-    is_good = _within(values, quantity)
+    above = values >= quantity.minimum if quantity.minimum_allowed else values > quantity.minimum
+    is_good = np.isfinite(values) & above & (values <= quantity.maximum)
     return ~(is_good & (values == np.floor(values)) if path in _WHOLE else is_good), line
 
 
 def _read_clocks(screen: Screen) -> None:
-    """Read the clock once for each combination of times; drop the runs of those that do not fit."""
+    """Read the clocks, and drop the runs whose times do not fit together."""
     times = {path: column for path, column in screen.columns.values.items() if path in TIMES}
     if not times:
         screen.clock = clock_of(screen.columns.base)
         return
     base = screen.columns.base
-    worn = worn_kind(base)
-    if worn is not None:
-        screen.clock, problems = worn.clock(base, times)
-        for is_bad, line in problems:
-            screen.refuse(is_bad, line)
-        return
-    given = time_texts(base)
-    rows, places = np.unique(np.stack(list(times.values()), axis=1), axis=0, return_inverse=True)
-    places = places.reshape(-1)
-    found = [_clock_or_reason(base.name, given, dict(zip(times, row, strict=True))) for row in rows.tolist()]
-    refused = np.array([isinstance(item, str) for item in found])[places]
-    table = np.array(
-        [
-            (np.nan,) * 4 if isinstance(item, str) else (item.duration, item.step, item.output_interval, item.period)
-            for item in found
-        ]
-    )
-    screen.clock = Clock(*table[places].T.copy())
-    screen.refuse(refused, lambda run: str(found[places[run]]))
-
-
-def _clock_or_reason(name: str, given: TimeTexts, times: Mapping[str, float]) -> Clock | str:
-    try:
-        return clock_with(name, given, times)
-    except ScenarioError as error:
-        return str(error)
+    screen.clock, problems = base.motion.motion_kind.clock(base, times)
+    for is_bad, line in problems:
+        screen.refuse(is_bad, line)
 
 
 def _clock_of(clock: Clock, kept: Any) -> Clock:
@@ -195,13 +156,13 @@ def _plan_batches(screen: Screen, places: Members, change: Callable[[Run], Run])
 
 def _of_one_program(scenario: Scenario, runs: int) -> list[Members]:
     """Places of the runs, those together that have the same effects and zeros in the same settings."""
-    worn = worn_kind(scenario)
-    own = scenario.sensors.flaws if worn is None else worn.switches(scenario)
+    own = scenario.motion.motion_kind.switches(scenario)
     settings: tuple[Any, ...] = (*scenario.device.valve.settings.values(), *own)
     varied_settings = [setting > 0.0 for setting in settings if isinstance(setting, np.ndarray)]
     varied_settings += [is_on for is_on in switches_of(scenario.device).values() if isinstance(is_on, np.ndarray)]
     if not varied_settings:
         return [np.arange(runs)]
+    # A bit for each setting: runs with the same bits have the same program.
     patterns: NDArray[np.int64] = np.zeros(runs, dtype=np.int64)
     for setting in varied_settings:
         patterns = 2 * patterns + setting
@@ -241,6 +202,7 @@ def _misshapen(scenario: Scenario) -> tuple[Problem, ...]:
         problem = actuator_problem(alone)
         return f"actuator: {problem}" if problem else ""
 
+    # A kind checks single numbers, so the runs are gone through one by one.
     found = [words(run) for run in range(varied[0].size)]
     return ((np.array([bool(line) for line in found]), lambda run: found[run]),)
 
@@ -254,54 +216,6 @@ def _beyond_the_table(scenario: Scenario) -> tuple[Problem, ...]:
 def _without_growth(scenario: Scenario) -> tuple[Problem, ...]:
     """An actuator that is no vane, whose chamber 1 does not grow with the angle."""
     return () if scenario.device.actuator.kind == VANE else (growth_and_problem(scenario.device)[1],)
-
-
-def _beyond_the_stops(scenario: Scenario) -> tuple[Problem, ...]:
-    """A vane that begins, is held or is to move beyond the stops."""
-    actuator, motion = scenario.device.actuator, vane_motion(scenario)
-    profile = ProfileChoice("constant", {"level": motion.angle}) if isinstance(motion, FreeMotion) else motion.profile
-    lowest, highest = profile_bounds(profile)
-    lower, upper = actuator.angle_min - TOLERANCE, actuator.angle_max + TOLERANCE
-    outside = np.atleast_1d(np.logical_or(lowest < lower, highest > upper))
-    if profile.kind == "constant":
-        level = profile.level
-
-        def angle_line(run: int) -> str:
-            low, high = (quantity_text(at(stop, run), "rad") for stop in (actuator.angle_min, actuator.angle_max))
-            path = path_of_locked_angle(scenario) or LOCKED_ANGLE
-            return f"{path} = {quantity_text(at(level, run), 'rad')}: must be between the stops, {low} to {high}"
-
-        return ((outside, angle_line),)
-    # The bounds hold for all time; a run that may leave them is checked at its own times.
-    found = {int(run): _stop_violation(scenario, profile, int(run)) for run in np.flatnonzero(outside)}
-    for run, problem in found.items():
-        outside[run] = bool(problem)
-    return ((outside, lambda run: found[run]),)
-
-
-def _stop_violation(scenario: Scenario, profile: ProfileChoice, run: int) -> str:
-    actuator = scenario.device.actuator
-    settings = {name: at(value, run) for name, value in profile.settings.items()}
-    stops = (at(actuator.angle_min, run), at(actuator.angle_max, run))
-    one = ProfileChoice(profile.kind, settings)
-    return profile_problem(scenario.device.name, stops, one, at(scenario.run.duration, run), at(scenario.run.step, run))
-
-
-def _too_late(scenario: Scenario) -> tuple[Problem, ...]:
-    """Sensors whose delay is longer than the run, or than can be stored."""
-    delay, step = scenario.sensors.delay, scenario.run.step
-
-    def long_line(run: int) -> str:
-        longest = quantity_text(MAXIMUM_STEPS_OF_DELAY * at(step, run), "s")
-        return f"sensors.delay = {at(delay, run):.9g} s: must be at most {longest}, {MAXIMUM_STEPS_OF_DELAY:.0e} steps"
-
-    return (
-        (
-            delay > scenario.run.duration,
-            lambda run: f"sensors.delay = {at(delay, run):.9g} s: must not be longer than run.duration",
-        ),
-        (delay / step > MAXIMUM_STEPS_OF_DELAY, long_line),
-    )
 
 
 def _number(scenario: Scenario, path: str) -> Floats | float:
@@ -325,7 +239,7 @@ def _second_regulator_above_the_first(scenario: Scenario) -> tuple[Problem, ...]
     return ((np.atleast_1d(supply.dorsiflexion_pressure > supply.pressure), line),)
 
 
-def rules_of(worn: MotionKind | None) -> tuple[Rule, ...]:
-    """The rules for a leg that wears the device, or for a vane alone."""
-    own: tuple[Rule, ...] = (_beyond_the_stops, _too_late) if worn is None else (worn.rules,)
-    return _inconsistent, _misshapen, _beyond_the_table, _without_growth, *own, _second_regulator_above_the_first
+def rules_of(kind: MotionKind) -> tuple[Rule, ...]:
+    """The rules for the scenarios of a kind of motion."""
+    of_device = _inconsistent, _misshapen, _beyond_the_table, _without_growth
+    return *of_device, kind.rules, _second_regulator_above_the_first

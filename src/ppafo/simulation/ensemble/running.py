@@ -12,7 +12,6 @@ from ppafo.engine.lane_samples import FELL
 from ppafo.engine.lane_samples import REQUEST as REQUEST_ROW
 from ppafo.engine.lane_source import SAME_MOMENT
 from ppafo.engine.lanes import Batch, BatchResult, Floats, add_meters, group_of, meters_of, run_blocks
-from ppafo.engine.led_leg import GAIT_SHANK
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, row_numbers
 from ppafo.engine.run import NEVER_FAILED, Members
@@ -23,8 +22,7 @@ from ppafo.metrics.metric import LED, LED_SHANK, REACTS, REQUEST, STEADY, WALK, 
 from ppafo.model.gas import energy_per_content
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState, TrueMasses
 from ppafo.simulation.sampled import run_in_turn
-from ppafo.simulation.scenario import FreeMotion, Scenario, worn_kind
-from ppafo.simulation.simulate import OPEN_LOOP
+from ppafo.simulation.scenario import Scenario
 
 REFERENCE = "reference"
 _WITH_ENERGY_BALANCE = frozenset({"temperature_1", "temperature_2", *ENERGIES})
@@ -131,6 +129,7 @@ class Outcome:
         """Return the programs that batches need, with their meters."""
         first = {batch.program: batch for batch in batches}
         alone = [Batch(item.program, item.clock, item.parameters[:, :1], item.states[:, :1]) for item in first.values()]
+        # Several are compiled side by side before the first batch runs; a single one as it is met.
         return [_meter_batch(batch, self.request).batch.program for batch in alone] if len(alone) > 1 else []
 
     def run(self, plain: Batch, members: Members, threads: int | None) -> None:
@@ -138,6 +137,7 @@ class Outcome:
         task = _meter_batch(plain, self.request)
         batch = task.batch
         states = np.empty_like(batch.states)
+        # A run that ends at its last sample has there the states with which it ends.
         ends = np.empty_like(states) if task.late_totals else states
         read_from_traces = {name: np.full(members.size, np.nan) for name, kind in task.metrics.items() if kind.traced}
 
@@ -206,6 +206,7 @@ class _MeteredBatch:
         if FELL not in program.traced:
             return np.ones((result.record.shape[0], result.record.shape[2]), dtype=np.bool_)
         stood: NDArray[np.bool_] = result.record[:, program.traced.index(FELL)] < 0.0
+        # The first sample stays in any case, as in the recording of a single run.
         stood[0] = True
         return stood
 
@@ -250,7 +251,7 @@ def has_channels(program: Program, kind: MetricKind) -> bool:
         STEADY: not program.takes_course,
         LED: not program.reacts,
         REACTS: program.reacts,
-        LED_SHANK: program.shank is GAIT_SHANK,
+        LED_SHANK: program.is_on_gait,
         REQUEST: REQUEST_ROW in row_numbers(program.state_rows()),
     }
     return (
@@ -262,16 +263,7 @@ def has_channels(program: Program, kind: MetricKind) -> bool:
 
 def lacking(scenario: Scenario, kind: MetricKind) -> str:
     """Why no run of a scenario has what a metric needs, an empty text where it has."""
-    worn = worn_kind(scenario)
-    if worn is not None:
-        return worn.lacks(scenario, kind)
-    if WALK in kind.needs:
-        return "it needs a walk"
-    motion = scenario.motion
-    if LED_SHANK in kind.needs and not (isinstance(motion, FreeMotion) and motion.leg is not None and motion.leg.gait):
-        return "it needs a leg whose shank follows a gait"
-    is_open = scenario.controller.kind == OPEN_LOOP
-    return "its controller follows no reference" if is_open and REFERENCE in kind.channels else ""
+    return scenario.motion.motion_kind.lacks(scenario, kind)
 
 
 def reacts(scenario: Scenario) -> bool:
@@ -301,9 +293,10 @@ def _meter_batch(plain: Batch, request: Request) -> _MeteredBatch:
     falls = {FELL} if program.reacts and (late or request.bands) else set[str]()
     traced = sorted({*read_from_traces, *request.bands, *late, *falls})
     every_sample = bool(read_from_traces or (late and (falls or request.bands)))
-    trace_every = 1 if every_sample else stride if request.bands else max(1, samples_of(plain) - 1)
+    # Totals alone need no more than the first sample and the last.
+    trace_every = 1 if every_sample else stride if request.bands else max(1, plain.clock.samples - 1)
     batch = add_meters(plain, [meter for _, meter in meters], traced, trace_every if traced else 0)
-    return _MeteredBatch(batch, available, interval, samples_of(plain), stride if every_sample else 1, late)
+    return _MeteredBatch(batch, available, interval, plain.clock.samples, stride if every_sample else 1, late)
 
 
 def _late_totals(plain: Batch, metrics: Mapping[str, MetricKind]) -> tuple[str, ...]:
@@ -326,14 +319,10 @@ def intervals(batch: Batch) -> Floats:
     return np.asarray(timing.step * batch.clock.record_every)
 
 
-def samples_of(batch: Batch) -> int:
-    """Number of samples of each run of a batch that is not metered yet, the first and the last among them."""
-    return batch.clock.samples
-
-
 def _stride(interval: Floats, request: Request) -> int:
     """Samples between two that are kept."""
     stride = max(1, round(request.every / float(interval[0])))
+    # Runs of one batch may have other steps, but traces are rows of one array.
     if np.abs(stride * interval - request.every).max() > _SAME * request.every:
         raise ScenarioError(
             f"traces every {request.every:.6g} s need an output interval that divides it in every run, not "

@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from ppafo.analyses.design.front.search import LARGEST_SEED, SearchTable
+from ppafo.control.kind import OPEN_LOOP
 from ppafo.documents.models import NAME, StrictTable, Text, Texts
 from ppafo.documents.toml_text import beside
 from ppafo.errors import StudyError, UnitError, first_twice, nearest_name, refused_as
@@ -26,7 +27,6 @@ from ppafo.signals.recording import Floats
 from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.numbers import TIMES, declared_numbers
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.simulate import OPEN_LOOP
 from ppafo.studies.draws import common_level
 from ppafo.studies.sampling import NOISE
 from ppafo.units import parse_quantity

@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from ppafo.control.catalog import CONTROLLERS
+from ppafo.control.kind import OPEN_LOOP
 from ppafo.control.profiles import KNOTS
 from ppafo.documents.models import NAME, StrictTable, Text, Texts
 from ppafo.documents.toml_text import beside
@@ -20,7 +21,6 @@ from ppafo.parameters.parts.catalogue import DEFAULT
 from ppafo.signals.recording import Floats
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.simulate import OPEN_LOOP
 from ppafo.storage.result_folder import read_recording
 from ppafo.units import parse_quantity, split_quantity
 

@@ -1,0 +1,102 @@
+"""What a vane alone brings to an ensemble: clocks of runs, numbers that contradict each other, metrics it has not."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ppafo.control.kind import OPEN_LOOP
+from ppafo.errors import ScenarioError
+from ppafo.metrics.metric import LED_SHANK, WALK, MetricKind
+from ppafo.model.columns import Problem, at
+from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, Clock
+from ppafo.simulation.declaration import LOCKED_ANGLE, quantity_text
+from ppafo.simulation.ensemble.running import REFERENCE
+from ppafo.simulation.numbers import clock_with, path_of_locked_angle, time_texts
+from ppafo.simulation.profiles import TOLERANCE, profile_bounds, profile_problem
+from ppafo.simulation.scenario import ProfileChoice, Scenario, vane_motion
+
+
+def rules(scenario: Scenario) -> tuple[Problem, ...]:
+    """Return what may be wrong with a scenario that represents many runs: the vane beyond a stop, a delay too long."""
+    return *_beyond_the_stops(scenario), *_too_late(scenario)
+
+
+def _beyond_the_stops(scenario: Scenario) -> tuple[Problem, ...]:
+    """A vane that begins, is held or is to move beyond the stops."""
+    actuator, motion = scenario.device.actuator, vane_motion(scenario)
+    profile = ProfileChoice("constant", {"level": motion.angle}) if motion.profile is None else motion.profile
+    lowest, highest = profile_bounds(profile)
+    lower, upper = actuator.angle_min - TOLERANCE, actuator.angle_max + TOLERANCE
+    outside = np.atleast_1d(np.logical_or(lowest < lower, highest > upper))
+    if profile.kind == "constant":
+        level = profile.level
+
+        def angle_line(run: int) -> str:
+            low, high = (quantity_text(at(stop, run), "rad") for stop in (actuator.angle_min, actuator.angle_max))
+            path = path_of_locked_angle(scenario) or LOCKED_ANGLE
+            return f"{path} = {quantity_text(at(level, run), 'rad')}: must be between the stops, {low} to {high}"
+
+        return ((outside, angle_line),)
+    # The bounds hold for all time; a run that may leave them is checked at its own times.
+    found = {int(run): _stop_violation(scenario, profile, int(run)) for run in np.flatnonzero(outside)}
+    for run, problem in found.items():
+        outside[run] = bool(problem)
+    return ((outside, lambda run: found[run]),)
+
+
+def _stop_violation(scenario: Scenario, profile: ProfileChoice, run: int) -> str:
+    actuator = scenario.device.actuator
+    settings = {name: at(value, run) for name, value in profile.settings.items()}
+    stops = (at(actuator.angle_min, run), at(actuator.angle_max, run))
+    one = ProfileChoice(profile.kind, settings)
+    return profile_problem(scenario.device.name, stops, one, at(scenario.run.duration, run), at(scenario.run.step, run))
+
+
+def _too_late(scenario: Scenario) -> tuple[Problem, ...]:
+    """Sensors whose delay is longer than the run, or than can be stored."""
+    delay, step = scenario.sensors.delay, scenario.run.step
+
+    def long_line(run: int) -> str:
+        longest = quantity_text(MAXIMUM_STEPS_OF_DELAY * at(step, run), "s")
+        return f"sensors.delay = {at(delay, run):.9g} s: must be at most {longest}, {MAXIMUM_STEPS_OF_DELAY:.0e} steps"
+
+    return (
+        (
+            delay > scenario.run.duration,
+            lambda run: f"sensors.delay = {at(delay, run):.9g} s: must not be longer than run.duration",
+        ),
+        (delay / step > MAXIMUM_STEPS_OF_DELAY, long_line),
+    )
+
+
+def clock(base: Scenario, times: Mapping[str, Any]) -> tuple[Clock, tuple[Problem, ...]]:
+    """Return the clock with columns of times [s] by path, and what does not fit together.
+
+    Times are read as those of a file are, once for each combination of them.
+    """
+    # Once for each combination: times are read as the texts of a file are, and an ensemble has few of them.
+    given = time_texts(base)
+    rows, places = np.unique(np.stack(list(times.values()), axis=1), axis=0, return_inverse=True)
+    places = places.reshape(-1)
+    reasons, table = [""] * len(rows), np.full((len(rows), 4), np.nan)
+    for number, row in enumerate(rows.tolist()):
+        try:
+            read = clock_with(base.name, given, dict(zip(times, row, strict=True)))
+        except ScenarioError as error:
+            reasons[number] = str(error)
+        else:
+            table[number] = read.duration, read.step, read.output_interval, read.period
+    refused = np.array([bool(reason) for reason in reasons])[places]
+    return Clock(*table[places].T.copy()), ((refused, lambda run: reasons[places[run]]),)
+
+
+def lacks(scenario: Scenario, kind: MetricKind) -> str:
+    """Return why no run of a vane has what a metric needs, an empty text where it has."""
+    if WALK in kind.needs:
+        return "it needs a walk"
+    leg = vane_motion(scenario).leg
+    if LED_SHANK in kind.needs and not (leg is not None and leg.gait):
+        return "it needs a leg whose shank follows a gait"
+    is_open = scenario.controller.kind == OPEN_LOOP
+    return "its controller follows no reference" if is_open and REFERENCE in kind.channels else ""

@@ -1,0 +1,121 @@
+"""A foot on a shank that is led, without ground: what it adds to the plan of a vane and to what a run records."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ppafo.constants import STANDARD_GRAVITY
+from ppafo.control.catalog import PROFILES
+from ppafo.control.kind import ProfileKind
+from ppafo.control.profiles import CONSTANT
+from ppafo.engine.lanes import Floats
+from ppafo.engine.led_leg import GAIT_SHANK, LedLeg, shank_over_samples
+from ppafo.engine.over_samples import over_samples
+from ppafo.engine.run import Run
+from ppafo.model.columns import Problem
+from ppafo.model.gait import foot_in_gait
+from ppafo.model.leg import FootLoad, torque_on_foot
+from ppafo.model.plant import PlantParameters
+from ppafo.simulation.plan import CarriedLeg, plan_vane
+from ppafo.simulation.profiles import profile_parameters
+from ppafo.simulation.scenario import Leg, Scenario, vane_motion
+from ppafo.simulation.vane_recording import Measured, friction_sizes, measured
+
+
+def plan_leg(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
+    """Return the run of a vane that moves the foot of a leg, and what may be wrong with it."""
+    leg = _leg_of(scenario)
+
+    def put_on(plant: PlantParameters) -> tuple[PlantParameters, LedLeg]:
+        foot = leg.foot_mass, leg.foot_mass_centre, leg.foot_inertia
+        load = foot_load(plant.inertia, plant.gravity_torque, *foot, leg.shank_length)
+        return with_load(plant, load), LedLeg(load, shank_parameters(leg))
+
+    return plan_vane(scenario, CarriedLeg(shank_kind(leg), put_on))
+
+
+def measured_leg(scenario: Scenario, run: Run, times: Floats, rows: Mapping[str, Floats]) -> Measured:
+    """Return recording and metrics of a vane that moves the foot of a leg."""
+
+    def external_torque(torque: Floats) -> Floats:
+        return _torque_on_leg(_leg_of(scenario), run, times, rows, torque)
+
+    return measured(scenario, run, times, rows, external_torque, _leg_channels(run, times, rows["state.angle"]))
+
+
+def _leg_of(scenario: Scenario) -> Leg:
+    leg: Leg | None = vane_motion(scenario).leg
+    assert leg is not None, "the motion has a leg"
+    return leg
+
+
+def shank_kind(leg: Leg) -> ProfileKind:
+    """What leads the shank of a leg."""
+    return PROFILES[leg.shank.kind] if leg.curves is None else GAIT_SHANK
+
+
+def shank_parameters(leg: Leg) -> Any:
+    """Parameters of what leads the shank of a leg; its settings may be arrays (runs,)."""
+    if leg.curves is None:
+        return profile_parameters(leg.shank)
+    return leg.curves._replace(start=leg.shank.start, toe_lever=leg.toe_lever)
+
+
+def foot_load(
+    inertia: float,
+    gravity_torque: float,
+    foot_mass: float,
+    foot_mass_centre: float,
+    foot_inertia: float,
+    shank_length: float,
+) -> FootLoad:
+    """What turns about the ankle of a leg: J and S of equation (11) with (1), docs/equations.md.
+
+    Inertia [kg m^2] and largest gravity torque [N m] of foot plate and vane, then the foot and the shank as in ``Leg``.
+    """
+    moment = foot_mass * foot_mass_centre
+    return FootLoad(
+        mass_moment=moment + gravity_torque / STANDARD_GRAVITY,
+        inertia=inertia + foot_inertia + moment * foot_mass_centre,
+        shank_length=shank_length,
+        gravity=STANDARD_GRAVITY,
+    )
+
+
+def with_load(plant: PlantParameters, load: FootLoad) -> PlantParameters:
+    """The plant with the inertia of all that turns; the weight of the foot plate is accounted for in the leg."""
+    return plant._replace(inertia=load.inertia, gravity_torque=0.0)
+
+
+def _leg_channels(run: Run, times: Floats, angle: Floats) -> dict[str, tuple[Floats, str]]:
+    """Shank and foot of a leg whose shank moves; where a gait leads it, beside the foot that was measured."""
+    kind, leg = run.program.shank, run.leg
+    # A shank at rest has one angle, which the scenario says.
+    if kind is None or leg is None or kind is CONSTANT:
+        return {}
+    shank = np.broadcast_to(shank_over_samples(kind, leg.shank, times).angle, times.shape)
+    if kind is not GAIT_SHANK:
+        return {"shank_angle": (shank, "rad"), "foot_angle": (shank - angle + 0.5 * np.pi, "rad")}
+    foot = over_samples(foot_in_gait, leg.shank, times, angle)
+    return {
+        "shank_angle": (shank, "rad"),
+        "foot_angle": (foot.angle, "rad"),
+        "measured_foot_angle": (foot.measured_angle, "rad"),
+        "toe_difference": (foot.toe_difference, "m"),
+    }
+
+
+def _torque_on_leg(leg: Leg, run: Run, times: Floats, rows: Mapping[str, Floats], torque: Floats) -> Floats:
+    """T_ex [N m] by the second row of equation (11): what the foot needs beside T_2. A blow at a stop is not in it."""
+    assert run.leg is not None, "the run has the leg of its scenario"
+    angle, rate, plant = rows["state.angle"], rows["state.angular_velocity"], run.plant
+    foot = foot_load(0.0, 0.0, leg.foot_mass, leg.foot_mass_centre, leg.foot_inertia, leg.shank_length)
+    kind = shank_kind(leg)
+    now = shank_over_samples(kind, run.leg.shank, times)
+    added, needed = (over_samples(torque_on_foot, load, now, angle) for load in (run.leg.load, foot))
+    net = torque + added - plant.external_torque - plant.viscous_damping * rate
+    net -= np.sign(rate) * friction_sizes(run, rows)
+    # A vane at rest is held by friction or a stop.
+    acceleration = np.where(rate != 0.0, net / plant.inertia, 0.0)
+    return np.asarray(foot.inertia * acceleration - needed + plant.external_torque)

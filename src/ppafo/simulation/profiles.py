@@ -1,0 +1,85 @@
+"""Functions of time of a scenario: read from its file, as the engine takes them, and their values and bounds."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from ppafo.control.catalog import PROFILES
+from ppafo.engine.over_samples import over_samples
+from ppafo.engine.rows import rebuilt
+from ppafo.model.columns import over_runs
+from ppafo.model.declaration import Quantity
+from ppafo.parameters.device import Device
+from ppafo.simulation.declaration import Reading, kind_at, profile_settings, quantity_text
+from ppafo.simulation.scenario import ProfileChoice
+
+MAXIMUM_CHECKED_TIMES = 20_000
+TOLERANCE = 1.0e-9
+"""How far beyond a stop an angle may be [rad]: rounding of a stop that is given in degrees."""
+
+
+def profile_parameters(choice: ProfileChoice) -> Any:
+    """The NamedTuple of a profile, nested ones filled in the order of its quantities; settings may be arrays."""
+    kind = PROFILES[choice.kind]
+    return rebuilt(kind.parameters, [choice.settings[item.name] for item in kind.quantities])
+
+
+def profile_values(choice: ProfileChoice, times: "np.ndarray[tuple[int], np.dtype[np.float64]]") -> np.ndarray:
+    """Value, rate and second derivative of a profile at times [s], shape (3, times)."""
+    found = np.empty((3, times.size))
+    for row, series in enumerate(over_samples(PROFILES[choice.kind].value, profile_parameters(choice), times)):
+        found[row] = series
+    return found
+
+
+def profile_bounds(choice: ProfileChoice) -> tuple[float, float]:
+    """Lowest and highest value of a profile, N m or rad as its levels; arrays (runs,) where its settings are."""
+    kind = PROFILES[choice.kind]
+    numbers = [choice.settings[item.name] for item in kind.quantities]
+    lowest, highest = over_runs(lambda *values: kind.bounds(rebuilt(kind.parameters, values)), *numbers)
+    return lowest, highest
+
+
+def read_profile(reading: Reading, section: str, prescribed: Quantity) -> ProfileChoice:
+    """Return a function of time with all its settings in SI."""
+    kind = kind_at(reading.document, section)
+    return ProfileChoice(kind, reading.section(section, profile_settings(kind, prescribed)))
+
+
+def profile_problem(
+    device: str, stops: tuple[float, float], profile: ProfileChoice, duration: float, step: float
+) -> str:
+    """Return where a profile leaves the stops [rad] of a device, named by ``device``; an empty text if nowhere."""
+    for time, angle in _angles(profile, duration, step):
+        if not stops[0] - TOLERANCE <= angle <= stops[1] + TOLERANCE:
+            return (
+                f"[motion.profile] leaves the stops of {device}, {range_text(stops)}: it is at "
+                f"{quantity_text(angle, 'rad')} at {time:.6g} s"
+            )
+    return ""
+
+
+def _angles(profile: ProfileChoice, duration: float, step: float) -> Iterator[tuple[float, float]]:
+    """Yield times and angles [rad]: those that the engine asks for, and the crests between them."""
+    kind = PROFILES[profile.kind]
+    parameters = rebuilt(kind.parameters, [profile.settings[item.name] for item in kind.quantities])
+    count = max(1, min(MAXIMUM_CHECKED_TIMES, round(duration / step)))
+    for number in range(count + 1):
+        time = duration * number / count
+        angle, rate, acceleration = kind.value(parameters, time)
+        yield time, angle
+        # Where a parabola through this time turns: a crest between two times must not escape the check.
+        away = -rate / acceleration if acceleration else 0.0
+        if 0.0 < away < min(duration / count, duration - time):
+            yield time + away, angle + 0.5 * rate * away
+
+
+def stops_of(device: Device) -> tuple[float, float]:
+    """Return both stops [rad] of a device, the lower one first."""
+    return device.actuator.angle_min, device.actuator.angle_max
+
+
+def range_text(stops: tuple[float, float]) -> str:
+    """Return the range between two stops [rad] for a message."""
+    return f"{quantity_text(stops[0], 'rad')} to {quantity_text(stops[1], 'rad')}"

@@ -1,0 +1,134 @@
+"""Recording and metrics of a run of a vane alone, from its rows: most runs of many are never looked at."""
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from ppafo.control.kind import OPEN_LOOP
+from ppafo.engine.lane_source import SAME_MOMENT
+from ppafo.engine.lanes import Floats
+from ppafo.engine.over_samples import over_samples
+from ppafo.engine.program import place_over_samples
+from ppafo.engine.rows import leaf_paths, rebuilt
+from ppafo.engine.run import Run
+from ppafo.engine.scheme.actuators import pressures_of, torque_of
+from ppafo.metrics import evaluate
+from ppafo.metrics.metric import Metric
+from ppafo.model.gas import energy_per_content
+from ppafo.model.plant import gravity_torque, sliding_friction
+from ppafo.model.ports import friction_in_motion
+from ppafo.model.regulator import LineState, line_pressures
+from ppafo.parameters.device import Gas
+from ppafo.signals.recording import Channel, Recording
+from ppafo.simulation.profiles import profile_values
+from ppafo.simulation.scenario import Scenario, vane_motion
+
+Measured = tuple[Recording, Mapping[str, Metric], str]
+"""Recording and metrics, and how a completed run ended, in words."""
+
+
+def measured_free(scenario: Scenario, run: Run, times: Floats, rows: Mapping[str, Floats]) -> Measured:
+    """Return recording and metrics of a free vane, whose T_ex of equation (1) is constant."""
+    external = np.full(times.size, run.plant.external_torque)
+    return measured(scenario, run, times, rows, lambda _: external)
+
+
+def measured_prescribed(scenario: Scenario, run: Run, times: Floats, rows: Mapping[str, Floats]) -> Measured:
+    """Return recording and metrics of a vane whose T_ex of equation (1) is what keeps it on its path."""
+    path, plant = vane_motion(scenario).profile, run.plant
+    assert path is not None, "the angle is prescribed"
+
+    def external_torque(torque: Floats) -> Floats:
+        acceleration = profile_values(path, times)[2]
+        angle, rate = rows["state.angle"], rows["state.angular_velocity"]
+        friction = over_samples(sliding_friction, rate, 1.0) * friction_sizes(run, rows)
+        gravity = gravity_torque(angle, plant.gravity_torque)
+        return np.asarray(torque - gravity - friction - plant.viscous_damping * rate - plant.inertia * acceleration)
+
+    return measured(scenario, run, times, rows, external_torque)
+
+
+def measured(
+    scenario: Scenario,
+    run: Run,
+    times: Floats,
+    rows: Mapping[str, Floats],
+    external_torque: Callable[[Floats], Floats],
+    of_leg: Mapping[str, tuple[Floats, str]] | None = None,
+) -> Measured:
+    """Return recording and metrics of rows (samples,) by path, at times [s].
+
+    ``external_torque`` makes T_ex of equation (1) [N m] of the torque of the actuator [N m]; ``of_leg`` are channels of
+    a leg.
+    """
+    angle, rate = rows["state.angle"], rows["state.angular_velocity"]
+    actuator = run.program.actuator
+    pressure_1, pressure_2 = pressures_of(actuator, run.plant, angle, rows["state.mass_1"], rows["state.mass_2"])
+    torque = np.asarray(torque_of(actuator, run.plant, angle, pressure_1, pressure_2))
+    channels = {
+        "angle": (angle, "rad"),
+        "angular_velocity": (rate, "rad/s"),
+        "pressure_1": (pressure_1, "Pa"),
+        "pressure_2": (pressure_2, "Pa"),
+        "torque": (torque, "N m"),
+        "command": (rows["result.command"], "-"),
+        "supplied_mass": (rows["state.supplied_mass"], "kg"),
+        "vented_mass": (rows["state.vented_mass"], "kg"),
+        "leaked_mass": (rows["state.leaked_mass"], "kg"),
+        "external_torque": (external_torque(torque), "N m"),
+        "mass_1": (rows["state.mass_1"], "kg"),
+        "mass_2": (rows["state.mass_2"], "kg"),
+    }
+    if scenario.controller.kind != OPEN_LOOP:
+        # Times of the first samples [s], shape (count,), rounded as the engine does, so that a reference has its bits.
+        steps = np.arange(times.size, dtype=np.float64) * run.record_every
+        whole = np.round(steps)
+        moments: Floats = np.where(np.abs(steps - whole) <= SAME_MOMENT, whole, steps) * run.step
+        channels["reference"] = (profile_values(scenario.reference, moments)[0], "N m")
+    channels |= gas_channels(scenario.device.gas, run, rows)
+    channels |= of_leg or {}
+    values = {name: Channel(np.asarray(series), unit) for name, (series, unit) in channels.items()}
+    recording = Recording(scenario.name, times, values, kind="simulated")
+    return recording, evaluate(recording), "completed"
+
+
+def gas_channels(gas: Gas, run: Run, rows: Mapping[str, Floats]) -> dict[str, tuple[Floats, str]]:
+    """Return what a run records of its gas beside pressures, in SI with the unit, from rows (samples,) by path.
+
+    Line pressures and the gas through the bottle's regulator where there are lines; true masses, temperatures and
+    energies where the gas has an energy balance.
+    """
+    found: dict[str, tuple[Floats, str]] = {}
+    if run.lines is not None:
+        lines = rebuilt(LineState, [rows[path] for path in leaf_paths(LineState, "line_state")])
+        line_1, line_2 = line_pressures(run.lines.parameters, run.plant.gas_product, lines)
+        found |= {"line_pressure_1": (np.asarray(line_1), "Pa"), "line_pressure_2": (np.asarray(line_2), "Pa")}
+        found["regulated_mass"] = (np.asarray(lines.regulated_mass), "kg")
+    if run.program.has_true_masses:
+        found |= {name: (rows[f"masses.{name}"], "kg") for name in ("mass_1", "mass_2")}
+    if not run.program.is_thermal:
+        return found
+    for chamber in (1, 2):
+        warmth = rows[f"state.mass_{chamber}"] / rows[f"masses.mass_{chamber}"]
+        found[f"temperature_{chamber}"] = (gas.temperature * warmth, "K")
+    per_content = energy_per_content(run.plant.gas_product, gas.heat_capacity_ratio)
+    found["gas_energy"] = (per_content * (rows["state.mass_1"] + rows["state.mass_2"]), "J")
+    for name, row in (("supplied_enthalpy", "supplied"), ("vented_enthalpy", "vented"), ("wall_heat", "heat")):
+        found[name] = (per_content * rows[f"masses.{row}_content"], "J")
+    found["gas_work"] = (rows["masses.gas_work"], "J")
+    return found
+
+
+def friction_sizes(run: Run, rows: Mapping[str, Floats]) -> Floats | float:
+    """Size of the friction torque in motion [N m] at each sample, with the effects of a run."""
+    law = place_over_samples(friction_in_motion, run.program.effects, run.effects)
+    if law is None:
+        return run.plant.dynamic_torque
+    angle, masses = rows["state.angle"], (rows["state.mass_1"], rows["state.mass_2"])
+    pressures = pressures_of(run.program.actuator, run.plant, angle, *masses)
+    states = {
+        name: rebuilt(row, [rows[path] for path in leaf_paths(row, name)])
+        for name, row in run.program.effect_states.items()
+    }
+    sizes: Floats = law(states, run.plant.dynamic_torque, rows["state.angular_velocity"], *pressures)
+    return sizes
