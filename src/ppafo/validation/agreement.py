@@ -35,8 +35,12 @@ from ppafo.validation.replay import Motion, Replay, Replayed, initial_in_fixed_v
 DEFAULT_LIMIT = 0.02
 """Largest delay [s] that is looked for; sensors, filters and valves are late by less, and a model by more is wrong."""
 
-LEAST_NOISE = 5.0e-4
-"""Noise of samples over the full range that is taken at least: the engine keeps to twice that."""
+ENGINE_ERROR, LEAST_NOISE = 3.0e-5, 1.0e-4
+"""Over the full range: what the engine is off (tests/convergence), and the noise of samples that is taken at least."""
+_ROUNDING = 1.0e-9
+"""Fraction of a range [-] that is no step of a converter but how a file rounds."""
+_UNMOVED = 1.0e-3
+"""Error over the full range that is accepted of a signal that does not move: the zero of its sensor."""
 _WITHIN_NOISE = 1.5
 """Size of white noise over its estimate up to which it may be noise."""
 _SHIFTS = 81
@@ -224,7 +228,7 @@ def channel_agreement(item: Comparison, delay: float) -> ChannelAgreement:
     weights = sample_weights(curve.times)
     error = errors(curve, delay)
     worst = int(np.argmax(np.abs(error)))
-    noise = max(noise_of(curve.values), LEAST_NOISE * curve.full_range)
+    noise = noise_in(curve.values, curve.full_range)
     variation = variation_of(curve.values, weights, noise)
     usual = acceptable_error(variation, noise, curve.full_range) / curve.full_range
     return ChannelAgreement(
@@ -242,6 +246,13 @@ def channel_agreement(item: Comparison, delay: float) -> ChannelAgreement:
     )
 
 
+def noise_in(values: Floats, full_range: float) -> float:
+    """Return the noise of samples [their unit], with what a converter rounds: its resolution / sqrt(12)."""
+    steps = np.diff(np.unique(values))
+    resolution = float(np.min(steps, where=steps > _ROUNDING * steps.sum(), initial=full_range)) if steps.size else 0.0
+    return max(math.hypot(noise_of(values), resolution / math.sqrt(12.0)), LEAST_NOISE * full_range)
+
+
 def variation_of(values: Floats, weights: Floats, noise: float) -> float:
     """Return the standard deviation of a signal about its mean [its unit], its white noise taken out."""
     away = values - weights @ values
@@ -249,12 +260,9 @@ def variation_of(values: Floats, weights: Floats, noise: float) -> float:
 
 
 def acceptable_error(variation: float, noise: float, full_range: float) -> float:
-    """Return the largest RMS error [its unit] that passes: 10 % of full range or half of the variance, and noise.
-
-    What a zero of a sensor and the engine are off at most is accepted of a signal that does not move.
-    """
+    """Return the largest RMS error [its unit] that passes: 10 % of full range or half of the variance, and noise."""
     explained = min(ACCEPTABLE_FRACTION * full_range, math.sqrt(1.0 - EXPLAINED_FRACTION) * variation)
-    return math.hypot(max(explained, 2.0 * LEAST_NOISE * full_range), _WITHIN_NOISE * noise)
+    return math.hypot(max(explained, _UNMOVED * full_range), _WITHIN_NOISE * noise)
 
 
 def common_delay(items: Sequence[Comparison], longest_delay: float) -> Delay:

@@ -59,10 +59,14 @@ class Validation:
 
     @property
     def passes(self) -> bool:
-        """True where every error is within its limit and, without limits given, no cause is found that no bench has."""
-        within = all(recording.passes for recording in self.recordings)
-        found = self.causes.found
-        return within and (self.has_limits or found is None or found.is_usual)
+        """True where every error is within its limit and, without limits given, nothing but what any bench has is left.
+
+        What no single cause explains is a disagreement as one that a cause explains is; of a recorded angle that is
+        followed causes are not searched.
+        """
+        causes = self.causes
+        is_usual = causes.is_noise or (causes.tried == 0 if causes.found is None else causes.found.is_usual)
+        return (self.has_limits or is_usual) and all(recording.passes for recording in self.recordings)
 
     def json_document(self) -> dict[str, Any]:
         """Return errors, causes and recordings as plain data in SI."""
