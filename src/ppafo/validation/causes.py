@@ -329,11 +329,11 @@ class _Search:
         return Candidate("several sensors", words, lambda _: change, (1.0,), usual=1.0)
 
     def needs_another(self, first: _Tried, candidates: Sequence[Candidate]) -> bool:
-        """Return whether a second change explains what a first leaves, so that no single one does.
+        """Return whether a second change, larger than on any bench, explains what a first leaves.
 
-        To first order in both sizes. As two causes are told apart, its G must be larger by ln N, and its own size costs
-        as much. What both leave over the noise is its correlation, for which a square counts less. What the engine may
-        be off needs no cause.
+        To first order in both sizes. As two causes are told apart, its G must be larger by ln N; its own size costs as
+        much, and the choice among p candidates 2 ln p (extended BIC, Chen and Chen 2008). What both leave over the noise
+        is its correlation, for which a square counts less. What the engine may be off needs no cause.
         """
         change, errors = first.candidate.at(first.size), first.left.errors
         own = np.zeros_like(errors)
@@ -343,15 +343,16 @@ class _Search:
             own = own if near is None else (near.errors - errors) / step
             own /= max(float(np.linalg.norm(own)), 1.0e-300)
         rest = errors - (own @ errors) * own
+        threshold = 2.0 * (self.penalty + math.log(len(candidates)))
         engine = sum(float(np.square(one.engine) @ one.good.sum(axis=1)) for one in self.records)
-        for _, column in self._slopes(change, first.left, candidates):
+        for one, column in self._slopes(change, first.left, candidates):
             across = column - (own @ column) * own
             size = float(across @ across)
             if size > _PARTING * float(column @ column):
                 along = float(across @ rest)
                 explained = along * along / size
                 noise = max((float(rest @ rest) - explained) / len(errors), 1.0)
-                if explained > engine + 2.0 * self.penalty * noise * noise:
+                if abs(along / size) > one.usual and explained > engine + threshold * noise * noise:
                     return True
         return False
 
