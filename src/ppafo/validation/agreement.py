@@ -14,7 +14,7 @@ from ppafo.parameters.device import Device
 from ppafo.signals import Recording
 from ppafo.signals.faults import noise_of
 from ppafo.signals.recording import Floats
-from ppafo.simulation.recorded import SUPPLY, regular_interval, with_fixed_volume
+from ppafo.simulation.recorded import SUPPLY, regular_interval, start_of, with_fixed_volume
 from ppafo.simulation.scenario import Leg
 from ppafo.validation.measured import (
     ACCEPTABLE_FRACTION,
@@ -30,7 +30,7 @@ from ppafo.validation.measured import (
     parse_thresholds,
     supply_gauge,
 )
-from ppafo.validation.replay import Motion, Replay, Replayed, initial_in_fixed_volume, replay_recording, start_of
+from ppafo.validation.replay import INITIAL_REMEDIES, Motion, Replay, Replayed, replay_recording
 
 DEFAULT_LIMIT = 0.02
 """Largest delay [s] that is looked for; sensors, filters and valves are late by less, and a model by more is wrong."""
@@ -292,11 +292,11 @@ def replay_of(measured: Measured, device: Device, settings: ReplaySettings) -> R
     """Return the replay of a recording on a device, or on a fixed volume in its place."""
     motion, initial = settings.motion, settings.initial
     if settings.volume is not None:
-        device = with_fixed_volume(device, settings.volume)
-        motion, initial = "locked", initial_in_fixed_volume(device, initial)
+        device, beside = with_fixed_volume(device, settings.volume)
+        motion, initial = "locked", {**initial, **beside}
     if motion == "measured" and not measured.has(ANGLE):
         raise DataError(f"{measured.file}: there is no channel '{ANGLE}' to prescribe (--motion measured)")
-    start = start_of(measured, device, initial)
+    start = start_of(measured.recording, device, initial, measured.file, INITIAL_REMEDIES)
     return Replay(measured, device, start, motion, settings.longest_delay, settings.leg)
 
 

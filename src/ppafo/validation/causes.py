@@ -331,9 +331,9 @@ class _Search:
     def needs_another(self, first: _Tried, candidates: Sequence[Candidate]) -> bool:
         """Return whether a second change, larger than on any bench, explains what a first leaves.
 
-        To first order in both sizes. As two causes are told apart, its G must be larger by ln N; its own size costs as
-        much, and the choice among p candidates 2 ln p (extended BIC, Chen and Chen 2008). What both leave over the noise
-        is its correlation, for which a square counts less. What the engine may be off needs no cause.
+        To first order in both sizes. As two causes are told apart, its G must be larger by ln N; its size costs as much
+        and the choice among p candidates 2 ln p (extended BIC, Chen and Chen 2008). What both leave over the noise is
+        correlation, for which a square counts less. What the engine may be off needs no cause.
         """
         change, errors = first.candidate.at(first.size), first.left.errors
         own = np.zeros_like(errors)

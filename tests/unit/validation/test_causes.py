@@ -162,7 +162,7 @@ def test_errors_of_several_sensors_as_on_any_bench_are_no_disagreement(bench: Re
 
 
 def test_two_mistakes_that_look_like_a_third_are_not_named_as_that(bench: Recording) -> None:
-    """With some 100 Pa and 0.02 deg of noise the area of the valve leaves 1.4 times the noise, and another change it."""
+    """The area of the valve leaves little more than the noise, and a second change explains that."""
     run = simulate(load_scenario("step-response", ["motion.kind=free", "run.duration=0.2 s"])).recording
     random, seen = np.random.default_rng(12), bench
     for name, size in (("angle", 4e-4), ("pressure_1", 100.0), ("pressure_2", 100.0)):
