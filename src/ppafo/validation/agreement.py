@@ -4,7 +4,7 @@ How much later the measurement is than the model is the shift in time that leave
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -223,22 +223,32 @@ class Comparison:
 
 
 def channel_agreement(item: Comparison, delay: float) -> ChannelAgreement:
-    """The errors in one channel with the model shifted by ``delay`` [s]."""
+    """The errors in one channel with the model shifted by ``delay`` [s].
+
+    Without a limit of its own an RMS error passes up to 10 % of full range or half of the variance, and noise.
+    """
     curve = item.curve
-    weights = sample_weights(curve.times)
-    error = errors(curve, delay)
-    worst = int(np.argmax(np.abs(error)))
-    noise = noise_in(curve.values, curve.full_range)
-    variation = variation_of(curve.values, weights, noise)
-    usual = acceptable_error(variation, noise, curve.full_range) / curve.full_range
+    # Each sample speaks for its time by the trapezoidal rule, but not for a gap.
+    intervals = np.diff(curve.times)
+    intervals = np.minimum(intervals, _LONGEST_WEIGHT * np.median(intervals))
+    weights = 0.5 * (np.append(intervals, 0.0) + np.insert(intervals, 0, 0.0))
+    weights = np.asarray(weights / weights.sum())
+    error = curve.shift(delay, curve.times) - curve.values
+    unaligned = curve.shift(0.0, curve.times) - curve.values
+    worst, noise = int(np.argmax(np.abs(error))), noise_in(curve.values, curve.full_range)
+    # White noise is no part of what the signal goes through, and no model explains it.
+    away = curve.values - weights @ curve.values
+    variation = math.sqrt(max(float(weights @ away**2) - noise * noise, 0.0))
+    explained = min(ACCEPTABLE_FRACTION * curve.full_range, math.sqrt(1.0 - EXPLAINED_FRACTION) * variation)
+    usual = math.hypot(max(explained, _UNMOVED * curve.full_range), _WITHIN_NOISE * noise) / curve.full_range
     return ChannelAgreement(
         channel=item.channel,
         unit=item.unit,
         full_range=curve.full_range,
         variation=variation,
         noise=noise,
-        rms=_rms(error, weights),
-        rms_unaligned=_rms(errors(curve, 0.0), weights),
+        rms=float(np.sqrt(weights @ error**2)),
+        rms_unaligned=float(np.sqrt(weights @ unaligned**2)),
         bias=float(weights @ error),
         largest=float(error[worst]),
         largest_time=float(curve.times[worst]),
@@ -251,41 +261,6 @@ def noise_in(values: Floats, full_range: float) -> float:
     steps = np.diff(np.unique(values))
     resolution = float(np.min(steps, where=steps > _ROUNDING * steps.sum(), initial=full_range)) if steps.size else 0.0
     return max(math.hypot(noise_of(values), resolution / math.sqrt(12.0)), LEAST_NOISE * full_range)
-
-
-def variation_of(values: Floats, weights: Floats, noise: float) -> float:
-    """Return the standard deviation of a signal about its mean [its unit], its white noise taken out."""
-    away = values - weights @ values
-    return math.sqrt(max(float(weights @ away**2) - noise * noise, 0.0))
-
-
-def acceptable_error(variation: float, noise: float, full_range: float) -> float:
-    """Return the largest RMS error [its unit] that passes: 10 % of full range or half of the variance, and noise."""
-    explained = min(ACCEPTABLE_FRACTION * full_range, math.sqrt(1.0 - EXPLAINED_FRACTION) * variation)
-    return math.hypot(max(explained, _UNMOVED * full_range), _WITHIN_NOISE * noise)
-
-
-def common_delay(items: Sequence[Comparison], longest_delay: float) -> Delay:
-    """The delay that all channels share; sums and multiples of two others do not count twice."""
-    chosen = [item for item in items if item.channel in ("angle", "pressure_1", "pressure_2")] or list(items)[:1]
-    return estimate_delay([item.curve for item in chosen], longest_delay)
-
-
-def errors(curve: Curve, delay: float) -> Floats:
-    """Model less measured at the times of the measurement, with the model ``delay`` [s] later."""
-    return curve.shift(delay, curve.times) - curve.values
-
-
-def sample_weights(time: Floats) -> Floats:
-    """Fraction of the time [-] for which each sample speaks, by the trapezoidal rule; gaps are not counted."""
-    intervals = np.diff(time)
-    intervals = np.minimum(intervals, _LONGEST_WEIGHT * np.median(intervals))
-    weights = 0.5 * (np.append(intervals, 0.0) + np.insert(intervals, 0, 0.0))
-    return np.asarray(weights / weights.sum())
-
-
-def _rms(error: Floats, weights: Floats) -> float:
-    return float(np.sqrt(weights @ error**2))
 
 
 def replay_of(measured: Measured, device: Device, settings: ReplaySettings) -> Replay:
@@ -305,7 +280,9 @@ def compare_recording(measured: Measured, device: Device, settings: ReplaySettin
     wanted = replay_of(measured, device, settings)
     replayed = replay_recording(wanted)
     items = _comparisons(measured, replayed, wanted.device, settings)
-    delay = common_delay(items, settings.longest_delay)
+    # Sums and multiples of two others do not count twice.
+    chosen = [item for item in items if item.channel in (ANGLE, PRESSURE_1, PRESSURE_2)] or items[:1]
+    delay = estimate_delay([item.curve for item in chosen], settings.longest_delay)
     channels = tuple(channel_agreement(item, delay.correction) for item in items)
     longest = f"model and measurement are more than {settings.longest_delay:g} s apart in time; no delay was removed"
     late = [longest] if delay.is_at_limit else []
