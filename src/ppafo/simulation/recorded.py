@@ -1,7 +1,7 @@
 """What a run takes from a recording: its inputs step by step, its start, its scenario, and what is refused."""
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -185,6 +185,23 @@ def samples_at_rest(recording: Recording) -> int:
     return max(1, min(quiet, int((time < time[0] + REST_WINDOW).sum())))
 
 
+def start_of(
+    recording: Recording, device: Device, known: Mapping[str, float], file: str, remedies: Mapping[str, str]
+) -> Start:
+    """Return where the replay of a recording starts: ``known`` values [SI] go before what its samples at rest show.
+
+    DataError, which begins with ``file``, for a channel that is not there, with the remedy for it.
+    """
+    count, values = samples_at_rest(recording), dict(known)
+    for name in (ANGLE, "pressure_1", "pressure_2", "angular_velocity"):
+        if name not in values and name in recording:
+            values[name] = value_at_rest(recording.time[:count], recording[name][:count])
+        elif name in remedies and name not in values:
+            raise DataError(f"{file}: there is no channel '{name}' to start from; {remedies[name]}")
+    angle = float(between_stops(np.array([values[ANGLE]]), device, file)[0])
+    return Start(angle, values.get("angular_velocity", 0.0), values["pressure_1"], values["pressure_2"])
+
+
 def value_at_rest(time: Floats, values: Floats, at_end: bool = False) -> float:
     """Return the value [SI] with which a stretch at rest begins, or ends: the mean of its samples if they do not move.
 
@@ -259,15 +276,16 @@ def locked_vane(angle: float) -> PrescribedMotion:
     return PrescribedMotion(ProfileChoice("constant", {"level": angle}), "locked")
 
 
-def with_fixed_volume(device: Device, volume: float) -> Device:
+def with_fixed_volume(device: Device, volume: float) -> tuple[Device, dict[str, float]]:
     """Return the device with a fixed volume [m^3] in the place of chamber 1, whatever the actuator: nothing leaks.
 
-    The vane is at the lower stop.
+    With it where a replay starts beside the pressure in the volume: the vane at the lower stop, chamber 2 as the room.
     """
     leak = device.actuator.leak
     shut = replace(leak, area=0.0) if isinstance(leak, Orifice) else replace(leak, sonic_conductance=0.0)
     fixed = replace(device.actuator, dead_volume_1=volume, leak=shut, kind=VANE, settings={}, table=None)
-    return replace(device, actuator=fixed)
+    start = {ANGLE: device.actuator.angle_min, "pressure_2": device.supply.atmospheric_pressure}
+    return replace(device, actuator=fixed), start
 
 
 def replay_scenario(

@@ -4,7 +4,7 @@ How much later the measurement is than the model is the shift in time that leave
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -14,7 +14,7 @@ from ppafo.parameters.device import Device
 from ppafo.signals import Recording
 from ppafo.signals.faults import noise_of
 from ppafo.signals.recording import Floats
-from ppafo.simulation.recorded import SUPPLY, regular_interval, with_fixed_volume
+from ppafo.simulation.recorded import SUPPLY, regular_interval, start_of, with_fixed_volume
 from ppafo.simulation.scenario import Leg
 from ppafo.validation.measured import (
     ACCEPTABLE_FRACTION,
@@ -30,13 +30,17 @@ from ppafo.validation.measured import (
     parse_thresholds,
     supply_gauge,
 )
-from ppafo.validation.replay import Motion, Replay, Replayed, initial_in_fixed_volume, replay_recording, start_of
+from ppafo.validation.replay import INITIAL_REMEDIES, Motion, Replay, Replayed, replay_recording
 
 DEFAULT_LIMIT = 0.02
 """Largest delay [s] that is looked for; sensors, filters and valves are late by less, and a model by more is wrong."""
 
-LEAST_NOISE = 5.0e-4
-"""Noise of samples over the full range that is taken at least: the engine keeps to twice that."""
+ENGINE_ERROR, LEAST_NOISE = 3.0e-5, 1.0e-4
+"""Over the full range: what the engine is off (tests/convergence), and the noise of samples that is taken at least."""
+_ROUNDING = 1.0e-9
+"""Fraction of a range [-] that is no step of a converter but how a file rounds."""
+_UNMOVED = 1.0e-3
+"""Error over the full range that is accepted of a signal that does not move: the zero of its sensor."""
 _WITHIN_NOISE = 1.5
 """Size of white noise over its estimate up to which it may be noise."""
 _SHIFTS = 81
@@ -219,22 +223,32 @@ class Comparison:
 
 
 def channel_agreement(item: Comparison, delay: float) -> ChannelAgreement:
-    """The errors in one channel with the model shifted by ``delay`` [s]."""
+    """The errors in one channel with the model shifted by ``delay`` [s].
+
+    Without a limit of its own an RMS error passes up to 10 % of full range or half of the variance, and noise.
+    """
     curve = item.curve
-    weights = sample_weights(curve.times)
-    error = errors(curve, delay)
-    worst = int(np.argmax(np.abs(error)))
-    noise = max(noise_of(curve.values), LEAST_NOISE * curve.full_range)
-    variation = variation_of(curve.values, weights, noise)
-    usual = acceptable_error(variation, noise, curve.full_range) / curve.full_range
+    # Each sample speaks for its time by the trapezoidal rule, but not for a gap.
+    intervals = np.diff(curve.times)
+    intervals = np.minimum(intervals, _LONGEST_WEIGHT * np.median(intervals))
+    weights = 0.5 * (np.append(intervals, 0.0) + np.insert(intervals, 0, 0.0))
+    weights = np.asarray(weights / weights.sum())
+    error = curve.shift(delay, curve.times) - curve.values
+    unaligned = curve.shift(0.0, curve.times) - curve.values
+    worst, noise = int(np.argmax(np.abs(error))), noise_in(curve.values, curve.full_range)
+    # White noise is no part of what the signal goes through, and no model explains it.
+    away = curve.values - weights @ curve.values
+    variation = math.sqrt(max(float(weights @ away**2) - noise * noise, 0.0))
+    explained = min(ACCEPTABLE_FRACTION * curve.full_range, math.sqrt(1.0 - EXPLAINED_FRACTION) * variation)
+    usual = math.hypot(max(explained, _UNMOVED * curve.full_range), _WITHIN_NOISE * noise) / curve.full_range
     return ChannelAgreement(
         channel=item.channel,
         unit=item.unit,
         full_range=curve.full_range,
         variation=variation,
         noise=noise,
-        rms=_rms(error, weights),
-        rms_unaligned=_rms(errors(curve, 0.0), weights),
+        rms=float(np.sqrt(weights @ error**2)),
+        rms_unaligned=float(np.sqrt(weights @ unaligned**2)),
         bias=float(weights @ error),
         largest=float(error[worst]),
         largest_time=float(curve.times[worst]),
@@ -242,53 +256,22 @@ def channel_agreement(item: Comparison, delay: float) -> ChannelAgreement:
     )
 
 
-def variation_of(values: Floats, weights: Floats, noise: float) -> float:
-    """Return the standard deviation of a signal about its mean [its unit], its white noise taken out."""
-    away = values - weights @ values
-    return math.sqrt(max(float(weights @ away**2) - noise * noise, 0.0))
-
-
-def acceptable_error(variation: float, noise: float, full_range: float) -> float:
-    """Return the largest RMS error [its unit] that passes: 10 % of full range or half of the variance, and noise.
-
-    What a zero of a sensor and the engine are off at most is accepted of a signal that does not move.
-    """
-    explained = min(ACCEPTABLE_FRACTION * full_range, math.sqrt(1.0 - EXPLAINED_FRACTION) * variation)
-    return math.hypot(max(explained, 2.0 * LEAST_NOISE * full_range), _WITHIN_NOISE * noise)
-
-
-def common_delay(items: Sequence[Comparison], longest_delay: float) -> Delay:
-    """The delay that all channels share; sums and multiples of two others do not count twice."""
-    chosen = [item for item in items if item.channel in ("angle", "pressure_1", "pressure_2")] or list(items)[:1]
-    return estimate_delay([item.curve for item in chosen], longest_delay)
-
-
-def errors(curve: Curve, delay: float) -> Floats:
-    """Model less measured at the times of the measurement, with the model ``delay`` [s] later."""
-    return curve.shift(delay, curve.times) - curve.values
-
-
-def sample_weights(time: Floats) -> Floats:
-    """Fraction of the time [-] for which each sample speaks, by the trapezoidal rule; gaps are not counted."""
-    intervals = np.diff(time)
-    intervals = np.minimum(intervals, _LONGEST_WEIGHT * np.median(intervals))
-    weights = 0.5 * (np.append(intervals, 0.0) + np.insert(intervals, 0, 0.0))
-    return np.asarray(weights / weights.sum())
-
-
-def _rms(error: Floats, weights: Floats) -> float:
-    return float(np.sqrt(weights @ error**2))
+def noise_in(values: Floats, full_range: float) -> float:
+    """Return the noise of samples [their unit], with what a converter rounds: its resolution / sqrt(12)."""
+    steps = np.diff(np.unique(values))
+    resolution = float(np.min(steps, where=steps > _ROUNDING * steps.sum(), initial=full_range)) if steps.size else 0.0
+    return max(math.hypot(noise_of(values), resolution / math.sqrt(12.0)), LEAST_NOISE * full_range)
 
 
 def replay_of(measured: Measured, device: Device, settings: ReplaySettings) -> Replay:
     """Return the replay of a recording on a device, or on a fixed volume in its place."""
     motion, initial = settings.motion, settings.initial
     if settings.volume is not None:
-        device = with_fixed_volume(device, settings.volume)
-        motion, initial = "locked", initial_in_fixed_volume(device, initial)
+        device, beside = with_fixed_volume(device, settings.volume)
+        motion, initial = "locked", {**initial, **beside}
     if motion == "measured" and not measured.has(ANGLE):
         raise DataError(f"{measured.file}: there is no channel '{ANGLE}' to prescribe (--motion measured)")
-    start = start_of(measured, device, initial)
+    start = start_of(measured.recording, device, initial, measured.file, INITIAL_REMEDIES)
     return Replay(measured, device, start, motion, settings.longest_delay, settings.leg)
 
 
@@ -297,7 +280,9 @@ def compare_recording(measured: Measured, device: Device, settings: ReplaySettin
     wanted = replay_of(measured, device, settings)
     replayed = replay_recording(wanted)
     items = _comparisons(measured, replayed, wanted.device, settings)
-    delay = common_delay(items, settings.longest_delay)
+    # Sums and multiples of two others do not count twice.
+    chosen = [item for item in items if item.channel in (ANGLE, PRESSURE_1, PRESSURE_2)] or items[:1]
+    delay = estimate_delay([item.curve for item in chosen], settings.longest_delay)
     channels = tuple(channel_agreement(item, delay.correction) for item in items)
     longest = f"model and measurement are more than {settings.longest_delay:g} s apart in time; no delay was removed"
     late = [longest] if delay.is_at_limit else []

@@ -58,6 +58,17 @@ class Change:
     start: float | None = None
 
 
+def joined(first: Change, second: Change) -> Change:
+    """Return two changes at once; of numbers and settings that both have, the first's."""
+    sensors = dict(first.sensors)
+    for name, one in second.sensors.items():
+        own = sensors.get(name, Sensor())
+        about = one.about if one.gain != 1.0 else own.about
+        sensors[name] = Sensor(own.gain * one.gain, own.zero + one.zero, about, own.delay + one.delay)
+    numbers, effects = {**second.numbers, **first.numbers}, {**second.effects, **first.effects}
+    return replace(first, sensors=sensors, numbers=numbers, effects=effects, clock=first.clock * second.clock)
+
+
 @dataclass(frozen=True, slots=True)
 class Candidate:
     """A cause before its size is known: what a size changes, its words with the place of ``shown`` times the size.
@@ -83,6 +94,10 @@ class Candidate:
     def at(self, size: float) -> Change:
         """Return the change of a size that was sought."""
         return self.change(math.exp(size) if self.is_ratio else size)
+
+    def in_words(self, size: float) -> str:
+        """Return what a size that was sought seems to be."""
+        return self.words.format(self.shown * (math.exp(size) if self.is_ratio else size))
 
 
 def _sensed(names: Iterable[str], kind: str, about: float, size: float) -> Change:
@@ -127,6 +142,11 @@ def exchanges(device: Device, names: Collection[str]) -> Iterator[Candidate]:
         if name in names:
             words = f"{name} seems to have the wrong sign"
             yield Candidate(f"sign of {name}", words, partial(_sensed, [name], "gain", 0.0), (-1.0,))
+    if PRESSURE_1 in names and PRESSURE_2 in names:
+        # A symmetric device mirrors both by an angle from the other end, and no recording tells these apart.
+        words = "command seems to have the wrong sign, and pressure_1 and pressure_2 to be swapped"
+        mirrored = Change({COMMAND: Sensor(gain=-1.0)}, is_swapped=True)
+        yield Candidate("sign of command and swap", words, lambda _: mirrored)
     if ANGLE in names:
         middle = 0.5 * (actuator.angle_min + actuator.angle_max)
         words = "the angle seems to be counted from the other end"

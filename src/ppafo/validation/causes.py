@@ -7,29 +7,31 @@ for a cause with a size. A common delay, and a start that was read from noisy sa
 """
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
 
 from ppafo.errors import PpafoError
 from ppafo.parameters.device import Device
 from ppafo.progress import Progress, Report, report_nothing
-from ppafo.signals.faults import is_at_limit, is_noisy, noise_of, plateaus
 from ppafo.signals.recording import Floats
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.recorded import COMMAND, samples_at_rest
 from ppafo.validation.agreement import (
-    LEAST_NOISE,
+    ENGINE_ERROR,
     ChannelAgreement,
     RecordingAgreement,
     ReplaySettings,
     measured_values,
+    noise_in,
     replay_of,
 )
-from ppafo.validation.candidates import SENSORS, Candidate, Change, Sensor, effects, exchanges, numbers, sizes
+from ppafo.validation.candidates import SENSORS, Candidate, Change, Sensor, effects, exchanges, joined, numbers, sizes
 from ppafo.validation.measured import ANGLE, PRESSURE_1, PRESSURE_2, Measured
 from ppafo.validation.replay import Replay, Replayed, replay_together, replayed_scenario
 
@@ -43,8 +45,14 @@ _STEPS = 2
 _DIFFERENCE = 0.02
 """Fraction of the distance between two sizes of a grid over which a derivative is taken."""
 
-_FEWEST_CLIPPED, _OUTLIER, _OVER_STEPS = 5, 6.0, 3.0
-"""Clipped samples over samples of any other value; an outlier over the noise, and over the range of its neighbours."""
+_SMALL = 0.1
+"""Size over the smallest of its grid by which a second change is tried beside a first."""
+
+_BY_CHANCE, _OUTLIER, _OVER_STEPS = 1.0e-3, 6.0, 3.0
+"""Chance below which a run of equal samples is a limit; an outlier over the noise, and over its neighbours' range."""
+
+_PARTING = 1.0e-4
+"""Fraction of a squared slope that must lie across the first's, for a second change to be another one."""
 
 _AT_REST = 2.0
 """Standard deviation of the angle over its noise, below which a vane may be locked."""
@@ -89,14 +97,16 @@ class Causes:
 class _Record(NamedTuple):
     """A recording that is compared: channels and values (channels, samples) over their noise.
 
-    ``good`` is 1 for a sample that a sensor made and 0 for others, which ``words`` describe. ``delay`` [s] was found
-    with the model of the set; ``starts`` are how readings change with the standard error of each start that was read.
+    ``engine`` is the error of the engine over the noise, ``good`` is 1 for a sample that a sensor made and 0 for
+    others, which ``words`` describe. ``delay`` [s] was found with the model of the set; ``starts`` are how readings
+    change with the standard error of each start that was read.
     """
 
     measured: Measured
     channels: tuple[str, ...]
     values: Floats
     noise: Floats
+    engine: Floats
     good: Floats
     words: tuple[str, ...]
     delay: float
@@ -111,10 +121,27 @@ class _Left(NamedTuple):
 
 
 class _Tried(NamedTuple):
+    """A candidate at the size that leaves least, and by how much G [-] it explains more than none."""
+
+    candidate: Candidate
     size: float
     left: _Left
     gain: float
-    is_inside: bool
+
+    @property
+    def is_inside(self) -> bool:
+        """True for a size that is not at an end of its grid, beyond which a better one may lie."""
+        return min(self.candidate.grid) < self.size < max(self.candidate.grid)
+
+    @property
+    def is_usual(self) -> bool:
+        """True for an error that sensors of any bench have."""
+        return 0.0 < abs(self.size) <= self.candidate.usual
+
+    @property
+    def explains(self) -> bool:
+        """True where nothing but noise is left in any channel."""
+        return float(self.left.squares.max()) < ONLY_NOISE and self.gain > 0.0
 
 
 def causes_of(
@@ -132,27 +159,54 @@ def causes_of(
         return Causes(is_noise=none is not None)
     report(Progress("searching for causes"))
     names = set.intersection(*(set(one.recording.names) for one in read))
-    stages: list[Iterable[Candidate]] = [_samples(records)]
+    stages, sized = [list(_samples(records))], list[Candidate]()
     # A measured angle is an input: a delay of the sensors would be one of an input.
     if settings.motion != "measured":
         # Numbers of the set are compared with sensors: the gain of a command is the area of its valve.
         sized = [*sizes(device, names), *numbers(read[0], device, settings)]
-        stages += [_motions(search), exchanges(device, names), sized, effects(device)]
-    tried: list[Cause] = []
+        stages += [list(_motions(search)), list(exchanges(device, names)), sized, list(effects(device))]
+    tried: list[_Tried] = []
     for stage in stages:
-        tried += search.compared(list(stage), none.squares)
-        named = sorted((one for one in tried if one.left**2 < ONLY_NOISE and one.gain > 0.0), key=lambda one: -one.gain)
+        if stage is sized:
+            # Errors that any bench has come before a fault: they need no cause.
+            usual = [one for one in sized if one.usual]
+            together = search.compared([search.together(usual, none)], none.squares)
+            if any(one.explains for one in together):
+                alone = [one for one in search.compared(usual, none.squares) if one.explains and one.is_usual]
+                return Causes(_cause_of(alone or together, search.penalty), None, len(usual))
+        tried += search.compared(stage, none.squares)
+        named = [one for one in tried if one.explains]
         if named:
-            # Of those that the recordings cannot tell apart, numbers of the set come first.
-            alike = [one for one in named if one.gain > named[0].gain - search.penalty]
-            first, *others = sorted(alike, key=lambda one: not one.numbers)
-            return Causes(replace(first, same=tuple(others)), None, len(tried))
+            first = max(named, key=lambda one: one.gain)
+            if first.candidate.name.startswith(_SAMPLES) or not search.needs_another(first, sized):
+                return Causes(_cause_of(named, search.penalty), None, len(tried))
+            return Causes(None, _cause_of([first], search.penalty), len(tried))
     if settings.motion == "measured":
         # Only samples were searched: that no change explains the recordings would say too much.
         return Causes()
     # What is wrong with samples is seen in them, whatever else is wrong.
-    nearest = max(tried, key=lambda one: (one.name.startswith(_SAMPLES), one.gain), default=None)
-    return Causes(None, nearest, len(tried))
+    nearest = max(tried, key=lambda one: (one.candidate.name.startswith(_SAMPLES), one.gain), default=None)
+    return Causes(None, None if nearest is None else _cause_of([nearest], search.penalty), len(tried))
+
+
+def _cause_of(named: Sequence[_Tried], penalty: float) -> Cause:
+    """Return the best of those that explain recordings, with all that the recordings cannot tell from it."""
+    best = max(one.gain for one in named)
+    # Of those that the recordings cannot tell apart, numbers of the set come first.
+    alike = [
+        Cause(
+            name=one.name,
+            in_words=one.in_words(at.size),
+            gain=at.gain,
+            left=math.sqrt(float(at.left.squares.max())),
+            numbers={path: (value, one.unit) for path, value in one.at(at.size).numbers.items() if one.unit},
+            is_usual=at.is_usual,
+        )
+        for at, one in ((at, at.candidate) for at in sorted(named, key=lambda one: -one.gain))
+        if at.gain > best - penalty
+    ]
+    first, *others = sorted(alike, key=lambda one: not one.numbers)
+    return replace(first, same=tuple(others))
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,7 +270,7 @@ class _Search:
             return None
         return replace(wanted, device=device)
 
-    def compared(self, candidates: Sequence[Candidate], none: Floats) -> list[Cause]:
+    def compared(self, candidates: Sequence[Candidate], none: Floats) -> list[_Tried]:
         """Return the candidates at the sizes that leave least: the best of a grid, then two Gauss-Newton steps.
 
         ``none`` are the mean squares without any. A size at an end of its grid is refused.
@@ -229,44 +283,78 @@ class _Search:
                 if left is not None:
                     parts = np.log(np.maximum(none, 1.0)) - np.log(np.maximum(left.squares, 1.0))
                     gain = float(counts @ parts) - self.penalty * (len(one.sizes) > 1)
+                    now, before = _Tried(one, size, left, gain), best.get(one.name)
                     # Sizes that leave nothing but noise are equal: one inside the grid is known better than its ends.
-                    inside = min(one.grid) < size < max(one.grid)
-                    before = best.get(one.name)
-                    if before is None or (gain, inside) > (before.gain, before.is_inside):
-                        best[one.name] = _Tried(size=size, left=left, gain=gain, is_inside=inside)
+                    if before is None or (gain, now.is_inside) > (before.gain, before.is_inside):
+                        best[one.name] = now
             if step < _STEPS:
-                runs = self._improved([one for one in candidates if len(one.sizes) > 1 and one.name in best], best)
+                runs = self._improved([one for one in best.values() if len(one.candidate.sizes) > 1])
+        return [one for one in best.values() if len(one.candidate.sizes) == 1 or one.is_inside]
+
+    def _improved(self, moved: Sequence[_Tried]) -> list[tuple[Candidate, float]]:
+        """Return the size of each candidate after a Gauss-Newton step, no further than its neighbours in the grid."""
+        ends = []
+        for one in moved:
+            grid = sorted(one.candidate.grid)
+            place = int(np.argmin(np.abs(np.array(grid) - one.size)))
+            ends.append((grid[max(0, place - 1)], grid[min(len(grid) - 1, place + 1)]))
+        lengths = [_DIFFERENCE * (high - low) for low, high in ends]
+        beside = self.evaluated([one.candidate.at(one.size + size) for one, size in zip(moved, lengths, strict=True)])
+        runs = []
+        for one, left, length, (low, high) in zip(moved, beside, lengths, ends, strict=True):
+            if left is not None:
+                slope = (left.errors - one.left.errors) / length
+                size = one.size - float(slope @ one.left.errors) / max(float(slope @ slope), 1.0e-300)
+                runs.append((one.candidate, min(max(size, low), high)))
+        return runs
+
+    def _slopes(self, change: Change, left: _Left, beside: Sequence[Candidate]) -> list[tuple[Candidate, Floats]]:
+        """Return how the errors that a change leaves grow with the size of each of others beside it."""
+        steps = [_SMALL * min(map(abs, one.grid)) for one in beside]
+        moved = self.evaluated([joined(change, one.at(step)) for one, step in zip(beside, steps, strict=True)])
         return [
-            Cause(
-                name=one.name,
-                in_words=one.words.format(one.shown * (math.exp(at.size) if one.is_ratio else at.size)),
-                gain=at.gain,
-                left=math.sqrt(float(at.left.squares.max())),
-                numbers={path: (value, one.unit) for path, value in one.at(at.size).numbers.items() if one.unit},
-                is_usual=0.0 < abs(at.size) <= one.usual,
-            )
-            for one, at in ((one, best[one.name]) for one in candidates if one.name in best)
-            if len(one.sizes) == 1 or at.is_inside
+            (one, (other.errors - left.errors) / step)
+            for one, step, other in zip(beside, steps, moved, strict=True)
+            if other is not None
         ]
 
-    def _improved(self, moved: Sequence[Candidate], best: Mapping[str, _Tried]) -> list[tuple[Candidate, float]]:
-        """Return the size of each candidate after a Gauss-Newton step, no further than its neighbours in the grid."""
-        ends = {}
-        for one in moved:
-            grid = sorted(one.grid)
-            place = int(np.argmin(np.abs(np.array(grid) - best[one.name].size)))
-            ends[one.name] = grid[max(0, place - 1)], grid[min(len(grid) - 1, place + 1)]
-        lengths = {name: _DIFFERENCE * (high - low) for name, (low, high) in ends.items()}
-        beside = self.evaluated([one.at(best[one.name].size + lengths[one.name]) for one in moved])
-        runs = []
-        for one, left in zip(moved, beside, strict=True):
-            if left is not None:
-                size, before = best[one.name][:2]
-                slope = (left.errors - before.errors) / lengths[one.name]
-                low, high = ends[one.name]
-                size -= float(slope @ before.errors) / max(float(slope @ slope), 1.0e-300)
-                runs.append((one, min(max(size, low), high)))
-        return runs
+    def together(self, usual: Sequence[Candidate], none: _Left) -> Candidate:
+        """Return the errors that any bench has, all at once, each as large as explains most within its limit."""
+        slopes = self._slopes(Change(), none, usual)
+        limits = np.array([one.usual for one, _ in slopes])
+        columns = np.stack([column for _, column in slopes], axis=1)
+        found = lsq_linear(columns * limits, -none.errors, (-1.0, 1.0)).x * limits
+        change = reduce(joined, [one.at(float(size)) for (one, _), size in zip(slopes, found, strict=True)])
+        words = "zeros, gains and delays of several sensors seem to be off"
+        return Candidate("several sensors", words, lambda _: change, (1.0,), usual=1.0)
+
+    def needs_another(self, first: _Tried, candidates: Sequence[Candidate]) -> bool:
+        """Return whether a second change, larger than on any bench, explains what a first leaves.
+
+        To first order in both sizes. As two causes are told apart, its G must be larger by ln N; its size costs as much
+        and the choice among p candidates 2 ln p (extended BIC, Chen and Chen 2008). What both leave over the noise is
+        correlation, for which a square counts less. What the engine may be off needs no cause.
+        """
+        change, errors = first.candidate.at(first.size), first.left.errors
+        own = np.zeros_like(errors)
+        if len(first.candidate.sizes) > 1:
+            step = _SMALL * min(map(abs, first.candidate.grid))
+            near = self.evaluated([first.candidate.at(first.size + step)])[0]
+            own = own if near is None else (near.errors - errors) / step
+            own /= max(float(np.linalg.norm(own)), 1.0e-300)
+        rest = errors - (own @ errors) * own
+        threshold = 2.0 * (self.penalty + math.log(len(candidates)))
+        engine = sum(float(np.square(one.engine) @ one.good.sum(axis=1)) for one in self.records)
+        for one, column in self._slopes(change, first.left, candidates):
+            across = column - (own @ column) * own
+            size = float(across @ across)
+            if size > _PARTING * float(column @ column):
+                along = float(across @ rest)
+                explained = along * along / size
+                noise = max((float(rest @ rest) - explained) / len(errors), 1.0)
+                if abs(along / size) > one.usual and explained > engine + threshold * noise * noise:
+                    return True
+        return False
 
 
 def _record_of(measured: Measured, agreement: RecordingAgreement, device: Device, settings: ReplaySettings) -> _Record:
@@ -282,14 +370,16 @@ def _record_of(measured: Measured, agreement: RecordingAgreement, device: Device
         is_good = np.logical_not(is_wrong) if fault else np.ones(len(values), dtype=bool)
         series.append(values)
         good.append(is_good)
-        noise.append(max(noise_of(values[is_good]), LEAST_NOISE * one.full_range) if fault else one.noise)
+        noise.append(noise_in(values[is_good], one.full_range) if fault else one.noise)
         words += [f"{one.channel} {fault}"] if fault else []
     names, sizes = tuple(one.channel for one in chosen), np.array(noise)
+    ranges = np.array([one.full_range for one in chosen])
     record = _Record(
         measured=measured,
         channels=names,
         values=np.stack(series) / sizes[:, None],
         noise=sizes,
+        engine=ENGINE_ERROR * ranges / sizes,
         good=np.stack(good).astype(np.float64),
         words=tuple(words),
         delay=agreement.delay.correction,
@@ -362,17 +452,20 @@ def _left(record: _Record, replayed: Replayed, change: Change, longest_delay: fl
 
 def _fault_of(values: Floats, one: ChannelAgreement, time: Floats) -> tuple[str, Flags]:
     """Return what is wrong with samples of a channel, and with which: constant, clipped, isolated; else no words."""
-    levels, counts = np.unique(values, return_counts=True)
+    edges = np.flatnonzero(np.diff(values))
+    lengths, levels = np.diff(np.concatenate([[-1], edges, [len(values) - 1]])), values[[*edges, -1]]
     if len(levels) == 1:
         held = "the vane was locked (--motion locked), or " if one.channel == ANGLE else ""
         return f"never changes: {held}its sensor is dead or not connected", np.ones(len(values), dtype=bool)
-    for place, word in ((0, "least"), (-1, "largest")):
-        is_there = values == levels[place]
-        is_many = counts[place] >= _FEWEST_CLIPPED * int(counts[1:-1].max(initial=1))
-        # A vane runs into its stops, and only noise tells that from a sensor at its limit.
-        is_sudden = one.channel != ANGLE and any(is_at_limit(values, plateau) for plateau in plateaus(values))
-        if is_many and (is_sudden or is_noisy(values[~is_there])):
-            return f"is clipped: {counts[place]} samples are exactly its {word} value", is_there
+    # A coarse converter repeats other values too. That all else agrees tells a stop of the vane from a sensor's.
+    low, high, count = levels.min(), levels.max(), len(values)
+    inner = lengths[(levels > low) & (levels < high)]
+    repeated = max(1.0 - len(inner) / max(int(inner.sum()), 1), 1.0 / count)
+    runs = [(end, word, int(lengths[levels == end].max())) for end, word in ((low, "least"), (high, "largest"))]
+    ends = [(end, word) for end, word, longest in runs if count * repeated ** (longest - 1) < _BY_CHANCE]
+    if ends:
+        said = " and ".join(f"{int((values == end).sum())} samples are exactly its {word} value" for end, word in ends)
+        return f"is clipped: {said}", np.isin(values, [end for end, _ in ends])
     # Mirrored at the ends, where an outlier would else be three of its own five neighbours.
     around = np.lib.stride_tricks.sliding_window_view(np.pad(values, 2, mode="reflect"), 5)
     away = np.abs(values - np.median(around, axis=1))

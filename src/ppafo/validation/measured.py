@@ -14,13 +14,11 @@ from ppafo.constants import PASCALS_PER_PSI
 from ppafo.errors import DataError, UnitError, nearest_name, one_line
 from ppafo.parameters.device import Device
 from ppafo.signals import CHANNELS, Recording
-from ppafo.signals.faults import FEWEST_AT_LIMIT, Plateau, is_at_limit, is_noisy, lasting_change, plateaus
-from ppafo.signals.recording import Floats
+from ppafo.signals.faults import lasting_change
 from ppafo.simulation.recorded import (
     COMMAND,
     DORSIFLEXION_SUPPLY,
     EXTERNAL_TORQUE,
-    PRESSURES,
     SUPPLY,
     check_absolute,
     check_command,
@@ -187,8 +185,7 @@ def check_recording(recording: Recording, device: Device, file: str, sha256: str
     _check_size(recording, device, file)
     _check_pressures(recording, device, file)
     _check_change(recording, device, file)
-    remarks = (*unknown, *_gap_remarks(recording), *_constant_remarks(recording), *_clip_remarks(recording))
-    return Measured(file, sha256, recording, remarks)
+    return Measured(file, sha256, recording, (*unknown, *_gap_remarks(recording)))
 
 
 def _check_names(recording: Recording, file: str) -> tuple[str, ...]:
@@ -278,31 +275,3 @@ def _gap_remarks(recording: Recording) -> tuple[str, ...]:
     first = float(recording.time[int(np.argmax(gaps > _REMARKED_GAP * usual))])
     noun = "gap" if count == 1 else "gaps"
     return (f"{count} {noun} in time, the first after {first:.6g} s; inputs were kept across",)
-
-
-def _constant_remarks(recording: Recording) -> tuple[str, ...]:
-    """Remark on channels to compare that never change; a real sensor that is connected has noise."""
-    return tuple(
-        f"'{name}' is {recording[name][0]:.6g} {recording.unit(name)} throughout: sensor not connected?"
-        for name in COMPARED
-        if name in recording and recording[name].max() == recording[name].min()
-    )
-
-
-def _clip_remarks(recording: Recording) -> tuple[str, ...]:
-    """Remark on channels that stay at exactly their largest or smallest value as a sensor at its limit does."""
-    return tuple(
-        f"'{name}' stays at exactly its {plateau.word} value for {plateau.count} samples, from "
-        f"{recording.time[plateau.first]:.6g} s (sample {plateau.first + 1}): sensor at its limit?"
-        for name in (ANGLE, *PRESSURES)
-        if name in recording
-        for plateau in plateaus(recording[name])
-        if _is_at_limit(recording[name], plateau, name)
-    )
-
-
-def _is_at_limit(values: Floats, plateau: Plateau, name: str) -> bool:
-    """Tell whether a sensor is at its limit; a vane runs into its stops, so that an angle has to be noisy elsewhere."""
-    if name == ANGLE:
-        return plateau.count >= FEWEST_AT_LIMIT and is_noisy(values[values != plateau.value])
-    return is_at_limit(values, plateau)

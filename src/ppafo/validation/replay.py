@@ -22,13 +22,10 @@ from ppafo.simulation.recorded import (
     SUPPLY,
     RecordedInputs,
     Start,
-    between_stops,
     locked_vane,
     replay_scenario,
     sample_period,
-    samples_at_rest,
     step_inputs,
-    value_at_rest,
     with_highest_supply,
     with_prescribed_angle,
 )
@@ -187,6 +184,8 @@ def _recording(measured: Measured, run: Run, record: Floats) -> Recording:
 
 _UNITS = {ANGLE: "rad", PRESSURE_1: "Pa_a", PRESSURE_2: "Pa_a"}
 _EXAMPLES = {ANGLE: "angle=75 deg", PRESSURE_1: "pressure_1=0 psi_g", PRESSURE_2: "pressure_2=50 psi_g"}
+INITIAL_REMEDIES = {name: f'give its initial value, --initial "{example}"' for name, example in _EXAMPLES.items()}
+"""What to do about a channel that a replay would start from and that was not recorded."""
 
 
 def parse_initial(texts: Sequence[str], atmosphere: float) -> dict[str, float]:
@@ -207,27 +206,3 @@ def parse_initial(texts: Sequence[str], atmosphere: float) -> dict[str, float]:
         with refused_as(DataError, f"initial value '{one_line(text)}'", UnitError):
             values[name] = parse_quantity(value, _UNITS[name], atmosphere)
     return values
-
-
-def initial_in_fixed_volume(device: Device, given: Mapping[str, float]) -> dict[str, float]:
-    """Return where the replay of a fixed volume starts beside its pressure, which nothing else touches."""
-    beside = {ANGLE: device.actuator.angle_min, PRESSURE_2: device.supply.atmospheric_pressure}
-    return {**given, **beside}
-
-
-def start_of(measured: Measured, device: Device, given: Mapping[str, float]) -> Start:
-    """Return where the replay of a recording starts; ``given`` values [SI] go before the recording's."""
-    count = samples_at_rest(measured.recording)
-    values = {name: given[name] if name in given else _first(measured, name, count) for name in _UNITS}
-    rate = _first(measured, "angular_velocity", count) if measured.has("angular_velocity") else 0.0
-    angle = float(between_stops(np.array([values[ANGLE]]), device, measured.file)[0])
-    return Start(angle, rate, values[PRESSURE_1], values[PRESSURE_2])
-
-
-def _first(measured: Measured, name: str, count: int) -> float:
-    if not measured.has(name):
-        raise DataError(
-            f"{measured.file}: there is no channel '{name}' to start from; give its initial value, --initial "
-            f'"{_EXAMPLES[name]}"'
-        )
-    return value_at_rest(measured.recording.time[:count], measured.recording[name][:count])

@@ -123,15 +123,6 @@ def test_a_misspelt_input_is_not_passed_over(step: Step) -> None:
     assert "did you mean 'supply_pressure'" in refused(misspelt, device)
 
 
-def test_a_clipped_sensor_is_remarked_on_and_a_vane_at_its_stop_is_not(step: Step) -> None:
-    device, recording = step
-    assert not any("limit" in remark for remark in check_recording(recording, device, "bench.csv").remarks)
-    noise = 2e3 * np.random.default_rng(2).standard_normal(len(recording))
-    clipped = np.minimum(recording["pressure_1"] + noise, 3.0e5)
-    remarks = check_recording(recording.with_channel("pressure_1", clipped, "Pa"), device, "bench.csv").remarks
-    assert any("'pressure_1' stays at exactly its largest value" in remark for remark in remarks)
-
-
 def test_an_angle_far_beyond_the_stops_is_refused_and_noise_at_a_stop_is_not(
     step: Step, agree: Callable[..., Any]
 ) -> None:

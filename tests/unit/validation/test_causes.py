@@ -58,6 +58,15 @@ def clipped(one: Recording) -> Recording:
     return with_channel(one, "pressure_1", np.minimum(one["pressure_1"], 3.0e5))
 
 
+def clipped_low(one: Recording) -> Recording:
+    return with_channel(one, "pressure_2", np.maximum(one["pressure_2"], 2.5e5))
+
+
+def clipped_angle(one: Recording) -> Recording:
+    """A range that ends 2 deg before the stop."""
+    return with_channel(one, "angle", np.minimum(one["angle"], np.radians(128.0)))
+
+
 def with_outliers(one: Recording) -> Recording:
     values = one["pressure_1"].copy()
     values[[40, 80, 150]] += 6.0e4
@@ -85,6 +94,8 @@ def fast_clock(one: Recording) -> Recording:
     [
         (dead, "pressure_2 never changes"),
         (clipped, "pressure_1 is clipped"),
+        (clipped_low, "pressure_2 is clipped"),
+        (clipped_angle, "angle is clipped"),
         (with_outliers, "pressure_1 has 3 isolated outliers, the first at 0.04 s"),
         (swapped, "pressure_1 and pressure_2 seem to be swapped"),
         (reversed_command, "command seems to have the wrong sign"),
@@ -140,6 +151,26 @@ def test_what_sensors_of_any_bench_are_off_by_is_no_disagreement(bench: Recordin
     assert found is not None
     assert found.name == "zero of pressure_2"
     assert found.is_usual
+
+
+def test_errors_of_several_sensors_as_on_any_bench_are_no_disagreement(bench: Recording) -> None:
+    gained = with_channel(bench, "pressure_1", ROOM + 1.003 * (bench["pressure_1"] - ROOM) + 1.5e3)
+    found = causes(with_channel(gained, "pressure_2", bench["pressure_2"] - 1.8e3)).found
+    assert found is not None
+    assert found.name == "several sensors"
+    assert found.is_usual
+
+
+def test_two_mistakes_that_look_like_a_third_are_not_named_as_that(bench: Recording) -> None:
+    """The area of the valve leaves little more than the noise, and a second change explains that."""
+    run = simulate(load_scenario("step-response", ["motion.kind=free", "run.duration=0.2 s"])).recording
+    random, seen = np.random.default_rng(12), bench
+    for name, size in (("angle", 4e-4), ("pressure_1", 100.0), ("pressure_2", 100.0)):
+        seen = with_channel(seen, name, run[name] + size * random.standard_normal(len(run)))
+    wrong = with_channel(seen, "pressure_2", ROOM + 1.007 * (seen["pressure_2"] - ROOM))
+    found = causes(replace(wrong, time=1.005 * wrong.time))
+    assert found.found is None
+    assert found.nearest is not None
 
 
 def test_two_mistakes_at_once_have_no_single_cause_and_the_nearest_is_said(bench: Recording) -> None:

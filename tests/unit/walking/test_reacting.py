@@ -23,11 +23,12 @@ from ppafo.metrics.metric import REACTS
 from ppafo.model.plant import PlantState
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.ensemble.running import lacking
+from ppafo.simulation.recorded import start_of
 from ppafo.simulation.scenario import Scenario
 from ppafo.storage.opensim import opensim_recording
 from ppafo.translation.native import translated_text
 from ppafo.validation.measured import check_recording
-from ppafo.validation.replay import Replay, replay_recording, start_of
+from ppafo.validation.replay import Replay, replay_recording
 from ppafo.walking import load_walk, walk, walk_population
 from ppafo.walking.motion import walk_of, with_duration
 from ppafo.walking.planning import plan_walk
@@ -99,7 +100,7 @@ def test_the_gas_is_that_of_a_vane_which_is_led_along_the_same_ankle() -> None:
     recording = played.recording
     assert recording["angle"].max() - recording["angle"].min() > 0.3, "the foot moves"
     measured = check_recording(recording, scenario.device, "walk")
-    start = start_of(measured, scenario.device, {})
+    start = start_of(recording, scenario.device, {}, "walk", {})
     found = replay_recording(Replay(measured, scenario.device, start, "measured", 0.0)).recording
     for chamber in ("pressure_1", "pressure_2"):
         again = np.interp(recording.time, found.time, found[chamber])

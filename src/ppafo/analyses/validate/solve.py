@@ -38,7 +38,7 @@ from ppafo.validation.measured import (
     parse_thresholds,
     read_measured,
 )
-from ppafo.validation.replay import MOTIONS, Motion, parse_initial
+from ppafo.validation.replay import MOTIONS, parse_initial
 from ppafo.version import __version__
 
 LARGEST_DELAY = 1.0
@@ -59,10 +59,14 @@ class Validation:
 
     @property
     def passes(self) -> bool:
-        """True where every error is within its limit and, without limits given, no cause is found that no bench has."""
-        within = all(recording.passes for recording in self.recordings)
-        found = self.causes.found
-        return within and (self.has_limits or found is None or found.is_usual)
+        """True where every error is within its limit and, without limits given, nothing but what any bench has is left.
+
+        What no single cause explains is a disagreement as one that a cause explains is; of a recorded angle that is
+        followed causes are not searched.
+        """
+        causes = self.causes
+        is_usual = causes.is_noise or (causes.tried == 0 if causes.found is None else causes.found.is_usual)
+        return (self.has_limits or is_usual) and all(recording.passes for recording in self.recordings)
 
     def json_document(self) -> dict[str, Any]:
         """Return errors, causes and recordings as plain data in SI."""
@@ -124,8 +128,12 @@ def validate(
         raise DataError(f"volume of {volume:g} m^3: must be above 0")
     if not 0.0 <= longest_delay <= LARGEST_DELAY:
         raise DataError(f"longest delay of {longest_delay:g} s: must be from 0 to {LARGEST_DELAY:g} s")
+    chosen = next((one for one in MOTIONS if one == motion), None)
+    if chosen is None:
+        near = nearest_name(motion, MOTIONS)
+        raise DataError(f"motion '{one_line(motion)}' is not one of {', '.join(MOTIONS)}{near}")
     settings = ReplaySettings(
-        motion=_motion(motion),
+        motion=chosen,
         initial=parse_initial(initial, device.supply.atmospheric_pressure),
         longest_delay=longest_delay,
         thresholds=parse_thresholds(thresholds),
@@ -134,8 +142,14 @@ def validate(
     if not recordings:
         raise DataError("no recording was given; name at least one .csv or .nc file or result folder")
     column_map = columns if columns is None or isinstance(columns, ColumnMap) else _column_map(str(columns))
-    read = [read_measured(path, device, column_map) for path in recordings]
-    _check_distinct(read)
+    read: list[Measured] = []
+    for path in recordings:
+        measured = read_measured(path, device, column_map)
+        # Given twice, under two names too, a recording would count twice as evidence.
+        same = next((one.file for one in read if one.sha256 == measured.sha256), None)
+        if same is not None:
+            raise DataError(f"{measured.file}: the same recording as {same}; give each once")
+        read.append(measured)
     agreements = []
     for measured in read:
         report(Progress(f"replaying {measured.file}"))
@@ -150,22 +164,6 @@ def validate(
         has_limits=bool(thresholds),
     )
     return finding_of(validation)
-
-
-def _check_distinct(read: Sequence[Measured]) -> None:
-    """Refuse a recording that is given twice, under two names too: it would count twice as evidence."""
-    seen: dict[str, str] = {}
-    for one in read:
-        if one.sha256 in seen:
-            raise DataError(f"{one.file}: the same recording as {seen[one.sha256]}; give each once")
-        seen[one.sha256] = one.file
-
-
-def _motion(text: str) -> Motion:
-    for motion in MOTIONS:
-        if motion == text:
-            return motion
-    raise DataError(f"motion '{one_line(text)}' is not one of {', '.join(MOTIONS)}{nearest_name(text, MOTIONS)}")
 
 
 def _column_map(text: str) -> ColumnMap:
@@ -254,6 +252,15 @@ def finding_of(validation: Validation) -> Finding[Validation]:
     names = recording_names([agreement.file for agreement in validation.recordings])
     kinds = {agreement.measured.kind for agreement in validation.recordings}
     pairs = list(zip(names, validation.recordings, strict=True))
+    said, unmeasured = [verdict(validation)], sorted(kinds - {"measured"})
+    # The verdict must not be read without these.
+    if unmeasured:
+        said.append(
+            f"Not everything here was measured: {', '.join(KIND_WORDS[kind] for kind in unmeasured)}. Agreement with "
+            "such a recording shows how well two models agree, not how well the model agrees with a device."
+        )
+    if validation.overrides:
+        said.append(f"values changed: {', '.join(validation.overrides)}")
     hashes = [(item.file, f"sha256 {item.sha256}") for item in validation.recordings if item.sha256]
     method = (
         f"The model with the valve '{validation.device.valve_name}' was run with the inputs of each recording, from "
@@ -265,7 +272,7 @@ def finding_of(validation: Validation) -> Finding[Validation]:
         name="validate",
         kicker="Validation of a parameter set",
         title=f"{validation.device.name} against {count} recording{'' if count == 1 else 's'}",
-        said=(verdict(validation), *_departures(validation, sorted(kinds - {"measured"}))),
+        said=said,
         parts=(
             Part(said=[method], is_detail=True),
             *(_part(validation, name, agreement) for name, agreement in pairs),
@@ -274,7 +281,10 @@ def finding_of(validation: Validation) -> Finding[Validation]:
         found=validation,
         passed=validation.passes,
         kind=next(iter(kinds)) if len(kinds) == 1 else "measured",
-        files={f"{name}-replayed.csv": partial(_replay_csv, agreement) for name, agreement in pairs},
+        files={
+            f"{name}-replayed.csv": partial(marked_csv_bytes, agreement.model.resample(agreement.measured.time))
+            for name, agreement in pairs
+        },
     )
 
 
@@ -346,25 +356,17 @@ def _cause_data(one: Cause | None) -> dict[str, Any] | None:
     }
 
 
-def _departures(validation: Validation, kinds: Sequence[str]) -> list[str]:
-    """Return what the verdict must not be read without: recordings that nobody measured, values that were changed."""
-    said = []
-    if kinds:
-        said.append(
-            f"Not everything here was measured: {', '.join(KIND_WORDS[kind] for kind in kinds)}. Agreement with "
-            "such a recording shows how well two models agree, not how well the model agrees with a device."
-        )
-    if validation.overrides:
-        said.append(f"values changed: {', '.join(validation.overrides)}")
-    return said
-
-
 def _part(validation: Validation, name: str, agreement: RecordingAgreement) -> Part:
-    kind = KIND_WORDS[agreement.measured.kind]
+    measured, kind = agreement.measured, KIND_WORDS[agreement.measured.kind]
+    late = f"{_MILLISECONDS * agreement.delay.correction:.3g} ms" if agreement.delay.correction else "none found"
+    replayed = (
+        f"{len(measured)} samples over {measured.duration:.4g} s; inputs from the recording: "
+        f"{', '.join(agreement.inputs)}; delay of the measurement: {late}"
+    )
     return Part(
         f"{agreement.file} ({kind})",
         columns_of(_HEAD, map(channel_cells, agreement.channels)),
-        [replay_sentence(agreement)],
+        [replayed],
         remarks=[f"note: {remark}" for remark in agreement.remarks],
         panels=partial(agreement_panels, agreement, validation.device.supply.atmospheric_pressure),
         name=f"{name}-agreement",
@@ -372,20 +374,6 @@ def _part(validation: Validation, name: str, agreement: RecordingAgreement) -> P
         "its RMS value dashed where it is in range.",
         across=_across(agreement),
         size=(7.6 / _across(agreement), 2.1),
-    )
-
-
-def _replay_csv(agreement: RecordingAgreement) -> bytes:
-    return marked_csv_bytes(agreement.model.resample(agreement.measured.time))
-
-
-def replay_sentence(agreement: RecordingAgreement) -> str:
-    """Return how a recording was replayed, as plain words."""
-    measured = agreement.measured
-    late = f"{_MILLISECONDS * agreement.delay.correction:.3g} ms" if agreement.delay.correction else "none found"
-    return (
-        f"{len(measured)} samples over {measured.duration:.4g} s; inputs from the recording: "
-        f"{', '.join(agreement.inputs)}; delay of the measurement: {late}"
     )
 
 
@@ -430,24 +418,23 @@ def _recording_data(agreement: RecordingAgreement) -> dict[str, Any]:
         "delay_is_at_limit": agreement.delay.is_at_limit,
         "passes": agreement.passes,
         "remarks": list(agreement.remarks),
-        "channels": {channel.channel: _channel_data(channel) for channel in agreement.channels},
-    }
-
-
-def _channel_data(channel: ChannelAgreement) -> dict[str, Any]:
-    kind = Kind("", "", COMPARED[channel.channel].quantity)
-    return {
-        "unit": channel.unit,
-        "rms": channel.rms,
-        "rms_share": channel.fraction,
-        "noise": channel.noise,
-        "limit_share": channel.limit,
-        "passes": channel.passes,
-        "full_range": channel.full_range,
-        "variation": channel.variation,
-        "rms_unaligned": channel.rms_unaligned,
-        "bias": channel.bias,
-        "largest": channel.largest,
-        "largest_time": channel.largest_time,
-        "shown": {"unit": kind.shown_unit, "rms": display_value(channel.rms, kind.quantity)},
+        "channels": {
+            channel.channel: {
+                "unit": channel.unit,
+                "rms": channel.rms,
+                "rms_share": channel.fraction,
+                "noise": channel.noise,
+                "limit_share": channel.limit,
+                "passes": channel.passes,
+                "full_range": channel.full_range,
+                "variation": channel.variation,
+                "rms_unaligned": channel.rms_unaligned,
+                "bias": channel.bias,
+                "largest": channel.largest,
+                "largest_time": channel.largest_time,
+                "shown": {"unit": kind.shown_unit, "rms": display_value(channel.rms, kind.quantity)},
+            }
+            for channel in agreement.channels
+            for kind in [Kind("", "", COMPARED[channel.channel].quantity)]
+        },
     }

@@ -10,7 +10,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import numpy as np
 from pydantic import Field
 
 from ppafo.documents.models import NAME, StrictTable, Text, Texts
@@ -37,7 +36,6 @@ from ppafo.identification.trajectory.problem import (
 from ppafo.identification.trajectory.tolerances import stated_by, tolerance_parameters
 from ppafo.identification.wording import in_shown_unit
 from ppafo.parameters import apply_overrides, build_device
-from ppafo.parameters.device import Device
 from ppafo.parameters.overrides import over
 from ppafo.parameters.parameter_set import ParameterSet
 from ppafo.progress import Report
@@ -47,12 +45,9 @@ from ppafo.simulation.recorded import (
     ANGLE,
     COMMAND,
     LONGEST_STEP,
-    Start,
-    between_stops,
     locked_vane,
     replay_scenario,
-    samples_at_rest,
-    value_at_rest,
+    start_of,
     with_fixed_volume,
 )
 from ppafo.simulation.scenario import Scenario
@@ -332,10 +327,9 @@ def _replay(
     angle, volume = quantity_in(item, "locked", "rad", said), positive_in(item, "volume", "m^3", said)
     known = {} if angle is None else {ANGLE: angle}
     if volume is not None:
-        # Without a vane chamber 1 is the volume, and chamber 2 the room.
-        known = {ANGLE: device.actuator.angle_min, "pressure_2": device.supply.atmospheric_pressure}
-        device = with_fixed_volume(device, volume)
-    start = _start_of(used, device, known, said)
+        device, known = with_fixed_volume(device, volume)
+    remedies = dict.fromkeys(FITTED_CHANNELS, "give a scenario, which prescribes the initial state")
+    start = start_of(used, device, known, said, remedies)
     motion = locked_vane(start.angle) if known else None
     return replay_scenario(recording, device, start, used.duration, said, motion), first, inputs
 
@@ -348,26 +342,6 @@ def _compared_channels(item: ExperimentSection) -> tuple[str, ...]:
         return ("pressure_1",)
     is_prescribed = item.locked is not None or ANGLE in (item.inputs or ())
     return FITTED_CHANNELS[1:] if is_prescribed else FITTED_CHANNELS
-
-
-def _start_of(recording: Recording, device: Device, known: Mapping[str, float], said: str) -> Start:
-    """Return the value of the samples at rest, at most 50 ms; the first one where the valve is open from the start."""
-    count = samples_at_rest(recording)
-
-    def first(name: str) -> float:
-        if name in known:
-            return known[name]
-        if name not in recording:
-            raise IdentificationError(
-                f"{said}: there is no channel '{name}' to start from; give a scenario, which prescribes the "
-                "initial state"
-            )
-        return value_at_rest(recording.time[:count], recording[name][:count])
-
-    # The mean of many samples has less noise than the first one.
-    angle, pressure_1, pressure_2 = (first(name) for name in FITTED_CHANNELS)
-    rate = first("angular_velocity") if "angular_velocity" in recording and ANGLE not in known else 0.0
-    return Start(float(between_stops(np.array([angle]), device, said)[0]), rate, pressure_1, pressure_2)
 
 
 @dataclass(frozen=True, slots=True)
