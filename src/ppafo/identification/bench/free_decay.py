@@ -17,10 +17,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.bench.law import Values, solve, sought, tolerance, within
+from ppafo.identification.bench.law import Readings, Values, solve, sought, tolerance, within
 from ppafo.identification.bench.result import BenchResult, Panel, Reported, Series, count_of, result_of
 from ppafo.identification.fit import Free
-from ppafo.identification.source import Source, check_moves, check_no_gap, check_sources, window
+from ppafo.identification.source import Source, check_moves, check_no_gap, check_no_outlier, check_sources, window
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.signals.faults import is_at_limit, noise_of, plateaus
 from ppafo.signals.recording import Floats
@@ -88,7 +88,7 @@ def free_decay(sources: tuple[Source, ...], settings: FreeDecaySettings | None =
         return np.concatenate(parts)
 
     measured = np.concatenate([one for item in decays for one in (item.angle, item.velocity) if one is not None])
-    found, model = solve(law, measured, numbers, _groups(decays), chosen.confidence)
+    found, model = solve(law, Readings(measured, *_labels(decays)), numbers, chosen.confidence)
     reported = (
         Reported(damping, units[0], f"Viscous damping{over_inertia}"),
         Reported(friction, units[1], f"Dynamic friction{over_inertia}"),
@@ -188,17 +188,17 @@ class Decay(NamedTuple):
     velocity: Floats | None
 
 
-def _groups(decays: tuple[Decay, ...]) -> tuple[list[str], list[str]]:
-    """Return a label of the decay, and one of the sensor and whether the vane is still fast, for each reading."""
-    labels, channels = [], []
+def _labels(decays: tuple[Decay, ...]) -> tuple[list[str], list[str], tuple[list[str]]]:
+    """Return sensor, decay, and whether the vane is still fast, for each reading."""
+    sensors, labels, halves = [], [], []
     for number, decay in enumerate(decays, start=1):
         moved = np.abs(decay.angle - decay.angle[0])
         half = int(np.searchsorted(np.maximum.accumulate(moved), 0.5 * float(moved.max())))
         for sensor in (ANGLE,) if decay.velocity is None else (ANGLE, VELOCITY):
-            words = [f"{sensor} in the first half", f"{sensor} in the second half"]
-            channels += [words[0]] * half + [words[1]] * (decay.time.size - half)
+            halves += ["the first half of the way"] * half + ["the second half of the way"] * (decay.time.size - half)
             labels += [f"decay {number}"] * decay.time.size
-    return labels, channels
+            sensors += [sensor] * decay.time.size
+    return sensors, labels, (halves,)
 
 
 def decay_of(source: Source, start: float | None, end: float | None) -> Decay:
@@ -220,6 +220,8 @@ def decay_of(source: Source, start: float | None, end: float | None) -> Decay:
             f"{noise:.3g} rad; push the vane"
         )
     skipped = check_no_gap(source, PROCEDURE, part)
+    for name in (name for name in (ANGLE, VELOCITY) if name in part):
+        check_no_outlier(source, PROCEDURE, name, part)
     velocity, _ = smoothed_rates(part.time, part[ANGLE])
     first = 0 if start is not None else int(np.argmax(np.abs(velocity)))
     sign = 1.0 if velocity[first] > 0.0 else -1.0

@@ -13,8 +13,17 @@ import numpy as np
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.flow import GasAt, Law, Opening, orifice_shape, solve_flow
+from ppafo.identification.bench.law import Readings
 from ppafo.identification.bench.result import BenchResult, Panel, Reported, fitted_panels, result_of
-from ppafo.identification.source import Source, check_absolute, check_moves, check_not_clipped, check_sources, pool
+from ppafo.identification.source import (
+    Source,
+    check_absolute,
+    check_moves,
+    check_no_wrong_reading,
+    check_not_clipped,
+    check_sources,
+    pool,
+)
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.model.gas import critical_pressure_ratio
 from ppafo.signals.recording import Floats
@@ -60,12 +69,13 @@ def open_valve_flow(sources: tuple[Source, ...], settings: OpenValveFlowSettings
             f"{_SPAN:g} or more and go beyond {_SUBSONIC:g}; these go from {ratio.min():.3g} to {ratio.max():.3g}"
         )
     choked = critical_pressure_ratio(settings.gas.heat_capacity_ratio)
+    # The noise of the pressures tells the more in the flow the nearer they are to each other.
+    levels = [_LEVELS[place] for place in np.digitize(ratio, (choked, _NEARLY_EQUAL)).tolist()]
     found, model = solve_flow(
         Opening(settings.gas, settings.law, settings.area or 1.0),
         (size.path, critical),
         dict(zip(CHANNELS, (upstream, downstream), strict=False)),
-        flow,
-        (labels, [_LEVELS[place] for place in np.digitize(ratio, (choked, _NEARLY_EQUAL)).tolist()]),
+        Readings(flow, levels, labels),
         settings.tolerances,
         settings.confidence,
     )
@@ -128,6 +138,8 @@ def open_readings(sources: tuple[Source, ...], gas: GasAt) -> tuple[Floats, Floa
         )
     if np.ptp(flow) <= 0.0:
         check_moves(sources[0], PROCEDURE, "mass_flow")
+    pressures = {name: pool(sources, name) for name in CHANNELS[:2]}
+    check_no_wrong_reading(sources, PROCEDURE, "mass_flow", pressures, is_open)
     labels = [f"recording {number}" for number, one in enumerate(recordings, start=1) for _ in range(len(one))]
     kept = [label for label, is_kept in zip(labels, is_open.tolist(), strict=True) if is_kept]
     return upstream, downstream, np.abs(flow), kept

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.errors import IdentificationError
+from ppafo.identification.bench import law
 from ppafo.identification.bench.law import Values, solve, sought, within
 from ppafo.identification.bench.result import (
     BenchResult,
@@ -28,7 +29,14 @@ from ppafo.identification.bench.result import (
     result_of,
     with_residuals,
 )
-from ppafo.identification.source import Source, check_moves, check_not_clipped, check_sources, pool
+from ppafo.identification.source import (
+    Source,
+    check_moves,
+    check_no_wrong_reading,
+    check_not_clipped,
+    check_sources,
+    pool,
+)
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.signals.recording import Floats
 
@@ -84,13 +92,13 @@ def static_torque(sources: tuple[Source, ...], settings: StaticTorqueSettings | 
         *within(f"gain of the {names.load} sensor", tolerances.gain_of(names.load)),
     )
 
-    def law(at: Values) -> Floats:
+    def shown_torque(at: Values) -> Floats:
         true = (pressure - at["zero of the pressure sensor"]) / (1.0 + at["gain of the pressure sensor"])
         held = branch * (at[names.friction_path] + at[names.growth_path] * np.abs(true))
         shown = (1.0 + at[f"gain of the {names.load} sensor"]) * (at[names.slope_path] * true - held)
         return np.asarray(weight * (shown + at[names.zero_path]))
 
-    found, weighted = solve(law, weight * torque, numbers, _groups(readings), chosen.confidence)
+    found, weighted = solve(shown_torque, _labelled(readings, weight * torque), numbers, chosen.confidence)
     model = weighted / weight
     reported = (
         Reported(names.slope_path, names.slope_unit, f"{names.slope.capitalize()}, the common slope of both branches"),
@@ -141,19 +149,16 @@ def _straight_line(readings: "Readings", names: str) -> tuple[float, float, floa
     return float(slope), float(zero), float(friction), max(abs(float(friction)), deviation)
 
 
-def _groups(readings: "Readings") -> tuple[list[str], list[str]]:
-    """Return a label of branch and half of the pressures and one of the repetition, for each reading.
-
-    Of many repetitions it is the recording and the branch.
-    """
+def _labelled(readings: "Readings", measured: Floats) -> law.Readings:
+    """Return readings with their repetition or, of many repetitions, their recording, their branch and half."""
     branches = np.where(readings.branch > 0.0, "the rising branch", "the falling branch").tolist()
-    # Each group is one more test: of very many none would be significant.
-    if readings.clusters.max() >= _MOST_REPETITIONS:
-        return [f"recording {number + 1}" for number in readings.files.tolist()], branches
     middle = 0.5 * float(readings.pressure.max() + readings.pressure.min())
-    halves = np.where(readings.pressure > middle, "higher", "lower").tolist()
-    levels = [f"{branch} at {half} pressures" for branch, half in zip(branches, halves, strict=True)]
-    return levels, [f"repetition {number + 1}" for number in readings.clusters.tolist()]
+    halves = np.where(readings.pressure > middle, "readings at higher pressures", "readings at lower pressures")
+    # Each group is one more test: of very many none would be significant.
+    is_many = readings.clusters.max() >= _MOST_REPETITIONS
+    numbers, noun = (readings.files, "recording") if is_many else (readings.clusters, "repetition")
+    recordings = [f"{noun} {number + 1}" for number in numbers.tolist()]
+    return law.Readings(measured, [readings.names.load] * len(recordings), recordings, (branches, halves.tolist()))
 
 
 @dataclass(frozen=True, slots=True)
@@ -239,6 +244,8 @@ def readings_of(sources: tuple[Source, ...]) -> Readings:
             )
     pressure, torque, direction = (pool(sources, name) for name in ("pressure_difference", load, "direction"))
     used = direction != 0.0
+    drivers = {"pressure_difference": pressure, "direction": direction}
+    check_no_wrong_reading(sources, PROCEDURE, load, drivers, used)
     # A scale that only pulls shows nothing until friction is overcome: the rising branch then has a flat start, a
     # lowest reading that belongs to two pressures or more, or is nothing at all.
     lowest = torque.min()

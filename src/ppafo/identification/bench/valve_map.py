@@ -15,9 +15,9 @@ import numpy as np
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.flow import GasAt, flow_tolerances, orifice_shape, read_flow, true_pressure
-from ppafo.identification.bench.law import Values, solve, sought
+from ppafo.identification.bench.law import Readings, Values, solve, sought
 from ppafo.identification.bench.result import BenchResult, Panel, Reported, Role, Series, result_of, with_residuals
-from ppafo.identification.source import Source, check_absolute, check_moves, check_sources, pool
+from ppafo.identification.source import Source, check_absolute, check_moves, check_no_wrong_reading, check_sources, pool
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.model.effects.spool_play import spool_position
 from ppafo.signals.recording import Floats
@@ -78,7 +78,7 @@ def valve_map(sources: tuple[Source, ...], settings: ValveMapSettings) -> BenchR
         shape = np.abs(orifice_shape(before, behind, gas.heat_capacity_ratio))
         return read_flow(at, gas, area * gas.choked_flow_constant * shape)
 
-    found, model = solve(law, flow, numbers, _groups(command, branch, highest), settings.confidence)
+    found, model = solve(law, _labelled(sources, branch), numbers, settings.confidence)
     values = dict(zip((one.name for one in numbers), found.values.tolist(), strict=True))
     reported = [
         Reported(band, "", "Command below which nothing flows, in both directions", _SMALL_COMMAND),
@@ -141,6 +141,8 @@ def _areas(sources: tuple[Source, ...], gas: GasAt) -> Floats:
             f"{sources[0].name}: {PROCEDURE}: the command covers a range of only {np.ptp(command):.3g}; "
             f"{_MINIMUM_RANGE:g} or more is needed to identify dead band and gain"
         )
+    drivers = {"command": command, "branch": np.concatenate([_branch(source) for source in sources])}
+    check_no_wrong_reading(sources, PROCEDURE, "mass_flow", drivers, np.ones(flow.size, dtype=bool))
     shape = np.abs(orifice_shape(upstream, downstream, gas.heat_capacity_ratio))
     if not shape.any():
         raise IdentificationError(f"{sources[0].name}: {PROCEDURE}: both pressures are equal throughout")
@@ -162,12 +164,14 @@ def _branch(source: Source) -> Floats:
     return signs[last]
 
 
-def _groups(command: Floats, branch: Floats, highest: float) -> tuple[list[str], list[str]]:
-    """Return a label of side and branch of the command and one of its size, for each reading."""
-    sides = np.where(command > 0.0, "to chamber 1", "to chamber 2")
-    ways = np.where(branch < 0.0, "falling", "rising")
-    sizes = np.where(np.abs(command) > 0.5 * highest, "large commands", "small commands")
-    return [f"{way} commands {side}" for way, side in zip(ways, sides, strict=True)], sizes.tolist()
+def _labelled(sources: tuple[Source, ...], branch: Floats) -> Readings:
+    """Return the flow with its recording, the branch and the side of the command, and whether it is large."""
+    command, flow = pool(sources, "command"), pool(sources, "mass_flow")
+    recordings = [f"recording {number}" for number, one in enumerate(sources, start=1) for _ in one.recording.time]
+    ways = np.where(branch < 0.0, "falling commands", "rising commands").tolist()
+    sides = np.where(command > 0.0, "commands to chamber 1", "commands to chamber 2").tolist()
+    sizes = np.where(np.abs(command) > 0.5 * np.abs(command).max(), "large commands", "small commands").tolist()
+    return Readings(flow, ["mass_flow"] * flow.size, recordings, (ways, sides, sizes))
 
 
 def _panel(command: Floats, branch: Floats, flow: Floats, model: Floats) -> Panel:

@@ -20,7 +20,7 @@ import numpy as np
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.flow import GAS_LAW, TEMPERATURE, GasAt, Law, Opening, gas_tolerances, solve_flow
-from ppafo.identification.bench.law import Values, solve, sought, tolerance, within
+from ppafo.identification.bench.law import Readings, Values, solve, sought, tolerance, within
 from ppafo.identification.bench.result import (
     BenchResult,
     Panel,
@@ -37,6 +37,8 @@ from ppafo.identification.source import (
     check_absolute,
     check_moves,
     check_no_gap,
+    check_no_outlier,
+    check_no_wrong_reading,
     check_not_clipped,
     check_sources,
     pool,
@@ -171,6 +173,8 @@ def closed_chambers(source: Source, settings: VaneLeakSettings) -> ClosedChamber
                     f"sensor is saturated, or the chamber was not yet closed; give start"
                 )
     check_absolute(source, PROCEDURE, CHANNELS)
+    for name in CHANNELS:
+        check_no_outlier(source, PROCEDURE, name, part)
     pair = part["pressure_1"], part["pressure_2"]
     fuller = 1 if np.mean((pair[0] - pair[1])[:EDGE]) > 0.0 else 2
     first, second = pair if fuller == 1 else pair[::-1]
@@ -279,12 +283,13 @@ def _decaying_leak(
         *(one for name in names for one in within(f"zero of {name}", tolerances.zero_of_pressure)),
     )
     measured = np.concatenate([one for item in closed for one in item.fitted])
-    labels, channels = [], []
+    sensors, labels, halves = list[str](), list[str](), list[str]()
     for number, item in enumerate(closed, start=1):
         for name, values in zip(names, item.fitted, strict=False):
             labels += [f"decay {number}"] * values.size
-            channels += [f"{name}, {'early' if is_early else 'late'} in the fall" for is_early in item.is_early]
-    found, model = solve(law, measured, numbers, (labels, channels), settings.confidence)
+            sensors += [name] * values.size
+            halves += ["the early fall" if is_early else "the late fall" for is_early in item.is_early]
+    found, model = solve(law, Readings(measured, sensors, labels, (halves,)), numbers, settings.confidence)
     times = [item.time for item in closed for _ in item.fitted]
     series, place = [Series("measured", np.concatenate(times), measured, "measured")], 0
     for time in times:
@@ -341,6 +346,8 @@ def _steady_leak(sources: tuple[Source, ...], settings: VaneLeakSettings) -> Ben
     for source in sources:
         check_absolute(source, PROCEDURE, CHANNELS)
     first, second, flow = (pool(sources, name) for name in STEADY)
+    everything = np.ones(flow.size, dtype=bool)
+    check_no_wrong_reading(sources, PROCEDURE, "mass_flow", {"first": first, "second": second}, everything)
     difference = first - second
     if float(difference @ flow) <= 0.0:
         raise IdentificationError(
@@ -354,8 +361,7 @@ def _steady_leak(sources: tuple[Source, ...], settings: VaneLeakSettings) -> Ben
         opening,
         (size.path, ""),
         {"pressure_1": first, "pressure_2": second},
-        flow,
-        (labels, [f"flow at {half} pressures" for half in halves]),
+        Readings(flow, ["mass_flow"] * flow.size, labels, ([f"flow at {half} pressures" for half in halves],)),
         settings.tolerances,
         settings.confidence,
     )

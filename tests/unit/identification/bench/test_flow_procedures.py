@@ -161,7 +161,7 @@ def test_flow_with_the_wrong_sign_is_told(planted: ModuleType) -> None:
 def test_a_valve_that_is_open_at_command_zero_is_told(planted: ModuleType) -> None:
     source = planted.sweep()
     command, flow = source.recording["command"].copy(), source.recording["mass_flow"].copy()
-    nearest = int(np.argmin(np.abs(command)))
+    nearest = np.argsort(np.abs(command))[:8]
     command[nearest], flow[nearest] = 0.0, flow.max()
     with pytest.raises(IdentificationError, match="more than half of its largest flow at command 0"):
         valve_map((changed(changed(source, "command", command), "mass_flow", flow),), ValveMapSettings(planted.CO2))
