@@ -11,6 +11,7 @@ Tribology 112, 1990): q, up to T_s / T_c - 1, and w_s are tolerances, as are the
 Without an inertia only beta/I [1/s] and T_c/I [rad/s^2] follow.
 """
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -82,7 +83,7 @@ def free_decay(sources: tuple[Source, ...], settings: FreeDecaySettings | None =
         parts = []
         for number, decay in enumerate(decays):
             start, speed = at[f"start angle {number + 1}"], at[f"start speed {number + 1}"]
-            swept, left = course(decay.time, speed, *rates, at[_RISE], at[_RISE_VELOCITY])
+            swept, left = course(decay.time, speed, *rates, math.expm1(at[_RISE]), at[_RISE_VELOCITY])
             parts.append(start + (1.0 + at[_GAIN]) * decay.sign * swept)
             parts += [] if decay.velocity is None else [decay.sign * left]
         return np.concatenate(parts)
@@ -95,7 +96,7 @@ def free_decay(sources: tuple[Source, ...], settings: FreeDecaySettings | None =
     )
     values = dict(zip((one.name for one in numbers), found.values.tolist(), strict=True))
     rates = values[damping] / inertia, values[friction] / inertia
-    near_rest = values.get(_RISE, 0.0), values.get(_RISE_VELOCITY, 0.0)
+    near_rest = math.expm1(values.get(_RISE, 0.0)), values.get(_RISE_VELOCITY, 0.0)
     at_rest = sum(
         float(decay.time[-1]) > course_times(values[f"start speed {number + 1}"], *rates, *near_rest)[0][-1]
         for number, decay in enumerate(decays)
@@ -129,9 +130,10 @@ def _numbers(
         # deceleration: half of each is a start between the two.
         rates.append((0.5 * speed / swept, 0.25 * speed**2 / swept))
     rate, deceleration = (inertia * float(item) for item in np.median(rates, axis=0))
-    most, usual = settings.rise, _STRIBECK[0]
-    # Between no rise and all of it nothing is known: an even distribution, its width over the root of 12.
-    rise = Free(_RISE, 0.5 * most, 0.0, 2.0 * most, most, most / np.sqrt(12.0)) if most > 0.0 else None
+    most, usual = math.log1p(settings.rise), _STRIBECK[0]
+    # Between no rise and all of it nothing is known, not even the order of magnitude: an even distribution of the
+    # logarithm, its width over the root of 12.
+    rise = Free(_RISE, 0.5 * most, 0.0, 2.0 * most, most, most / math.sqrt(12.0)) if most > 0.0 else None
     return (
         sought(damping, rate, 0.0),
         sought(friction, deceleration, 0.0),
