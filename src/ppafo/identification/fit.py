@@ -107,9 +107,10 @@ class Fit:
     sensors: Mapping[str, Noise]
     jacobian: Floats
 
-    def index(self, name: str) -> int:
-        """Return the place of a number."""
-        return [one.name for one in self.numbers].index(name)
+    @property
+    def by_name(self) -> dict[str, float]:
+        """The numbers by name [SI]."""
+        return dict(zip((one.name for one in self.numbers), self.values.tolist(), strict=True))
 
 
 STATED = "stated limit"

@@ -268,8 +268,11 @@ def _figures(identification: Identification) -> list[Part]:
         panels = partial(trajectory_panels, measurement, model, atmosphere)
         part = _figure(f"trajectory-fit-{label}", f"{label} and the fit.", panels=panels)
         found.append(replace(part, title=label, size=(7.0, 2.0)))
-    both = figure_3(identification.results)
-    return found if both is None else [*found, _figure("figure-3", "Like figure 3 of the paper.", draw=lambda: both)]
+    first = {result.procedure: result for result in reversed(identification.results)}
+    if {"static-torque", "free-decay"} <= first.keys():
+        draw = partial(figure_3, first["static-torque"], first["free-decay"])
+        found.append(_figure("figure-3", "Like figure 3 of the paper.", draw=draw))
+    return found
 
 
 def _figure(name: str, caption: str, **drawn: Any) -> Part:

@@ -19,10 +19,12 @@ import numpy as np
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.law import Readings, Values, solve, sought, tolerance, within
-from ppafo.identification.bench.result import BenchResult, Panel, Reported, Series, count_of, result_of
+from ppafo.identification.bench.result import BenchResult, Reported, count_of, curve_mark, readings_mark, result_of
 from ppafo.identification.fit import Free
 from ppafo.identification.source import Source, check_moves, check_no_gap, check_no_outlier, check_sources, window
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
+from ppafo.report.kind import TIME, Kind
+from ppafo.report.panels import Mark, Panel
 from ppafo.signals.faults import is_at_limit, noise_of, plateaus
 from ppafo.signals.recording import Floats
 
@@ -94,7 +96,7 @@ def free_decay(sources: tuple[Source, ...], settings: FreeDecaySettings | None =
         Reported(damping, units[0], f"Viscous damping{over_inertia}"),
         Reported(friction, units[1], f"Dynamic friction{over_inertia}"),
     )
-    values = dict(zip((one.name for one in numbers), found.values.tolist(), strict=True))
+    values = found.by_name
     rates = values[damping] / inertia, values[friction] / inertia
     near_rest = math.expm1(values.get(_RISE, 0.0)), values.get(_RISE_VELOCITY, 0.0)
     at_rest = sum(
@@ -281,25 +283,25 @@ def _smoothing_width(count: int) -> int:
 def _panels(
     decays: tuple[Decay, ...], model: Floats, rates: tuple[float, float], near_rest: tuple[float, float]
 ) -> tuple[Panel, ...]:
-    angles: list[Series] = []
-    shown: list[Series] = []
-    measured, fitted, place = "measured", "fitted", 0
+    angles, shown, place = list[Mark](), list[Mark](), 0
+    measured, fitted, fastest = "measured", "fitted", 0.0
     for decay in decays:
         count = decay.time.size
-        angles.append(Series(measured, decay.time, decay.angle, "measured"))
-        angles.append(Series(fitted, decay.time, model[place : place + count], "law"))
+        angles.append(readings_mark(measured, decay.time, decay.angle))
+        angles.append(curve_mark(fitted, decay.time, model[place : place + count]))
         place += count if decay.velocity is None else 2 * count
         velocity, acceleration = smoothed_rates(decay.time, decay.sign * decay.angle)
-        moving = velocity > 0.03 * velocity.max()
         inner = slice(_smoothing_width(count), None, max(1, count // 200))
-        shown.append(Series(measured, velocity[inner][moving[inner]], acceleration[inner][moving[inner]], "measured"))
+        moving = velocity[inner] > 0.03 * velocity.max()
+        shown.append(readings_mark(measured, velocity[inner][moving], acceleration[inner][moving]))
+        fastest = max(fastest, float(velocity.max()))
         measured = fitted = ""  # the legend names the first decay only
-    fastest = max((float(series.x.max()) for series in shown if series.x.size), default=1.0)
     line = np.linspace(0.0, fastest, 200)
     rise, velocity_of_rise = near_rest
     more = rise / (1.0 + np.square(line / velocity_of_rise)) if velocity_of_rise > 0.0 else 0.0
-    shown.append(Series("$-\\beta\\omega/I - T_c/I$", line, -rates[0] * line - rates[1] * (1.0 + more), "law"))
+    shown.append(curve_mark("$-\\beta\\omega/I - T_c/I$", line, -rates[0] * line - rates[1] * (1.0 + more)))
+    rate, acceleration_kind = Kind("Angular velocity", "rad/s"), Kind("Angular acceleration", "rad/s$^2$")
     return (
-        Panel("Free decay", "Time", "s", "Angle", "rad", tuple(angles)),
-        Panel("Damping", "Angular velocity", "rad/s", "Angular acceleration", "rad/s^2", tuple(shown)),
+        Panel(TIME, Kind("Angle", "rad", "angle"), angles, "Free decay", legend="inside"),
+        Panel(rate, acceleration_kind, shown, "Damping", legend="inside"),
     )

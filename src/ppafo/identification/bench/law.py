@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ppafo.identification.fit import SAMPLES_PER_COEFFICIENT, Block, Fit, Free, fit
+from ppafo.identification.source import Source
 from ppafo.identification.tolerances import deviation_of_limit
 from ppafo.signals.recording import Floats
 
@@ -52,6 +53,11 @@ class Readings:
     sensors: Sequence[str]
     recordings: Sequence[str]
     groups: tuple[Sequence[str], ...] = ()
+
+
+def recordings_of(sources: tuple[Source, ...]) -> list[str]:
+    """Return what a recording is called, with its file, for each of its readings."""
+    return [f"recording {number} ({one.name})" for number, one in enumerate(sources, 1) for _ in one.recording.time]
 
 
 def solve(

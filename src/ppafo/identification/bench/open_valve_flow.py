@@ -13,8 +13,15 @@ import numpy as np
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.flow import GasAt, Law, Opening, orifice_shape, solve_flow
-from ppafo.identification.bench.law import Readings
-from ppafo.identification.bench.result import BenchResult, Panel, Reported, fitted_panels, result_of
+from ppafo.identification.bench.law import Readings, recordings_of
+from ppafo.identification.bench.result import (
+    BenchResult,
+    Reported,
+    curve_mark,
+    readings_mark,
+    result_of,
+    with_residuals,
+)
 from ppafo.identification.source import (
     Source,
     check_absolute,
@@ -26,6 +33,7 @@ from ppafo.identification.source import (
 )
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.model.gas import critical_pressure_ratio
+from ppafo.report.kind import Kind
 from ppafo.signals.recording import Floats
 
 PROCEDURE = "open-valve-flow"
@@ -79,8 +87,9 @@ def open_valve_flow(sources: tuple[Source, ...], settings: OpenValveFlowSettings
         settings.tolerances,
         settings.confidence,
     )
-    axes = "Downstream over upstream pressure", "-", "Flow over upstream pressure", "kg/(s Pa)"
-    panel = Panel("Open-valve flow", *axes)
+    shown, fitted = (1.0e8 * one / upstream for one in (flow, model))
+    marks = readings_mark("measured", ratio, shown), curve_mark(settings.law, ratio, fitted)
+    axes = Kind("Downstream over upstream pressure"), Kind("Flow over upstream pressure", "g/s per bar")
     others = " or ".join(f"'{item}'" for item in ("orifice", "iso6358", "laminar") if item != settings.law)
     return result_of(
         PROCEDURE,
@@ -90,7 +99,7 @@ def open_valve_flow(sources: tuple[Source, ...], settings: OpenValveFlowSettings
         settings.confidence,
         f"{flow.size} readings at pressure ratios from {ratio.min():.2f} to {ratio.max():.2f}; "
         f"scatter {np.std(flow - model) / largest:.2%} of the largest flow",
-        fitted_panels(panel, settings.law, ratio, flow / upstream, model / upstream),
+        with_residuals("Open-valve flow", *axes, marks, ratio, shown - fitted),
         f"try law = {others}, or leave those readings out",
     )
 
@@ -140,6 +149,5 @@ def open_readings(sources: tuple[Source, ...], gas: GasAt) -> tuple[Floats, Floa
         check_moves(sources[0], PROCEDURE, "mass_flow")
     pressures = {name: pool(sources, name) for name in CHANNELS[:2]}
     check_no_wrong_reading(sources, PROCEDURE, "mass_flow", pressures, is_open)
-    labels = [f"recording {number}" for number, one in enumerate(recordings, start=1) for _ in range(len(one))]
-    kept = [label for label, is_kept in zip(labels, is_open.tolist(), strict=True) if is_kept]
+    kept = [label for label, is_kept in zip(recordings_of(sources), is_open.tolist(), strict=True) if is_kept]
     return upstream, downstream, np.abs(flow), kept

@@ -17,15 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.bench import law
-from ppafo.identification.bench.law import Values, solve, sought, within
+from ppafo.identification.bench.law import Readings, Values, recordings_of, solve, sought, within
 from ppafo.identification.bench.result import (
     BenchResult,
-    Panel,
     Reported,
-    Role,
-    Series,
     count_of,
+    curve_mark,
+    readings_mark,
     result_of,
     with_residuals,
 )
@@ -38,6 +36,7 @@ from ppafo.identification.source import (
     pool,
 )
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
+from ppafo.report.kind import Kind
 from ppafo.signals.recording import Floats
 
 Labels = NDArray[np.int64]
@@ -79,9 +78,9 @@ def static_torque(sources: tuple[Source, ...], settings: StaticTorqueSettings | 
     chosen = settings or StaticTorqueSettings()
     readings = readings_of(sources)
     names, tolerances = readings.names, chosen.tolerances
-    pressure, torque, branch, weight = readings.pressure, readings.torque, readings.branch, readings.weight
+    pressure, torque, branch = readings.pressure, readings.torque, readings.branch
     slope, zero, friction, size = _straight_line(readings, ", ".join(source.name for source in sources))
-    span = float(np.abs(pressure).max())
+    load, span = names.load, float(np.abs(pressure).max())
     numbers = (
         sought(names.slope_path, slope),
         sought(names.friction_path, friction, scale=size),
@@ -89,45 +88,44 @@ def static_torque(sources: tuple[Source, ...], settings: StaticTorqueSettings | 
         sought(names.zero_path, zero, scale=size),
         *within("zero of the pressure sensor", tolerances.zero_of_pressure),
         *within("gain of the pressure sensor", tolerances.gain_of("pressure")),
-        *within(f"gain of the {names.load} sensor", tolerances.gain_of(names.load)),
+        *within(f"gain of the {load} sensor", tolerances.gain_of(load)),
     )
 
-    def shown_torque(at: Values) -> Floats:
+    def law(at: Values) -> Floats:
         true = (pressure - at["zero of the pressure sensor"]) / (1.0 + at["gain of the pressure sensor"])
         held = branch * (at[names.friction_path] + at[names.growth_path] * np.abs(true))
-        shown = (1.0 + at[f"gain of the {names.load} sensor"]) * (at[names.slope_path] * true - held)
-        return np.asarray(weight * (shown + at[names.zero_path]))
+        shown = (1.0 + at[f"gain of the {load} sensor"]) * (at[names.slope_path] * true - held)
+        return np.asarray(readings.weight * (shown + at[names.zero_path]))
 
-    found, weighted = solve(shown_torque, _labelled(readings, weight * torque), numbers, chosen.confidence)
-    model = weighted / weight
+    found, weighted = solve(law, _labelled(readings), numbers, chosen.confidence)
+    left = torque - weighted / readings.weight
     reported = (
         Reported(names.slope_path, names.slope_unit, f"{names.slope.capitalize()}, the common slope of both branches"),
         Reported(names.friction_path, names.unit, f"{names.friction.capitalize()} without a pressure difference"),
         Reported(names.growth_path, f"{names.unit}/Pa", f"Growth of the {names.friction} with the pressure difference"),
-        Reported(names.zero_path, names.unit, f"Zero of the {names.load} sensor", float(np.ptp(torque))),
+        Reported(names.zero_path, names.unit, f"Zero of the {load} sensor", float(np.ptp(torque))),
     )
-    values = found.values.tolist()
-    count = count_of(int(readings.clusters.max()) + 1, "repetition")
+    values = found.by_name
     ends = np.array([pressure.min(), pressure.max()])
-    branches: dict[Role, Mask] = {"rising": branch > 0.0, "falling": branch < 0.0}
-    series = [Series(f"pressure {role}", pressure[on], torque[on], role) for role, on in branches.items()]
-    series.append(Series("nominal", ends, values[0] * ends + values[3], "law"))
-    load = names.load
-    panel = Panel(f"Static {load}", "Pressure difference", "Pa_d", load.capitalize(), names.unit, tuple(series))
+    branches = {"rising": branch > 0.0, "falling": branch < 0.0}
+    marks = [readings_mark(f"pressure {role}", pressure[on], torque[on], role) for role, on in branches.items()]
+    marks.append(curve_mark("nominal", ends, values[names.slope_path] * ends + values[names.zero_path]))
+    axes = Kind("Pressure difference", "Pa_d", "pressure change"), Kind(load.capitalize(), names.unit, load)
     return result_of(
         PROCEDURE,
         sources,
         found,
         reported,
         chosen.confidence,
-        f"{pressure.size} readings, {count}; {names.slope} {values[0]:.4g} {names.slope_unit}, {names.friction} "
-        f"{values[1]:.3g} {names.unit}; scatter {np.std(torque - model):.3g} {names.unit}",
-        with_residuals(panel, pressure, torque - model),
+        f"{pressure.size} readings, {count_of(int(readings.clusters.max()) + 1, 'repetition')}; {names.slope} "
+        f"{values[names.slope_path]:.4g} {names.slope_unit}, {names.friction} {values[names.friction_path]:.3g} "
+        f"{names.unit}; scatter {np.std(left):.3g} {names.unit}",
+        with_residuals(f"Static {load}", *axes, marks, pressure, left),
         f"one {names.slope} and a {names.friction} linear in pressure do not describe them",
     )
 
 
-def _straight_line(readings: "Readings", names: str) -> tuple[float, float, float, float]:
+def _straight_line(readings: "Sweeps", names: str) -> tuple[float, float, float, float]:
     """Return rough slope, zero, friction and its size; refuse signs that no device has. ``names`` are the files."""
     columns = (readings.pressure, np.ones_like(readings.pressure), -readings.branch)
     design = np.stack(columns, axis=1)
@@ -149,16 +147,20 @@ def _straight_line(readings: "Readings", names: str) -> tuple[float, float, floa
     return float(slope), float(zero), float(friction), max(abs(float(friction)), deviation)
 
 
-def _labelled(readings: "Readings", measured: Floats) -> law.Readings:
+def _labelled(readings: "Sweeps") -> Readings:
     """Return readings with their repetition or, of many repetitions, their recording, their branch and half."""
     branches = np.where(readings.branch > 0.0, "the rising branch", "the falling branch").tolist()
     middle = 0.5 * float(readings.pressure.max() + readings.pressure.min())
     halves = np.where(readings.pressure > middle, "readings at higher pressures", "readings at lower pressures")
     # Each group is one more test: of very many none would be significant.
     is_many = readings.clusters.max() >= _MOST_REPETITIONS
-    numbers, noun = (readings.files, "recording") if is_many else (readings.clusters, "repetition")
-    recordings = [f"{noun} {number + 1}" for number in numbers.tolist()]
-    return law.Readings(measured, [readings.names.load] * len(recordings), recordings, (branches, halves.tolist()))
+    parts = [f"repetition {number + 1}" for number in readings.clusters.tolist()]
+    return Readings(
+        readings.weight * readings.torque,
+        [readings.names.load] * len(parts),
+        readings.files if is_many else parts,
+        (branches, halves.tolist()),
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,7 +192,7 @@ def names_of(load: str, slides: bool) -> Names:
 
 
 @dataclass(frozen=True, slots=True)
-class Readings:
+class Sweeps:
     """Readings of both branches: pressure difference [Pa], load [N m or N], branch (+1, -1), repetition, recording.
 
     ``weight`` is one over the noise of each, 1 for a usual reading: the mean of many samples has less.
@@ -201,7 +203,7 @@ class Readings:
     branch: Floats
     weight: Floats
     clusters: Labels
-    files: Labels
+    files: list[str]
     names: Names
 
 
@@ -227,7 +229,7 @@ def _swept(source: Source, name: str) -> float:
     return abs(float(np.sum((direction[1:] * np.diff(source.recording[name]))[within]))) / sweeps
 
 
-def readings_of(sources: tuple[Source, ...]) -> Readings:
+def readings_of(sources: tuple[Source, ...]) -> Sweeps:
     """Return the readings of all recordings; IdentificationError where they cannot separate slope from friction."""
     is_force = bool(sources) and all(_FORCE in one.recording and _TORQUE not in one.recording for one in sources)
     load = _FORCE if is_force else _TORQUE
@@ -292,7 +294,10 @@ def readings_of(sources: tuple[Source, ...]) -> Readings:
     names = names_of(load, slides(sources))
     # The mean of n samples has the noise of one over sqrt(n).
     weight = np.sqrt(counts / counts.mean())
-    return Readings(pressure, torque, direction[first], weight, clusters[first], files[first], names)
+    labels = [label for label, is_used in zip(recordings_of(sources), used.tolist(), strict=True) if is_used]
+    return Sweeps(
+        pressure, torque, direction[first], weight, clusters[first], [labels[one] for one in first.tolist()], names
+    )
 
 
 def _runs(pressure: Floats, labels: NDArray[np.float64]) -> Labels:

@@ -15,11 +15,19 @@ import numpy as np
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.flow import GasAt, flow_tolerances, orifice_shape, read_flow, true_pressure
-from ppafo.identification.bench.law import Readings, Values, solve, sought
-from ppafo.identification.bench.result import BenchResult, Panel, Reported, Role, Series, result_of, with_residuals
+from ppafo.identification.bench.law import Readings, Values, recordings_of, solve, sought
+from ppafo.identification.bench.result import (
+    BenchResult,
+    Reported,
+    curve_mark,
+    readings_mark,
+    result_of,
+    with_residuals,
+)
 from ppafo.identification.source import Source, check_absolute, check_moves, check_no_wrong_reading, check_sources, pool
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.model.effects.spool_play import spool_position
+from ppafo.report.kind import Kind
 from ppafo.signals.recording import Floats
 
 PROCEDURE = "valve-map"
@@ -79,7 +87,7 @@ def valve_map(sources: tuple[Source, ...], settings: ValveMapSettings) -> BenchR
         return read_flow(at, gas, area * gas.choked_flow_constant * shape)
 
     found, model = solve(law, _labelled(sources, branch), numbers, settings.confidence)
-    values = dict(zip((one.name for one in numbers), found.values.tolist(), strict=True))
+    values = found.by_name
     reported = [
         Reported(band, "", "Command below which nothing flows, in both directions", _SMALL_COMMAND),
         Reported(_GAIN, "m^2", "Effective area Cd A per command beyond the dead band"),
@@ -88,6 +96,12 @@ def valve_map(sources: tuple[Source, ...], settings: ValveMapSettings) -> BenchR
         reported.append(Reported(_SATURATION, "", "Command from which the valve opens no further"))
     if is_two_way:
         reported.append(Reported(_PLAY, "", "Width between a rising and a falling command", _SMALL_COMMAND))
+    marks = []
+    for role, sign in (("rising", 1.0), ("falling", -1.0)):
+        on = branch == sign
+        if on.any():
+            marks.append(readings_mark(f"command {role}", command[on], flow[on], role))
+            marks.append(curve_mark("fitted" if sign > 0 else "", command[on], model[on]))
     ways = bool((command > 0.1).any() and (command < -0.1).any())
     one_way = "only one direction was recorded: whether the other behaves the same is unknown"
     return result_of(
@@ -98,7 +112,7 @@ def valve_map(sources: tuple[Source, ...], settings: ValveMapSettings) -> BenchR
         settings.confidence,
         f"{command.size} readings; dead band {values[band]:.3g}, {values[_GAIN] * 1e6:.4g} mm^2 per command; "
         f"scatter {np.std(flow - model) / np.abs(flow).max():.2%} of the largest flow",
-        with_residuals(_panel(command, branch, flow, model), command, flow - model),
+        with_residuals("Valve map", Kind("Command"), Kind("Flow", "kg/s", "mass flow"), marks, command, flow - model),
         "the opening is not the same in both directions, or not linear in the command",
         () if ways else (one_way,),
     )
@@ -167,19 +181,7 @@ def _branch(source: Source) -> Floats:
 def _labelled(sources: tuple[Source, ...], branch: Floats) -> Readings:
     """Return the flow with its recording, the branch and the side of the command, and whether it is large."""
     command, flow = pool(sources, "command"), pool(sources, "mass_flow")
-    recordings = [f"recording {number}" for number, one in enumerate(sources, start=1) for _ in one.recording.time]
     ways = np.where(branch < 0.0, "falling commands", "rising commands").tolist()
     sides = np.where(command > 0.0, "commands to chamber 1", "commands to chamber 2").tolist()
     sizes = np.where(np.abs(command) > 0.5 * np.abs(command).max(), "large commands", "small commands").tolist()
-    return Readings(flow, ["mass_flow"] * flow.size, recordings, (ways, sides, sizes))
-
-
-def _panel(command: Floats, branch: Floats, flow: Floats, model: Floats) -> Panel:
-    series = []
-    branches: dict[Role, float] = {"rising": 1.0, "falling": -1.0}
-    for role, sign in branches.items():
-        on = branch == sign
-        if on.any():
-            series.append(Series(f"command {role}", command[on], flow[on], role))
-            series.append(Series("fitted" if sign > 0 else "", command[on], model[on], "law"))
-    return Panel("Valve map", "Command", "-", "Flow", "kg/s", tuple(series))
+    return Readings(flow, ["mass_flow"] * flow.size, recordings_of(sources), (ways, sides, sizes))

@@ -20,14 +20,13 @@ import numpy as np
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.flow import GAS_LAW, TEMPERATURE, GasAt, Law, Opening, gas_tolerances, solve_flow
-from ppafo.identification.bench.law import Readings, Values, solve, sought, tolerance, within
+from ppafo.identification.bench.law import Readings, Values, recordings_of, solve, sought, tolerance, within
 from ppafo.identification.bench.result import (
     BenchResult,
-    Panel,
     Reported,
-    Series,
     count_of,
-    fitted_panels,
+    curve_mark,
+    readings_mark,
     result_of,
     with_residuals,
 )
@@ -45,6 +44,7 @@ from ppafo.identification.source import (
     window,
 )
 from ppafo.identification.tolerances import DEFAULTS, HELD, Tolerances, deviation_of_limit
+from ppafo.report.kind import TIME, Kind
 from ppafo.signals.faults import plateaus, stands_out
 from ppafo.signals.recording import Floats
 
@@ -291,11 +291,10 @@ def _decaying_leak(
             halves += ["the early fall" if is_early else "the late fall" for is_early in item.is_early]
     found, model = solve(law, Readings(measured, sensors, labels, (halves,)), numbers, settings.confidence)
     times = [item.time for item in closed for _ in item.fitted]
-    series, place = [Series("measured", np.concatenate(times), measured, "measured")], 0
-    for time in times:
-        series.append(Series("" if place else opening.law, time, model[place : place + time.size], "law"))
-        place += time.size
-    panel = Panel("Closed chambers", "Time", "s", "Pressure", "Pa", tuple(series))
+    time, parts = np.concatenate(times), np.split(model, np.cumsum([one.size for one in times])[:-1])
+    marks = [readings_mark("measured", time, measured)]
+    for number, part in enumerate(zip(times, parts, strict=True)):
+        marks.append(curve_mark("" if number else opening.law, *part))
     room = all(item.is_a_room for item in closed)
     remark = (f"the pressure in chamber {3 - fuller} is constant, so it is treated as a room",) if room else ()
     differences = [item.first - item.second for item in closed]
@@ -307,7 +306,7 @@ def _decaying_leak(
         (size,),
         settings.confidence,
         f"{count_of(len(closed), 'decay')} of up to {longest:.3g} s; the pressure difference falls by {fall:.1%}",
-        with_residuals(panel, np.concatenate(times), measured - model),
+        with_residuals("Closed chambers", TIME, Kind("Pressure", "Pa_a", "pressure"), marks, time, measured - model),
         _REMEDY.format("'orifice'" if settings.is_laminar else "'laminar'"),
         remark,
     )
@@ -356,17 +355,19 @@ def _steady_leak(sources: tuple[Source, ...], settings: VaneLeakSettings) -> Ben
     opening, size = settings.opening, settings.size
     # A leak of another law parts low from high pressures.
     halves = np.where(difference > np.median(difference), "higher", "lower")
-    labels = [f"recording {number}" for number, one in enumerate(sources, start=1) for _ in range(len(one.recording))]
     found, model = solve_flow(
         opening,
         (size.path, ""),
         {"pressure_1": first, "pressure_2": second},
-        Readings(flow, ["mass_flow"] * flow.size, labels, ([f"flow at {half} pressures" for half in halves],)),
+        Readings(
+            flow, ["mass_flow"] * flow.size, recordings_of(sources), ([f"flow at {half} pressures" for half in halves],)
+        ),
         settings.tolerances,
         settings.confidence,
     )
     scatter = np.std(flow - model) / float(np.abs(flow).max())
-    panel = Panel("Steady leak", "Pressure difference", "Pa_d", "Flow", "kg/s")
+    marks = readings_mark("measured", difference, flow), curve_mark(opening.law, difference, model)
+    axes = Kind("Pressure difference", "Pa_d", "pressure change"), Kind("Flow", "kg/s", "mass flow")
     return result_of(
         PROCEDURE,
         sources,
@@ -374,6 +375,6 @@ def _steady_leak(sources: tuple[Source, ...], settings: VaneLeakSettings) -> Ben
         (size,),
         settings.confidence,
         f"{flow.size} steady readings; scatter {scatter:.2%} of the largest flow",
-        fitted_panels(panel, opening.law, difference, flow, model),
+        with_residuals("Steady leak", *axes, marks, difference, flow - model),
         _REMEDY.format("'orifice'" if settings.is_laminar else "'laminar'"),
     )
