@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.bench.law import Readings, Values, solve, sought, tolerance, within
+from ppafo.identification.bench.law import Readings, Values, recordings_of, solve, sought, tolerance, within
 from ppafo.identification.bench.result import BenchResult, Reported, count_of, curve_mark, readings_mark, result_of
 from ppafo.identification.fit import Free
 from ppafo.identification.source import Source, check_moves, check_no_gap, check_no_outlier, check_sources, window
@@ -90,8 +90,19 @@ def free_decay(sources: tuple[Source, ...], settings: FreeDecaySettings | None =
             parts += [] if decay.velocity is None else [decay.sign * left]
         return np.concatenate(parts)
 
-    measured = np.concatenate([one for item in decays for one in (item.angle, item.velocity) if one is not None])
-    found, model = solve(law, Readings(measured, *_labels(decays)), numbers, chosen.confidence)
+    series, halves, sensors = list[Floats](), list[str](), list[str]()
+    for decay in decays:
+        moved = np.abs(decay.angle - decay.angle[0])
+        half = int(np.searchsorted(np.maximum.accumulate(moved), 0.5 * float(moved.max())))
+        for sensor, seen in ((ANGLE, decay.angle), (VELOCITY, decay.velocity)):
+            if seen is not None:
+                series.append(seen)
+                sensors += [sensor] * seen.size
+                # A law that is wrong parts the fast from the slow.
+                halves += ["the first half of the way"] * half + ["the second half of the way"] * (seen.size - half)
+    counts = [item.time.size * (1 if item.velocity is None else 2) for item in decays]
+    readings = Readings(np.concatenate(series), sensors, recordings_of(sources, counts), (halves,))
+    found, model = solve(law, readings, numbers, chosen.confidence)
     reported = (
         Reported(damping, units[0], f"Viscous damping{over_inertia}"),
         Reported(friction, units[1], f"Dynamic friction{over_inertia}"),
@@ -190,19 +201,6 @@ class Decay(NamedTuple):
     angle: Floats
     sign: float
     velocity: Floats | None
-
-
-def _labels(decays: tuple[Decay, ...]) -> tuple[list[str], list[str], tuple[list[str]]]:
-    """Return sensor, decay, and whether the vane is still fast, for each reading."""
-    sensors, labels, halves = [], [], []
-    for number, decay in enumerate(decays, start=1):
-        moved = np.abs(decay.angle - decay.angle[0])
-        half = int(np.searchsorted(np.maximum.accumulate(moved), 0.5 * float(moved.max())))
-        for sensor in (ANGLE,) if decay.velocity is None else (ANGLE, VELOCITY):
-            halves += ["the first half of the way"] * half + ["the second half of the way"] * (decay.time.size - half)
-            labels += [f"decay {number}"] * decay.time.size
-            sensors += [sensor] * decay.time.size
-    return sensors, labels, (halves,)
 
 
 def decay_of(source: Source, start: float | None, end: float | None) -> Decay:

@@ -2,7 +2,7 @@
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,9 +55,11 @@ class Readings:
     groups: tuple[Sequence[str], ...] = ()
 
 
-def recordings_of(sources: tuple[Source, ...]) -> list[str]:
-    """Return what a recording is called, with its file, for each of its readings."""
-    return [f"recording {number} ({one.name})" for number, one in enumerate(sources, 1) for _ in one.recording.time]
+def recordings_of(sources: tuple[Source, ...], counts: Iterable[int] = ()) -> list[str]:
+    """Return what a recording is called, with its file, for each of its readings, of which there are ``counts``."""
+    sizes = tuple(counts) or [len(one.recording) for one in sources]
+    pairs = enumerate(zip(sources, sizes, strict=True), start=1)
+    return [label for number, (one, size) in pairs for label in [f"recording {number} ({one.name})"] * size]
 
 
 def solve(

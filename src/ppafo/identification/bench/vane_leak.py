@@ -283,12 +283,12 @@ def _decaying_leak(
         *(one for name in names for one in within(f"zero of {name}", tolerances.zero_of_pressure)),
     )
     measured = np.concatenate([one for item in closed for one in item.fitted])
-    sensors, labels, halves = list[str](), list[str](), list[str]()
-    for number, item in enumerate(closed, start=1):
+    sensors, halves = list[str](), list[str]()
+    for item in closed:
         for name, values in zip(names, item.fitted, strict=False):
-            labels += [f"decay {number}"] * values.size
             sensors += [name] * values.size
             halves += ["the early fall" if is_early else "the late fall" for is_early in item.is_early]
+    labels = recordings_of(sources, [item.time.size * len(item.fitted) for item in closed])
     found, model = solve(law, Readings(measured, sensors, labels, (halves,)), numbers, settings.confidence)
     times = [item.time for item in closed for _ in item.fitted]
     time, parts = np.concatenate(times), np.split(model, np.cumsum([one.size for one in times])[:-1])
