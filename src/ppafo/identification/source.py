@@ -4,7 +4,7 @@ Every refusal names the file and the remedy.
 """
 
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import combinations, product
 from pathlib import Path
@@ -112,10 +112,17 @@ _ALIKE, _FEWEST_ALIKE = 6, 8
 _KINDS: tuple[RecordingKind, ...] = ("synthetic", "simulated", "measured")
 
 
-def check_sources(sources: tuple[Source, ...], procedure: str, channels: Iterable[str], fewest: int) -> None:
+def check_sources(
+    sources: tuple[Source, ...],
+    procedure: str,
+    channels: Iterable[str],
+    fewest: int,
+    moving: Iterable[str] = (),
+    absolute: Iterable[str] = (),
+) -> None:
     """Refuse recordings that lack a channel or have fewer samples than the procedure needs.
 
-    IdentificationError names the recording.
+    A ``moving`` channel must change, an ``absolute`` pressure be above zero. IdentificationError names the recording.
     """
     if not sources:
         raise IdentificationError(f"{procedure}: no recording was given")
@@ -139,6 +146,21 @@ def check_sources(sources: tuple[Source, ...], procedure: str, channels: Iterabl
             raise IdentificationError(
                 f"{source.name}: {procedure} needs at least {fewest} samples, it has {len(recording)}"
             )
+        for name in moving:
+            check_moves(source, procedure, name)
+        for name in absolute:
+            _check_absolute(source, procedure, name)
+
+
+def _check_absolute(source: Source, procedure: str, name: str) -> None:
+    # Gauge pressures, passed for absolute, are 0 or less where the other side is open.
+    values = source.recording[name]
+    low = int(np.argmin(values))
+    if values[low] <= 0.0:
+        raise IdentificationError(
+            f"{source.name}: {procedure}: '{name}' is {_shown(source, name, values[low])} at sample {low + 1}, "
+            "which is not an absolute pressure: use psi_g, bar_g or kPa_g for gauge"
+        )
 
 
 def _shown(source: Source, name: str, value: float) -> str:
@@ -176,21 +198,6 @@ def check_not_clipped(
         )
 
 
-def check_absolute(source: Source, procedure: str, names: Iterable[str]) -> None:
-    """Refuse pressures that are zero or less: they were recorded as gauge.
-
-    IdentificationError names the recording and the channel.
-    """
-    for name in names:
-        values = source.recording[name]
-        low = int(np.argmin(values))
-        if values[low] <= 0.0:
-            raise IdentificationError(
-                f"{source.name}: {procedure}: '{name}' is {_shown(source, name, values[low])} at sample {low + 1}, "
-                "which is not an absolute pressure: use psi_g, bar_g or kPa_g for gauge"
-            )
-
-
 def check_no_outlier(source: Source, procedure: str, name: str, part: Recording) -> None:
     """Refuse samples of a channel that are far off the samples around them, in a part of a recording over time.
 
@@ -211,11 +218,11 @@ def check_no_outlier(source: Source, procedure: str, name: str, part: Recording)
 
 
 def check_no_wrong_reading(
-    sources: tuple[Source, ...], procedure: str, name: str, drivers: Mapping[str, Floats], used: NDArray[np.bool_]
+    sources: tuple[Source, ...], procedure: str, name: str, drivers: Sequence[Floats], used: NDArray[np.bool_]
 ) -> None:
     """Refuse readings of a channel far off the six readings that are nearest in what drives it, such as a typing error.
 
-    ``drivers`` are values by name of the readings of all recordings, ``used`` says which count. No law is needed: off
+    ``drivers`` are values of the readings of all recordings, ``used`` says which count. No law is needed: off
     means by more than 10 times the usual distance, a quarter of the usual range and 3 times the range of those six, of
     which one may be wrong too.
     IdentificationError names the recording, the sample, its value and the median of the six.
@@ -226,8 +233,8 @@ def check_no_wrong_reading(
     if values.size < _FEWEST_ALIKE:
         return
     # By the usual size, not the range, which one wrong reading would stretch.
-    sizes = [float(np.median(np.abs(one[used]))) or 1.0 for one in drivers.values()]
-    points = np.stack([one[used] / size for one, size in zip(drivers.values(), sizes, strict=True)], axis=1)
+    sizes = [float(np.median(np.abs(one[used]))) or 1.0 for one in drivers]
+    points = np.stack([one[used] / size for one, size in zip(drivers, sizes, strict=True)], axis=1)
     _, nearest = cKDTree(points).query(points, k=_ALIKE + 1)
     own = nearest == np.arange(values.size)[:, None]
     # Of more readings in one place a reading may not be among its own nearest.

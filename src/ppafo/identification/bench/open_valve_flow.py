@@ -24,7 +24,6 @@ from ppafo.identification.bench.result import (
 )
 from ppafo.identification.source import (
     Source,
-    check_absolute,
     check_moves,
     check_no_wrong_reading,
     check_not_clipped,
@@ -121,9 +120,8 @@ def open_readings(sources: tuple[Source, ...], gas: GasAt) -> tuple[Floats, Floa
 
     IdentificationError for exchanged pressures and a valve that never was open.
     """
-    check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES)
+    check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES, absolute=CHANNELS[:2])
     for source in sources:
-        check_absolute(source, PROCEDURE, CHANNELS[:2])
         upstream, downstream = (source.recording[name] for name in CHANNELS[:2])
         # A meter that is saturated stays where these pressures would have the flow change.
         driving = orifice_shape(upstream, downstream, gas.heat_capacity_ratio)
@@ -147,7 +145,7 @@ def open_readings(sources: tuple[Source, ...], gas: GasAt) -> tuple[Floats, Floa
         )
     if np.ptp(flow) <= 0.0:
         check_moves(sources[0], PROCEDURE, "mass_flow")
-    pressures = {name: pool(sources, name) for name in CHANNELS[:2]}
+    pressures = [pool(sources, name) for name in CHANNELS[:2]]
     check_no_wrong_reading(sources, PROCEDURE, "mass_flow", pressures, is_open)
     kept = [label for label, is_kept in zip(recordings_of(sources), is_open.tolist(), strict=True) if is_kept]
     return upstream, downstream, np.abs(flow), kept

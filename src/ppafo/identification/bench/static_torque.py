@@ -40,7 +40,6 @@ from ppafo.report.kind import Kind
 from ppafo.signals.recording import Floats
 
 Labels = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 
 PROCEDURE = "static-torque"
 _TORQUE, _FORCE = "torque", "force"
@@ -97,7 +96,13 @@ def static_torque(sources: tuple[Source, ...], settings: StaticTorqueSettings | 
         shown = (1.0 + at[f"gain of the {load} sensor"]) * (at[names.slope_path] * true - held)
         return np.asarray(readings.weight * (shown + at[names.zero_path]))
 
-    found, weighted = solve(law, _labelled(readings), numbers, chosen.confidence)
+    middle = 0.5 * float(pressure.max() + pressure.min())
+    groups = (
+        np.where(branch > 0.0, "the rising branch", "the falling branch").tolist(),
+        np.where(pressure > middle, "readings at higher pressures", "readings at lower pressures").tolist(),
+    )
+    labelled = Readings(readings.weight * torque, [load] * torque.size, readings.recordings, groups)
+    found, weighted = solve(law, labelled, numbers, chosen.confidence)
     left = torque - weighted / readings.weight
     reported = (
         Reported(names.slope_path, names.slope_unit, f"{names.slope.capitalize()}, the common slope of both branches"),
@@ -117,7 +122,7 @@ def static_torque(sources: tuple[Source, ...], settings: StaticTorqueSettings | 
         found,
         reported,
         chosen.confidence,
-        f"{pressure.size} readings, {count_of(int(readings.clusters.max()) + 1, 'repetition')}; {names.slope} "
+        f"{pressure.size} readings, {count_of(readings.repetitions, 'repetition')}; {names.slope} "
         f"{values[names.slope_path]:.4g} {names.slope_unit}, {names.friction} {values[names.friction_path]:.3g} "
         f"{names.unit}; scatter {np.std(left):.3g} {names.unit}",
         with_residuals(f"Static {load}", *axes, marks, pressure, left),
@@ -145,22 +150,6 @@ def _straight_line(readings: "Sweeps", names: str) -> tuple[float, float, float,
             "reverse the sign of channel 'direction'"
         )
     return float(slope), float(zero), float(friction), max(abs(float(friction)), deviation)
-
-
-def _labelled(readings: "Sweeps") -> Readings:
-    """Return readings with their repetition or, of many repetitions, their recording, their branch and half."""
-    branches = np.where(readings.branch > 0.0, "the rising branch", "the falling branch").tolist()
-    middle = 0.5 * float(readings.pressure.max() + readings.pressure.min())
-    halves = np.where(readings.pressure > middle, "readings at higher pressures", "readings at lower pressures")
-    # Each group is one more test: of very many none would be significant.
-    is_many = readings.clusters.max() >= _MOST_REPETITIONS
-    parts = [f"repetition {number + 1}" for number in readings.clusters.tolist()]
-    return Readings(
-        readings.weight * readings.torque,
-        [readings.names.load] * len(parts),
-        readings.files if is_many else parts,
-        (branches, halves.tolist()),
-    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,17 +182,18 @@ def names_of(load: str, slides: bool) -> Names:
 
 @dataclass(frozen=True, slots=True)
 class Sweeps:
-    """Readings of both branches: pressure difference [Pa], load [N m or N], branch (+1, -1), repetition, recording.
+    """Readings of both branches: pressure difference [Pa], load [N m or N], branch (+1, -1).
 
-    ``weight`` is one over the noise of each, 1 for a usual reading: the mean of many samples has less.
+    ``weight`` is one over the noise of each, 1 for a usual reading: the mean of many samples has less. ``recordings``
+    are labels of the repetition or, of many repetitions, the recording.
     """
 
     pressure: Floats
     torque: Floats
     branch: Floats
     weight: Floats
-    clusters: Labels
-    files: list[str]
+    recordings: list[str]
+    repetitions: int
     names: Names
 
 
@@ -233,9 +223,8 @@ def readings_of(sources: tuple[Source, ...]) -> Sweeps:
     """Return the readings of all recordings; IdentificationError where they cannot separate slope from friction."""
     is_force = bool(sources) and all(_FORCE in one.recording and _TORQUE not in one.recording for one in sources)
     load = _FORCE if is_force else _TORQUE
-    check_sources(sources, PROCEDURE, (load, "pressure_difference", "direction"), 1)
+    check_sources(sources, PROCEDURE, (load, "pressure_difference", "direction"), 1, moving=(load,))
     for source in sources:
-        check_moves(source, PROCEDURE, load)
         check_not_clipped(source, PROCEDURE, load, "pressure_difference", source.recording["pressure_difference"])
         values = source.recording["direction"]
         wrong = np.flatnonzero(~np.isin(values, (-1.0, 0.0, 1.0)))
@@ -246,8 +235,7 @@ def readings_of(sources: tuple[Source, ...]) -> Sweeps:
             )
     pressure, torque, direction = (pool(sources, name) for name in ("pressure_difference", load, "direction"))
     used = direction != 0.0
-    drivers = {"pressure_difference": pressure, "direction": direction}
-    check_no_wrong_reading(sources, PROCEDURE, load, drivers, used)
+    check_no_wrong_reading(sources, PROCEDURE, load, (pressure, direction), used)
     # A scale that only pulls shows nothing until friction is overcome: the rising branch then has a flat start, a
     # lowest reading that belongs to two pressures or more, or is nothing at all.
     lowest = torque.min()
@@ -280,24 +268,36 @@ def readings_of(sources: tuple[Source, ...]) -> Sweeps:
     for source in sources:
         driving = source.recording[load]
         check_not_clipped(source, PROCEDURE, "pressure_difference", load, driving, _MORE_THAN_FRICTION)
+    return _one_a_stroke(sources, used, pressure, torque, direction, names_of(load, slides(sources)))
+
+
+def _one_a_stroke(
+    sources: tuple[Source, ...],
+    used: NDArray[np.bool_],
+    pressure: Floats,
+    torque: Floats,
+    direction: Floats,
+    names: Names,
+) -> Sweeps:
+    """Return one reading for the samples of a stroke; ``used`` says which samples of all recordings the others are."""
     # A repetition of a recording is one cluster; so is a recording without repetitions.
-    recordings = [source.recording for source in sources]
-    files = np.concatenate([np.full(len(one), number) for number, one in enumerate(recordings)])[used]
-    repetitions = [one["repetition"] if "repetition" in one else np.zeros(len(one)) for one in recordings]
-    pairs = np.stack([files, np.concatenate(repetitions)[used]])
-    _, clusters = np.unique(pairs, axis=1, return_inverse=True)
-    clusters = clusters.reshape(-1)
+    parts = [(number, one.recording) for number, one in enumerate(sources)]
+    files = np.concatenate([np.full(len(one), number) for number, one in parts])[used]
+    strokes = [one["repetition"] if "repetition" in one else np.zeros(len(one)) for _, one in parts]
+    pairs = np.stack([files, np.concatenate(strokes)[used]])
+    clusters = np.unique(pairs, axis=1, return_inverse=True)[1].reshape(-1)
     runs = _runs(pressure, np.stack([direction, clusters]))
     counts = np.bincount(runs)
     first = np.concatenate(([0], np.cumsum(counts)[:-1]))
     pressure, torque = (np.bincount(runs, weights=values) / counts for values in (pressure, torque))
-    names = names_of(load, slides(sources))
     # The mean of n samples has the noise of one over sqrt(n).
-    weight = np.sqrt(counts / counts.mean())
-    labels = [label for label, is_used in zip(recordings_of(sources), used.tolist(), strict=True) if is_used]
-    return Sweeps(
-        pressure, torque, direction[first], weight, clusters[first], [labels[one] for one in first.tolist()], names
-    )
+    weight, repetitions = np.sqrt(counts / counts.mean()), int(clusters.max()) + 1
+    labels = [f"repetition {number + 1}" for number in clusters.tolist()]
+    # Each group is one more test: of very many none would be significant.
+    if repetitions > _MOST_REPETITIONS:
+        labels = [label for label, is_used in zip(recordings_of(sources), used.tolist(), strict=True) if is_used]
+    recordings = [labels[one] for one in first.tolist()]
+    return Sweeps(pressure, torque, direction[first], weight, recordings, repetitions, names)
 
 
 def _runs(pressure: Floats, labels: NDArray[np.float64]) -> Labels:

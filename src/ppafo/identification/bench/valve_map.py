@@ -24,7 +24,7 @@ from ppafo.identification.bench.result import (
     result_of,
     with_residuals,
 )
-from ppafo.identification.source import Source, check_absolute, check_moves, check_no_wrong_reading, check_sources, pool
+from ppafo.identification.source import Source, check_no_wrong_reading, check_sources, pool
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.model.effects.spool_play import spool_position
 from ppafo.report.kind import Kind
@@ -86,7 +86,13 @@ def valve_map(sources: tuple[Source, ...], settings: ValveMapSettings) -> BenchR
         shape = np.abs(orifice_shape(before, behind, gas.heat_capacity_ratio))
         return read_flow(at, gas, area * gas.choked_flow_constant * shape)
 
-    found, model = solve(law, _labelled(sources, branch), numbers, settings.confidence)
+    groups = (
+        np.where(branch < 0.0, "falling commands", "rising commands").tolist(),
+        np.where(command > 0.0, "commands to chamber 1", "commands to chamber 2").tolist(),
+        np.where(np.abs(command) > 0.5 * highest, "large commands", "small commands").tolist(),
+    )
+    readings = Readings(flow, ["mass_flow"] * flow.size, recordings_of(sources), groups)
+    found, model = solve(law, readings, numbers, settings.confidence)
     values = found.by_name
     reported = [
         Reported(band, "", "Command below which nothing flows, in both directions", _SMALL_COMMAND),
@@ -137,11 +143,8 @@ def spool_of(command: Floats, width: float) -> Floats:
 
 def _areas(sources: tuple[Source, ...], gas: GasAt) -> Floats:
     """Return the effective area [m^2] of each reading; IdentificationError for readings that cannot say it."""
-    check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES)
+    check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES, moving=CHANNELS[:2], absolute=CHANNELS[2:])
     for source in sources:
-        check_moves(source, PROCEDURE, "command")
-        check_moves(source, PROCEDURE, "mass_flow")
-        check_absolute(source, PROCEDURE, CHANNELS[2:])
         command = source.recording["command"]
         wrong = np.flatnonzero(np.abs(command) > 1.0 + 1e-9)
         if wrong.size:
@@ -155,7 +158,7 @@ def _areas(sources: tuple[Source, ...], gas: GasAt) -> Floats:
             f"{sources[0].name}: {PROCEDURE}: the command covers a range of only {np.ptp(command):.3g}; "
             f"{_MINIMUM_RANGE:g} or more is needed to identify dead band and gain"
         )
-    drivers = {"command": command, "branch": np.concatenate([_branch(source) for source in sources])}
+    drivers = command, np.concatenate([_branch(source) for source in sources])
     check_no_wrong_reading(sources, PROCEDURE, "mass_flow", drivers, np.ones(flow.size, dtype=bool))
     shape = np.abs(orifice_shape(upstream, downstream, gas.heat_capacity_ratio))
     if not shape.any():
@@ -176,12 +179,3 @@ def _branch(source: Source) -> Floats:
     signs = np.sign(np.diff(source.recording["command"], prepend=source.recording["command"][0]))
     last = np.maximum.accumulate(np.where(signs != 0.0, np.arange(signs.size), 0))
     return signs[last]
-
-
-def _labelled(sources: tuple[Source, ...], branch: Floats) -> Readings:
-    """Return the flow with its recording, the branch and the side of the command, and whether it is large."""
-    command, flow = pool(sources, "command"), pool(sources, "mass_flow")
-    ways = np.where(branch < 0.0, "falling commands", "rising commands").tolist()
-    sides = np.where(command > 0.0, "commands to chamber 1", "commands to chamber 2").tolist()
-    sizes = np.where(np.abs(command) > 0.5 * np.abs(command).max(), "large commands", "small commands").tolist()
-    return Readings(flow, ["mass_flow"] * flow.size, recordings_of(sources), (ways, sides, sizes))

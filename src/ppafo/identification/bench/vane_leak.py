@@ -33,8 +33,6 @@ from ppafo.identification.bench.result import (
 from ppafo.identification.fit import Free
 from ppafo.identification.source import (
     Source,
-    check_absolute,
-    check_moves,
     check_no_gap,
     check_no_outlier,
     check_no_wrong_reading,
@@ -113,7 +111,7 @@ def vane_leak(sources: tuple[Source, ...], settings: VaneLeakSettings) -> BenchR
     """
     if sources and all("mass_flow" in source.recording for source in sources):
         return _steady_leak(sources, settings)
-    check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES)
+    check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES, moving=("pressure_1",), absolute=CHANNELS)
     closed = tuple(closed_chambers(source, settings) for source in sources)
     if len({item.fuller for item in closed}) > 1:
         raise IdentificationError(
@@ -147,23 +145,16 @@ class ClosedChambers(NamedTuple):
         """The pressures [Pa] that are fitted: the one of a room is not."""
         return (self.first,) if self.is_a_room else (self.first, self.second)
 
-    @property
-    def is_early(self) -> list[bool]:
-        """Whether the difference is still in the upper half of its fall, for each sample."""
-        difference = self.first - self.second
-        half = int(np.argmax(difference < 0.5 * (difference[:EDGE].mean() + difference[-EDGE:].mean())))
-        return [place < half for place in range(self.time.size)]
-
 
 def closed_chambers(source: Source, settings: VaneLeakSettings) -> ClosedChambers:
     """Return the chambers of a recording between its start and equal pressures.
 
     IdentificationError where too few samples are left.
     """
-    check_moves(source, PROCEDURE, "pressure_1")
     part = window(source.recording, settings.start, settings.end)
     skipped = check_no_gap(source, PROCEDURE, part)
     for name in CHANNELS:
+        check_no_outlier(source, PROCEDURE, name, part)
         for plateau in plateaus(part[name]):
             # Later plateaus may be the resolution of the sensor, as the pressure hardly falls any more.
             if plateau.first < EDGE and stands_out(part[name], plateau):
@@ -172,9 +163,6 @@ def closed_chambers(source: Source, settings: VaneLeakSettings) -> ClosedChamber
                     f"{plateau.count} samples, up to sample {skipped + plateau.last + 1}, and changes only then: the "
                     f"sensor is saturated, or the chamber was not yet closed; give start"
                 )
-    check_absolute(source, PROCEDURE, CHANNELS)
-    for name in CHANNELS:
-        check_no_outlier(source, PROCEDURE, name, part)
     pair = part["pressure_1"], part["pressure_2"]
     fuller = 1 if np.mean((pair[0] - pair[1])[:EDGE]) > 0.0 else 2
     first, second = pair if fuller == 1 else pair[::-1]
@@ -269,13 +257,7 @@ def _decaying_leak(
     numbers = (
         sought(size.path, _rough_size(closed, opening, constant * gas.temperature / emptied), 0.0),
         *ratio,
-        *(one for number, item in enumerate(closed, start=1) for one in _starts(names, number, item)),
-        *(
-            one
-            for number, item in enumerate(closed, start=1)
-            for name, _ in zip(names, item.fitted, strict=False)
-            for one in within(f"relaxation of {name}, decay {number}", _MOST_RELAXED)
-        ),
+        *(one for number, item in enumerate(closed, start=1) for one in _of_decay(names, number, item)),
         # Of the logarithm of a time, for only its order of magnitude is known.
         Free(_RELAXATION, 0.0, -5.0, math.log(_RELAXED), 1.0, 1.5),
         *gas_tolerances(gas, tolerances),
@@ -285,9 +267,11 @@ def _decaying_leak(
     measured = np.concatenate([one for item in closed for one in item.fitted])
     sensors, halves = list[str](), list[str]()
     for item in closed:
+        difference = item.first - item.second
+        half = int(np.argmax(difference < 0.5 * (difference[:EDGE].mean() + difference[-EDGE:].mean())))
         for name, values in zip(names, item.fitted, strict=False):
             sensors += [name] * values.size
-            halves += ["the early fall" if is_early else "the late fall" for is_early in item.is_early]
+            halves += ["the early fall"] * half + ["the late fall"] * (values.size - half)
     labels = recordings_of(sources, [item.time.size * len(item.fitted) for item in closed])
     found, model = solve(law, Readings(measured, sensors, labels, (halves,)), numbers, settings.confidence)
     times = [item.time for item in closed for _ in item.fitted]
@@ -312,16 +296,19 @@ def _decaying_leak(
     )
 
 
-def _starts(names: list[str], number: int, item: ClosedChambers) -> list[Free]:
-    """Return the pressures [Pa] at the start of a decay, sought; of a room it is what was read, to its noise."""
+def _of_decay(names: list[str], number: int, item: ClosedChambers) -> list[Free]:
+    """Return the pressures [Pa] at the start of a decay, sought; of a room it is what was read, to its noise.
+
+    With them what each pressure that is fitted may be off at first [-].
+    """
     found = []
     for name, values in zip(names, (item.first, item.second), strict=True):
         size = max(abs(item.changes[0]), float(np.std(np.diff(values))), 1.0)
-        label, start = f"start of {name}, decay {number}", float(values[:EDGE].mean())
-        found.append(sought(label, start, 1.0, scale=size))
+        found.append(sought(f"start of {name}, decay {number}", float(values[:EDGE].mean()), 1.0, scale=size))
     if item.is_a_room:
-        known, deviation = float(item.second.mean()), max(float(item.second.std()), 1.0)
-        found[1] = replace(found[1], start=known, deviation=deviation)
+        found[1] = replace(found[1], start=float(item.second.mean()), deviation=max(float(item.second.std()), 1.0))
+    for name, _ in zip(names, item.fitted, strict=False):
+        found += within(f"relaxation of {name}, decay {number}", _MOST_RELAXED)
     return found
 
 
@@ -338,15 +325,11 @@ def _rough_size(closed: tuple[ClosedChambers, ...], opening: Opening, rate: floa
 
 def _steady_leak(sources: tuple[Source, ...], settings: VaneLeakSettings) -> BenchResult:
     """Return the leak from flow over pressures; the zero of the flow meter shows where the pressures differ."""
-    check_sources(sources, PROCEDURE, STEADY, _FEWEST_STEADY)
+    check_sources(sources, PROCEDURE, STEADY, _FEWEST_STEADY, moving=("mass_flow",), absolute=CHANNELS)
     for source in sources:
-        check_moves(source, PROCEDURE, "mass_flow")
         check_not_clipped(source, PROCEDURE, "mass_flow", "pressure_1", source.recording["pressure_1"])
-    for source in sources:
-        check_absolute(source, PROCEDURE, CHANNELS)
     first, second, flow = (pool(sources, name) for name in STEADY)
-    everything = np.ones(flow.size, dtype=bool)
-    check_no_wrong_reading(sources, PROCEDURE, "mass_flow", {"first": first, "second": second}, everything)
+    check_no_wrong_reading(sources, PROCEDURE, "mass_flow", (first, second), np.ones(flow.size, dtype=bool))
     difference = first - second
     if float(difference @ flow) <= 0.0:
         raise IdentificationError(
@@ -354,14 +337,13 @@ def _steady_leak(sources: tuple[Source, ...], settings: VaneLeakSettings) -> Ben
         )
     opening, size = settings.opening, settings.size
     # A leak of another law parts low from high pressures.
-    halves = np.where(difference > np.median(difference), "higher", "lower")
+    is_high = difference > np.median(difference)
+    halves = np.where(is_high, "flow at higher pressures", "flow at lower pressures").tolist()
     found, model = solve_flow(
         opening,
         (size.path, ""),
         {"pressure_1": first, "pressure_2": second},
-        Readings(
-            flow, ["mass_flow"] * flow.size, recordings_of(sources), ([f"flow at {half} pressures" for half in halves],)
-        ),
+        Readings(flow, ["mass_flow"] * flow.size, recordings_of(sources), (halves,)),
         settings.tolerances,
         settings.confidence,
     )
