@@ -58,6 +58,7 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
             enumerate(problem.procedure, start=1), key=lambda pair: PROCEDURES.index(pair[1].kind)
         )
     ]
+    # One recording may serve two procedures, which ask it other things, but not one procedure twice.
     found: list[Use] = []
     for kind in PROCEDURES:
         uses = [
@@ -76,6 +77,7 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
     for task in tasks:
         result = run_procedure(task.sources, task.item, Setting(current, valve, task.place, stated))
         results.append(result)
+        # The next procedure leans on what this one found; the new set is made of the old one at the end.
         current = with_estimates(current, result.estimates).parameter_set
     bench = {estimate.path: estimate for estimate in bench_estimates(results)}
     setting = FitSetting(

@@ -154,6 +154,7 @@ def figure_3(torque: BenchResult, decay: BenchResult) -> "Figure":
     """
     panels = []
     for result, panel in ((torque, torque.panels[0]), (decay, decay.panels[1])):
+        # Of a page that shows two kinds of recordings, the mark of the figure would not say which panel is which.
         words = "" if result.kind == "measured" else f", {result.kind}"
         panels.append(replace(panel, title=f"{panel.title}{words}"))
     return _figure(tuple(panels), kind_of((torque.kind, decay.kind)))

@@ -74,6 +74,7 @@ def valve_map(sources: tuple[Source, ...], settings: ValveMapSettings) -> BenchR
     numbers = (
         sought(band, start, 0.0, half, highest),
         sought(_GAIN, 0.5 * largest / (half - start), 0.0),
+        # Just inside the highest command, beyond which no reading changes with it.
         sought(_SATURATION, 0.02 * half + 0.98 * highest, half, highest * (1.0 + 1e-9), highest),
         *((sought(_PLAY, 0.02, 0.0, 0.5, 0.1),) if is_two_way else ()),
         *flow_tolerances(gas, settings.tolerances, names, float(np.abs(flow).max())),
@@ -163,6 +164,7 @@ def _areas(sources: tuple[Source, ...], gas: GasAt) -> Floats:
     shape = np.abs(orifice_shape(upstream, downstream, gas.heat_capacity_ratio))
     if not shape.any():
         raise IdentificationError(f"{sources[0].name}: {PROCEDURE}: both pressures are equal throughout")
+    # Over what the pressures would let pass, so that a supply that sags is no valve that saturates.
     areas = np.where(shape > 0.0, flow / (gas.choked_flow_constant * np.maximum(shape, 1e-3)), 0.0)
     if float(command @ areas) <= 0.0:
         raise IdentificationError(
