@@ -106,6 +106,7 @@ class Fit:
     has_converged: bool
     sensors: Mapping[str, Noise]
     jacobian: Floats
+    confidence: float
 
     @property
     def by_name(self) -> dict[str, float]:
@@ -414,7 +415,10 @@ def _whitened(work: _Work, point: Floats, settled: bool, confidence: float) -> F
     # Samples less what the numbers took: a tolerance that the readings do not move takes none.
     freedom = max(len(left) - float(np.sum(whitened * (whitened @ covariance))), 1.0)
     wide = float(student.ppf(0.5 + 0.5 * confidence, freedom)) * np.sqrt(np.diag(covariance))
-    touching = _touches(work, point, errors @ whitened + np.square(work.prior) * (point - work.mean))
+    # At a bound that the squares would leave a number is no longer free, and no group can move it there.
+    gradient = errors @ whitened + np.square(work.prior) * (point - work.mean)
+    near = 1.0e-6 * np.maximum(1.0, np.abs(point))
+    touching = ((point - work.low < near) & (gradient > 0.0)) | ((work.high - point < near) & (gradient < 0.0))
     names = [one.name for one in work.numbers]
     fractions = np.square(covariance * work.prior) / np.diag(covariance)[:, None]
     return Fit(
@@ -440,6 +444,7 @@ def _whitened(work: _Work, point: Floats, settled: bool, confidence: float) -> F
         has_converged=settled,
         sensors=known,
         jacobian=whitened / work.scale,
+        confidence=confidence,
     )
 
 
@@ -448,12 +453,6 @@ def _cost(work: _Work, left: Floats, point: Floats, linear: _Linear) -> float:
     scaled = (left / linear.noise)[:, None]
     parts = [whiten(scaled[one.rows], Noise(1.0, linear.sensors[one.channel].reflection)) for one in work.blocks]
     return sum(float(np.square(one).sum()) for one in parts) + float(np.square((point - work.mean) * work.prior).sum())
-
-
-def _touches(work: _Work, point: Floats, gradient: Floats) -> Mask:
-    """Return which numbers lie at a bound that the squares would leave."""
-    near = 1.0e-6 * np.maximum(1.0, np.abs(point))
-    return np.asarray(((point - work.low < near) & (gradient > 0.0)) | ((work.high - point < near) & (gradient < 0.0)))
 
 
 def _groups(work: _Work) -> Iterator[tuple[str, list[slice]]]:

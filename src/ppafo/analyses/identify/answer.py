@@ -45,7 +45,7 @@ class Identification:
     def estimates(self) -> tuple[Estimate, ...]:
         """All estimates of all procedures, the trajectory fit's last."""
         fitted = () if self.trajectory is None else self.trajectory.fit.estimates
-        return (*bench_estimates(self.results), *fitted)
+        return (*(item for result in self.results for item in result.estimates), *fitted)
 
     @property
     def is_good(self) -> bool:
@@ -312,8 +312,3 @@ def _trajectory_data(outcome: TrajectoryOutcome) -> dict[str, Any]:
         "remarks": list(outcome.remarks),
         "next_experiments": [plain(item) for item in outcome.expected],
     }
-
-
-def bench_estimates(results: Iterable[BenchResult]) -> list[Estimate]:
-    """Return the estimates of all procedures, in their order."""
-    return [estimate for result in results for estimate in result.estimates]

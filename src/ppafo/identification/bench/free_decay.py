@@ -119,7 +119,6 @@ def free_decay(sources: tuple[Source, ...], settings: FreeDecaySettings | None =
         sources,
         found,
         reported,
-        chosen.confidence,
         f"{count_of(len(decays), 'decay')}, {at_rest} to standstill; beta/I = {rates[0]:.4g} 1/s, T_c/I = "
         f"{rates[1]:.4g} rad/s^2{missing}",
         _panels(decays, model, rates, near_rest),

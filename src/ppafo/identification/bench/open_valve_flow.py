@@ -95,7 +95,6 @@ def open_valve_flow(sources: tuple[Source, ...], settings: OpenValveFlowSettings
         sources,
         found,
         (size, *((Reported(critical, "", "Critical ratio b of ISO 6358"),) if is_standard else ())),
-        settings.confidence,
         f"{flow.size} readings at pressure ratios from {ratio.min():.2f} to {ratio.max():.2f}; "
         f"scatter {np.std(flow - model) / largest:.2%} of the largest flow",
         with_residuals("Open-valve flow", *axes, marks, ratio, shown - fitted),

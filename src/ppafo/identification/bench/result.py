@@ -104,7 +104,6 @@ def result_of(
     sources: tuple[Source, ...],
     found: Fit,
     reported: Sequence[Reported],
-    confidence: float,
     summary: str,
     panels: tuple[Panel, ...],
     remedy: str,
@@ -134,7 +133,7 @@ def result_of(
         elif found.conflict is not None:
             verdict = "holds for this model only"
         origin = tuple(source.trace for source in sources)
-        estimates.append(Estimate(item.path, value, item.unit, low, high, verdict, sentence, origin, confidence))
+        estimates.append(Estimate(item.path, value, item.unit, low, high, verdict, sentence, origin, found.confidence))
     kind, told = kind_of(one.recording.kind for one in sources), (*remarks, *told_of_readings(sources))
     return BenchResult(procedure, summary, tuple(estimates), panels, kind, conflict_in_words(found, remedy), told)
 

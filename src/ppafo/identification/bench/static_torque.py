@@ -121,7 +121,6 @@ def static_torque(sources: tuple[Source, ...], settings: StaticTorqueSettings | 
         sources,
         found,
         reported,
-        chosen.confidence,
         f"{pressure.size} readings, {count_of(readings.repetitions, 'repetition')}; {names.slope} "
         f"{values[names.slope_path]:.4g} {names.slope_unit}, {names.friction} {values[names.friction_path]:.3g} "
         f"{names.unit}; scatter {np.std(left):.3g} {names.unit}",

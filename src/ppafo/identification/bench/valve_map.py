@@ -116,7 +116,6 @@ def valve_map(sources: tuple[Source, ...], settings: ValveMapSettings) -> BenchR
         sources,
         found,
         reported,
-        settings.confidence,
         f"{command.size} readings; dead band {values[band]:.3g}, {values[_GAIN] * 1e6:.4g} mm^2 per command; "
         f"scatter {np.std(flow - model) / np.abs(flow).max():.2%} of the largest flow",
         with_residuals("Valve map", Kind("Command"), Kind("Flow", "kg/s", "mass flow"), marks, command, flow - model),

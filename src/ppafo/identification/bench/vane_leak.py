@@ -184,25 +184,13 @@ _LOWEST = 1.0e-3
 """Difference at the end of a computed fall over that at its start."""
 
 
-class Falls(NamedTuple):
-    """Times [s], pressure difference [Pa], V1/V2 [-] and P1 V1/V2 + P2 [Pa] of two closed chambers."""
+def pressures_of_fall(
+    opening: Opening, size: float, first: float, second: float, ratio: float, rate: float, times: Floats
+) -> tuple[Floats, Floats]:
+    """Return both pressures [Pa] at times [s] as their difference falls; no gas is lost to the outside.
 
-    time: Floats
-    difference: Floats
-    ratio: float
-    conserved: float
-
-    def pressures(self, times: Floats) -> tuple[Floats, Floats]:
-        """Return both pressures [Pa] at times [s]; no gas is lost to the outside."""
-        difference = np.exp(np.interp(times, self.time, np.log(self.difference)))
-        second = (self.conserved - self.ratio * difference) / (1.0 + self.ratio)
-        return second + difference, second
-
-
-def fall_of_difference(opening: Opening, size: float, first: float, second: float, ratio: float, rate: float) -> Falls:
-    """Return times [s] and the difference [Pa] as it falls from two pressures [Pa] to a thousandth.
-
-    ``size`` is the size of the opening, ``ratio`` V1/V2 [-], 0 beside a room, ``rate`` R T / V1 [Pa/kg].
+    ``size`` is the size of the opening, ``first`` and ``second`` are the pressures [Pa] at the start, ``ratio`` is
+    V1/V2 [-], 0 beside a room, ``rate`` R T / V1 [Pa/kg].
     """
     start, conserved = max(first - second, 1.0), ratio * first + second
     # Even in the logarithm, as a laminar fall is in time.
@@ -212,8 +200,10 @@ def fall_of_difference(opening: Opening, size: float, first: float, second: floa
     flow = opening.flow(max(size, 1.0e-300), 0.0, lower + difference, lower)
     slowness = difference / np.maximum((1.0 + ratio) * rate * flow, 1.0e-300)
     steps = 0.5 * (slowness[1:] + slowness[:-1]) * np.diff(logs)
-    times = np.concatenate(([0.0], np.cumsum(steps)))
-    return Falls(time=times, difference=difference, ratio=ratio, conserved=conserved)
+    known = np.concatenate(([0.0], np.cumsum(steps)))
+    left = np.exp(np.interp(times, known, np.log(difference)))
+    end = (conserved - ratio * left) / (1.0 + ratio)
+    return end + left, end
 
 
 def _decaying_leak(
@@ -240,9 +230,9 @@ def _decaying_leak(
         for number, item in enumerate(closed, start=1):
             first, second = (at[f"start of {name}, decay {number}"] for name in names)
             ratio = 0.0 if item.is_a_room else at[_RATIO]
-            falls = fall_of_difference(opening, at[size.path], first, second, ratio, rate)
+            falls = pressures_of_fall(opening, at[size.path], first, second, ratio, rate, item.time)
             faded = np.exp(-item.time / lasting)
-            for name, true, _ in zip(names, falls.pressures(item.time), item.fitted, strict=False):
+            for name, true, _ in zip(names, falls, item.fitted, strict=False):
                 parts.append(true * (1.0 + at[f"relaxation of {name}, decay {number}"] * faded) + at[f"zero of {name}"])
         return np.concatenate(parts)
 
@@ -288,7 +278,6 @@ def _decaying_leak(
         sources,
         found,
         (size,),
-        settings.confidence,
         f"{count_of(len(closed), 'decay')} of up to {longest:.3g} s; the pressure difference falls by {fall:.1%}",
         with_residuals("Closed chambers", TIME, Kind("Pressure", "Pa_a", "pressure"), marks, time, measured - model),
         _REMEDY.format("'orifice'" if settings.is_laminar else "'laminar'"),
@@ -355,7 +344,6 @@ def _steady_leak(sources: tuple[Source, ...], settings: VaneLeakSettings) -> Ben
         sources,
         found,
         (size,),
-        settings.confidence,
         f"{flow.size} steady readings; scatter {scatter:.2%} of the largest flow",
         with_residuals("Steady leak", *axes, marks, difference, flow - model),
         _REMEDY.format("'orifice'" if settings.is_laminar else "'laminar'"),

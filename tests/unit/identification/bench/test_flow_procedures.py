@@ -17,7 +17,7 @@ from ppafo.identification.bench import (
     vane_leak,
 )
 from ppafo.identification.bench.flow import GasAt, Opening, iso6358_shape, orifice_shape
-from ppafo.identification.bench.vane_leak import fall_of_difference
+from ppafo.identification.bench.vane_leak import pressures_of_fall
 from ppafo.identification.fit import burg
 from ppafo.identification.source import Source
 from ppafo.model.orifice import isentropic_flow_function, iso6358_flow_function
@@ -265,7 +265,7 @@ def test_a_leak_in_the_form_of_the_standard_gives_its_conductance(planted: Modul
 def test_choked_outflow_of_one_chamber_into_a_room_is_an_exponential_of_the_pressure(planted: ModuleType) -> None:
     opening = Opening(planted.CO2, "orifice", 1.0 / planted.CO2.choked_flow_constant)
     time = np.linspace(0.0, 3.0, 50)
-    first, _ = fall_of_difference(opening, 0.2, 1e6, 1e5, 0.0, 1.0).pressures(time)
+    first, _ = pressures_of_fall(opening, 0.2, 1e6, 1e5, 0.0, 1.0, time)
     assert np.allclose(first, 1e6 * np.exp(-0.2 * time), rtol=1e-4)
 
 
