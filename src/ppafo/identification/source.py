@@ -161,6 +161,20 @@ def _check_absolute(source: Source, procedure: str, name: str) -> None:
             f"{source.name}: {procedure}: '{name}' is {_shown(source, name, values[low])} at sample {low + 1}, "
             "which is not an absolute pressure: use psi_g, bar_g or kPa_g for gauge"
         )
+    check_not_alone(source, procedure, name)
+
+
+def check_not_alone(source: Source, procedure: str, name: str) -> None:
+    """Refuse a value that lies further beyond all others of its channel than twice their range, and than their size.
+
+    So is a reading of ten times its value in what nothing else drives. IdentificationError names the sample.
+    """
+    values = source.recording[name]
+    order = np.argsort(values)
+    for wrong, others in ((order[-1], order[:-1]), (order[0], order[1:][::-1])):
+        away = abs(float(values[wrong] - values[others[-1]])) if others.size >= _FEWEST_ALIKE else 0.0
+        if away > max(2.0 * float(np.ptp(values[others])), float(np.median(np.abs(values)))):
+            _refuse_outlier(source, procedure, name, [int(wrong)], float(values[wrong]), float(values[others[-1]]))
 
 
 def _shown(source: Source, name: str, value: float) -> str:

@@ -31,6 +31,7 @@ from ppafo.identification.source import (
     Source,
     check_moves,
     check_no_wrong_reading,
+    check_not_alone,
     check_not_clipped,
     check_sources,
     pool,
@@ -224,6 +225,7 @@ def readings_of(sources: tuple[Source, ...]) -> Sweeps:
     load = _FORCE if is_force else _TORQUE
     check_sources(sources, PROCEDURE, (load, "pressure_difference", "direction"), 1, moving=(load,))
     for source in sources:
+        check_not_alone(source, PROCEDURE, "pressure_difference")
         check_not_clipped(source, PROCEDURE, load, "pressure_difference", source.recording["pressure_difference"])
         values = source.recording["direction"]
         wrong = np.flatnonzero(~np.isin(values, (-1.0, 0.0, 1.0)))

@@ -98,6 +98,21 @@ def test_a_reading_of_ten_times_its_value_is_named_before_a_fit(
         solved[kind]((changed(source, name, values),))
 
 
+@pytest.mark.parametrize(
+    ("kind", "name"),
+    [("static", "pressure_difference"), ("flow", "upstream_pressure"), ("sweep", "downstream_pressure")],
+)
+def test_a_pressure_of_ten_times_its_value_is_named_before_a_fit(
+    planted: ModuleType, solved: dict[str, Solve], kind: str, name: str
+) -> None:
+    source = made(planted, kind, 5)
+    values = source.recording[name].copy()
+    at = int(np.argsort(values)[values.size // 2])
+    values[at] *= 10.0
+    with pytest.raises(IdentificationError, match=f"'{name}' is .* at sample {at + 1}, where its neighbours are at"):
+        solved[kind]((changed(source, name, values),))
+
+
 def test_two_wrong_readings_are_both_named(planted: ModuleType) -> None:
     source = planted.static()
     torque = source.recording["torque"].copy()
