@@ -198,6 +198,7 @@ class VaneLeakProblem(StrictTable):
             lower, upper, per_angle, dead_1, dead_2 = (setting.number(f"actuator.{name}") for name in names)
             if not lower <= angle <= upper:
                 raise IdentificationError(f"{setting.place}: angle = {self.angle!r} lies beyond the stops of the set")
+            # A volume that is given counts before one from the angle: its line may be another one.
             volumes["volume_1"] = volumes["volume_1"] or dead_1 + per_angle * (angle - lower)
             volumes["volume_2"] = volumes["volume_2"] or dead_2 + per_angle * (upper - angle)
             of_volume = setting.deviation("actuator.dead_volume_1", dead_1, "m^3")
@@ -267,6 +268,7 @@ def run_procedure(sources: tuple[Source, ...], problem: ProcedureProblem, settin
     try:
         return _PROCEDURES[problem.kind](sources, settings)
     except IdentificationError as error:
+        # What is wrong with a file is told by its name, what is wrong with a procedure by its place in the problem.
         if any(str(error).startswith(source.name) for source in sources):
             raise
         raise IdentificationError(f"{setting.place}: {error}") from error
@@ -274,6 +276,7 @@ def run_procedure(sources: tuple[Source, ...], problem: ProcedureProblem, settin
 
 def window_of(problem: ProcedureProblem, setting: Setting) -> tuple[float, float]:
     """Return first and last time [s] that a procedure uses of its recordings."""
+    # Steady readings have no window: each counts by itself.
     if not isinstance(problem, FreeDecayProblem | VaneLeakProblem):
         return -math.inf, math.inf
     first, last = (quantity_in(problem, name, "s", setting.place) for name in ("start", "end"))

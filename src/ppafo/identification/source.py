@@ -4,17 +4,27 @@ Every refusal names the file and the remedy.
 """
 
 import hashlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import combinations, product
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ppafo.errors import IdentificationError, nearest_name
 from ppafo.identification.wording import in_shown_unit
 from ppafo.signals import CHANNELS, Recording, RecordingKind
-from ppafo.signals.faults import FEWEST_AT_LIMIT, is_at_limit, longest_gap, plateaus, scatters
+from ppafo.signals.faults import (
+    FEWEST_AT_LIMIT,
+    is_at_limit,
+    isolated_samples,
+    longest_gap,
+    noise_of,
+    plateaus,
+    scatters,
+)
 from ppafo.signals.recording import Floats
 from ppafo.storage.files import read_bytes
 
@@ -93,13 +103,26 @@ _SHARE_THAT_IS_CLIPPED = 0.05
 _FEWEST_CLIPPED = 4
 _FRACTION_THAT_MOVES = 0.02
 _LARGEST_NUMBER = 1.0e12
+_GROSS_SAMPLE, _GROSS_READING = 0.01, 0.25
+"""Shares of the usual range from which a sample over time, by 6 of them, and a reading are grossly wrong."""
+_NO_DECAY = 0.5
+"""Share of the range by which a first sample differs from the next four where it is wrong."""
+_ALIKE, _FEWEST_ALIKE = 6, 8
+"""Readings with which one is compared, and how many there must be."""
 _KINDS: tuple[RecordingKind, ...] = ("synthetic", "simulated", "measured")
 
 
-def check_sources(sources: tuple[Source, ...], procedure: str, channels: Iterable[str], fewest: int) -> None:
+def check_sources(
+    sources: tuple[Source, ...],
+    procedure: str,
+    channels: Iterable[str],
+    fewest: int,
+    moving: Iterable[str] = (),
+    absolute: Iterable[str] = (),
+) -> None:
     """Refuse recordings that lack a channel or have fewer samples than the procedure needs.
 
-    IdentificationError names the recording.
+    A ``moving`` channel must change, an ``absolute`` pressure be above zero. IdentificationError names the recording.
     """
     if not sources:
         raise IdentificationError(f"{procedure}: no recording was given")
@@ -123,6 +146,35 @@ def check_sources(sources: tuple[Source, ...], procedure: str, channels: Iterabl
             raise IdentificationError(
                 f"{source.name}: {procedure} needs at least {fewest} samples, it has {len(recording)}"
             )
+        for name in moving:
+            check_moves(source, procedure, name)
+        for name in absolute:
+            _check_absolute(source, procedure, name)
+
+
+def _check_absolute(source: Source, procedure: str, name: str) -> None:
+    # Gauge pressures, passed for absolute, are 0 or less where the other side is open.
+    values = source.recording[name]
+    low = int(np.argmin(values))
+    if values[low] <= 0.0:
+        raise IdentificationError(
+            f"{source.name}: {procedure}: '{name}' is {_shown(source, name, values[low])} at sample {low + 1}, "
+            "which is not an absolute pressure: use psi_g, bar_g or kPa_g for gauge"
+        )
+    check_not_alone(source, procedure, name)
+
+
+def check_not_alone(source: Source, procedure: str, name: str) -> None:
+    """Refuse a value that lies further beyond all others of its channel than twice their range, and than their size.
+
+    So is a reading of ten times its value in what nothing else drives. IdentificationError names the sample.
+    """
+    values = source.recording[name]
+    order = np.argsort(values)
+    for wrong, others in ((order[-1], order[:-1]), (order[0], order[1:][::-1])):
+        away = abs(float(values[wrong] - values[others[-1]])) if others.size >= _FEWEST_ALIKE else 0.0
+        if away > max(2.0 * float(np.ptp(values[others])), float(np.median(np.abs(values)))):
+            _refuse_outlier(source, procedure, name, [int(wrong)], float(values[wrong]), float(values[others[-1]]))
 
 
 def _shown(source: Source, name: str, value: float) -> str:
@@ -160,19 +212,76 @@ def check_not_clipped(
         )
 
 
-def check_absolute(source: Source, procedure: str, names: Iterable[str]) -> None:
-    """Refuse pressures that are zero or less: they were recorded as gauge.
+def check_no_outlier(source: Source, procedure: str, name: str, part: Recording) -> None:
+    """Refuse samples of a channel that are far off the samples around them, in a part of a recording over time.
 
-    IdentificationError names the recording and the channel.
+    IdentificationError names the recording, the sample, its value and the median of the samples around.
     """
-    for name in names:
-        values = source.recording[name]
-        low = int(np.argmin(values))
-        if values[low] <= 0.0:
-            raise IdentificationError(
-                f"{source.name}: {procedure}: '{name}' is {_shown(source, name, values[low])} at sample {low + 1}, "
-                "which is not an absolute pressure: use psi_g, bar_g or kPa_g for gauge"
-            )
+    values = part[name]
+    # Of samples that stand still the noise is 0, and what moves first among them is no error.
+    noise = max(noise_of(values), _GROSS_SAMPLE * usual_range(values))
+    is_out = isolated_samples(values, noise)
+    # A decay is fast at its start, with no sample before: there only what no decay does is an error.
+    is_out[:2] &= np.abs(values - np.median(values[:5]))[:2] > _NO_DECAY * np.ptp(values)
+    wrong = np.flatnonzero(is_out)
+    if wrong.size:
+        first = int(wrong[0])
+        around = float(np.median(values[max(first - 2, 0) : first + 3]))
+        skipped = int(np.searchsorted(source.recording.time, part.time[0]))
+        _refuse_outlier(source, procedure, name, (wrong + skipped).tolist(), float(values[first]), around)
+
+
+def check_no_wrong_reading(
+    sources: tuple[Source, ...], procedure: str, name: str, drivers: Sequence[Floats], used: NDArray[np.bool_]
+) -> None:
+    """Refuse readings of a channel far off the six readings that are nearest in what drives it, such as a typing error.
+
+    ``drivers`` are values of the readings of all recordings, ``used`` says which count. No law is needed: off
+    means by more than 10 times the usual distance, a quarter of the usual range and 3 times the range of those six, of
+    which one may be wrong too.
+    IdentificationError names the recording, the sample, its value and the median of the six.
+    """
+    from scipy.spatial import cKDTree
+
+    values, places = pool(sources, name)[used], np.flatnonzero(used)
+    if values.size < _FEWEST_ALIKE:
+        return
+    # By the usual size, not the range, which one wrong reading would stretch.
+    sizes = [float(np.median(np.abs(one[used]))) or 1.0 for one in drivers]
+    points = np.stack([one[used] / size for one, size in zip(drivers, sizes, strict=True)], axis=1)
+    _, nearest = cKDTree(points).query(points, k=_ALIKE + 1)
+    own = nearest == np.arange(values.size)[:, None]
+    # Of more readings in one place a reading may not be among its own nearest.
+    own[~own.any(axis=1), -1] = True
+    around = np.sort(values[nearest[~own].reshape(-1, _ALIKE)], axis=1)
+    middle = np.median(around, axis=1)
+    away = np.abs(values - middle)
+    spread = np.minimum(np.ptp(around[:, 1:], axis=1), np.ptp(around[:, :-1], axis=1))
+    least = max(10.0 * float(np.median(away)), _GROSS_READING * usual_range(values))
+    wrong = np.flatnonzero(away > 3.0 * spread + least)
+    if wrong.size:
+        first = int(wrong[np.argmax(away[wrong])])
+        ends = np.cumsum([len(one.recording) for one in sources])
+        at = int(np.searchsorted(ends, places[first], side="right"))
+        begins = int(ends[at]) - len(sources[at].recording)
+        samples = [int(place) - begins for place in places[wrong] if begins <= place < ends[at]]
+        samples.sort(key=lambda one: one != places[first] - begins)
+        _refuse_outlier(sources[at], procedure, name, samples, float(values[first]), float(middle[first]))
+
+
+def usual_range(values: Floats) -> float:
+    """Return how far all values go but the highest and the lowest twentieth, in their unit."""
+    return float(np.subtract(*np.quantile(values, (0.95, 0.05))))
+
+
+def _refuse_outlier(
+    source: Source, procedure: str, name: str, samples: list[int], value: float, around: float
+) -> NoReturn:
+    more = f", and so are samples {', '.join(str(one + 1) for one in samples[1:4])}" if samples[1:] else ""
+    raise IdentificationError(
+        f"{source.name}: {procedure}: '{name}' is {_shown(source, name, value)} at sample {samples[0] + 1}, where its "
+        f"neighbours are at {_shown(source, name, around)}: a wrong reading{more}; correct it or leave it out"
+    )
 
 
 def check_no_gap(source: Source, procedure: str, part: Recording) -> int:

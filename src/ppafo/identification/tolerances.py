@@ -127,6 +127,7 @@ class Tolerances:
         interval that the set states, the limit of ``held``, the default by kind.
         """
         gas_law = None if self.gas_law is None else abs(value) * self.gas_law
+        # What was measured on the day counts before what a set says of any day.
         of_bench = {"gas.temperature": self.gas_temperature, "gas.molar_mass": gas_law}.get(path)
         if of_bench is not None:
             return deviation_of_limit(of_bench)
@@ -164,6 +165,7 @@ def tolerances_of(section: BenchSection | None, file: str) -> Tolerances:
             continue
         said = f"{file}: bench: {name}"
         limit = limits[name] = quantity_of(said, text, unit)
+        # Half of a number on either side is no tolerance of a bench any more, and a misplaced point in most cases.
         if not 0.0 <= limit < math.inf or (unit == "1" and limit > _LARGEST_FRACTION):
             most = f" and at most {_LARGEST_FRACTION:.0%}" if unit == "1" else ""
             raise IdentificationError(f"{said} = '{text}': must be 0 or above{most}")

@@ -199,20 +199,6 @@ def observables(given: RigNumbers, state: RigState, angle: float, added_torque: 
     )
 
 
-def port_node(rig: RigPhysics, node: Node, line_mass: float, line_energy: float) -> Node:
-    """Gas at a port of the valve: in the line, or in the chamber itself where there is none."""
-    if rig.line_volume <= 0.0:
-        return node
-    return gas_node(rig, line_mass, line_energy, rig.line_volume)
-
-
-def into_chamber(given: RigNumbers, port: Node, node: Node, through_valve: Exchange) -> Exchange:
-    """Mass [kg/s] and enthalpy [W] from the line, or from the valve where there is none, into a chamber."""
-    if given.rig.line_volume <= 0.0:
-        return through_valve
-    return orifice_exchange(given.rig, port, node, 1.0, given.line_orifice, 1.0)
-
-
 def side(
     given: RigNumbers, node: Node, regulated: float, line_mass: float, line_energy: float, source: float, vent: float
 ) -> Side:
@@ -223,11 +209,14 @@ def side(
     plant, rig, orifice = given.plant, given.rig, given.valve_orifice
     supply = ambient_node(rig, regulated, rig.supply_temperature)
     room = ambient_node(rig, plant.atmospheric_pressure, rig.wall_temperature)
-    port = port_node(rig, node, line_mass, line_energy)
+    # Without a line its port is the chamber itself.
+    port = node if rig.line_volume <= 0.0 else gas_node(rig, line_mass, line_energy, rig.line_volume)
     supplied = orifice_exchange(rig, supply, port, rig.ports_open * source, orifice, plant.relieving)
     vented = orifice_exchange(rig, port, room, rig.ports_open * vent, orifice, 1.0)
     mass, energy = supplied.mass - vented.mass, supplied.energy - vented.energy
-    into = into_chamber(given, port, node, Exchange(mass, energy))
+    into = Exchange(mass, energy)
+    if rig.line_volume > 0.0:
+        into = orifice_exchange(rig, port, node, 1.0, given.line_orifice, 1.0)
     # Without a line its gas keeps its 0 kg: all that the valve passes enters the chamber, and there is no wall.
     heat = wall_heat(rig, port, rig.line_volume)
     return Side(

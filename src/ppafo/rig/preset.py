@@ -245,6 +245,7 @@ def real_device(device: Device, preset: Preset) -> Device:
             settings[name] = added[name]
     valve = replace(device.valve, settings=settings)
     leak, factor = device.actuator.leak, preset.values["leak.conductance_factor"]
+    # The form of the set is kept, and with it the law of the flow.
     if isinstance(leak, SonicOrifice):
         leak = replace(leak, sonic_conductance=leak.sonic_conductance * factor)
     else:

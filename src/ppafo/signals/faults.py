@@ -127,6 +127,17 @@ def stands_out(values: Floats, plateau: Plateau) -> bool:
     return plateau.count > _EXCEPTIONAL * int(others.max())
 
 
+def isolated_samples(values: Floats, noise: float) -> NDArray[np.bool_]:
+    """Return which samples stand out by themselves, far off the four around them; ``noise`` is a standard deviation.
+
+    They are off the median of five by more than 6 times the noise, and more than 3 times what the four range over.
+    """
+    # Mirrored at the ends, where an outlier would else be three of its own five neighbours.
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(values, 2, mode="reflect"), 5)
+    away = np.abs(values - np.median(around, axis=1))
+    return np.asarray((away > 6.0 * noise) & (away > 3.0 * np.ptp(around[:, [0, 1, 3, 4]], axis=1)))
+
+
 def noise_of(values: Floats) -> float:
     """Return the standard deviation of white noise [unit of the signal], from third differences that are not unusual.
 

@@ -20,7 +20,7 @@ from ppafo.analyses.reproduce.answer import (
 from ppafo.analyses.reproduce.bench import NoEvidence, SyntheticEvidence
 from ppafo.analyses.reproduce.figures import step_response_figure, torque_task_figure
 from ppafo.analyses.reproduce.step_response import Levels
-from ppafo.identification.bench.result import synthetic_figure_3
+from ppafo.identification.bench.result import figure_3
 from ppafo.page.html import bundled, digest
 from ppafo.report.finding import text_of
 from ppafo.report.writing import typeset
@@ -174,7 +174,7 @@ def test_figure_3_on_the_page_says_that_its_slope_is_not_the_reported_one(reprod
 def test_figure_3_says_in_each_panel_that_it_is_synthetic(reproduction: Reproduction) -> None:
     evidence = reproduction.synthetic
     assert isinstance(evidence, SyntheticEvidence)
-    figure = synthetic_figure_3(evidence.torque, evidence.decay)
+    figure = figure_3(evidence.torque, evidence.decay)
     assert all("synthetic" in axes.get_title(loc="left") for axes in figure.axes)
     rising, falling = figure.axes[0].lines[:2]
     assert (rising.get_marker(), falling.get_marker()) == ("x", "o")

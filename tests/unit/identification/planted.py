@@ -4,7 +4,7 @@ import numpy as np
 
 from ppafo.identification.bench.flow import GasAt, Opening, orifice_shape
 from ppafo.identification.bench.valve_map import area_of_command, spool_of
-from ppafo.identification.bench.vane_leak import fall_of_difference
+from ppafo.identification.bench.vane_leak import pressures_of_fall
 from ppafo.identification.source import Source
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import Floats
@@ -87,7 +87,7 @@ def leak(law: str, size: float, ratio: float = 1.3, seed: int = 1, lost: float =
     time = np.arange(0.0, 20.0, 0.05)
     opening = Opening(CO2, "laminar" if law == "laminar" else "orifice")
     rate = CO2.specific_gas_constant * CO2.temperature / volume
-    first, second = fall_of_difference(opening, size, SUPPLY, ROOM, ratio, rate).pressures(time)
+    first, second = pressures_of_fall(opening, size, SUPPLY, ROOM, ratio, rate, time)
     draw = np.random.default_rng(seed)
     first, second = (values + draw.normal(0.0, 300.0, time.size) - lost * time for values in (first, second))
     return source("leak", time, pressure_1=(first, "Pa"), pressure_2=(second, "Pa"))

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +15,6 @@ from ppafo.identification.bench.result import BenchResult, count_of, figure_3, p
 from ppafo.identification.estimate import Estimate
 from ppafo.identification.new_set import NewSet, in_set_unit
 from ppafo.identification.source import kind_of
-from ppafo.identification.trajectory.expected import Expected
 from ppafo.identification.trajectory.fitting import Known, TrajectoryFit
 from ppafo.identification.trajectory.section import TrajectoryOutcome
 from ppafo.identification.wording import in_shown_unit, with_error
@@ -46,7 +45,7 @@ class Identification:
     def estimates(self) -> tuple[Estimate, ...]:
         """All estimates of all procedures, the trajectory fit's last."""
         fitted = () if self.trajectory is None else self.trajectory.fit.estimates
-        return (*bench_estimates(self.results), *fitted)
+        return (*(item for result in self.results for item in result.estimates), *fitted)
 
     @property
     def is_good(self) -> bool:
@@ -62,12 +61,24 @@ class Identification:
 
     def json_document(self) -> dict[str, Any]:
         """Return estimates, checks and the new set as plain data in SI."""
+        procedures = [
+            {
+                "procedure": result.procedure,
+                "summary": result.summary,
+                "recordings_are": result.kind,
+                "estimates": [plain(item) for item in result.estimates],
+                "conflict": result.conflict,
+                "remarks": list(result.remarks),
+            }
+            for result in self.results
+        ]
         return {
             "problem": self.name,
             "started_from": self.before.name,
             "is_good": self.is_good,
-            "procedures": [_procedure_data(result) for result in self.results],
-            **_trajectory_data(self.trajectory),
+            "procedures": procedures,
+            # A problem without a fit has no such key, so that its document says what was asked.
+            **({} if self.trajectory is None else {"trajectory": _trajectory_data(self.trajectory)}),
             "new_set": {
                 "file": f"{self.name}.toml",
                 "identified": list(self.new_set.written),
@@ -99,6 +110,7 @@ def trajectory_panels(measurement: Recording, model: Recording, atmosphere: floa
     circles = {"linestyle": "", "marker": "o", "markersize": 3.6, "markerfacecolor": "none", "markeredgewidth": 0.7}
     for name in (name for name in _CHANNELS if name in measurement):
         kind, look = _CHANNELS[name]
+        # A pressure is shown as gauge of the standard atmosphere.
         above = 0.0 if name == "angle" else atmosphere - STANDARD_ATMOSPHERE
         samples, fitted = (each[name] - above for each in (measurement, model))
         marks = [
@@ -136,19 +148,29 @@ _MINIMUM_DIGITS, _MAXIMUM_DIGITS = 4, 9
 
 def finding_of(identification: Identification) -> Finding[Identification]:
     """Return what was identified in words and tables; passed where recordings agree and the set makes a device."""
-    name, new_set, fitted = identification.name, identification.new_set, identification.trajectory
+    name, new_set, before = identification.name, identification.new_set, identification.before
+    parts = []
+    for result in identification.results:
+        kind = "" if result.kind == "measured" else f" ({result.kind})"
+        remarks = [
+            *_conflict(result.conflict),
+            *(f"{item.path}: {item.explanation}" for item in result.estimates),
+            *(f"remark: {remark}" for remark in result.remarks),
+        ]
+        parts.append(_table(f"{result.procedure}{kind}: {result.summary}", result.estimates, before, remarks))
+    if identification.trajectory is not None:
+        parts.append(_trajectory_part(identification.trajectory, before))
+    written, fitted = new_set.written, new_set.fitted
+    # What holds for this model only is in the set as well, and is never counted with what is identified.
+    count = f"{count_of(len(written), 'value')} identified: {', '.join(written)}" if written else "no value identified"
+    rest = f"; for this model only: {', '.join(fitted)}" if fitted else ""
     problem = (f"it makes no device yet: {new_set.problem}",) if new_set.problem else ()
     return Finding(
         name="identify",
         kicker="Identification",
         title=f"The parameter set {name}",
         said=(),
-        parts=(
-            *(_procedure_part(result, identification.before) for result in identification.results),
-            *((_trajectory_part(fitted, identification.before),) if fitted else ()),
-            Part(said=(f"new set '{name}': {_count_sentence(identification)}", *problem)),
-            *_figures(identification),
-        ),
+        parts=(*parts, Part(said=(f"new set '{name}': {count}{rest}", *problem)), *_figures(identification)),
         found=identification,
         passed=identification.is_good,
         kind=identification.kind,
@@ -156,44 +178,37 @@ def finding_of(identification: Identification) -> Finding[Identification]:
     )
 
 
-def _count_sentence(identification: Identification) -> str:
-    """Return how many values are identified, and apart from them which are fitted only."""
-    written, fitted = identification.new_set.written, identification.new_set.fitted
-    found = f"{count_of(len(written), 'value')} identified: {', '.join(written)}" if written else "no value identified"
-    rest = f"; for this model only: {', '.join(fitted)}" if fitted else ""
-    return f"{found}{rest}"
+def _table(heading: str, estimates: Iterable[Estimate], before: ParameterSet, remarks: Sequence[str]) -> Part:
+    rows = (estimate_row(item, before) for item in estimates)
+    return Part(heading, columns_of(("",) * 4, rows), remarks=tuple(remarks))
 
 
-def _procedure_part(result: BenchResult, before: ParameterSet) -> Part:
-    kind = "" if result.kind == "measured" else f" ({result.kind})"
-    return Part(
-        f"{result.procedure}{kind}: {result.summary}",
-        columns_of(_BLANK, (estimate_row(item, before) for item in result.estimates)),
-        remarks=(
-            *((f"holds for this model only: {result.conflict}",) if result.conflict else ()),
-            *(f"{item.path}: {item.explanation}" for item in result.estimates),
-            *(f"remark: {remark}" for remark in result.remarks),
-        ),
-    )
+def _conflict(sentence: str) -> tuple[str, ...]:
+    return (f"holds for this model only: {sentence}",) if sentence else ()
 
 
 def _trajectory_part(outcome: TrajectoryOutcome, before: ParameterSet) -> Part:
     """Return estimates, each with its sentence, then tolerances that matter, what is left, and candidates."""
     kind, fit = kind_of_fit(outcome.fit), outcome.fit
     origin = "" if kind == "measured" else f" ({kind})"
-    candidates = enumerate(outcome.expected, start=1)
-    return Part(
+    remarks = [
+        *_conflict(fit.conflict),
+        # Of a conflict the explanation of each number is the one sentence that stands above.
+        *(f"{item.path}: {item.explanation}" for item in fit.estimates if item.explanation != fit.conflict),
+        *_tolerances(fit.known, before),
+        *(f"remark: {remark}" for remark in outcome.remarks),
+    ]
+    for number, one in enumerate(outcome.expected, start=1):
+        fraction = 1.0 - one.shrinkage[one.most_helped]
+        remarks.append(
+            f"next experiment {number}: {one.label}: gain {one.gain:.2f}; largest for {one.most_helped}, "
+            f"whose interval would shrink by {fraction:.0%}"
+        )
+    heading = (
         f"trajectory{origin}: {count_of(len(fit.estimates), 'number')} fitted to "
-        f"{count_of(len(fit.measurements), 'recording')}, {count_of(len(fit.known), 'tolerance')}",
-        columns_of(_BLANK, (estimate_row(item, before) for item in fit.estimates)),
-        remarks=(
-            *((f"holds for this model only: {fit.conflict}",) if fit.conflict else ()),
-            *(f"{item.path}: {item.explanation}" for item in fit.estimates if item.explanation != fit.conflict),
-            *_tolerances(fit.known, before),
-            *(f"remark: {remark}" for remark in outcome.remarks),
-            *(f"next experiment {number}: {_candidate(candidate)}" for number, candidate in candidates),
-        ),
+        f"{count_of(len(fit.measurements), 'recording')}, {count_of(len(fit.known), 'tolerance')}"
     )
+    return _table(heading, fit.estimates, before, remarks)
 
 
 def _tolerances(known: Sequence[Known], before: ParameterSet) -> list[str]:
@@ -223,34 +238,19 @@ def _shown(number: float, path: str, unit: str, before: ParameterSet) -> tuple[f
     return in_shown_unit(number, unit) if own == unit else (found, own)
 
 
-_BLANK = ("",) * 4
-
-
 def estimate_row(item: Estimate, before: ParameterSet) -> tuple[str, ...]:
     """Return path, value, interval and verdict of an estimate in the unit of the set, digits that tell its ends."""
     if math.isnan(item.value):
         return item.path, "no value", "", item.verdict
     shown = [_shown(one, item.path, item.unit, before) for one in (item.value, item.low, item.high)]
     (value, unit), (low, _), (high, _) = shown
-    digits = _digits(value, 0.5 * abs(high - low))
+    half_width, digits = 0.5 * abs(high - low), _MINIMUM_DIGITS
+    if half_width > 0.0 and math.isfinite(half_width) and value != 0.0:
+        # One digit more than the interval has, so that its ends differ from the value.
+        needed = math.ceil(math.log10(abs(value) / half_width)) + 1
+        digits = min(max(needed, _MINIMUM_DIGITS), _MAXIMUM_DIGITS)
     text = f"{value:#.{digits}g} {unit}".removesuffix(" -").rstrip()
     return item.path, text, f"{low:#.{digits}g} to {high:#.{digits}g}", item.verdict
-
-
-def _candidate(one: Expected) -> str:
-    fraction = 1.0 - one.shrinkage[one.most_helped]
-    return (
-        f"{one.label}: gain {one.gain:.2f}; largest for {one.most_helped}, "
-        f"whose interval would shrink by {fraction:.0%}"
-    )
-
-
-def _digits(value: float, half_width: float) -> int:
-    """Return the digits that a number needs so that its interval can be distinguished from it, at least four."""
-    if not (half_width > 0.0 and math.isfinite(half_width) and value != 0.0):
-        return _MINIMUM_DIGITS
-    needed = math.ceil(math.log10(abs(value) / half_width)) + 1
-    return min(max(needed, _MINIMUM_DIGITS), _MAXIMUM_DIGITS)
 
 
 def _figures(identification: Identification) -> list[Part]:
@@ -261,19 +261,19 @@ def _figures(identification: Identification) -> list[Part]:
         counts[result.procedure] = counts.get(result.procedure, 0) + 1
         number = counts[result.procedure]
         name = result.procedure if number == 1 else f"{result.procedure}-{number}"
-        found.append(_figure(name, result.summary, draw=partial(procedure_figure, result)))
+        draw = partial(procedure_figure, result)
+        found.append(Part(name=name, caption=result.summary, is_detail=True, draw=draw))
     fit = None if identification.trajectory is None else identification.trajectory.fit
     for measurement, model, scenario in zip(fit.measurements, fit.models, fit.scenarios, strict=True) if fit else ():
         label, atmosphere = measurement.label, scenario.device.supply.atmospheric_pressure
         panels = partial(trajectory_panels, measurement, model, atmosphere)
-        part = _figure(f"trajectory-fit-{label}", f"{label} and the fit.", panels=panels)
-        found.append(replace(part, title=label, size=(7.0, 2.0)))
-    both = figure_3(identification.results)
-    return found if both is None else [*found, _figure("figure-3", "Like figure 3 of the paper.", draw=lambda: both)]
-
-
-def _figure(name: str, caption: str, **drawn: Any) -> Part:
-    return Part(name=name, caption=caption, is_detail=True, **drawn)
+        name, caption = f"trajectory-fit-{label}", f"{label} and the fit."
+        found.append(Part(name=name, caption=caption, is_detail=True, panels=panels, title=label, size=(7.0, 2.0)))
+    first = {result.procedure: result for result in reversed(identification.results)}
+    if {"static-torque", "free-decay"} <= first.keys():
+        draw = partial(figure_3, first["static-torque"], first["free-decay"])
+        found.append(Part(name="figure-3", caption="Like figure 3 of the paper.", is_detail=True, draw=draw))
+    return found
 
 
 def kind_of_fit(fit: TrajectoryFit) -> RecordingKind:
@@ -281,54 +281,34 @@ def kind_of_fit(fit: TrajectoryFit) -> RecordingKind:
     return kind_of([recording.kind for recording in fit.measurements])
 
 
-def _procedure_data(result: BenchResult) -> dict[str, Any]:
-    return {
-        "procedure": result.procedure,
-        "summary": result.summary,
-        "recordings_are": result.kind,
-        "estimates": [plain(item) for item in result.estimates],
-        "conflict": result.conflict,
-        "remarks": list(result.remarks),
-    }
-
-
-def _trajectory_data(outcome: TrajectoryOutcome | None) -> dict[str, Any]:
-    """Return the part ``trajectory`` of the data, empty without a fit; matrices are in the order of estimates."""
-    if outcome is None:
-        return {}
+def _trajectory_data(outcome: TrajectoryOutcome) -> dict[str, Any]:
+    """Return a trajectory fit as plain data in SI; matrices are in the order of estimates."""
     fit = outcome.fit
-    return {
-        "trajectory": {
-            "recordings_are": kind_of_fit(fit),
-            "recordings": [_recording(fit, index) for index in range(len(fit.measurements))],
-            "confidence": fit.problem.confidence,
-            "evaluations": fit.fit.evaluations,
-            "has_converged": fit.fit.has_converged,
-            "estimates": [plain(item) for item in fit.estimates],
-            "covariance": fit.covariance.tolist(),
-            "correlation": fit.correlation.tolist(),
-            "tolerances": [plain(item) for item in fit.known],
-            "channels": [plain(item) for item in fit.channels],
-            "conflict": None if fit.fit.conflict is None else plain(fit.fit.conflict),
-            "not_identifiable": [dict(item) for item in fit.fit.unidentified],
-            "remarks": list(outcome.remarks),
-            "next_experiments": [plain(item) for item in outcome.expected],
+    recordings = [
+        {
+            "label": experiment.label,
+            "source": experiment.source,
+            "kind": experiment.recording.kind,
+            "scenario": experiment.scenario.name,
+            "inputs": list(experiment.inputs),
+            # Those of the window that was fitted, not of the file.
+            "samples": len(measurement),
         }
-    }
-
-
-def _recording(fit: TrajectoryFit, index: int) -> dict[str, Any]:
-    experiment = fit.problem.experiments[index]
+        for experiment, measurement in zip(fit.problem.experiments, fit.measurements, strict=True)
+    ]
     return {
-        "label": experiment.label,
-        "source": experiment.source,
-        "kind": experiment.recording.kind,
-        "scenario": experiment.scenario.name,
-        "inputs": list(experiment.inputs),
-        "samples": len(fit.measurements[index]),
+        "recordings_are": kind_of_fit(fit),
+        "recordings": recordings,
+        "confidence": fit.problem.confidence,
+        "evaluations": fit.fit.evaluations,
+        "has_converged": fit.fit.has_converged,
+        "estimates": [plain(item) for item in fit.estimates],
+        "covariance": fit.covariance.tolist(),
+        "correlation": fit.correlation.tolist(),
+        "tolerances": [plain(item) for item in fit.known],
+        "channels": [plain(item) for item in fit.channels],
+        "conflict": None if fit.fit.conflict is None else plain(fit.fit.conflict),
+        "not_identifiable": [dict(item) for item in fit.fit.unidentified],
+        "remarks": list(outcome.remarks),
+        "next_experiments": [plain(item) for item in outcome.expected],
     }
-
-
-def bench_estimates(results: Iterable[BenchResult]) -> list[Estimate]:
-    """Return the estimates of all procedures, in their order."""
-    return [estimate for result in results for estimate in result.estimates]

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ppafo.analyses.identify.answer import Identification, bench_estimates, finding_of
+from ppafo.analyses.identify.answer import Identification, finding_of
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.result import BenchResult
 from ppafo.identification.new_set import with_estimates
@@ -58,6 +58,7 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
             enumerate(problem.procedure, start=1), key=lambda pair: PROCEDURES.index(pair[1].kind)
         )
     ]
+    # One recording may serve two procedures, which ask it other things, but not one procedure twice.
     found: list[Use] = []
     for kind in PROCEDURES:
         uses = [
@@ -76,20 +77,21 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
     for task in tasks:
         result = run_procedure(task.sources, task.item, Setting(current, valve, task.place, stated))
         results.append(result)
+        # The next procedure leans on what this one found; the new set is made of the old one at the end.
         current = with_estimates(current, result.estimates).parameter_set
-    bench = {estimate.path: estimate for estimate in bench_estimates(results)}
+    of_bench = [estimate for result in results for estimate in result.estimates]
     setting = FitSetting(
         lambda item: _source(folder, item.recording, item.columns, problem, current),
         folder,
         f"{file}: trajectory",
         current,
         problem.device.valve,
-        bench,
+        {estimate.path: estimate for estimate in of_bench},
         used,
         stated,
     )
     fitted = None if problem.trajectory is None else solve_section(problem.trajectory, setting, progress)
-    estimates = (*bench_estimates(results), *(() if fitted is None else fitted.fit.estimates))
+    estimates = (*of_bench, *(() if fitted is None else fitted.fit.estimates))
     new_set = with_estimates(before, estimates, valve)
     outcome = Identification(problem.name, tuple(results), fitted, before, new_set)
     return replace(outcome, new_set=replace(new_set, parameter_set=_name_set(outcome, problem)))

@@ -30,7 +30,7 @@ from ppafo.analyses.reproduce.figures import step_response_figure, torque_task_f
 from ppafo.analyses.reproduce.publication import ALL, SEED, Study
 from ppafo.analyses.reproduce.step_response import Levels, StepEvents
 from ppafo.analyses.reproduce.torque_task import WITHIN_REACH, InterpretationOfU
-from ppafo.identification.bench.result import synthetic_figure_3
+from ppafo.identification.bench.result import figure_3
 from ppafo.metrics import Metric
 from ppafo.parameters import load_parameter_set
 from ppafo.parameters.audit import Finding as AuditFinding
@@ -381,5 +381,5 @@ def _figures(reproduction: Reproduction) -> list[Part]:
         ),
     }
     if not isinstance(found, NoEvidence):
-        drawn[IDENTIFICATION_FIGURE] = partial(synthetic_figure_3, found.torque, found.decay)
+        drawn[IDENTIFICATION_FIGURE] = partial(figure_3, found.torque, found.decay)
     return [Part(name=name, draw=draw, is_detail=True) for name, draw in drawn.items()]

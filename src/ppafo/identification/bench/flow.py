@@ -8,14 +8,14 @@ With r the downstream over the upstream pressure and k the heat capacity ratio, 
     laminar    c (P_a^2 - P_b^2)
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from ppafo.constants import STANDARD_ATMOSPHERE, UNIVERSAL_GAS_CONSTANT
-from ppafo.identification.bench.law import Values, solve, sought, tolerance, within
+from ppafo.identification.bench.law import Readings, Values, solve, sought, tolerance, within
 from ppafo.identification.fit import Fit, Free
 from ppafo.identification.tolerances import Tolerances
 from ppafo.model.gas import choked_flow_constant, critical_pressure_ratio, specific_gas_constant
@@ -154,8 +154,7 @@ def solve_flow(
     opening: Opening,
     paths: tuple[str, str],
     pressures: Mapping[str, Floats],
-    flow: Floats,
-    labels: tuple[Sequence[str], Sequence[str]],
+    readings: Readings,
     tolerances: Tolerances,
     confidence: float,
 ) -> tuple[Fit, Floats]:
@@ -165,7 +164,7 @@ def solve_flow(
     channels [Pa absolute], the one from which a positive flow [kg/s] comes first.
     """
     size, critical = paths
-    names = (*pressures,)
+    names, flow = (*pressures,), readings.measured
 
     def law(at: Values) -> Floats:
         first, second = (true_pressure(at, name, shown) for name, shown in pressures.items())
@@ -178,4 +177,4 @@ def solve_flow(
         *((sought(critical, *CRITICAL_RATIOS),) if critical else ()),
         *flow_tolerances(opening.gas, tolerances, (names[0], names[1]), float(np.abs(flow).max())),
     )
-    return solve(law, flow, numbers, labels, confidence)
+    return solve(law, readings, numbers, confidence)

@@ -11,17 +11,20 @@ Tribology 112, 1990): q, up to T_s / T_c - 1, and w_s are tolerances, as are the
 Without an inertia only beta/I [1/s] and T_c/I [rad/s^2] follow.
 """
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.bench.law import Values, solve, sought, tolerance, within
-from ppafo.identification.bench.result import BenchResult, Panel, Reported, Series, count_of, result_of
+from ppafo.identification.bench.law import Readings, Values, recordings_of, solve, sought, tolerance, within
+from ppafo.identification.bench.result import BenchResult, Reported, count_of, curve_mark, readings_mark, result_of
 from ppafo.identification.fit import Free
-from ppafo.identification.source import Source, check_moves, check_no_gap, check_sources, window
+from ppafo.identification.source import Source, check_moves, check_no_gap, check_no_outlier, check_sources, window
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
+from ppafo.report.kind import TIME, Kind
+from ppafo.report.panels import Mark, Panel
 from ppafo.signals.faults import is_at_limit, noise_of, plateaus
 from ppafo.signals.recording import Floats
 
@@ -82,20 +85,31 @@ def free_decay(sources: tuple[Source, ...], settings: FreeDecaySettings | None =
         parts = []
         for number, decay in enumerate(decays):
             start, speed = at[f"start angle {number + 1}"], at[f"start speed {number + 1}"]
-            swept, left = course(decay.time, speed, *rates, at[_RISE], at[_RISE_VELOCITY])
+            swept, left = course(decay.time, speed, *rates, math.expm1(at[_RISE]), at[_RISE_VELOCITY])
             parts.append(start + (1.0 + at[_GAIN]) * decay.sign * swept)
             parts += [] if decay.velocity is None else [decay.sign * left]
         return np.concatenate(parts)
 
-    measured = np.concatenate([one for item in decays for one in (item.angle, item.velocity) if one is not None])
-    found, model = solve(law, measured, numbers, _groups(decays), chosen.confidence)
+    series, halves, sensors = list[Floats](), list[str](), list[str]()
+    for decay in decays:
+        moved = np.abs(decay.angle - decay.angle[0])
+        half = int(np.searchsorted(np.maximum.accumulate(moved), 0.5 * float(moved.max())))
+        for sensor, seen in ((ANGLE, decay.angle), (VELOCITY, decay.velocity)):
+            if seen is not None:
+                series.append(seen)
+                sensors += [sensor] * seen.size
+                # A law that is wrong parts the fast from the slow.
+                halves += ["the first half of the way"] * half + ["the second half of the way"] * (seen.size - half)
+    counts = [item.time.size * (1 if item.velocity is None else 2) for item in decays]
+    readings = Readings(np.concatenate(series), sensors, recordings_of(sources, counts), (halves,))
+    found, model = solve(law, readings, numbers, chosen.confidence)
     reported = (
         Reported(damping, units[0], f"Viscous damping{over_inertia}"),
         Reported(friction, units[1], f"Dynamic friction{over_inertia}"),
     )
-    values = dict(zip((one.name for one in numbers), found.values.tolist(), strict=True))
+    values = found.by_name
     rates = values[damping] / inertia, values[friction] / inertia
-    near_rest = values.get(_RISE, 0.0), values.get(_RISE_VELOCITY, 0.0)
+    near_rest = math.expm1(values.get(_RISE, 0.0)), values.get(_RISE_VELOCITY, 0.0)
     at_rest = sum(
         float(decay.time[-1]) > course_times(values[f"start speed {number + 1}"], *rates, *near_rest)[0][-1]
         for number, decay in enumerate(decays)
@@ -105,7 +119,6 @@ def free_decay(sources: tuple[Source, ...], settings: FreeDecaySettings | None =
         sources,
         found,
         reported,
-        chosen.confidence,
         f"{count_of(len(decays), 'decay')}, {at_rest} to standstill; beta/I = {rates[0]:.4g} 1/s, T_c/I = "
         f"{rates[1]:.4g} rad/s^2{missing}",
         _panels(decays, model, rates, near_rest),
@@ -129,9 +142,10 @@ def _numbers(
         # deceleration: half of each is a start between the two.
         rates.append((0.5 * speed / swept, 0.25 * speed**2 / swept))
     rate, deceleration = (inertia * float(item) for item in np.median(rates, axis=0))
-    most, usual = settings.rise, _STRIBECK[0]
-    # Between no rise and all of it nothing is known: an even distribution, its width over the root of 12.
-    rise = Free(_RISE, 0.5 * most, 0.0, 2.0 * most, most, most / np.sqrt(12.0)) if most > 0.0 else None
+    most, usual = math.log1p(settings.rise), _STRIBECK[0]
+    # Between no rise and all of it nothing is known, not even the order of magnitude: an even distribution of the
+    # logarithm, its width over the root of 12.
+    rise = Free(_RISE, 0.5 * most, 0.0, 2.0 * most, most, most / math.sqrt(12.0)) if most > 0.0 else None
     return (
         sought(damping, rate, 0.0),
         sought(friction, deceleration, 0.0),
@@ -188,19 +202,6 @@ class Decay(NamedTuple):
     velocity: Floats | None
 
 
-def _groups(decays: tuple[Decay, ...]) -> tuple[list[str], list[str]]:
-    """Return a label of the decay, and one of the sensor and whether the vane is still fast, for each reading."""
-    labels, channels = [], []
-    for number, decay in enumerate(decays, start=1):
-        moved = np.abs(decay.angle - decay.angle[0])
-        half = int(np.searchsorted(np.maximum.accumulate(moved), 0.5 * float(moved.max())))
-        for sensor in (ANGLE,) if decay.velocity is None else (ANGLE, VELOCITY):
-            words = [f"{sensor} in the first half", f"{sensor} in the second half"]
-            channels += [words[0]] * half + [words[1]] * (decay.time.size - half)
-            labels += [f"decay {number}"] * decay.time.size
-    return labels, channels
-
-
 def decay_of(source: Source, start: float | None, end: float | None) -> Decay:
     """Return the decay in a recording between two times [s]; without a start it begins where the speed is largest.
 
@@ -220,6 +221,8 @@ def decay_of(source: Source, start: float | None, end: float | None) -> Decay:
             f"{noise:.3g} rad; push the vane"
         )
     skipped = check_no_gap(source, PROCEDURE, part)
+    for name in (name for name in (ANGLE, VELOCITY) if name in part):
+        check_no_outlier(source, PROCEDURE, name, part)
     velocity, _ = smoothed_rates(part.time, part[ANGLE])
     first = 0 if start is not None else int(np.argmax(np.abs(velocity)))
     sign = 1.0 if velocity[first] > 0.0 else -1.0
@@ -277,25 +280,25 @@ def _smoothing_width(count: int) -> int:
 def _panels(
     decays: tuple[Decay, ...], model: Floats, rates: tuple[float, float], near_rest: tuple[float, float]
 ) -> tuple[Panel, ...]:
-    angles: list[Series] = []
-    shown: list[Series] = []
-    measured, fitted, place = "measured", "fitted", 0
+    angles, shown, place = list[Mark](), list[Mark](), 0
+    measured, fitted, fastest = "measured", "fitted", 0.0
     for decay in decays:
         count = decay.time.size
-        angles.append(Series(measured, decay.time, decay.angle, "measured"))
-        angles.append(Series(fitted, decay.time, model[place : place + count], "law"))
+        angles.append(readings_mark(measured, decay.time, decay.angle))
+        angles.append(curve_mark(fitted, decay.time, model[place : place + count]))
         place += count if decay.velocity is None else 2 * count
         velocity, acceleration = smoothed_rates(decay.time, decay.sign * decay.angle)
-        moving = velocity > 0.03 * velocity.max()
         inner = slice(_smoothing_width(count), None, max(1, count // 200))
-        shown.append(Series(measured, velocity[inner][moving[inner]], acceleration[inner][moving[inner]], "measured"))
+        moving = velocity[inner] > 0.03 * velocity.max()
+        shown.append(readings_mark(measured, velocity[inner][moving], acceleration[inner][moving]))
+        fastest = max(fastest, float(velocity.max()))
         measured = fitted = ""  # the legend names the first decay only
-    fastest = max((float(series.x.max()) for series in shown if series.x.size), default=1.0)
     line = np.linspace(0.0, fastest, 200)
     rise, velocity_of_rise = near_rest
     more = rise / (1.0 + np.square(line / velocity_of_rise)) if velocity_of_rise > 0.0 else 0.0
-    shown.append(Series("$-\\beta\\omega/I - T_c/I$", line, -rates[0] * line - rates[1] * (1.0 + more), "law"))
+    shown.append(curve_mark("$-\\beta\\omega/I - T_c/I$", line, -rates[0] * line - rates[1] * (1.0 + more)))
+    rate, acceleration_kind = Kind("Angular velocity", "rad/s"), Kind("Angular acceleration", "rad/s$^2$")
     return (
-        Panel("Free decay", "Time", "s", "Angle", "rad", tuple(angles)),
-        Panel("Damping", "Angular velocity", "rad/s", "Angular acceleration", "rad/s^2", tuple(shown)),
+        Panel(TIME, Kind("Angle", "rad", "angle"), angles, "Free decay", legend="inside"),
+        Panel(rate, acceleration_kind, shown, "Damping", legend="inside"),
     )

@@ -2,16 +2,21 @@
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from ppafo.identification.fit import Block, Fit, Free, fit
+from ppafo.identification.fit import SAMPLES_PER_COEFFICIENT, Block, Fit, Free, fit
+from ppafo.identification.source import Source
 from ppafo.identification.tolerances import deviation_of_limit
 from ppafo.signals.recording import Floats
 
 Values = Mapping[str, float]
 """Numbers of a law by name, SI units; one that is not there is 0."""
+
+_MEMORY = 2
+"""Coefficients of the noise at most: for a slow sensor, drift or hum. More would pass the misfit of a law for noise."""
 
 _WIDEST = 12.0
 """Limits by which a tolerance may be off at most in the search."""
@@ -37,28 +42,44 @@ def sought(name: str, start: float, low: float = -math.inf, high: float = math.i
     return Free(name, start, low, high, scale or abs(start) or 1.0)
 
 
-def solve(
-    law: Callable[[Values], Floats],
-    measured: Floats,
-    numbers: Sequence[Free],
-    labels: tuple[Sequence[str], Sequence[str]],
-    confidence: float,
-) -> tuple[Fit, Floats]:
-    """Return the fit of a law to readings, and what the law gives there, in the unit of what was measured.
+@dataclass(frozen=True, slots=True)
+class Readings:
+    """Readings by their sensor, whose noise is one, by recording or repetition, and by groups: a label for each.
 
-    ``labels`` are two for each reading, of its recording or repetition and of its branch or level: readings of one
-    label are a group whose numbers are compared with the numbers of all.
+    Numbers of a recording, of a sensor and of a group are compared with the numbers of all.
     """
-    names = [one.name for one in numbers]
-    keys = list(zip(*labels, strict=True))
+
+    measured: Floats
+    sensors: Sequence[str]
+    recordings: Sequence[str]
+    groups: tuple[Sequence[str], ...] = ()
+
+
+def recordings_of(sources: tuple[Source, ...], counts: Iterable[int] = ()) -> list[str]:
+    """Return what a recording is called, with its file, for each of its readings, of which there are ``counts``."""
+    sizes = tuple(counts) or [len(one.recording) for one in sources]
+    pairs = enumerate(zip(sources, sizes, strict=True), start=1)
+    return [label for number, (one, size) in pairs for label in [f"recording {number} ({one.name})"] * size]
+
+
+def solve(
+    law: Callable[[Values], Floats], readings: Readings, numbers: Sequence[Free], confidence: float
+) -> tuple[Fit, Floats]:
+    """Return the fit of a law to readings, and what the law gives there, in the unit of what was measured."""
+    names, measured = [one.name for one in numbers], readings.measured
+    keys = list(zip(readings.recordings, readings.sensors, *readings.groups, strict=True))
     # In the order of their first reading, so that the first block is the first recording.
     ranks = {key: rank for rank, key in enumerate(dict.fromkeys(keys))}
     # A block of the fit is a slice, so that readings of one label must lie side by side.
     order = np.argsort([ranks[key] for key in keys], kind="stable")
-    ends = np.cumsum([0, *np.bincount([ranks[key] for key in keys])])
+    counts = np.bincount([ranks[key] for key in keys])
+    ends = np.cumsum([0, *counts])
     # A meter shows six digits at most: residuals below say nothing.
     floor = 1.0e-6 * float(np.ptp(measured))
-    blocks = [Block(*key, slice(int(ends[rank]), int(ends[rank + 1])), floor) for key, rank in ranks.items()]
+    blocks = [
+        Block(recording, sensor, slice(int(ends[rank]), int(ends[rank + 1])), floor, tuple(groups))
+        for (recording, sensor, *groups), rank in ranks.items()
+    ]
 
     def at(point: Floats) -> Values:
         return defaultdict(float, zip(names, point.tolist(), strict=True))
@@ -66,5 +87,7 @@ def solve(
     def residuals(points: Floats) -> Floats:
         return np.stack([(measured - law(at(point)))[order] for point in points.T], axis=1)
 
-    found = fit(residuals, numbers, blocks, confidence)
+    found = fit(
+        residuals, numbers, blocks, confidence, memory=min(_MEMORY, int(counts.min()) // SAMPLES_PER_COEFFICIENT)
+    )
     return found, law(at(found.values))

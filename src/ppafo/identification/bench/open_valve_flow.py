@@ -13,10 +13,26 @@ import numpy as np
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.flow import GasAt, Law, Opening, orifice_shape, solve_flow
-from ppafo.identification.bench.result import BenchResult, Panel, Reported, fitted_panels, result_of
-from ppafo.identification.source import Source, check_absolute, check_moves, check_not_clipped, check_sources, pool
+from ppafo.identification.bench.law import Readings, recordings_of
+from ppafo.identification.bench.result import (
+    BenchResult,
+    Reported,
+    curve_mark,
+    readings_mark,
+    result_of,
+    with_residuals,
+)
+from ppafo.identification.source import (
+    Source,
+    check_moves,
+    check_no_wrong_reading,
+    check_not_clipped,
+    check_sources,
+    pool,
+)
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.model.gas import critical_pressure_ratio
+from ppafo.report.kind import Kind
 from ppafo.signals.recording import Floats
 
 PROCEDURE = "open-valve-flow"
@@ -60,27 +76,28 @@ def open_valve_flow(sources: tuple[Source, ...], settings: OpenValveFlowSettings
             f"{_SPAN:g} or more and go beyond {_SUBSONIC:g}; these go from {ratio.min():.3g} to {ratio.max():.3g}"
         )
     choked = critical_pressure_ratio(settings.gas.heat_capacity_ratio)
+    # The noise of the pressures tells the more in the flow the nearer they are to each other.
+    levels = [_LEVELS[place] for place in np.digitize(ratio, (choked, _NEARLY_EQUAL)).tolist()]
     found, model = solve_flow(
         Opening(settings.gas, settings.law, settings.area or 1.0),
         (size.path, critical),
         dict(zip(CHANNELS, (upstream, downstream), strict=False)),
-        flow,
-        (labels, [_LEVELS[place] for place in np.digitize(ratio, (choked, _NEARLY_EQUAL)).tolist()]),
+        Readings(flow, levels, labels),
         settings.tolerances,
         settings.confidence,
     )
-    axes = "Downstream over upstream pressure", "-", "Flow over upstream pressure", "kg/(s Pa)"
-    panel = Panel("Open-valve flow", *axes)
+    shown, fitted = (1.0e8 * one / upstream for one in (flow, model))
+    marks = readings_mark("measured", ratio, shown), curve_mark(settings.law, ratio, fitted)
+    axes = Kind("Downstream over upstream pressure"), Kind("Flow over upstream pressure", "g/s per bar")
     others = " or ".join(f"'{item}'" for item in ("orifice", "iso6358", "laminar") if item != settings.law)
     return result_of(
         PROCEDURE,
         sources,
         found,
         (size, *((Reported(critical, "", "Critical ratio b of ISO 6358"),) if is_standard else ())),
-        settings.confidence,
         f"{flow.size} readings at pressure ratios from {ratio.min():.2f} to {ratio.max():.2f}; "
         f"scatter {np.std(flow - model) / largest:.2%} of the largest flow",
-        fitted_panels(panel, settings.law, ratio, flow / upstream, model / upstream),
+        with_residuals("Open-valve flow", *axes, marks, ratio, shown - fitted),
         f"try law = {others}, or leave those readings out",
     )
 
@@ -102,9 +119,8 @@ def open_readings(sources: tuple[Source, ...], gas: GasAt) -> tuple[Floats, Floa
 
     IdentificationError for exchanged pressures and a valve that never was open.
     """
-    check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES)
+    check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES, absolute=CHANNELS[:2])
     for source in sources:
-        check_absolute(source, PROCEDURE, CHANNELS[:2])
         upstream, downstream = (source.recording[name] for name in CHANNELS[:2])
         # A meter that is saturated stays where these pressures would have the flow change.
         driving = orifice_shape(upstream, downstream, gas.heat_capacity_ratio)
@@ -128,6 +144,7 @@ def open_readings(sources: tuple[Source, ...], gas: GasAt) -> tuple[Floats, Floa
         )
     if np.ptp(flow) <= 0.0:
         check_moves(sources[0], PROCEDURE, "mass_flow")
-    labels = [f"recording {number}" for number, one in enumerate(recordings, start=1) for _ in range(len(one))]
-    kept = [label for label, is_kept in zip(labels, is_open.tolist(), strict=True) if is_kept]
+    pressures = [pool(sources, name) for name in CHANNELS[:2]]
+    check_no_wrong_reading(sources, PROCEDURE, "mass_flow", pressures, is_open)
+    kept = [label for label, is_kept in zip(recordings_of(sources), is_open.tolist(), strict=True) if is_kept]
     return upstream, downstream, np.abs(flow), kept

@@ -1,67 +1,58 @@
 """What a bench procedure returns: estimates with one verdict each, a table and two panels, in SI units.
 
-The figures have the paper's style; figure 3 is the static torque beside the free decay.
+Figure 3 of the paper is the static torque beside the free decay.
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ppafo.constants import PASCALS_PER_PSI
 from ppafo.identification.estimate import Estimate, Verdict
 from ppafo.identification.fit import Fit
 from ppafo.identification.source import Source, kind_of, told_of_readings
 from ppafo.identification.wording import conflict_in_words, widened_by
-from ppafo.report.style import BLACK, BLUE, VERMILION, house_style, mark_kind
+from ppafo.report.kind import Kind
+from ppafo.report.panels import Mark, Panel, draw_panels
+from ppafo.report.style import BLACK, BLUE, VERMILION
 from ppafo.signals import RecordingKind
 from ppafo.signals.recording import Floats
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Role = Literal["rising", "falling", "measured", "law"]
-"""How a series looks: crosses, circles, dots, a line."""
+_MAXIMUM_POINTS = 1200
+"""A page with every sample would be some megabytes, and look the same."""
+_READING = {"linestyle": "none", "markersize": 5, "markeredgewidth": 1.1}
+_LOOKS = {
+    "rising": (BLUE, {"marker": "x", **_READING}),
+    "falling": (VERMILION, {"marker": "o", "markerfacecolor": "none", **_READING}),
+    "measured": (BLUE, {"marker": ".", "linestyle": "none", "markersize": 4}),
+}
 
 
-@dataclass(frozen=True, slots=True)
-class Series:
-    """Points or a line: values along both axes in the units of the panel; an empty name stays out of the legend."""
-
-    name: str
-    x: Floats
-    y: Floats
-    role: Role
+def readings_mark(label: str, x: Floats, y: Floats, role: str = "measured") -> Mark:
+    """Return readings [SI] as dots, crosses where something was ``rising`` or circles where it was ``falling``."""
+    some = slice(None, None, max(1, x.size // _MAXIMUM_POINTS))
+    colour, style = _LOOKS[role]
+    return Mark("line", x[some], y[some], (), label, colour, style)
 
 
-@dataclass(frozen=True, slots=True)
-class Panel:
-    """One panel: what its axes are, their SI units, and what is drawn."""
-
-    title: str
-    x_name: str
-    x_unit: str
-    y_name: str
-    y_unit: str
-    series: tuple[Series, ...] = ()
+def curve_mark(label: str, x: Floats, y: Floats) -> Mark:
+    """Return the curve of a law [SI] in the order of x; an empty label stays out of the legend."""
+    order = np.argsort(x, kind="stable")
+    return Mark("line", x[order], y[order], (), label, BLACK, {"linewidth": 1.4})
 
 
-def fitted_panels(panel: Panel, name: str, x: Floats, measured: Floats, model: Floats) -> tuple[Panel, Panel]:
-    """Return a panel with readings and the curve of a law by ``name``, and the one of their differences."""
-    order = np.argsort(x)
-    series = Series("measured", x, measured, "measured"), Series(name, x[order], model[order], "law")
-    return with_residuals(replace(panel, series=series), x, measured - model)
-
-
-def with_residuals(panel: Panel, x: Floats, residuals: Floats) -> tuple[Panel, Panel]:
-    """Return a panel and the one of its residuals, in the units of its axes."""
-    zero = Series("", np.array([x.min(), x.max()]), np.zeros(2), "law")
-    left = Series("", x, residuals, "measured")
-    axes = panel.x_name, panel.x_unit, "Measured minus fitted", panel.y_unit
-    return panel, Panel("Residuals", *axes, (left, zero))
+def with_residuals(
+    title: str, x: Kind, y: Kind, marks: Sequence[Mark], at: Floats, residuals: Floats
+) -> tuple[Panel, Panel]:
+    """Return a panel and the one of the residuals [SI] at places along its horizontal axis."""
+    quantity = "pressure change" if y.quantity == "pressure" else y.quantity
+    left = [readings_mark("", at, residuals), Mark("level", (), 0.0, colour=BLACK, style={"linewidth": 1.4})]
+    below = Panel(x, Kind("Measured minus fitted", y.unit, quantity), left, "Residuals", legend="")
+    return Panel(x, y, marks, title, legend="inside"), below
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +104,6 @@ def result_of(
     sources: tuple[Source, ...],
     found: Fit,
     reported: Sequence[Reported],
-    confidence: float,
     summary: str,
     panels: tuple[Panel, ...],
     remedy: str,
@@ -125,7 +115,7 @@ def result_of(
     """
     estimates = []
     for item in reported:
-        place = found.index(item.path)
+        place = [*found.by_name].index(item.path)
         value, low, high = (float(one[place]) for one in (found.values, found.low, found.high))
         number = found.numbers[place]
         size, half = abs(value) if item.size is None else item.size, 0.5 * (high - low)
@@ -143,83 +133,34 @@ def result_of(
         elif found.conflict is not None:
             verdict = "holds for this model only"
         origin = tuple(source.trace for source in sources)
-        estimates.append(Estimate(item.path, value, item.unit, low, high, verdict, sentence, origin, confidence))
+        estimates.append(Estimate(item.path, value, item.unit, low, high, verdict, sentence, origin, found.confidence))
     kind, told = kind_of(one.recording.kind for one in sources), (*remarks, *told_of_readings(sources))
     return BenchResult(procedure, summary, tuple(estimates), panels, kind, conflict_in_words(found, remedy), told)
 
 
-_SIZE = (8.4, 3.7)
-_SHOWN_IN = {
-    "Pa": ("psi", 1.0 / PASCALS_PER_PSI),
-    "Pa_d": ("psi", 1.0 / PASCALS_PER_PSI),
-    "rad": ("deg", 180.0 / math.pi),
-    "m^2": ("mm$^2$", 1.0e6),
-    "kg/s": ("g/s", 1.0e3),
-    "kg/(s Pa)": ("g/s per bar", 1.0e8),
-    "rad/s^2": ("rad/s$^2$", 1.0),
-    "-": ("", 1.0),
-}
-_READING = {"linestyle": "none", "markersize": 5, "markeredgewidth": 1.1}
-_LOOKS: dict[Role, dict[str, Any]] = {
-    "rising": {"marker": "x", "color": BLUE, **_READING},
-    "falling": {"marker": "o", "color": VERMILION, "markerfacecolor": "none", **_READING},
-    "measured": {"marker": ".", "color": BLUE, "linestyle": "none", "markersize": 4},
-    "law": {"color": BLACK, "linewidth": 1.4},
-}
-_MAXIMUM_POINTS = 1200
+_SIZE = (4.1, 3.3)
 
 
 def procedure_figure(result: BenchResult) -> "Figure":
     """Return the figure of a procedure: its two panels side by side."""
-    return _figure(result.panels, (result.kind,))
+    return _figure(result.panels, result.kind)
 
 
-def figure_3(results: Sequence[BenchResult]) -> "Figure | None":
-    """Return figure 3 of the paper, torque over pressure and damping; None unless both were identified."""
-    by_name = {result.procedure: result for result in reversed(results)}
-    torque, decay = by_name.get("static-torque"), by_name.get("free-decay")
-    if torque is None or decay is None:
-        return None
-    return _figure((torque.panels[0], decay.panels[1]), (torque.kind, decay.kind))
+def figure_3(torque: BenchResult, decay: BenchResult) -> "Figure":
+    """Return figure 3 of the paper, torque over pressure and damping, from a static torque and a free decay.
 
-
-def synthetic_figure_3(torque: BenchResult, decay: BenchResult) -> "Figure":
-    """Return figure 3 of the paper from synthetic recordings, which each panel says of itself."""
+    Each panel says of itself where its recordings are synthetic.
+    """
     panels = []
-    for panel in (torque.panels[0], decay.panels[1]):
-        names = {"measured": "synthetic measurement"}
-        series = tuple(replace(item, name=names.get(item.name, item.name)) for item in panel.series)
-        panels.append(replace(panel, title=f"{panel.title}, synthetic", series=series))
-    return _figure(tuple(panels), (torque.kind, decay.kind))
+    for result, panel in ((torque, torque.panels[0]), (decay, decay.panels[1])):
+        # Of a page that shows two kinds of recordings, the mark of the figure would not say which panel is which.
+        words = "" if result.kind == "measured" else f", {result.kind}"
+        panels.append(replace(panel, title=f"{panel.title}{words}"))
+    return _figure(tuple(panels), kind_of((torque.kind, decay.kind)))
 
 
-def _figure(panels: tuple[Panel, ...], kinds: tuple[RecordingKind, ...]) -> "Figure":
-    from matplotlib.figure import Figure
-    from matplotlib.layout_engine import ConstrainedLayoutEngine
-
-    with house_style():
-        # The strip above the panels is left to the kind of the recordings, clear of titles and legends.
-        layout = ConstrainedLayoutEngine(rect=(0.0, 0.0, 1.0, 0.94))
-        figure = Figure(figsize=_SIZE, layout=layout)
-        row = figure.subplots(1, len(panels), squeeze=False)[0]
-        for letter, axes, panel in zip("AB", row, panels, strict=False):
-            _draw(axes, letter, panel)
-        mark_kind(figure, kind_of(kinds))
-        return figure
-
-
-def _draw(axes: "Axes", letter: str, panel: Panel) -> None:
-    (x_unit, x_scale), (y_unit, y_scale) = (_SHOWN_IN.get(unit, (unit, 1.0)) for unit in (panel.x_unit, panel.y_unit))
-    for item in sorted(panel.series, key=lambda one: one.role == "law"):
-        # A page with every sample would be some megabytes, and look the same.
-        thin = slice(None, None, 1 if item.role == "law" else max(1, item.x.size // _MAXIMUM_POINTS))
-        axes.plot(x_scale * item.x[thin], y_scale * item.y[thin], label=item.name, **_LOOKS[item.role])
-    axes.set_title(f"$\\bf{{{letter}}}$   {panel.title}", pad=20)
-    axes.set_xlabel(f"{panel.x_name} ({x_unit})" if x_unit else panel.x_name)
-    axes.set_ylabel(f"{panel.y_name} ({y_unit})" if y_unit else panel.y_name)
-    axes.margins(0.04)
-    named = [item for item in panel.series if item.name]
-    if len(named) > 1:
-        axes.legend(
-            loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, borderaxespad=0.1, handlelength=1.2, columnspacing=1.0
-        )
+def _figure(panels: tuple[Panel, ...], kind: RecordingKind) -> "Figure":
+    lettered = [
+        replace(panel, title=f"$\\bf{{{letter}}}$   {panel.title}") for letter, panel in zip("AB", panels, strict=True)
+    ]
+    return draw_panels(lettered, 2, _SIZE, kind=kind)

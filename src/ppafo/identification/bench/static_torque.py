@@ -17,23 +17,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.bench.law import Values, solve, sought, within
+from ppafo.identification.bench.law import Readings, Values, recordings_of, solve, sought, within
 from ppafo.identification.bench.result import (
     BenchResult,
-    Panel,
     Reported,
-    Role,
-    Series,
     count_of,
+    curve_mark,
+    readings_mark,
     result_of,
     with_residuals,
 )
-from ppafo.identification.source import Source, check_moves, check_not_clipped, check_sources, pool
+from ppafo.identification.source import (
+    Source,
+    check_moves,
+    check_no_wrong_reading,
+    check_not_alone,
+    check_not_clipped,
+    check_sources,
+    pool,
+)
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
+from ppafo.report.kind import Kind
 from ppafo.signals.recording import Floats
 
 Labels = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 
 PROCEDURE = "static-torque"
 _TORQUE, _FORCE = "torque", "force"
@@ -71,9 +78,9 @@ def static_torque(sources: tuple[Source, ...], settings: StaticTorqueSettings | 
     chosen = settings or StaticTorqueSettings()
     readings = readings_of(sources)
     names, tolerances = readings.names, chosen.tolerances
-    pressure, torque, branch, weight = readings.pressure, readings.torque, readings.branch, readings.weight
+    pressure, torque, branch = readings.pressure, readings.torque, readings.branch
     slope, zero, friction, size = _straight_line(readings, ", ".join(source.name for source in sources))
-    span = float(np.abs(pressure).max())
+    load, span = names.load, float(np.abs(pressure).max())
     numbers = (
         sought(names.slope_path, slope),
         sought(names.friction_path, friction, scale=size),
@@ -81,45 +88,49 @@ def static_torque(sources: tuple[Source, ...], settings: StaticTorqueSettings | 
         sought(names.zero_path, zero, scale=size),
         *within("zero of the pressure sensor", tolerances.zero_of_pressure),
         *within("gain of the pressure sensor", tolerances.gain_of("pressure")),
-        *within(f"gain of the {names.load} sensor", tolerances.gain_of(names.load)),
+        *within(f"gain of the {load} sensor", tolerances.gain_of(load)),
     )
 
     def law(at: Values) -> Floats:
         true = (pressure - at["zero of the pressure sensor"]) / (1.0 + at["gain of the pressure sensor"])
         held = branch * (at[names.friction_path] + at[names.growth_path] * np.abs(true))
-        shown = (1.0 + at[f"gain of the {names.load} sensor"]) * (at[names.slope_path] * true - held)
-        return np.asarray(weight * (shown + at[names.zero_path]))
+        shown = (1.0 + at[f"gain of the {load} sensor"]) * (at[names.slope_path] * true - held)
+        return np.asarray(readings.weight * (shown + at[names.zero_path]))
 
-    found, weighted = solve(law, weight * torque, numbers, _groups(readings), chosen.confidence)
-    model = weighted / weight
+    middle = 0.5 * float(pressure.max() + pressure.min())
+    groups = (
+        np.where(branch > 0.0, "the rising branch", "the falling branch").tolist(),
+        np.where(pressure > middle, "readings at higher pressures", "readings at lower pressures").tolist(),
+    )
+    labelled = Readings(readings.weight * torque, [load] * torque.size, readings.recordings, groups)
+    found, weighted = solve(law, labelled, numbers, chosen.confidence)
+    left = torque - weighted / readings.weight
     reported = (
         Reported(names.slope_path, names.slope_unit, f"{names.slope.capitalize()}, the common slope of both branches"),
         Reported(names.friction_path, names.unit, f"{names.friction.capitalize()} without a pressure difference"),
         Reported(names.growth_path, f"{names.unit}/Pa", f"Growth of the {names.friction} with the pressure difference"),
-        Reported(names.zero_path, names.unit, f"Zero of the {names.load} sensor", float(np.ptp(torque))),
+        Reported(names.zero_path, names.unit, f"Zero of the {load} sensor", float(np.ptp(torque))),
     )
-    values = found.values.tolist()
-    count = count_of(int(readings.clusters.max()) + 1, "repetition")
+    values = found.by_name
     ends = np.array([pressure.min(), pressure.max()])
-    branches: dict[Role, Mask] = {"rising": branch > 0.0, "falling": branch < 0.0}
-    series = [Series(f"pressure {role}", pressure[on], torque[on], role) for role, on in branches.items()]
-    series.append(Series("nominal", ends, values[0] * ends + values[3], "law"))
-    load = names.load
-    panel = Panel(f"Static {load}", "Pressure difference", "Pa_d", load.capitalize(), names.unit, tuple(series))
+    branches = {"rising": branch > 0.0, "falling": branch < 0.0}
+    marks = [readings_mark(f"pressure {role}", pressure[on], torque[on], role) for role, on in branches.items()]
+    marks.append(curve_mark("nominal", ends, values[names.slope_path] * ends + values[names.zero_path]))
+    axes = Kind("Pressure difference", "Pa_d", "pressure change"), Kind(load.capitalize(), names.unit, load)
     return result_of(
         PROCEDURE,
         sources,
         found,
         reported,
-        chosen.confidence,
-        f"{pressure.size} readings, {count}; {names.slope} {values[0]:.4g} {names.slope_unit}, {names.friction} "
-        f"{values[1]:.3g} {names.unit}; scatter {np.std(torque - model):.3g} {names.unit}",
-        with_residuals(panel, pressure, torque - model),
+        f"{pressure.size} readings, {count_of(readings.repetitions, 'repetition')}; {names.slope} "
+        f"{values[names.slope_path]:.4g} {names.slope_unit}, {names.friction} {values[names.friction_path]:.3g} "
+        f"{names.unit}; scatter {np.std(left):.3g} {names.unit}",
+        with_residuals(f"Static {load}", *axes, marks, pressure, left),
         f"one {names.slope} and a {names.friction} linear in pressure do not describe them",
     )
 
 
-def _straight_line(readings: "Readings", names: str) -> tuple[float, float, float, float]:
+def _straight_line(readings: "Sweeps", names: str) -> tuple[float, float, float, float]:
     """Return rough slope, zero, friction and its size; refuse signs that no device has. ``names`` are the files."""
     columns = (readings.pressure, np.ones_like(readings.pressure), -readings.branch)
     design = np.stack(columns, axis=1)
@@ -139,21 +150,6 @@ def _straight_line(readings: "Readings", names: str) -> tuple[float, float, floa
             "reverse the sign of channel 'direction'"
         )
     return float(slope), float(zero), float(friction), max(abs(float(friction)), deviation)
-
-
-def _groups(readings: "Readings") -> tuple[list[str], list[str]]:
-    """Return a label of branch and half of the pressures and one of the repetition, for each reading.
-
-    Of many repetitions it is the recording and the branch.
-    """
-    branches = np.where(readings.branch > 0.0, "the rising branch", "the falling branch").tolist()
-    # Each group is one more test: of very many none would be significant.
-    if readings.clusters.max() >= _MOST_REPETITIONS:
-        return [f"recording {number + 1}" for number in readings.files.tolist()], branches
-    middle = 0.5 * float(readings.pressure.max() + readings.pressure.min())
-    halves = np.where(readings.pressure > middle, "higher", "lower").tolist()
-    levels = [f"{branch} at {half} pressures" for branch, half in zip(branches, halves, strict=True)]
-    return levels, [f"repetition {number + 1}" for number in readings.clusters.tolist()]
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,18 +181,19 @@ def names_of(load: str, slides: bool) -> Names:
 
 
 @dataclass(frozen=True, slots=True)
-class Readings:
-    """Readings of both branches: pressure difference [Pa], load [N m or N], branch (+1, -1), repetition, recording.
+class Sweeps:
+    """Readings of both branches: pressure difference [Pa], load [N m or N], branch (+1, -1).
 
-    ``weight`` is one over the noise of each, 1 for a usual reading: the mean of many samples has less.
+    ``weight`` is one over the noise of each, 1 for a usual reading: the mean of many samples has less. ``recordings``
+    are labels of the repetition or, of many repetitions, the recording.
     """
 
     pressure: Floats
     torque: Floats
     branch: Floats
     weight: Floats
-    clusters: Labels
-    files: Labels
+    recordings: list[str]
+    repetitions: int
     names: Names
 
 
@@ -222,13 +219,13 @@ def _swept(source: Source, name: str) -> float:
     return abs(float(np.sum((direction[1:] * np.diff(source.recording[name]))[within]))) / sweeps
 
 
-def readings_of(sources: tuple[Source, ...]) -> Readings:
+def readings_of(sources: tuple[Source, ...]) -> Sweeps:
     """Return the readings of all recordings; IdentificationError where they cannot separate slope from friction."""
     is_force = bool(sources) and all(_FORCE in one.recording and _TORQUE not in one.recording for one in sources)
     load = _FORCE if is_force else _TORQUE
-    check_sources(sources, PROCEDURE, (load, "pressure_difference", "direction"), 1)
+    check_sources(sources, PROCEDURE, (load, "pressure_difference", "direction"), 1, moving=(load,))
     for source in sources:
-        check_moves(source, PROCEDURE, load)
+        check_not_alone(source, PROCEDURE, "pressure_difference")
         check_not_clipped(source, PROCEDURE, load, "pressure_difference", source.recording["pressure_difference"])
         values = source.recording["direction"]
         wrong = np.flatnonzero(~np.isin(values, (-1.0, 0.0, 1.0)))
@@ -239,6 +236,7 @@ def readings_of(sources: tuple[Source, ...]) -> Readings:
             )
     pressure, torque, direction = (pool(sources, name) for name in ("pressure_difference", load, "direction"))
     used = direction != 0.0
+    check_no_wrong_reading(sources, PROCEDURE, load, (pressure, direction), used)
     # A scale that only pulls shows nothing until friction is overcome: the rising branch then has a flat start, a
     # lowest reading that belongs to two pressures or more, or is nothing at all.
     lowest = torque.min()
@@ -271,21 +269,36 @@ def readings_of(sources: tuple[Source, ...]) -> Readings:
     for source in sources:
         driving = source.recording[load]
         check_not_clipped(source, PROCEDURE, "pressure_difference", load, driving, _MORE_THAN_FRICTION)
+    return _one_a_stroke(sources, used, pressure, torque, direction, names_of(load, slides(sources)))
+
+
+def _one_a_stroke(
+    sources: tuple[Source, ...],
+    used: NDArray[np.bool_],
+    pressure: Floats,
+    torque: Floats,
+    direction: Floats,
+    names: Names,
+) -> Sweeps:
+    """Return one reading for the samples of a stroke; ``used`` says which samples of all recordings the others are."""
     # A repetition of a recording is one cluster; so is a recording without repetitions.
-    recordings = [source.recording for source in sources]
-    files = np.concatenate([np.full(len(one), number) for number, one in enumerate(recordings)])[used]
-    repetitions = [one["repetition"] if "repetition" in one else np.zeros(len(one)) for one in recordings]
-    pairs = np.stack([files, np.concatenate(repetitions)[used]])
-    _, clusters = np.unique(pairs, axis=1, return_inverse=True)
-    clusters = clusters.reshape(-1)
+    parts = [(number, one.recording) for number, one in enumerate(sources)]
+    files = np.concatenate([np.full(len(one), number) for number, one in parts])[used]
+    strokes = [one["repetition"] if "repetition" in one else np.zeros(len(one)) for _, one in parts]
+    pairs = np.stack([files, np.concatenate(strokes)[used]])
+    clusters = np.unique(pairs, axis=1, return_inverse=True)[1].reshape(-1)
     runs = _runs(pressure, np.stack([direction, clusters]))
     counts = np.bincount(runs)
     first = np.concatenate(([0], np.cumsum(counts)[:-1]))
     pressure, torque = (np.bincount(runs, weights=values) / counts for values in (pressure, torque))
-    names = names_of(load, slides(sources))
     # The mean of n samples has the noise of one over sqrt(n).
-    weight = np.sqrt(counts / counts.mean())
-    return Readings(pressure, torque, direction[first], weight, clusters[first], files[first], names)
+    weight, repetitions = np.sqrt(counts / counts.mean()), int(clusters.max()) + 1
+    labels = [f"repetition {number + 1}" for number in clusters.tolist()]
+    # Each group is one more test: of very many none would be significant.
+    if repetitions > _MOST_REPETITIONS:
+        labels = [label for label, is_used in zip(recordings_of(sources), used.tolist(), strict=True) if is_used]
+    recordings = [labels[one] for one in first.tolist()]
+    return Sweeps(pressure, torque, direction[first], weight, recordings, repetitions, names)
 
 
 def _runs(pressure: Floats, labels: NDArray[np.float64]) -> Labels:

@@ -15,11 +15,19 @@ import numpy as np
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.flow import GasAt, flow_tolerances, orifice_shape, read_flow, true_pressure
-from ppafo.identification.bench.law import Values, solve, sought
-from ppafo.identification.bench.result import BenchResult, Panel, Reported, Role, Series, result_of, with_residuals
-from ppafo.identification.source import Source, check_absolute, check_moves, check_sources, pool
+from ppafo.identification.bench.law import Readings, Values, recordings_of, solve, sought
+from ppafo.identification.bench.result import (
+    BenchResult,
+    Reported,
+    curve_mark,
+    readings_mark,
+    result_of,
+    with_residuals,
+)
+from ppafo.identification.source import Source, check_no_wrong_reading, check_sources, pool
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.model.effects.spool_play import spool_position
+from ppafo.report.kind import Kind
 from ppafo.signals.recording import Floats
 
 PROCEDURE = "valve-map"
@@ -66,6 +74,7 @@ def valve_map(sources: tuple[Source, ...], settings: ValveMapSettings) -> BenchR
     numbers = (
         sought(band, start, 0.0, half, highest),
         sought(_GAIN, 0.5 * largest / (half - start), 0.0),
+        # Just inside the highest command, beyond which no reading changes with it.
         sought(_SATURATION, 0.02 * half + 0.98 * highest, half, highest * (1.0 + 1e-9), highest),
         *((sought(_PLAY, 0.02, 0.0, 0.5, 0.1),) if is_two_way else ()),
         *flow_tolerances(gas, settings.tolerances, names, float(np.abs(flow).max())),
@@ -78,8 +87,14 @@ def valve_map(sources: tuple[Source, ...], settings: ValveMapSettings) -> BenchR
         shape = np.abs(orifice_shape(before, behind, gas.heat_capacity_ratio))
         return read_flow(at, gas, area * gas.choked_flow_constant * shape)
 
-    found, model = solve(law, flow, numbers, _groups(command, branch, highest), settings.confidence)
-    values = dict(zip((one.name for one in numbers), found.values.tolist(), strict=True))
+    groups = (
+        np.where(branch < 0.0, "falling commands", "rising commands").tolist(),
+        np.where(command > 0.0, "commands to chamber 1", "commands to chamber 2").tolist(),
+        np.where(np.abs(command) > 0.5 * highest, "large commands", "small commands").tolist(),
+    )
+    readings = Readings(flow, ["mass_flow"] * flow.size, recordings_of(sources), groups)
+    found, model = solve(law, readings, numbers, settings.confidence)
+    values = found.by_name
     reported = [
         Reported(band, "", "Command below which nothing flows, in both directions", _SMALL_COMMAND),
         Reported(_GAIN, "m^2", "Effective area Cd A per command beyond the dead band"),
@@ -88,6 +103,12 @@ def valve_map(sources: tuple[Source, ...], settings: ValveMapSettings) -> BenchR
         reported.append(Reported(_SATURATION, "", "Command from which the valve opens no further"))
     if is_two_way:
         reported.append(Reported(_PLAY, "", "Width between a rising and a falling command", _SMALL_COMMAND))
+    marks = []
+    for role, sign in (("rising", 1.0), ("falling", -1.0)):
+        on = branch == sign
+        if on.any():
+            marks.append(readings_mark(f"command {role}", command[on], flow[on], role))
+            marks.append(curve_mark("fitted" if sign > 0 else "", command[on], model[on]))
     ways = bool((command > 0.1).any() and (command < -0.1).any())
     one_way = "only one direction was recorded: whether the other behaves the same is unknown"
     return result_of(
@@ -95,10 +116,9 @@ def valve_map(sources: tuple[Source, ...], settings: ValveMapSettings) -> BenchR
         sources,
         found,
         reported,
-        settings.confidence,
         f"{command.size} readings; dead band {values[band]:.3g}, {values[_GAIN] * 1e6:.4g} mm^2 per command; "
         f"scatter {np.std(flow - model) / np.abs(flow).max():.2%} of the largest flow",
-        with_residuals(_panel(command, branch, flow, model), command, flow - model),
+        with_residuals("Valve map", Kind("Command"), Kind("Flow", "kg/s", "mass flow"), marks, command, flow - model),
         "the opening is not the same in both directions, or not linear in the command",
         () if ways else (one_way,),
     )
@@ -123,11 +143,8 @@ def spool_of(command: Floats, width: float) -> Floats:
 
 def _areas(sources: tuple[Source, ...], gas: GasAt) -> Floats:
     """Return the effective area [m^2] of each reading; IdentificationError for readings that cannot say it."""
-    check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES)
+    check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES, moving=CHANNELS[:2], absolute=CHANNELS[2:])
     for source in sources:
-        check_moves(source, PROCEDURE, "command")
-        check_moves(source, PROCEDURE, "mass_flow")
-        check_absolute(source, PROCEDURE, CHANNELS[2:])
         command = source.recording["command"]
         wrong = np.flatnonzero(np.abs(command) > 1.0 + 1e-9)
         if wrong.size:
@@ -141,9 +158,12 @@ def _areas(sources: tuple[Source, ...], gas: GasAt) -> Floats:
             f"{sources[0].name}: {PROCEDURE}: the command covers a range of only {np.ptp(command):.3g}; "
             f"{_MINIMUM_RANGE:g} or more is needed to identify dead band and gain"
         )
+    drivers = command, np.concatenate([_branch(source) for source in sources])
+    check_no_wrong_reading(sources, PROCEDURE, "mass_flow", drivers, np.ones(flow.size, dtype=bool))
     shape = np.abs(orifice_shape(upstream, downstream, gas.heat_capacity_ratio))
     if not shape.any():
         raise IdentificationError(f"{sources[0].name}: {PROCEDURE}: both pressures are equal throughout")
+    # Over what the pressures would let pass, so that a supply that sags is no valve that saturates.
     areas = np.where(shape > 0.0, flow / (gas.choked_flow_constant * np.maximum(shape, 1e-3)), 0.0)
     if float(command @ areas) <= 0.0:
         raise IdentificationError(
@@ -160,22 +180,3 @@ def _branch(source: Source) -> Floats:
     signs = np.sign(np.diff(source.recording["command"], prepend=source.recording["command"][0]))
     last = np.maximum.accumulate(np.where(signs != 0.0, np.arange(signs.size), 0))
     return signs[last]
-
-
-def _groups(command: Floats, branch: Floats, highest: float) -> tuple[list[str], list[str]]:
-    """Return a label of side and branch of the command and one of its size, for each reading."""
-    sides = np.where(command > 0.0, "to chamber 1", "to chamber 2")
-    ways = np.where(branch < 0.0, "falling", "rising")
-    sizes = np.where(np.abs(command) > 0.5 * highest, "large commands", "small commands")
-    return [f"{way} commands {side}" for way, side in zip(ways, sides, strict=True)], sizes.tolist()
-
-
-def _panel(command: Floats, branch: Floats, flow: Floats, model: Floats) -> Panel:
-    series = []
-    branches: dict[Role, float] = {"rising": 1.0, "falling": -1.0}
-    for role, sign in branches.items():
-        on = branch == sign
-        if on.any():
-            series.append(Series(f"command {role}", command[on], flow[on], role))
-            series.append(Series("fitted" if sign > 0 else "", command[on], model[on], "law"))
-    return Panel("Valve map", "Command", "-", "Flow", "kg/s", tuple(series))

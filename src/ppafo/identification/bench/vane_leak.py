@@ -20,29 +20,29 @@ import numpy as np
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.flow import GAS_LAW, TEMPERATURE, GasAt, Law, Opening, gas_tolerances, solve_flow
-from ppafo.identification.bench.law import Values, solve, sought, tolerance, within
+from ppafo.identification.bench.law import Readings, Values, recordings_of, solve, sought, tolerance, within
 from ppafo.identification.bench.result import (
     BenchResult,
-    Panel,
     Reported,
-    Series,
     count_of,
-    fitted_panels,
+    curve_mark,
+    readings_mark,
     result_of,
     with_residuals,
 )
 from ppafo.identification.fit import Free
 from ppafo.identification.source import (
     Source,
-    check_absolute,
-    check_moves,
     check_no_gap,
+    check_no_outlier,
+    check_no_wrong_reading,
     check_not_clipped,
     check_sources,
     pool,
     window,
 )
 from ppafo.identification.tolerances import DEFAULTS, HELD, Tolerances, deviation_of_limit
+from ppafo.report.kind import TIME, Kind
 from ppafo.signals.faults import plateaus, stands_out
 from ppafo.signals.recording import Floats
 
@@ -111,7 +111,7 @@ def vane_leak(sources: tuple[Source, ...], settings: VaneLeakSettings) -> BenchR
     """
     if sources and all("mass_flow" in source.recording for source in sources):
         return _steady_leak(sources, settings)
-    check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES)
+    check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES, moving=("pressure_1",), absolute=CHANNELS)
     closed = tuple(closed_chambers(source, settings) for source in sources)
     if len({item.fuller for item in closed}) > 1:
         raise IdentificationError(
@@ -145,23 +145,16 @@ class ClosedChambers(NamedTuple):
         """The pressures [Pa] that are fitted: the one of a room is not."""
         return (self.first,) if self.is_a_room else (self.first, self.second)
 
-    @property
-    def is_early(self) -> list[bool]:
-        """Whether the difference is still in the upper half of its fall, for each sample."""
-        difference = self.first - self.second
-        half = int(np.argmax(difference < 0.5 * (difference[:EDGE].mean() + difference[-EDGE:].mean())))
-        return [place < half for place in range(self.time.size)]
-
 
 def closed_chambers(source: Source, settings: VaneLeakSettings) -> ClosedChambers:
     """Return the chambers of a recording between its start and equal pressures.
 
     IdentificationError where too few samples are left.
     """
-    check_moves(source, PROCEDURE, "pressure_1")
     part = window(source.recording, settings.start, settings.end)
     skipped = check_no_gap(source, PROCEDURE, part)
     for name in CHANNELS:
+        check_no_outlier(source, PROCEDURE, name, part)
         for plateau in plateaus(part[name]):
             # Later plateaus may be the resolution of the sensor, as the pressure hardly falls any more.
             if plateau.first < EDGE and stands_out(part[name], plateau):
@@ -170,7 +163,6 @@ def closed_chambers(source: Source, settings: VaneLeakSettings) -> ClosedChamber
                     f"{plateau.count} samples, up to sample {skipped + plateau.last + 1}, and changes only then: the "
                     f"sensor is saturated, or the chamber was not yet closed; give start"
                 )
-    check_absolute(source, PROCEDURE, CHANNELS)
     pair = part["pressure_1"], part["pressure_2"]
     fuller = 1 if np.mean((pair[0] - pair[1])[:EDGE]) > 0.0 else 2
     first, second = pair if fuller == 1 else pair[::-1]
@@ -192,25 +184,13 @@ _LOWEST = 1.0e-3
 """Difference at the end of a computed fall over that at its start."""
 
 
-class Falls(NamedTuple):
-    """Times [s], pressure difference [Pa], V1/V2 [-] and P1 V1/V2 + P2 [Pa] of two closed chambers."""
+def pressures_of_fall(
+    opening: Opening, size: float, first: float, second: float, ratio: float, rate: float, times: Floats
+) -> tuple[Floats, Floats]:
+    """Return both pressures [Pa] at times [s] as their difference falls; no gas is lost to the outside.
 
-    time: Floats
-    difference: Floats
-    ratio: float
-    conserved: float
-
-    def pressures(self, times: Floats) -> tuple[Floats, Floats]:
-        """Return both pressures [Pa] at times [s]; no gas is lost to the outside."""
-        difference = np.exp(np.interp(times, self.time, np.log(self.difference)))
-        second = (self.conserved - self.ratio * difference) / (1.0 + self.ratio)
-        return second + difference, second
-
-
-def fall_of_difference(opening: Opening, size: float, first: float, second: float, ratio: float, rate: float) -> Falls:
-    """Return times [s] and the difference [Pa] as it falls from two pressures [Pa] to a thousandth.
-
-    ``size`` is the size of the opening, ``ratio`` V1/V2 [-], 0 beside a room, ``rate`` R T / V1 [Pa/kg].
+    ``size`` is the size of the opening, ``first`` and ``second`` are the pressures [Pa] at the start, ``ratio`` is
+    V1/V2 [-], 0 beside a room, ``rate`` R T / V1 [Pa/kg].
     """
     start, conserved = max(first - second, 1.0), ratio * first + second
     # Even in the logarithm, as a laminar fall is in time.
@@ -220,8 +200,10 @@ def fall_of_difference(opening: Opening, size: float, first: float, second: floa
     flow = opening.flow(max(size, 1.0e-300), 0.0, lower + difference, lower)
     slowness = difference / np.maximum((1.0 + ratio) * rate * flow, 1.0e-300)
     steps = 0.5 * (slowness[1:] + slowness[:-1]) * np.diff(logs)
-    times = np.concatenate(([0.0], np.cumsum(steps)))
-    return Falls(time=times, difference=difference, ratio=ratio, conserved=conserved)
+    known = np.concatenate(([0.0], np.cumsum(steps)))
+    left = np.exp(np.interp(times, known, np.log(difference)))
+    end = (conserved - ratio * left) / (1.0 + ratio)
+    return end + left, end
 
 
 def _decaying_leak(
@@ -248,9 +230,9 @@ def _decaying_leak(
         for number, item in enumerate(closed, start=1):
             first, second = (at[f"start of {name}, decay {number}"] for name in names)
             ratio = 0.0 if item.is_a_room else at[_RATIO]
-            falls = fall_of_difference(opening, at[size.path], first, second, ratio, rate)
+            falls = pressures_of_fall(opening, at[size.path], first, second, ratio, rate, item.time)
             faded = np.exp(-item.time / lasting)
-            for name, true, _ in zip(names, falls.pressures(item.time), item.fitted, strict=False):
+            for name, true, _ in zip(names, falls, item.fitted, strict=False):
                 parts.append(true * (1.0 + at[f"relaxation of {name}, decay {number}"] * faded) + at[f"zero of {name}"])
         return np.concatenate(parts)
 
@@ -265,13 +247,7 @@ def _decaying_leak(
     numbers = (
         sought(size.path, _rough_size(closed, opening, constant * gas.temperature / emptied), 0.0),
         *ratio,
-        *(one for number, item in enumerate(closed, start=1) for one in _starts(names, number, item)),
-        *(
-            one
-            for number, item in enumerate(closed, start=1)
-            for name, _ in zip(names, item.fitted, strict=False)
-            for one in within(f"relaxation of {name}, decay {number}", _MOST_RELAXED)
-        ),
+        *(one for number, item in enumerate(closed, start=1) for one in _of_decay(names, number, item)),
         # Of the logarithm of a time, for only its order of magnitude is known.
         Free(_RELAXATION, 0.0, -5.0, math.log(_RELAXED), 1.0, 1.5),
         *gas_tolerances(gas, tolerances),
@@ -279,18 +255,20 @@ def _decaying_leak(
         *(one for name in names for one in within(f"zero of {name}", tolerances.zero_of_pressure)),
     )
     measured = np.concatenate([one for item in closed for one in item.fitted])
-    labels, channels = [], []
-    for number, item in enumerate(closed, start=1):
+    sensors, halves = list[str](), list[str]()
+    for item in closed:
+        difference = item.first - item.second
+        half = int(np.argmax(difference < 0.5 * (difference[:EDGE].mean() + difference[-EDGE:].mean())))
         for name, values in zip(names, item.fitted, strict=False):
-            labels += [f"decay {number}"] * values.size
-            channels += [f"{name}, {'early' if is_early else 'late'} in the fall" for is_early in item.is_early]
-    found, model = solve(law, measured, numbers, (labels, channels), settings.confidence)
+            sensors += [name] * values.size
+            halves += ["the early fall"] * half + ["the late fall"] * (values.size - half)
+    labels = recordings_of(sources, [item.time.size * len(item.fitted) for item in closed])
+    found, model = solve(law, Readings(measured, sensors, labels, (halves,)), numbers, settings.confidence)
     times = [item.time for item in closed for _ in item.fitted]
-    series, place = [Series("measured", np.concatenate(times), measured, "measured")], 0
-    for time in times:
-        series.append(Series("" if place else opening.law, time, model[place : place + time.size], "law"))
-        place += time.size
-    panel = Panel("Closed chambers", "Time", "s", "Pressure", "Pa", tuple(series))
+    time, parts = np.concatenate(times), np.split(model, np.cumsum([one.size for one in times])[:-1])
+    marks = [readings_mark("measured", time, measured)]
+    for number, part in enumerate(zip(times, parts, strict=True)):
+        marks.append(curve_mark("" if number else opening.law, *part))
     room = all(item.is_a_room for item in closed)
     remark = (f"the pressure in chamber {3 - fuller} is constant, so it is treated as a room",) if room else ()
     differences = [item.first - item.second for item in closed]
@@ -300,24 +278,26 @@ def _decaying_leak(
         sources,
         found,
         (size,),
-        settings.confidence,
         f"{count_of(len(closed), 'decay')} of up to {longest:.3g} s; the pressure difference falls by {fall:.1%}",
-        with_residuals(panel, np.concatenate(times), measured - model),
+        with_residuals("Closed chambers", TIME, Kind("Pressure", "Pa_a", "pressure"), marks, time, measured - model),
         _REMEDY.format("'orifice'" if settings.is_laminar else "'laminar'"),
         remark,
     )
 
 
-def _starts(names: list[str], number: int, item: ClosedChambers) -> list[Free]:
-    """Return the pressures [Pa] at the start of a decay, sought; of a room it is what was read, to its noise."""
+def _of_decay(names: list[str], number: int, item: ClosedChambers) -> list[Free]:
+    """Return the pressures [Pa] at the start of a decay, sought; of a room it is what was read, to its noise.
+
+    With them what each pressure that is fitted may be off at first [-].
+    """
     found = []
     for name, values in zip(names, (item.first, item.second), strict=True):
         size = max(abs(item.changes[0]), float(np.std(np.diff(values))), 1.0)
-        label, start = f"start of {name}, decay {number}", float(values[:EDGE].mean())
-        found.append(sought(label, start, 1.0, scale=size))
+        found.append(sought(f"start of {name}, decay {number}", float(values[:EDGE].mean()), 1.0, scale=size))
     if item.is_a_room:
-        known, deviation = float(item.second.mean()), max(float(item.second.std()), 1.0)
-        found[1] = replace(found[1], start=known, deviation=deviation)
+        found[1] = replace(found[1], start=float(item.second.mean()), deviation=max(float(item.second.std()), 1.0))
+    for name, _ in zip(names, item.fitted, strict=False):
+        found += within(f"relaxation of {name}, decay {number}", _MOST_RELAXED)
     return found
 
 
@@ -334,13 +314,11 @@ def _rough_size(closed: tuple[ClosedChambers, ...], opening: Opening, rate: floa
 
 def _steady_leak(sources: tuple[Source, ...], settings: VaneLeakSettings) -> BenchResult:
     """Return the leak from flow over pressures; the zero of the flow meter shows where the pressures differ."""
-    check_sources(sources, PROCEDURE, STEADY, _FEWEST_STEADY)
+    check_sources(sources, PROCEDURE, STEADY, _FEWEST_STEADY, moving=("mass_flow",), absolute=CHANNELS)
     for source in sources:
-        check_moves(source, PROCEDURE, "mass_flow")
         check_not_clipped(source, PROCEDURE, "mass_flow", "pressure_1", source.recording["pressure_1"])
-    for source in sources:
-        check_absolute(source, PROCEDURE, CHANNELS)
     first, second, flow = (pool(sources, name) for name in STEADY)
+    check_no_wrong_reading(sources, PROCEDURE, "mass_flow", (first, second), np.ones(flow.size, dtype=bool))
     difference = first - second
     if float(difference @ flow) <= 0.0:
         raise IdentificationError(
@@ -348,26 +326,25 @@ def _steady_leak(sources: tuple[Source, ...], settings: VaneLeakSettings) -> Ben
         )
     opening, size = settings.opening, settings.size
     # A leak of another law parts low from high pressures.
-    halves = np.where(difference > np.median(difference), "higher", "lower")
-    labels = [f"recording {number}" for number, one in enumerate(sources, start=1) for _ in range(len(one.recording))]
+    is_high = difference > np.median(difference)
+    halves = np.where(is_high, "flow at higher pressures", "flow at lower pressures").tolist()
     found, model = solve_flow(
         opening,
         (size.path, ""),
         {"pressure_1": first, "pressure_2": second},
-        flow,
-        (labels, [f"flow at {half} pressures" for half in halves]),
+        Readings(flow, ["mass_flow"] * flow.size, recordings_of(sources), (halves,)),
         settings.tolerances,
         settings.confidence,
     )
     scatter = np.std(flow - model) / float(np.abs(flow).max())
-    panel = Panel("Steady leak", "Pressure difference", "Pa_d", "Flow", "kg/s")
+    marks = readings_mark("measured", difference, flow), curve_mark(opening.law, difference, model)
+    axes = Kind("Pressure difference", "Pa_d", "pressure change"), Kind("Flow", "kg/s", "mass flow")
     return result_of(
         PROCEDURE,
         sources,
         found,
         (size,),
-        settings.confidence,
         f"{flow.size} steady readings; scatter {scatter:.2%} of the largest flow",
-        fitted_panels(panel, opening.law, difference, flow, model),
+        with_residuals("Steady leak", *axes, marks, difference, flow - model),
         _REMEDY.format("'orifice'" if settings.is_laminar else "'laminar'"),
     )

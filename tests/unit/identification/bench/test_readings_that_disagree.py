@@ -1,0 +1,131 @@
+"""A repetition or a recording that disagrees is flagged by its name, and a grossly wrong reading is named."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from ppafo.errors import IdentificationError
+from ppafo.identification.bench import (
+    BenchResult,
+    FreeDecaySettings,
+    OpenValveFlowSettings,
+    ValveMapSettings,
+    VaneLeakSettings,
+    free_decay,
+    open_valve_flow,
+    static_torque,
+    valve_map,
+    vane_leak,
+)
+from ppafo.identification.source import Source
+from ppafo.signals.recording import Floats
+
+Solve = Callable[[tuple[Source, ...]], BenchResult]
+RESPONSES = {
+    "decay": "angle",
+    "flow": "mass_flow",
+    "sweep": "mass_flow",
+    "leak": "pressure_1",
+    "steady": "mass_flow",
+    "static": "torque",
+}
+
+
+@pytest.fixture
+def solved(planted: ModuleType) -> dict[str, Solve]:
+    """The procedure for each kind of recording."""
+    leaking = VaneLeakSettings(planted.CO2, 60e-6, 60e-6 / 1.3, 0.113)
+    return {
+        "decay": lambda sources: free_decay(sources, FreeDecaySettings(rise=0.0)),
+        "flow": lambda sources: open_valve_flow(sources, OpenValveFlowSettings(planted.CO2)),
+        "sweep": lambda sources: valve_map(sources, ValveMapSettings(planted.CO2)),
+        "leak": lambda sources: vane_leak(sources, leaking),
+        "steady": lambda sources: vane_leak(sources, leaking),
+        "static": static_torque,
+    }
+
+
+def made(planted: ModuleType, kind: str, seed: int) -> Source:
+    """Return a right recording of a kind."""
+    sized = {"leak": ("orifice", 3.39e-8), "steady": ("orifice", 3.39e-8)}
+    return getattr(planted, kind)(*sized.get(kind, ()), seed=seed)  # type: ignore[no-any-return]
+
+
+def changed(source: Source, name: str, values: Floats, file: str = "") -> Source:
+    recording = source.recording.with_channel(name, values, source.recording.unit(name))
+    return Source(replace(recording, label=file or recording.label))
+
+
+@pytest.mark.parametrize("seed", [11, 12, 13])
+@pytest.mark.parametrize("fault", ["gain", "zero"])
+def test_a_repetition_of_another_gain_or_zero_is_named_and_not_weighed_out(
+    planted: ModuleType, solved: dict[str, Solve], fault: str, seed: int
+) -> None:
+    source = planted.static(seed=seed)
+    torque = source.recording["torque"].copy()
+    own = source.recording["repetition"] == 2.0
+    torque[own] = 1.03 * torque[own] if fault == "gain" else torque[own] + 0.1
+    result = solved["static"]((changed(source, "torque", torque),))
+    assert result.conflict.startswith("repetition 2 alone wants other numbers")
+    assert not any(item.is_identified for item in result.estimates)
+
+
+@pytest.mark.parametrize("kind", ["decay", "flow", "sweep", "steady"])
+def test_a_recording_of_another_gain_is_named_with_its_file(
+    planted: ModuleType, solved: dict[str, Solve], kind: str
+) -> None:
+    name = RESPONSES[kind]
+    right = tuple(made(planted, kind, seed) for seed in (1, 2, 3))
+    values = right[2].recording[name]
+    wrong = changed(right[2], name, values[0] + 1.1 * (values - values[0]), "third.csv")
+    assert solved[kind](right).conflict == ""
+    assert solved[kind]((*right[:2], wrong)).conflict.startswith("recording 3 (third.csv) alone wants other numbers")
+
+
+@pytest.mark.parametrize("kind", RESPONSES)
+def test_a_reading_of_ten_times_its_value_is_named_before_a_fit(
+    planted: ModuleType, solved: dict[str, Solve], kind: str
+) -> None:
+    name, source = RESPONSES[kind], made(planted, kind, 5)
+    values = source.recording[name].copy()
+    # Neither about zero nor at the ends.
+    at = int(np.flatnonzero(np.abs(values) > 0.5 * np.abs(values).max())[9])
+    values[at] *= 10.0
+    with pytest.raises(IdentificationError, match=f"'{name}' is .* at sample {at + 1}, where its neighbours are at"):
+        solved[kind]((changed(source, name, values),))
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"),
+    [("static", "pressure_difference"), ("flow", "upstream_pressure"), ("sweep", "downstream_pressure")],
+)
+def test_a_pressure_of_ten_times_its_value_is_named_before_a_fit(
+    planted: ModuleType, solved: dict[str, Solve], kind: str, name: str
+) -> None:
+    source = made(planted, kind, 5)
+    values = source.recording[name].copy()
+    at = int(np.argsort(values)[values.size // 2])
+    values[at] *= 10.0
+    with pytest.raises(IdentificationError, match=f"'{name}' is .* at sample {at + 1}, where its neighbours are at"):
+        solved[kind]((changed(source, name, values),))
+
+
+def test_two_wrong_readings_are_both_named(planted: ModuleType) -> None:
+    source = planted.static()
+    torque = source.recording["torque"].copy()
+    torque[[12, 90]] *= (10.0, 20.0)
+    with pytest.raises(IdentificationError, match=r"at sample 91, .*: a wrong reading, and so are samples 13;"):
+        static_torque((changed(source, "torque", torque),))
+
+
+def test_friction_that_grows_with_the_root_of_the_pressure_holds_for_this_model_only(planted: ModuleType) -> None:
+    flagged = 0
+    for seed in range(10):
+        source = planted.static(seed=seed)
+        pressure, way = source.recording["pressure_difference"], source.recording["direction"]
+        torque = source.recording["torque"] - 0.4 * way * np.sqrt(pressure / pressure.max())
+        flagged += bool(static_torque((changed(source, "torque", torque),)).conflict)
+    assert flagged >= 9
