@@ -255,7 +255,8 @@ def _control(
 
     What the file does not give may follow valve, device, lines and sensors.
     """
-    law = walking_controllers()[kind_at(reading.document, "controller")]
+    kind = kind_at(reading.document, "controller")
+    law = walking_controllers()[kind]
     with refused_as(ScenarioError, f"{reading.file}", ScenarioError):
         # A timing of a controller that uses no gait phase is refused.
         with_timing(law, TIMINGS[timing_of(reading.document)])
@@ -279,7 +280,8 @@ def _control(
     seconds = DEFAULT_PERIOD if period is None else reading.number("controller.period", PERIOD)
     if rate is not None:
         seconds = 1.0 / reading.number("controller.rate", RATE)
-    return Control(law.name, settings, seconds), links
+    # A law named by its module is found by that name alone; one of the catalogue by its name with gains for walking.
+    return Control(kind if ":" in kind else law.name, settings, seconds), links
 
 
 def _fault(reading: Reading, part: str) -> FaultSettings:

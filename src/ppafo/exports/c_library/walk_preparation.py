@@ -134,7 +134,7 @@ def sensors_that_fail(configuration: Scenario) -> dict[str, FaultSettings]:
 def _control(configuration: Scenario) -> dict[str, Quantity]:
     """Settings of controller and timing by path, in the order of the controller's parameters."""
     control = law_of(configuration)
-    law = walking_controllers().get(control.name, control)
+    law = walking_controllers().get(configuration.controller.kind, control)
     own = {item.name for item in law.quantities}
     return {f"{'controller' if item.name in own else 'timing'}.{item.name}": item for item in control.quantities}
 
