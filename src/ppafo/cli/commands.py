@@ -62,7 +62,11 @@ _EVERY: dict[str, dict[str, Command | Group]] = {
         "tune": Command(f"{_ANALYSES}:tune", library="ppafo.analyses.tune.problem:TUNING"),
         "linearise": _of_scenario(f"{_ANALYSES}:linearise"),
         "design": Command(f"{_ANALYSES}:design", library="ppafo.analyses.design.loading:FILE"),
-        "bottle": Command(f"{_ANALYSES}:bottle", library="ppafo.parameters.bottles.bottle:FILE"),
+        "bottle": Command(
+            f"{_ANALYSES}:bottle",
+            listing="ppafo.parameters.bottles.bottle:described_bottles",
+            listed="bottle",
+        ),
     },
     "walk": {
         "gait": Group(

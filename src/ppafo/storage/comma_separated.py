@@ -177,7 +177,9 @@ def read_csv(path: str | Path, label: str | None = None, atmosphere: float = STA
         text = text_of(content, remedy='; a column map with encoding = "latin-1" reads that')
         # Whoever writes a table ends its last line: one without an end is a file that was cut off in a number.
         if not text.endswith(("\n", "\r")):
-            raise DataError("the last line has no end: the file is cut off, or lacks its final line break")
+            raise DataError(
+                "the last line has no line break: the file may be cut off in a number; add one if it is whole"
+            )
         lines = text.splitlines()
         first = next((number for number, line in enumerate(lines) if not line.startswith("#")), len(lines))
         rows = csv.reader(islice(lines, first, None), strict=True)

@@ -1,7 +1,7 @@
 """An identification: estimates and checks in the units of the set, the new set, the figures."""
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -155,6 +155,7 @@ def finding_of(identification: Identification) -> Finding[Identification]:
         remarks = [
             *_conflict(result.conflict),
             *(f"{item.path}: {item.explanation}" for item in result.estimates),
+            *_far_from(before, result.estimates),
             *(f"remark: {remark}" for remark in result.remarks),
         ]
         parts.append(_table(f"{result.procedure}{kind}: {result.summary}", result.estimates, before, remarks))
@@ -181,6 +182,26 @@ def finding_of(identification: Identification) -> Finding[Identification]:
 def _table(heading: str, estimates: Iterable[Estimate], before: ParameterSet, remarks: Sequence[str]) -> Part:
     rows = (estimate_row(item, before) for item in estimates)
     return Part(heading, columns_of(("",) * 4, rows), remarks=tuple(remarks))
+
+
+_FAR_FROM_SET = 5.0
+"""Ratio to the value of the set before from which a unit is suspected: 6.89 is psi read as kPa, 8.85 N m as lbf in."""
+
+
+def _far_from(before: ParameterSet, estimates: Iterable[Estimate]) -> Iterator[str]:
+    """Yield a remark on each value that is many times what the set had, or a small part of it."""
+    for item in estimates:
+        entry = before.numbers.get(item.path)
+        value, unit = in_set_unit(item.value, item.path, item.unit, before)
+        if entry is None or not item.is_usable or not (entry.value > 0.0 and value > 0.0):
+            continue
+        ratio = value / entry.value
+        if not 1.0 / _FAR_FROM_SET < ratio < _FAR_FROM_SET:
+            yield (
+                f"remark: {item.path} is {ratio:.3g} times the value of set '{before.name}', "
+                f"{entry.value:.4g} {unit}".rstrip()
+                + ": check the units of the recording"
+            )
 
 
 def _conflict(sentence: str) -> tuple[str, ...]:

@@ -144,8 +144,18 @@ _SAME_TURN = 1.01
 
 
 def check_rotation(evidence: Evidence) -> Iterator[Finding]:
-    """Yield a warning where the range of angles is larger than the actuator turns by its designation."""
+    """Yield an error where the stops are the wrong way round; a warning for a range larger than by the designation."""
     rated, angles = evidence.number(_RATED), evidence.angle_range()
+    stops = evidence.numbers("actuator.angle_min", "actuator.angle_max")
+    if stops is not None and not stops[0] < stops[1]:
+        yield Finding(
+            id="stops",
+            severity="error",
+            title="the lower stop is not below the upper one",
+            values=evidence.values_of("actuator.angle_min", "actuator.angle_max"),
+            sides=(Side("actuator.angle_min", stops[0], "rad"), Side("actuator.angle_max", stops[1], "rad")),
+            paragraph="No run can be made with these stops. Exchange them, or correct the wrong one.",
+        )
     if rated is None or angles is None or angles[3] - angles[1] <= _SAME_TURN * rated:
         return
     turn = angles[3] - angles[1]

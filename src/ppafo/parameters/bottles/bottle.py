@@ -255,8 +255,19 @@ class Bottle:
 
 
 def list_bottles() -> tuple[str, ...]:
-    """Return the names of the bottles that come with the package."""
-    return FILE.names()
+    """Return the names of the bottles that come with the package: bottle files, and bottles of the catalogue."""
+    return tuple(dict.fromkeys((*FILE.names(), *bottle_parts())))
+
+
+def described_bottles() -> list[dict[str, Any]]:
+    """Return name and title of each bottle that comes with the package."""
+    titles = {
+        name: f"{part.title}, {1000.0 * part.values['content']:.0f} g, of the catalogue of parts"
+        for name, part in bottle_parts().items()
+    }
+    # A bottle file has its own walls and regulator, and comes before a part of its name.
+    titles |= {name: str(FILE.parse(FILE.read(name), name)["title"]) for name in FILE.names()}
+    return [{"name": name, "title": titles[name]} for name in list_bottles()]
 
 
 def load_bottle(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Bottle:
@@ -266,7 +277,7 @@ def load_bottle(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Bott
     """
     # A bottle file has its own walls and regulator; a part of the same name has only a content and a mass.
     part = None if str(name_or_path) in FILE.names() else bottle_parts().get(str(name_or_path))
-    name, known = label(str(name_or_path)), (*FILE.names(), *bottle_parts())
+    name, known = label(str(name_or_path)), list_bottles()
     if not (name in known or Path(name_or_path).suffix == ".toml" or "/" in name):
         hint = nearest_name(name, known)
         raise ParameterError(f"there is no bottle '{name}'{hint}; available: {', '.join(known)}, or give a .toml file")
