@@ -170,7 +170,7 @@ def causes_of(
         if stage is sized:
             # Errors that any bench has come before a fault: they need no cause.
             usual = [one for one in sized if one.usual]
-            together = search.compared([search.together(usual, none)], none.squares)
+            together = search.compared(search.together(usual, none), none.squares)
             if any(one.explains for one in together):
                 alone = [one for one in search.compared(usual, none.squares) if one.explains and one.is_usual]
                 return Causes(_cause_of(alone or together, search.penalty), None, len(usual))
@@ -318,15 +318,17 @@ class _Search:
             if other is not None
         ]
 
-    def together(self, usual: Sequence[Candidate], none: _Left) -> Candidate:
-        """Return the errors that any bench has, all at once, each as large as explains most within its limit."""
+    def together(self, usual: Sequence[Candidate], none: _Left) -> list[Candidate]:
+        """Return the errors that any bench has, all at once, each as large as explains most; none without a sensor."""
         slopes = self._slopes(Change(), none, usual)
+        if not slopes:
+            return []
         limits = np.array([one.usual for one, _ in slopes])
         columns = np.stack([column for _, column in slopes], axis=1)
         found = lsq_linear(columns * limits, -none.errors, (-1.0, 1.0)).x * limits
         change = reduce(joined, [one.at(float(size)) for (one, _), size in zip(slopes, found, strict=True)])
         words = "zeros, gains and delays of several sensors seem to be off"
-        return Candidate("several sensors", words, lambda _: change, (1.0,), usual=1.0)
+        return [Candidate("several sensors", words, lambda _: change, (1.0,), usual=1.0)]
 
     def needs_another(self, first: _Tried, candidates: Sequence[Candidate]) -> bool:
         """Return whether a second change, larger than on any bench, explains what a first leaves.
