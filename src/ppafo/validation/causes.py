@@ -283,7 +283,7 @@ class _Search:
                 if left is not None:
                     parts = np.log(np.maximum(none, 1.0)) - np.log(np.maximum(left.squares, 1.0))
                     gain = float(counts @ parts) - self.penalty * (len(one.sizes) > 1)
-                    now, before = _Tried(one, size, left, gain), best.get(one.name)
+                    now, before = _Tried(candidate=one, size=size, left=left, gain=gain), best.get(one.name)
                     # Sizes that leave nothing but noise are equal: one inside the grid is known better than its ends.
                     if before is None or (gain, now.is_inside) > (before.gain, before.is_inside):
                         best[one.name] = now
@@ -323,6 +323,7 @@ class _Search:
         slopes = self._slopes(Change(), none, usual)
         if not slopes:
             return []
+        # In units of its limit each has the same bounds, whatever its own unit is.
         limits = np.array([one.usual for one, _ in slopes])
         columns = np.stack([column for _, column in slopes], axis=1)
         found = lsq_linear(columns * limits, -none.errors, (-1.0, 1.0)).x * limits
@@ -344,12 +345,14 @@ class _Search:
             near = self.evaluated([first.candidate.at(first.size + step)])[0]
             own = own if near is None else (near.errors - errors) / step
             own /= max(float(np.linalg.norm(own)), 1.0e-300)
+        # Beside a second change the first would have another size: what it can take over is no merit of the second.
         rest = errors - (own @ errors) * own
         threshold = 2.0 * (self.penalty + math.log(len(candidates)))
         engine = sum(float(np.square(one.engine) @ one.good.sum(axis=1)) for one in self.records)
         for one, column in self._slopes(change, first.left, candidates):
             across = column - (own @ column) * own
             size = float(across @ across)
+            # What does the same as the first leaves rounding, along which anything may seem to be explained.
             if size > _PARTING * float(column @ column):
                 along = float(across @ rest)
                 explained = along * along / size
