@@ -258,6 +258,7 @@ def channel_agreement(item: Comparison, delay: float) -> ChannelAgreement:
 
 def noise_in(values: Floats, full_range: float) -> float:
     """Return the noise of samples [their unit], with what a converter rounds: its resolution / sqrt(12)."""
+    # At rest a coarse converter repeats one value, and third differences see no noise at all.
     steps = np.diff(np.unique(values))
     resolution = float(np.min(steps, where=steps > _ROUNDING * steps.sum(), initial=full_range)) if steps.size else 0.0
     return max(math.hypot(noise_of(values), resolution / math.sqrt(12.0)), LEAST_NOISE * full_range)

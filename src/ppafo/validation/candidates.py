@@ -63,6 +63,7 @@ def joined(first: Change, second: Change) -> Change:
     sensors = dict(first.sensors)
     for name, one in second.sensors.items():
         own = sensors.get(name, Sensor())
+        # A zero and a delay turn about nothing, so that the gain's point stays.
         about = one.about if one.gain != 1.0 else own.about
         sensors[name] = Sensor(own.gain * one.gain, own.zero + one.zero, about, own.delay + one.delay)
     numbers, effects = {**second.numbers, **first.numbers}, {**second.effects, **first.effects}

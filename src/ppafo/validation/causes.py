@@ -170,7 +170,7 @@ def causes_of(
         if stage is sized:
             # Errors that any bench has come before a fault: they need no cause.
             usual = [one for one in sized if one.usual]
-            together = search.compared([search.together(usual, none)], none.squares)
+            together = search.compared(search.together(usual, none), none.squares)
             if any(one.explains for one in together):
                 alone = [one for one in search.compared(usual, none.squares) if one.explains and one.is_usual]
                 return Causes(_cause_of(alone or together, search.penalty), None, len(usual))
@@ -283,7 +283,7 @@ class _Search:
                 if left is not None:
                     parts = np.log(np.maximum(none, 1.0)) - np.log(np.maximum(left.squares, 1.0))
                     gain = float(counts @ parts) - self.penalty * (len(one.sizes) > 1)
-                    now, before = _Tried(one, size, left, gain), best.get(one.name)
+                    now, before = _Tried(candidate=one, size=size, left=left, gain=gain), best.get(one.name)
                     # Sizes that leave nothing but noise are equal: one inside the grid is known better than its ends.
                     if before is None or (gain, now.is_inside) > (before.gain, before.is_inside):
                         best[one.name] = now
@@ -318,15 +318,18 @@ class _Search:
             if other is not None
         ]
 
-    def together(self, usual: Sequence[Candidate], none: _Left) -> Candidate:
-        """Return the errors that any bench has, all at once, each as large as explains most within its limit."""
+    def together(self, usual: Sequence[Candidate], none: _Left) -> list[Candidate]:
+        """Return the errors that any bench has, all at once, each as large as explains most; none without a sensor."""
         slopes = self._slopes(Change(), none, usual)
+        if not slopes:
+            return []
+        # In units of its limit each has the same bounds, whatever its own unit is.
         limits = np.array([one.usual for one, _ in slopes])
         columns = np.stack([column for _, column in slopes], axis=1)
         found = lsq_linear(columns * limits, -none.errors, (-1.0, 1.0)).x * limits
         change = reduce(joined, [one.at(float(size)) for (one, _), size in zip(slopes, found, strict=True)])
         words = "zeros, gains and delays of several sensors seem to be off"
-        return Candidate("several sensors", words, lambda _: change, (1.0,), usual=1.0)
+        return [Candidate("several sensors", words, lambda _: change, (1.0,), usual=1.0)]
 
     def needs_another(self, first: _Tried, candidates: Sequence[Candidate]) -> bool:
         """Return whether a second change, larger than on any bench, explains what a first leaves.
@@ -342,12 +345,14 @@ class _Search:
             near = self.evaluated([first.candidate.at(first.size + step)])[0]
             own = own if near is None else (near.errors - errors) / step
             own /= max(float(np.linalg.norm(own)), 1.0e-300)
+        # Beside a second change the first would have another size: what it can take over is no merit of the second.
         rest = errors - (own @ errors) * own
         threshold = 2.0 * (self.penalty + math.log(len(candidates)))
         engine = sum(float(np.square(one.engine) @ one.good.sum(axis=1)) for one in self.records)
         for one, column in self._slopes(change, first.left, candidates):
             across = column - (own @ column) * own
             size = float(across @ across)
+            # What does the same as the first leaves rounding, along which anything may seem to be explained.
             if size > _PARTING * float(column @ column):
                 along = float(across @ rest)
                 explained = along * along / size

@@ -89,6 +89,10 @@ _PANELS = (
 )
 
 
+_NAMED = "ground_force"
+"""The panel that names the curves: it has nothing to hide in the swing."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class ReactingPair:
     """A walk of a neuromuscular gait model with the device, and with it off."""
@@ -285,9 +289,9 @@ def stride_panels(comparison: Comparison) -> list[Panel]:
             if channel in walked.averages:
                 curves = walked.averages[channel]
                 band = (curves.mean - curves.deviation, curves.mean + curves.deviation)
-                marks.append(Mark("line", percent, curves.mean, (), "" if panels else label, colour))
+                marks.append(Mark("line", percent, curves.mean, (), label if channel == _NAMED else "", colour))
                 marks.append(Mark("band", percent, band, colour=colour, style={"alpha": 0.2}))
-        legend = "" if panels else "inside"
+        legend = "inside" if channel == _NAMED else ""
         panels.append(
             Panel(stride, kind, marks, legend=legend, then=lambda axes: axes.set_xlim(0.0, 100.0), shares_x=True)
         )

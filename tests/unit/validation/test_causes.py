@@ -161,6 +161,15 @@ def test_errors_of_several_sensors_as_on_any_bench_are_no_disagreement(bench: Re
     assert found.is_usual
 
 
+def test_a_torque_without_any_sensor_of_the_device_is_searched(bench: Recording) -> None:
+    run = simulate(load_scenario("step-response", ["motion.kind=free", "run.duration=0.2 s"])).recording
+    channels = {"command": Channel(run["command"], "-"), "torque": Channel(1.1 * run["torque"], "N m")}
+    start = {"angle": float(run["angle"][0]), "pressure_1": ROOM, "pressure_2": float(run["pressure_2"][0])}
+    found = causes(Recording("torque", run.time, channels, "synthetic"), initial=start)
+    assert found.nearest is not None
+    assert found.nearest.name == "actuator.torque_constant"
+
+
 def test_two_mistakes_that_look_like_a_third_are_not_named_as_that(bench: Recording) -> None:
     """The area of the valve leaves little more than the noise, and a second change explains that."""
     run = simulate(load_scenario("step-response", ["motion.kind=free", "run.duration=0.2 s"])).recording
