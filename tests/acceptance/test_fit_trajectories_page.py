@@ -11,7 +11,8 @@ import pytest
 from ppafo.cli.main import main
 from ppafo.parameters.loading import load_device, load_parameter_set
 
-PAGE = (Path(__file__).parents[2] / "docs" / "how-to" / "fit-trajectories.md").read_text(encoding="utf-8")
+WHOLE = (Path(__file__).parents[2] / "docs" / "how-to" / "identify.md").read_text(encoding="utf-8")
+PAGE = WHOLE.partition("\n## Fit recordings of motion\n")[2].partition("\n## ")[0]
 COMMANDS = [line for block in re.findall(r"```sh\n(.*?)```", PAGE, re.DOTALL) for line in block.strip().splitlines()]
 PLANTED = {
     "foot_plate.inertia": 0.010,

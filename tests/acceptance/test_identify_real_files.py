@@ -11,7 +11,7 @@ from ppafo.analyses.identify.answer import Identification
 from ppafo.analyses.identify.solve import identify
 from ppafo.cli.main import main
 
-PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "identify-from-raw-files.md"
+PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "identify.md"
 EXAMPLE = Path(str(resources.files("ppafo"))) / "examples" / "measured-cylinder"
 KNOWN_AREA = 5.1875e-4
 

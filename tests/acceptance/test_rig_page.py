@@ -10,7 +10,7 @@ from ppafo.cli.main import main
 from ppafo.rig.experiments import EXPERIMENTS
 from ppafo.rig.preset import list_presets
 
-PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "use-the-simulated-bench.md"
+PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "identify.md"
 COMMANDS = re.findall(r"^    ppafo (rig .*)$", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
 
 

@@ -47,7 +47,7 @@ def test_recordings_and_what_is_made_of_them_say_that_they_are_synthetic() -> No
 def test_the_example_of_the_how_to_page_runs_and_calls_its_numbers_identified(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    page = Path(__file__).parents[2] / "docs" / "how-to" / "fit-trajectories.md"
+    page = Path(__file__).parents[2] / "docs" / "how-to" / "identify.md"
     (code,) = re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
     exec(compile(code, str(page), "exec"), {"__name__": "example"})
     lines = capsys.readouterr().out.splitlines()

@@ -103,8 +103,11 @@ _SHARE_THAT_IS_CLIPPED = 0.05
 _FEWEST_CLIPPED = 4
 _FRACTION_THAT_MOVES = 0.02
 _LARGEST_NUMBER = 1.0e12
-_GROSS_SAMPLE, _GROSS_READING = 0.01, 0.25
-"""Shares of the usual range from which a sample over time, by 6 of them, and a reading are grossly wrong."""
+_GROSS_SAMPLE, _GROSS_READING = 1.0 / 6.0, 0.25
+"""Shares of the usual range from which a sample over time, by 6 of them, and a reading are grossly wrong.
+
+A real logger's glitch of a third of the range is one of many samples, and no reason to refuse the recording.
+"""
 _NO_DECAY = 0.5
 """Share of the range by which a first sample differs from the next four where it is wrong."""
 _ALIKE, _FEWEST_ALIKE = 6, 8
