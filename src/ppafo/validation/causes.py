@@ -178,7 +178,9 @@ def causes_of(
         named = [one for one in tried if one.explains]
         if named:
             first = max(named, key=lambda one: one.gain)
-            if first.candidate.name.startswith(_SAMPLES) or not search.needs_another(first, sized):
+            # What has no size of its own to fit, a swap or a sign, cannot pass for two other changes.
+            is_fitted = len(first.candidate.sizes) > 1 and not first.candidate.name.startswith(_SAMPLES)
+            if not is_fitted or not search.needs_another(first, sized):
                 return Causes(_cause_of(named, search.penalty), None, len(tried))
             return Causes(None, _cause_of([first], search.penalty), len(tried))
     if settings.motion == "measured":
