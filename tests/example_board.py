@@ -13,7 +13,7 @@ from ppafo.simulation.loading import load_scenario
 from tests.virtual_wire import free_port
 
 COMPILER = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
-WHOLE = ("controller.kind=pid_on_chip", "sensors.pressure_resolution=1 Pa_d")
+WHOLE = ("controller.kind=pid_fixed_point", "sensors.pressure_resolution=1 Pa_d")
 SENT = ("reference", "angle", "pressure_1", "pressure_2", "torque")
 
 

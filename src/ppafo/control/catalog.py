@@ -4,7 +4,7 @@ from ppafo.control import profiles
 from ppafo.control.kind import ControllerKind, ProfileKind
 from ppafo.kinds import Kinds
 
-ON_CHIP = "_on_chip"
+FIXED_POINT = "_fixed_point"
 """Ending of the name of a controller in its fixed-point form."""
 
 CONTROLLERS: Kinds[ControllerKind] = Kinds(
@@ -20,9 +20,9 @@ CONTROLLERS: Kinds[ControllerKind] = Kinds(
         "sliding_mode": "ppafo.control.controllers.feedback:SLIDING_MODE",
         "damped_proportional": "ppafo.control.controllers.feedback:DAMPED_PROPORTIONAL",
         "feedback_linearisation": "ppafo.control.controllers.model_based:FEEDBACK_LINEARISATION",
-        "pid_on_chip": "ppafo.processor.torque_laws:PID_ON_CHIP",
-        "on_off_on_chip": "ppafo.processor.torque_laws:ON_OFF_ON_CHIP",
-        "on_off_dead_zone_on_chip": "ppafo.processor.torque_laws:DEAD_ZONE_ON_CHIP",
+        "pid_fixed_point": "ppafo.processor.torque_laws:PID_FIXED_POINT",
+        "on_off_fixed_point": "ppafo.processor.torque_laws:ON_OFF_FIXED_POINT",
+        "on_off_dead_zone_fixed_point": "ppafo.processor.torque_laws:DEAD_ZONE_FIXED_POINT",
     },
 )
 

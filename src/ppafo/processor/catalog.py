@@ -19,7 +19,7 @@ firmware.hex: firmware.elf
 
 
 def _flash(said: str, needs: str, command: str) -> str:
-    """The part of a make file that writes the chip."""
+    """The part of a make file that writes the processor."""
     return f"\n# {said}. Read README.md first.\nflash: {needs}\n\t{command}\n"
 
 
@@ -55,7 +55,7 @@ MSP430F2013 = Target(
 )
 
 
-def _words_of_cortex(name: str, chip: str, pins: Mapping[str, str]) -> dict[str, str]:
+def _words_of_cortex(name: str, part: str, pins: Mapping[str, str]) -> dict[str, str]:
     """What fills the templates for a Cortex-M on a micro:bit, whose compiler may be gcc, clang or zig."""
     for_zig = f"zig cc -target thumb-freestanding-eabi -mcpu={name.replace('-', '_')}"
     return {
@@ -65,10 +65,10 @@ def _words_of_cortex(name: str, chip: str, pins: Mapping[str, str]) -> dict[str,
         "flags_of_target": "$(PROCESSOR) -mthumb -fomit-frame-pointer",
         "link": "$(LINKER) $(PROCESSOR) -mthumb -nostdlib -Wl,--gc-sections",
         "start": "start_cortex.o",
-        "board_objects": f"board_microbit.o converter_{chip}.o",
-        "board_files": f"`board_microbit.c` and `converter_{chip}.c`",
+        "board_objects": f"board_microbit.o converter_{part}.o",
+        "board_files": f"`board_microbit.c` and `converter_{part}.c`",
         "not_run": "timer and outputs run in QEMU's micro:bit V1, converter and watchdog have no simulator",
-        "script": f"{chip}.ld",
+        "script": f"{part}.ld",
         "flash": _flash("Onto the drive that the board is", "firmware.hex", 'cp firmware.hex "$(MICROBIT)"') + _HEX,
         "flash_said": "onto the drive that the board is, as in make flash MICROBIT=/media/MICROBIT",
         **pins,

@@ -69,7 +69,7 @@ def export_firmware(
     else:
         found = words.tried(scenarios, target or TARGETS[0], samples, overrides)
     code = output.EXIT_GOOD if found.agrees else output.EXIT_CHECK_FAILED
-    said = Said(found.text, found.document, "chip", code, draw=found.draw)
+    said = Said(found.text, found.document, "processor", code, draw=found.draw)
     if out is not None:
         output.write_files(out, output.said_files(said), COMMAND)
     return said

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple, get_type_hints
 
-from ppafo.control.catalog import CONTROLLERS, ON_CHIP
+from ppafo.control.catalog import CONTROLLERS, FIXED_POINT
 from ppafo.engine.rows import is_number, leaf_paths, leaves, members, rebuilt
 from ppafo.engine.source_text import SourceCollector, is_row
 from ppafo.errors import ProgramError, ScenarioError
@@ -162,7 +162,7 @@ MOST_TICKS = 32767
 _TEMPLATES = ("Makefile", "README.md", "board.h", "board_simulated.c", "controller.h", "host.c", "main.c")
 
 
-class ChipController(NamedTuple):
+class FixedPointController(NamedTuple):
     """The integer controller of a scenario: law, whole numbers by name, converter, ticks of a sample."""
 
     law: FixedLaw
@@ -179,18 +179,18 @@ def integer_form(scenario: Scenario) -> Scenario:
     kind = scenario.controller.kind
     if kind in FIXED_LAWS:
         return scenario
-    if f"{kind}{ON_CHIP}" not in FIXED_LAWS:
+    if f"{kind}{FIXED_POINT}" not in FIXED_LAWS:
         raise ScenarioError(
             f"{scenario.name}: the controller '{kind}' has no fixed-point form; controllers that have one: "
-            f"{', '.join(name.removesuffix(ON_CHIP) for name in FIXED_LAWS)}"
+            f"{', '.join(name.removesuffix(FIXED_POINT) for name in FIXED_LAWS)}"
         )
     scenario.device.check_vane("a fixed-point controller")
     settings = {**scenario.controller.settings, **{item.name: item.default or 0.0 for item in SETTINGS}}
-    return replace(scenario, controller=replace(scenario.controller, kind=f"{kind}{ON_CHIP}", settings=settings))
+    return replace(scenario, controller=replace(scenario.controller, kind=f"{kind}{FIXED_POINT}", settings=settings))
 
 
-def chip_controller(scenario: Scenario) -> ChipController:
-    """The integer controller of a scenario; ScenarioError where the timer of a chip cannot make its sample period."""
+def fixed_point_controller(scenario: Scenario) -> FixedPointController:
+    """The integer controller of a scenario; ScenarioError where the timer cannot make its sample period."""
     scenario = integer_form(scenario)
     control = scenario.controller
     ticks = ticks_of(scenario.name, control.period)
@@ -198,19 +198,19 @@ def chip_controller(scenario: Scenario) -> ChipController:
     row = plan_run(scenario).controller
     numbers = dict(zip((item.name for item in law.number_quantities), leaves(row.numbers), strict=True))
     converter = converter_with(row.steps, row.numbers.limits)
-    return ChipController(law=law, numbers=numbers, converter=converter, ticks=ticks)
+    return FixedPointController(law=law, numbers=numbers, converter=converter, ticks=ticks)
 
 
 def firmware(scenario: Scenario, target: str = TARGETS[0]) -> dict[str, bytes]:
     """Files of the firmware of a scenario's controller, by name. ScenarioError where it has no integer form."""
     chosen = target_of(target)
     scenario = integer_form(scenario)
-    chip = chip_controller(scenario)
-    converter = chip.converter
+    fixed = fixed_point_controller(scenario)
+    converter = fixed.converter
     words = {
         "title": scenario.name,
         "description": in_markdown(scenario.description),
-        "kind": chip.law.name,
+        "kind": fixed.law.name,
         "target": chosen.name,
         "processor": chosen.processor,
         "board": chosen.board,
@@ -222,26 +222,26 @@ def firmware(scenario: Scenario, target: str = TARGETS[0]) -> dict[str, bytes]:
         "torque_step": f"{converter.torque_step * 1.0e3:.4g} mN m",
         "lowest": f"{-converter.middle * converter.torque_step:.4g} N m",
         "highest": f"{(converter.top - converter.middle) * converter.torque_step:.4g} N m",
-        "silence": f"{(2 * chip.ticks * TICK + 2.05e-3) * 1.0e3:.4g} ms",
+        "silence": f"{(2 * fixed.ticks * TICK + 2.05e-3) * 1.0e3:.4g} ms",
         **chosen.words,
     }
     words["wiring"] = filled(template("ppafo.processor", chosen.wiring), words).rstrip()
     texts = {name: filled(template("ppafo.processor", name), words) for name in (*_TEMPLATES, *chosen.templates)}
     texts["LICENSE"] = licence()
     texts["controller.c"] = law_source(
-        chip.law,
-        f"The controller '{chip.law.name}' of ppafo {__version__} in fixed point.",
+        fixed.law,
+        f"The controller '{fixed.law.name}' of ppafo {__version__} in fixed point.",
         (", ".join(f"int16_t {name}" for name in Readings._fields), "readings", ", ".join(Readings._fields)),
         {"bool controller_is_sound": "state.sound == 1"},
     )
     control = scenario.controller
     texts["parameters.h"] = parameters_header(
-        f"the controller '{chip.law.name}' of {scenario.name}, made by ppafo {__version__}",
+        f"the controller '{fixed.law.name}' of {scenario.name}, made by ppafo {__version__}",
         _origins(scenario),
-        f"#define CONTROLLER_TICKS {chip.ticks}u /* of 125 us in a sample period of {control.period:.9g} s */\n"
+        f"#define CONTROLLER_TICKS {fixed.ticks}u /* of 125 us in a sample period of {control.period:.9g} s */\n"
         f"#define CONTROLLER_BITS {int(control.settings[SETTINGS[0].name])} /* of the converter */",
-        chip.law,
-        chip.numbers,
+        fixed.law,
+        fixed.numbers,
     )
     return {name: text.encode() for name, text in sorted(texts.items())}
 

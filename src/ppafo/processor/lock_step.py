@@ -11,16 +11,16 @@ import numpy as np
 from ppafo.engine.rows import rebuilt
 from ppafo.errors import SimulationError
 from ppafo.processor.catalog import target_of
-from ppafo.processor.firmware import ChipController, chip_controller, firmware, integer_form
+from ppafo.processor.firmware import FixedPointController, firmware, fixed_point_controller, integer_form
 from ppafo.processor.fixed_point import COMMAND_STEPS, Readings, read
 from ppafo.processor.simulators import (
-    ChipSimulator,
     Decision,
     Image,
+    ProcessorSimulator,
     Sizes,
     Target,
-    chip_simulator,
     missing_tools,
+    processor_simulator,
 )
 from ppafo.processor.torque_laws import TARGETS
 from ppafo.report.style import BLACK, REFERENCE, Margins, figure_of_panels, house_style, look_of_valve, mark_kind
@@ -37,39 +37,39 @@ EPISODE = 200
 """Drawn samples from one reset to the next."""
 
 TURN = 50
-"""Drawn samples that the chip is asked at once."""
+"""Drawn samples that the processor is asked at once."""
 
 Shown = TypeVar("Shown", bound=tuple[int, ...])
 """What the converter shows at a sample."""
 
 
-class PythonChip:
-    """The integer controller of a scenario in Python, as the chip computes it."""
+class PythonProcessor:
+    """The integer controller of a scenario in Python, as the processor computes it."""
 
-    def __init__(self, chip: ChipController) -> None:
-        self.law = chip.law
-        given = [int(chip.numbers[item.name]) for item in chip.law.number_quantities]
-        self.numbers: Any = rebuilt(chip.law.numbers, given)
-        self.state: Any = chip.law.begins
+    def __init__(self, fixed: FixedPointController) -> None:
+        self.law = fixed.law
+        given = [int(fixed.numbers[item.name]) for item in fixed.law.number_quantities]
+        self.numbers: Any = rebuilt(fixed.law.numbers, given)
+        self.state: Any = fixed.law.begins
 
     def begin(self) -> None:
         """Forget everything."""
         self.state = self.law.begins
 
     def sample(self, readings: tuple[int, ...]) -> tuple[int, int]:
-        """Command in steps, and the status word that the chip reports with it."""
+        """Command in steps, and the status word that the processor reports with it."""
         command, self.state = self.law.sample(self.numbers, self.state, readings)
         return command, self.law.status(self.state)
 
 
-class ChipLaw:
-    """The simulated chip as a controller of a scenario; it keeps the decision of every sample.
+class SimulatedController:
+    """The simulated processor as a controller of a scenario; it keeps the decision of every sample.
 
     ``shown`` makes the converter's readings of a reference and a measurement; ``at_zero`` is the command for no steps.
     """
 
     def __init__(
-        self, simulator: ChipSimulator, shown: Callable[[float, Any], tuple[int, ...]], at_zero: float = 0.0
+        self, simulator: ProcessorSimulator, shown: Callable[[float, Any], tuple[int, ...]], at_zero: float = 0.0
     ) -> None:
         self.simulator = simulator
         self._shown, self._at_zero = shown, at_zero
@@ -81,7 +81,7 @@ class ChipLaw:
         self.decisions.clear()
 
     def update(self, time: float, reference: float, measurement: Any) -> float:
-        """Command from -1 to 1, from what the converter shows; the chip needs no time [s], it counts samples."""
+        """Command from -1 to 1, from what the converter shows; the processor needs no time [s], it counts samples."""
         del time
         found = self.simulator.sample(self._shown(reference, measurement))
         self.decisions.append(found)
@@ -103,14 +103,14 @@ class Cost(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class ChipRun:
-    """A scenario with the chip's simulator in charge, the same with the integer controller in the lanes, and the cost.
+class ProcessorRun:
+    """A scenario controlled by the processor's simulator, the same by the integer controller in Python, and the cost.
 
     ``differences`` are samples at which the commands differ; ``same_bits`` is true where every channel is the same.
     """
 
     scenario: Scenario
-    chip: Result
+    processor: Result
     lanes: Result
     cost: Cost
     samples: int
@@ -118,22 +118,22 @@ class ChipRun:
     same_bits: bool
 
 
-def run_on_chip(scenario: Scenario, target: str = TARGETS[0]) -> ChipRun:
+def run_on_processor(scenario: Scenario, target: str = TARGETS[0]) -> ProcessorRun:
     """Run a scenario with its controller on the processor's simulator, in virtual time, and once more in the lanes.
 
     ScenarioError where the controller has no integer form, SimulationError where a tool is missing.
     """
     scenario = integer_form(scenario)
-    chip = chip_controller(scenario)
-    with chip_simulator(firmware(scenario, target), target_of(target)) as (simulator, image):
-        law = ChipLaw(simulator, partial(read, chip.converter))
-        on_chip = simulate(scenario.controlled_by(law))
+    fixed = fixed_point_controller(scenario)
+    with processor_simulator(firmware(scenario, target), target_of(target)) as (simulator, image):
+        law = SimulatedController(simulator, partial(read, fixed.converter))
+        fixed_point_kind = simulate(scenario.controlled_by(law))
         cost = cost_of(target_of(target), image, simulator.stack(), law.decisions)
     in_lanes = simulate(scenario)
-    mine, theirs = on_chip.recording.channels, in_lanes.recording.channels
+    mine, theirs = fixed_point_kind.recording.channels, in_lanes.recording.channels
     same = all(np.array_equal(mine[name].values, theirs[name].values) for name in theirs)
     differ = int(np.count_nonzero(mine["command"].values != theirs["command"].values))
-    return ChipRun(scenario, on_chip, in_lanes, cost, len(law.decisions), differ, same)
+    return ProcessorRun(scenario, fixed_point_kind, in_lanes, cost, len(law.decisions), differ, same)
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,14 +147,14 @@ class Comparison:
 
 
 def compare_drawn(scenario: Scenario, samples: int, seed: int = 1, target: str = TARGETS[0]) -> Comparison:
-    """Give drawn readings to the chip's simulator and to Python, with a reset after every ``EPISODE`` of them."""
-    chip, chosen = chip_controller(scenario), target_of(target)
-    given = _in_episodes(drawn_readings(int(chip.converter.top), samples, seed))
-    return compare_with(PythonChip(chip), given, samples, firmware(scenario, target), chosen)
+    """Give drawn readings to the processor's simulator and to Python, with a reset after every ``EPISODE`` of them."""
+    fixed, chosen = fixed_point_controller(scenario), target_of(target)
+    given = _in_episodes(drawn_readings(int(fixed.converter.top), samples, seed))
+    return compare_with(PythonProcessor(fixed), given, samples, firmware(scenario, target), chosen)
 
 
 def compare_with(
-    reference: PythonChip,
+    reference: PythonProcessor,
     given: Generator[tuple[Shown, bool], int, None],
     samples: int,
     contents: Mapping[str, bytes],
@@ -167,7 +167,7 @@ def compare_with(
     wanted: list[tuple[int, int]] = []
     asked: list[Shown] = []
     decisions: list[Decision] = []
-    with chip_simulator(contents, target) as (simulator, image):
+    with processor_simulator(contents, target) as (simulator, image):
         readings, begins = next(given)
         for number in range(samples):
             if begins or len(asked) == TURN:
@@ -217,7 +217,7 @@ def drawn_readings(top: int, samples: int, seed: int) -> Iterator[Readings]:
 
 
 def cost_of(target: Target, image: Image, stack: int, decisions: list[Decision]) -> Cost:
-    """What the decisions of a chip took of it. SimulationError where there are none."""
+    """What the decisions of a processor took of it. SimulationError where there are none."""
     if not decisions:
         raise SimulationError("no sample was taken on the processor")
     work = [item.work for item in decisions]
@@ -230,7 +230,7 @@ _WIDTH, _TORQUE, _COMMAND = 7.6, 2.6, 0.9
 _LANES = (0, (1, 3))
 
 
-def chip_figure(runs: Sequence[ChipRun]) -> "Figure":
+def processor_figure(runs: Sequence[ProcessorRun]) -> "Figure":
     """Return the figure of some runs, two panels for each: torque with its reference, and the command to the valve.
 
     With ``torque-task-solenoid`` and ``torque-task-proportional`` it is figure 8 of the paper.
@@ -244,21 +244,23 @@ def chip_figure(runs: Sequence[ChipRun]) -> "Figure":
         for place, run in enumerate(runs):
             _draw(grid[2 * place], grid[2 * place + 1], run)
         grid[-1].set_xlabel("Time (s)")
-        grid[-1].set_xlim(0.0, max(run.chip.recording.duration for run in runs))
-        mark_kind(figure, runs[0].chip.recording.kind)
+        grid[-1].set_xlim(0.0, max(run.processor.recording.duration for run in runs))
+        mark_kind(figure, runs[0].processor.recording.kind)
         return figure
 
 
-def _draw(torque: "Axes", command: "Axes", run: ChipRun) -> None:
+def _draw(torque: "Axes", command: "Axes", run: ProcessorRun) -> None:
     """Draw a run, and that in the lanes as dots on its lines."""
     colour = look_of_valve(run.scenario.device.valve.kind).colour
-    chip, lanes, target = run.chip.recording, run.lanes.recording, run.cost.target.name
+    fixed, lanes, target = run.processor.recording, run.lanes.recording, run.cost.target.name
     bits = "same bits as in the simulation" if run.same_bits else "NOT the bits of the simulation"
     torque.set_title(f"{run.scenario.name}: {run.differences} of {run.samples} decisions differ, {bits}")
-    torque.plot(chip.time, chip["reference"], REFERENCE.line, color=REFERENCE.colour, linewidth=1.3, label="reference")
+    torque.plot(
+        fixed.time, fixed["reference"], REFERENCE.line, color=REFERENCE.colour, linewidth=1.3, label="reference"
+    )
     for axes, name in ((torque, "torque"), (command, "command")):
         step = "steps-post" if name == "command" else "default"
-        axes.plot(chip.time, chip[name], color=colour, drawstyle=step, label=f"{target} in its simulator")
+        axes.plot(fixed.time, fixed[name], color=colour, drawstyle=step, label=f"{target} in its simulator")
         axes.plot(
             lanes.time, lanes[name], color=BLACK, linewidth=0.9, linestyle=_LANES, drawstyle=step, label="simulation"
         )

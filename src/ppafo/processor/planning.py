@@ -57,7 +57,7 @@ class Numbers:
         return numbers, (whole, _too_large(size, self.name), _reference(reference, converter))
 
 
-def on_chip(
+def fixed_point_kind(
     floats: ControllerKind, parameters: type, initial: Any, update: Callable[..., Any], plan: Numbers
 ) -> ControllerKind:
     """The integer form of a law as a controller of the catalogue: its settings, and the converter's."""

@@ -72,14 +72,14 @@ class Image:
     symbols: Mapping[str, int]
 
 
-class ChipSimulator(Protocol):
+class ProcessorSimulator(Protocol):
     """A simulator with an image in it, which waits for a sample. SimulationError where it does not answer."""
 
     def begin(self) -> None:
         """Reset the processor, and let it come to where it waits for a sample."""
 
     def sample(self, readings: Iterable[int]) -> Decision:
-        """What the chip decides for the readings of one sample."""
+        """What the processor decides for the readings of one sample."""
 
     def samples(self, every: Sequence[Iterable[int]]) -> list[Decision]:
         """What it decides for some samples in turn, at most 50: asked at once where the simulator takes that."""
@@ -119,7 +119,7 @@ class Target:
     tools: tuple[str, ...]
     packages: str
     counted: str
-    simulator: Callable[["Target", Image], ChipSimulator]
+    simulator: Callable[["Target", Image], ProcessorSimulator]
     machine: Machine = NO_MACHINE
 
 
@@ -151,7 +151,7 @@ def built(contents: Mapping[str, bytes], folder: Path, goals: Sequence[str] = ("
 
 
 @contextmanager
-def chip_simulator(contents: Mapping[str, bytes], target: Target) -> Iterator[tuple[ChipSimulator, Image]]:
+def processor_simulator(contents: Mapping[str, bytes], target: Target) -> Iterator[tuple[ProcessorSimulator, Image]]:
     """The simulator of a target with the firmware of these files in it, and the image; both end with the ``with``.
 
     SimulationError where a tool is missing, the files cannot be built, or the simulator does not answer.
@@ -173,7 +173,7 @@ def built_image(contents: Mapping[str, bytes], target: Target) -> Iterator[Image
         raise SimulationError(
             f"the simulator of {target.name} needs {', '.join(absent)}; {target.packages} are packages of Debian"
         )
-    with tempfile.TemporaryDirectory(prefix="ppafo-chip-", ignore_cleanup_errors=True) as folder:
+    with tempfile.TemporaryDirectory(prefix="ppafo-processor-", ignore_cleanup_errors=True) as folder:
         built(contents, Path(folder))
         yield read_image(Path(folder), target)
 
@@ -323,7 +323,7 @@ class MspdebugSimulator:
         self._answer()
 
     def sample(self, readings: Iterable[int]) -> Decision:
-        """What the chip decides for the readings of one sample."""
+        """What the processor decides for the readings of one sample."""
         return self.samples((readings,))[0]
 
     def samples(self, every: Sequence[Iterable[int]]) -> list[Decision]:
@@ -470,7 +470,7 @@ class QemuSimulator:
         return [self.sample(readings) for readings in every]
 
     def sample(self, readings: Iterable[int]) -> Decision:
-        """What the chip decides for the readings of one sample."""
+        """What the processor decides for the readings of one sample."""
         self.debugger.write(self._readings, b"".join(number.to_bytes(2, "little") for number in readings))
         # Behind the breakpoint, or the machine would stop at once.
         self.debugger.go_on(self._stop + _LENGTH_OF_NOP)

@@ -38,7 +38,7 @@ from ppafo.processor.fixed_point import (
     shifted,
     still_sound,
 )
-from ppafo.processor.planning import Numbers, on_chip
+from ppafo.processor.planning import Numbers, fixed_point_kind
 
 TARGETS = ("msp430f2013", "cortex-m0", "cortex-m4")
 """Processors that an integer controller can be written for."""
@@ -58,7 +58,7 @@ class FixedLaw:
     number from -1 to 1. ``sample(numbers, state, readings)`` is the law itself, on whole numbers only: the
     command in steps and the next state. ``numbers`` and ``readings`` are the NamedTuple classes of what it is given;
     ``number_quantities`` declare the numbers, in order. The state ``begins`` so, and ``state_ranges`` has lowest and
-    highest of every number of it, by its own name; ``status`` is the word that a chip reports of it.
+    highest of every number of it, by its own name; ``status`` is the word that a processor reports of it.
     """
 
     kind: ControllerKind
@@ -180,30 +180,30 @@ _DEAD_ZONE_NUMBERS = (
     Quantity("release", "", "error at which it closes again, in counts", None, 0.0, _READING),
     Quantity("opening", "", "command while it is open, in steps", None, 0.0, _STEPS),
 )
-ON_OFF_ON_CHIP = on_chip(
+ON_OFF_FIXED_POINT = fixed_point_kind(
     FLOAT_ON_OFF,
     OnOffRows,
     each(float, OnOffCounts(1)),
     on_off_update,
-    Numbers("on_off_on_chip", (*OF_STEPS, *OF_LIMITS), prepare_on_off),
+    Numbers("on_off_fixed_point", (*OF_STEPS, *OF_LIMITS), prepare_on_off),
 )
 ON_OFF = FixedLaw(
-    kind=ON_OFF_ON_CHIP,
+    kind=ON_OFF_FIXED_POINT,
     sample=on_off_sample,
     numbers=OnOffNumbers,
     number_quantities=OF_LIMITS,
     begins=OnOffCounts(1),
     state_ranges={"sound": (0, 1)},
 )
-DEAD_ZONE_ON_CHIP = on_chip(
+DEAD_ZONE_FIXED_POINT = fixed_point_kind(
     FLOAT_DEAD_ZONE,
     DeadZoneRows,
     each(float, DeadZoneCounts(0, 1)),
     dead_zone_update,
-    Numbers("on_off_dead_zone_on_chip", (*OF_STEPS, *_DEAD_ZONE_NUMBERS), prepare_dead_zone, largest_dead_zone),
+    Numbers("on_off_dead_zone_fixed_point", (*OF_STEPS, *_DEAD_ZONE_NUMBERS), prepare_dead_zone, largest_dead_zone),
 )
 DEAD_ZONE = FixedLaw(
-    kind=DEAD_ZONE_ON_CHIP,
+    kind=DEAD_ZONE_FIXED_POINT,
     sample=dead_zone_sample,
     numbers=DeadZoneNumbers,
     number_quantities=_DEAD_ZONE_NUMBERS,
@@ -338,15 +338,15 @@ _PID_NUMBERS = (
 )
 _PID_BEGINS = PidCounts(integral=0, error=0, slope=0, started=0, sound=1)
 _ERROR = LARGEST_READING + LARGEST_READING
-PID_ON_CHIP = on_chip(
+PID_FIXED_POINT = fixed_point_kind(
     FLOAT_PID,
     PidRows,
     each(float, _PID_BEGINS),
     pid_update,
-    Numbers("pid_on_chip", (*OF_STEPS, *_PID_NUMBERS), prepare_pid, largest_pid),
+    Numbers("pid_fixed_point", (*OF_STEPS, *_PID_NUMBERS), prepare_pid, largest_pid),
 )
 PID = FixedLaw(
-    kind=PID_ON_CHIP,
+    kind=PID_FIXED_POINT,
     sample=pid_sample,
     numbers=PidNumbers,
     number_quantities=_PID_NUMBERS,

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 from ppafo.errors import ScenarioError
 from ppafo.processor.lock_step import (
-    ChipRun,
     Comparison,
     Cost,
-    chip_figure,
+    ProcessorRun,
     compare_drawn,
-    run_on_chip,
+    processor_figure,
+    run_on_processor,
     table_rows,
 )
 from ppafo.simulation.loading import load_scenario
@@ -47,11 +47,11 @@ def tried(names: Sequence[str], target: str, samples: int | None, overrides: Seq
 
 
 def _runs(scenarios: Sequence[Scenario], target: str) -> Tried:
-    """Scenarios with the chip in charge, one after the other, and their figure."""
-    found = [run_on_chip(scenario, target) for scenario in scenarios]
+    """Scenarios with the processor in charge, one after the other, and their figure."""
+    found = [run_on_processor(scenario, target) for scenario in scenarios]
     texts, documents = [], []
     for one in found:
-        metrics = {name: one.chip.metrics[name].value for name in _SHOWN if name in one.chip.metrics}
+        metrics = {name: one.processor.metrics[name].value for name in _SHOWN if name in one.processor.metrics}
         lines = [
             f"{one.scenario.name} with the controller on the processor's simulator, ppafo as the plant",
             "",
@@ -75,12 +75,12 @@ def _runs(scenarios: Sequence[Scenario], target: str) -> Tried:
         "\n\n".join(texts),
         documents[0] if len(documents) == 1 else {"runs": documents},
         all(one.same_bits and not one.differences for one in found),
-        lambda: chip_figure(found),
+        lambda: processor_figure(found),
     )
 
 
 def _drawn(found: Comparison, name: str, period: float, about: dict[str, Any]) -> Tried:
-    """Drawn samples on the chip and in Python."""
+    """Drawn samples on the processor and in Python."""
     lines = [
         f"{found.samples} drawn samples of the controller of {name} on the processor's simulator",
         "",
@@ -112,7 +112,7 @@ def table(targets: Sequence[str], samples: int | None) -> Tried:
     return Tried("\n".join(lines), {"rows": documents}, not any(item.get("differences") for item in documents))
 
 
-def _compared(found: ChipRun | Comparison) -> dict[str, Any]:
+def _compared(found: ProcessorRun | Comparison) -> dict[str, Any]:
     return {"samples": found.samples, "differences": found.differences}
 
 

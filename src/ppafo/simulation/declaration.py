@@ -14,7 +14,7 @@ from importlib import resources
 from typing import Any
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.control.catalog import CONTROLLERS, ON_CHIP, PROFILES
+from ppafo.control.catalog import CONTROLLERS, FIXED_POINT, PROFILES
 from ppafo.documents.models import quote
 from ppafo.errors import KindError, ScenarioError, UnitError, nearest_name, one_line, refused_as
 from ppafo.kinds import Kinds
@@ -78,7 +78,8 @@ SUPPLY_LINES = tuple(item.name for item in fields(SupplyLine))
 _REGULATED = quantities_of(RegulatedLine)
 
 RENAMED_MOTIONS = {"led": "prescribed", "held": "locked"}
-"""Kinds of motion by their name in an earlier version."""
+RENAMED_CONTROLLERS = {f"{name}_on_chip": f"{name}{FIXED_POINT}" for name in ("pid", "on_off", "on_off_dead_zone")}
+"""Kinds of motion and controllers by their names in an earlier version."""
 SECTIONS = (
     "device",
     "run",
@@ -198,9 +199,12 @@ def find_kinds(document: Mapping[str, Any], file: str) -> None:
     ScenarioError where one cannot be loaded or has an old name.
     """
     check_motion_kind(kind_at(document, "motion"), f"{file}: motion.kind")
+    law = kind_at(document, "controller")
+    if law in RENAMED_CONTROLLERS:
+        raise ScenarioError(f"{file}: the controller '{law}' is now called '{RENAMED_CONTROLLERS[law]}'")
     old = value_at(document, ARITHMETIC)
     if old is not None:
-        said = no_arithmetic(kind_at(document, "controller"), old)
+        said = no_arithmetic(law, old)
         raise ScenarioError(f"{file}: {ARITHMETIC} = {quote(old)}: {said}")
     kind = kind_at(document, "motion")
     with refused_as(ScenarioError, f"{file}: motion.kind", KindError):
@@ -223,10 +227,10 @@ def no_arithmetic(kind: str, text: object) -> str:
     """Return what to write in the place of ``controller.arithmetic``, which ``text`` was once given for."""
     if text == "float":
         return "is no setting any more; leave it out: every controller but the fixed-point ones computes with floats"
-    integer = kind if kind.endswith(ON_CHIP) else f"{kind}{ON_CHIP}"
+    integer = kind if kind.endswith(FIXED_POINT) else f"{kind}{FIXED_POINT}"
     if integer in CONTROLLERS:
         return f'is no setting any more; leave it out and write controller.kind = "{integer}"'
-    known = ", ".join(name for name in CONTROLLERS if name.endswith(ON_CHIP))
+    known = ", ".join(name for name in CONTROLLERS if name.endswith(FIXED_POINT))
     return f"is no setting any more, and '{kind}' has no fixed-point form; controllers that have one: {known}"
 
 

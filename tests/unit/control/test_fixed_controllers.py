@@ -120,14 +120,14 @@ def test_pid_on_whole_numbers_follows_the_float_form(settings: dict[str, float])
 
 
 def test_on_off_switches_where_the_float_form_does() -> None:
-    law = FIXED_LAWS["on_off_on_chip"]
+    law = FIXED_LAWS["on_off_fixed_point"]
     for torque in (-1.0, 1.9, 2.1, 4.0):
         found, _ = law.kind.update(parameters(law), law.kind.initial, 2.0, seen(torque), PERIOD)
         assert found == CONTROLLERS["on_off"].update((), (), 2.0, seen(torque), PERIOD)[0]
 
 
 def test_a_dead_zone_has_hysteresis_and_an_opening() -> None:
-    law = FIXED_LAWS["on_off_dead_zone_on_chip"]
+    law = FIXED_LAWS["on_off_dead_zone_fixed_point"]
     given_numbers = parameters(law, dead_zone=0.5, release=0.1, opening=0.25)
     state, found = law.kind.initial, []
     for torque in (1.7, 1.4, 1.7, 1.95, 2.4, 2.6, 2.05):

@@ -290,7 +290,7 @@ def test_what_a_scenario_says_is_plain_words_in_every_page_and_comment() -> None
     """Neither HTML, nor a heading, a link, or a mark that turns the direction of what follows in a source file."""
     hostile = "</p><script>alert(1)</script> `a` [x](javascript:b) ``` \\ \u202e \x1b[31m\n# Heading */"
     described = replace(load_scenario("torque-task-proportional"), description=hostile)
-    fixed = load_scenario("torque-task-proportional", ("controller.kind=pid_on_chip",))
+    fixed = load_scenario("torque-task-proportional", ("controller.kind=pid_fixed_point",))
     texts = {
         **c_library(described),
         **{f"plant/{name}": text for name, text in plant_library(described).items()},
@@ -300,7 +300,7 @@ def test_what_a_scenario_says_is_plain_words_in_every_page_and_comment() -> None
     assert len(said) == 3
     for page in said:
         (line,) = [line for line in page.splitlines() if "alert" in line]
-        assert re.search(r"(?<!\\)[<>`\[\]()#]", line.split("Controller `pid_on_chip`")[0]) is None
+        assert re.search(r"(?<!\\)[<>`\[\]()#]", line.split("Controller `pid_fixed_point`")[0]) is None
         assert "Heading" in line
     for text in texts.values():
         assert not any(mark in text.decode() for mark in "\u202e\x1b")

@@ -1,4 +1,4 @@
-"""Integer controllers as firmware: proved, built without a warning, and the same as in Python on a simulated chip."""
+"""Integer controllers as firmware: proved, built without a warning, and the same as in Python on a simulated fixed."""
 
 import shutil
 import subprocess
@@ -11,15 +11,15 @@ import pytest
 
 from ppafo.errors import ProgramError, ScenarioError
 from ppafo.processor.catalog import CATALOG
-from ppafo.processor.firmware import chip_controller, firmware, proof
+from ppafo.processor.firmware import firmware, fixed_point_controller, proof
 from ppafo.processor.fixed_point import Readings
-from ppafo.processor.lock_step import PythonChip, compare_drawn, drawn_readings, run_on_chip
+from ppafo.processor.lock_step import PythonProcessor, compare_drawn, drawn_readings, run_on_processor
 from ppafo.processor.simulators import (
     QemuSimulator,
     Target,
     built,
-    chip_simulator,
     missing_tools,
+    processor_simulator,
     read_image,
     sizes,
 )
@@ -29,15 +29,15 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.translation.widths import Interval
 
 SCENARIOS = {
-    "pid": ("torque-task-proportional", "controller.kind=pid_on_chip"),
+    "pid": ("torque-task-proportional", "controller.kind=pid_fixed_point"),
     "pid with all": (
         "torque-task-anti-windup",
-        "controller.kind=pid_on_chip",
+        "controller.kind=pid_fixed_point",
         "controller.converter_bits=14",
         "controller.converter_range=1.2 MPa_a",
     ),
-    "on_off": ("torque-task-solenoid", "controller.kind=on_off_on_chip"),
-    "on_off_dead_zone": ("torque-task-proportional", "controller.kind=on_off_dead_zone_on_chip"),
+    "on_off": ("torque-task-solenoid", "controller.kind=on_off_fixed_point"),
+    "on_off_dead_zone": ("torque-task-proportional", "controller.kind=on_off_dead_zone_fixed_point"),
 }
 MSP430, CORTEX_M0, CORTEX_M4 = CATALOG.values()
 
@@ -74,19 +74,19 @@ def test_no_number_of_a_law_can_overflow_and_no_state_leaves_its_range(law: Fixe
 
 @pytest.mark.parametrize(("name", "low", "high"), [("integral", -(2**30), 2**30), ("slope", -(2**31), 2**31 - 1)])
 def test_a_state_with_a_wider_range_is_not_proved(name: str, low: int, high: int) -> None:
-    law = FIXED_LAWS["pid_on_chip"]
+    law = FIXED_LAWS["pid_fixed_point"]
     with pytest.raises(ProgramError, match="beyond 32 bits"):
         proof(replace(law, state_ranges={**law.state_ranges, name: (low, high)}))
 
 
 def test_a_state_that_may_leave_a_narrower_range_is_not_proved() -> None:
-    law = FIXED_LAWS["pid_on_chip"]
+    law = FIXED_LAWS["pid_fixed_point"]
     with pytest.raises(ProgramError, match="may leave their ranges"):
         proof(replace(law, state_ranges={**law.state_ranges, "error": (-1000, 1000)}))
 
 
 def test_a_converter_of_sixteen_bits_is_not_proved() -> None:
-    law = FIXED_LAWS["pid_on_chip"]
+    law = FIXED_LAWS["pid_fixed_point"]
     wider = [replace(item, maximum=item.maximum * 2.0 + 1.0) for item in law.number_quantities[:2]]
     with pytest.raises(ProgramError):
         proof(law, (*wider, *(replace(item, maximum=65535.0) for item in law.number_quantities[2:])))
@@ -97,8 +97,8 @@ def test_drawn_readings_reach_edges_saturation_and_faults() -> None:
     for place in range(3):
         seen = {readings[place] for readings in drawn}
         assert {0, 1, 4094, 4095} <= seen
-    chip = PythonChip(chip_controller(scenario_of("pid with all")))
-    found = [chip.sample(readings)[0] for readings in drawn_readings(16383, 200, 3)]
+    fixed = PythonProcessor(fixed_point_controller(scenario_of("pid with all")))
+    found = [fixed.sample(readings)[0] for readings in drawn_readings(16383, 200, 3)]
     assert {-1000, 1000} <= set(found)
 
 
@@ -107,14 +107,14 @@ def test_drawn_readings_reach_edges_saturation_and_faults() -> None:
 def test_the_c_of_a_law_decides_as_python_does_under_the_sanitizer(tmp_path: Path, law: str) -> None:
     scenario = scenario_of(law)
     built(firmware(scenario), tmp_path, ("host", "checked"))
-    chip = PythonChip(chip_controller(scenario))
+    fixed = PythonProcessor(fixed_point_controller(scenario))
     lines, wanted = [], []
-    for number, readings in enumerate(drawn_readings(int(chip_controller(scenario).converter.top), 20_000, 5)):
+    for number, readings in enumerate(drawn_readings(int(fixed_point_controller(scenario).converter.top), 20_000, 5)):
         if number % 200 == 0:
-            chip.begin()
+            fixed.begin()
             lines.append("begin")
         lines.append(" ".join(map(str, readings)))
-        wanted.append("{} {}".format(*chip.sample(readings)))
+        wanted.append("{} {}".format(*fixed.sample(readings)))
     for program in ("host", "checked"):
         done = subprocess.run(
             [tmp_path / program], input="\n".join(lines), capture_output=True, text=True, check=True, timeout=120
@@ -125,7 +125,7 @@ def test_the_c_of_a_law_decides_as_python_does_under_the_sanitizer(tmp_path: Pat
 
 @every_target
 @pytest.mark.parametrize("law", SCENARIOS)
-def test_the_chip_decides_as_python_does_within_its_memory_and_time(law: str, target: Target) -> None:
+def test_the_processor_decides_as_python_does_within_its_memory_and_time(law: str, target: Target) -> None:
     scenario = scenario_of(law)
     found = compare_drawn(scenario, 600, seed=2, target=target.name)
     assert found.first_difference == ""
@@ -142,19 +142,19 @@ def test_the_chip_decides_as_python_does_within_its_memory_and_time(law: str, ta
 
 @every_target
 @pytest.mark.parametrize("law", ["pid", "on_off"])
-def test_the_torque_task_with_the_chip_in_charge_has_the_bits_of_the_lanes(law: str, target: Target) -> None:
-    found = run_on_chip(scenario_of(law, "run.duration=0.3 s"), target.name)
+def test_the_torque_task_with_the_processor_in_charge_has_the_bits_of_the_lanes(law: str, target: Target) -> None:
+    found = run_on_processor(scenario_of(law, "run.duration=0.3 s"), target.name)
     assert found.samples == (300 if law == "pid" else 6)
     assert found.differences == 0
     assert found.same_bits
-    assert len(set(found.chip.recording["command"])) > 1 or law == "on_off"
+    assert len(set(found.processor.recording["command"])) > 1 or law == "on_off"
 
 
 @on_cortex
 def test_instructions_are_as_many_as_single_steps(target: Target) -> None:
     scenario = scenario_of("pid")
     readings = Readings(2000, 1500, 1502)
-    with chip_simulator(firmware(scenario, target.name), target) as (simulator, image):
+    with processor_simulator(firmware(scenario, target.name), target) as (simulator, image):
         assert isinstance(simulator, QemuSimulator)
         simulator.sample(readings)
         counted = simulator.sample(readings).work
@@ -188,14 +188,14 @@ def test_other_compilers_build_for_a_cortex_too(target: Target, compiler: str, t
     }
     built(firmware(scenario_of("pid"), target.name), tmp_path, ["all", *given[compiler]])
     simulator = target.simulator(target, read_image(tmp_path, target))
-    chip = PythonChip(chip_controller(scenario_of("pid")))
+    fixed = PythonProcessor(fixed_point_controller(scenario_of("pid")))
     for readings in drawn_readings(4095, 100, 3):
-        assert simulator.sample(readings)[:2] == chip.sample(readings)
+        assert simulator.sample(readings)[:2] == fixed.sample(readings)
     simulator.close()
 
 
 @every_target
-def test_a_chip_with_other_numbers_is_found_out(
+def test_a_processor_with_other_numbers_is_found_out(
     target: Target, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scenario = scenario_of("pid")

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from ppafo.processor.catalog import CORTEX_M0
-from ppafo.processor.firmware import chip_controller, firmware
+from ppafo.processor.firmware import firmware, fixed_point_controller
 from ppafo.processor.fixed_point import Readings
-from ppafo.processor.lock_step import PythonChip
+from ppafo.processor.lock_step import PythonProcessor
 from ppafo.processor.simulators import Debugger, built, missing_tools, read_image
 from tests.unit.exports.test_firmware import scenario_of
 
@@ -83,10 +83,10 @@ def board(tmp_path: Path) -> Iterator[Board]:
 
 
 def test_pins_and_pulse_follow_the_command_until_a_reading_cannot_be_true(board: Board) -> None:
-    chip = PythonChip(chip_controller(scenario_of("pid")))
+    fixed = PythonProcessor(fixed_point_controller(scenario_of("pid")))
     seen = set()
     for readings in (Readings(2060, 1500, 1500), Readings(3000, 1500, 1500), Readings(1000, 1500, 1500)):
-        command, is_sound = chip.sample(readings)
+        command, is_sound = fixed.sample(readings)
         pins = board.sample(readings)
         assert is_sound == 1
         assert pins & (VALVE_A | VALVE_B | ENABLE) == ENABLE | (VALVE_A if command > 0 else VALVE_B)

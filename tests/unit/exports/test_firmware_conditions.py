@@ -1,4 +1,4 @@
-"""The samples that chips are compared with reach every condition of the controllers in C both ways: MC/DC by clang.
+"""Samples that processors are compared with reach every condition of the controllers in C both ways: MC/DC by clang.
 
 Each condition has been true and false, and each of a decision of several has, on its own, changed what the decision
 came to. The samples are the first of every comparison with the same seed, however long that is.
@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import pytest
 
-from ppafo.processor.firmware import chip_controller, firmware
+from ppafo.processor.firmware import firmware, fixed_point_controller
 from ppafo.processor.lock_step import EPISODE, drawn_readings
 from tests.unit.exports.test_firmware import SCENARIOS, scenario_of
 
@@ -147,7 +147,7 @@ def test_a_small_decision_is_measured_as_one_counts_it_by_hand(given: str, missi
 
 def samples_of(law: str, count: int) -> str:
     """Drawn samples as the program for this computer takes them."""
-    top = int(chip_controller(scenario_of(law)).converter.top)
+    top = int(fixed_point_controller(scenario_of(law)).converter.top)
     lines = []
     for number, readings in enumerate(drawn_readings(top, count, 1)):
         lines += ["begin"] if number % EPISODE == 0 else []

@@ -189,7 +189,7 @@ THERMAL = ("gas_model.kind=thermal", "gas_model.heat_transfer_coefficient=50 W/(
 
 
 @pytest.mark.parametrize(
-    "overrides", [(*THERMAL, "gas_model.wall_area_per_volume=100 1/m"), ("controller.kind=pid_on_chip",)]
+    "overrides", [(*THERMAL, "gas_model.wall_area_per_volume=100 1/m"), ("controller.kind=pid_fixed_point",)]
 )
 def test_a_scenario_asks_no_more_of_another_actuator_than_it_can(overrides: tuple[str, ...]) -> None:
     with pytest.raises(ParameterError, match="is made for a vane, and 'cylinder-lever' has an actuator 'cylinder'"):

@@ -6,33 +6,33 @@ import pytest
 from ppafo.errors import ProgramError, ScenarioError
 from ppafo.exports.c_library import c_library
 from ppafo.model.sensors import Measurement
-from ppafo.processor.firmware import chip_controller, integer_form
+from ppafo.processor.firmware import fixed_point_controller, integer_form
 from ppafo.processor.fixed_point import Converter, read
-from ppafo.processor.lock_step import PythonChip
+from ppafo.processor.lock_step import PythonProcessor
 from ppafo.running import simulate
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
 
-FIXED = "controller.kind=pid_on_chip"
+FIXED = "controller.kind=pid_fixed_point"
 
 
 class InPython:
     """The integer controller as a Python object."""
 
-    def __init__(self, chip: PythonChip, converter: Converter) -> None:
-        self.chip = chip
+    def __init__(self, fixed: PythonProcessor, converter: Converter) -> None:
+        self.processor = fixed
         self.converter = converter
 
     def reset(self) -> None:
-        self.chip.begin()
+        self.processor.begin()
 
     def update(self, time: float, reference: float, measurement: Measurement) -> float:
         assert time >= 0.0
-        return self.chip.sample(read(self.converter, reference, measurement))[0] / 1000
+        return self.processor.sample(read(self.converter, reference, measurement))[0] / 1000
 
 
 @pytest.mark.parametrize(
-    ("name", "kind"), [("torque-task-proportional", "pid_on_chip"), ("torque-task-solenoid", "on_off_on_chip")]
+    ("name", "kind"), [("torque-task-proportional", "pid_fixed_point"), ("torque-task-solenoid", "on_off_fixed_point")]
 )
 def test_whole_numbers_cost_less_than_one_percent_in_both_torque_tasks(name: str, kind: str) -> None:
     overrides = (f"controller.kind={kind}",)
@@ -43,8 +43,8 @@ def test_whole_numbers_cost_less_than_one_percent_in_both_torque_tasks(name: str
 
 def test_the_lanes_decide_as_python_does() -> None:
     scenario = load_scenario("torque-task-proportional", (FIXED,))
-    chip = chip_controller(scenario)
-    mine = simulate(scenario.controlled_by(InPython(PythonChip(chip), chip.converter))).recording
+    fixed = fixed_point_controller(scenario)
+    mine = simulate(scenario.controlled_by(InPython(PythonProcessor(fixed), fixed.converter))).recording
     lanes = simulate(scenario).recording
     assert all(np.array_equal(mine[name], lanes[name]) for name in lanes.names)
     assert len(set(lanes["command"])) > 100
@@ -64,7 +64,7 @@ def test_fewer_bits_cost_more_and_can_be_a_column() -> None:
         (("controller.converter_bits=9.5",), r"controller.converter_bits = 9.5: must be whole"),
         (("controller.converter_bits=15",), "must be at least 8 and at most 14"),
         (("controller.converter_range=0.4 MPa_a",), "reference: from 0 N m to 6 N m, and the converter shows"),
-        (("controller.derivative_gain=20",), "a gain of 'pid_on_chip' is .* times the largest"),
+        (("controller.derivative_gain=20",), "a gain of 'pid_fixed_point' is .* times the largest"),
     ],
 )
 def test_what_whole_numbers_cannot_hold_is_refused(overrides: tuple[str, ...], said: str) -> None:
@@ -82,10 +82,10 @@ def test_a_converter_without_whole_numbers_is_refused() -> None:
 @pytest.mark.parametrize(
     ("name", "given", "said"),
     [
-        ("torque-task-proportional", "fixed", r'write controller.kind = "pid_on_chip"'),
-        ("torque-task-solenoid", "fixed", r'write controller.kind = "on_off_on_chip"'),
+        ("torque-task-proportional", "fixed", r'write controller.kind = "pid_fixed_point"'),
+        ("torque-task-solenoid", "fixed", r'write controller.kind = "on_off_fixed_point"'),
         ("torque-task-proportional", "float", "leave it out: every controller but the fixed-point ones"),
-        ("step-response", "fixed", "'constant' has no fixed-point form; controllers that have one: pid_on_chip"),
+        ("step-response", "fixed", "'constant' has no fixed-point form; controllers that have one: pid_fixed_point"),
     ],
 )
 def test_a_file_with_the_old_arithmetic_is_told_the_kind_to_write(name: str, given: str, said: str) -> None:
@@ -98,13 +98,13 @@ def test_a_file_with_the_old_arithmetic_is_told_the_kind_to_write(name: str, giv
         load_scenario(name, (f"controller.arithmetic={given}",))
 
 
-def test_a_chip_takes_the_integer_form_of_a_controller_with_its_gains() -> None:
+def test_a_processor_takes_the_integer_form_of_a_controller_with_its_gains() -> None:
     scenario = load_scenario("torque-task-proportional", ("controller.proportional_gain=0.1 1/(N m)",))
     named = load_scenario("torque-task-proportional", (FIXED, "controller.proportional_gain=0.1 1/(N m)"))
     assert integer_form(scenario).controller == named.controller
-    assert chip_controller(scenario).numbers == chip_controller(named).numbers
+    assert fixed_point_controller(scenario).numbers == fixed_point_controller(named).numbers
 
 
 def test_whole_numbers_have_no_exported_library() -> None:
     with pytest.raises(ProgramError, match="no library yet; 'ppafo export firmware' writes it"):
-        c_library(load_scenario("torque-task-solenoid", ("controller.kind=on_off_on_chip",)))
+        c_library(load_scenario("torque-task-solenoid", ("controller.kind=on_off_fixed_point",)))

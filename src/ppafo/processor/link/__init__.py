@@ -3,7 +3,7 @@
 from ppafo.errors import ScenarioError
 from ppafo.exports import filled, template
 from ppafo.exports.hil.wire import MICROSECONDS
-from ppafo.processor.firmware import chip_controller, firmware
+from ppafo.processor.firmware import firmware, fixed_point_controller
 from ppafo.simulation.scenario import Scenario
 from ppafo.version import __version__
 
@@ -13,7 +13,7 @@ _TEMPLATES = ("Makefile", "README.md", "host.c", "link.c", "link.h", "plant.h")
 
 def example_controller(scenario: Scenario) -> dict[str, bytes]:
     """Files of a controller at the wire, by name. ScenarioError where it has no form on whole numbers."""
-    chip = chip_controller(scenario)
+    fixed = fixed_point_controller(scenario)
     written = firmware(scenario)
     period = round(scenario.controller.period * MICROSECONDS)
     if abs(period / MICROSECONDS - scenario.controller.period) > 1.0e-9 * scenario.controller.period:
@@ -22,13 +22,13 @@ def example_controller(scenario: Scenario) -> dict[str, bytes]:
         )
     words = {
         "title": scenario.name,
-        "kind": chip.law.name,
+        "kind": fixed.law.name,
         "version": __version__,
         "period": str(period),
-        "pressure_step": repr(chip.converter.pressure_step),
-        "torque_step": repr(chip.converter.torque_step),
-        "top": repr(chip.converter.top),
-        "middle": repr(chip.converter.middle),
+        "pressure_step": repr(fixed.converter.pressure_step),
+        "torque_step": repr(fixed.converter.torque_step),
+        "top": repr(fixed.converter.top),
+        "middle": repr(fixed.converter.middle),
         "next": f"ppafo hil {scenario.name} --port udp:127.0.0.1:5000 --out out/hil",
     }
     own = {name: filled(template(__name__, name), words).encode() for name in _TEMPLATES}

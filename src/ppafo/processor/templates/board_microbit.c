@@ -1,5 +1,5 @@
 /* The @processor@, on @board@: timer, outputs, pulse, watchdog. README.md says what is wired to it.
- * Not run on a chip; timer, outputs and pulse run in QEMU's micro:bit V1. */
+ * Not run on a processor; timer, outputs and pulse run in QEMU's micro:bit V1. */
 #include "board.h"
 #include "parameters.h"
 
@@ -48,7 +48,7 @@ void board_tick(void);
 static volatile uint32_t ticks;
 static volatile uint32_t pulse;
 
-/* Every 125 us, and where the pulse ends. The watchdog is fed as long as samples come: one that does not lets the chip
+/* Every 125 us, and where the pulse ends. The watchdog is fed as long as samples come: one that does not lets the processor
  * reset, and all vents. The pulse follows the timer itself: an interrupt that is late shifts an edge and nothing else. */
 void board_tick(void)
 {

@@ -1,4 +1,4 @@
-/* The converter of the nRF51822: 10 bits, one input after another. Not run on a chip. */
+/* The converter of the nRF51822: 10 bits, one input after another. Not run on a processor. */
 #include "board.h"
 #include "parameters.h"
 

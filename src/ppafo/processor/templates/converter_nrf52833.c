@@ -1,4 +1,4 @@
-/* The converter of the nRF52833: 14 bits, three inputs in one go, which it writes into memory. Not run on a chip. */
+/* The converter of the nRF52833: 14 bits, three inputs in one go, which it writes into memory. Not run on a processor. */
 #include "board.h"
 #include "parameters.h"
 

@@ -24,7 +24,7 @@
 
 static volatile uint16_t ticks;
 
-/* Every 125 us. The watchdog is fed as long as samples come: one that does not lets the chip reset, and all vents. */
+/* Every 125 us. The watchdog is fed as long as samples come: one that does not lets the processor reset, and all vents. */
 __attribute__((interrupt(10))) void board_tick(void)
 {
     if (ticks < CONTROLLER_TICKS + CONTROLLER_TICKS) {

@@ -50,7 +50,7 @@ def of_target(command: str) -> Any:
 
 
 @pytest.mark.parametrize("command", [of_target(line) for line in COMMANDS if "--try" in line])
-def test_the_simulated_chip_decides_as_the_page_says(
+def test_the_simulated_processor_decides_as_the_page_says(
     command: str, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -68,7 +68,7 @@ def test_the_simulated_chip_decides_as_the_page_says(
         assert proportional[-4:] == wanted[-4:]
         assert [line.split()[0] for line in proportional] == [line.split()[0] for line in wanted]
         assert solenoid[3:5] == [wanted[3].replace("3000", "60"), wanted[4]]
-        assert (tmp_path / "out" / "figure-8" / "chip.png").read_bytes().startswith(b"\x89PNG")
+        assert (tmp_path / "out" / "figure-8" / "processor.png").read_bytes().startswith(b"\x89PNG")
 
 
 def check_table(said: list[str]) -> None:
@@ -95,7 +95,7 @@ def compiler_of(target: str) -> str:
 
 def test_what_fixed_point_costs_is_as_in_the_table() -> None:
     rows = dict(re.findall(r"^\| (.*?) \| ([\d.]+ N m \| [\d.]+ g) \|$", EVIDENCE, re.MULTILINE))
-    fixed = "controller.kind=pid_on_chip"
+    fixed = "controller.kind=pid_fixed_point"
     for row, overrides in {
         "floating point": (),
         "fixed point, 12 bits": (fixed,),
