@@ -161,9 +161,11 @@ def add_parameters(parser: argparse.ArgumentParser, command: Command, is_listing
     readings = list(parameters_of(verb))
     names = [parameter.name for parameter, _ in readings]
     helps = _help_by_parameter(verb, names)
+    # argparse gives an optional word nothing where options stand between it and a repeated one.
+    is_alone = sum(not option_of(parameter, reading) for parameter, reading in readings) == 1
     for parameter, reading in readings:
         said = helps.get(parameter.name, reading.word.help)
-        _add_parameter(parser, parameter, reading, said, command.lists, is_listing)
+        _add_parameter(parser, parameter, reading, said, command.lists and is_alone, is_listing)
     if command.lists:
         parser.add_argument("--list", action="store_true", help="list what comes with the package")
     if OUT in names:
@@ -178,7 +180,7 @@ def _add_parameter(
     parameter: inspect.Parameter,
     reading: Reading,
     said: str,
-    lists: bool,
+    may_be_missing: bool,
     is_listing: bool,
 ) -> None:
     word, is_required = reading.word, parameter.default is inspect.Parameter.empty
@@ -202,7 +204,7 @@ def _add_parameter(
         if reading.is_repeated:
             options["nargs"] = "+" if is_required and not is_listing else "*"
         # With --list the word may be missing; without it ``run`` refuses that.
-        elif not is_required or lists:
+        elif not is_required or may_be_missing or is_listing:
             options["nargs"] = "?"
         parser.add_argument(parameter.name, **options)
         return

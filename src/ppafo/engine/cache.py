@@ -254,9 +254,7 @@ def _compile_and_keep(kept: Path, wanted: _Wanted) -> ModuleType:
         with announce(wanted.estimate(_entries_named(kept.parent, _PROGRAM)), f"kept in {kept.parent}"):
             module = wanted.compile(path)
         (aside / SECONDS_FILE).write_text(f"{time.perf_counter() - start:.2f}", encoding="ascii")
-        files = sorted(path for path in aside.rglob("*") if not path.is_dir())
-        sums = {path.relative_to(aside).as_posix(): _checksum(path) for path in files}
-        (aside / _CHECKSUMS).write_text(json.dumps(sums, indent=2), encoding="utf-8")
+        (aside / _CHECKSUMS).write_text(json.dumps(_checksums(aside), indent=2), encoding="utf-8")
         for place in aside.rglob("*"):  # compilers let a group write where the user's habits (umask) do
             place.chmod(0o700 if place.is_dir() else 0o600)
         with contextlib.suppress(OSError):  # another process was quicker, with the same program
@@ -323,6 +321,12 @@ def _is_own(kept: Path, files: Collection[str]) -> bool:
     is_folder = found[0] in used
     used += [(kept / name).lstat() for name in (_CHECKSUMS, *files)]
     return is_whose and is_folder and bool(files) and not any(item.st_mode & WRITTEN_BY_OTHERS for item in used)
+
+
+def _checksums(folder: Path) -> dict[str, str]:
+    """Return the hash of every file of a program but the list of them itself."""
+    files = sorted(path for path in folder.rglob("*") if not path.is_dir() and path.name != _CHECKSUMS)
+    return {path.relative_to(folder).as_posix(): _checksum(path) for path in files}
 
 
 def _checksum(path: Path) -> str:

@@ -66,7 +66,9 @@ class ColumnMap(StrictTable):
     encoding: Annotated[Literal["utf-8", "latin-1"], Field(description="encoding of the text")] = "utf-8"
     header: Annotated[bool, Field(description="whether a line names the columns")] = True
     skip_lines: Annotated[int, Field(ge=0, description="lines before the header, or before the first row")] = 0
-    skip_rows: Annotated[int, Field(ge=0, description="rows of numbers to leave out at the start")] = 0
+    skip_rows: Annotated[
+        int, Field(ge=0, description="rows below the header to leave out: a line of units, or numbers")
+    ] = 0
     channels: Annotated[dict[str, MappedChannel], Field(min_length=1, description="channels by name, with 'time'")]
     direction: Annotated[MappedDirection | None, Field(description="direction from the rate of a channel")] = None
 

@@ -226,13 +226,7 @@ def result_of_walk(scenario: Scenario, run: Run, outcome: BatchResult, supply: S
     rows = state_row_numbers(run)
     record = {name: outcome.record[:, row, 0] for name, row in rows.items()}
     failed, too_many_parts = (float(outcome.states[rows[f"result.{name}"], 0]) for name in LaneResult._fields[1:])
-    status = Status("completed", None, "completed")
-    # A number that is none at the end, which the run did not see itself, has no time: it counts from the start.
-    if failed < NEVER_FAILED or not np.isfinite(outcome.states).all():
-        begin = failed if failed < NEVER_FAILED else 0.0
-        status = Status(
-            "diverged", begin, f"diverged at t = {begin:.6g} s; {TOO_MANY_PARTS if too_many_parts else REMEDY}"
-        )
+    status = _status(failed, bool(too_many_parts), outcome.states)
     time = np.arange(outcome.record.shape[0], dtype=np.float64) * (run.step * run.record_every)
     if status.time is not None:
         kept = time < status.time
@@ -241,6 +235,15 @@ def result_of_walk(scenario: Scenario, run: Run, outcome: BatchResult, supply: S
         time, record = time[kept], {name: values[kept] for name, values in record.items()}
     found: WalkResult = walk_of(scenario).who.result(scenario, run, time, record, status, supply)
     return found
+
+
+def _status(failed: float, too_many_parts: bool, states: Floats) -> Status:
+    """How a walk ended that failed at a time [s], or never, with its last states."""
+    if failed >= NEVER_FAILED and bool(np.isfinite(states).all()):
+        return Status("completed", None, "completed")
+    # A number that is none at the end, which the run did not see itself, has no time: it counts from the start.
+    time = failed if failed < NEVER_FAILED else 0.0
+    return Status("diverged", time, f"diverged at t = {time:.6g} s; {TOO_MANY_PARTS if too_many_parts else REMEDY}")
 
 
 def measured(

@@ -88,8 +88,10 @@ def walk_figure(walks: Mapping[str, Strides]) -> "Figure":
     figure = draw_panels(
         panels,
         size=(7.1, 1.7),
-        title=f"{first.scenario.name}: {gait.name}, {first.metrics['strides'].value:.0f} strides",
-        note="band: standard deviation; grey: stance",
+        title=(
+            f"{first.scenario.name}: {gait.name}, {first.metrics['strides'].value:.0f} strides; "
+            "band: standard deviation; grey: stance"
+        ),
         kind=first.recording.kind,
     )
     # Between title and panels: a name with its number of strides is too long to stand beside the title of a panel.
