@@ -14,6 +14,7 @@ import tempfile
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -43,12 +44,7 @@ class NumbaCompiler:
 
     def identity(self) -> str:
         """The processor, and the versions of Numba and of Python's own code."""
-        # Programs of another processor or version must not be taken for damaged ones.
-        numba = _imported()
-        from numba.core.registry import cpu_target
-
-        processor = cpu_target.target_context.codegen().magic_tuple()
-        return repr((processor, numba.__version__, sys.implementation.cache_tag))
+        return _identity()
 
     def described(self) -> str:
         """Its version, and LLVM's."""
@@ -93,6 +89,16 @@ def _errors_of_settings() -> tuple[type[Exception], ...]:
     """What Numba raises at its import: its own error, and PyYAML's, with which it reads its file if it can."""
     yaml = sys.modules.get("yaml")
     return (ValueError,) if yaml is None else (ValueError, yaml.YAMLError)
+
+
+@cache
+def _identity() -> str:
+    # Programs of another processor or version must not be taken for damaged ones.
+    numba = _imported()
+    from numba.core.registry import cpu_target
+
+    processor = cpu_target.target_context.codegen().magic_tuple()
+    return repr((processor, numba.__version__, sys.implementation.cache_tag))
 
 
 def _run_by_numba(source: str, path: str, module: ModuleType, run: Callable[[str, str, ModuleType], None]) -> None:

@@ -4,7 +4,7 @@ import math
 from collections import namedtuple
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any, NamedTuple, get_type_hints
 
 from ppafo.control.kind import OPEN_LOOP, ControllerKind, ProfileKind
@@ -256,8 +256,7 @@ class Program:
         free = FreePart if self.leg is None else self.leg.begun
         begun = free if self.angle is None else (NoParameters if self.is_locked else PrescribedStep)
         gas = self.gas.begun(self) if self.feed is None else self.feed.begun(self)
-        # What a valve shows beside its openings is the second in the order of declaration: plant, shown, result.
-        _, shown, _ = get_type_hints(self.valve.connect).values()
+        shown = _shown_by(self.valve.connect)
         return {
             **({} if self.leg is None else self.leg.led),
             **({"held": HeldChambers} if self.hands_chambers_on else {}),
@@ -385,3 +384,11 @@ def place_over_samples(
         return called_over_samples(composed.function, composed.of_columns, *of_effects, *own)
 
     return called
+
+
+@cache
+def _shown_by(connect: Any) -> Any:
+    """The class of what a valve shows beside its openings, from the function that connects it."""
+    # In the order of declaration: plant, what the valve shows, result.
+    _, shown, _ = get_type_hints(connect).values()
+    return shown

@@ -4,6 +4,7 @@ The schema, the conversion to SI, the messages and the table of ``ppafo sets sho
 ``Pa_a`` (a level, absolute in SI). Limits are wide: they exclude slips of the pen and what no solver could handle.
 """
 
+import functools
 import math
 from collections.abc import Mapping
 from dataclasses import replace
@@ -101,6 +102,7 @@ def quantities(
     return _by_path(tuple(valve_kinds.items()), actuator_kind, species, device_effects())
 
 
+@functools.lru_cache(maxsize=32)
 def _by_path(
     valve_kinds: tuple[tuple[str, str], ...], actuator_kind: str, species: str, effects: tuple[Effect, ...]
 ) -> Mapping[str, Quantity]:

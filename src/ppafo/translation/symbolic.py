@@ -158,6 +158,12 @@ def _type_of(item: Any, collector: SourceCollector) -> Type:
     return Items(tuple(_type_of(kind, collector) for _, kind in members(item)))
 
 
+@lru_cache(maxsize=256)
+def _row_class(name: str, fields: tuple[str, ...]) -> Any:
+    """A class of rows whose fields hold expressions."""
+    return namedtuple(name, fields)
+
+
 @dataclass(frozen=True, slots=True)
 class _Call:
     """One call of a function: ``names`` hold the values so far."""
@@ -239,7 +245,7 @@ class _Call:
     def _of_build(self, term: Term, *parts: Any) -> Any:
         if not isinstance(term.type, Row):
             return parts
-        return namedtuple(term.type.name, tuple(name for name, _ in term.type.fields))(*parts)
+        return _row_class(term.type.name, tuple(name for name, _ in term.type.fields))(*parts)
 
     def _of_field(self, term: Term, owner: Any) -> Any:
         return getattr(owner, term.detail)
