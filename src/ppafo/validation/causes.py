@@ -19,6 +19,7 @@ from scipy.optimize import lsq_linear
 from ppafo.errors import PpafoError
 from ppafo.parameters.device import Device
 from ppafo.progress import Progress, Report, report_nothing
+from ppafo.signals.faults import isolated_samples
 from ppafo.signals.recording import Floats
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.recorded import COMMAND, samples_at_rest
@@ -48,8 +49,8 @@ _DIFFERENCE = 0.02
 _SMALL = 0.1
 """Size over the smallest of its grid by which a second change is tried beside a first."""
 
-_BY_CHANCE, _OUTLIER, _OVER_STEPS = 1.0e-3, 6.0, 3.0
-"""Chance below which a run of equal samples is a limit; an outlier over the noise, and over its neighbours' range."""
+_BY_CHANCE = 1.0e-3
+"""Chance below which a run of equal samples is a limit."""
 
 _PARTING = 1.0e-4
 """Fraction of a squared slope that must lie across the first's, for a second change to be another one."""
@@ -473,10 +474,7 @@ def _fault_of(values: Floats, one: ChannelAgreement, time: Floats) -> tuple[str,
     if ends:
         said = " and ".join(f"{int((values == end).sum())} samples are exactly its {word} value" for end, word in ends)
         return f"is clipped: {said}", np.isin(values, [end for end, _ in ends])
-    # Mirrored at the ends, where an outlier would else be three of its own five neighbours.
-    around = np.lib.stride_tricks.sliding_window_view(np.pad(values, 2, mode="reflect"), 5)
-    away = np.abs(values - np.median(around, axis=1))
-    is_out = (away > _OUTLIER * one.noise) & (away > _OVER_STEPS * np.ptp(around[:, [0, 1, 3, 4]], axis=1))
+    is_out = isolated_samples(values, one.noise)
     count = int(is_out.sum())
     first = f"{float(time[int(np.argmax(is_out))]):.6g} s"
     return (f"has {count} isolated outlier{'s' * (count > 1)}, the first at {first}" if count else ""), is_out
