@@ -265,6 +265,9 @@ def test_the_controller_of_the_page_walks() -> None:
     assert walked.metrics["net_push_off_work"].value > 0.5
     command = walked.recording["command"]
     assert set(command.round(12)) <= {-1.0, 0.0, 1.0, VENT}
+    # Named by its module, as step 2 of the page has it, it is the same controller.
+    named = ppafo.walk(words[2], 0.1, ["controller.kind=my_laws.hysteresis:KIND", *overrides[1:]])
+    assert (named.recording["command"] == command).all()
 
 
 @pytest.fixture

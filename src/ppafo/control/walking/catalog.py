@@ -289,15 +289,26 @@ def walking_controllers() -> dict[str, ControllerKind]:
     laws = {
         name: law
         for name, law in CONTROLLERS.items()
-        if law is not switching.CONSTANT and law.plan is None and not shared_settings(law)
+        if law is not switching.CONSTANT and law.plan is None and not shared_settings(law) and not reads_gait(law)
     }
     return dict(WALKING_CONTROLLERS) | {name: law_that_walks(law) for name, law in laws.items()}
 
 
 def load_walking_controller(name: str) -> None:
     """Load a controller of another package by its name, so that ``walking_controllers`` has it; KindError if broken."""
-    if WALKING_CONTROLLERS.get(name) is None:
-        CONTROLLERS.get(name)
+    if ":" not in name:
+        if WALKING_CONTROLLERS.get(name) is None:
+            CONTROLLERS.get(name)
+        return
+    # Either catalogue would take an object that is named by its module: what its law reads says whose it is.
+    law = CONTROLLERS.get(name)
+    if law is not None and reads_gait(law):
+        WALKING_CONTROLLERS[name] = law
+
+
+def reads_gait(kind: ControllerKind) -> bool:
+    """Return whether the law of a controller takes a ``GaitMeasurement``, and has gait phases of its own."""
+    return kind.update.__annotations__.get("measurement") in (GaitMeasurement, GaitMeasurement.__name__)
 
 
 def law_that_walks(law: ControllerKind) -> ControllerKind:
