@@ -154,7 +154,7 @@ def _content(kind: str, source: str | None, name: str, path: Path) -> str:
     content = (templates / f"{kind}{_SUFFIX}").read_bytes() if source is None else files.read(source)
     files.parse(content, source or f"template of a {kind}")
     text = content.decode("utf-8")
-    # A name below a table is that of something else.
+    # A name below a table belongs to something else.
     table = _FIRST_TABLE.search(text)
     named = _NAME_LINE.search(text, 0, table.start() if table else len(text))
     if named is None:

@@ -262,7 +262,7 @@ def finding_of_studies(solved: Studies) -> Finding[Studies]:
     rows: list[Sequence[Cell]] = [] if reproduction is None else [(SEED, *row) for row in _paper_rows(reproduction)]
     details = [] if reproduction is None else [Part(f"{SEED}: the paper", said=(_PAPER,), is_detail=True)]
     for study in solved.studies:
-        told: list[Sequence[Cell]] = []
+        stated_claims: list[Sequence[Cell]] = []
         for item in study.claims:
             entry = item.claim.entry
             # A number that only own arithmetic on published ones gives.
@@ -270,9 +270,9 @@ def finding_of_studies(solved: Studies) -> Finding[Studies]:
             rows.append((study.publication.name, entry.id, published, item.ours, VERDICTS[item.verdict]))
             stated = f"{entry.statement} ({item.claim.source})"
             agrees = _agrees(entry.at_least, entry.at_most, entry.unit)
-            told.append((entry.id, stated, agrees, "; ".join(entry.assumed) or None, item.note or None))
+            stated_claims.append((entry.id, stated, agrees, "; ".join(entry.assumed) or None, item.note or None))
         heading, said = f"{study.publication.name}: {study.publication.title}", (study.publication.citation,)
-        columns = columns_of(_DETAILS_HEAD, told)
+        columns = columns_of(_DETAILS_HEAD, stated_claims)
         details.append(Part(heading, columns, said, left=len(_DETAILS_HEAD), is_detail=True))
     name = solved.studies[0].publication.name
     return Finding(

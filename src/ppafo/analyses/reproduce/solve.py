@@ -101,8 +101,8 @@ def reproduce_paper(overrides: Sequence[str] = (), report: Report = report_nothi
     of_task = tuple(value.sentence() for value in assumed if {SOLENOID, PROPORTIONAL} & set(value.used_by))
     events, supply = step_events(step.recording), step.scenario.device.supply
     levels = Levels(supply.pressure, supply.atmospheric_pressure)
-    step_told = tuple(step_observations(step.recording, levels, events))
-    torque_told = tuple(torque_task_observations(solenoid, proportional))
+    step_observed = tuple(step_observations(step.recording, levels, events))
+    torque_observed = tuple(torque_task_observations(solenoid, proportional))
     report(Progress(f"simulating {SOLENOID} over the phase of its decisions"))
     phased = phased_runs(solenoid)
     claims = [
@@ -110,14 +110,14 @@ def reproduce_paper(overrides: Sequence[str] = (), report: Report = report_nothi
         told_claim(
             "figure_7_words",
             "What the text tells of the pressures and the angle of the step response.",
-            step_told,
+            step_observed,
             of_step,
         ),
         *torque_task_claims(phased, proportional, of_task),
         told_claim(
             "oscillation_words",
             "What the text tells of the oscillation with both valves.",
-            torque_told,
+            torque_observed,
             of_task,
         ),
         *control_claims(solenoid, proportional, phased),
@@ -125,8 +125,8 @@ def reproduce_paper(overrides: Sequence[str] = (), report: Report = report_nothi
     ]
     return Reproduction(
         claims=tuple(sorted(claims, key=lambda claim: ORDER.index(claim.id))),
-        step_observations=step_told,
-        torque_observations=torque_told,
+        step_observations=step_observed,
+        torque_observations=torque_observed,
         readings_of_u=readings_of_u(solenoid, proportional),
         step=step,
         step_events=events,

@@ -72,7 +72,7 @@ def step_events(recording: Recording, resolution: float = RESOLUTION) -> StepEve
     breakaway = int(np.flatnonzero(np.abs(angle - angle[0]) > resolution * travel)[0]) - 1
     away = np.flatnonzero(np.abs(angle - angle[-1]) > resolution * travel)
     stop = int(away[-1]) + 1
-    # Without a sample of rest at either end, and of motion between, nothing can be told.
+    # Without a sample of rest at either end, and of motion between, nothing can be determined.
     if stop >= len(recording) - 1 or stop - breakaway < 2 or breakaway < 1:
         return None
     return StepEvents(breakaway, stop, float(recording.time[breakaway]), float(recording.time[stop]))

@@ -44,7 +44,7 @@ def shown_values(parameter_set: ParameterSet) -> Finding[dict[str, Any]]:
     rows = []
     for value in document["values"]:
         number = value["value"]
-        # A flag is a number to Python: it is asked for first.
+        # A flag is a number to Python: it is tested first.
         written = str(number).lower() if isinstance(number, bool) else number
         written = written if isinstance(written, str) else f"{number:.6g}"
         if value.get("uncertainty") is not None:

@@ -151,7 +151,7 @@ def finding_of(
     said, file = verdict(problem, before, after), problem.scenario.origin.file or problem.scenario.name
     options = " ".join(f'--set "{line}"' for line in overrides)
     verb = "simulate" if not problem.scenario.walks else "walk"
-    told = _remarks(problem, after, starts, runs, reached)
+    remarks = _remarks(problem, after, starts, runs, reached)
     gains = []
     for item in problem.searched:
         numbers = (item.before, after.gains[item.path], item.minimum, item.maximum)
@@ -179,7 +179,7 @@ def finding_of(
             ),
             Part(
                 "The search",
-                remarks=told,
+                remarks=remarks,
                 panels=lambda: [_course(before, starts), _places(problem, after, starts)],
                 name="search",
                 caption=_COURSE,
@@ -206,7 +206,7 @@ def finding_of(
             after=after,
             starts=starts,
             runs=runs,
-            remarks=told,
+            remarks=remarks,
             problem=problem,
         ),
         passed=after.is_feasible,

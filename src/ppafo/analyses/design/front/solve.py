@@ -148,7 +148,7 @@ class Evaluation:
             for scenario in task.scenarios.values():
                 found = moving_together(scenario, {path: chosen[path] for path in SUPPLIES if path in chosen})
                 for path in SUPPLIES[:2]:
-                    # One pressure may follow the other: all are asked for, not the variables alone.
+                    # One pressure may follow the other: all pressures are read, not the variables alone.
                     highest = np.maximum(highest, found.get(path, number_at(scenario, path)))
         total += np.asarray(np.maximum(0.0, highest / ratings - 1.0))
         return np.where(np.isfinite(objectives).all(axis=1) & np.isfinite(total), total, np.inf)

@@ -393,7 +393,7 @@ def _offered(asked: Wish, one: Tried, bottle: Part) -> tuple[Wish, Tried] | None
         asked = replace(asked, torque=math.floor(100.0 * one.torque) / 100.0)
     for again in _few_strides(asked, one.valve, one.actuator):
         walked = _walked(again, bottle, asked.seconds)
-        # Rounded down to what a command line can say, so that the offer is kept when it is asked for.
+        # Rounded down to what a command line can say, so that a run from that line still meets the offer.
         hundredths = math.floor(min(_time(walked), asked.seconds) / 0.6)  # of a minute
         lasts = asked.seconds if _time(walked) >= asked.seconds else 0.6 * hundredths
         if again.torque >= asked.torque > 0.0 and lasts >= _SHORTEST and _keeps(walked, asked.torque):
