@@ -33,8 +33,8 @@ HEADING = """\
 # Written by
 #     .venv/bin/pytest -n 2 --dist loadfile --costs record
 # which adds tests above 2 s; take a name out to try it again. `@pytest.mark.short` keeps a test in `make test` whatever
-# it costs, `@pytest.mark.long` keeps one out. A file above 10 s that is not here is an error: make it quicker before
-# you record it.
+# it costs, `@pytest.mark.long` keeps one out. A file above 10 s that is not here is named after a run: make it quicker
+# before you record it.
 """
 _PROPERTY = "ppafo_costs"
 
@@ -184,7 +184,10 @@ class Table:
                 self.built += built
 
     def too_costly(self) -> list[str]:
-        """A line about each costly file that is not recorded; others cost more where the computer is slower."""
+        """A line about each costly file that is not recorded.
+
+        No failure: a slower computer, or linear algebra of an older processor, doubles a cost without a change of code.
+        """
         return [
             f"{file} costs {own:.1f} s, more than {LARGEST:g} s: see {RECORDED.name}"
             for file, own in sorted(self.own.items())
@@ -192,13 +195,10 @@ class Table:
         ]
 
     @pytest.hookimpl(trylast=True)
-    def pytest_sessionfinish(self, session: pytest.Session) -> None:
-        """Record, or let the session fail."""
-        asked = self.config.getoption("--costs")
-        if asked == "record":
+    def pytest_sessionfinish(self) -> None:
+        """Record, where that was asked for."""
+        if self.config.getoption("--costs") == "record":
             write(self.own, self.functions, is_whole=not (self.config.option.markexpr or self.config.option.keyword))
-        elif asked and self.too_costly() and session.exitstatus == pytest.ExitCode.OK:
-            session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
         """Print the table."""
@@ -214,7 +214,7 @@ class Table:
         write_line(f"{self.built:8.1f}  models and libraries that are built once")
         write_line(f"{sum(self.own.values()) + self.built:8.1f}  in all, of {sum(self.tests.values())} tests")
         for line in self.too_costly():
-            write_line(f"ERROR {line}")
+            write_line(f"NOTE {line}")
 
 
 def write(own: Mapping[str, float], functions: Mapping[tuple[str, str], float], is_whole: bool) -> None:

@@ -77,16 +77,16 @@ def costly(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_a_new_file_that_costs_much_is_an_error_until_it_is_recorded(costly: Path) -> None:
+def test_a_new_file_that_costs_much_is_named_until_it_is_recorded(costly: Path) -> None:
     asked = run_tests("--costs", "show", cwd=costly)
-    assert asked.returncode == 1
-    assert re.findall(r"^ERROR (\S+) costs \S+ s, more than 0.1 s: see costs.toml$", asked.stdout, re.MULTILINE) == [
+    assert asked.returncode == 0, "a slow computer fails nothing"
+    assert re.findall(r"^NOTE (\S+) costs \S+ s, more than 0.1 s: see costs.toml$", asked.stdout, re.MULTILINE) == [
         "tests/test_burns.py"
     ]
-    assert run_tests(cwd=costly).returncode == 0, "nobody asked"
+    assert "NOTE" not in run_tests(cwd=costly).stdout, "nobody asked"
     assert run_tests("--costs", "record", cwd=costly).returncode == 0
     again = run_tests("--costs", "show", cwd=costly)
-    assert again.returncode == 0
+    assert "NOTE" not in again.stdout
     assert "tests/test_burns.py (2 tests)" in again.stdout
 
 
