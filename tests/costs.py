@@ -26,7 +26,7 @@ LONG = 2.0
 NOTED = 5.0
 """CPU seconds above which a file is recorded."""
 LARGEST = 10.0
-"""CPU seconds of a file that is not recorded: twice ``NOTED``, for a computer that is slower or busy."""
+"""CPU seconds above which a file that is not recorded is named: twice ``NOTED``, for a slower or busy computer."""
 SHOWN = 2.0
 HEADING = """\
 # CPU seconds of the costly files of tests, models not counted, and their long tests, which `make test` leaves out.
@@ -194,7 +194,6 @@ class Table:
             if own > LARGEST and file not in recorded()
         ]
 
-    @pytest.hookimpl(trylast=True)
     def pytest_sessionfinish(self) -> None:
         """Record, where that was asked for."""
         if self.config.getoption("--costs") == "record":
