@@ -81,10 +81,10 @@ def volumes_of(batch: Batch) -> tuple[Floats, Floats]:
     rows = named_rows(batch.program.parameter_rows(), batch.parameters)
     angle = named_rows(batch.program.state_rows(), batch.states)["state.angle"]
     first = zip(
-        angle, rows["plant.angle_min"], rows["plant.volume_per_angle"], rows["plant.dead_volume_1"], strict=True
+        angle, rows["plant.angle_min"], rows["plant.displacement_per_radian"], rows["plant.dead_volume_1"], strict=True
     )
     second = zip(
-        angle, rows["plant.angle_max"], rows["plant.volume_per_angle"], rows["plant.dead_volume_2"], strict=True
+        angle, rows["plant.angle_max"], rows["plant.displacement_per_radian"], rows["plant.dead_volume_2"], strict=True
     )
     return (
         np.array([chamber_1_volume(*values) for values in first]),

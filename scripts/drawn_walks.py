@@ -155,7 +155,7 @@ def drawn_device(base: Scenario, draws: np.random.Generator) -> dict[str, float]
     return believed | {
         "supply.pressure": supply,
         "supply.dorsiflexion_pressure": supply,
-        "actuator.volume_per_angle": draws.uniform(0.8, 1.2) * device.actuator.volume_per_angle,
+        "actuator.displacement_per_radian": draws.uniform(0.8, 1.2) * device.actuator.displacement_per_radian,
         "actuator.dead_volume_1": 2.0 ** draws.uniform(-1.0, 1.0) * device.actuator.dead_volume_1,
         "actuator.dead_volume_2": 2.0 ** draws.uniform(-1.0, 1.0) * device.actuator.dead_volume_2,
         "valve.area": draws.uniform(0.9, 1.1) * orifice.area,

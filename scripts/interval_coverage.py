@@ -59,7 +59,7 @@ PRESETS = {"ideal": "ideal-laboratory", "default": "paper-bench"}
 DEPARTURES = {
     "stribeck": ("effects.stribeck.velocity=0.3 rad/s",),
     "dead volume": ("actuator.dead_volume_1=35 cm^3", "actuator.dead_volume_2=35 cm^3"),
-    "volume per angle": ("actuator.volume_per_angle=28 cm^3/rad",),
+    "displacement per radian": ("actuator.displacement_per_radian=28 cm^3/rad",),
     "leak that opens": ("effects.leak_opening.pressure=150 kPa_d",),
     "slew limit": ("valve.slew_limit=40 1/s",),
 }

@@ -3,7 +3,7 @@
 import contextlib
 import difflib
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 
 class PpafoError(Exception):
@@ -102,12 +102,20 @@ def said_missing(names: Sequence[str]) -> str:
     return f"{listed} {'is' if len(quoted) == 1 else 'are'} missing"
 
 
+RENAMED_KEYS: Mapping[str, str] = {"quantum": "resolution", "volume_per_angle": "displacement_per_radian"}
+"""Keys of files of earlier versions and what they are called now."""
+
+
 def nearest_name(name: str, allowed: Iterable[str]) -> str:
     """Return a hint such as ``, did you mean 'angle'?``, or an empty text where no allowed name is near.
 
-    A name that is far from all in letters may be short for one: its first word, or another.
+    A name of an earlier version is answered with what it is called now. One that is far from all in letters may be
+    short for one: its first word, or another.
     """
     word, known = str(name), list(allowed)
+    before, dot, last = word.rpartition(".")
+    if (now := f"{before}{dot}{RENAMED_KEYS.get(last, last)}") != word and now in known:
+        return f", which is now called '{now}'"
     # 0.6 finds a transposed or forgotten letter, and is difflib's own default.
     near = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
     if not near:

@@ -62,7 +62,6 @@ ALLOWED_IN_MESSAGES: Mapping[str, tuple[str, str]] = {
     "identification/trajectory/section.py": ("held: is now locked", "the old key of a problem file"),
     "metrics/metric.py": ("wearer who reacts", "what recordings on disk are told apart by"),
     "walking/result.py": ("walk of a wearer who reacts", "the format of a result on disk"),
-    "report/display_units.py": ("volume per angle", "a kind of quantity, which no user reads"),
 }
 """By file: what stands there as a name, and of what."""
 ALLOWED_IN_FILES: Mapping[str, tuple[str, str]] = {

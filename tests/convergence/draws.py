@@ -64,7 +64,7 @@ def random_device(chance: random.Random, kind: str) -> Device:
     name, molar_mass, heat_capacity_ratio = chance.choice(GASES)
     actuator = Actuator(
         torque_constant=chance.uniform(1.1e-5, 1.8e-5),
-        volume_per_angle=chance.uniform(30e-6, 70e-6),
+        displacement_per_radian=chance.uniform(30e-6, 70e-6),
         angle_min=math.radians(20.0),
         angle_max=math.radians(130.0),
         dead_volume_1=logarithmic(chance, 1e-6, 15e-6),

@@ -29,7 +29,7 @@ PER_ANGLE, DEAD, LOWEST, HIGHEST = 51e-6, 2e-6, math.radians(20.0), math.radians
 HELD = DEAD + PER_ANGLE * math.radians(55.0)
 RATE = CONDUCTANCE * PRODUCT / HELD
 VOLUMES = (
-    "actuator.volume_per_angle=51 cm^3/rad",
+    "actuator.displacement_per_radian=51 cm^3/rad",
     "actuator.dead_volume_1=2 cm^3",
     "actuator.dead_volume_2=2 cm^3",
 )

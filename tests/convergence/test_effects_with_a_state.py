@@ -17,7 +17,7 @@ from tests.judge.reference_solver import compare_with_reference, solve_reference
 ICE = ("effects.ice.blockage_per_gas=3e4 1/kg", "effects.ice.melting_time=30 ms")
 VENTING = (
     *("controller.kind=constant", "controller.command=-0.5", "controller.rate=125 Hz", "initial.pressure_1=40 psi_g"),
-    *("actuator.volume_per_angle=51 cm^3/rad", "actuator.dead_volume_1=2 cm^3", "actuator.dead_volume_2=2 cm^3"),
+    *("actuator.displacement_per_radian=51 cm^3/rad", "actuator.dead_volume_1=2 cm^3", "actuator.dead_volume_2=2 cm^3"),
     *("motion.angle=130 deg", "run.duration=0.2 s", "run.output_interval=4 ms"),
 )
 

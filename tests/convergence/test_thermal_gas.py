@@ -74,7 +74,7 @@ def compressed(step: float) -> float:
     run = dataclasses.replace(planned, step=step, tolerance=1e9, **counts)
     states = plant_states(run, run_batch(batch_of(run)))
     pressure, _ = chamber_pressures_of(run, states)
-    volume = run.plant.dead_volume_1 + run.plant.volume_per_angle * (states[:, 0] - run.plant.angle_min)
+    volume = run.plant.dead_volume_1 + run.plant.displacement_per_radian * (states[:, 0] - run.plant.angle_min)
     return float(np.abs(pressure * volume**RATIO / (pressure[0] * volume[0] ** RATIO) - 1.0).max())
 
 
@@ -139,6 +139,6 @@ def test_energy_balance_closes_with_what_was_supplied_vented_warmed_and_worked(n
 def test_work_of_the_gas_is_pressure_times_change_of_volume() -> None:
     fine = load_scenario("step-response", ("run.step=0.05 ms", "run.output_interval=0.05 ms"))
     record = simulate(with_walls(fine, 50.0)).recording
-    per_angle = load_scenario("step-response").device.actuator.volume_per_angle
+    per_angle = load_scenario("step-response").device.actuator.displacement_per_radian
     work = per_angle * np.trapezoid(record["pressure_1"] - record["pressure_2"], record["angle"])
     assert record["gas_work"][-1] == pytest.approx(float(work), rel=1e-3)

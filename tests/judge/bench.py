@@ -51,8 +51,8 @@ class Bench:
     def gas(self, y: Any) -> tuple[float, float, float, float, float, float]:
         """Both volumes [m^3], pressures [Pa] and temperatures over that of the walls."""
         rig, extra = self.rig, self.extra
-        volume_1 = rig.dead_1 + rig.volume_per_angle * (y[0] - rig.lowest)
-        volume_2 = rig.dead_2 + rig.volume_per_angle * (rig.highest - y[0])
+        volume_1 = rig.dead_1 + rig.displacement_per_radian * (y[0] - rig.lowest)
+        volume_2 = rig.dead_2 + rig.displacement_per_radian * (rig.highest - y[0])
         product = rig.gas_constant * rig.temperature
         if math.isfinite(extra.heat):
             pressure_1, pressure_2 = (rig.k - 1.0) * y[4] / volume_1, (rig.k - 1.0) * y[5] / volume_2
@@ -133,7 +133,7 @@ class Bench:
         energies = [0.0, 0.0]
         if math.isfinite(extra.heat):
             enthalpy = rig.gas_constant * rig.temperature * rig.k / (rig.k - 1.0)
-            swept = rig.volume_per_angle * velocity
+            swept = rig.displacement_per_radian * velocity
             walls = extra.heat * extra.walls * rig.temperature
             energies[0] = enthalpy * (into_1[1] - carried) - pressure_1 * swept + walls * volume_1 * (1.0 - warmth_1)
             energies[1] = enthalpy * (into_2[1] + carried) + pressure_2 * swept + walls * volume_2 * (1.0 - warmth_2)
@@ -157,8 +157,8 @@ def bench(scenario: Scenario, commands: Sequence[tuple[float, float]], times: An
     y[0] = scenario.motion.angle
     product = rig.gas_constant * rig.temperature
     volumes = (
-        rig.dead_1 + rig.volume_per_angle * (y[0] - rig.lowest),
-        rig.dead_2 + rig.volume_per_angle * (rig.highest - y[0]),
+        rig.dead_1 + rig.displacement_per_radian * (y[0] - rig.lowest),
+        rig.dead_2 + rig.displacement_per_radian * (rig.highest - y[0]),
     )
     for n, pressure in enumerate((scenario.initial.pressure_1, scenario.initial.pressure_2)):
         ideal = pressure / (1.0 + extra.virial * pressure)

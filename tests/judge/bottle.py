@@ -190,7 +190,7 @@ def numbers_of(walk: Any) -> Numbers:
         188.924,
         valve.area * valve.discharge_coefficient,
         leak.area * leak.discharge_coefficient,
-        actuator.volume_per_angle,
+        actuator.displacement_per_radian,
         actuator.angle_min,
         actuator.angle_max,
         actuator.dead_volume_1,

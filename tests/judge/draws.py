@@ -46,7 +46,7 @@ def actuator(chance: Chance, dead: tuple[float, float] = (1.0, 15.0), restitutio
     bounce = chance.choice([0.0, chance.uniform(0.0, 0.6)]) if restitution is None else restitution
     return [
         f"actuator.torque_constant={chance.uniform(1.1e-5, 1.8e-5)} m^3",
-        f"actuator.volume_per_angle={chance.uniform(30.0, 70.0)} cm^3/rad",
+        f"actuator.displacement_per_radian={chance.uniform(30.0, 70.0)} cm^3/rad",
         f"actuator.dead_volume_1={logarithmic(chance, *dead)} cm^3",
         f"actuator.dead_volume_2={logarithmic(chance, *dead)} cm^3",
         f"actuator.restitution={bounce}",

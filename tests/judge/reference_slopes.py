@@ -122,7 +122,7 @@ def thermal_gas_rates(
     vent_1 = transport(thermal, pressure_1, room, warmth_1, 1.0, outlet_1)
     vent_2 = transport(thermal, pressure_2, room, warmth_2, 1.0, outlet_2)
     leak = transport(thermal, pressure_1, pressure_2, warmth_1, warmth_2, across)
-    compression = (thermal.heat_capacity_ratio - 1.0) * plant.volume_per_angle * angular_velocity
+    compression = (thermal.heat_capacity_ratio - 1.0) * plant.displacement_per_radian * angular_velocity
     wall_1 = thermal.wall_exchange * volume_1 * (1.0 - warmth_1)
     wall_2 = thermal.wall_exchange * volume_2 * (1.0 - warmth_2)
     return ThermalGasRates(

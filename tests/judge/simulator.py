@@ -117,7 +117,7 @@ class Rig(NamedTuple):
     """Everything that the equations need, in SI units."""
 
     torque_constant: float
-    volume_per_angle: float
+    displacement_per_radian: float
     lowest: float
     highest: float
     dead_1: float
@@ -223,8 +223,8 @@ def place_of(rig: Rig, time: float, y: Any) -> tuple[float, float]:
 @njit(cache=True)
 def gas_of(rig: Rig, angle: float, y: Any) -> tuple[float, float, float, float]:
     """Both pressures [Pa] and both temperatures over that of the device."""
-    volume_1 = rig.dead_1 + rig.volume_per_angle * (angle - rig.lowest)
-    volume_2 = rig.dead_2 + rig.volume_per_angle * (rig.highest - angle)
+    volume_1 = rig.dead_1 + rig.displacement_per_radian * (angle - rig.lowest)
+    volume_2 = rig.dead_2 + rig.displacement_per_radian * (rig.highest - angle)
     product = rig.gas_constant * rig.temperature
     if rig.thermal == 0.0:
         return y[MASS_1] * product / volume_1, y[MASS_2] * product / volume_2, 1.0, 1.0
@@ -343,9 +343,9 @@ def rates(rig: Rig, time: float, y: Any, way: float, coils: Any, target: float, 
     slope[TAKEN] = from_1 + from_2
     if rig.thermal > 0.0:
         enthalpy = rig.gas_constant * rig.temperature * rig.k / (rig.k - 1.0)
-        volume_rate = rig.volume_per_angle * velocity if way != REST else 0.0
-        volume_1 = rig.dead_1 + rig.volume_per_angle * (angle - rig.lowest)
-        volume_2 = rig.dead_2 + rig.volume_per_angle * (rig.highest - angle)
+        volume_rate = rig.displacement_per_radian * velocity if way != REST else 0.0
+        volume_1 = rig.dead_1 + rig.displacement_per_radian * (angle - rig.lowest)
+        volume_2 = rig.dead_2 + rig.displacement_per_radian * (rig.highest - angle)
         heat = rig.heat * rig.walls * rig.temperature
         slope[ENERGY_1] = enthalpy * (warm_1 + cold_1 - carried) - pressure_1 * volume_rate
         slope[ENERGY_2] = enthalpy * (warm_2 + cold_2 + carried) + pressure_2 * volume_rate
@@ -699,7 +699,7 @@ def rig_of(scenario: Scenario, bias: float = 0.0, relieving: bool | None = None)
     leg = motion.leg if free else None
     return Rig(
         actuator.torque_constant,
-        actuator.volume_per_angle,
+        actuator.displacement_per_radian,
         actuator.angle_min,
         actuator.angle_max,
         actuator.dead_volume_1,
@@ -743,9 +743,9 @@ def start_of(scenario: Scenario, rig: Rig, moved: float) -> Any:
         y[VELOCITY] = scenario.motion.angular_velocity * (1.0 + moved)
     product = rig.gas_constant * rig.temperature
     content_1 = scenario.initial.pressure_1 * (1.0 + moved)
-    content_1 *= rig.dead_1 + rig.volume_per_angle * (y[ANGLE] - rig.lowest)
+    content_1 *= rig.dead_1 + rig.displacement_per_radian * (y[ANGLE] - rig.lowest)
     content_2 = scenario.initial.pressure_2 * (1.0 - moved)
-    content_2 *= rig.dead_2 + rig.volume_per_angle * (rig.highest - y[ANGLE])
+    content_2 *= rig.dead_2 + rig.displacement_per_radian * (rig.highest - y[ANGLE])
     y[MASS_1], y[MASS_2] = content_1 / product, content_2 / product
     y[ENERGY_1], y[ENERGY_2] = content_1 / (rig.k - 1.0), content_2 / (rig.k - 1.0)
     return y

@@ -14,7 +14,7 @@ from tests.judge.draws import draw
 from tests.judge.simulator import judge
 
 SMALL_CHAMBERS = (
-    "actuator.volume_per_angle=51 cm^3/rad",
+    "actuator.displacement_per_radian=51 cm^3/rad",
     "actuator.dead_volume_1=0.07 cm^3",
     "actuator.dead_volume_2=0.3 cm^3",
     "actuator.restitution=0.6",

@@ -34,7 +34,7 @@ def test_the_same_number_draws_the_same_document_and_another_one_another() -> No
 
 
 @pytest.mark.parametrize(
-    "flaw", ["valve.area=31.63 mm^2", "foot_plate.inertia=8.43 g m^2", "actuator.volume_per_angle=51.1 cm^3/rad"]
+    "flaw", ["valve.area=31.63 mm^2", "foot_plate.inertia=8.43 g m^2", "actuator.displacement_per_radian=51.1 cm^3/rad"]
 )
 def test_the_judge_would_see_a_device_that_is_wrong_by_two_in_a_thousand(flaw: str, step_response: Scenario) -> None:
     answer, other = judge(step_response), judge(load_scenario("step-response", (flaw,)))

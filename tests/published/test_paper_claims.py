@@ -85,7 +85,7 @@ def test_the_step_response_goes_as_the_text_tells(told: dict[str, Observation], 
 
 
 def test_with_the_reported_volume_pressure_2_rises_above_its_supply_instead_of_slowing() -> None:
-    found = simulate("step-response", ["actuator.volume_per_angle=51 cm^3/rad", *SHORT_LINES])
+    found = simulate("step-response", ["actuator.displacement_per_radian=51 cm^3/rad", *SHORT_LINES])
     supply = found.scenario.device.supply
     levels = Levels(supply.pressure, supply.atmospheric_pressure)
     held = {item.id: item for item in step_observations(found.recording, levels, step_events(found.recording))}

@@ -28,7 +28,7 @@ def test_four_numbers_of_the_device_lie_in_their_intervals_beside_all_tolerances
         assert estimate.verdict == "identified"
 
 
-@pytest.mark.parametrize("cell", ["dead volume", "volume per angle", "leak that opens", "slew limit"])
+@pytest.mark.parametrize("cell", ["dead volume", "displacement per radian", "leak that opens", "slew limit"])
 def test_a_device_that_the_model_is_not_is_said_to_hold_for_this_model_only(cell: str) -> None:
     found = fitted(cell, states=False)
     assert found.conflict

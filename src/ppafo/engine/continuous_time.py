@@ -37,7 +37,7 @@ def real_gas_rates(
     """Rates of both contents [kg/s] of gas that is not ideal, from the flows into its chambers. Equation (3)."""
     volume_1, volume_2 = chamber_volumes(plant, angle)
     # The chambers are opposite: what one gains in volume the other loses.
-    growth = plant.volume_per_angle * angular_velocity
+    growth = plant.displacement_per_radian * angular_velocity
     return (
         content_rate(content_1, volume_1, growth, flow_1),
         content_rate(content_2, volume_2, -growth, flow_2),

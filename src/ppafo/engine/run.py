@@ -214,7 +214,9 @@ def _alike_together(run: Run, runs: int, members: Members) -> Members:
     the gas.
     """
     plant = run.plant
-    gas = plant.dead_volume_1 + plant.dead_volume_2 + plant.volume_per_angle * (plant.angle_max - plant.angle_min)
+    gas = (
+        plant.dead_volume_1 + plant.dead_volume_2 + plant.displacement_per_radian * (plant.angle_max - plant.angle_min)
+    )
     duration = np.broadcast_to(gas / (plant.valve_conductance * plant.gas_product), (runs,))
     return np.argsort(duration[members], kind="stable")
 

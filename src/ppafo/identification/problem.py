@@ -180,7 +180,7 @@ class VaneLeakProblem(StrictTable):
         """Return the settings of the procedure [SI]; volumes as given, else from the angle.
 
         Equations (4), (5): V1 = V_dead1 + v (theta - theta_min) and V2 = V_dead2 + v (theta_max - theta), with v the
-        volume per angle [m^3/rad].
+        displacement per radian [m^3/rad].
         """
         start, end, angle = (
             quantity_in(self, name, unit, setting.place)
@@ -194,7 +194,7 @@ class VaneLeakProblem(StrictTable):
                     f"{setting.place}: angle = {self.angle!r}: volumes follow from the angle of a vane only; give "
                     "volume_1 and volume_2"
                 )
-            names = ("angle_min", "angle_max", "volume_per_angle", "dead_volume_1", "dead_volume_2")
+            names = ("angle_min", "angle_max", "displacement_per_radian", "dead_volume_1", "dead_volume_2")
             lower, upper, per_angle, dead_1, dead_2 = (setting.number(f"actuator.{name}") for name in names)
             if not lower <= angle <= upper:
                 raise IdentificationError(f"{setting.place}: angle = {self.angle!r} lies beyond the stops of the set")
@@ -202,7 +202,7 @@ class VaneLeakProblem(StrictTable):
             volumes["volume_1"] = volumes["volume_1"] or dead_1 + per_angle * (angle - lower)
             volumes["volume_2"] = volumes["volume_2"] or dead_2 + per_angle * (upper - angle)
             of_volume = setting.deviation("actuator.dead_volume_1", dead_1, "m^3")
-            of_angle = (angle - lower) * setting.deviation("actuator.volume_per_angle", per_angle, "m^3/rad")
+            of_angle = (angle - lower) * setting.deviation("actuator.displacement_per_radian", per_angle, "m^3/rad")
             deviation = math.hypot(of_volume, of_angle) / (dead_1 + per_angle * (angle - lower))
         forms = ("discharge_coefficient", "critical_ratio")
         coefficient, ratio = (number_in_si(setting.parameter_set, f"actuator.leak.{name}") for name in forms)

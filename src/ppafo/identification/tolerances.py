@@ -26,7 +26,7 @@ HELD = {
     "gas.molar_mass": GAS_LAW,
     "gas.heat_capacity_ratio": 0.02,
     "actuator.torque_constant": 0.02,
-    "actuator.volume_per_angle": 0.02,
+    "actuator.displacement_per_radian": 0.02,
     "actuator.dead_volume_1": 0.05,
     "actuator.dead_volume_2": 0.05,
     "actuator.leak.discharge_coefficient": 0.3,

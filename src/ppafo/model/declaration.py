@@ -23,7 +23,7 @@ NOMINAL = {
         "dorsiflexion_pressure",
         "atmospheric_pressure",
         "relieving",
-        "volume_per_angle",
+        "displacement_per_radian",
         "dead_volume_1",
         "dead_volume_2",
         "angle_min",

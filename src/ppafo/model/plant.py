@@ -28,7 +28,7 @@ class PlantParameters(NamedTuple):
 
     gas_product: float
     torque_constant: float
-    volume_per_angle: float
+    displacement_per_radian: float
     angle_min: float
     angle_max: float
     dead_volume_1: float
@@ -166,20 +166,20 @@ def driving_torque(plant: PlantParameters, angle: float, pressure_1: float, pres
     return net_driving_torque(actuator, gravity, plant.external_torque)
 
 
-def chamber_1_volume(angle: Number, angle_min: float, volume_per_angle: float, dead_volume: float) -> Number:
+def chamber_1_volume(angle: Number, angle_min: float, displacement_per_radian: float, dead_volume: float) -> Number:
     """Volume of chamber 1 [m^3], growing with the angle [rad]; equation (4) with a dead volume and a lower stop."""
-    return dead_volume + volume_per_angle * (angle - angle_min)
+    return dead_volume + displacement_per_radian * (angle - angle_min)
 
 
-def chamber_2_volume(angle: Number, angle_max: float, volume_per_angle: float, dead_volume: float) -> Number:
+def chamber_2_volume(angle: Number, angle_max: float, displacement_per_radian: float, dead_volume: float) -> Number:
     """Volume of chamber 2 [m^3], shrinking with the angle [rad]; equation (5) with a dead volume and an upper stop."""
-    return dead_volume + volume_per_angle * (angle_max - angle)
+    return dead_volume + displacement_per_radian * (angle_max - angle)
 
 
 def chamber_volumes(plant: PlantParameters, angle: Number) -> tuple[Number, Number]:
     """Volumes of both chambers [m^3] at an angle [rad]. Equations (4), (5)."""
-    volume_1 = chamber_1_volume(angle, plant.angle_min, plant.volume_per_angle, plant.dead_volume_1)
-    volume_2 = chamber_2_volume(angle, plant.angle_max, plant.volume_per_angle, plant.dead_volume_2)
+    volume_1 = chamber_1_volume(angle, plant.angle_min, plant.displacement_per_radian, plant.dead_volume_1)
+    volume_2 = chamber_2_volume(angle, plant.angle_max, plant.displacement_per_radian, plant.dead_volume_2)
     return volume_1, volume_2
 
 

@@ -95,7 +95,7 @@ def build_device(parameter_set: ParameterSet, valve: str | None = None, links: G
     growth, (is_bad, line) = growth_and_problem(device)
     if is_bad:
         raise ParameterError(f"{device.name}: {line(0)}")
-    return replace(device, actuator=replace(device.actuator, torque_constant=growth, volume_per_angle=growth))
+    return replace(device, actuator=replace(device.actuator, torque_constant=growth, displacement_per_radian=growth))
 
 
 def growth_and_problem(device: Device) -> tuple[Any, Problem]:
@@ -115,7 +115,7 @@ def _actuator(parameter_set: ParameterSet, read: Callable[[str], float]) -> Actu
     given = {item.name: _given_or_default(parameter_set, read, "actuator", item) for item in quantities}
     actuator = Actuator(
         torque_constant=given.get("torque_constant", 0.0),
-        volume_per_angle=given.get("volume_per_angle", 0.0),
+        displacement_per_radian=given.get("displacement_per_radian", 0.0),
         angle_min=given["angle_min"],
         angle_max=given["angle_max"],
         dead_volume_1=given["dead_volume_1"],

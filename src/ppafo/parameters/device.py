@@ -55,14 +55,14 @@ class SonicOrifice:
 class Actuator:
     """An actuator between two stops; chamber 1 grows with the angle. Equations (2), (4), (5).
 
-    torque_constant [m^3], volume_per_angle [m^3/rad], angle_min and angle_max [rad], dead_volume_1 and dead_volume_2
-    [m^3], restitution of the stops [-], leak between the chambers. ``kind`` is its name in the catalogue; one that is
-    no vane has ``settings`` in SI, all of them present, one that was measured its ``table``, a
+    torque_constant [m^3], displacement_per_radian [m^3/rad], angle_min and angle_max [rad], dead_volume_1 and
+    dead_volume_2 [m^3], restitution of the stops [-], leak between the chambers. ``kind`` is its name in the
+    catalogue; one that is no vane has ``settings`` in SI, all of them present, one that was measured its ``table``, a
     ``model.actuators.table.Table``, and the first two numbers are then means over the range.
     """
 
     torque_constant: float
-    volume_per_angle: float
+    displacement_per_radian: float
     angle_min: Annotated[float, Number("rad", "lower stop, where chamber 1 is smallest", minimum=-10.0, maximum=10.0)]
     angle_max: Annotated[float, Number("rad", "upper stop, where chamber 2 is smallest", minimum=-10.0, maximum=10.0)]
     dead_volume_1: Annotated[float, Number("m^3", "line and clearance of chamber 1", minimum=SMALLEST_VOLUME)]

@@ -99,7 +99,7 @@ def plant_with(device: Device, valve: Restriction, leak: Restriction, external_t
     return PlantParameters(
         gas_product=gas.specific_gas_constant * gas.temperature,
         torque_constant=actuator.torque_constant,
-        volume_per_angle=actuator.volume_per_angle,
+        displacement_per_radian=actuator.displacement_per_radian,
         angle_min=actuator.angle_min,
         angle_max=actuator.angle_max,
         dead_volume_1=actuator.dead_volume_1,

@@ -38,7 +38,7 @@ QUANTITIES: MappingProxyType[str, tuple[str, str]] = MappingProxyType(
         "torque": ("N m", "N m"),
         "velocity": ("m/s", "m/s"),
         "volume": ("m^3", "cm^3"),
-        "volume per angle": ("m^3/rad", "cm^3/rad"),
+        "displacement per radian": ("m^3/rad", "cm^3/rad"),
         "volume flow": ("m^3/s", "L/min"),
         "body length": ("m", "cm"),
         "conductance": ("m^3/(s Pa)", "L/(s bar)"),

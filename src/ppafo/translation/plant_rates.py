@@ -85,7 +85,7 @@ def thermal_gas_flows(
     """All rates of gas with an energy balance [kg/s], at absolute pressures [Pa]. Equations (3), (6) to (9)."""
     in_1, in_2, leak = port_flows(plant, openings, pressure_1, pressure_2)
     volume_1, volume_2 = chamber_volumes(plant, state.angle)
-    growth = plant.volume_per_angle * state.angular_velocity
+    growth = plant.displacement_per_radian * state.angular_velocity
     return thermal_flows(thermal, state, masses, volume_1, volume_2, growth, in_1, in_2, leak)
 
 

@@ -22,7 +22,7 @@ _SAME = {
     "supply_pressure": "supply.pressure",
     "dorsiflexion_pressure": "supply.dorsiflexion_pressure",
     "atmospheric_pressure": "supply.atmospheric_pressure",
-    "volume_per_angle": "actuator.volume_per_angle",
+    "displacement_per_radian": "actuator.displacement_per_radian",
     "dead_volume_1": "actuator.dead_volume_1",
     "dead_volume_2": "actuator.dead_volume_2",
     "angle_min": "actuator.angle_min",

@@ -119,7 +119,7 @@ def test_one_discharge_coefficient_is_consistent_where_both_valves_have_one_area
 
 @pytest.mark.parametrize(("volume", "verdict"), [(51.0, "inconsistent_as_reported"), (18.0, "consistent")])
 def test_the_swept_volume_is_judged_by_virtual_work(volume: float, verdict: str) -> None:
-    assert arithmetic(actuator__volume_per_angle=volume)["swept_volume"].verdict == verdict
+    assert arithmetic(actuator__displacement_per_radian=volume)["swept_volume"].verdict == verdict
 
 
 def test_the_last_phase_with_valve_a_first_is_the_run_as_its_scenario_has_it(reproduction: Reproduction) -> None:

@@ -339,7 +339,7 @@ def test_bench_and_trajectory_hold_a_number_alike() -> None:
     assert decay.inertia_deviation == held["foot_plate.inertia"] == told.inertia_deviation
     assert leak.gas.temperature_deviation == held["gas.temperature"]
     swept = math.radians(60.0) - device.actuator.angle_min
-    volume = math.hypot(held["actuator.dead_volume_1"], swept * held["actuator.volume_per_angle"])
+    volume = math.hypot(held["actuator.dead_volume_1"], swept * held["actuator.displacement_per_radian"])
     assert leak.volume_1 is not None
     assert leak.volume_deviation == pytest.approx(volume / leak.volume_1)
 

@@ -44,7 +44,7 @@ def test_the_torque_constant_of_another_kind_is_its_mean_growth() -> None:
     actuator = load_device("cylinder-lever").actuator
     stroke = 2.0 * 0.025 * np.sin(np.radians(55.0))
     area = 0.25 * np.pi * 0.0257**2
-    assert actuator.torque_constant == actuator.volume_per_angle
+    assert actuator.torque_constant == actuator.displacement_per_radian
     assert actuator.torque_constant == pytest.approx(area * stroke / np.radians(110.0), rel=0.01)
 
 

@@ -136,7 +136,7 @@ def test_deep_nesting_is_a_clean_error() -> None:
 def test_a_misspelt_key_names_the_nearest_and_the_allowed_ones() -> None:
     message = problem_of(changed("[actuator.torque_constant]", "[actuator.torque_constnt]"))
     assert "unknown key 'actuator.torque_constnt', did you mean 'torque_constant'?" in message
-    assert "volume_per_angle" in message
+    assert "displacement_per_radian" in message
 
 
 def test_a_misspelt_section_names_the_nearest() -> None:

@@ -7,7 +7,7 @@ from ppafo.parameters import load_device, load_parameter_set
 COMPLETED = load_parameter_set("ppafo2011")
 PRINTED = load_parameter_set("ppafo2011-printed")
 
-VOLUMES = {f"actuator.{name}" for name in ("volume_per_angle", "dead_volume_1", "dead_volume_2")}
+VOLUMES = {f"actuator.{name}" for name in ("displacement_per_radian", "dead_volume_1", "dead_volume_2")}
 
 
 def test_the_printed_set_holds_nothing_that_was_assumed() -> None:
@@ -29,13 +29,13 @@ def test_every_published_value_is_as_printed_up_to_its_unit() -> None:
 def test_the_volumes_of_the_completed_set_are_fitted_and_have_an_uncertainty_and_the_printed_one_is_kept() -> None:
     assert {COMPLETED.numbers[path].origin for path in VOLUMES} == {"derived"}
     assert all(COMPLETED.numbers[path].uncertainty for path in VOLUMES)
-    assert PRINTED.numbers["actuator.volume_per_angle"].value == 51.0
+    assert PRINTED.numbers["actuator.displacement_per_radian"].value == 51.0
 
 
 def test_energy_closes_with_the_stated_efficiency() -> None:
     actuator = load_device("ppafo2011").actuator
     efficiency = COMPLETED.numbers["reported.torque_efficiency"].value
-    assert actuator.torque_constant / actuator.volume_per_angle == pytest.approx(efficiency, rel=0.01)
+    assert actuator.torque_constant / actuator.displacement_per_radian == pytest.approx(efficiency, rel=0.01)
 
 
 def test_every_accepted_contradiction_gives_a_reason() -> None:

@@ -93,7 +93,7 @@ def test_closed_chambers_follow_the_adiabate_as_the_vane_moves(perfect: Preset, 
     solution = solve_rig(closed)
     plant = run.plant
     angle = of(solution, "angle")
-    volume = plant.dead_volume_2 + plant.volume_per_angle * (plant.angle_max - angle)
+    volume = plant.dead_volume_2 + plant.displacement_per_radian * (plant.angle_max - angle)
     assert np.ptp(volume) > 1e-6
     product = solution.pressures[:, 1] * volume**K
     assert np.abs(product / product[0] - 1.0).max() < 1e-6

@@ -22,7 +22,7 @@ from ppafo.simulation.simulate import Status
 CHAOTIC = (
     "motion.kind=free",
     "motion.angle=40 deg",
-    "actuator.volume_per_angle=51 cm^3/rad",
+    "actuator.displacement_per_radian=51 cm^3/rad",
     "actuator.dead_volume_1=0.5 cm^3",
     "actuator.dead_volume_2=1.1 cm^3",
     "sensors.angle_resolution=0.1 deg",

@@ -39,8 +39,8 @@ def independent(device: Device, supply: Callable[[float], float], angle: Callabl
 
     def pressures(time: float, masses: np.ndarray) -> tuple[float, float]:
         turned = angle(time)
-        volume_1 = actuator.dead_volume_1 + actuator.volume_per_angle * (turned - actuator.angle_min)
-        volume_2 = actuator.dead_volume_2 + actuator.volume_per_angle * (actuator.angle_max - turned)
+        volume_1 = actuator.dead_volume_1 + actuator.displacement_per_radian * (turned - actuator.angle_min)
+        volume_2 = actuator.dead_volume_2 + actuator.displacement_per_radian * (actuator.angle_max - turned)
         return masses[0] * product / volume_1, masses[1] * product / volume_2
 
     def slopes(time: float, masses: np.ndarray) -> list[float]:

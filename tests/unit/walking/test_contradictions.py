@@ -68,7 +68,7 @@ def test_supplies_that_let_no_gas_back_ask_for_room_above_their_pressure(name: s
 
 
 REPORTED_VANE = (
-    "actuator.volume_per_angle=51 cm^3/rad",
+    "actuator.displacement_per_radian=51 cm^3/rad",
     "actuator.dead_volume_1=2 cm^3",
     "actuator.dead_volume_2=2 cm^3",
 )

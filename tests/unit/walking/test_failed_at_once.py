@@ -6,7 +6,7 @@ from ppafo.walking.walk import walk
 # The ankle begins beyond the stop of a device whose chambers can neither hold nor vent their gas.
 BEYOND = (
     "actuator.angle_max=81.7 deg",
-    "actuator.volume_per_angle=100.8 cm^3/rad",
+    "actuator.displacement_per_radian=100.8 cm^3/rad",
     "actuator.dead_volume_1=2 cm^3",
     "actuator.dead_volume_2=2 cm^3",
     "valve.discharge_coefficient=0.0116",

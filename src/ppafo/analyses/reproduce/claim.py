@@ -361,8 +361,8 @@ _VANE_EFFICIENCY = Interval(0.7, 0.9)
 
 
 def _swept_volume(reported: Reported) -> Claim:
-    """Compare the volume per angle with the torque constant over the efficiency of vanes: virtual work."""
-    path, constant = "actuator.volume_per_angle", "actuator.torque_constant"
+    """Compare the displacement per radian with the torque constant over the efficiency of vanes: virtual work."""
+    path, constant = "actuator.displacement_per_radian", "actuator.torque_constant"
     # Work at the shaft is efficiency times the work of the gas: k dtheta dp = eta V dtheta dp.
     needed = reported.range(constant).over(_VANE_EFFICIENCY)
     low, high = (reported.in_reported_unit(path, end) for end in needed)

@@ -72,8 +72,8 @@ def share_of_healthy_moment(values: Values) -> float:
 
 
 def swept_volume(_values: Values) -> float:
-    """Volume per angle [m^3/rad] of the device."""
-    return load_device(DEVICE).actuator.volume_per_angle
+    """Displacement per radian [m^3/rad] of the device."""
+    return load_device(DEVICE).actuator.displacement_per_radian
 
 
 def walking_torque(values: Values) -> float:

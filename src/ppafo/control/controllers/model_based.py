@@ -21,7 +21,7 @@ class NominalChambers(NamedTuple):
     """The believed device, SI units; conductances are Cd A C1 [kg/(s Pa)], ``gas_product`` is R T / M [J/kg]."""
 
     torque_constant: Annotated[float, Number("m^3", "believed K_actuator", 1.451e-5, 1.0e-9, 1.0)]
-    volume_per_angle: Annotated[float, Number("m^3/rad", "believed B_vane", 2.35e-5, 1.0e-9, 1.0)]
+    displacement_per_radian: Annotated[float, Number("m^3/rad", "believed B_vane", 2.35e-5, 1.0e-9, 1.0)]
     angle_min: Annotated[float, Number("rad", "believed lower stop", math.radians(20.0), -10.0, 10.0)]
     angle_max: Annotated[float, Number("rad", "believed upper stop", math.radians(130.0), -10.0, 10.0)]
     dead_volume_1: Annotated[float, Number("m^3", "believed dead volume of chamber 1", 2.65e-5, 1.0e-9, 1.0)]
@@ -79,8 +79,8 @@ def torque_rates(
     """
     # A measured angle beyond a stop must not make a believed volume 0 or less.
     least = min(nominal.dead_volume_1, nominal.dead_volume_2)
-    volume_1 = chamber_1_volume(angle, nominal.angle_min, nominal.volume_per_angle, nominal.dead_volume_1)
-    volume_2 = chamber_2_volume(angle, nominal.angle_max, nominal.volume_per_angle, nominal.dead_volume_2)
+    volume_1 = chamber_1_volume(angle, nominal.angle_min, nominal.displacement_per_radian, nominal.dead_volume_1)
+    volume_2 = chamber_2_volume(angle, nominal.angle_max, nominal.displacement_per_radian, nominal.dead_volume_2)
     volume_1, volume_2 = max(volume_1, least), max(volume_2, least)
     ratio, valve = nominal.critical_ratio, nominal.valve_conductance
     leak = ellipse_flow(pressure_1, pressure_2, nominal.leak_conductance, ratio)
@@ -90,7 +90,7 @@ def torque_rates(
     feed_2 = max(ellipse_flow(nominal.dorsiflexion_pressure, pressure_2, valve, ratio), 0.0)
     vent_1 = ellipse_flow(pressure_1, nominal.atmospheric_pressure, valve, ratio)
     per_flow = nominal.torque_constant * nominal.gas_product
-    swept = nominal.torque_constant * nominal.volume_per_angle * angular_velocity
+    swept = nominal.torque_constant * nominal.displacement_per_radian * angular_velocity
     closed = -per_flow * leak * (1.0 / volume_1 + 1.0 / volume_2)
     closed = closed - swept * (pressure_1 / volume_1 + pressure_2 / volume_2)
     rising = per_flow * (feed_1 / volume_1 + vent_2 / volume_2)

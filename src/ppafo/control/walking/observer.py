@@ -50,7 +50,7 @@ class NominalDevice(NamedTuple):
     nominal_dorsiflexion_pressure: float
     nominal_atmospheric_pressure: float
     nominal_relieving: float
-    nominal_volume_per_angle: float
+    nominal_displacement_per_radian: float
     nominal_dead_volume_1: float
     nominal_dead_volume_2: float
     nominal_angle_min: float
@@ -89,7 +89,7 @@ NOMINAL_QUANTITIES = (
     _nominal("dorsiflexion_pressure", "Pa_a", "pressure to chamber 2", 1.0e8),
     _nominal("atmospheric_pressure", "Pa_a", "pressure of the atmosphere", 1.0e8),
     _nominal("relieving", "", "1 where the supplies take gas back", 1.0),
-    _nominal("volume_per_angle", "m^3/rad", "growth of chamber 1 with the angle", 1.0),
+    _nominal("displacement_per_radian", "m^3/rad", "growth of chamber 1 with the angle", 1.0),
     _nominal("dead_volume_1", "m^3", "dead volume of chamber 1", 1.0),
     _nominal("dead_volume_2", "m^3", "dead volume of chamber 2", 1.0),
     _nominal("angle_min", "rad", "lower stop", 10.0, -10.0),
@@ -299,7 +299,7 @@ def met_chamber(
 
 def volumes(nominal: NominalDevice, angle: float) -> tuple[float, float]:
     """Volumes of both chambers [m^3] at a measured angle [rad], not below the dead volumes. Equations (4), (5)."""
-    growth = nominal.nominal_volume_per_angle
+    growth = nominal.nominal_displacement_per_radian
     return (
         nominal.nominal_dead_volume_1 + max(growth * (angle - nominal.nominal_angle_min), 0.0),
         nominal.nominal_dead_volume_2 + max(growth * (nominal.nominal_angle_max - angle), 0.0),

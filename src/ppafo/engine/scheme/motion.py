@@ -330,9 +330,9 @@ def part_error(plant: PlantParameters, begun: FreePart, slid: PartSlide, angle: 
     missed = MISSED_FRACTION * abs(angle - begun.next_angle)
     # Where a chamber is small, a little of the angle is much of the pressure.
     volume_1, volume_2 = chamber_volumes(plant, begun.next_angle)
-    swept = plant.volume_per_angle * (plant.angle_max - plant.angle_min)
+    swept = plant.displacement_per_radian * (plant.angle_max - plant.angle_min)
     allowed_volume = min(ALLOWED_OF_ANGLE * swept, ALLOWED_BY_GAS * min(volume_1, volume_2))
-    return (bent + missed) * plant.volume_per_angle / allowed_volume
+    return (bent + missed) * plant.displacement_per_radian / allowed_volume
 
 
 def rebound_velocity(plant: PlantParameters, angular_velocity: float, torque: float) -> float:

@@ -512,7 +512,7 @@ def with_work(plant: PlantParameters, masses: ThermalState, before: PlantState, 
         supplied_content=masses.supplied_content,
         vented_content=masses.vented_content,
         heat_content=masses.heat_content,
-        gas_work=masses.gas_work + difference * plant.volume_per_angle * (after.angle - before.angle),
+        gas_work=masses.gas_work + difference * plant.displacement_per_radian * (after.angle - before.angle),
     )
 
 

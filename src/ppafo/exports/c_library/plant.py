@@ -158,8 +158,8 @@ def _volume_conditions(alone: PlantAlone, names: list[str]) -> list[str]:
         return []
     plant = "run->parameters.plant"
     # Where V = V_dead + B (angle - stop) is 0: beyond it a chamber would have no volume.
-    low = f"{plant}.angle_min - {plant}.dead_volume_1 / {plant}.volume_per_angle"
-    high = f"{plant}.angle_max + {plant}.dead_volume_2 / {plant}.volume_per_angle"
+    low = f"{plant}.angle_min - {plant}.dead_volume_1 / {plant}.displacement_per_radian"
+    high = f"{plant}.angle_max + {plant}.dead_volume_2 / {plant}.displacement_per_radian"
     ends = ["angle"]
     if "angular_velocity" in names:
         ends.append("angle + angular_velocity * run->parameters.timing.step")

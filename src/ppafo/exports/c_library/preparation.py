@@ -203,7 +203,7 @@ class Writing:
         }
         if self.program.has_shape:
             # The vane's own numbers have no meaning for another shape; the text that reads them is shared.
-            fields["actuator"] |= {"torque_constant": "0.0", "volume_per_angle": "0.0"}
+            fields["actuator"] |= {"torque_constant": "0.0", "displacement_per_radian": "0.0"}
         constant = f"{add(specific_gas_constant)}({UNIVERSAL_GAS_CONSTANT!r}, gas_molar_mass)"
         fields["gas"] = fields["gas"] | {"specific_gas_constant": constant}
         # Lines have a check valve of their own, so that the valve may push gas back into them.
@@ -238,7 +238,7 @@ class Writing:
         gauge = f"{vane}.supply_pressure - {vane}.atmospheric_pressure"
         yield f"growth = {add(mean_growth)}(shape, stops, {gauge}, {add(model.chambers)})"
         fields = [
-            "growth" if field in ("torque_constant", "volume_per_angle") else f"{vane}.{field}"
+            "growth" if field in ("torque_constant", "displacement_per_radian") else f"{vane}.{field}"
             for field in PlantParameters._fields
         ]
         yield f"{name} = {add(model.plant)}({', '.join(fields)}, shape)"

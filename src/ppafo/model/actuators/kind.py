@@ -88,8 +88,8 @@ class ActuatorKind:
 class ShapedPlant(Protocol):
     """A plant whose actuator is no vane: ``PlantParameters`` with the numbers of its kind. What a kind may ask of it.
 
-    ``volume_per_angle`` is the mean displacement per radian of chamber 1, and ``torque_constant`` the same number:
-    they scale errors, and laws that were made for a vane rely on them.
+    ``displacement_per_radian`` of chamber 1 is the mean over the range, and ``torque_constant`` the same number: they
+    scale errors, and laws that were made for a vane rely on them.
     """
 
     @property
@@ -139,7 +139,7 @@ def mean_growth(shape: Any, stops: Range, gauge: float, chambers: Callable[..., 
 
 def plant_in_shape(plant: PlantParameters, model: ActuatorModel, shape: Any, growth: float) -> Any:
     """The plant of another kind from a vane's with the same stops, gas and orifices; mean growth [m^3/rad]."""
-    return model.plant(*plant._replace(torque_constant=growth, volume_per_angle=growth), shape)
+    return model.plant(*plant._replace(torque_constant=growth, displacement_per_radian=growth), shape)
 
 
 _PLANTS: dict[type, type] = {}

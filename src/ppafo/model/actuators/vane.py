@@ -40,7 +40,7 @@ class VaneSettings(NamedTuple):
     """Torque per pressure, and displacement per radian."""
 
     torque_constant: Annotated[float, Number("m^3", "torque per pressure difference", minimum=SMALLEST_VOLUME)]
-    volume_per_angle: Annotated[float, Number("m^3/rad", "displacement per radian", minimum=SMALLEST_VOLUME)]
+    displacement_per_radian: Annotated[float, Number("m^3/rad", "displacement per radian", minimum=SMALLEST_VOLUME)]
 
 
 KIND = ActuatorKind(

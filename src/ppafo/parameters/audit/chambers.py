@@ -8,7 +8,7 @@ from ppafo.parameters.audit.evidence import Evidence, Finding, Side, density_cha
 # Does the torque constant equal the displacement per radian, as virtual work demands: T dtheta = (P1 - P2) dV?
 
 _TORQUE_CONSTANT = "actuator.torque_constant"
-_VOLUME_PER_ANGLE = "actuator.volume_per_angle"
+_DISPLACEMENT_PER_RADIAN = "actuator.displacement_per_radian"
 _EFFICIENCY = "reported.torque_efficiency"
 _SUPPLY = "supply.pressure"
 _ID = "virtual-work"
@@ -18,7 +18,7 @@ _TOLERANCE = 0.1
 
 def check_virtual_work(evidence: Evidence) -> Iterator[Finding]:
     """Yield a warning where the two differ by more than 10 %, a note where a stated efficiency explains it."""
-    found, efficiency = evidence.numbers(_TORQUE_CONSTANT, _VOLUME_PER_ANGLE), evidence.number(_EFFICIENCY)
+    found, efficiency = evidence.numbers(_TORQUE_CONSTANT, _DISPLACEMENT_PER_RADIAN), evidence.number(_EFFICIENCY)
     if found is None or min(found) <= 0.0:
         return
     if efficiency is not None and abs(found[1] * efficiency / found[0] - 1.0) <= _TOLERANCE:
@@ -28,7 +28,7 @@ def check_virtual_work(evidence: Evidence) -> Iterator[Finding]:
             id=_ID,
             severity="note",
             title="torque constant and displacement per radian agree, with the stated efficiency",
-            values=evidence.values_of(_TORQUE_CONSTANT, _VOLUME_PER_ANGLE, _EFFICIENCY),
+            values=evidence.values_of(_TORQUE_CONSTANT, _DISPLACEMENT_PER_RADIAN, _EFFICIENCY),
             sides=(Side("torque constant over displacement per radian", ratio, ""),),
             paragraph=(
                 f"Energy closes: the shaft gets {100.0 * ratio:.3g} % of the work p dV of the gas, and the other "
@@ -38,31 +38,31 @@ def check_virtual_work(evidence: Evidence) -> Iterator[Finding]:
             ),
         )
     elif abs(found[1] / found[0] - 1.0) > _TOLERANCE:
-        torque_constant, volume_per_angle = found
-        gas_paths, gas_sides, gas_text = _gas_use(evidence, torque_constant, volume_per_angle)
+        torque_constant, displacement_per_radian = found
+        gas_paths, gas_sides, gas_text = _gas_use(evidence, torque_constant, displacement_per_radian)
         yield Finding(
             id=_ID,
             severity="warning",
             title="torque constant and displacement per radian differ, against virtual work",
-            values=evidence.values_of(_TORQUE_CONSTANT, _VOLUME_PER_ANGLE, _EFFICIENCY, *gas_paths),
+            values=evidence.values_of(_TORQUE_CONSTANT, _DISPLACEMENT_PER_RADIAN, _EFFICIENCY, *gas_paths),
             sides=(
                 Side("torque constant", torque_constant, "m^3"),
-                Side("displacement per radian", volume_per_angle, "m^3/rad"),
+                Side("displacement per radian", displacement_per_radian, "m^3/rad"),
                 *gas_sides,
             ),
             paragraph=(
                 f"A frictionless vane that turns by dtheta does the work T dtheta = (P1 - P2) dV, so that the torque "
                 f"constant {1e6 * torque_constant:.4g} cm^3 and the displacement per radian "
-                f"{1e6 * volume_per_angle:.4g} cm^3/rad should be one number; the displacement is "
-                f"{volume_per_angle / torque_constant:.2g} times the torque constant.{gas_text} Measure the volume of "
-                "gas that a full turn displaces; until then energy and efficiency figures are uncertain by the same "
-                "factor."
+                f"{1e6 * displacement_per_radian:.4g} cm^3/rad should be one number; the displacement is "
+                f"{displacement_per_radian / torque_constant:.2g} times the torque constant.{gas_text} "
+                "Measure the volume of gas that a full turn displaces; until then energy and efficiency figures are "
+                "uncertain by the same factor."
             ),
         )
 
 
 def _gas_use(
-    evidence: Evidence, torque_constant: float, volume_per_angle: float
+    evidence: Evidence, torque_constant: float, displacement_per_radian: float
 ) -> tuple[tuple[str, ...], tuple[Side, ...], str]:
     """Return paths, numbers and a sentence on the volume that the gas of one filling occupies."""
     gas, supply, angles = evidence.gas(), evidence.number(_SUPPLY), evidence.angle_range()
@@ -71,7 +71,7 @@ def _gas_use(
         return (), (), ""
     density = density_change(gas, supply - evidence.atmosphere())
     used, turn = evidence.number(path) or 0.0, abs(angles[3] - angles[1])
-    needed, by_torque, by_volume = used / density, torque_constant * turn, volume_per_angle * turn
+    needed, by_torque, by_volume = used / density, torque_constant * turn, displacement_per_radian * turn
     sides = (
         Side("volume that the gas use needs", needed, "m^3"),
         Side("volume swept by the torque constant", by_torque, "m^3"),
@@ -90,7 +90,7 @@ def _gas_use(
 
 # Are both chamber volumes positive over the angles in use? Equations (4) and (5).
 
-_SLOPE = "actuator.volume_per_angle"
+_SLOPE = "actuator.displacement_per_radian"
 _STOPS = ("actuator.angle_min", "actuator.angle_max")
 _DEAD = ("actuator.dead_volume_1", "actuator.dead_volume_2")
 
@@ -175,7 +175,7 @@ def check_rotation(evidence: Evidence) -> Iterator[Finding]:
 
 # Is the gas of one filling that was measured the gas that chamber 1 holds? Equations (3) and (4).
 
-_VOLUME = ("actuator.volume_per_angle", "actuator.dead_volume_1")
+_VOLUME = ("actuator.displacement_per_radian", "actuator.dead_volume_1")
 _LEAST, _MOST = 0.6, 1.1
 """Fraction of the measured gas that a filling may hold: the rest leaks across the vane while the task lasts."""
 

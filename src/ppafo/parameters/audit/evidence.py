@@ -175,7 +175,7 @@ class Evidence:
 
     def chamber_1_volume(self, angle: float) -> float | None:
         """Return the volume of chamber 1 [m^3] at an angle [rad], without a dead volume that the set does not have."""
-        found = self.numbers("actuator.volume_per_angle", "actuator.angle_min")
+        found = self.numbers("actuator.displacement_per_radian", "actuator.angle_min")
         dead_volume = self.number("actuator.dead_volume_1") or 0.0
         return None if found is None else chamber_1_volume(angle, found[1], found[0], dead_volume)
 

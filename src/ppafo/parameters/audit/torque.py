@@ -228,7 +228,7 @@ def _while_walking(evidence: Evidence, torque: float, pressure: float) -> Iterat
             severity=severity,
             title=f"valve '{valve}' fills chamber 1 {'within' if time <= _PUSH_OFF else 'too slowly for'} a push-off",
             values=evidence.values_of(
-                "actuator.volume_per_angle", "actuator.dead_volume_1", *sizes, "reported.walking_torque_pressure"
+                "actuator.displacement_per_radian", "actuator.dead_volume_1", *sizes, "reported.walking_torque_pressure"
             ),
             sides=(Side("time to fill", time, "s"), Side("time of push-off", _PUSH_OFF, "s")),
             paragraph=(

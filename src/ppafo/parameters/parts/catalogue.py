@@ -32,7 +32,7 @@ POWER = Quantity("power", "W", "electrical power: of an energised coil, of a spo
 IDLE_POWER = Quantity("idle_power", "W", "electrical power without a stroke", None, 0.0, 1000.0)
 ENERGY = Quantity("energy", "J", "energy of the charged cell", None, 0.0, 1.0e8, minimum_allowed=False)
 
-_OF_ACTUATOR = ("torque_constant", "volume_per_angle")
+_OF_ACTUATOR = ("torque_constant", "displacement_per_radian")
 
 VALVE = (MASS, RATING, NOMINAL_FLOW, NOMINAL_DIAMETER, POWER, IDLE_POWER, *ORIFICE)
 GROUPS: dict[str, tuple[Quantity, ...]] = {

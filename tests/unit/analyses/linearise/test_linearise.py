@@ -67,11 +67,11 @@ def of_the_textbook(run: Run, way: float | None, at: Mapping[str, float]) -> dic
         moves = {"valve_opening": at["valve_rate"], "valve_rate": bend}
     openings = openings_of(at["valve_opening"] if moves else at["command"])
     volumes = (
-        plant.dead_volume_1 + plant.volume_per_angle * (at["angle"] - plant.angle_min),
-        plant.dead_volume_2 + plant.volume_per_angle * (plant.angle_max - at["angle"]),
+        plant.dead_volume_1 + plant.displacement_per_radian * (at["angle"] - plant.angle_min),
+        plant.dead_volume_2 + plant.displacement_per_radian * (plant.angle_max - at["angle"]),
     )
     pressures = (at["pressure_1"], at["pressure_2"])
-    growth = plant.volume_per_angle * at["angular_velocity"]
+    growth = plant.displacement_per_radian * at["angular_velocity"]
     contents = [pressure * volume / plant.gas_product for pressure, volume in zip(pressures, volumes, strict=True)]
     if isinstance(run.thermal, ThermalParameters):
         warmth = [at[f"temperature_{side}"] / run.thermal.temperature for side in (1, 2)]

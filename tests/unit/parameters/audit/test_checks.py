@@ -153,12 +153,14 @@ def test_a_set_with_almost_nothing_in_it_has_almost_nothing_to_say() -> None:
 
 
 def test_a_stated_efficiency_that_explains_the_volume_is_a_note_and_another_is_a_warning() -> None:
-    closed = findings("actuator.volume_per_angle=18.1 cm^3/rad", "reported.torque_efficiency=0.8")["virtual-work"]
+    closed = findings("actuator.displacement_per_radian=18.1 cm^3/rad", "reported.torque_efficiency=0.8")[
+        "virtual-work"
+    ]
     assert closed.severity == "note"
     assert side(closed, "torque constant over displacement per radian") == pytest.approx(0.8, rel=0.01)
     assert findings("reported.torque_efficiency=0.8")["virtual-work"].severity == "warning"
-    assert findings("actuator.volume_per_angle=18.1 cm^3/rad")["virtual-work"].severity == "warning"
-    assert "virtual-work" not in findings("actuator.volume_per_angle=14.5 cm^3/rad")
+    assert findings("actuator.displacement_per_radian=18.1 cm^3/rad")["virtual-work"].severity == "warning"
+    assert "virtual-work" not in findings("actuator.displacement_per_radian=14.5 cm^3/rad")
 
 
 def test_the_gas_of_one_filling_is_asked_of_the_whole_chamber() -> None:
@@ -167,7 +169,7 @@ def test_the_gas_of_one_filling_is_asked_of_the_whole_chamber() -> None:
     assert side(found, "gas that fills chamber 1") == pytest.approx((26.5e-6 + 23.5e-6 * 0.9599) * 6.123, rel=0.01)
     short = "actuator.dead_volume_1=2 cm^3"
     assert findings(short)["gas-of-one-filling"].severity == "warning"
-    assert findings(short, "actuator.volume_per_angle=51 cm^3/rad")["gas-of-one-filling"].severity == "note"
+    assert findings(short, "actuator.displacement_per_radian=51 cm^3/rad")["gas-of-one-filling"].severity == "note"
     assert findings("actuator.dead_volume_1=60 cm^3")["gas-of-one-filling"].severity == "warning"
 
 
@@ -176,7 +178,7 @@ def test_published_torques_at_rest_speak_of_the_torque_constant() -> None:
     assert side(findings()["rated-torque"], "torque constant times pressure") == pytest.approx(12.0, rel=0.01)
     weak = findings("actuator.torque_constant=10 cm^3")
     assert {weak[name].severity for name in ("walking-torque", "rated-torque")} == {"warning"}
-    small = findings("actuator.volume_per_angle=14.5 cm^3/rad")
+    small = findings("actuator.displacement_per_radian=14.5 cm^3/rad")
     assert {small[name].severity for name in ("walking-torque", "rated-torque")} == {"note"}
 
 

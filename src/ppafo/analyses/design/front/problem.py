@@ -47,7 +47,7 @@ OWN = {
 """Variables that stand for several numbers of the device."""
 _BY_PARTS = {
     "actuator.torque_constant": SIZE,
-    "actuator.volume_per_angle": SIZE,
+    "actuator.displacement_per_radian": SIZE,
     "actuator.dead_volume_1": DEAD_VOLUME,
     "actuator.dead_volume_2": DEAD_VOLUME,
 }

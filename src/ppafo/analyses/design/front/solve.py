@@ -180,7 +180,7 @@ def design_columns(problem: DesignProblem, scenario: Scenario, candidates: Candi
     count = len(candidates)
     columns = {path: np.full(count, number) for path, number in combinations[0].valve.model_numbers.items()}
     size = chosen.get(SIZE, np.ones(count))
-    for name in ("torque_constant", "volume_per_angle"):
+    for name in ("torque_constant", "displacement_per_radian"):
         columns[f"actuator.{name}"] = size * np.array([item.actuator.values[name] for item in combinations])
     if DEAD_VOLUME in chosen:
         columns |= {f"{DEAD_VOLUME}_{chamber}": chosen[DEAD_VOLUME] for chamber in (1, 2)}

@@ -148,7 +148,7 @@ class Trials:
         columns = {path: np.full(count, number) for path, number in valve.model_numbers.items()}
         columns |= {path: columns[path] * opening for path in _OPENINGS if path in columns}
         if problem.actuator is not None:
-            for name in ("torque_constant", "volume_per_angle"):
+            for name in ("torque_constant", "displacement_per_radian"):
                 columns[f"actuator.{name}"] = np.full(count, problem.actuator.values[name])
         columns |= {"supply.pressure": pressure, "supply.dorsiflexion_pressure": pressure}
         settings = problem.scenario.controller.settings

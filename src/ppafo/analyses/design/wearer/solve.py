@@ -289,7 +289,7 @@ def _few_strides(wish: Wish, valve: Part, actuator: Part) -> list[Tried]:
     return [] if best is None else [best]
 
 
-_OF_ACTUATOR = ("torque_constant", "volume_per_angle")
+_OF_ACTUATOR = ("torque_constant", "displacement_per_radian")
 
 
 def _lightest(

@@ -94,7 +94,7 @@ def test_a_design_does_what_the_table_says_when_it_is_simulated_alone(study: Des
     size = point.numbers["actuator.size"]
     numbers = point.valve.model_numbers | {
         "actuator.torque_constant": size * point.actuator.values["torque_constant"],
-        "actuator.volume_per_angle": size * point.actuator.values["volume_per_angle"],
+        "actuator.displacement_per_radian": size * point.actuator.values["displacement_per_radian"],
         "actuator.dead_volume_1": point.numbers["actuator.dead_volume"],
         "actuator.dead_volume_2": point.numbers["actuator.dead_volume"],
         "supply.pressure": point.numbers["supply.pressure"],
@@ -164,7 +164,7 @@ def test_a_noisy_design_is_worth_its_mean_over_noise_that_the_search_never_met(f
     size, pressure = point.numbers["actuator.size"], point.numbers["supply.pressure"]
     numbers = point.valve.model_numbers | {
         "actuator.torque_constant": size * point.actuator.values["torque_constant"],
-        "actuator.volume_per_angle": size * point.actuator.values["volume_per_angle"],
+        "actuator.displacement_per_radian": size * point.actuator.values["displacement_per_radian"],
         "actuator.dead_volume_1": point.numbers["actuator.dead_volume"],
         "actuator.dead_volume_2": point.numbers["actuator.dead_volume"],
         "supply.pressure": pressure,

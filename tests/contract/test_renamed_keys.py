@@ -1,0 +1,35 @@
+"""A key of an earlier version is answered with what it is called now, wherever a user may write it."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import ppafo
+from ppafo.errors import PpafoError
+
+PACKAGE = Path(ppafo.__file__).parent
+NOW = "which is now called 'actuator.displacement_per_radian'"
+
+
+@pytest.mark.parametrize(
+    ("shipped", "load", "now"),
+    [
+        ("parameters/sets/ppafo2011.toml", ppafo.load_parameter_set, "which is now called 'displacement_per_radian'"),
+        ("studies/library/torque-task-uncertainty.toml", ppafo.load_study, NOW),
+    ],
+)
+def test_a_file_names_the_new_key(shipped: str, load: Callable[[Path], object], now: str, tmp_path: Path) -> None:
+    old = tmp_path / "old.toml"
+    text = (PACKAGE / shipped).read_text(encoding="utf-8")
+    assert "displacement_per_radian" in text
+    old.write_text(text.replace("displacement_per_radian", "volume_per_angle"), encoding="utf-8")
+    with pytest.raises(PpafoError, match=now) as refused:
+        load(old)
+    assert "volume_per_angle'" in str(refused.value)
+    assert str(old) in str(refused.value)
+
+
+def test_an_override_names_the_new_key() -> None:
+    with pytest.raises(PpafoError, match=NOW):
+        ppafo.simulate("step-response", ["actuator.volume_per_angle=30 cm^3/rad"])
