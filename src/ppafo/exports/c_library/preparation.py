@@ -30,13 +30,12 @@ from ppafo.parameters.declaration import members
 from ppafo.parameters.device import Device, SonicOrifice
 from ppafo.parameters.graph import Graph, Term
 from ppafo.parameters.plant import SEEN_BY_EFFECTS, area_restriction, effects_of, plant_with, sonic_restriction
-from ppafo.simulation.clock import links_of_times, step_unless_given, step_with_output
+from ppafo.simulation.clock import step_unless_given, step_with_output
 from ppafo.simulation.declaration import LOCKED_ANGLE, SUPPLY_LINE, SUPPLY_LINES, THERMAL, gas_settings, value_at
 from ppafo.simulation.leg import foot_load, shank_kind, with_load
 from ppafo.simulation.numbers import (
     TIMES,
     declared_numbers,
-    links_that_hold,
     number_at,
     other_form,
     path_of_locked_angle,
@@ -95,43 +94,32 @@ def _term(term: Term, rows: list[str], collector: Collector) -> str:
     return f"{collector.add(term.function)}({given})"
 
 
+def _written(sign: str, is_reflected: bool = False) -> "Callable[[Written, Written | float], Written]":
+    """An operator that writes its sign between two numbers; a reflected one has the other number first."""
+
+    def operator(number: "Written", other: "Written | float") -> "Written":
+        first, second = (other, number) if is_reflected else (number, other)
+        return Written(f"({_text(first)} {sign} {_text(second)})")
+
+    return operator
+
+
 @dataclass(frozen=True, slots=True)
 class Written:
     """A number as text: arithmetic of Python on it is written, operation by operation."""
 
     text: str
 
-    def __mul__(self, other: "Written | float") -> "Written":
-        """The product."""
-        return _joined(self, "*", other)
-
-    def __rmul__(self, other: float) -> "Written":
-        """The product."""
-        return _joined(other, "*", self)
-
-    def __add__(self, other: "Written | float") -> "Written":
-        """The sum."""
-        return _joined(self, "+", other)
-
-    def __radd__(self, other: float) -> "Written":
-        """The sum."""
-        return _joined(other, "+", self)
-
-    def __rsub__(self, other: float) -> "Written":
-        """A number less this one."""
-        return _joined(other, "-", self)
-
-    def __rtruediv__(self, other: float) -> "Written":
-        """A number over this one."""
-        return _joined(other, "/", self)
+    __mul__ = _written("*")
+    __rmul__ = _written("*", is_reflected=True)
+    __add__ = _written("+")
+    __radd__ = _written("+", is_reflected=True)
+    __rsub__ = _written("-", is_reflected=True)
+    __rtruediv__ = _written("/", is_reflected=True)
 
     def sqrt(self) -> "Written":
         """The root, by the name under which NumPy looks for it."""
         return Written(f"math.sqrt({self.text})")
-
-
-def _joined(first: Written | float, sign: str, second: Written | float) -> Written:
-    return Written(f"({_text(first)} {sign} {_text(second)})")
 
 
 def _text(number: Written | float) -> str:
@@ -337,11 +325,6 @@ def settings_of(scenario: Scenario) -> tuple[Setting, ...]:
     )
 
 
-def links_of(scenario: Scenario) -> Graph:
-    """Settings that follow others as long as nobody changes them."""
-    return {**links_that_hold(scenario), **links_of_times(time_texts(scenario))}
-
-
 def relations_of(scenario: Scenario) -> tuple[Relation, ...]:
     """Settings that contradict each other, as they would in a file."""
     rules: list[tuple[str, str, str, float]] = [
@@ -368,15 +351,10 @@ def relations_of(scenario: Scenario) -> tuple[Relation, ...]:
 
 
 def declared_settings(scenario: Scenario) -> dict[str, Quantity]:
-    """Declarations by path, without the form of an orifice that is not used, and without second names."""
-    declared = used_numbers(scenario.device, declared_numbers(scenario))
-    return {path: item for path, item in declared.items() if path != "controller.rate"}
-
-
-def used_numbers(device: Device, declared: Mapping[str, Quantity]) -> dict[str, Quantity]:
-    """Declarations by path, without the form of an orifice that is not used, and effects that are off."""
-    sections = "valve", "actuator.leak"
-    unused = {f"{section}.{name}" for section in sections for name in other_form(device, section)}
+    """Declarations by path, without the form of an orifice that is not used, effects that are off, second names."""
+    device = scenario.device
+    unused = {"controller.rate"}
+    unused |= {f"{section}.{name}" for section in ("valve", "actuator.leak") for name in other_form(device, section)}
     is_on = effects_of(device)
     unused |= {
         f"{effect.section}.{item.name}"
@@ -384,7 +362,7 @@ def used_numbers(device: Device, declared: Mapping[str, Quantity]) -> dict[str, 
         if effect not in is_on
         for item in effect.quantities
     }
-    return {path: item for path, item in declared.items() if path not in unused}
+    return {path: item for path, item in declared_numbers(scenario).items() if path not in unused}
 
 
 def preparation_of(scenario: Scenario, program: Program, collector: Collector, boundary: Boundary) -> str:
@@ -397,7 +375,8 @@ def preparation_of(scenario: Scenario, program: Program, collector: Collector, b
         *writing.plant("plant", torque),
         *([] if leg is None else _leg(leg, writing)),
         *_steps(scenario, writing),
-        *_pieces(scenario, writing),
+        *_followed(scenario, writing),
+        *writing.gas(),
         *_start(scenario, writing),
     ]
     return writing.text(settings_of(scenario), lines, boundary)
@@ -418,18 +397,20 @@ def _steps(scenario: Scenario, writing: Writing) -> Iterator[str]:
     yield f"needs_parts = not {writing.add(is_slow_locked)}(plant, {shortened}, {angle}, {stiffness})"
 
 
-def _pieces(scenario: Scenario, writing: Writing) -> Iterator[str]:
-    """Lines that make the parameters of controller, profiles, sensors, gas and lines."""
+def _followed(scenario: Scenario, writing: Writing) -> Iterator[str]:
+    """Lines that make the parameters of the controller, of the reference and of a prescribed angle."""
     program = writing.program
     if program.controller is not None:
         yield f"controller = {_kind(writing, 'controller', CONTROLLERS[scenario.controller.kind])}"
-    yield f"reference = {_reference(scenario, writing)}"
+    profile, settings = PROFILES[scenario.reference.kind], scenario.reference.settings
+    # Where none is followed, the one that stands in its place is written out.
+    known = {} if program.has_reference else {item.name: repr(settings[item.name]) for item in profile.quantities}
+    yield f"reference = {_kind(writing, 'reference', profile, known)}"
     if program.angle is RECORDED_ANGLE:
         yield f"path = {writing.add(Segment)}(0.0, motion_angle, 0.0)"
     elif isinstance(scenario.motion, PrescribedMotion):
         held = {"level": c_identifier(path_of_locked_angle(scenario) or LOCKED_ANGLE)} if program.is_locked else {}
         yield f"path = {_kind(writing, 'motion.profile', PROFILES[scenario.motion.profile.kind], held)}"
-    yield from writing.gas()
 
 
 def _leg(leg: Leg, writing: Writing) -> Iterator[str]:
@@ -451,15 +432,6 @@ def _kind(writing: Writing, section: str, kind: Any, given: Mapping[str, str] | 
     """Parameters of a controller or profile from its settings."""
     names = writing.section(section, [item.name for item in kind.quantities]) | dict(given or {})
     return writing.kind(section, kind, names.values())
-
-
-def _reference(scenario: Scenario, writing: Writing) -> str:
-    """The reference; where none is followed, the one that stands in its place."""
-    choice = scenario.reference
-    kind = PROFILES[choice.kind]
-    if writing.program.has_reference:
-        return _kind(writing, "reference", kind)
-    return _kind(writing, "reference", kind, {item.name: repr(choice.settings[item.name]) for item in kind.quantities})
 
 
 def _start(scenario: Scenario, writing: Writing) -> Iterator[str]:

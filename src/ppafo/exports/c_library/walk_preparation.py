@@ -35,7 +35,6 @@ from ppafo.walking.preparation import (
     DISTORTING,
     FROZEN,
     NEVER,
-    FaultSettings,
     device_share,
     distorting_fault,
     fixed_fault,
@@ -126,11 +125,6 @@ def _numbers(configuration: Scenario) -> dict[str, tuple[Quantity, float]]:
     }
 
 
-def sensors_that_fail(configuration: Scenario) -> dict[str, FaultSettings]:
-    """Faults of a walk by the name of the sensor, only where there is one."""
-    return {sensor: item for sensor, item in walk_of(configuration).faults.items() if item.kind}
-
-
 def _control(configuration: Scenario) -> dict[str, Quantity]:
     """Settings of controller and timing by path, in the order of the controller's parameters."""
     control = law_of(configuration)
@@ -165,20 +159,55 @@ def relations_of_walk(configuration: Scenario) -> tuple[Relation, ...]:
 def preparation_of_walk(configuration: Scenario, program: Program, collector: Collector, boundary: Boundary) -> str:
     """The composed function ``prepare`` of a walk, once everything it calls is gathered."""
     writing = Writing(configuration.device, configuration.supply_lines, program, collector)
+    return writing.text(settings_of_walk(configuration), _lines(configuration, writing), boundary)
+
+
+def _lines(configuration: Scenario, writing: Writing) -> Iterator[str]:
+    """Lines from settings to the numbers of a run; each needs names that lines before it have made."""
     form: ExportedWalk = kind_at(walk_of(configuration).who.exported)
-    lines = [
-        *writing.plant("bare", "0.0"),
-        # Each line needs names that lines before it have made, so this order is fixed.
-        *form.leg(configuration, writing),
-        *_gait_sensors(configuration, writing),
-        *_plant_faults(configuration, writing),
-        *_steps(configuration, writing),
-        *writing.timing("signal_delay"),
-        *_components(configuration, writing),
-        *form.start(configuration, writing),
-        *writing.start(),
-    ]
-    return writing.text(settings_of_walk(configuration), lines, boundary)
+    add = writing.add
+    yield from writing.plant("bare", "0.0")
+    yield from form.leg(configuration, writing)
+
+    # Sensors with their faults, and the longest time by which one is late.
+    faults = walk_of(configuration).faults
+    for sensor, fault in faults.items():
+        names = writing.section(f"faults.{sensor}", [item.name for item in fault_numbers(sensor, fault.kind)])
+        yield f"{sensor}_fault = {_fault(writing, fault.kind, names)}"
+    row = writing.row("SensorNumbers", writing.section("sensors", (*_FORCES, *_OTHERS)))
+    failing_sensors = ", ".join(f"{sensor}_fault" for sensor in faults)
+    yield f"gait_sensors = {add(gait_sensors)}({row}, controller_period, {failing_sensors})"
+    yield f"signal_delay = {add(longest_delay)}(gait_sensors) * controller_period"
+
+    # What fails of the plant and the shut-off valve, numbers written out.
+    failing = failing_of(configuration)
+    if failing is not None:
+        yield f"plant_faults = {writing.constant(failing[0], 'plant_faults')}"
+        yield f"shut_off = {writing.constant(failing[1], 'shut_off')}"
+        yield f"unpowered = {writing.constant(POWERED, 'unpowered')}"
+
+    # Steps: the smallest volume limits them, and adiabatic gas, which is stiffer by the heat capacity ratio.
+    yield f"volume = {add(smallest_chamber)}(plant)"
+    if configuration.supply_lines is not None:
+        volumes = (c_identifier(f"supply_line.{line}.volume") for line in SUPPLY_LINES)
+        yield f"volume = min(volume, {', '.join(volumes)})"
+    stiffness = "1.0" if configuration.gas_model is None else "gas_heat_capacity_ratio"
+    given = "run_duration, run_step, run_output_interval, controller_period"
+    yield f"counts_of_steps = {add(walk_step_counts)}({given}, plant, volume, {stiffness})"
+    yield "needs_parts = False"
+    yield from writing.timing("signal_delay")
+
+    # Controller, gas and course.
+    settings = map(c_identifier, _control(configuration))
+    yield f"controller = {writing.kind('controller', law_of(configuration), settings)}"
+    yield f"reference = {writing.constant(profile_parameters(NO_REFERENCE), 'reference')}"
+    yield from writing.gas()
+    planned = course_of_walk(configuration)
+    if planned is not None:
+        yield f"walk_course = {writing.constant(planned.course, 'walk_course')}"
+
+    yield from form.start(configuration, writing)
+    yield from writing.start()
 
 
 def _leg(configuration: Scenario, writing: Writing) -> Iterator[str]:
@@ -195,27 +224,6 @@ def _leg(configuration: Scenario, writing: Writing) -> Iterator[str]:
     yield f"gait_timing = {writing.constant(gait_timing(walk_of(configuration).gait), 'gait_timing')}"
 
 
-def _gait_sensors(configuration: Scenario, writing: Writing) -> Iterator[str]:
-    """Lines that make the sensors with their faults, and the longest time by which one is late."""
-    add, faults = writing.add, walk_of(configuration).faults
-    for sensor, fault in faults.items():
-        names = writing.section(f"faults.{sensor}", [item.name for item in fault_numbers(sensor, fault.kind)])
-        yield f"{sensor}_fault = {_fault(writing, fault.kind, names)}"
-    row = writing.row("SensorNumbers", writing.section("sensors", (*_FORCES, *_OTHERS)))
-    failing = ", ".join(f"{sensor}_fault" for sensor in faults)
-    yield f"gait_sensors = {add(gait_sensors)}({row}, controller_period, {failing})"
-    yield f"signal_delay = {add(longest_delay)}(gait_sensors) * controller_period"
-
-
-def _plant_faults(configuration: Scenario, writing: Writing) -> Iterator[str]:
-    """Lines that make what fails of the plant and the shut-off valve, numbers written out, where there are any."""
-    failing = failing_of(configuration)
-    if failing is not None:
-        yield f"plant_faults = {writing.constant(failing[0], 'plant_faults')}"
-        yield f"shut_off = {writing.constant(failing[1], 'shut_off')}"
-        yield f"unpowered = {writing.constant(POWERED, 'unpowered')}"
-
-
 def _fault(writing: Writing, kind: str, names: Mapping[str, str]) -> str:
     """A fault of a sensor from its settings, or none."""
     if not kind:
@@ -228,31 +236,6 @@ def _fault(writing: Writing, kind: str, names: Mapping[str, str]) -> str:
         return f"{writing.add(fixed_fault)}({names['time']}, {holds!r}, {reading}, {names['period']})"
     given = ", ".join(names.get(name, "0.0") for name in DISTORTING)
     return f"{writing.add(distorting_fault)}({given}, controller_period)"
-
-
-def _steps(configuration: Scenario, writing: Writing) -> Iterator[str]:
-    """Lines that make the steps."""
-    yield f"volume = {writing.add(smallest_chamber)}(plant)"
-    if configuration.supply_lines is not None:
-        volumes = (c_identifier(f"supply_line.{line}.volume") for line in SUPPLY_LINES)
-        yield f"volume = min(volume, {', '.join(volumes)})"
-    # Adiabatic gas is stiffer by the heat capacity ratio, so its steps are shorter.
-    stiffness = "1.0" if configuration.gas_model is None else "gas_heat_capacity_ratio"
-    given = "run_duration, run_step, run_output_interval, controller_period"
-    yield f"counts_of_steps = {writing.add(walk_step_counts)}({given}, plant, volume, {stiffness})"
-    yield "needs_parts = False"
-
-
-def _components(configuration: Scenario, writing: Writing) -> Iterator[str]:
-    """Lines that make the parameters of the controller, its noise, gas, lines and course."""
-    control = law_of(configuration)
-    given = [c_identifier(path) for path in _control(configuration)]
-    yield f"controller = {writing.kind('controller', control, given)}"
-    yield f"reference = {writing.constant(profile_parameters(NO_REFERENCE), 'reference')}"
-    yield from writing.gas()
-    planned = course_of_walk(configuration)
-    if planned is not None:
-        yield f"walk_course = {writing.constant(planned.course, 'walk_course')}"
 
 
 def _start(configuration: Scenario, writing: Writing) -> Iterator[str]:

@@ -90,7 +90,16 @@ from ppafo.exports.c_library.files import (
     conditions_of_program,
     run_words,
 )
-from ppafo.exports.c_library.program import COUNTS, IN_PARTS, TOGETHER, WHOLE, ExportedProgram, c_text, outline_of
+from ppafo.exports.c_library.program import (
+    COUNTS,
+    IN_PARTS,
+    TOGETHER,
+    WHOLE,
+    ExportedProgram,
+    c_text,
+    outline_of,
+    places_of,
+)
 from ppafo.parameters import ParameterSet, apply_overrides, load_parameter_set
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import ATMOSPHERE_PATH, itself
@@ -341,8 +350,8 @@ def _unit(library: Library, functions: str) -> str:
     words = {
         **run_words(library),
         "settings_type": "run_settings",
-        "state_count": str(len(program.state_places)),
-        "parameter_count": str(len(program.parameter_places)),
+        "state_count": str(len(places_of(program.program.state_rows()))),
+        "parameter_count": str(len(places_of(program.program.parameter_rows()))),
         "count_count": str(len(COUNTS)),
         "prepare": "\n".join(f"    {line}" for line in prepare),
         "needs_other": _COUNT.sub(lambda found: f"counts[COUNT_{found[1].upper()}]", "\n".join(refused)),
