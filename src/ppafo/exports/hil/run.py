@@ -53,10 +53,6 @@ class Plant:
     compiled_by: str
     period: float
 
-    def begin(self) -> SampledRun:
-        """The plant at its start."""
-        return SampledRun(batch_of(self.run), self.module)
-
 
 def plant_of(scenario: Scenario, rate: int = wire.RATE) -> Plant:
     """The plant of a scenario with ``rate`` commands a second; a proportional valve gets a vent valve."""
@@ -297,7 +293,7 @@ def run_plant(
     number = random.SystemRandom().randint(0, _LARGEST_RUN) if run is None else run
     before = load_now()
     # Built before the clock starts: arrays and programs take milliseconds.
-    begun = plant.begin()
+    begun = SampledRun(batch_of(plant.run), plant.module)
     with without_collections():
         exchange = Bench(begun, plant.period, port, pace(plant.period), number).run(patience, is_stopped)
     machine = Machine(
