@@ -32,11 +32,6 @@ _RANKED = ("published", "task", "changed", "identified", "fitted", "datasheet", 
 """Of two settings with one effect, such as an area and its discharge coefficient, the better known one is shown."""
 
 
-def lead_channel(channels: Sequence[str]) -> str:
-    """Return the channel of the first panel of a page: a torque that is controlled, else the motion of the vane."""
-    return "torque" if "reference" in channels else "angle"
-
-
 def opening_of(
     scenario: Scenario, module: WasmModule, given: Mapping[str, float], claims: Sequence[str]
 ) -> dict[str, Any]:
@@ -84,7 +79,8 @@ def computed_opening(
     known = [one["name"] for one in module.description["metrics"]]
     named, claims = claims, [name for name in claims if name in known]
     channels = [one["name"] for one in module.description["channels"]]
-    lead = lead_channel(channels)
+    # The first panel shows a torque that is controlled, else the motion of the vane.
+    lead = "torque" if "reference" in channels else "angle"
 
     def runs(columns: Mapping[str, Floats], bands: Sequence[str]) -> Any:
         count = max((len(column) for column in columns.values()), default=1)

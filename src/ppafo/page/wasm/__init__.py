@@ -329,7 +329,7 @@ def program_of(library: Library) -> bytes:
     ).decode()
     prebuilt = prebuilt_programs().get(digest)
     if prebuilt is not None:
-        return _programs().joinpath(prebuilt).read_bytes()
+        return _PROGRAMS.joinpath(prebuilt).read_bytes()
     check_can_build()
     return kept_bytes("wasm", f"{digest} {compiler_version()}", lambda: build(source_of(library)))
 
@@ -429,14 +429,13 @@ def compiler_version() -> str:
     return version("ziglang") if importlib.util.find_spec("ziglang") is not None else ""
 
 
-def _programs() -> Path:
-    return Path(str(files("ppafo.page.wasm").joinpath("programs")))
+_PROGRAMS = files("ppafo.page.wasm").joinpath("programs")
 
 
 @cache
 def prebuilt_programs() -> dict[str, str]:
     """Names of the files of prebuilt programs by the digest of their text."""
-    found: dict[str, str] = json.loads(_programs().joinpath(INDEX).read_text(encoding="utf-8"))["programs"]
+    found: dict[str, str] = json.loads(_PROGRAMS.joinpath(INDEX).read_text(encoding="utf-8"))["programs"]
     return found
 
 
