@@ -276,8 +276,9 @@ def _gauge_texts(item: Scenario, settings: Iterable[Mapping[str, Any]]) -> dict[
         path: link.gap for path, links in item.graph.items() for link in links if link.sources == (ATMOSPHERE_PATH,)
     }
     texts = {}
-    for path in gaps.keys() - following:
-        gap = gaps[path]
+    for path, gap in gaps.items():
+        if path in following:
+            continue
         # As a file may write it: the shortest text that gives the same number.
         written = (
             f"{number!r} {unit}"
