@@ -168,7 +168,7 @@ def add_parameters(parser: argparse.ArgumentParser, command: Command, is_listing
         _add_parameter(parser, parameter, reading, said, command.lists and is_alone, is_listing)
     if command.lists:
         parser.add_argument("--list", action="store_true", help="list what comes with the package")
-    parser.add_argument("--json", action="store_true", help="print one JSON document instead of text")
+    output.add_json_argument(parser)
     if OUT not in names:
         what = "also write the result as files into this folder"
         if command.default_folder:

@@ -1,5 +1,6 @@
 """Delivery of a result: printed as text or JSON, written into a folder whole or not at all, an exit code."""
 
+import argparse
 import contextlib
 import logging
 import os
@@ -21,6 +22,11 @@ if TYPE_CHECKING:
 EXIT_GOOD = 0
 EXIT_CHECK_FAILED = 1
 EXIT_INTERRUPTED = 130
+
+
+def add_json_argument(parser: argparse.ArgumentParser) -> None:
+    """Add ``--json``, which every command takes."""
+    parser.add_argument("--json", action="store_true", help="print one JSON document instead of text")
 
 
 def check_output(out: Path | None, command: str, kept: Mapping[str, bytes] | None = None) -> None:

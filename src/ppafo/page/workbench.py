@@ -10,7 +10,7 @@ from typing import Any
 
 from ppafo.errors import PpafoError, ScenarioError, UnitError
 from ppafo.loading import load_scenario
-from ppafo.page.html import block_of, packed_once, page_of, policy_of_block
+from ppafo.page.html import block_of, packed_once, page_of
 from ppafo.page.opening import computed_opening, first_settings, opening_like, opening_of
 from ppafo.page.still import still_of
 from ppafo.page.wasm import WasmModule, module_of
@@ -365,7 +365,8 @@ def live_part(scenarios: "Sequence[str | Scenario]") -> LivePart | None:
         if isinstance(item, Scenario) and shorter is not None and shorter < item.run.duration:
             part = f"{shorter:g} s of the {item.run.duration:g} s above"
             remark = max(remark, f"It begins with {part}: lengthen run.duration to compare the numbers.")
-    return LivePart(policy_of_block(), block_of(content, modules), remark)
+    html, policy = block_of(content, modules)
+    return LivePart(policy, html, remark)
 
 
 def _content(

@@ -9,7 +9,7 @@ from ppafo.control.catalog import CONTROLLERS, FIXED_POINT
 from ppafo.engine.rows import is_number, leaf_paths, leaves, members, rebuilt
 from ppafo.engine.source_text import SourceCollector, is_row
 from ppafo.errors import ProgramError, ScenarioError
-from ppafo.exports import filled, in_markdown, licence, template
+from ppafo.exports import filled, in_markdown, template
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.plant import plant_parameters
 from ppafo.processor.catalog import target_of
@@ -226,7 +226,7 @@ def firmware(scenario: Scenario, target: str = TARGETS[0]) -> dict[str, bytes]:
     }
     words["wiring"] = filled(template("ppafo.processor", chosen.wiring), words).rstrip()
     texts = {name: filled(template("ppafo.processor", name), words) for name in (*_TEMPLATES, *chosen.templates)}
-    texts["LICENSE"] = licence()
+    texts["LICENSE"] = template("ppafo.exports.c_library", "LICENSE")
     texts["controller.c"] = law_source(fixed.law)
     texts["parameters.h"] = parameters_header(scenario, fixed)
     return {name: text.encode() for name, text in sorted(texts.items())}

@@ -72,7 +72,7 @@ class SimulatedController:
     def update(self, time: float, reference: float, measurement: Any) -> float:
         """Command from -1 to 1, from what the converter shows; the processor needs no time [s], it counts samples."""
         del time
-        found = self.simulator.sample(read(self.converter, reference, measurement))
+        (found,) = self.simulator.samples((read(self.converter, reference, measurement),))
         self.decisions.append(found)
         return found.command / COMMAND_STEPS
 

@@ -78,11 +78,8 @@ class ProcessorSimulator(Protocol):
     def begin(self) -> None:
         """Reset the processor, and let it come to where it waits for a sample."""
 
-    def sample(self, readings: Iterable[int]) -> Decision:
-        """What the processor decides for the readings of one sample."""
-
     def samples(self, every: Sequence[Iterable[int]]) -> list[Decision]:
-        """What it decides for some samples in turn, at most 50: asked at once where the simulator takes that."""
+        """What the processor decides for some samples in turn, at most 50, asked at once where the simulator can."""
 
     def stack(self) -> int:
         """How deep the stack has been [bytes]."""
@@ -307,10 +304,6 @@ class MspdebugSimulator:
         self._say(f"reset\nrun\n{_SAID_OUTPUTS}")
         self._answer()
 
-    def sample(self, readings: Iterable[int]) -> Decision:
-        """What the processor decides for the readings of one sample."""
-        return self.samples((readings,))[0]
-
     def samples(self, every: Sequence[Iterable[int]]) -> list[Decision]:
         """What it decides for some samples in turn, at most 50: asked at once, so that neither waits for the other."""
         asked = []
@@ -445,19 +438,17 @@ class QemuSimulator:
 
     def samples(self, every: Sequence[Iterable[int]]) -> list[Decision]:
         """What it decides for some samples, one after the other."""
-        return [self.sample(readings) for readings in every]
-
-    def sample(self, readings: Iterable[int]) -> Decision:
-        """What the processor decides for the readings of one sample."""
-        self.debugger.write(self._readings, b"".join(number.to_bytes(2, "little") for number in readings))
-        # Behind the breakpoint, or the machine would stop at once.
-        self.debugger.go_on(self._stop + _LENGTH_OF_NOP)
-        command, is_sound, begun, ended = _FORM_OF_OUTPUTS.unpack(
-            self.debugger.read(self._outputs, _FORM_OF_OUTPUTS.size)
-        )
-        # The counter counts down, and begins anew at 2^24.
-        ticks = (begun - ended) % 2**_COUNTER_BITS
-        return Decision(command, is_sound, round(ticks / self._ticks))
+        decisions = []
+        for readings in every:
+            self.debugger.write(self._readings, b"".join(number.to_bytes(2, "little") for number in readings))
+            # Behind the breakpoint, or the machine would stop at once.
+            self.debugger.go_on(self._stop + _LENGTH_OF_NOP)
+            outputs = self.debugger.read(self._outputs, _FORM_OF_OUTPUTS.size)
+            command, is_sound, begun, ended = _FORM_OF_OUTPUTS.unpack(outputs)
+            # The counter counts down, and begins anew at 2^24.
+            ticks = (begun - ended) % 2**_COUNTER_BITS
+            decisions.append(Decision(command, is_sound, round(ticks / self._ticks)))
+        return decisions
 
     def stack(self) -> int:
         """How deep the stack has been [bytes]: what it has written of the RAM that was filled before."""

@@ -12,9 +12,7 @@ from typing import TYPE_CHECKING
 from ppafo.engine.lane_source import SAME_MOMENT
 from ppafo.engine.lanes import SIGNAL_ROWS
 from ppafo.engine.run import NEVER_FAILED
-from ppafo.engine.source_text import Collector
-from ppafo.exports import filled, in_comment, in_markdown, licence, template
-from ppafo.exports.c_library.boundary import Boundary
+from ppafo.exports import filled, in_comment, in_markdown, template
 from ppafo.exports.c_library.program import ExportedProgram, Further, c_text_of_run
 from ppafo.kinds import kind_at
 from ppafo.metrics import METRICS
@@ -183,18 +181,14 @@ def library_files(library: Library) -> dict[str, bytes]:
     surface = library.surface
     sources = {surface.header: f"{name}.h", surface.main: "main.c", surface.page: "README.md", **_FILES}
     texts = {target: filled(template(_FOLDER, source), words) for source, target in sources.items()}
-    texts["LICENSE"] = licence()
+    texts["LICENSE"] = template(_FOLDER, "LICENSE")
     head = f'#include "{name}.h"\n\n#include <string.h>\n\n'
     title = f"{library.title}: the functions of ppafo {__version__} that a run is made of. Not to be edited."
-    written = [add for add in (library.further, library.following) if add is not None]
-
-    def further(collector: Collector, boundary: Boundary) -> str:
-        return "\n\n".join(add(collector, boundary) for add in written)
-
+    further = [add for add in (library.further, library.following) if add is not None]
     settings = [item.name for item in library.settings]
     # The interface is written around the functions, whose names must not hide its own.
     interface = "".join(filled(template(_FOLDER, file), words) for file in ("interface.c", surface.source))
-    functions = c_text_of_run(program, title, name, settings, further if written else None, interface)
+    functions = c_text_of_run(program, title, name, settings, further, interface)
     texts[f"{name}.c"] = f"{head}{functions}\n{interface}"
     return {file: text.encode() for file, text in sorted(texts.items())}
 

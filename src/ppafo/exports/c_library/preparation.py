@@ -176,10 +176,11 @@ class Writing:
         cells = dict(zip(leaf_paths(type(row), path), map(_text, leaves(row)), strict=True))
         return row_expression(type(row), path, cells, self.add)
 
-    def kind(self, name: str, kind: Any, given: Iterable[str]) -> str:
-        """Parameters of a controller or profile, of numbers in the order of its quantities."""
-        cells = dict(zip(leaf_paths(kind.parameters, name), given, strict=True))
-        return row_expression(kind.parameters, name, cells, self.add)
+    def kind(self, section: str, kind: Any, given: Mapping[str, str] | None = None) -> str:
+        """Parameters of a controller or profile: the settings of a section, some of them ``given`` in other words."""
+        numbers = self.section(section, [item.name for item in kind.quantities]) | dict(given or {})
+        cells = dict(zip(leaf_paths(kind.parameters, section), numbers.values(), strict=True))
+        return row_expression(kind.parameters, section, cells, self.add)
 
     def plant(self, name: str, torque: str) -> Iterator[str]:
         """Lines that make the device and its plant under a name, with an external torque."""
@@ -368,49 +369,59 @@ def declared_settings(scenario: Scenario) -> dict[str, Quantity]:
 def preparation_of(scenario: Scenario, program: Program, collector: Collector, boundary: Boundary) -> str:
     """The composed function ``prepare`` of a scenario, once everything it calls is gathered."""
     writing = Writing(scenario.device, scenario.supply_lines, program, collector)
-    leg = scenario.motion.leg if isinstance(scenario.motion, FreeMotion) else None
+    return writing.text(settings_of(scenario), _lines(scenario, writing), boundary)
+
+
+def _lines(scenario: Scenario, writing: Writing) -> Iterator[str]:
+    """Lines from settings to the numbers of a run; each needs names that lines before it have made."""
+    program, add, motion = writing.program, writing.add, scenario.motion
+    leg = motion.leg if isinstance(motion, FreeMotion) else None
     free = "motion_external_torque" if leg is None else "-motion_ankle_torque"
-    torque = free if isinstance(scenario.motion, FreeMotion) else "0.0"
-    lines = [
-        *writing.plant("plant", torque),
-        *([] if leg is None else _leg(leg, writing)),
-        *_steps(scenario, writing),
-        *_followed(scenario, writing),
-        *writing.gas(),
-        *_start(scenario, writing),
-    ]
-    return writing.text(settings_of(scenario), lines, boundary)
+    yield from writing.plant("plant", free if isinstance(motion, FreeMotion) else "0.0")
+    if leg is not None:
+        yield from _leg(leg, writing)
 
-
-def _steps(scenario: Scenario, writing: Writing) -> Iterator[str]:
-    """Lines that make the steps, delays in them, and whether the error decides about their parts."""
+    # Steps, delays in them, and whether the error decides about their parts.
     given = "run_duration, run_step, run_output_interval, controller_period"
-    yield f"counts_of_steps = {writing.add(step_counts)}({given})"
-    yield f"tolerance = {writing.add(relative_tolerance)}(run_tolerance)"
+    yield f"counts_of_steps = {add(step_counts)}({given})"
+    yield f"tolerance = {add(relative_tolerance)}(run_tolerance)"
     yield from writing.timing("sensors_delay", "tolerance")
-    if scenario.supply_lines is not None or not writing.program.is_locked or writing.program.has_shape:
+    level = c_identifier(path_of_locked_angle(scenario) or LOCKED_ANGLE)
+    if scenario.supply_lines is not None or not program.is_locked or program.has_shape:
         yield "needs_parts = True"
-        return
-    stiffness = "1.0" if scenario.gas_model is None else "gas_heat_capacity_ratio"
-    angle = c_identifier(path_of_locked_angle(scenario) or LOCKED_ANGLE)
-    shortened = f"step / {writing.add(smaller)}(1.0, tolerance)"
-    yield f"needs_parts = not {writing.add(is_slow_locked)}(plant, {shortened}, {angle}, {stiffness})"
+    else:
+        stiffness = "1.0" if scenario.gas_model is None else "gas_heat_capacity_ratio"
+        shortened = f"step / {add(smaller)}(1.0, tolerance)"
+        yield f"needs_parts = not {add(is_slow_locked)}(plant, {shortened}, {level}, {stiffness})"
 
-
-def _followed(scenario: Scenario, writing: Writing) -> Iterator[str]:
-    """Lines that make the parameters of the controller, of the reference and of a prescribed angle."""
-    program = writing.program
+    # Controller, reference, prescribed angle and gas.
     if program.controller is not None:
-        yield f"controller = {_kind(writing, 'controller', CONTROLLERS[scenario.controller.kind])}"
+        yield f"controller = {writing.kind('controller', CONTROLLERS[scenario.controller.kind])}"
     profile, settings = PROFILES[scenario.reference.kind], scenario.reference.settings
-    # Where none is followed, the one that stands in its place is written out.
+    # Where no reference is followed, the one that stands in its place is written out.
     known = {} if program.has_reference else {item.name: repr(settings[item.name]) for item in profile.quantities}
-    yield f"reference = {_kind(writing, 'reference', profile, known)}"
+    yield f"reference = {writing.kind('reference', profile, known)}"
     if program.angle is RECORDED_ANGLE:
-        yield f"path = {writing.add(Segment)}(0.0, motion_angle, 0.0)"
-    elif isinstance(scenario.motion, PrescribedMotion):
-        held = {"level": c_identifier(path_of_locked_angle(scenario) or LOCKED_ANGLE)} if program.is_locked else {}
-        yield f"path = {_kind(writing, 'motion.profile', PROFILES[scenario.motion.profile.kind], held)}"
+        yield f"path = {add(Segment)}(0.0, motion_angle, 0.0)"
+    elif isinstance(motion, PrescribedMotion):
+        held = {"level": level} if program.is_locked else {}
+        yield f"path = {writing.kind('motion.profile', PROFILES[motion.profile.kind], held)}"
+    yield from writing.gas()
+
+    # The states at the start.
+    moved = "motion_angle", "motion_angular_velocity"
+    if isinstance(motion, PrescribedMotion):
+        moved = "angle", "angular_velocity"
+        assert program.angle is not None, "the angle is prescribed"
+        yield f"angle, angular_velocity, _ = {add(program.angle.value)}(path, 0.0)"
+    pressures = "initial_pressure_1, initial_pressure_2"
+    if program.has_shape:
+        yield f"filled = {add(program.actuator.chambers)}(plant, {moved[0]}, {pressures})"
+        volumes = "filled.volume_1, filled.volume_2"
+        yield f"state = {add(state_with_volumes)}(plant, {', '.join(moved)}, {volumes}, {pressures})"
+    else:
+        yield f"state = {add(state_at_start)}(plant, {', '.join(moved)}, {pressures})"
+    yield from writing.start()
 
 
 def _leg(leg: Leg, writing: Writing) -> Iterator[str]:
@@ -419,34 +430,9 @@ def _leg(leg: Leg, writing: Writing) -> Iterator[str]:
     foot = writing.section("motion", ["foot_mass", "foot_mass_centre", "foot_inertia", "shank_length"])
     yield f"load = {add(foot_load)}(plant.inertia, plant.gravity_torque, {', '.join(foot.values())})"
     yield f"plant = {add(with_load)}(plant, load)"
-    kind = shank_kind(leg)
     if leg.curves is None:
-        yield f"shank = {_kind(writing, 'motion.shank', kind)}"
+        yield f"shank = {writing.kind('motion.shank', shank_kind(leg))}"
         return
     constant = dict(zip(leaf_paths(ShankSeries, "shank"), map(repr, numbers(leg.curves)), strict=True))
     cells = constant | {"shank.start": c_identifier("motion.shank.start"), "shank.toe_lever": "motion_toe_lever"}
     yield f"shank = {row_expression(ShankSeries, 'shank', cells, add)}"
-
-
-def _kind(writing: Writing, section: str, kind: Any, given: Mapping[str, str] | None = None) -> str:
-    """Parameters of a controller or profile from its settings."""
-    names = writing.section(section, [item.name for item in kind.quantities]) | dict(given or {})
-    return writing.kind(section, kind, names.values())
-
-
-def _start(scenario: Scenario, writing: Writing) -> Iterator[str]:
-    """Lines that make the states at the start."""
-    program, add = writing.program, writing.add
-    moved = "motion_angle", "motion_angular_velocity"
-    if isinstance(scenario.motion, PrescribedMotion):
-        moved = "angle", "angular_velocity"
-        assert program.angle is not None, "the angle is prescribed"
-        yield f"angle, angular_velocity, _ = {add(program.angle.value)}(path, 0.0)"
-    given = "initial_pressure_1, initial_pressure_2"
-    if program.has_shape:
-        yield f"filled = {add(program.actuator.chambers)}(plant, {moved[0]}, {given})"
-        volumes = "filled.volume_1, filled.volume_2"
-        yield f"state = {add(state_with_volumes)}(plant, {', '.join(moved)}, {volumes}, {given})"
-    else:
-        yield f"state = {add(state_at_start)}(plant, {', '.join(moved)}, {given})"
-    yield from writing.start()

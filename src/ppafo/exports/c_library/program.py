@@ -163,13 +163,13 @@ def c_text_of_run(
     title: str,
     name: str,
     settings: Sequence[str],
-    further: Further | None,
+    further: Sequence[Further],
     around: str,
 ) -> str:
     """All functions of an exported program in C for people: of a single run, without lanes, between structs.
 
     ``name`` begins the names of the structs of settings and metrics, which the file ``around`` it declares; ``further``
-    may add a function that takes ``settings``.
+    may add functions that take ``settings``.
     """
     from ppafo.translation.c99 import Reading, c_source, documents_of, is_free
     from ppafo.translation.walk import walk_module
@@ -178,7 +178,7 @@ def c_text_of_run(
     program, structs = item.program, Structs()
     link_program(program, collector)
     entries = [metrics_entry(item, collector, structs)] if item.metrics else []
-    entries += [] if further is None else [further(collector, structs)]
+    entries += [add(collector, structs) for add in further]
     loop = run_loop(item.loops[WHOLE], collector, f"{name}_outputs", item.loops.get(IN_PARTS))
     composed = "\n\n".join([HEADER, collector.text(), loop, *entries, ""])
     states = struct_of("run_states", program.state_rows(), collector.add)

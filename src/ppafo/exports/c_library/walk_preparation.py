@@ -198,7 +198,7 @@ def _lines(configuration: Scenario, writing: Writing) -> Iterator[str]:
     yield from writing.timing("signal_delay")
 
     # Controller, gas and course.
-    settings = map(c_identifier, _control(configuration))
+    settings = {item.name: c_identifier(path) for path, item in _control(configuration).items()}
     yield f"controller = {writing.kind('controller', law_of(configuration), settings)}"
     yield f"reference = {writing.constant(profile_parameters(NO_REFERENCE), 'reference')}"
     yield from writing.gas()

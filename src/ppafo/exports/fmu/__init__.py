@@ -19,7 +19,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from ppafo.errors import ProgramError, ScenarioError, nearest_name
-from ppafo.exports import filled, licence, template
+from ppafo.exports import filled, template
 from ppafo.exports.c_library import library_of
 from ppafo.exports.c_library.files import library_files
 from ppafo.exports.c_library.plant import follow_lines, plant_of, surfaced
@@ -164,7 +164,7 @@ def functional_unit(interface: Interface, fmi: int, platforms: Sequence[str]) ->
     contents = {
         "modelDescription.xml": _DESCRIBED[fmi](interface, identifier, token),
         "documentation/index.html": filled(template("ppafo.exports.fmu", "index.html"), words).encode(),
-        "documentation/licenses/license.txt": licence().encode(),
+        "documentation/licenses/license.txt": template("ppafo.exports.c_library", "LICENSE").encode(),
         **{f"sources/{name}": content for name, content in sources.items()},
     }
     if fmi == 3:
