@@ -195,7 +195,7 @@ def c_text_of_run(
     }
     documents = documents_of(collector) | _DOCUMENTS
     # A short name is taken only where it is unambiguous and C leaves it free; all others keep their module's path.
-    own = {name: name_of(item) for name, item in collector.owners.items()}
+    own = {name: re.sub(r"\W", "_", item.__qualname__).strip("_") for name, item in collector.owners.items()}
     counts, taken = Counter(own.values()), _names_around()
     short = {name: word for name, word in own.items() if counts[word] == 1 and word not in taken and is_free(word)}
     return c_source(
@@ -240,11 +240,6 @@ def _names_around() -> frozenset[str]:
 
 
 _FUNCTION = re.compile(r"^(?:static )?[\w ]+\b\*?(\w+)\(", re.MULTILINE)
-
-
-def name_of(item: Any) -> str:
-    """The name of a function or row of Python as one of C."""
-    return re.sub(r"\W", "_", str(item.__qualname__)).strip("_")
 
 
 def c_text(item: ExportedProgram, title: str, settings: Sequence[str], further: Further | None, together: int) -> str:

@@ -96,33 +96,25 @@ def check_can_leave(configuration: Scenario) -> None:
 
 def settings_of_walk(configuration: Scenario) -> tuple[Setting, ...]:
     """Every number of a walk in SI units, under the path that overrides know it by."""
-    return tuple(
-        Setting(c_identifier(path), path, replace(item, summary=SAID.get(path, item.summary)), value)
-        for path, (item, value) in _numbers(configuration).items()
-    )
-
-
-def _numbers(configuration: Scenario) -> dict[str, tuple[Quantity, float]]:
-    """Declaration and value of every number of a walk, by path."""
-    duration = configuration.run.duration
-    of_run = {
-        "run.duration": duration,
-        "run.step": configuration.run.step,
-        "run.output_interval": walk_of(configuration).who.interval(duration),
-    }
-    times, control = of_run | {"controller.period": configuration.controller.period}, _control(configuration)
-    who = walk_of(configuration).who
+    run, who, control = configuration.run, walk_of(configuration).who, _control(configuration)
+    of_run = {"run.duration": run.duration, "run.step": run.step, "run.output_interval": who.interval(run.duration)}
+    times = of_run | {"controller.period": configuration.controller.period}
     declared = declared_settings(configuration) | control | {f"run.{item.name}": item for item in (*RUN, who.step)}
     # What fails of the plant, with its shut-off valve, is written out in the source; persons are drawn in Python.
     fixed = ("shut_off.", *(f"faults.{part}." for part in walk_of(configuration).broken), f"wearer.{PERSON.name}")
     # The structures of libraries have the times behind the device.
     wearer = (f"wearer.{item.name}" for item in who.numbers)
     paths = dict.fromkeys((*device_numbers(configuration.device), *of_run, *wearer, *times, *control, *declared))
-    return {
-        path: (declared[path], times[path] if path in times else number_at(configuration, path))
+    return tuple(
+        Setting(
+            c_identifier(path),
+            path,
+            replace(declared[path], summary=SAID.get(path, declared[path].summary)),
+            times[path] if path in times else number_at(configuration, path),
+        )
         for path in paths
         if path in declared and not path.startswith(fixed)
-    }
+    )
 
 
 def _control(configuration: Scenario) -> dict[str, Quantity]:
@@ -135,11 +127,11 @@ def _control(configuration: Scenario) -> dict[str, Quantity]:
 
 def links_of_walk(configuration: Scenario) -> Graph:
     """Settings of a walk that follow others as long as nobody changes them."""
-    known = _numbers(configuration)
+    known = {item.path: item.value for item in settings_of_walk(configuration)}
     recorded = {"run.output_interval": (Follows((Term(("run.duration",), walk_of(configuration).who.interval),)),)}
     # A plant alone has no settings of the controller that its walk had.
     links = {path: links for path, links in {**configuration.graph, **recorded}.items() if path in known}
-    return holding(links, lambda path: known[path][1])
+    return holding(links, known.__getitem__)
 
 
 def relations_of_walk(configuration: Scenario) -> tuple[Relation, ...]:
@@ -148,7 +140,7 @@ def relations_of_walk(configuration: Scenario) -> tuple[Relation, ...]:
     if configuration.supply_lines is not None:
         rules.append(("supply.dorsiflexion_pressure", "at most", "supply.pressure"))
     rules += _RELATIONS
-    known = _numbers(configuration)
+    known = {item.path for item in settings_of_walk(configuration)}
     return tuple(
         Relation(c_identifier(path), relation, c_identifier(other))
         for path, relation, other in rules
