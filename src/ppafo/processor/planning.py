@@ -15,24 +15,19 @@ Settings = Mapping[str, float]
 _ROUNDING = 1.0e-9
 
 
-def holds_all(settings: Settings, period: float, torque_step: float) -> float:
-    """0: a law without numbers of its own can hold all settings."""
-    return 0.0
-
-
 @dataclass(frozen=True, slots=True)
 class Numbers:
     """The plan of an integer law, of which ``ControllerKind`` says what it is given and what it makes.
 
     ``prepare(settings, period, torque_step)`` makes the numbers after the converter's, for one run, ``quantities``
     declare all of them in order. ``largest`` is the largest part of its range that any number takes, above 1 where the
-    settings cannot be held.
+    settings cannot be held. A law without numbers of its own has neither.
     """
 
     name: str
     quantities: tuple[Quantity, ...]
-    prepare: Callable[[Settings, float, float], tuple[float, ...]]
-    largest: Callable[[Settings, float, float], float] = holds_all
+    prepare: Callable[[Settings, float, float], tuple[float, ...]] | None = None
+    largest: Callable[[Settings, float, float], float] | None = None
 
     def __call__(
         self, settings: Mapping[str, Any], period: Any, torque_constant: Any, reference: tuple[Any, Any]
@@ -42,16 +37,13 @@ class Numbers:
         converter: Converter = over_runs(converter_of, bits, pressure_range, torque_constant)
         names = tuple(settings)
 
-        def prepared(period: float, torque_step: float, *values: float) -> tuple[float, ...]:
-            return self.prepare(dict(zip(names, values, strict=True)), period, torque_step)
+        def own_numbers(period: float, torque_step: float, *values: float) -> tuple[float, ...]:
+            of_run = dict(zip(names, values, strict=True))
+            size = 0.0 if self.largest is None else self.largest(of_run, period, torque_step)
+            return size, *(() if self.prepare is None else self.prepare(of_run, period, torque_step))
 
-        def largest(period: float, torque_step: float, *values: float) -> float:
-            return self.largest(dict(zip(names, values, strict=True)), period, torque_step)
-
-        given = (period, converter.torque_step, *settings.values())
-        every = (*converter, *over_runs(prepared, *given))
-        numbers = dict(zip((item.name for item in self.quantities), every, strict=True))
-        size = over_runs(largest, *given)
+        size, *own = over_runs(own_numbers, period, converter.torque_step, *settings.values())
+        numbers = dict(zip((item.name for item in self.quantities), (*converter, *own), strict=True))
         broken = np.asarray(bits % 1.0 != 0.0)
         whole: Problem = (broken, lambda run: f"controller.converter_bits = {at(bits, run):g}: must be whole")
         return numbers, (whole, _too_large(size, self.name), _reference(reference, converter))

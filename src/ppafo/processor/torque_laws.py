@@ -142,11 +142,6 @@ def dead_zone_update(
     return float(command) / COMMAND_STEPS, each(float, after)
 
 
-def prepare_on_off(settings: Mapping[str, float], period: float, torque_step: float) -> tuple[float, ...]:
-    """The law has no numbers but the converter's."""
-    return ()
-
-
 def prepare_dead_zone(settings: Mapping[str, float], period: float, torque_step: float) -> tuple[float, ...]:
     """Numbers of ``DeadZoneNumbers`` after the limits, for settings in SI units and a torque per count [N m]."""
     # A release beyond the dead zone would close the valve before it opens.
@@ -172,7 +167,7 @@ ON_OFF_FIXED_POINT = fixed_point_kind(
     OnOffRows,
     each(float, OnOffCounts(1)),
     on_off_update,
-    Numbers("on_off_fixed_point", (*OF_STEPS, *OF_LIMITS), prepare_on_off),
+    Numbers("on_off_fixed_point", (*OF_STEPS, *OF_LIMITS)),
 )
 ON_OFF = FixedLaw(
     kind=ON_OFF_FIXED_POINT,
