@@ -168,11 +168,12 @@ def add_parameters(parser: argparse.ArgumentParser, command: Command, is_listing
         _add_parameter(parser, parameter, reading, said, command.lists and is_alone, is_listing)
     if command.lists:
         parser.add_argument("--list", action="store_true", help="list what comes with the package")
-    if OUT in names:
-        output.add_json_argument(parser)
-    else:
-        default = "one in out/ named after what ran" if command.default_folder else ""
-        output.add_output_arguments(parser, default)
+    output.add_json_argument(parser)
+    if OUT not in names:
+        what = "also write the result as files into this folder"
+        if command.default_folder:
+            what = "the result folder; default one in out/ named after what ran"
+        parser.add_argument("--out", metavar="DIR", type=Path, help=what)
 
 
 def _add_parameter(
@@ -295,7 +296,8 @@ class CommandParser(argparse.ArgumentParser):
 
     def exit(self, status: int = 0, message: str | None = None) -> NoReturn:
         """End the process after ``--help`` or ``--version``, once their text has really been written."""
-        output.flush_output()
+        with output.printing():
+            print(end="", flush=True)
         super().exit(status, message)
 
     def options(self) -> set[str]:

@@ -109,7 +109,10 @@ def _run(words: list[str]) -> int:
             if not word.isascii() and any("\ud800" <= character <= "\udfff" for character in word):
                 raise UsageError(f"'{one_line(word)}' is not text in UTF-8; give the file or folder another name")
         if words[:1] == ["--completion"]:  # its shell is a word that is no command
-            return _complete(words[1:])
+            if len(words) != 2 or words[1] not in SHELLS:
+                raise UsageError(f"--completion {' '.join(words[1:])}: must be {' or '.join(SHELLS)}")
+            print(completion_script(words[1]))
+            return 0
         check_words(words)
         parser = build_parser(words)
         # Before argparse, which would complain of what is missing first.
@@ -130,13 +133,6 @@ def _run(words: list[str]) -> int:
     except KeyboardInterrupt as interrupt:
         print(f"ppafo: {str(interrupt) or 'interrupted; nothing is half written'}", file=sys.stderr)
         return EXIT_INTERRUPTED
-
-
-def _complete(words: list[str]) -> int:
-    if len(words) != 1 or words[0] not in SHELLS:
-        raise UsageError(f"--completion {' '.join(words)}: must be {' or '.join(SHELLS)}")
-    print(completion_script(words[0]))
-    return 0
 
 
 def _readable(message: str) -> str:

@@ -24,15 +24,8 @@ EXIT_CHECK_FAILED = 1
 EXIT_INTERRUPTED = 130
 
 
-def add_output_arguments(parser: argparse.ArgumentParser, default: str = "") -> None:
-    """Add ``--json`` and ``--out``, which every command takes; ``default`` is where it writes without ``--out``."""
-    add_json_argument(parser)
-    what = f"the result folder; default {default}" if default else "also write the result as files into this folder"
-    parser.add_argument("--out", metavar="DIR", type=Path, help=what)
-
-
 def add_json_argument(parser: argparse.ArgumentParser) -> None:
-    """Add ``--json``, for a command whose ``--out`` is another one."""
+    """Add ``--json``, which every command takes."""
     parser.add_argument("--json", action="store_true", help="print one JSON document instead of text")
 
 
@@ -132,12 +125,6 @@ def print_result(text: str, document: Mapping[str, Any], as_json: bool) -> None:
         shown = json_text(document) if as_json else text
         encoding = sys.stdout.encoding or "utf-8"
         print(shown.encode(encoding, "backslashreplace").decode(encoding), flush=True)
-
-
-def flush_output() -> None:
-    """Write what was printed so far, such as a help text, with the same errors as ``print_result``."""
-    with printing():
-        print(end="", flush=True)
 
 
 @contextlib.contextmanager

@@ -31,8 +31,3 @@ def in_markdown(text: str) -> str:
 def in_comment(text: str) -> str:
     """What a scenario says, for a comment in C: one line that neither ends the comment nor begins another."""
     return one_line(text).replace("*/", "* /").replace("/*", "/ *")
-
-
-def licence() -> str:
-    """The licence of what is exported."""
-    return template("ppafo.exports.c_library", "LICENSE")

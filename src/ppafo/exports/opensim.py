@@ -63,32 +63,23 @@ def files_of_recording(path: Path, side: Side, body_mass: float | None) -> tuple
     return {"recording.sto": opensim_bytes(recording)}, list(missing)
 
 
-def coordinate_of(side: Side) -> str:
-    """Return the name that models of OpenSim give the ankle of a side."""
-    return f"ankle_angle_{side[0]}"
-
-
 def device_torque(result: WalkResult, side: Side = "right", strikes: Sequence[float] = ()) -> Recording:
     """Return what the device adds along OpenSim's ankle [N m], above 0 in dorsiflexion, as ``opensim_files`` has it."""
-    name = f"{coordinate_of(side)}_device"
-    recording = result.recording
     if result.status.time is not None:
         raise ScenarioError(f"{result.scenario.name}: {result.status.message}")
-    if not strikes:
-        return Recording(name, recording.time, {name: _reversed(recording["external_torque"])}, "simulated")
-    check_strikes(strikes)
-    if "external_torque" not in result.averages:
-        raise ScenarioError(f"{result.scenario.name}: has no whole stride with help to lay on heel strikes")
-    mean = result.averages["external_torque"].mean
-    parts = [first + PHASES[:-1] * (last - first) for first, last in pairwise(strikes)]
-    time = np.append(np.concatenate(parts), strikes[-1])
-    values = np.append(np.tile(mean[:-1], len(parts)), mean[0])
-    return Recording(name, time, {name: _reversed(values)}, "simulated")
-
-
-def _reversed(torque: "np.ndarray") -> Channel:
-    """Return a torque [N m] above 0 in plantarflexion as one above 0 in dorsiflexion; no zero gets a minus."""
-    return Channel(0.0 - torque, "N m")
+    time, torque = result.recording.time, result.recording["external_torque"]
+    if strikes:
+        check_strikes(strikes)
+        if "external_torque" not in result.averages:
+            raise ScenarioError(f"{result.scenario.name}: has no whole stride with help to lay on heel strikes")
+        mean = result.averages["external_torque"].mean
+        parts = [first + PHASES[:-1] * (last - first) for first, last in pairwise(strikes)]
+        time = np.append(np.concatenate(parts), strikes[-1])
+        torque = np.append(np.tile(mean[:-1], len(parts)), mean[0])
+    # Models of OpenSim call the ankle of a side so.
+    name = f"ankle_angle_{side[0]}_device"
+    # A difference: with a sign alone a zero would get a minus.
+    return Recording(name, time, {name: Channel(0.0 - torque, "N m")}, "simulated")
 
 
 def check_strikes(strikes: Sequence[float]) -> None:

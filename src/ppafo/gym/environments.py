@@ -14,12 +14,13 @@ from ppafo.engine.lanes import Floats
 from ppafo.errors import ScenarioError, SimulationError, nearest_name
 from ppafo.gym.episodes import (
     Environments,
-    Episodes,
     Flags,
     Judging,
     Places,
     Ranges,
+    ScenarioEpisodes,
     Seen,
+    WalkEpisodes,
     scenario_episodes,
     walk_episodes,
 )
@@ -110,7 +111,7 @@ class World:
         file, flaws = (usual, flaws) if scenario is None else (scenario, ())
         words = over(flaws, overrides, ScenarioError)
         varied = VARIED.get(task, {}) if vary is None and scenario is None else vary or {}
-        self.episodes: Episodes
+        self.episodes: ScenarioEpisodes | WalkEpisodes
         if self.task.walks:
             if varied:
                 raise ScenarioError(f"vary: {', '.join(varied)}: a walk draws wearers and gaits, and no numbers")
@@ -123,7 +124,7 @@ class World:
             chosen = load_scenario(file, words)
             chosen.device.check_vane("an environment")
             self.episodes = scenario_episodes(chosen, randomise, varied, targets)
-        bounds = observed_bounds(self.task, self.episodes.device)
+        bounds = observed_bounds(self.task, self.episodes.base.device)
         self.judging = Judging(
             error_weight=self.task.error_weight if error_weight is None else error_weight,
             gas_weight=self.task.gas_weight if gas_weight is None else gas_weight,

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Protocol, final
+from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +41,6 @@ from ppafo.gym.tasks import (
 from ppafo.model.plant import actuator_torque
 from ppafo.model.sensors import Measurement
 from ppafo.parameters import load_parameter_set
-from ppafo.parameters.device import Device
 from ppafo.parameters.graph import ATMOSPHERE_PATH, gauge_link
 from ppafo.parameters.parameter_set import atmospheric_pressure, entry_in_si
 from ppafo.simulation.ensemble.planning import plan_ensemble
@@ -138,6 +137,10 @@ def _observed(rows: LaneRows, task: Task) -> list[str]:
     reference = add(program.reference.value)
     view, error, kept = (f"{add(function)}({given})" for function, given in (task.observed, task.error, task.kept))
     observation = "observations[first + lane, {0}] = {1}({2}, bounds[0, {0}], bounds[1, {0}])"
+    # Late signals of an episode begin with the readings at its start.
+    stored = [f"signal_history[{row}, slot, lane] = {name}" for row, name in enumerate(SIGNALS)]
+    filled = ["for slot in range(signal_history.shape[1]):", *indent(stored)]
+    at_start = ["if step_index == 0:", *indent([*current_readings(rows), *filled])] if program.late_signals else []
     pressures = f"true_1, true_2 = {pressures_of(rows, 'state')}"
     weights = "error_weight, gas_weight, timing.period"
     return [
@@ -149,7 +152,7 @@ def _observed(rows: LaneRows, task: Task) -> list[str]:
         "sample_index = step_index // steps_per_sample",
         "time = step_index * timing.step",
         *held,
-        *_signals_at_start(rows),
+        *at_start,
         *(sense_gait(rows) if program.walks else sense(rows)),
         f"wanted, wanted_rate, _ = {reference}(reference, time)",
         f"requested = {add(Requested)}(wanted, wanted_rate)",
@@ -167,15 +170,6 @@ def _observed(rows: LaneRows, task: Task) -> list[str]:
         f"outcomes[{FAILED}, first + lane] = 1.0 if result.failure_time <= time else 0.0",
         f"outcomes[{THROUGH}, first + lane] = 1.0 if step_index >= steps_in_all else 0.0",
     ]
-
-
-def _signals_at_start(rows: LaneRows) -> list[str]:
-    """Lines that fill the late signals of an episode that begins with the readings at its start."""
-    if not rows.program.late_signals:
-        return []
-    stored = [f"signal_history[{row}, slot, lane] = {name}" for row, name in enumerate(SIGNALS)]
-    filled = ["for slot in range(signal_history.shape[1]):", *indent(stored)]
-    return ["if step_index == 0:", *indent([*current_readings(rows), *filled])]
 
 
 @dataclass(frozen=True, slots=True)
@@ -246,7 +240,8 @@ class Environments:
         self._parameters = np.zeros((blocks, len(parameter_rows), width))
         self._commands = np.zeros((blocks, clock.command_delay + 2, width))
         self._own = np.zeros((blocks, len(OWN_PATHS), width))
-        self._actions = np.zeros((count, 1 + task.walks))
+        # Where the next actions are written (environments, 1 or 2).
+        self.actions = np.zeros((count, 1 + task.walks))
         self._chosen = np.zeros(count)
         self._observations = np.zeros((count, len(task.observed_paths)))
         self._outcomes = np.zeros((OUTCOMES, count))
@@ -260,17 +255,12 @@ class Environments:
             np.empty((0, len(state_rows), width)),
             np.empty((0, 0, width)),
             self._own.reshape(-1, width),
-            self._actions,
+            self.actions,
             np.ascontiguousarray(judging.bounds),
             self._chosen,
             self._observations,
             self._outcomes,
         )
-
-    @property
-    def actions(self) -> Floats:
-        """Where the next actions are written (environments, 1 or 2)."""
-        return self._actions
 
     def begin(self, places: Places, columns: Columns) -> Seen:
         """Begin episodes of some environments at once; what the others show is not to be used."""
@@ -331,28 +321,6 @@ MOST_DRAWS = 100
 _SEED = "sensors.seed"
 
 
-class Episodes(Protocol):
-    """Starts of episodes of one program and clock."""
-
-    @property
-    def program(self) -> Program:
-        """What all episodes are run by."""
-
-    @property
-    def clock(self) -> Clock:
-        """Their clock."""
-
-    @property
-    def device(self) -> Device:
-        """The device before anything is drawn."""
-
-    def draw(self, generators: Generators) -> tuple[Columns, Floats]:
-        """Return an episode for each generator: its columns, and what was drawn of it (numbers, episodes)."""
-
-    def shown(self, drawn: Floats) -> Any:
-        """Return the scenario or walk of what was drawn of one episode (numbers,)."""
-
-
 class FromOutside:
     """Stands for the controller of a scenario whose commands come from an agent."""
 
@@ -380,11 +348,6 @@ class ScenarioEpisodes:
     plain: Columns
     gauge: frozenset[str] = frozenset()
 
-    @property
-    def device(self) -> Device:
-        """The device before anything is drawn."""
-        return self.base.device
-
     def draw(self, generators: Generators) -> tuple[Columns, Floats]:
         """Return an episode for each generator, and what was drawn of each (numbers, episodes) in SI.
 
@@ -398,7 +361,14 @@ class ScenarioEpisodes:
         left, reason = np.arange(count), ""
         for _ in range(MOST_DRAWS):
             for place in left.tolist():
-                values[:, place], columns.goals[0, place] = self._one(generators[place])
+                generator = generators[place]
+                drawn = (generator.uniform(*ends) for ends in self.ranges.values())
+                # A seed is drawn as all numbers are, and has to be whole.
+                values[:, place] = [
+                    float(np.floor(value)) if path == _SEED else value
+                    for path, value in zip(self.ranges, drawn, strict=True)
+                ]
+                columns.goals[0, place] = generator.uniform(*self.targets)
             left, reason = self._plan(columns, values, left)
             if not left.size:
                 return columns, values
@@ -409,15 +379,7 @@ class ScenarioEpisodes:
         given = dict(zip(self.ranges, drawn.tolist(), strict=True))
         return with_numbers(self.base, absolute(self.base, given, self.gauge))
 
-    def _one(self, generator: np.random.Generator) -> tuple[list[float], float]:
-        drawn = [
-            # A seed is drawn as all numbers are, and has to be whole.
-            float(np.floor(generator.uniform(*ends))) if path == _SEED else generator.uniform(*ends)
-            for path, ends in self.ranges.items()
-        ]
-        return drawn, generator.uniform(*self.targets)
-
-    def _plan(self, columns: Columns, values: Floats, left: Any) -> tuple[Any, str]:
+    def _plan(self, columns: Columns, values: Floats, left: Places) -> tuple[Places, str]:
         """Write the columns of some episodes; return the places of those that do not fit, and why one does not."""
         given = dict(zip(self.ranges, values[:, left], strict=True))
         plan = plan_ensemble(check_columns(self.base, given, self.gauge))
@@ -504,17 +466,12 @@ def _repeated(columns: Columns, count: int) -> Columns:
 class WalkEpisodes:
     """Episodes of a walk, ``commanded`` from outside; ``randomise`` draws another wearer with another gait for each."""
 
-    configuration: Scenario
+    base: Scenario
     commanded: Scenario
     program: Program
     clock: Clock
     randomise: bool
     plain: Columns
-
-    @property
-    def device(self) -> Device:
-        """The device, which is not drawn."""
-        return self.configuration.device
 
     def draw(self, generators: Generators) -> tuple[Columns, Floats]:
         """Return an episode for each generator, and no drawn numbers: a wearer is not a list of numbers."""
@@ -524,14 +481,14 @@ class WalkEpisodes:
             seed = float(generator.integers(0, LARGEST_SEED))
             drawn = replace(self.commanded, sensors=replace(self.commanded.sensors, seed=int(seed)))
             build = draw_builds(2, generator)
-            gaits = draw_gaits(walk_of(self.configuration).gait, build.stature, generator)
+            gaits = draw_gaits(walk_of(self.base).gait, build.stature, generator)
             batch = batch_of_many(drawn, build, gaits, generator)
             columns.parameters[:, place], columns.states[:, place] = batch.parameters[:, 1], batch.states[:, 1]
         return columns, np.zeros((0, len(generators)))
 
     def shown(self, drawn: Floats) -> Scenario:  # noqa: ARG002 - a wearer is no list of numbers
         """Return the walk before anything is drawn."""
-        return self.configuration
+        return self.base
 
 
 def walk_episodes(configuration: Scenario, randomise: bool, seconds: float) -> WalkEpisodes:

@@ -25,7 +25,15 @@ def picture(trail: Sequence[tuple[float, float, float]], unit: str, period: floa
         figure = Figure(figsize=SIZE, dpi=RESOLUTION, layout="constrained")
         canvas: Any = FigureCanvasAgg(figure)
         grid: Any = figure.subplot_mosaic([["vane", "angle"], ["vane", "error"]], width_ratios=[1.0, 1.8])
-        _draw_vane(grid["vane"], float(angles[-1]))
+        # Housing, dual vane and shaft; the angle grows in plantarflexion, 90 deg is neutral.
+        vane, angle = grid["vane"], float(angles[-1])
+        turn, along = np.linspace(0.0, 2.0 * np.pi, 121), np.array([-1.0, 1.0])
+        vane.plot(np.cos(turn), np.sin(turn), color=GREY)
+        vane.plot(along * np.cos(angle), along * np.sin(angle), color=BLUE, linewidth=6.0, solid_capstyle="butt")
+        vane.plot(0.15 * np.cos(turn), 0.15 * np.sin(turn), color=GREY)
+        vane.set_aspect("equal")
+        vane.set_axis_off()
+        vane.set_title(f"Vane at {np.degrees(angle):.0f} deg")
         for name, values, label in (
             ("angle", np.degrees(angles), "Angle (deg)"),
             ("error", np.degrees(errors) if unit == "rad" else errors, f"Error ({'deg' if unit == 'rad' else unit})"),
@@ -40,15 +48,3 @@ def picture(trail: Sequence[tuple[float, float, float]], unit: str, period: floa
         canvas.draw()
         # Without transparency, and a copy, since the canvas owns its buffer.
         return np.asarray(canvas.buffer_rgba())[:, :, :3].copy()
-
-
-def _draw_vane(axes: Any, angle: float) -> None:
-    """Draw housing, shaft and dual vane; the angle grows in plantarflexion, 90 deg is neutral."""
-    turn = np.linspace(0.0, 2.0 * np.pi, 121)
-    axes.plot(np.cos(turn), np.sin(turn), color=GREY)
-    along = np.array([-1.0, 1.0])
-    axes.plot(along * np.cos(angle), along * np.sin(angle), color=BLUE, linewidth=6.0, solid_capstyle="butt")
-    axes.plot(0.15 * np.cos(turn), 0.15 * np.sin(turn), color=GREY)
-    axes.set_aspect("equal")
-    axes.set_axis_off()
-    axes.set_title(f"Vane at {np.degrees(angle):.0f} deg")

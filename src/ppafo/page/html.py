@@ -73,17 +73,15 @@ def page_of(title: str, content: Mapping[str, Any], modules: Mapping[str, str], 
     return filled.encode()
 
 
-def block_of(content: Mapping[str, Any], modules: Mapping[str, str]) -> str:
-    """Return a part of a page that has ``policy_of_block`` in its head: place, data, style and script."""
-    place = '<div id="workbench"></div>'
-    style, script = f"<style>{bundled('page.css')}</style>", f"<script>{bundled('loader.js')}</script>"
-    return "\n".join([style, place, data_of(content, modules), script])
+def block_of(content: Mapping[str, Any], modules: Mapping[str, str]) -> tuple[str, str]:
+    """Return a part of a page, place, data, style and script, and the policy that the page has in its head.
 
-
-def policy_of_block() -> str:
-    """Return the policy of a page with a block in it: the one script, nothing fetched, styles of the page's own."""
-    policy = _POLICY.format(script=digest(bundled("loader.js")), style="")
-    return policy.replace("'sha256-'", "'unsafe-inline'")
+    That allows the one script, nothing fetched, and styles of the page's own.
+    """
+    place, script = '<div id="workbench"></div>', bundled("loader.js")
+    style = f"<style>{bundled('page.css')}</style>"
+    policy = _POLICY.format(script=digest(script), style="").replace("'sha256-'", "'unsafe-inline'")
+    return "\n".join([style, place, data_of(content, modules), f"<script>{script}</script>"]), policy
 
 
 def data_of(content: Mapping[str, Any], modules: Mapping[str, str]) -> str:

@@ -32,11 +32,6 @@ _RANKED = ("published", "task", "changed", "identified", "fitted", "datasheet", 
 """Of two settings with one effect, such as an area and its discharge coefficient, the better known one is shown."""
 
 
-def lead_channel(channels: Sequence[str]) -> str:
-    """Return the channel of the first panel of a page: a torque that is controlled, else the motion of the vane."""
-    return "torque" if "reference" in channels else "angle"
-
-
 def opening_of(
     scenario: Scenario, module: WasmModule, given: Mapping[str, float], claims: Sequence[str]
 ) -> dict[str, Any]:
@@ -84,7 +79,8 @@ def computed_opening(
     known = [one["name"] for one in module.description["metrics"]]
     named, claims = claims, [name for name in claims if name in known]
     channels = [one["name"] for one in module.description["channels"]]
-    lead = lead_channel(channels)
+    # The first panel shows a torque that is controlled, else the motion of the vane.
+    lead = "torque" if "reference" in channels else "angle"
 
     def runs(columns: Mapping[str, Floats], bands: Sequence[str]) -> Any:
         count = max((len(column) for column in columns.values()), default=1)
@@ -97,13 +93,16 @@ def computed_opening(
     usual = [float(base.metrics[name][0]) for name in claims]
     course = base.traces[lead][:, 0]
     span = float(np.ptp(course)) if np.isfinite(course).all() else 0.0
-    changes = {}
+    changes, atmosphere = {}, scenario.device.supply.atmospheric_pressure
     for entry in module.description["settings"]:
-        ends = _ends(entry, given, scenario.device.supply.atmospheric_pressure)
-        if entry["key"].startswith(_NATURE) or entry["kept"] == "zero" or ends is None:
+        value = given.get(entry["key"], entry["value"])
+        size = _STEP * abs(value - (atmosphere if entry["unit"] == "Pa_a" else 0.0))
+        low = value - size if entry["minimum"] is None else max(entry["minimum"], value - size)
+        high = value + size if entry["maximum"] is None else min(entry["maximum"], value + size)
+        if entry["key"].startswith(_NATURE) or entry["kept"] == "zero" or not low < high:
             continue
         try:
-            found = runs({entry["key"]: np.array(ends)}, (lead,))
+            found = runs({entry["key"]: np.array([low, high])}, (lead,))
         except ScenarioError:
             continue  # what an ensemble does not vary, such as a time that others divide, is not a first slider
         moved = [_share(found.metrics[name] - value, abs(value)) for name, value in zip(claims, usual, strict=True)]
@@ -123,15 +122,6 @@ def computed_opening(
 def _short(values: Floats) -> list[float | None]:
     """Values with four digits, as a drawing needs them; None where a run had failed."""
     return [float(f"{value:.4g}") if np.isfinite(value) else None for value in values.tolist()]
-
-
-def _ends(entry: Mapping[str, Any], given: Mapping[str, float], atmosphere: float) -> tuple[float, float] | None:
-    value = given.get(entry["key"], entry["value"])
-    size = _STEP * abs(value - (atmosphere if entry["unit"] == "Pa_a" else 0.0))
-    ends = value - size, value + size
-    low, high = entry["minimum"], entry["maximum"]
-    ends = (ends[0] if low is None else max(low, ends[0]), ends[1] if high is None else min(high, ends[1]))
-    return ends if ends[0] < ends[1] else None
 
 
 def _share(change: Floats, of: float) -> float:

@@ -10,7 +10,7 @@ from typing import Any
 
 from ppafo.errors import PpafoError, ScenarioError, UnitError
 from ppafo.loading import load_scenario
-from ppafo.page.html import block_of, packed_once, page_of, policy_of_block
+from ppafo.page.html import block_of, packed_once, page_of
 from ppafo.page.opening import computed_opening, first_settings, opening_like, opening_of
 from ppafo.page.still import still_of
 from ppafo.page.wasm import WasmModule, module_of
@@ -275,17 +275,19 @@ def _gauge_texts(item: Scenario, settings: Iterable[Mapping[str, Any]]) -> dict[
     gaps = {
         path: link.gap for path, links in item.graph.items() for link in links if link.sources == (ATMOSPHERE_PATH,)
     }
-    return {path: _gauge_text(gap, 0.0) for path, gap in gaps.items() if path not in following}
-
-
-def _gauge_text(value: float, atmosphere: float) -> str:
-    """A gauge pressure as a file may write it: the shortest one that gives the same number."""
-    for unit in _GAUGES:
-        for digits in range(1, 17):
-            number = float(f"{from_si(value, unit, _LEVEL, atmosphere):.{digits}g}")
-            if to_si(number, unit, _LEVEL, atmosphere) == value:
-                return f"{number!r} {unit}"
-    return ""
+    texts = {}
+    for path, gap in gaps.items():
+        if path in following:
+            continue
+        # As a file may write it: the shortest text that gives the same number.
+        written = (
+            f"{number!r} {unit}"
+            for unit in _GAUGES
+            for digits in range(1, 17)
+            if to_si(number := float(f"{from_si(gap, unit, _LEVEL, 0.0):.{digits}g}"), unit, _LEVEL, 0.0) == gap
+        )
+        texts[path] = next(written, "")
+    return texts
 
 
 def _scales(shown: Iterable[tuple[str, str]]) -> dict[str, list[dict[str, Any]]]:
@@ -363,7 +365,8 @@ def live_part(scenarios: "Sequence[str | Scenario]") -> LivePart | None:
         if isinstance(item, Scenario) and shorter is not None and shorter < item.run.duration:
             part = f"{shorter:g} s of the {item.run.duration:g} s above"
             remark = max(remark, f"It begins with {part}: lengthen run.duration to compare the numbers.")
-    return LivePart(policy_of_block(), block_of(content, modules), remark)
+    html, policy = block_of(content, modules)
+    return LivePart(policy, html, remark)
 
 
 def _content(
@@ -437,7 +440,22 @@ def _tabs(simulated: Sequence[Simulated]) -> list[dict[str, Any]]:
     groups: dict[str, list[Simulated]] = {}
     for item in simulated:
         groups.setdefault(_task(item.scenario), []).append(item)
-    return [_tab(title, group) for title, group in groups.items()]
+    tabs = []
+    for title, group in groups.items():
+        alone = " ".join(group[0].scenario.description.split()).replace("psi_g", "psi") if len(group) == 1 else ""
+        starts = [item.scenario for item in group[:_OPEN]]
+        asked = [one for one in words()["questions"] if title in one["tabs"]]
+        tabs.append(
+            {
+                "title": title,
+                "summary": alone or _SUMMARIES.get(title, ""),
+                "programs": [item.scenario.name for item in group],
+                "start": [{"program": scenario.name, "changes": usual_changes(scenario)} for scenario in starts],
+                "claims": words()["claims_of_walks" if title == _WALK else "claims"],
+                "questions": [{"text": one["text"], "changes": one["changes"]} for one in asked],
+            }
+        )
+    return tabs
 
 
 def _task(scenario: Scenario) -> str:
@@ -447,20 +465,6 @@ def _task(scenario: Scenario) -> str:
     if isinstance(motion, FreeMotion):
         return _STEP if scenario.controller.kind == "constant" else _TASKS["free"]
     return _TASKS["locked" if motion.profile.kind == "constant" else "prescribed"]
-
-
-def _tab(title: str, group: Sequence[Simulated]) -> dict[str, Any]:
-    alone = " ".join(group[0].scenario.description.split()).replace("psi_g", "psi") if len(group) == 1 else ""
-    return {
-        "title": title,
-        "summary": alone or _SUMMARIES.get(title, ""),
-        "programs": [item.scenario.name for item in group],
-        "start": [{"program": item.scenario.name, "changes": usual_changes(item.scenario)} for item in group[:_OPEN]],
-        "claims": words()["claims_of_walks" if title == _WALK else "claims"],
-        "questions": [
-            {"text": one["text"], "changes": one["changes"]} for one in words()["questions"] if title in one["tabs"]
-        ],
-    }
 
 
 _SUMMARIES = {

@@ -17,10 +17,8 @@ firmware.hex: firmware.elf
 \t$(OBJCOPY) -O ihex $< $@
 """
 
-
-def _flash(said: str, needs: str, command: str) -> str:
-    """The part of a make file that writes the processor."""
-    return f"\n# {said}. Read README.md first.\nflash: {needs}\n\t{command}\n"
+_FLASH = "\n# {said}. Read README.md first.\nflash: {needs}\n\t{command}\n"
+"""The part of a make file that writes the processor."""
 
 
 MSP430F2013 = Target(
@@ -43,7 +41,11 @@ MSP430F2013 = Target(
         "board_files": "`board_msp430f2013.c`, `msp430.h`",
         "not_run": "no simulator here has them",
         "script": "msp430f2013.ld",
-        "flash": _flash("Into the processor of an eZ430-F2013", "firmware.elf", 'mspdebug uif "prog firmware.elf"'),
+        "flash": _FLASH.format(
+            said="Into the processor of an eZ430-F2013",
+            needs="firmware.elf",
+            command='mspdebug uif "prog firmware.elf"',
+        ),
         "flash_said": "into the processor of an eZ430-F2013, by mspdebug",
     },
     templates=("board_msp430f2013.c", "msp430.h", "msp430f2013.ld", "start_msp430.c"),
@@ -69,7 +71,10 @@ def _words_of_cortex(name: str, part: str, pins: Mapping[str, str]) -> dict[str,
         "board_files": f"`board_microbit.c` and `converter_{part}.c`",
         "not_run": "timer and outputs run in QEMU's micro:bit V1, converter and watchdog have no simulator",
         "script": f"{part}.ld",
-        "flash": _flash("Onto the drive that the board is", "firmware.hex", 'cp firmware.hex "$(MICROBIT)"') + _HEX,
+        "flash": _FLASH.format(
+            said="Onto the drive that the board is", needs="firmware.hex", command='cp firmware.hex "$(MICROBIT)"'
+        )
+        + _HEX,
         "flash_said": "onto the drive that the board is, as in make flash MICROBIT=/media/MICROBIT",
         **pins,
     }

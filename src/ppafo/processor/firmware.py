@@ -1,7 +1,7 @@
 """A scenario's controller as firmware for a small processor: proof, translated C, a thin layer, make file, page."""
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple, get_type_hints
 
@@ -9,7 +9,7 @@ from ppafo.control.catalog import CONTROLLERS, FIXED_POINT
 from ppafo.engine.rows import is_number, leaf_paths, leaves, members, rebuilt
 from ppafo.engine.source_text import SourceCollector, is_row
 from ppafo.errors import ProgramError, ScenarioError
-from ppafo.exports import filled, in_markdown, licence, template
+from ppafo.exports import filled, in_markdown, template
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.plant import plant_parameters
 from ppafo.processor.catalog import target_of
@@ -39,42 +39,34 @@ def proof(law: FixedLaw, numbers: Sequence[Quantity] | None = None) -> Narrowed:
     collector = SourceCollector("")
     entry = collector.add(law.sample)
     state = type(law.begins)
-    parameters = tuple(_typed_row(row, collector) for row in (law.numbers, state, law.readings))
+    parameters = tuple(_typed_row(row, collector) for row in (law.numbers, state, Readings))
     module = walk_module(collector.text(), {entry: parameters})
     declared = (Interval(int(item.minimum), int(item.maximum)) for item in numbers or law.number_quantities)
     own_names = (path.rpartition(".")[2] for path in leaf_paths(state, ""))
     given: dict[str, Range] = {
         "numbers": _nested(law.numbers, declared),
         "state": _nested(state, (Interval(*law.state_ranges[name]) for name in own_names)),
-        "readings": (Interval(0, LARGEST_READING),) * len(members(law.readings)),
+        "readings": (Interval(0, LARGEST_READING),) * len(Readings._fields),
     }
     found = narrowed(module, given)
-    allowed = Interval(-COMMAND_STEPS, COMMAND_STEPS)
-    if not is_within(found.returned, (allowed, given["state"])):
-        raise ProgramError(f"{law.name}: command and state may leave their ranges: {found.returned}")
+    allowed: Range = (Interval(-COMMAND_STEPS, COMMAND_STEPS), given["state"])
+    # Within it where the hull of both is no wider.
+    if hull(found.returned, allowed) != allowed:
+        raise ProgramError(f"{law.kind.name}: command and state may leave their ranges: {found.returned}")
     return found
 
 
-def is_within(found: Range, allowed: Range) -> bool:
-    """True where every number of a range lies within the same of another."""
-    return hull(found, allowed) == allowed
-
-
-def law_source(law: FixedLaw, title: str, asked: tuple[str, str, str], told: Mapping[str, str]) -> str:
-    """The law in C, with a state of its own and the numbers of ``parameters.h``.
-
-    ``asked`` are the parameters of a sample, the name of the readings that are made of them, and their values; ``told``
-    has heads of functions that tell something of the state, and what.
-    """
+def law_source(law: FixedLaw) -> str:
+    """The law in C, with a state of its own and the numbers of ``parameters.h``."""
     collector = SourceCollector("")
     entry = collector.add(law.sample)
     documents = documents_of(collector)
-    text = c_source(proof(law).module, documents, f"{title} Not to be edited.", prelude=PRELUDE)
+    title = f"The controller '{law.kind.name}' of ppafo {__version__} in fixed point. Not to be edited."
+    text = c_source(proof(law).module, documents, title, prelude=PRELUDE)
     text = _OF_NUMBERS.sub("PPAFO_CALLED", text)
-    numbers, state, readings = (collector.add(item) for item in (law.numbers, type(law.begins), law.readings))
+    numbers, state, readings = (collector.add(item) for item in (law.numbers, type(law.begins), Readings))
     given = rebuilt(law.numbers, [macro(item) for item in law.number_quantities])
-    parameters, name, values = asked
-    functions = "\n".join(f"{head}(void)\n{{\n    return {value};\n}}\n" for head, value in told.items())
+    parameters = ", ".join(f"int16_t {name}" for name in Readings._fields)
     return f"""#include "controller.h"
 
 #include "parameters.h"
@@ -91,13 +83,17 @@ void controller_begin(void)
 int16_t controller_sample({parameters})
 {{
     static const {numbers} numbers = {_written(given)};
-    const {readings} {name} = {{{values}}};
-    const {entry}_result result = {entry}(numbers, state, {name});
+    const {readings} readings = {{{", ".join(Readings._fields)}}};
+    const {entry}_result result = {entry}(numbers, state, readings);
     state = result.item_1;
     return result.item_0;
 }}
 
-{functions}"""
+bool controller_is_sound(void)
+{{
+    return state.sound == 1;
+}}
+"""
 
 
 def _written(row: Any) -> str:
@@ -110,38 +106,35 @@ def macro(item: Quantity) -> str:
     return f"CONTROLLER_{item.name.upper()}"
 
 
-def parameters_header(
-    said: str, origins: Iterable[str], clock: str, law: FixedLaw, numbers: Mapping[str, float]
-) -> str:
+def parameters_header(scenario: Scenario, fixed: "FixedPointController") -> str:
     """``parameters.h``: every number of a law, its unit, meaning and origin; one beyond its range is refused in C."""
+    control, law = scenario.controller, fixed.law
+    declared: dict[str, Quantity] = {item.name: item for item in CONTROLLERS[control.kind].quantities}
+    source = scenario.origin.file or "a scenario without a file"
+    settings = (
+        f"{name} {value:.9g} {declared[name].unit} (controller.{name})".replace("  ", " ")
+        for name, value in control.settings.items()
+    )
+    constant = plant_parameters(scenario.device, 0.0).torque_constant
     lines = [
-        f"/* Numbers of {said} from:",
-        *(f" *   {line}" for line in origins),
+        f"/* Numbers of the controller '{law.kind.name}' of {scenario.name}, made by ppafo {__version__} from:",
+        f" *   period {control.period:.9g} s (controller.rate or controller.period of {source.rpartition('/')[2]})",
+        *(f" *   {line}" for line in settings),
+        f" *   torque over pressure {constant:.9g} N m/Pa (actuator of the set {scenario.origin.parameter_set})",
         " * Every number must stay within its range: for that the arithmetic is proved not to overflow. */",
         "#ifndef PPAFO_PARAMETERS_H",
         "#define PPAFO_PARAMETERS_H",
         "",
-        clock,
+        f"#define CONTROLLER_TICKS {fixed.ticks}u /* of 125 us in a sample period of {control.period:.9g} s */",
+        f"#define CONTROLLER_BITS {int(control.settings[SETTINGS[0].name])} /* of the converter */",
     ]
     for item in law.number_quantities:
-        number = int(numbers[item.name])
+        number = int(fixed.numbers[item.name])
         lines.append(f"#define {macro(item)} {number} /* {item.summary}; {item.minimum:g} to {item.maximum:g} */")
         # A user may edit this file: the proof that nothing overflows holds within these ranges only.
         lines += [f"#if {macro(item)} < {item.minimum:.0f} || {macro(item)} > {item.maximum:.0f}"]
         lines += [f'#error "{macro(item)} is beyond its range"', "#endif"]
     return "\n".join([*lines, "", "#endif", ""])
-
-
-def ticks_of(name: str, period: float) -> int:
-    """Pulses of the timer in a sample period [s]; ScenarioError where there is no whole number of them."""
-    ticks = round(period / TICK)
-    # Half of the range: the watchdog waits for two sample periods.
-    if not 1 <= ticks <= MOST_TICKS // 2 or abs(ticks * TICK - period) > 1.0e-9 * period:
-        raise ScenarioError(
-            f"{name}: controller.period = {period:.9g} s: on the processor a multiple of 0.125 ms, "
-            f"up to {MOST_TICKS // 2 * TICK:.3g} s"
-        )
-    return ticks
 
 
 def _nested(row: type, ranges: Iterator[Interval]) -> Range:
@@ -192,9 +185,15 @@ def integer_form(scenario: Scenario) -> Scenario:
 def fixed_point_controller(scenario: Scenario) -> FixedPointController:
     """The integer controller of a scenario; ScenarioError where the timer cannot make its sample period."""
     scenario = integer_form(scenario)
-    control = scenario.controller
-    ticks = ticks_of(scenario.name, control.period)
-    law = FIXED_LAWS[control.kind]
+    period = scenario.controller.period
+    ticks = round(period / TICK)
+    # Half of the range: the watchdog waits for two sample periods.
+    if not 1 <= ticks <= MOST_TICKS // 2 or abs(ticks * TICK - period) > 1.0e-9 * period:
+        raise ScenarioError(
+            f"{scenario.name}: controller.period = {period:.9g} s: on the processor a multiple of 0.125 ms, "
+            f"up to {MOST_TICKS // 2 * TICK:.3g} s"
+        )
+    law = FIXED_LAWS[scenario.controller.kind]
     row = plan_run(scenario).controller
     numbers = dict(zip((item.name for item in law.number_quantities), leaves(row.numbers), strict=True))
     converter = converter_with(row.steps, row.numbers.limits)
@@ -210,7 +209,7 @@ def firmware(scenario: Scenario, target: str = TARGETS[0]) -> dict[str, bytes]:
     words = {
         "title": scenario.name,
         "description": in_markdown(scenario.description),
-        "kind": fixed.law.name,
+        "kind": fixed.law.kind.name,
         "target": chosen.name,
         "processor": chosen.processor,
         "board": chosen.board,
@@ -227,32 +226,7 @@ def firmware(scenario: Scenario, target: str = TARGETS[0]) -> dict[str, bytes]:
     }
     words["wiring"] = filled(template("ppafo.processor", chosen.wiring), words).rstrip()
     texts = {name: filled(template("ppafo.processor", name), words) for name in (*_TEMPLATES, *chosen.templates)}
-    texts["LICENSE"] = licence()
-    texts["controller.c"] = law_source(
-        fixed.law,
-        f"The controller '{fixed.law.name}' of ppafo {__version__} in fixed point.",
-        (", ".join(f"int16_t {name}" for name in Readings._fields), "readings", ", ".join(Readings._fields)),
-        {"bool controller_is_sound": "state.sound == 1"},
-    )
-    control = scenario.controller
-    texts["parameters.h"] = parameters_header(
-        f"the controller '{fixed.law.name}' of {scenario.name}, made by ppafo {__version__}",
-        _origins(scenario),
-        f"#define CONTROLLER_TICKS {fixed.ticks}u /* of 125 us in a sample period of {control.period:.9g} s */\n"
-        f"#define CONTROLLER_BITS {int(control.settings[SETTINGS[0].name])} /* of the converter */",
-        fixed.law,
-        fixed.numbers,
-    )
+    texts["LICENSE"] = template("ppafo.exports.c_library", "LICENSE")
+    texts["controller.c"] = law_source(fixed.law)
+    texts["parameters.h"] = parameters_header(scenario, fixed)
     return {name: text.encode() for name, text in sorted(texts.items())}
-
-
-def _origins(scenario: Scenario) -> Iterator[str]:
-    """Settings that the numbers come from, each with unit and value in SI units."""
-    control = scenario.controller
-    declared: dict[str, Quantity] = {item.name: item for item in CONTROLLERS[control.kind].quantities}
-    source = scenario.origin.file or "a scenario without a file"
-    yield f"period {control.period:.9g} s (controller.rate or controller.period of {source.rpartition('/')[2]})"
-    for name, value in control.settings.items():
-        yield f"{name} {value:.9g} {declared[name].unit} (controller.{name})".replace("  ", " ")
-    constant = plant_parameters(scenario.device, 0.0).torque_constant
-    yield f"torque over pressure {constant:.9g} N m/Pa (actuator of the set {scenario.origin.parameter_set})"

@@ -1,10 +1,9 @@
 """A controller on the processor's simulator beside the same in Python: drawn samples, or a run of the plant."""
 
 import random
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -12,19 +11,17 @@ from ppafo.engine.rows import rebuilt
 from ppafo.errors import SimulationError
 from ppafo.processor.catalog import target_of
 from ppafo.processor.firmware import FixedPointController, firmware, fixed_point_controller, integer_form
-from ppafo.processor.fixed_point import COMMAND_STEPS, Readings, read
+from ppafo.processor.fixed_point import COMMAND_STEPS, Converter, Readings, read
 from ppafo.processor.simulators import (
     Decision,
     Image,
     ProcessorSimulator,
     Sizes,
     Target,
-    missing_tools,
     processor_simulator,
 )
 from ppafo.processor.torque_laws import TARGETS
 from ppafo.report.style import BLACK, REFERENCE, Margins, figure_of_panels, house_style, look_of_valve, mark_kind
-from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Result, simulate
 
@@ -38,9 +35,6 @@ EPISODE = 200
 
 TURN = 50
 """Drawn samples that the processor is asked at once."""
-
-Shown = TypeVar("Shown", bound=tuple[int, ...])
-"""What the converter shows at a sample."""
 
 
 class PythonProcessor:
@@ -56,23 +50,18 @@ class PythonProcessor:
         """Forget everything."""
         self.state = self.law.begins
 
-    def sample(self, readings: tuple[int, ...]) -> tuple[int, int]:
+    def sample(self, readings: Readings) -> tuple[int, int]:
         """Command in steps, and the status word that the processor reports with it."""
         command, self.state = self.law.sample(self.numbers, self.state, readings)
-        return command, self.law.status(self.state)
+        return command, self.state.sound
 
 
 class SimulatedController:
-    """The simulated processor as a controller of a scenario; it keeps the decision of every sample.
+    """The simulated processor as a controller of a scenario; it keeps the decision of every sample."""
 
-    ``shown`` makes the converter's readings of a reference and a measurement; ``at_zero`` is the command for no steps.
-    """
-
-    def __init__(
-        self, simulator: ProcessorSimulator, shown: Callable[[float, Any], tuple[int, ...]], at_zero: float = 0.0
-    ) -> None:
+    def __init__(self, simulator: ProcessorSimulator, converter: Converter) -> None:
         self.simulator = simulator
-        self._shown, self._at_zero = shown, at_zero
+        self.converter = converter
         self.decisions: list[Decision] = []
 
     def reset(self) -> None:
@@ -83,9 +72,9 @@ class SimulatedController:
     def update(self, time: float, reference: float, measurement: Any) -> float:
         """Command from -1 to 1, from what the converter shows; the processor needs no time [s], it counts samples."""
         del time
-        found = self.simulator.sample(self._shown(reference, measurement))
+        (found,) = self.simulator.samples((read(self.converter, reference, measurement),))
         self.decisions.append(found)
-        return found.command / COMMAND_STEPS if found.command else self._at_zero
+        return found.command / COMMAND_STEPS
 
 
 class Cost(NamedTuple):
@@ -126,7 +115,7 @@ def run_on_processor(scenario: Scenario, target: str = TARGETS[0]) -> ProcessorR
     scenario = integer_form(scenario)
     fixed = fixed_point_controller(scenario)
     with processor_simulator(firmware(scenario, target), target_of(target)) as (simulator, image):
-        law = SimulatedController(simulator, partial(read, fixed.converter))
+        law = SimulatedController(simulator, fixed.converter)
         fixed_point_kind = simulate(scenario.controlled_by(law))
         cost = cost_of(target_of(target), image, simulator.stack(), law.decisions)
     in_lanes = simulate(scenario)
@@ -149,27 +138,13 @@ class Comparison:
 def compare_drawn(scenario: Scenario, samples: int, seed: int = 1, target: str = TARGETS[0]) -> Comparison:
     """Give drawn readings to the processor's simulator and to Python, with a reset after every ``EPISODE`` of them."""
     fixed, chosen = fixed_point_controller(scenario), target_of(target)
-    given = _in_episodes(drawn_readings(int(fixed.converter.top), samples, seed))
-    return compare_with(PythonProcessor(fixed), given, samples, firmware(scenario, target), chosen)
-
-
-def compare_with(
-    reference: PythonProcessor,
-    given: Generator[tuple[Shown, bool], int, None],
-    samples: int,
-    contents: Mapping[str, bytes],
-    target: Target,
-) -> Comparison:
-    """Give readings to a firmware in its simulator and to the same in Python.
-
-    ``given`` yields readings, and whether both are reset before them; it gets the command that they led to [steps].
-    """
+    reference = PythonProcessor(fixed)
     wanted: list[tuple[int, int]] = []
-    asked: list[Shown] = []
+    asked: list[Readings] = []
     decisions: list[Decision] = []
-    with processor_simulator(contents, target) as (simulator, image):
-        readings, begins = next(given)
-        for number in range(samples):
+    with processor_simulator(firmware(scenario, target), chosen) as (simulator, image):
+        for number, readings in enumerate(drawn_readings(int(fixed.converter.top), samples, seed)):
+            begins = number % EPISODE == 0
             if begins or len(asked) == TURN:
                 decisions += simulator.samples(asked)
                 asked = []
@@ -178,20 +153,13 @@ def compare_with(
                 simulator.begin()
             asked.append(readings)
             wanted.append(reference.sample(readings))
-            if number + 1 < samples:
-                readings, begins = given.send(wanted[-1][0])
         decisions += simulator.samples(asked)
-        cost = cost_of(target, image, simulator.stack(), decisions)
+        cost = cost_of(chosen, image, simulator.stack(), decisions)
     differ = [place for place, found in enumerate(decisions) if found[:2] != wanted[place]]
     first = ""
     if differ:
         first = f"sample {differ[0]}: {decisions[differ[0]][:2]} on the processor, {wanted[differ[0]]} in Python"
     return Comparison(samples, len(differ), first, cost)
-
-
-def _in_episodes(given: Iterator[Readings]) -> Generator[tuple[Readings, bool], int, None]:
-    for number, readings in enumerate(given):
-        yield readings, number % EPISODE == 0
 
 
 def drawn_readings(top: int, samples: int, seed: int) -> Iterator[Readings]:
@@ -285,23 +253,3 @@ TRIED = (
     TriedLaw("`on_off_dead_zone`", "torque-task-proportional", ("controller.kind=on_off_dead_zone",)),
 )
 """What the table has, for each target."""
-
-
-class TableRow(NamedTuple):
-    """A controller on a target: what was found, None where a tool is ``missing``."""
-
-    law: str
-    target: Target
-    found: Comparison | None
-    missing: tuple[str, ...]
-
-
-def table_rows(targets: Sequence[str], samples: int) -> Iterator[TableRow]:
-    """The rows of the table, each after so many drawn samples on the simulator and in Python."""
-    for name in targets:
-        target = target_of(name)
-        missing = missing_tools(target)
-        for law in TRIED:
-            scenario = load_scenario(law.scenario, law.overrides)
-            found = None if missing else compare_drawn(scenario, samples, target=name)
-            yield TableRow(law=law.said, target=target, found=found, missing=missing)

@@ -78,17 +78,14 @@ class ProcessorSimulator(Protocol):
     def begin(self) -> None:
         """Reset the processor, and let it come to where it waits for a sample."""
 
-    def sample(self, readings: Iterable[int]) -> Decision:
-        """What the processor decides for the readings of one sample."""
-
     def samples(self, every: Sequence[Iterable[int]]) -> list[Decision]:
-        """What it decides for some samples in turn, at most 50: asked at once where the simulator takes that."""
+        """What the processor decides for some samples in turn, at most 50, asked at once where the simulator can."""
 
     def stack(self) -> int:
         """How deep the stack has been [bytes]."""
 
-    def close(self) -> None:
-        """End the simulator."""
+    close: Callable[[], object]
+    """Ends the simulator."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,18 +153,6 @@ def processor_simulator(contents: Mapping[str, bytes], target: Target) -> Iterat
 
     SimulationError where a tool is missing, the files cannot be built, or the simulator does not answer.
     """
-    with built_image(contents, target) as image:
-        simulator = target.simulator(target, image)
-        try:
-            yield simulator, image
-        finally:
-            simulator.close()
-
-
-@contextmanager
-def built_image(contents: Mapping[str, bytes], target: Target) -> Iterator[Image]:
-    """The image for the simulator that is built of these files, in a folder that goes with the ``with``."""
-    # SimulationError where this computer lacks a tool of a target.
     absent = missing_tools(target)
     if absent:
         raise SimulationError(
@@ -175,20 +160,19 @@ def built_image(contents: Mapping[str, bytes], target: Target) -> Iterator[Image
         )
     with tempfile.TemporaryDirectory(prefix="ppafo-processor-", ignore_cleanup_errors=True) as folder:
         built(contents, Path(folder))
-        yield read_image(Path(folder), target)
+        image = read_image(Path(folder), target)
+        simulator = target.simulator(target, image)
+        try:
+            yield simulator, image
+        finally:
+            simulator.close()
 
 
 def read_image(folder: Path, target: Target) -> Image:
     """The image for the simulator in a folder where a firmware was built."""
     file, shipped = folder / "simulated.elf", folder / "firmware.elf"
-    content = file.read_bytes()
-    own = _sizes(content, target)
-    return Image(file, own, sizes(shipped, target) if shipped.is_file() else own, _symbols(content))
-
-
-def sizes(image: Path, target: Target) -> Sizes:
-    """Flash and RAM that a program takes of a target."""
-    return _sizes(image.read_bytes(), target)
+    own = sizes(file, target)
+    return Image(file, own, sizes(shipped, target) if shipped.is_file() else own, _symbols(file.read_bytes()))
 
 
 class _Section(NamedTuple):
@@ -214,8 +198,9 @@ def _sections(content: bytes) -> list[_Section]:
     return [_Section._make(_SECTION.unpack_from(content, start + length * place)) for place in range(count)]
 
 
-def _sizes(content: bytes, target: Target) -> Sizes:
-    loaded = [item for item in _sections(content) if item.flags & _LOADED]
+def sizes(image: Path, target: Target) -> Sizes:
+    """Flash and RAM that a program takes of a target."""
+    loaded = [item for item in _sections(image.read_bytes()) if item.flags & _LOADED]
     in_ram = [item for item in loaded if target.ram.holds(item.address)]
     values = sum(item.size for item in in_ram if item.kind == _WITH_VALUES)
     flash = sum(item.size for item in loaded if target.flash.holds(item.address))
@@ -307,24 +292,17 @@ class MspdebugSimulator:
         self._cycles = 0
         self._folder = image.file.parent
         self._console = Console(["mspdebug", "-n", "-q", "sim"], self._folder)
+        self.close: Callable[[], object] = self._console.close
         self._start = target.ram.start + image.sizes.data
         self._free = target.ram.size - image.sizes.data
         self._say(f"prog {image.file.name}\nfill {self._start} {self._free} {UNTOUCHED:x}")
         self._say(f"simio add tracer counter\nsetbreak board_wait\nrun\n{_SAID_OUTPUTS}")
         self._answer()
 
-    def close(self) -> None:
-        """End the simulator."""
-        self._console.close()
-
     def begin(self) -> None:
         """Reset the processor, and let it come to where it waits for a sample."""
         self._say(f"reset\nrun\n{_SAID_OUTPUTS}")
         self._answer()
-
-    def sample(self, readings: Iterable[int]) -> Decision:
-        """What the processor decides for the readings of one sample."""
-        return self.samples((readings,))[0]
 
     def samples(self, every: Sequence[Iterable[int]]) -> list[Decision]:
         """What it decides for some samples in turn, at most 50: asked at once, so that neither waits for the other."""
@@ -335,13 +313,13 @@ class MspdebugSimulator:
         # mspdebug asks the system for every byte of its console, and for a file at once.
         (self._folder / _ASKED).write_text("".join(asked), encoding="ascii")
         self._say(f"read {_ASKED}")
-        return [self._decision() for _ in every]
-
-    def _decision(self) -> Decision:
-        before = self._cycles
-        words = self._answer()
-        command = int.from_bytes(words[:2], "little", signed=True)
-        return Decision(command, int.from_bytes(words[2:], "little"), self._cycles - before)
+        decisions = []
+        for _ in every:
+            before = self._cycles
+            words = self._answer()
+            command = int.from_bytes(words[:2], "little", signed=True)
+            decisions.append(Decision(command, int.from_bytes(words[2:], "little"), self._cycles - before))
+        return decisions
 
     def stack(self) -> int:
         """How deep the stack has been [bytes]: what it has written of the RAM that was filled before."""
@@ -383,13 +361,10 @@ class Debugger:
         command = ["qemu-system-arm", "-M", machine, "-kernel", image.file.name, "-icount", time, "-S"]
         quiet = ["-display", "none", "-monitor", "none", "-serial", "none", "-gdb", "stdio"]
         self._console = Console([*command, *quiet], image.file.parent)
+        self.close: Callable[[], object] = self._console.close
         self.packet("QStartNoAckMode")
         # The answer to this packet is the last that is acknowledged.
         self._console.say(b"+")
-
-    def close(self) -> None:
-        """End QEMU."""
-        self._console.close()
 
     def reset(self) -> None:
         """Reset the machine; it stands still at its beginning."""
@@ -409,15 +384,14 @@ class Debugger:
 
     def read(self, address: int, size: int) -> bytes:
         """What is in memory."""
-        return b"".join(
-            self._read(at, min(_PIECE, address + size - at)) for at in range(address, address + size, _PIECE)
-        )
-
-    def _read(self, address: int, size: int) -> bytes:
-        answer = self.packet(f"m{address:x},{size:x}")
-        if len(answer) != 2 * size:
-            raise SimulationError(f"QEMU cannot read {size} bytes at 0x{address:x}: {answer}")
-        return bytes.fromhex(answer)
+        found = b""
+        for at in range(address, address + size, _PIECE):
+            count = min(_PIECE, address + size - at)
+            answer = self.packet(f"m{at:x},{count:x}")
+            if len(answer) != 2 * count:
+                raise SimulationError(f"QEMU cannot read {count} bytes at 0x{at:x}: {answer}")
+            found += bytes.fromhex(answer)
+        return found
 
     def write(self, address: int, content: bytes) -> None:
         """Put something into memory."""
@@ -452,13 +426,10 @@ class QemuSimulator:
         self._ticks = target.machine.clock * _NANOSECONDS * 1.0e-9
         self._bottom = target.ram.start + target.ram.size - DEEPEST
         self.debugger = Debugger(target.machine.name, image)
+        self.close: Callable[[], object] = self.debugger.close
         self.debugger.write(self._bottom, bytes([UNTOUCHED]) * DEEPEST)
         self.debugger.stop_at(self._stop)
         self.debugger.go_on()
-
-    def close(self) -> None:
-        """End the simulator."""
-        self.debugger.close()
 
     def begin(self) -> None:
         """Reset the processor, and let it come to where it waits for a sample."""
@@ -467,19 +438,17 @@ class QemuSimulator:
 
     def samples(self, every: Sequence[Iterable[int]]) -> list[Decision]:
         """What it decides for some samples, one after the other."""
-        return [self.sample(readings) for readings in every]
-
-    def sample(self, readings: Iterable[int]) -> Decision:
-        """What the processor decides for the readings of one sample."""
-        self.debugger.write(self._readings, b"".join(number.to_bytes(2, "little") for number in readings))
-        # Behind the breakpoint, or the machine would stop at once.
-        self.debugger.go_on(self._stop + _LENGTH_OF_NOP)
-        command, is_sound, begun, ended = _FORM_OF_OUTPUTS.unpack(
-            self.debugger.read(self._outputs, _FORM_OF_OUTPUTS.size)
-        )
-        # The counter counts down, and begins anew at 2^24.
-        ticks = (begun - ended) % 2**_COUNTER_BITS
-        return Decision(command, is_sound, round(ticks / self._ticks))
+        decisions = []
+        for readings in every:
+            self.debugger.write(self._readings, b"".join(number.to_bytes(2, "little") for number in readings))
+            # Behind the breakpoint, or the machine would stop at once.
+            self.debugger.go_on(self._stop + _LENGTH_OF_NOP)
+            outputs = self.debugger.read(self._outputs, _FORM_OF_OUTPUTS.size)
+            command, is_sound, begun, ended = _FORM_OF_OUTPUTS.unpack(outputs)
+            # The counter counts down, and begins anew at 2^24.
+            ticks = (begun - ended) % 2**_COUNTER_BITS
+            decisions.append(Decision(command, is_sound, round(ticks / self._ticks)))
+        return decisions
 
     def stack(self) -> int:
         """How deep the stack has been [bytes]: what it has written of the RAM that was filled before."""

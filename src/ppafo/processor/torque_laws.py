@@ -44,21 +44,15 @@ TARGETS = ("msp430f2013", "cortex-m0", "cortex-m4")
 """Processors that an integer controller can be written for."""
 
 
-def sound_of(state: Any) -> int:
-    """1 while all readings have been sound, from the state of a torque law."""
-    found: int = state.sound
-    return found
-
-
 @dataclass(frozen=True, slots=True)
 class FixedLaw:
     """The integer form of a controller of the catalogue.
 
     ``kind`` runs it in the lanes: its update reads the converter, calls ``sample`` and gives the command back as a
     number from -1 to 1. ``sample(numbers, state, readings)`` is the law itself, on whole numbers only: the
-    command in steps and the next state. ``numbers`` and ``readings`` are the NamedTuple classes of what it is given;
+    command in steps and the next state. ``numbers`` is the NamedTuple class of what it is given beside readings;
     ``number_quantities`` declare the numbers, in order. The state ``begins`` so, and ``state_ranges`` has lowest and
-    highest of every number of it, by its own name; ``status`` is the word that a processor reports of it.
+    highest of every number of it, by its own name; its ``sound`` is what a processor reports.
     """
 
     kind: ControllerKind
@@ -67,13 +61,6 @@ class FixedLaw:
     number_quantities: tuple[Quantity, ...]
     begins: Any
     state_ranges: Mapping[str, tuple[int, int]]
-    readings: type = Readings
-    status: Callable[[Any], int] = sound_of
-
-    @property
-    def name(self) -> str:
-        """That of its controller."""
-        return self.kind.name
 
 
 class OnOffNumbers(NamedTuple):
@@ -361,4 +348,4 @@ PID = FixedLaw(
 )
 
 
-FIXED_LAWS: dict[str, FixedLaw] = {law.name: law for law in (PID, ON_OFF, DEAD_ZONE)}
+FIXED_LAWS: dict[str, FixedLaw] = {law.kind.name: law for law in (PID, ON_OFF, DEAD_ZONE)}

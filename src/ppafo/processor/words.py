@@ -1,19 +1,22 @@
 """What controllers on the simulator of a processor came to, in words and as data."""
 
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from ppafo.errors import ScenarioError
+from ppafo.processor.catalog import target_of
 from ppafo.processor.lock_step import (
+    TRIED,
     Comparison,
     Cost,
     ProcessorRun,
     compare_drawn,
     processor_figure,
     run_on_processor,
-    table_rows,
 )
+from ppafo.processor.simulators import missing_tools
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
 
@@ -41,9 +44,19 @@ def tried(names: Sequence[str], target: str, samples: int | None, overrides: Seq
         raise ScenarioError("several SCENARIOs: are run in turn and drawn in one figure; give one for --samples")
     if samples is None:
         return _runs(scenarios, target)
-    found = compare_drawn(scenarios[0], samples, target=target)
-    about = {"scenario": scenarios[0].name, "target": target}
-    return _drawn(found, scenarios[0].name, scenarios[0].controller.period, about)
+    # Drawn samples on the processor and in Python.
+    scenario = scenarios[0]
+    found = compare_drawn(scenario, samples, target=target)
+    lines = [
+        f"{found.samples} drawn samples of the controller of {scenario.name} on the processor's simulator",
+        "",
+        *_cost_lines(found.cost, scenario.controller.period),
+        f"decisions   {found.samples}, {found.differences} different from the fixed-point controller in Python",
+        *([f"the first: {found.first_difference}"] if found.differences else []),
+    ]
+    about = {"scenario": scenario.name, "target": target}
+    document = {**about, **_compared(found), **_cost_document(found.cost)}
+    return Tried("\n".join(lines), document, not found.differences)
 
 
 def _runs(scenarios: Sequence[Scenario], target: str) -> Tried:
@@ -79,34 +92,24 @@ def _runs(scenarios: Sequence[Scenario], target: str) -> Tried:
     )
 
 
-def _drawn(found: Comparison, name: str, period: float, about: dict[str, Any]) -> Tried:
-    """Drawn samples on the processor and in Python."""
-    lines = [
-        f"{found.samples} drawn samples of the controller of {name} on the processor's simulator",
-        "",
-        *_cost_lines(found.cost, period),
-        f"decisions   {found.samples}, {found.differences} different from the fixed-point controller in Python",
-        *([f"the first: {found.first_difference}"] if found.differences else []),
-    ]
-    document = {**about, **_compared(found), **_cost_document(found.cost)}
-    return Tried("\n".join(lines), document, not found.differences)
-
-
 def table(targets: Sequence[str], samples: int | None) -> Tried:
     """Every controller on every target, as a table."""
     lines = ["| target | controller | flash | data + stack | worst and mean | drawn samples | other decisions |"]
     lines.append("|---|---|---|---|---|---|---|")
     documents = []
-    for row in table_rows(targets, samples or SAMPLES_OF_TABLE):
-        found, own = row.found, {"target": row.target.name, "controller": row.law.replace("`", "")}
-        if found is None:
-            lines.append(f"| {row.target.name} | {row.law} | not run: {', '.join(row.missing)} is missing | | | | |")
-            documents.append({**own, "missing": list(row.missing)})
+    for target, law in itertools.product(map(target_of, targets), TRIED):
+        own: dict[str, Any] = {"target": target.name, "controller": law.said.replace("`", "")}
+        missing = missing_tools(target)
+        if missing:
+            lines.append(f"| {target.name} | {law.said} | not run: {', '.join(missing)} is missing | | | | |")
+            documents.append({**own, "missing": list(missing)})
             continue
+        scenario = load_scenario(law.scenario, law.overrides)
+        found = compare_drawn(scenario, samples or SAMPLES_OF_TABLE, target=target.name)
         cost = found.cost
         lines.append(
-            f"| {row.target.name} | {row.law} | {cost.sizes.flash:,} | {cost.sizes.data} + {cost.stack} "
-            f"| {cost.worst:,}, {cost.mean:,.0f} {row.target.counted} | {found.samples:,} | {found.differences} |"
+            f"| {target.name} | {law.said} | {cost.sizes.flash:,} | {cost.sizes.data} + {cost.stack} "
+            f"| {cost.worst:,}, {cost.mean:,.0f} {target.counted} | {found.samples:,} | {found.differences} |"
         )
         documents.append({**own, **_compared(found), **_cost_document(cost)})
     return Tried("\n".join(lines), {"rows": documents}, not any(item.get("differences") for item in documents))

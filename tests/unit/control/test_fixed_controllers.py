@@ -82,7 +82,7 @@ def test_the_converter_rounds_and_stays_in_its_range() -> None:
 def test_every_number_of_a_law_is_declared_in_the_order_of_its_rows(law: FixedLaw) -> None:
     names = [path.rpartition(".")[2] for path in leaf_paths(law.kind.parameters, "")]
     assert [item.name for item in law.kind.plan.quantities] == names
-    assert CONTROLLERS[law.name] is law.kind
+    assert CONTROLLERS[law.kind.name] is law.kind
     assert [item.name for item in law.number_quantities] == [
         path.rpartition(".")[2] for path in leaf_paths(law.numbers, "")
     ]

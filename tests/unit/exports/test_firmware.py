@@ -156,8 +156,7 @@ def test_instructions_are_as_many_as_single_steps(target: Target) -> None:
     readings = Readings(2000, 1500, 1502)
     with processor_simulator(firmware(scenario, target.name), target) as (simulator, image):
         assert isinstance(simulator, QemuSimulator)
-        simulator.sample(readings)
-        counted = simulator.sample(readings).work
+        counted = simulator.samples([readings, readings])[1].work
         debugger, stop = simulator.debugger, image.symbols["simulated_stop"] & ~1
         debugger.packet(f"z0,{stop:x},2")
         steps, place = 0, 0
@@ -190,7 +189,7 @@ def test_other_compilers_build_for_a_cortex_too(target: Target, compiler: str, t
     simulator = target.simulator(target, read_image(tmp_path, target))
     fixed = PythonProcessor(fixed_point_controller(scenario_of("pid")))
     for readings in drawn_readings(4095, 100, 3):
-        assert simulator.sample(readings)[:2] == fixed.sample(readings)
+        assert simulator.samples([readings])[0][:2] == fixed.sample(readings)
     simulator.close()
 
 

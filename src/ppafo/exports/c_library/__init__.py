@@ -1,15 +1,13 @@
 """A scenario as a library in C99, with an example and make files."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
-from typing import TYPE_CHECKING
+from functools import partial
 
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.engine.run import batch_of
 from ppafo.errors import ProgramError
 from ppafo.exports.c_library.files import (
     Library,
-    Setting,
     Switch,
     c_identifier,
     choosing,
@@ -17,17 +15,15 @@ from ppafo.exports.c_library.files import (
     words_of,
     words_of_walk,
 )
-from ppafo.exports.c_library.preparation import following_text, links_of, preparation_of, relations_of, settings_of
-from ppafo.exports.c_library.program import Further, exported
+from ppafo.exports.c_library.preparation import following_text, preparation_of, relations_of, settings_of
+from ppafo.exports.c_library.program import exported
 from ppafo.model.catalog import ordered_effects
 from ppafo.parameters.device import Device
-from ppafo.parameters.graph import Graph
 from ppafo.parameters.plant import effects_of
-from ppafo.simulation.plan import plan_run, step_counts
-from ppafo.simulation.scenario import Control, Scenario, Sensors
-
-if TYPE_CHECKING:
-    from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.clock import links_of_times
+from ppafo.simulation.numbers import links_that_hold, time_texts
+from ppafo.simulation.plan import plan_run
+from ppafo.simulation.scenario import Scenario
 
 _FLAWS = (
     *("sensors_angle_noise", "sensors_pressure_noise", "sensors_angle_resolution", "sensors_pressure_resolution"),
@@ -56,7 +52,9 @@ def scenario_library(scenario: Scenario) -> Library:
             f"{scenario.name}: a fixed-point controller has no library yet; 'ppafo export firmware' writes it"
         )
     program = exported(batch_of(plan_run(scenario)).program)
-    settings, links = settings_of(scenario), links_of(scenario)
+    settings = settings_of(scenario)
+    # Settings that follow others as long as nobody changes them.
+    links = {**links_that_hold(scenario), **links_of_times(time_texts(scenario))}
     of_sensors = [
         (("sensors_delay",), program.program.late_signals),
         (_FLAWS, not program.program.ideal_sensors),
@@ -68,6 +66,7 @@ def scenario_library(scenario: Scenario) -> Library:
     ]
     # Another program where samples lie between steps and did not, or the other way round.
     interval = "prepared->counts.interval"
+    was_inside = "true" if program.program.samples_inside else "false"
     return Library(
         title=scenario.name,
         description=" ".join(scenario.description.split()),
@@ -75,54 +74,34 @@ def scenario_library(scenario: Scenario) -> Library:
         settings=settings,
         relations=relations_of(scenario),
         switches=_switches(scenario.device, of_sensors),
-        other_program=(
-            (
-                f"({interval} != (double)(int64_t){interval}) != {_truth(program.program.samples_inside)}",
-                "run_output_interval",
-            ),
-        ),
+        other_program=((f"({interval} != (double)(int64_t){interval}) != {was_inside}", "run_output_interval"),),
         words=words_of(scenario, links),
-        further=lambda collector, boundary: preparation_of(scenario, program.program, collector, boundary),
-        following=_following(settings, links),
+        further=partial(preparation_of, scenario, program.program),
+        following=partial(following_text, settings, links) if links else None,
         links=links,
     )
 
 
-def commanded(scenario: Scenario) -> Scenario:
-    """The plant of a scenario alone, under a command that is handed in at every step of its engine."""
-    # The engine's own step: commands come once in each, and nothing lies between.
-    step = step_counts(
-        scenario.run.duration, scenario.run.step, scenario.run.output_interval, scenario.controller.period
-    ).step
-    return replace(
-        scenario,
-        name=f"{scenario.name}-plant",
-        description=f"The plant alone of this scenario: {scenario.description}",
-        run=replace(scenario.run, step=step, output_interval=step),
-        controller=Control("constant", {"command": 0.0}, step),
-        sensors=Sensors(),
-    )
-
-
-def walk_library(configuration: "Scenario") -> Library:
+def walk_library(configuration: Scenario) -> Library:
     """A library whose settings are all numbers of a walk; ScenarioError for one that cannot be exported."""
     from ppafo.exports.c_library.walk_preparation import (
         check_can_leave,
         links_of_walk,
         preparation_of_walk,
         relations_of_walk,
-        sensors_that_fail,
         settings_of_walk,
     )
+    from ppafo.walking.motion import walk_of
     from ppafo.walking.planning import plan_walk
 
     # Before anything is planned: what cannot be exported should be said at once.
     check_can_leave(configuration)
     program = exported(batch_of(plan_walk(configuration)).program)
     settings, links = settings_of_walk(configuration), links_of_walk(configuration)
-    failing = sensors_that_fail(configuration)
+    failing = {sensor: item for sensor, item in walk_of(configuration).faults.items() if item.kind}
     # A sensor that fails is never ideal, whatever the settings are.
     of_readings = [] if failing else [((*_FLAWS, *_FLAWS_OF_WALK), not program.program.ideal_sensors)]
+    was_late = "true" if program.program.late_readings else "false"
     return Library(
         title=configuration.name,
         description=" ".join(configuration.description.split()),
@@ -130,20 +109,13 @@ def walk_library(configuration: "Scenario") -> Library:
         settings=settings,
         relations=relations_of_walk(configuration),
         switches=_switches(configuration.device, of_readings),
-        other_program=(
-            (f"(prepared->counts.signal_delay > 0.0) != {_truth(program.program.late_readings)}", "controller_period"),
-        ),
+        other_program=((f"(prepared->counts.signal_delay > 0.0) != {was_late}", "controller_period"),),
         words=words_of_walk(configuration, links, failing),
-        further=lambda collector, boundary: preparation_of_walk(configuration, program.program, collector, boundary),
-        following=_following(settings, links),
+        further=partial(preparation_of_walk, configuration, program.program),
+        following=partial(following_text, settings, links) if links else None,
         links=links,
         defaults=frozenset(c_identifier(path) for path in links if not path.startswith("supply.")),
     )
-
-
-def _following(settings: Sequence[Setting], links: Graph) -> Further | None:
-    """The writer of the function that lets settings follow others, None where none does."""
-    return (lambda collector, boundary: following_text(settings, links, collector, boundary)) if links else None
 
 
 def _switches(device: Device, others: Iterable[tuple[Sequence[str], bool]]) -> tuple[Switch, ...]:
@@ -156,7 +128,3 @@ def _switches(device: Device, others: Iterable[tuple[Sequence[str], bool]]) -> t
         if effect.switch
     ]
     return tuple(Switch(tuple(names), is_above) for names, is_above in (*of_valve, *of_effects, *others))
-
-
-def _truth(value: bool) -> str:
-    return "true" if value else "false"

@@ -6,7 +6,6 @@ row for each; the composed functions are the same but for their first and last l
 
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Protocol
 
 from ppafo.engine.rows import is_number, leaf_paths, members, row_expression
 from ppafo.engine.source_text import is_row
@@ -15,27 +14,8 @@ from ppafo.translation.typed import FLOAT, Items, Row, Shared, Type
 NameOf = Callable[[type], str]
 
 
-class Boundary(Protocol):
-    """Writes how functions take numbers from what they are handed, and give them back; ``array`` is a parameter."""
-
-    def cell(self, array: str, place: int, name: str) -> str:
-        """One number of many, by its place and its name."""
-
-    def named(self, array: str, names: Sequence[str], body: Sequence[str]) -> list[str]:
-        """Lines in which numbers go by their own names."""
-
-    def taken(self, array: str, group: str, groups: Mapping[str, type], name_of: NameOf) -> str:
-        """Expression for one of several groups of rows."""
-
-    def given(self, array: str, groups: Mapping[str, type]) -> list[str]:
-        """Lines that hand back groups of rows, which have their names."""
-
-    def head(self, name: str, parameters: Mapping[str, str]) -> str:
-        """The first lines of a function; ``parameters`` by name, with their types as arrays."""
-
-
 class Arrays:
-    """Arrays of all numbers, one after another."""
+    """Arrays of all numbers, one after another; ``array`` is the name of a parameter."""
 
     def cell(self, array: str, place: int, name: str) -> str:  # noqa: ARG002
         """One number of many, by its place."""
@@ -46,16 +26,16 @@ class Arrays:
         return [*(f"{name} = {array}[{place}]" for place, name in enumerate(names)), *body]
 
     def taken(self, array: str, group: str, groups: Mapping[str, type], name_of: NameOf) -> str:
-        """The row of a group, from the numbers of all."""
+        """Expression for the row of one of several groups, from the numbers of all."""
         cells = {path: f"{array}[{place}]" for place, path in enumerate(_paths(groups))}
         return row_expression(groups[group], group, cells, name_of)
 
     def given(self, array: str, groups: Mapping[str, type]) -> list[str]:
-        """Lines that write the numbers of groups one by one."""
+        """Lines that hand back the numbers of groups, which have their names, one by one."""
         return [f"{array}[{place}] = {path}" for place, path in enumerate(_paths(groups))]
 
     def head(self, name: str, parameters: Mapping[str, str]) -> str:
-        """The function, with its types."""
+        """The first lines of a function; ``parameters`` by name, with their types."""
         return f'@njit("void({", ".join(parameters.values())})")\ndef {name}({", ".join(parameters)}):'
 
 
@@ -83,6 +63,10 @@ class Structs:
     def head(self, name: str, parameters: Mapping[str, str]) -> str:
         """The function, whose types are stated where it is translated."""
         return f"def {name}({', '.join(parameters)}):"
+
+
+Boundary = Arrays | Structs
+"""Writes how functions take numbers from what they are handed, and give them back."""
 
 
 def _paths(groups: Mapping[str, type]) -> list[str]:

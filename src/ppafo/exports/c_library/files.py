@@ -12,9 +12,7 @@ from typing import TYPE_CHECKING
 from ppafo.engine.lane_source import SAME_MOMENT
 from ppafo.engine.lanes import SIGNAL_ROWS
 from ppafo.engine.run import NEVER_FAILED
-from ppafo.engine.source_text import Collector
-from ppafo.exports import filled, in_comment, in_markdown, licence, template
-from ppafo.exports.c_library.boundary import Boundary
+from ppafo.exports import filled, in_comment, in_markdown, template
 from ppafo.exports.c_library.program import ExportedProgram, Further, c_text_of_run
 from ppafo.kinds import kind_at
 from ppafo.metrics import METRICS
@@ -183,18 +181,14 @@ def library_files(library: Library) -> dict[str, bytes]:
     surface = library.surface
     sources = {surface.header: f"{name}.h", surface.main: "main.c", surface.page: "README.md", **_FILES}
     texts = {target: filled(template(_FOLDER, source), words) for source, target in sources.items()}
-    texts["LICENSE"] = licence()
+    texts["LICENSE"] = template(_FOLDER, "LICENSE")
     head = f'#include "{name}.h"\n\n#include <string.h>\n\n'
     title = f"{library.title}: the functions of ppafo {__version__} that a run is made of. Not to be edited."
-    written = [add for add in (library.further, library.following) if add is not None]
-
-    def further(collector: Collector, boundary: Boundary) -> str:
-        return "\n\n".join(add(collector, boundary) for add in written)
-
+    further = [add for add in (library.further, library.following) if add is not None]
     settings = [item.name for item in library.settings]
     # The interface is written around the functions, whose names must not hide its own.
     interface = "".join(filled(template(_FOLDER, file), words) for file in ("interface.c", surface.source))
-    functions = c_text_of_run(program, title, name, settings, further if written else None, interface)
+    functions = c_text_of_run(program, title, name, settings, further, interface)
     texts[f"{name}.c"] = f"{head}{functions}\n{interface}"
     return {file: text.encode() for file, text in sorted(texts.items())}
 
@@ -215,6 +209,16 @@ def run_words(library: Library) -> dict[str, str]:
 def _words(library: Library, name: str) -> dict[str, str]:
     program = library.program
     outputs = ["time", *program.outputs]
+    # The last argument of the loop of a run in C, where it has both kinds of steps.
+    in_parts = ", run->needs_parts" if program.chooses_parts else ""
+    steps = {"name": name, "signal_rows": str(SIGNAL_ROWS), "in_parts": in_parts}
+    relations = _relations(library)
+    table = []
+    for item in library.settings:
+        low, high = _limits(item.quantity)
+        marks = item.quantity.minimum_allowed, item.name in library.defaults
+        flags = ", ".join("true" if mark else "false" for mark in marks)
+        table.append(f'    {{"{item.name}", {item.value!r}, {low!r}, {high!r}, {flags}}},')
     return {
         **run_words(library),
         "name": name,
@@ -223,19 +227,19 @@ def _words(library: Library, name: str) -> dict[str, str]:
         "description": "\n * ".join(textwrap.wrap(in_comment(library.description), 110)),
         "about": in_markdown(library.description),
         "version": __version__,
-        "in_parts": in_parts(program),
+        "in_parts": in_parts,
         "run": filled(template(_FOLDER, "run.h"), {"name": name}),
-        "steps": steps_source(library),
+        "steps": filled(template(_FOLDER, "steps.c"), steps),
         "first": "".join(f"    before.{item} = before.{library.surface.step};\n" for item in library.surface.as_step),
         "follow": "" if library.following is None else "    follow(&before, &all);",
         "settings": _members((item.name, item.quantity.unit, _said(item.quantity)) for item in library.settings),
         "outputs": _members((("time", "s", "since the start"), *((item, *OUTPUTS[item]) for item in program.outputs))),
         "metrics": _members((kind.name, kind.unit, kind.summary) for kind in program.metrics),
-        "table": "\n".join(_line_of_table(item, item.name in library.defaults) for item in library.settings),
+        "table": "\n".join(table),
         "relations": "\n".join(
-            f'    if (!({holds})) {{\n        return "{name}";\n    }}' for holds, name in _relations(library)
+            f'    if (!({holds})) {{\n        return "{name}";\n    }}' for holds, name in relations
         ),
-        "is_whole": _IS_WHOLE if _rules_of_times(library) else "",
+        "is_whole": _IS_WHOLE if any("is_whole(" in holds for holds, _ in relations) else "",
         "needs_other": "\n".join(
             f'    if ({condition}) {{\n        return "{name}";\n    }}'
             for condition, name in conditions_of_program(library)
@@ -254,17 +258,6 @@ def _words(library: Library, name: str) -> dict[str, str]:
         **library.words,
         **library.surface.words,
     }
-
-
-def in_parts(program: ExportedProgram) -> str:
-    """The last argument of the loop of a run in C, where it has both kinds of steps."""
-    return ", run->needs_parts" if program.chooses_parts else ""
-
-
-def steps_source(library: Library) -> str:
-    """The function that does some steps of a run and takes a sample, for what stands behind the source of a library."""
-    words = {"name": library.name, "signal_rows": str(SIGNAL_ROWS), "in_parts": in_parts(library.program)}
-    return filled(template(_FOLDER, "steps.c"), words)
 
 
 def _members(items: Iterable[tuple[str, str, str]]) -> str:
@@ -301,7 +294,12 @@ def conditions_of_program(library: Library) -> list[tuple[str, str]]:
 
 def conditions_of(library: Library) -> list[tuple[str, str]]:
     """Conditions on settings as text in C, each with the setting that is named where it fails, also for NaN."""
-    return [*map(_range, library.settings), *_relations(library)]
+    ranges = []
+    for item in library.settings:
+        value, sign = f"settings->{item.name}", ">=" if item.quantity.minimum_allowed else ">"
+        low, high = _limits(item.quantity)
+        ranges.append((f"{value} {sign} {low!r} && {value} <= {high!r}", item.name))
+    return [*ranges, *_relations(library)]
 
 
 RULES_OF_TIMES = (
@@ -324,37 +322,17 @@ static bool is_whole(double count)
 
 def _relations(library: Library) -> list[tuple[str, str]]:
     """Conditions between settings as text in C, each with the setting that is named."""
-    return [*map(_related, library.relations), *_rules_of_times(library)]
-
-
-def _rules_of_times(library: Library) -> list[tuple[str, str]]:
-    """Conditions on the times of a scenario as text in C, each with the setting that is named."""
+    found = []
+    for item in library.relations:
+        other, sign = f"settings->{item.other}", "-" if item.relation == "at least" else "+"
+        if item.tolerance:
+            # With the tolerance of files, or a setting that a file accepts would be refused in C.
+            slack = repr(item.tolerance)
+            other = f"{other} * (1.0 {sign} {slack})" if item.is_share else f"{other} {sign} {slack}"
+        found.append((f"settings->{item.name} {_SIGNS[item.relation]} {other}", item.name))
     # A plant alone has no times of a file, and a walk checks its own.
     rules = RULES_OF_TIMES if library.keeps_times and not library.program.program.walks else ()
-    return [(rule.format(*(f"settings->{name}" for name in names)), named) for named, rule, names in rules]
-
-
-def _related(item: Relation) -> tuple[str, str]:
-    """That a setting does not contradict another."""
-    other, sign = f"settings->{item.other}", "-" if item.relation == "at least" else "+"
-    if item.tolerance:
-        # With the tolerance of files, or a setting that a file accepts would be refused in C.
-        other = f"{other} * (1.0 {sign} {item.tolerance!r})" if item.is_share else f"{other} {sign} {item.tolerance!r}"
-    return f"settings->{item.name} {_SIGNS[item.relation]} {other}", item.name
-
-
-def _range(item: Setting) -> tuple[str, str]:
-    """That a setting is a number that the declaration allows."""
-    value, sign = f"settings->{item.name}", ">=" if item.quantity.minimum_allowed else ">"
-    low, high = _limits(item.quantity)
-    return f"{value} {sign} {low!r} && {value} <= {high!r}", item.name
-
-
-def _line_of_table(item: Setting, is_as_chosen: bool) -> str:
-    """A setting with its default and its range, as C begins a struct of them."""
-    low, high = _limits(item.quantity)
-    marks = ", ".join("true" if mark else "false" for mark in (item.quantity.minimum_allowed, is_as_chosen))
-    return f'    {{"{item.name}", {item.value!r}, {low!r}, {high!r}, {marks}}},'
+    return [*found, *((rule.format(*(f"settings->{name}" for name in names)), named) for named, rule, names in rules)]
 
 
 def _limits(quantity: Quantity) -> tuple[float, float]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 from ppafo.control.catalog import PROFILES
 from ppafo.control.controllers import switching
-from ppafo.exports.c_library import commanded, library_of
+from ppafo.exports.c_library import library_of
 from ppafo.exports.c_library.files import Library, Surface, c_identifier, library_files
 from ppafo.exports.c_library.program import ExportedProgram
 from ppafo.exports.c_library.walk_preparation import check_can_leave
@@ -204,13 +204,26 @@ def follow_lines(alone: PlantAlone, settings: str, inputs: Mapping[str, str]) ->
 
 
 def _prescribed_vane(scenario: Scenario) -> Scenario:
-    """The scenario under a command; an ankle is prescribed from outside, beginning where the scenario has it."""
+    """The scenario under a command at every step of its engine; an ankle is prescribed from outside as well."""
     motion = scenario.motion
     if isinstance(motion, PrescribedMotion):
         found: tuple[float, float, float] = PROFILES[motion.profile.kind].value(profile_parameters(motion.profile), 0.0)
         settings = {"start_level": found[0], "level": found[0], "ramp_start": 0.0, "ramp_time": 2.0}
+        # It begins where the scenario has it.
         motion = PrescribedMotion(ProfileChoice("ramp_hold", settings))
-    return replace(commanded(scenario), motion=motion)
+    # The engine's own step: commands come once in each, and nothing lies between.
+    step = step_counts(
+        scenario.run.duration, scenario.run.step, scenario.run.output_interval, scenario.controller.period
+    ).step
+    return replace(
+        scenario,
+        name=f"{scenario.name}-plant",
+        description=f"The plant alone of this scenario: {scenario.description}",
+        run=replace(scenario.run, step=step, output_interval=step),
+        controller=Control("constant", {"command": 0.0}, step),
+        sensors=Sensors(),
+        motion=motion,
+    )
 
 
 def _commanded_walk(walk: Scenario) -> Scenario:

@@ -30,13 +30,12 @@ from ppafo.parameters.declaration import members
 from ppafo.parameters.device import Device, SonicOrifice
 from ppafo.parameters.graph import Graph, Term
 from ppafo.parameters.plant import SEEN_BY_EFFECTS, area_restriction, effects_of, plant_with, sonic_restriction
-from ppafo.simulation.clock import links_of_times, step_unless_given, step_with_output
+from ppafo.simulation.clock import step_unless_given, step_with_output
 from ppafo.simulation.declaration import LOCKED_ANGLE, SUPPLY_LINE, SUPPLY_LINES, THERMAL, gas_settings, value_at
 from ppafo.simulation.leg import foot_load, shank_kind, with_load
 from ppafo.simulation.numbers import (
     TIMES,
     declared_numbers,
-    links_that_hold,
     number_at,
     other_form,
     path_of_locked_angle,
@@ -95,43 +94,32 @@ def _term(term: Term, rows: list[str], collector: Collector) -> str:
     return f"{collector.add(term.function)}({given})"
 
 
+def _written(sign: str, is_reflected: bool = False) -> "Callable[[Written, Written | float], Written]":
+    """An operator that writes its sign between two numbers; a reflected one has the other number first."""
+
+    def operator(number: "Written", other: "Written | float") -> "Written":
+        first, second = (other, number) if is_reflected else (number, other)
+        return Written(f"({_text(first)} {sign} {_text(second)})")
+
+    return operator
+
+
 @dataclass(frozen=True, slots=True)
 class Written:
     """A number as text: arithmetic of Python on it is written, operation by operation."""
 
     text: str
 
-    def __mul__(self, other: "Written | float") -> "Written":
-        """The product."""
-        return _joined(self, "*", other)
-
-    def __rmul__(self, other: float) -> "Written":
-        """The product."""
-        return _joined(other, "*", self)
-
-    def __add__(self, other: "Written | float") -> "Written":
-        """The sum."""
-        return _joined(self, "+", other)
-
-    def __radd__(self, other: float) -> "Written":
-        """The sum."""
-        return _joined(other, "+", self)
-
-    def __rsub__(self, other: float) -> "Written":
-        """A number less this one."""
-        return _joined(other, "-", self)
-
-    def __rtruediv__(self, other: float) -> "Written":
-        """A number over this one."""
-        return _joined(other, "/", self)
+    __mul__ = _written("*")
+    __rmul__ = _written("*", is_reflected=True)
+    __add__ = _written("+")
+    __radd__ = _written("+", is_reflected=True)
+    __rsub__ = _written("-", is_reflected=True)
+    __rtruediv__ = _written("/", is_reflected=True)
 
     def sqrt(self) -> "Written":
         """The root, by the name under which NumPy looks for it."""
         return Written(f"math.sqrt({self.text})")
-
-
-def _joined(first: Written | float, sign: str, second: Written | float) -> Written:
-    return Written(f"({_text(first)} {sign} {_text(second)})")
 
 
 def _text(number: Written | float) -> str:
@@ -188,10 +176,11 @@ class Writing:
         cells = dict(zip(leaf_paths(type(row), path), map(_text, leaves(row)), strict=True))
         return row_expression(type(row), path, cells, self.add)
 
-    def kind(self, name: str, kind: Any, given: Iterable[str]) -> str:
-        """Parameters of a controller or profile, of numbers in the order of its quantities."""
-        cells = dict(zip(leaf_paths(kind.parameters, name), given, strict=True))
-        return row_expression(kind.parameters, name, cells, self.add)
+    def kind(self, section: str, kind: Any, given: Mapping[str, str] | None = None) -> str:
+        """Parameters of a controller or profile: the settings of a section, some of them ``given`` in other words."""
+        numbers = self.section(section, [item.name for item in kind.quantities]) | dict(given or {})
+        cells = dict(zip(leaf_paths(kind.parameters, section), numbers.values(), strict=True))
+        return row_expression(kind.parameters, section, cells, self.add)
 
     def plant(self, name: str, torque: str) -> Iterator[str]:
         """Lines that make the device and its plant under a name, with an external torque."""
@@ -337,11 +326,6 @@ def settings_of(scenario: Scenario) -> tuple[Setting, ...]:
     )
 
 
-def links_of(scenario: Scenario) -> Graph:
-    """Settings that follow others as long as nobody changes them."""
-    return {**links_that_hold(scenario), **links_of_times(time_texts(scenario))}
-
-
 def relations_of(scenario: Scenario) -> tuple[Relation, ...]:
     """Settings that contradict each other, as they would in a file."""
     rules: list[tuple[str, str, str, float]] = [
@@ -368,15 +352,10 @@ def relations_of(scenario: Scenario) -> tuple[Relation, ...]:
 
 
 def declared_settings(scenario: Scenario) -> dict[str, Quantity]:
-    """Declarations by path, without the form of an orifice that is not used, and without second names."""
-    declared = used_numbers(scenario.device, declared_numbers(scenario))
-    return {path: item for path, item in declared.items() if path != "controller.rate"}
-
-
-def used_numbers(device: Device, declared: Mapping[str, Quantity]) -> dict[str, Quantity]:
-    """Declarations by path, without the form of an orifice that is not used, and effects that are off."""
-    sections = "valve", "actuator.leak"
-    unused = {f"{section}.{name}" for section in sections for name in other_form(device, section)}
+    """Declarations by path, without the form of an orifice that is not used, effects that are off, second names."""
+    device = scenario.device
+    unused = {"controller.rate"}
+    unused |= {f"{section}.{name}" for section in ("valve", "actuator.leak") for name in other_form(device, section)}
     is_on = effects_of(device)
     unused |= {
         f"{effect.section}.{item.name}"
@@ -384,52 +363,65 @@ def used_numbers(device: Device, declared: Mapping[str, Quantity]) -> dict[str, 
         if effect not in is_on
         for item in effect.quantities
     }
-    return {path: item for path, item in declared.items() if path not in unused}
+    return {path: item for path, item in declared_numbers(scenario).items() if path not in unused}
 
 
 def preparation_of(scenario: Scenario, program: Program, collector: Collector, boundary: Boundary) -> str:
     """The composed function ``prepare`` of a scenario, once everything it calls is gathered."""
     writing = Writing(scenario.device, scenario.supply_lines, program, collector)
-    leg = scenario.motion.leg if isinstance(scenario.motion, FreeMotion) else None
+    return writing.text(settings_of(scenario), _lines(scenario, writing), boundary)
+
+
+def _lines(scenario: Scenario, writing: Writing) -> Iterator[str]:
+    """Lines from settings to the numbers of a run; each needs names that lines before it have made."""
+    program, add, motion = writing.program, writing.add, scenario.motion
+    leg = motion.leg if isinstance(motion, FreeMotion) else None
     free = "motion_external_torque" if leg is None else "-motion_ankle_torque"
-    torque = free if isinstance(scenario.motion, FreeMotion) else "0.0"
-    lines = [
-        *writing.plant("plant", torque),
-        *([] if leg is None else _leg(leg, writing)),
-        *_steps(scenario, writing),
-        *_pieces(scenario, writing),
-        *_start(scenario, writing),
-    ]
-    return writing.text(settings_of(scenario), lines, boundary)
+    yield from writing.plant("plant", free if isinstance(motion, FreeMotion) else "0.0")
+    if leg is not None:
+        yield from _leg(leg, writing)
 
-
-def _steps(scenario: Scenario, writing: Writing) -> Iterator[str]:
-    """Lines that make the steps, delays in them, and whether the error decides about their parts."""
+    # Steps, delays in them, and whether the error decides about their parts.
     given = "run_duration, run_step, run_output_interval, controller_period"
-    yield f"counts_of_steps = {writing.add(step_counts)}({given})"
-    yield f"tolerance = {writing.add(relative_tolerance)}(run_tolerance)"
+    yield f"counts_of_steps = {add(step_counts)}({given})"
+    yield f"tolerance = {add(relative_tolerance)}(run_tolerance)"
     yield from writing.timing("sensors_delay", "tolerance")
-    if scenario.supply_lines is not None or not writing.program.is_locked or writing.program.has_shape:
+    level = c_identifier(path_of_locked_angle(scenario) or LOCKED_ANGLE)
+    if scenario.supply_lines is not None or not program.is_locked or program.has_shape:
         yield "needs_parts = True"
-        return
-    stiffness = "1.0" if scenario.gas_model is None else "gas_heat_capacity_ratio"
-    angle = c_identifier(path_of_locked_angle(scenario) or LOCKED_ANGLE)
-    shortened = f"step / {writing.add(smaller)}(1.0, tolerance)"
-    yield f"needs_parts = not {writing.add(is_slow_locked)}(plant, {shortened}, {angle}, {stiffness})"
+    else:
+        stiffness = "1.0" if scenario.gas_model is None else "gas_heat_capacity_ratio"
+        shortened = f"step / {add(smaller)}(1.0, tolerance)"
+        yield f"needs_parts = not {add(is_slow_locked)}(plant, {shortened}, {level}, {stiffness})"
 
-
-def _pieces(scenario: Scenario, writing: Writing) -> Iterator[str]:
-    """Lines that make the parameters of controller, profiles, sensors, gas and lines."""
-    program = writing.program
+    # Controller, reference, prescribed angle and gas.
     if program.controller is not None:
-        yield f"controller = {_kind(writing, 'controller', CONTROLLERS[scenario.controller.kind])}"
-    yield f"reference = {_reference(scenario, writing)}"
+        yield f"controller = {writing.kind('controller', CONTROLLERS[scenario.controller.kind])}"
+    profile, settings = PROFILES[scenario.reference.kind], scenario.reference.settings
+    # Where no reference is followed, the one that stands in its place is written out.
+    known = {} if program.has_reference else {item.name: repr(settings[item.name]) for item in profile.quantities}
+    yield f"reference = {writing.kind('reference', profile, known)}"
     if program.angle is RECORDED_ANGLE:
-        yield f"path = {writing.add(Segment)}(0.0, motion_angle, 0.0)"
-    elif isinstance(scenario.motion, PrescribedMotion):
-        held = {"level": c_identifier(path_of_locked_angle(scenario) or LOCKED_ANGLE)} if program.is_locked else {}
-        yield f"path = {_kind(writing, 'motion.profile', PROFILES[scenario.motion.profile.kind], held)}"
+        yield f"path = {add(Segment)}(0.0, motion_angle, 0.0)"
+    elif isinstance(motion, PrescribedMotion):
+        held = {"level": level} if program.is_locked else {}
+        yield f"path = {writing.kind('motion.profile', PROFILES[motion.profile.kind], held)}"
     yield from writing.gas()
+
+    # The states at the start.
+    moved = "motion_angle", "motion_angular_velocity"
+    if isinstance(motion, PrescribedMotion):
+        moved = "angle", "angular_velocity"
+        assert program.angle is not None, "the angle is prescribed"
+        yield f"angle, angular_velocity, _ = {add(program.angle.value)}(path, 0.0)"
+    pressures = "initial_pressure_1, initial_pressure_2"
+    if program.has_shape:
+        yield f"filled = {add(program.actuator.chambers)}(plant, {moved[0]}, {pressures})"
+        volumes = "filled.volume_1, filled.volume_2"
+        yield f"state = {add(state_with_volumes)}(plant, {', '.join(moved)}, {volumes}, {pressures})"
+    else:
+        yield f"state = {add(state_at_start)}(plant, {', '.join(moved)}, {pressures})"
+    yield from writing.start()
 
 
 def _leg(leg: Leg, writing: Writing) -> Iterator[str]:
@@ -438,43 +430,9 @@ def _leg(leg: Leg, writing: Writing) -> Iterator[str]:
     foot = writing.section("motion", ["foot_mass", "foot_mass_centre", "foot_inertia", "shank_length"])
     yield f"load = {add(foot_load)}(plant.inertia, plant.gravity_torque, {', '.join(foot.values())})"
     yield f"plant = {add(with_load)}(plant, load)"
-    kind = shank_kind(leg)
     if leg.curves is None:
-        yield f"shank = {_kind(writing, 'motion.shank', kind)}"
+        yield f"shank = {writing.kind('motion.shank', shank_kind(leg))}"
         return
     constant = dict(zip(leaf_paths(ShankSeries, "shank"), map(repr, numbers(leg.curves)), strict=True))
     cells = constant | {"shank.start": c_identifier("motion.shank.start"), "shank.toe_lever": "motion_toe_lever"}
     yield f"shank = {row_expression(ShankSeries, 'shank', cells, add)}"
-
-
-def _kind(writing: Writing, section: str, kind: Any, given: Mapping[str, str] | None = None) -> str:
-    """Parameters of a controller or profile from its settings."""
-    names = writing.section(section, [item.name for item in kind.quantities]) | dict(given or {})
-    return writing.kind(section, kind, names.values())
-
-
-def _reference(scenario: Scenario, writing: Writing) -> str:
-    """The reference; where none is followed, the one that stands in its place."""
-    choice = scenario.reference
-    kind = PROFILES[choice.kind]
-    if writing.program.has_reference:
-        return _kind(writing, "reference", kind)
-    return _kind(writing, "reference", kind, {item.name: repr(choice.settings[item.name]) for item in kind.quantities})
-
-
-def _start(scenario: Scenario, writing: Writing) -> Iterator[str]:
-    """Lines that make the states at the start."""
-    program, add = writing.program, writing.add
-    moved = "motion_angle", "motion_angular_velocity"
-    if isinstance(scenario.motion, PrescribedMotion):
-        moved = "angle", "angular_velocity"
-        assert program.angle is not None, "the angle is prescribed"
-        yield f"angle, angular_velocity, _ = {add(program.angle.value)}(path, 0.0)"
-    given = "initial_pressure_1, initial_pressure_2"
-    if program.has_shape:
-        yield f"filled = {add(program.actuator.chambers)}(plant, {moved[0]}, {given})"
-        volumes = "filled.volume_1, filled.volume_2"
-        yield f"state = {add(state_with_volumes)}(plant, {', '.join(moved)}, {volumes}, {given})"
-    else:
-        yield f"state = {add(state_at_start)}(plant, {', '.join(moved)}, {given})"
-    yield from writing.start()

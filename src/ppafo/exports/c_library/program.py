@@ -65,15 +65,12 @@ class _ForOneRun(ast.NodeTransformer):
             return node
         return ast.copy_location(ast.Call(node.args[0], node.args[1:], node.keywords), node)
 
-    def visit_IfExp(self, node: ast.IfExp) -> ast.expr:
+    def visit_If(self, node: ast.If | ast.IfExp) -> ast.AST | list[ast.stmt]:
         """What is done for a column is left away."""
         self.generic_visit(node)
         return node.orelse if self.asks_for_column(node.test) else node
 
-    def visit_If(self, node: ast.If) -> ast.stmt | list[ast.stmt]:
-        """What is done for a column is left away."""
-        self.generic_visit(node)
-        return node.orelse if self.asks_for_column(node.test) else node
+    visit_IfExp = visit_If  # noqa: N815 - named by the library
 
     def asks_for_column(self, node: ast.expr) -> bool:
         """True for a test of whether numbers are columns."""
@@ -140,16 +137,6 @@ class ExportedProgram:
         """Channels that it gives at each sample, in order."""
         return self.program.traced
 
-    @property
-    def state_places(self) -> dict[str, str]:
-        """Name of the place of each state row in C, by its path."""
-        return places_of(self.program.state_rows())
-
-    @property
-    def parameter_places(self) -> dict[str, str]:
-        """Name of the place of each parameter row in C, by its path."""
-        return places_of(self.program.parameter_rows())
-
 
 def exported(program: Program) -> ExportedProgram:
     """The program as it is exported; a metric that needs all samples of a channel is left out."""
@@ -176,22 +163,22 @@ def c_text_of_run(
     title: str,
     name: str,
     settings: Sequence[str],
-    further: Further | None,
+    further: Sequence[Further],
     around: str,
 ) -> str:
     """All functions of an exported program in C for people: of a single run, without lanes, between structs.
 
     ``name`` begins the names of the structs of settings and metrics, which the file ``around`` it declares; ``further``
-    may add a function that takes ``settings``.
+    may add functions that take ``settings``.
     """
-    from ppafo.translation.c99 import Reading, c_source, documents_of
+    from ppafo.translation.c99 import Reading, c_source, documents_of, is_free
     from ppafo.translation.walk import walk_module
 
     collector = SourceCollector(INLINE, for_one_run)
     program, structs = item.program, Structs()
     link_program(program, collector)
     entries = [metrics_entry(item, collector, structs)] if item.metrics else []
-    entries += [] if further is None else [further(collector, structs)]
+    entries += [add(collector, structs) for add in further]
     loop = run_loop(item.loops[WHOLE], collector, f"{name}_outputs", item.loops.get(IN_PARTS))
     composed = "\n\n".join([HEADER, collector.text(), loop, *entries, ""])
     states = struct_of("run_states", program.state_rows(), collector.add)
@@ -207,12 +194,16 @@ def c_text_of_run(
         "follow": (given, given),
     }
     documents = documents_of(collector) | _DOCUMENTS
+    # A short name is taken only where it is unambiguous and C leaves it free; all others keep their module's path.
+    own = {name: re.sub(r"\W", "_", item.__qualname__).strip("_") for name, item in collector.owners.items()}
+    counts, taken = Counter(own.values()), _names_around()
+    short = {name: word for name, word in own.items() if counts[word] == 1 and word not in taken and is_free(word)}
     return c_source(
         # Functions of the C library have last bits of their own: a run must not call any.
         walk_module(composed, types),
         documents,
         title,
-        reading=Reading(_short(collector), {kind.row.name: kind.row.name for kind in (given, outputs, found)}, around),
+        reading=Reading(short, {kind.row.name: kind.row.name for kind in (given, outputs, found)}, around),
     )
 
 
@@ -227,17 +218,6 @@ _DOCUMENTS = {
     "prepare": "From the settings, in SI units, to the numbers of a run.",
     "follow": "Let settings that still have their default follow others.",
 }
-
-
-def _short(collector: SourceCollector) -> dict[str, str]:
-    """Short names for the functions and rows of a module: their own, where no other has it and C leaves it free."""
-    from ppafo.translation.c99 import is_free
-
-    own = {name: name_of(item) for name, item in collector.owners.items()}
-    # A short name is taken only where it is unambiguous; all others keep their module's path.
-    counts = Counter(own.values())
-    taken = _names_around()
-    return {name: short for name, short in own.items() if counts[short] == 1 and short not in taken and is_free(short)}
 
 
 @cache
@@ -262,11 +242,6 @@ def _names_around() -> frozenset[str]:
 _FUNCTION = re.compile(r"^(?:static )?[\w ]+\b\*?(\w+)\(", re.MULTILINE)
 
 
-def name_of(item: Any) -> str:
-    """The name of a function or row of Python as one of C."""
-    return re.sub(r"\W", "_", str(item.__qualname__)).strip("_")
-
-
 def c_text(item: ExportedProgram, title: str, settings: Sequence[str], further: Further | None, together: int) -> str:
     """All functions of an exported program in C; ``further`` may add one that takes ``settings``, which are named.
 
@@ -278,7 +253,8 @@ def c_text(item: ExportedProgram, title: str, settings: Sequence[str], further: 
     # A collector that also takes functions that Python applies to columns.
     collector = SourceCollector(INLINE, for_one_run)
     composed = _composed_text(item, collector, further, together)
-    state, parameter = list(item.state_places.values()), list(item.parameter_places.values())
+    state = list(places_of(item.program.state_rows()).values())
+    parameter = list(places_of(item.program.parameter_rows()).values())
     alone = [name.replace("AT_", "PARAMETER_", 1) for name in parameter]
     steps = {name: _stepping(program, _STEPS[name]) for name, program in item.loops.items()}
     places = {
@@ -313,7 +289,8 @@ def c_text(item: ExportedProgram, title: str, settings: Sequence[str], further: 
 def outline_of(item: ExportedProgram, settings: Sequence[str], further: Further | None, together: int) -> str:
     """All that ``c_text`` makes the same functions from but its title: the same outline, the same code."""
     composed = _composed_text(item, Outline(INLINE, for_one_run), further, together)
-    names = [item.state_places, item.parameter_places, [kind.name for kind in item.metrics], list(settings)]
+    places = [places_of(item.program.state_rows()), places_of(item.program.parameter_rows())]
+    names = [*places, [kind.name for kind in item.metrics], list(settings)]
     return f"{names!r}\n{composed}"
 
 

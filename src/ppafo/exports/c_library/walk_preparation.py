@@ -35,7 +35,6 @@ from ppafo.walking.preparation import (
     DISTORTING,
     FROZEN,
     NEVER,
-    FaultSettings,
     device_share,
     distorting_fault,
     fixed_fault,
@@ -97,38 +96,25 @@ def check_can_leave(configuration: Scenario) -> None:
 
 def settings_of_walk(configuration: Scenario) -> tuple[Setting, ...]:
     """Every number of a walk in SI units, under the path that overrides know it by."""
-    return tuple(
-        Setting(c_identifier(path), path, replace(item, summary=SAID.get(path, item.summary)), value)
-        for path, (item, value) in _numbers(configuration).items()
-    )
-
-
-def _numbers(configuration: Scenario) -> dict[str, tuple[Quantity, float]]:
-    """Declaration and value of every number of a walk, by path."""
-    duration = configuration.run.duration
-    of_run = {
-        "run.duration": duration,
-        "run.step": configuration.run.step,
-        "run.output_interval": walk_of(configuration).who.interval(duration),
-    }
-    times, control = of_run | {"controller.period": configuration.controller.period}, _control(configuration)
-    who = walk_of(configuration).who
+    run, who, control = configuration.run, walk_of(configuration).who, _control(configuration)
+    of_run = {"run.duration": run.duration, "run.step": run.step, "run.output_interval": who.interval(run.duration)}
+    times = of_run | {"controller.period": configuration.controller.period}
     declared = declared_settings(configuration) | control | {f"run.{item.name}": item for item in (*RUN, who.step)}
     # What fails of the plant, with its shut-off valve, is written out in the source; persons are drawn in Python.
     fixed = ("shut_off.", *(f"faults.{part}." for part in walk_of(configuration).broken), f"wearer.{PERSON.name}")
     # The structures of libraries have the times behind the device.
     wearer = (f"wearer.{item.name}" for item in who.numbers)
     paths = dict.fromkeys((*device_numbers(configuration.device), *of_run, *wearer, *times, *control, *declared))
-    return {
-        path: (declared[path], times[path] if path in times else number_at(configuration, path))
+    return tuple(
+        Setting(
+            c_identifier(path),
+            path,
+            replace(declared[path], summary=SAID.get(path, declared[path].summary)),
+            times[path] if path in times else number_at(configuration, path),
+        )
         for path in paths
         if path in declared and not path.startswith(fixed)
-    }
-
-
-def sensors_that_fail(configuration: Scenario) -> dict[str, FaultSettings]:
-    """Faults of a walk by the name of the sensor, only where there is one."""
-    return {sensor: item for sensor, item in walk_of(configuration).faults.items() if item.kind}
+    )
 
 
 def _control(configuration: Scenario) -> dict[str, Quantity]:
@@ -141,11 +127,11 @@ def _control(configuration: Scenario) -> dict[str, Quantity]:
 
 def links_of_walk(configuration: Scenario) -> Graph:
     """Settings of a walk that follow others as long as nobody changes them."""
-    known = _numbers(configuration)
+    known = {item.path: item.value for item in settings_of_walk(configuration)}
     recorded = {"run.output_interval": (Follows((Term(("run.duration",), walk_of(configuration).who.interval),)),)}
     # A plant alone has no settings of the controller that its walk had.
     links = {path: links for path, links in {**configuration.graph, **recorded}.items() if path in known}
-    return holding(links, lambda path: known[path][1])
+    return holding(links, known.__getitem__)
 
 
 def relations_of_walk(configuration: Scenario) -> tuple[Relation, ...]:
@@ -154,7 +140,7 @@ def relations_of_walk(configuration: Scenario) -> tuple[Relation, ...]:
     if configuration.supply_lines is not None:
         rules.append(("supply.dorsiflexion_pressure", "at most", "supply.pressure"))
     rules += _RELATIONS
-    known = _numbers(configuration)
+    known = {item.path for item in settings_of_walk(configuration)}
     return tuple(
         Relation(c_identifier(path), relation, c_identifier(other))
         for path, relation, other in rules
@@ -165,20 +151,55 @@ def relations_of_walk(configuration: Scenario) -> tuple[Relation, ...]:
 def preparation_of_walk(configuration: Scenario, program: Program, collector: Collector, boundary: Boundary) -> str:
     """The composed function ``prepare`` of a walk, once everything it calls is gathered."""
     writing = Writing(configuration.device, configuration.supply_lines, program, collector)
+    return writing.text(settings_of_walk(configuration), _lines(configuration, writing), boundary)
+
+
+def _lines(configuration: Scenario, writing: Writing) -> Iterator[str]:
+    """Lines from settings to the numbers of a run; each needs names that lines before it have made."""
     form: ExportedWalk = kind_at(walk_of(configuration).who.exported)
-    lines = [
-        *writing.plant("bare", "0.0"),
-        # Each line needs names that lines before it have made, so this order is fixed.
-        *form.leg(configuration, writing),
-        *_gait_sensors(configuration, writing),
-        *_plant_faults(configuration, writing),
-        *_steps(configuration, writing),
-        *writing.timing("signal_delay"),
-        *_components(configuration, writing),
-        *form.start(configuration, writing),
-        *writing.start(),
-    ]
-    return writing.text(settings_of_walk(configuration), lines, boundary)
+    add = writing.add
+    yield from writing.plant("bare", "0.0")
+    yield from form.leg(configuration, writing)
+
+    # Sensors with their faults, and the longest time by which one is late.
+    faults = walk_of(configuration).faults
+    for sensor, fault in faults.items():
+        names = writing.section(f"faults.{sensor}", [item.name for item in fault_numbers(sensor, fault.kind)])
+        yield f"{sensor}_fault = {_fault(writing, fault.kind, names)}"
+    row = writing.row("SensorNumbers", writing.section("sensors", (*_FORCES, *_OTHERS)))
+    failing_sensors = ", ".join(f"{sensor}_fault" for sensor in faults)
+    yield f"gait_sensors = {add(gait_sensors)}({row}, controller_period, {failing_sensors})"
+    yield f"signal_delay = {add(longest_delay)}(gait_sensors) * controller_period"
+
+    # What fails of the plant and the shut-off valve, numbers written out.
+    failing = failing_of(configuration)
+    if failing is not None:
+        yield f"plant_faults = {writing.constant(failing[0], 'plant_faults')}"
+        yield f"shut_off = {writing.constant(failing[1], 'shut_off')}"
+        yield f"unpowered = {writing.constant(POWERED, 'unpowered')}"
+
+    # Steps: the smallest volume limits them, and adiabatic gas, which is stiffer by the heat capacity ratio.
+    yield f"volume = {add(smallest_chamber)}(plant)"
+    if configuration.supply_lines is not None:
+        volumes = (c_identifier(f"supply_line.{line}.volume") for line in SUPPLY_LINES)
+        yield f"volume = min(volume, {', '.join(volumes)})"
+    stiffness = "1.0" if configuration.gas_model is None else "gas_heat_capacity_ratio"
+    given = "run_duration, run_step, run_output_interval, controller_period"
+    yield f"counts_of_steps = {add(walk_step_counts)}({given}, plant, volume, {stiffness})"
+    yield "needs_parts = False"
+    yield from writing.timing("signal_delay")
+
+    # Controller, gas and course.
+    settings = {item.name: c_identifier(path) for path, item in _control(configuration).items()}
+    yield f"controller = {writing.kind('controller', law_of(configuration), settings)}"
+    yield f"reference = {writing.constant(profile_parameters(NO_REFERENCE), 'reference')}"
+    yield from writing.gas()
+    planned = course_of_walk(configuration)
+    if planned is not None:
+        yield f"walk_course = {writing.constant(planned.course, 'walk_course')}"
+
+    yield from form.start(configuration, writing)
+    yield from writing.start()
 
 
 def _leg(configuration: Scenario, writing: Writing) -> Iterator[str]:
@@ -195,27 +216,6 @@ def _leg(configuration: Scenario, writing: Writing) -> Iterator[str]:
     yield f"gait_timing = {writing.constant(gait_timing(walk_of(configuration).gait), 'gait_timing')}"
 
 
-def _gait_sensors(configuration: Scenario, writing: Writing) -> Iterator[str]:
-    """Lines that make the sensors with their faults, and the longest time by which one is late."""
-    add, faults = writing.add, walk_of(configuration).faults
-    for sensor, fault in faults.items():
-        names = writing.section(f"faults.{sensor}", [item.name for item in fault_numbers(sensor, fault.kind)])
-        yield f"{sensor}_fault = {_fault(writing, fault.kind, names)}"
-    row = writing.row("SensorNumbers", writing.section("sensors", (*_FORCES, *_OTHERS)))
-    failing = ", ".join(f"{sensor}_fault" for sensor in faults)
-    yield f"gait_sensors = {add(gait_sensors)}({row}, controller_period, {failing})"
-    yield f"signal_delay = {add(longest_delay)}(gait_sensors) * controller_period"
-
-
-def _plant_faults(configuration: Scenario, writing: Writing) -> Iterator[str]:
-    """Lines that make what fails of the plant and the shut-off valve, numbers written out, where there are any."""
-    failing = failing_of(configuration)
-    if failing is not None:
-        yield f"plant_faults = {writing.constant(failing[0], 'plant_faults')}"
-        yield f"shut_off = {writing.constant(failing[1], 'shut_off')}"
-        yield f"unpowered = {writing.constant(POWERED, 'unpowered')}"
-
-
 def _fault(writing: Writing, kind: str, names: Mapping[str, str]) -> str:
     """A fault of a sensor from its settings, or none."""
     if not kind:
@@ -228,31 +228,6 @@ def _fault(writing: Writing, kind: str, names: Mapping[str, str]) -> str:
         return f"{writing.add(fixed_fault)}({names['time']}, {holds!r}, {reading}, {names['period']})"
     given = ", ".join(names.get(name, "0.0") for name in DISTORTING)
     return f"{writing.add(distorting_fault)}({given}, controller_period)"
-
-
-def _steps(configuration: Scenario, writing: Writing) -> Iterator[str]:
-    """Lines that make the steps."""
-    yield f"volume = {writing.add(smallest_chamber)}(plant)"
-    if configuration.supply_lines is not None:
-        volumes = (c_identifier(f"supply_line.{line}.volume") for line in SUPPLY_LINES)
-        yield f"volume = min(volume, {', '.join(volumes)})"
-    # Adiabatic gas is stiffer by the heat capacity ratio, so its steps are shorter.
-    stiffness = "1.0" if configuration.gas_model is None else "gas_heat_capacity_ratio"
-    given = "run_duration, run_step, run_output_interval, controller_period"
-    yield f"counts_of_steps = {writing.add(walk_step_counts)}({given}, plant, volume, {stiffness})"
-    yield "needs_parts = False"
-
-
-def _components(configuration: Scenario, writing: Writing) -> Iterator[str]:
-    """Lines that make the parameters of the controller, its noise, gas, lines and course."""
-    control = law_of(configuration)
-    given = [c_identifier(path) for path in _control(configuration)]
-    yield f"controller = {writing.kind('controller', control, given)}"
-    yield f"reference = {writing.constant(profile_parameters(NO_REFERENCE), 'reference')}"
-    yield from writing.gas()
-    planned = course_of_walk(configuration)
-    if planned is not None:
-        yield f"walk_course = {writing.constant(planned.course, 'walk_course')}"
 
 
 def _start(configuration: Scenario, writing: Writing) -> Iterator[str]:

@@ -19,7 +19,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from ppafo.errors import ProgramError, ScenarioError, nearest_name
-from ppafo.exports import filled, licence, template
+from ppafo.exports import filled, template
 from ppafo.exports.c_library import library_of
 from ppafo.exports.c_library.files import library_files
 from ppafo.exports.c_library.plant import follow_lines, plant_of, surfaced
@@ -74,13 +74,8 @@ def host_platform() -> str | None:
 
 def build(name: str, sources: Mapping[str, bytes], main: str) -> bytes:
     """The library of a unit for a platform. ProgramError where no compiler is there for it, or it refuses."""
-    return build_library(name, sources, main, HIDDEN)
-
-
-def build_library(name: str, sources: Mapping[str, bytes], main: str, flags: Sequence[str]) -> bytes:
-    """A library of some sources for a platform; ProgramError as in ``build``."""
     # No -march: a unit runs on processors that nobody here has seen.
-    command = [*compiler_for(name), *FLAGS, *flags]
+    command = [*compiler_for(name), *FLAGS, *HIDDEN]
     with tempfile.TemporaryDirectory() as folder:
         for file, content in sources.items():
             (Path(folder) / file).write_bytes(content)
@@ -155,10 +150,21 @@ def functional_unit(interface: Interface, fmi: int, platforms: Sequence[str]) ->
     # The token is the hash of the sources before it stands in them.
     sources = {name: content.replace(b"@token@", token.encode()) for name, content in sources.items()}
     main = f"fmi{fmi}.c"
+    tried = "".join(f"<tr><td>{name}</td><td>{item.tried}</td></tr>" for name, item in chosen.items())
+    words = {
+        "title": html.escape(interface.name),
+        "description": html.escape(interface.library.description),
+        "version": __version__,
+        "time": interface.time,
+        "tuning": interface.tuning,
+        "binaries": tried or "<tr><td>none</td><td></td></tr>",
+        "main": main,
+        "flags": " ".join(FLAGS),
+    }
     contents = {
         "modelDescription.xml": _DESCRIBED[fmi](interface, identifier, token),
-        "documentation/index.html": _page(interface, chosen, main),
-        "documentation/licenses/license.txt": licence().encode(),
+        "documentation/index.html": filled(template("ppafo.exports.fmu", "index.html"), words).encode(),
+        "documentation/licenses/license.txt": template("ppafo.exports.c_library", "LICENSE").encode(),
         **{f"sources/{name}": content for name, content in sources.items()},
     }
     if fmi == 3:
@@ -222,22 +228,6 @@ def _sources(interface: Interface, fmi: int) -> dict[str, bytes]:
         f"fmi{fmi}.c": "".join(filled(template("ppafo.exports.fmu", file), words) for file in calls[fmi]).encode(),
         **{file: headers.joinpath(file).read_bytes() for file in _HEADERS[fmi]},
     }
-
-
-def _page(interface: Interface, platforms: Mapping[str, Platform], main: str) -> bytes:
-    """The page inside a unit: what it is, how it goes on, how its binaries were tried."""
-    rows = "".join(f"<tr><td>{name}</td><td>{item.tried}</td></tr>" for name, item in platforms.items())
-    words = {
-        "title": html.escape(interface.name),
-        "description": html.escape(interface.library.description),
-        "version": __version__,
-        "time": interface.time,
-        "tuning": interface.tuning,
-        "binaries": rows or "<tr><td>none</td><td></td></tr>",
-        "main": main,
-        "flags": " ".join(FLAGS),
-    }
-    return filled(template("ppafo.exports.fmu", "index.html"), words).encode()
 
 
 def _archive(contents: Mapping[str, bytes]) -> bytes:

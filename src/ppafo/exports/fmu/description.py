@@ -154,20 +154,17 @@ def description_of_fmi2(interface: Interface, identifier: str, token: str) -> by
         canGetAndSetFMUstate="true",
         canSerializeFMUstate="true",
         canNotUseMemoryManagementFunctions="true",
-        canHandleVariableCommunicationStepSize=_truth(not interface.is_step_fixed),
+        canHandleVariableCommunicationStepSize=str(not interface.is_step_fixed).lower(),
     )
     # One file that takes the others in: tools that build from source need no list.
     Xml.SubElement(Xml.SubElement(kind, "SourceFiles"), "File", name="fmi2.c")
-    _units(root, variables)
-    categories = Xml.SubElement(root, "LogCategories")
-    Xml.SubElement(categories, "Category", name="logStatusError", description="why a call failed")
-    _experiment(root, interface)
+    _add_units_and_experiment(root, interface, variables)
     table = Xml.SubElement(root, "ModelVariables")
     # FMI 2 counts variables by their place in the list, from 1.
     places = {item.number: place for place, item in enumerate(variables, start=1)}
     for item in variables:
-        row = Xml.SubElement(table, "ScalarVariable", _scalar(item))
-        Xml.SubElement(row, "Real", _real(item))
+        of_variable, of_number = _attributes(item)
+        Xml.SubElement(Xml.SubElement(table, "ScalarVariable", of_variable), "Real", of_number)
     outputs = [places[item.number] for item in variables if item.causality == "output"]
     structure = Xml.SubElement(root, "ModelStructure")
     # Outputs of a step depend on no input of that instant.
@@ -182,7 +179,7 @@ def description_of_fmi3(interface: Interface, identifier: str, token: str) -> by
     """The description for FMI 3.0."""
     variables = variables_of(interface)
     root = Xml.Element("fmiModelDescription", _head("3.0", interface, instantiationToken=token))
-    has_clock = interface.clock is not None
+    has_clock = str(interface.clock is not None).lower()
     internal: dict[str, Any] = {"fixedInternalStepSize": repr(interface.step)} if interface.is_step_fixed else {}
     Xml.SubElement(
         root,
@@ -190,15 +187,12 @@ def description_of_fmi3(interface: Interface, identifier: str, token: str) -> by
         modelIdentifier=identifier,
         canGetAndSetFMUState="true",
         canSerializeFMUState="true",
-        canHandleVariableCommunicationStepSize=_truth(not interface.is_step_fixed),
-        hasEventMode=_truth(has_clock),
-        mightReturnEarlyFromDoStep=_truth(has_clock),
+        canHandleVariableCommunicationStepSize=str(not interface.is_step_fixed).lower(),
+        hasEventMode=has_clock,
+        mightReturnEarlyFromDoStep=has_clock,
         **internal,
     )
-    _units(root, variables)
-    categories = Xml.SubElement(root, "LogCategories")
-    Xml.SubElement(categories, "Category", name="logStatusError", description="why a call failed")
-    _experiment(root, interface)
+    _add_units_and_experiment(root, interface, variables)
     table = Xml.SubElement(root, "ModelVariables")
     # Clock and time get numbers behind all variables of the C.
     first = 1 + max(item.number for item in variables)
@@ -208,9 +202,11 @@ def description_of_fmi3(interface: Interface, identifier: str, token: str) -> by
     time = {"name": "time", "valueReference": str(first + 1), "description": "time", "causality": "independent"}
     Xml.SubElement(table, "Float64", {**time, "variability": "continuous", "unit": "s"})
     for item in variables:
-        Xml.SubElement(table, "Float64", {**_scalar(item), **_real(item)})
+        of_variable, of_number = _attributes(item)
+        Xml.SubElement(table, "Float64", of_variable | of_number)
     structure = Xml.SubElement(root, "ModelStructure")
-    outputs = [item.number for item in variables if item.causality == "output"] + [first] * has_clock
+    outputs = [item.number for item in variables if item.causality == "output"]
+    outputs += [] if interface.clock is None else [first]
     for name, known in {"Output": {"dependencies": ""}, "InitialUnknown": {}}.items():
         for number in outputs:
             Xml.SubElement(structure, name, {"valueReference": str(number), **known})
@@ -239,14 +235,10 @@ def _head(version: str, interface: Interface, **further: str) -> dict[str, str]:
     }
 
 
-def _experiment(root: Xml.Element, interface: Interface) -> None:
-    given = {"startTime": 0.0, "stopTime": interface.duration, "stepSize": interface.step}
-    Xml.SubElement(root, "DefaultExperiment", {name: repr(value) for name, value in given.items()})
-
-
-def _scalar(item: Variable) -> dict[str, str]:
+def _attributes(item: Variable) -> tuple[dict[str, str], dict[str, str]]:
+    """Attributes of a variable, and of the number that it is."""
     initial = {"parameter": {"initial": "exact"}, "input": {}}.get(item.causality, {"initial": "calculated"})
-    return {
+    of_variable = {
         "name": item.name,
         "valueReference": str(item.number),
         "description": item.summary,
@@ -254,15 +246,13 @@ def _scalar(item: Variable) -> dict[str, str]:
         "variability": item.variability,
         **initial,
     }
-
-
-def _real(item: Variable) -> dict[str, str]:
     limits = {"min": item.minimum, "max": item.maximum, "start": item.start}
     unit = _shown(item.unit)
-    found = {"unit": unit} if unit else {}
+    of_number = {"unit": unit} if unit else {}
     if unit in DISPLAY_UNITS:
-        found["displayUnit"] = DISPLAY_UNITS[unit]
-    return found | {name: repr(float(value)) for name, value in limits.items() if value is not None}
+        of_number["displayUnit"] = DISPLAY_UNITS[unit]
+    of_number |= {name: repr(float(value)) for name, value in limits.items() if value is not None}
+    return of_variable, of_number
 
 
 def _shown(unit: str) -> str:
@@ -271,7 +261,8 @@ def _shown(unit: str) -> str:
     return "" if bare in ("", "-", "1") else bare
 
 
-def _units(root: Xml.Element, variables: Iterable[Variable]) -> None:
+def _add_units_and_experiment(root: Xml.Element, interface: Interface, variables: Iterable[Variable]) -> None:
+    """Add what stands between the kind of a unit and its variables, in FMI 2 and 3 alike."""
     table = Xml.SubElement(root, "UnitDefinitions")
     for name in sorted({_shown(item.unit) for item in variables} - {""}):
         exponents = {BASE_UNITS[base]: str(power) for base, power in dimension(name).items()}
@@ -280,10 +271,10 @@ def _units(root: Xml.Element, variables: Iterable[Variable]) -> None:
         if name in DISPLAY_UNITS:
             factor = 1.0 / base_value(1.0, DISPLAY_UNITS[name]) * base_value(1.0, name)
             Xml.SubElement(unit, "DisplayUnit", name=DISPLAY_UNITS[name], factor=repr(factor))
-
-
-def _truth(value: bool) -> str:
-    return "true" if value else "false"
+    categories = Xml.SubElement(root, "LogCategories")
+    Xml.SubElement(categories, "Category", name="logStatusError", description="why a call failed")
+    given = {"startTime": 0.0, "stopTime": interface.duration, "stepSize": interface.step}
+    Xml.SubElement(root, "DefaultExperiment", {name: repr(value) for name, value in given.items()})
 
 
 def _text(root: Xml.Element) -> bytes:

@@ -14,7 +14,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol, final
+from typing import NamedTuple, final
 
 from ppafo.errors import ScenarioError
 from ppafo.exports.hil import wire
@@ -26,34 +26,6 @@ _AT_ONCE = 64
 """Packets that are taken without a look at the clock: a sender without end must not hold up the plant."""
 Take = Callable[[bytes], bool]
 """Takes what came in, and says whether what is waited for is there."""
-
-
-class Pace(Protocol):
-    """How the plant's time goes on."""
-
-    stood_still: list[float]
-
-    @property
-    def is_real(self) -> bool:
-        """True where times mean something."""
-
-    def begin(self) -> None:
-        """Let time begin."""
-
-    def now(self) -> float:
-        """Time [s] since the beginning."""
-
-    def late(self, due: float) -> float:
-        """By how much a time [s] that was listened for has been missed [s]."""
-
-    def call(self, seconds: float, port: wire.Port, take: Take) -> None:
-        """Hand over what comes in for some seconds, or until what is waited for is there."""
-
-    def listen(self, until: float, port: wire.Port, take: Take) -> None:
-        """Hand over what comes in until a time [s], or until what is waited for is there."""
-
-    def rest(self, until: float, port: wire.Port, take: Take) -> None:
-        """Hand over what comes in until a time [s]."""
 
 
 def _listen_for(seconds: float, clock: Callable[[], float], port: wire.Port, take: Take) -> None:
@@ -89,17 +61,17 @@ class RealTime:
 
     def __init__(self, period: float, clock: Callable[[], float] = time.perf_counter) -> None:
         self.stood_still: list[float] = []
+        self.clock = clock
         self._period = period
-        self._clock = clock
         self._start = clock()
 
     def begin(self) -> None:
         """Let time begin now."""
-        self._start = self._clock()
+        self._start = self.clock()
 
     def now(self) -> float:
         """Time [s] since the beginning, less the time in which it stood still."""
-        return self._clock() - self._start
+        return self.clock() - self._start
 
     def late(self, due: float) -> float:
         """By how much a time [s] that was listened for has been missed [s]."""
@@ -111,13 +83,9 @@ class RealTime:
             self._start += missed
         return missed
 
-    def call(self, seconds: float, port: wire.Port, take: Take) -> None:
-        """Hand over what comes in for some seconds, or until what is waited for is there."""
-        _listen_for(seconds, self._clock, port, take)
-
     def listen(self, until: float, port: wire.Port, take: Take) -> None:
         """Hand over what comes in until a time [s], or until what is waited for is there."""
-        _listen_for(until - self.now(), self._clock, port, take)
+        _listen_for(until - self.now(), self.clock, port, take)
 
     def rest(self, until: float, port: wire.Port, take: Take) -> None:
         """Hand over what comes in until a time [s]."""
@@ -135,8 +103,8 @@ class LockStep:
 
     def __init__(self, patience: float = 1.0, clock: Callable[[], float] = time.perf_counter) -> None:
         self.stood_still: list[float] = []
+        self.clock = clock
         self._patience = patience
-        self._clock = clock
         self._now = 0.0
 
     def begin(self) -> None:
@@ -152,19 +120,19 @@ class LockStep:
         self._now = due
         return 0.0
 
-    def call(self, seconds: float, port: wire.Port, take: Take) -> None:
-        """Hand over what comes in for some seconds, or until what is waited for is there."""
-        _listen_for(seconds, self._clock, port, take)
-
     def listen(self, until: float, port: wire.Port, take: Take) -> None:
         """Hand over what comes in until what is waited for is there."""
         del until
-        _listen_for(self._patience, self._clock, port, take)
+        _listen_for(self._patience, self.clock, port, take)
 
     def rest(self, until: float, port: wire.Port, take: Take) -> None:
         """Hand over what has come in."""
         del until
         _drain(port, take)
+
+
+Pace = RealTime | LockStep
+"""How the plant's time goes on; ``is_real`` where times mean something."""
 
 
 @contextmanager
@@ -343,7 +311,7 @@ class Bench:
         first = wire.sample_bytes(self._shown)
         for _ in range(max(1, math.ceil(patience / _CALL_INTERVAL))):
             self.port.send(first)
-            self.pace.call(_CALL_INTERVAL, self.port, self._take)
+            _listen_for(_CALL_INTERVAL, self.pace.clock, self.port, self._take)
             if self.judge.is_answered or is_stopped():
                 break
         if not self.judge.is_answered:
@@ -386,8 +354,10 @@ class Bench:
         """Wait for the answer to the sample that was sent [s], go on under it, and wait until the next one is due."""
         sequence = self.plant.taken
         next_due = (sequence + 1) * self.period
-        # In lock step nothing is waited for once the link is given up, or each sample would take a second.
-        if not self.judge.is_answered and (self.pace.is_real or not self._is_given_up):
+        # Nothing is to come where the port broke, or the plant is vented and the last sample had no answer.
+        is_given_up = bool(self.port.failure or (self.judge.vented and self.judge.sent - self.judge.answered > 1))
+        # In lock step nothing is waited for then, or each sample would take a second.
+        if not self.judge.is_answered and (self.pace.is_real or not is_given_up):
             self.pace.listen(next_due, self.port, self._take)
         answered = self._answered_at - sent if self.judge.is_answered else None
         if self.port.failure:
@@ -418,11 +388,6 @@ class Bench:
                 self.taken += 1
                 self._answered_at = self.pace.now()
         return self.judge.is_answered
-
-    @property
-    def _is_given_up(self) -> bool:
-        """True where nothing is to come: the port broke, or the plant is vented and the last sample had no answer."""
-        return bool(self.port.failure) or (bool(self.judge.vented) and self.judge.sent - self.judge.answered > 1)
 
     @property
     def _is_going_on(self) -> bool:

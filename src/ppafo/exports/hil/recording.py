@@ -82,7 +82,8 @@ class Collector:
         self._newest = 0
         self._newest_stamp = 0
         self._elapsed = 0
-        self._is_computed = False
+        self._names: list[str] = []
+        self._kind: RecordingKind = "measured"
         # In the order in which they came, as plain numbers: an hour of a bench has millions of samples.
         self._numbers, self._stamps, self._counts = array("q"), array("Q"), array("i")
         self._seen: set[int] = set()
@@ -103,6 +104,7 @@ class Collector:
                 self.ignored["without a channel"] += 1
                 return False
             self._first = first = packet
+            self._names = list(packet.counts)
             self._newest, self._newest_stamp = packet.sequence, packet.time
         if packet.run != first.run:
             self.ignored["of another run"] += 1
@@ -123,7 +125,8 @@ class Collector:
             # From sample to sample: half of what a time stamp holds is 36 minutes, and a recording may be longer.
             self._elapsed += _difference(packet.time, self._newest_stamp)
             self._newest, self._newest_stamp = number, packet.time
-        self._is_computed = self._is_computed or bool(packet.flags & wire.COMPUTED)
+        if packet.flags & wire.COMPUTED:
+            self._kind = "simulated"
         self._seen.add(number)
         self._numbers.append(number)
         self._stamps.append(packet.time)
@@ -182,14 +185,6 @@ class Collector:
             values = map(wire.value_of, self._names, counts)
             lines.append(",".join([repr(elapsed / wire.MICROSECONDS), *map(repr, values)]) + "\n")
         return "".join(lines)
-
-    @property
-    def _names(self) -> list[str]:
-        return list(self._first.counts) if self._first is not None else []
-
-    @property
-    def _kind(self) -> RecordingKind:
-        return "simulated" if self._is_computed else "measured"
 
 
 def _difference(later: int, earlier: int) -> int:

@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, final
+from typing import TYPE_CHECKING, Any, NamedTuple, final
 
 import numpy as np
 
@@ -52,10 +52,6 @@ class Plant:
     module: ModuleType
     compiled_by: str
     period: float
-
-    def begin(self) -> SampledRun:
-        """The plant at its start."""
-        return SampledRun(batch_of(self.run), self.module)
 
 
 def plant_of(scenario: Scenario, rate: int = wire.RATE) -> Plant:
@@ -121,14 +117,33 @@ def load_now() -> float | None:
         return None
 
 
+class Timing(NamedTuple):
+    """How late samples were sent, after how long they were answered [s], and how many had no answer of their own.
+
+    Samples with which a stopped run was vented are not among them: they were not sent.
+    """
+
+    sent_late: list[float]
+    answered_after: list[float]
+    missed: int
+
+
+def timing_of(rows: Sequence[Row]) -> Timing:
+    """Return the timing of the samples of a log."""
+    sent = [row for row in rows if row.sent_late is not None]
+    answered = [row.answered_after for row in sent if row.answered_after is not None]
+    return Timing([row.sent_late for row in sent if row.sent_late is not None], answered, len(sent) - len(answered))
+
+
 @final
 @dataclass(frozen=True, slots=True)
 class HardwareRun:
-    """A run at the wire: the result, what went over the wire, and the machine."""
+    """A run at the wire: the result, what went over the wire and when, and the machine."""
 
     plant: Plant
     result: Result
     exchange: Exchange
+    timing: Timing
     machine: Machine
 
     @property
@@ -136,38 +151,17 @@ class HardwareRun:
         """True where the run went to its end, and nothing vented the plant."""
         return self.result.status.is_completed and not self.exchange.vented
 
-    @property
-    def sent_late(self) -> list[float]:
-        """How late each sample was sent [s]."""
-        return [row.sent_late for row in self._in_time if row.sent_late is not None]
-
-    @property
-    def answered_after(self) -> list[float]:
-        """After how long each sample was answered that was [s]."""
-        return [row.answered_after for row in self._in_time if row.answered_after is not None]
-
-    @property
-    def missed(self) -> int:
-        """Samples without an answer of their own."""
-        return sum(row.answered_after is None for row in self._in_time)
-
-    @property
-    def _in_time(self) -> Sequence[Row]:
-        """The samples that were sent, without the samples with which a stopped run was vented."""
-        count = next((place for place, row in enumerate(self.exchange.rows) if row.sent_late is None), None)
-        return self.exchange.rows[:count]
-
     def document(self) -> dict[str, Any]:
         """The content of ``link.json``, in SI units."""
-        exchange = self.exchange
+        exchange, timing = self.exchange, self.timing
         return {
             "rate": round(1.0 / self.plant.period),
-            "samples": len(self.sent_late),
-            "answered": len(self.answered_after),
-            "missed": self.missed,
+            "samples": len(timing.sent_late),
+            "answered": len(timing.answered_after),
+            "missed": timing.missed,
             "longest_silence": longest_silence(exchange.rows) * self.plant.period,
-            "sent_late": spread(self.sent_late),
-            "answered_after": spread(self.answered_after),
+            "sent_late": spread(timing.sent_late),
+            "answered_after": spread(timing.answered_after),
             "stood_still": list(exchange.stood_still),
             "taken": exchange.taken,
             "refused": dict(exchange.refused),
@@ -194,7 +188,7 @@ class HardwareRun:
 
     def text(self) -> str:
         """The run in words."""
-        exchange, machine = self.exchange, self.machine
+        exchange, timing, machine = self.exchange, self.timing, self.machine
         others = [*exchange.ignored.items(), ("of somebody else", exchange.strangers)]
         silence = longest_silence(exchange.rows) * self.plant.period
         loads = "".join(
@@ -205,12 +199,12 @@ class HardwareRun:
         still = exchange.stood_still
         stood = f"stood still {len(still)} times, {sum(still):.3g} s in all" if still else "never stood still"
         lines = [
-            f"samples    {len(self.sent_late)} sent, {len(self.answered_after)} answered, {self.missed} missed; "
+            f"samples    {len(timing.sent_late)} sent, {len(timing.answered_after)} answered, {timing.missed} missed; "
             f"longest silence {silence * _PER_THOUSAND:.3g} ms",
             *(
                 (
-                    f"answers    {described_spread(self.answered_after)}",
-                    f"sent late  {described_spread(self.sent_late)}",
+                    f"answers    {described_spread(timing.answered_after)}",
+                    f"sent late  {described_spread(timing.sent_late)}",
                     f"time       {stood}",
                 )
                 if exchange.is_real_time
@@ -261,15 +255,17 @@ class HardwareRun:
 
     def plot(self) -> "Figure":
         """Histograms of how late samples were sent, and after how long they were answered."""
-        period, load = self.plant.period * _PER_THOUSAND, self.machine.load_after
+        period, load, timing = self.plant.period * _PER_THOUSAND, self.machine.load_after, self.timing
         beside = "" if load is None else f"; load {load:.2f} on {self.machine.cores} cores"
         with house_style():
             figure, ((late, after),) = figure_of_free_panels((7.2, 3.3), Margins(0.75, 0.2, 0.8, 0.85, 0.5, 0.7), 1, 2)
             figure.text(0.017, 0.97, f"{self.plant.scenario.name}: the link", va="top", fontsize=13, fontweight="bold")
-            said = f"Dashed: one sample, {period:g} ms. {self.missed} of {len(self.sent_late)} samples missed{beside}"
+            said = (
+                f"Dashed: one sample, {period:g} ms. {timing.missed} of {len(timing.sent_late)} samples missed{beside}"
+            )
             figure.text(0.017, 0.03, said, va="bottom", fontsize=9)
-            _histogram(late, self.sent_late, "Samples, after they were due")
-            _histogram(after, self.answered_after, "Answers, after their sample")
+            _histogram(late, timing.sent_late, "Samples, after they were due")
+            _histogram(after, timing.answered_after, "Answers, after their sample")
             late.set_ylabel("Samples")
             for axes in (late, after):
                 axes.axvline(period, color=VERMILION, linewidth=1.0, linestyle="--")
@@ -297,13 +293,14 @@ def run_plant(
     number = random.SystemRandom().randint(0, _LARGEST_RUN) if run is None else run
     before = load_now()
     # Built before the clock starts: arrays and programs take milliseconds.
-    begun = plant.begin()
+    begun = SampledRun(batch_of(plant.run), plant.module)
     with without_collections():
         exchange = Bench(begun, plant.period, port, pace(plant.period), number).run(patience, is_stopped)
     machine = Machine(
         f"{platform.system()} {platform.machine()}", os.cpu_count() or 1, platform.python_version(), before, load_now()
     )
-    return HardwareRun(plant, result_of(plant.scenario, plant.run, begun.result()), exchange, machine)
+    result = result_of(plant.scenario, plant.run, begun.result())
+    return HardwareRun(plant, result, exchange, timing_of(exchange.rows), machine)
 
 
 def run_at(

@@ -14,7 +14,7 @@ import struct
 import time
 import zlib
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple, Protocol, final
 
 from ppafo.errors import ScenarioError, one_line, reason
@@ -211,15 +211,11 @@ def _wrong_head(data: bytes) -> str | None:
         return "version"
     if len(data) > 3 and data[3] not in (SAMPLE, ANSWER):
         return "kind"
-    if len(data) > 4 and not _is_length(data[3], data[4]):
-        return "length"
+    if len(data) > 4:
+        longest = _SHORTEST if data[3] == ANSWER else LONGEST
+        if not _SHORTEST <= data[4] <= longest or (data[4] - _SHORTEST) % _WORD.size:
+            return "length"
     return None
-
-
-def _is_length(kind: int, length: int) -> bool:
-    if kind == ANSWER:
-        return length == _SHORTEST
-    return _SHORTEST <= length <= LONGEST and (length - _SHORTEST) % _WORD.size == 0
 
 
 def _read(data: bytes) -> Packet | str:
@@ -264,17 +260,12 @@ _WRITE_TIMEOUT = 2.0e-4
 class Port(Protocol):
     """Something that takes and gives bytes; a failure under way is kept in ``failure``, and then nothing comes."""
 
-    @property
-    def is_stream(self) -> bool:
-        """True where bytes follow each other, false where they come packet by packet."""
-
-    @property
-    def failure(self) -> str:
-        """What went wrong under way, empty while all is well."""
-
-    @property
-    def strangers(self) -> int:
-        """Packets of somebody else, which were dropped."""
+    is_stream: bool
+    """True where bytes follow each other, false where they come packet by packet."""
+    failure: str
+    """What went wrong under way, empty while all is well."""
+    strangers: int
+    """Packets of somebody else, which were dropped."""
 
     def send(self, data: bytes) -> None:
         """Send a packet, or drop it where that would take time."""
@@ -349,31 +340,31 @@ class SerialPort:
     def send(self, data: bytes) -> None:
         """Send a packet; it is lost where the line takes no more."""
         if not self.failure:
-            self._try(lambda: self._device.write(data))
+            with self._watched():
+                self._device.write(data)
 
     def receive(self, timeout: float) -> bytes:
         """What came in, once there is anything, within a time [s]."""
         if self.failure:
             time.sleep(timeout)
             return b""
-        return bytes(self._try(lambda: self._read(timeout)) or b"")
+        with self._watched():
+            self._device.timeout = timeout
+            waiting = self._device.in_waiting
+            return bytes(self._device.read(max(1, min(_LARGEST_RECEIVED, waiting))) or b"")
+        return b""
 
-    def _read(self, timeout: float) -> bytes:
-        self._device.timeout = timeout
-        waiting = self._device.in_waiting
-        data: bytes = self._device.read(max(1, min(_LARGEST_RECEIVED, waiting)))
-        return data
-
-    def _try(self, action: Any) -> Any:
+    @contextlib.contextmanager
+    def _watched(self) -> Iterator[None]:
+        """Keep a failure of the device, and let go of what takes too long."""
         import serial
 
         try:
-            return action()
+            yield
         except serial.SerialTimeoutException:
-            return None
+            pass
         except (OSError, TypeError) as error:  # pyserial on a device that is gone: SerialException is an OSError
             self.failure = f"the serial port broke: {one_line(error)}"
-            return None
 
     def close(self) -> None:
         """Give the device back."""
@@ -398,15 +389,12 @@ def open_port(text: str, baud: int = DEFAULT_BAUD, listens: bool = False) -> Por
             device = serial.Serial(place, baud, timeout=0.0, write_timeout=_WRITE_TIMEOUT, exclusive=True)
             device.reset_input_buffer()
         except (OSError, ValueError) as error:
-            raise ScenarioError(f"--port {one_line(text)}: cannot be opened: {_why(error)}") from error
+            # pyserial writes the number and the words of the system twice.
+            number = error.errno if isinstance(error, OSError) else None
+            why = one_line(error) if number is None else reason(OSError(number, os.strerror(number)))
+            raise ScenarioError(f"--port {one_line(text)}: cannot be opened: {why}") from error
         return SerialPort(device)
     raise ScenarioError(f"--port {one_line(text)}: must be {FORMS}")
-
-
-def _why(error: OSError | ValueError) -> str:
-    """Return why a serial device cannot be opened; pyserial writes the number and the words of the system twice."""
-    number = error.errno if isinstance(error, OSError) else None
-    return one_line(error) if number is None else reason(OSError(number, os.strerror(number)))
 
 
 def _open_udp(text: str, place: str, listens: bool) -> UdpPort:

@@ -90,7 +90,16 @@ from ppafo.exports.c_library.files import (
     conditions_of_program,
     run_words,
 )
-from ppafo.exports.c_library.program import COUNTS, IN_PARTS, TOGETHER, WHOLE, ExportedProgram, c_text, outline_of
+from ppafo.exports.c_library.program import (
+    COUNTS,
+    IN_PARTS,
+    TOGETHER,
+    WHOLE,
+    ExportedProgram,
+    c_text,
+    outline_of,
+    places_of,
+)
 from ppafo.parameters import ParameterSet, apply_overrides, load_parameter_set
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import ATMOSPHERE_PATH, itself
@@ -320,7 +329,7 @@ def program_of(library: Library) -> bytes:
     ).decode()
     prebuilt = prebuilt_programs().get(digest)
     if prebuilt is not None:
-        return _programs().joinpath(prebuilt).read_bytes()
+        return _PROGRAMS.joinpath(prebuilt).read_bytes()
     check_can_build()
     return kept_bytes("wasm", f"{digest} {compiler_version()}", lambda: build(source_of(library)))
 
@@ -341,8 +350,8 @@ def _unit(library: Library, functions: str) -> str:
     words = {
         **run_words(library),
         "settings_type": "run_settings",
-        "state_count": str(len(program.state_places)),
-        "parameter_count": str(len(program.parameter_places)),
+        "state_count": str(len(places_of(program.program.state_rows()))),
+        "parameter_count": str(len(places_of(program.program.parameter_rows()))),
         "count_count": str(len(COUNTS)),
         "prepare": "\n".join(f"    {line}" for line in prepare),
         "needs_other": _COUNT.sub(lambda found: f"counts[COUNT_{found[1].upper()}]", "\n".join(refused)),
@@ -420,14 +429,13 @@ def compiler_version() -> str:
     return version("ziglang") if importlib.util.find_spec("ziglang") is not None else ""
 
 
-def _programs() -> Path:
-    return Path(str(files("ppafo.page.wasm").joinpath("programs")))
+_PROGRAMS = files("ppafo.page.wasm").joinpath("programs")
 
 
 @cache
 def prebuilt_programs() -> dict[str, str]:
     """Names of the files of prebuilt programs by the digest of their text."""
-    found: dict[str, str] = json.loads(_programs().joinpath(INDEX).read_text(encoding="utf-8"))["programs"]
+    found: dict[str, str] = json.loads(_PROGRAMS.joinpath(INDEX).read_text(encoding="utf-8"))["programs"]
     return found
 
 

@@ -22,7 +22,7 @@ def example_controller(scenario: Scenario) -> dict[str, bytes]:
         )
     words = {
         "title": scenario.name,
-        "kind": fixed.law.name,
+        "kind": fixed.law.kind.name,
         "version": __version__,
         "period": str(period),
         "pressure_step": repr(fixed.converter.pressure_step),
