@@ -18,7 +18,7 @@ from ppafo.metrics.metric import Floats, MetricKind, ReadAt, Readings, hold, ram
 from ppafo.model.columns import choose, larger, truncated
 from ppafo.model.valves.kind import VENTS_ABOVE
 from ppafo.signals import Recording
-from ppafo.signals.meter import Course, MeterKind, Sample, starts_hold
+from ppafo.signals.meter import Course, MeterKind, Sample
 
 OSCILLATION_THRESHOLD = 0.05
 """Smallest swing that counts as an oscillation, as a fraction of the largest absolute reference."""
@@ -149,7 +149,7 @@ def update_oscillations(state: Oscillations, course: Course, sample: Sample) -> 
     """One sample more; the first one of the hold is the last one of the ramp too."""
     torque = sample.torque
     swing = next_swing(state.swing, torque, OSCILLATION_THRESHOLD * course.largest)
-    anew = starts_hold(course, sample)
+    anew = course.hold_start == sample.number
     begun = Swing(torque if anew else swing.play, UNDECIDED if anew else swing.turns, torque if anew else swing.highest)
     return Oscillations(begun, swing.turns if anew else state.turns_on_ramp)
 

@@ -9,7 +9,7 @@ import numpy as np
 from ppafo.metrics.metric import Floats, MetricKind, ReadAt, Readings, hold, ramp, spans
 from ppafo.model.columns import root
 from ppafo.signals import Recording
-from ppafo.signals.meter import Course, MeterKind, Sample, ends_before_hold
+from ppafo.signals.meter import Course, MeterKind, Sample
 
 _NEEDED = ("torque", "reference")
 
@@ -67,7 +67,8 @@ def update_squared_error(state: SquaredError, course: Course, sample: Sample) ->
     square = error * error
     # In intervals: all have one length, which cancels where the sum is read.
     piece = 0.5 * (state.last + square)
-    is_before = ends_before_hold(course, sample)
+    # The reference did not rest yet at the sample before this one.
+    is_before = course.hold_start >= sample.number
     return SquaredError(
         square, state.before_hold + (piece if is_before else 0.0), state.on_hold + (0.0 if is_before else piece)
     )
