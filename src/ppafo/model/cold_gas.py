@@ -236,7 +236,9 @@ def advance_supply(
             f"so that the walk ends before the bottle is bare"
         )
     flow = mass / step
-    parts = parts_of(table, line, supply, state.mass - mass, flow, step)
+    # Heun's rule is stable up to 2 over the fastest rate; a tenth of that keeps it accurate too.
+    fastest = max(following_rates(table, line, supply, state.mass - mass, flow).values())
+    parts = max(1, math.ceil(step * fastest / LARGEST_CHANGE))
     length = step / parts
     after = state
     for part in range(parts):
@@ -251,12 +253,6 @@ def advance_supply(
         after = SupplyState._make(value + 0.5 * length * (one + other) for value, one, other in rates)
     # The mass itself, so that what left the bottle came through the regulator or is ice, to the last digit.
     return after._replace(mass=state.mass - mass - (after.ice - state.ice))
-
-
-def parts_of(table: FluidTable, line: Isobar, supply: ColdSupply, mass: float, flow: float, step: float) -> int:
-    """Into how many parts a step [s] goes with at least a mass [kg] in the bottle, so that no temperature swings up."""
-    # Heun's rule is stable up to 2 over the fastest rate; a tenth of that keeps it accurate too.
-    return max(1, math.ceil(step * max(following_rates(table, line, supply, mass, flow).values()) / LARGEST_CHANGE))
 
 
 def following_rates(table: FluidTable, line: Isobar, supply: ColdSupply, mass: float, flow: float) -> dict[str, float]:
