@@ -108,7 +108,7 @@ def _current_source(program: Program) -> str:
     """The source of a program, written anew where it is out of date."""
     outline, source = write_source(program)
     # The kept text may rest on a function that a notebook has defined anew since.
-    if outline.is_current():
+    if outline.made_from.is_current():
         return source
     write_source.cache_clear()
     return write_source(program)[1]

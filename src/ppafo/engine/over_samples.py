@@ -26,7 +26,7 @@ def over_samples(function: Callable[..., Any], *given: Any) -> Any:
     """
     # A form that was made from a function that has changed since is made anew.
     found = _composed(function)
-    if found is not None and not found[0].is_current():
+    if found is not None and not found[0].made_from.is_current():
         _composed.cache_clear()
         found = _composed(function)
     return called_over_samples(function, (None if found is None else found[1]), *given)

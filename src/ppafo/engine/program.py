@@ -321,7 +321,7 @@ def composed_with(function: Callable[..., Any], effects: Sequence[Effect]) -> Co
     if not effects:
         return None
     collector, composed = _composed_with(function, tuple(effects))
-    if collector.is_current():
+    if collector.made_from.is_current():
         return composed
     _composed_with.cache_clear()
     return _composed_with(function, tuple(effects))[1]

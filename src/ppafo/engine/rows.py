@@ -32,12 +32,16 @@ def is_number(row: Any) -> bool:
     return not is_row(row) and get_origin(row) is not Annotated
 
 
-@lru_cache(maxsize=4096)
-def leaf_paths(row: Any, prefix: str) -> tuple[str, ...]:
+def leaf_paths(row: Any, prefix: str) -> list[str]:
     """Paths of all numbers in a NamedTuple class (or a float), in order, each beginning with ``prefix``: ``a.b[3]``."""
+    return list(_leaf_paths(row, prefix))
+
+
+@lru_cache(maxsize=4096)
+def _leaf_paths(row: Any, prefix: str) -> tuple[str, ...]:
     if is_number(row):
         return (prefix,)
-    return tuple(path for way, inner in members(row) for path in leaf_paths(inner, f"{prefix}{way}"))
+    return tuple(path for way, inner in members(row) for path in _leaf_paths(inner, f"{prefix}{way}"))
 
 
 def row_numbers(groups: Mapping[str, type], first: int = 0) -> dict[str, int]:

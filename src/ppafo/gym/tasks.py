@@ -183,7 +183,7 @@ class Task:
     walks: bool = False
 
     @property
-    def observed_paths(self) -> tuple[str, ...]:
+    def observed_paths(self) -> list[str]:
         """Paths of the observed numbers, in order, such as ``view.sensed.angle``."""
         return leaf_paths(self.view, "view")
 
