@@ -253,27 +253,34 @@ def finish(rows: Rows) -> list[str]:
     if not program.is_parted:
         return [*lines, *store_all(rows, ""), *judge(rows), *sense_end(rows)]
     lines += [rows.load("next_valve"), *[rows.load(name) for name in fed]]
-    if not program.is_adaptive:
-        flag = "" if program.parts_are_rare else "taken"
-        stored = [*store_all(rows, flag), *judge(rows, flag), *sense_end(rows)]
-        return [f"taken = {rows.remaining} > 0.0", *lines, *stored, *add_up(rows)]
-    positive = " and ".join(f"{mass} > 0.0" for mass in masses_after(rows, *fed))
+    flag, followed = "taken", ""
+    if program.is_adaptive:
+        positive = " and ".join(f"{mass} > 0.0" for mass in masses_after(rows, *fed))
+        followed = f" and not missed > {motion.LOST!r}"
+        lines += [
+            f"missed = max({', '.join(['error', 'gas_error', *state_errors(rows)])})",
+            "error = missed / timing.tolerance",
+            # A part with a mass below 0 or NaN counts as the worst error, and is done again, shorter.
+            f"error = error if {positive} else {motion.MAXIMUM_ERROR!r}",
+            # A run that has failed is carried to its end without more parts, so that its lane holds nobody up.
+            f"refused = {add(motion.is_refused)}(error, length) and not result.failure_time <= time",
+            f"next_length = {add(motion.next_pace)}(pace, error, length, refused, timing.step).length",
+            f"active = {rows.remaining} > 0.0",
+            f"{rows.cells['pace.length']} = next_length if active else pace.length",
+            "taken = active and not refused",
+        ]
+    else:
+        lines.insert(0, f"taken = {rows.remaining} > 0.0")
+        flag = "" if program.parts_are_rare else flag
     return [
         *lines,
-        f"missed = max({', '.join(['error', 'gas_error', *state_errors(rows)])})",
-        "error = missed / timing.tolerance",
-        # A part with a mass below 0 or NaN counts as the worst error, and is done again, shorter.
-        f"error = error if {positive} else {motion.MAXIMUM_ERROR!r}",
-        # A run that has failed is carried to its end without more parts, so that its lane holds nobody up.
-        f"refused = {add(motion.is_refused)}(error, length) and not result.failure_time <= time",
-        f"next_length = {add(motion.next_pace)}(pace, error, length, refused, timing.step).length",
-        f"active = {rows.remaining} > 0.0",
-        f"{rows.cells['pace.length']} = next_length if active else pace.length",
-        "taken = active and not refused",
-        *store_all(rows, "taken"),
-        *judge(rows, "taken", f" and not missed > {motion.LOST!r}"),
+        *store_all(rows, flag),
+        *judge(rows, flag, followed),
         *sense_end(rows),
-        *add_up(rows),
+        # Sums of part lengths miss the goal by rounding: the last part sets it.
+        f"arrives = length >= {rows.remaining} and taken or {rows.remaining} == 0.0",
+        f"{rows.before} = goal * timing.step if arrives else before + (length if taken else 0.0)",
+        f"{rows.remaining} = 0.0 if arrives else {rows.remaining}",
     ]
 
 
@@ -474,16 +481,6 @@ def waiting_lanes(rows: LaneRows) -> tuple[list[str], list[str]]:
     back = over_rows(count, f"x[row, lane] = x[row, lane] if {moves} else x[{rows.aside} + row, lane]")
     first, last = rows.over_lanes(kept), rows.over_lanes(again) if again else []
     return ["if part > 0:", *indent([*aside, *first])], ["if part > 0:", *indent([*back, *last])]
-
-
-def add_up(rows: Rows) -> list[str]:
-    """Lines that count the time of a part that is taken; the end of the last one is the goal to the last bit."""
-    return [
-        # Sums of part lengths miss the goal by rounding: the last part sets it.
-        f"arrives = length >= {rows.remaining} and taken or {rows.remaining} == 0.0",
-        f"{rows.before} = goal * timing.step if arrives else before + (length if taken else 0.0)",
-        f"{rows.remaining} = 0.0 if arrives else {rows.remaining}",
-    ]
 
 
 def give_up(rows: Rows) -> list[str]:

@@ -320,7 +320,10 @@ RECORDED_ANGLE = ProfileKind(
     value=segment_value,
     bounds=segment_bounds,
 )
-"""Not in the catalogue: a scenario file cannot name it, because its values come from a recording."""
+"""Not in the catalogue: a scenario file cannot name it, because its values come from a recording.
+
+Where it is the angle of a program, its parameters are ``path.start``, ``.level`` and ``.rate``.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -332,11 +335,6 @@ class StepInputs:
 
     command: Floats | None
     parameters: Mapping[str, Floats]
-
-
-def prescribe_recorded_angle(program: Program) -> Program:
-    """The program with a recorded angle prescribed, by the parameters ``path.start``, ``.level``, ``.rate``."""
-    return replace(program, angle=RECORDED_ANGLE)
 
 
 def replay(batch: Batch, inputs: StepInputs) -> BatchResult:
