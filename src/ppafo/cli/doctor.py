@@ -73,7 +73,7 @@ def doctor(
     if bits:
         return _bits()
     folder = cache.cache_folder()
-    cleared = cache.clear_kept(folder) + cache.clear(folder) if clear and folder is not None else 0
+    cleared = cache.clear(folder) if clear and folder is not None else 0
     why_not = "" if clear else cache.refusal(folder)
     if warm:
         if why_not:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ppafo.engine.lanes import StepInputs, prescribe_recorded_angle
+from ppafo.engine.lanes import RECORDED_ANGLE, StepInputs
 from ppafo.engine.run import Run
 from ppafo.errors import DataError
 from ppafo.parameters.device import VANE, Device, Orifice
@@ -123,7 +123,8 @@ def step_inputs(inputs: RecordedInputs, device: Device, run: Run) -> StepInputs:
 
 def with_prescribed_angle(run: Run, angle: float) -> Run:
     """Return the run with the vane on a recorded angle, which is ``angle`` [rad] at the start."""
-    return replace(run, program=prescribe_recorded_angle(run.program), path=(0.0, angle, 0.0), needs_parts=True)
+    program = replace(run.program, angle=RECORDED_ANGLE)
+    return replace(run, program=program, path=(0.0, angle, 0.0), needs_parts=True)
 
 
 def _path(inputs: RecordedInputs, device: Device, run: Run) -> dict[str, Floats]:

@@ -103,7 +103,7 @@ def symbolic(
     rows = {effect.name: row for effect, row in (acting or {}).items()}
     effects = tuple(acting or ())
     # A function of the model that has changed since, as in a notebook, is walked again.
-    if not _walked(function, given, effects).collector.is_current():
+    if not _walked(function, given, effects).collector.made_from.is_current():
         _walked.cache_clear()
     walked = _walked(function, given, effects)
     return Symbolic(walked, before, compare, tuple(rows[name] for name in walked.collector.needs.get(walked.name, ())))
