@@ -124,7 +124,12 @@ def controller_settings(kind: str) -> tuple[Quantity, ...]:
 
 def profile_settings(kind: str, prescribed: Quantity) -> tuple[Quantity, ...]:
     """Return the settings of a profile; a level, which has no unit of its own, gets the unit of what is prescribed."""
-    return tuple(_level(item, prescribed) for item in PROFILES[kind].quantities) if kind in PROFILES else ()
+    found = []
+    for item in PROFILES[kind].quantities if kind in PROFILES else ():
+        lowest, highest = max(item.minimum, prescribed.minimum), min(item.maximum, prescribed.maximum)
+        is_level = not item.unit
+        found.append(replace(item, unit=prescribed.unit, minimum=lowest, maximum=highest) if is_level else item)
+    return tuple(found)
 
 
 def gas_settings(kind: str) -> tuple[Quantity, ...]:
@@ -261,17 +266,6 @@ def value_at(document: Mapping[str, Any], path: str) -> Any:
     return node
 
 
-def _level(quantity: Quantity, prescribed: Quantity) -> Quantity:
-    if quantity.unit:
-        return quantity
-    return replace(
-        quantity,
-        unit=prescribed.unit,
-        minimum=max(quantity.minimum, prescribed.minimum),
-        maximum=min(quantity.maximum, prescribed.maximum),
-    )
-
-
 @functools.cache
 def line_entries() -> dict[str, Entry]:
     """Return the defaults for what ``[supply_line]`` does not give, by path such as ``dorsiflexion.droop``."""
@@ -334,7 +328,16 @@ class Reading:
             if quantity.default is None:
                 raise ScenarioError(f"{self.file}: '{path}' is missing: {quantity.summary or quantity.name}")
             return quantity.default
-        result = self._in_si(path, value, quantity, atmosphere)
+        if isinstance(value, bool) or not isinstance(value, str | int | float):
+            raise self.refusal(path, f"must be {_form(quantity, 1.0)}")
+        try:
+            result = parse_quantity(value, quantity.unit, atmosphere) if isinstance(value, str) else float(value)
+        except (UnitError, OverflowError) as error:
+            raise self.refusal(path, str(error)) from error
+        if not isinstance(value, str) and not math.isfinite(result):
+            raise self.refusal(path, "is not a finite number")
+        if not isinstance(value, str) and quantity.unit not in PLAIN:
+            raise self.refusal(path, f"a number without a unit; must be {_form(quantity, result)}")
         if not is_within(result, quantity):
             raise self.refusal(path, range_rule(quantity, limits(quantity, atmosphere)))
         return result
@@ -342,21 +345,6 @@ class Reading:
     def section(self, section: str, quantities: tuple[Quantity, ...]) -> dict[str, float]:
         """Return all values of a section by name, in SI."""
         return {item.name: self.number(f"{section}.{item.name}", item) for item in quantities}
-
-    def _in_si(self, path: str, value: object, quantity: Quantity, atmosphere: float) -> float:
-        if isinstance(value, bool) or not isinstance(value, str | int | float):
-            raise self.refusal(path, f"must be {_form(quantity, 1.0)}")
-        try:
-            if isinstance(value, str):
-                return parse_quantity(value, quantity.unit, atmosphere)
-            number = float(value)
-        except (UnitError, OverflowError) as error:
-            raise self.refusal(path, str(error)) from error
-        if not math.isfinite(number):
-            raise self.refusal(path, "is not a finite number")
-        if quantity.unit not in PLAIN:
-            raise self.refusal(path, f"a number without a unit; must be {_form(quantity, number)}")
-        return number
 
 
 def quantity_text(value: float, si_unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> str:

@@ -26,7 +26,7 @@ TIMES = ("run.duration", "run.step", "run.output_interval", "controller.rate", "
 
 _DEVICE_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow")
 _OF_DEVICE = (*_DEVICE_SECTIONS, "valve", EFFECT_SETTINGS)
-_ORIFICES = {"actuator.leak": ("device", "actuator", "leak"), "valve": ("device", "valve", "orifice")}
+_ORIFICES = {"valve": ("device", "valve", "orifice"), "actuator.leak": ("device", "actuator", "leak")}
 
 _TEXTS = (
     *TEXTS,
@@ -208,7 +208,16 @@ def check_columns(base: Scenario, columns: Mapping[str, Any], gauge: Collection[
         raise ScenarioError(
             f"{base.name}: an ensemble needs columns of one length, one value for each run, not {shapes or 'none'}"
         )
-    _check_together(base, values)
+    pair = in_two_forms(values)
+    if pair is not None:
+        raise ScenarioError(f"{base.name}: '{pair[0]}' and '{pair[1]}' vary: {either(pair[0])}")
+    for section in _ORIFICES:
+        form = [f"{section}.{name}" for name in other_form(base.device, section)]
+        missing = [path for path in form if path not in values]
+        if missing and len(missing) < len(form):
+            raise ScenarioError(
+                f"{base.name}: {section} is given in the other form; to vary {' or '.join(form)} give a column for both"
+            )
     every = moving_together(base, absolute(base, values, gauge))
     return Columns(base, every, {path: declared[path] for path in every}, frozenset(values))
 
@@ -231,19 +240,6 @@ def _check_path(base: Scenario, given: str, path: str, declared: Mapping[str, Qu
         )
     hint = nearest_name(path, declared) or f"; for example {', '.join(list(declared)[:6])}"
     raise ScenarioError(f"{base.name}: there is no number '{given}' that could vary{hint}")
-
-
-def _check_together(base: Scenario, values: Mapping[str, Floats]) -> None:
-    pair = in_two_forms(values)
-    if pair is not None:
-        raise ScenarioError(f"{base.name}: '{pair[0]}' and '{pair[1]}' vary: {either(pair[0])}")
-    for section in ("valve", "actuator.leak"):
-        form = [f"{section}.{name}" for name in other_form(base.device, section)]
-        missing = [path for path in form if path not in values]
-        if missing and len(missing) < len(form):
-            raise ScenarioError(
-                f"{base.name}: {section} is given in the other form; to vary {' or '.join(form)} give a column for both"
-            )
 
 
 def varied_scenario(columns: Columns, clock: Clock) -> Scenario:

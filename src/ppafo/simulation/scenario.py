@@ -343,11 +343,6 @@ class Scenario:
         return None if self.supply_line is None else self.supply_line.row(self.device.supply)
 
     @property
-    def effect_sections(self) -> dict[str, Any]:
-        """Settings of effects beside the device's, by section."""
-        return {"sensors": self.sensors}
-
-    @property
     def walks(self) -> bool:
         """True where a leg walks with the device, false for a vane alone."""
         return self.motion.motion_kind.walk is not None

@@ -166,12 +166,19 @@ def axis_or_distribution(item: declared.Varied, place: VariedPath) -> Axis | Dra
         raise UnitError(f"kind = 'whole_numbers' is for {' and '.join(WHOLE)} alone; use 'choice' or 'uniform'")
     if is_counted and item.kind not in ("grid", "list", "choice", "whole_numbers"):
         raise UnitError(f"kind = '{item.kind}' gives no whole numbers, which '{item.path}' needs; use 'whole_numbers'")
-    if isinstance(item, declared.Grid):
-        return Axis(item.path, _all_whole(item.path, _grid(item, place)))
     if isinstance(item, declared.Listed):
         levels = tuple(_level("values", value, place) for value in item.values)
         return Axis(item.path, _all_whole(item.path, levels))
-    return Drawn(item.path, _DISTRIBUTIONS[item.kind](item, place))
+    if not isinstance(item, declared.Grid):
+        return Drawn(item.path, _DISTRIBUTIONS[item.kind](item, place))
+    first, last = _key(item, "first", place), _key(item, "last", place)
+    if first == last:
+        raise UnitError(f"first and last are both {item.first!r}; a grid needs two different ends")
+    is_logarithmic = item.spacing == "logarithmic"
+    if is_logarithmic and min(first, last) <= 0.0:
+        raise UnitError("spacing = 'logarithmic' needs both ends above 0")
+    spaced = np.geomspace if is_logarithmic else np.linspace
+    return Axis(item.path, _all_whole(item.path, tuple(spaced(first, last, item.count).tolist())))
 
 
 def _all_whole(path: str, values: tuple[float, ...]) -> tuple[float, ...]:
@@ -179,17 +186,6 @@ def _all_whole(path: str, values: tuple[float, ...]) -> tuple[float, ...]:
     if broken:
         raise UnitError(f"{broken[0]:g} must be a whole number")
     return values
-
-
-def _grid(item: declared.Grid, place: VariedPath) -> tuple[float, ...]:
-    first, last = _key(item, "first", place), _key(item, "last", place)
-    if first == last:
-        raise UnitError(f"first and last are both {item.first!r}; a grid needs two different ends")
-    if item.spacing == "linear":
-        return tuple(np.linspace(first, last, item.count).tolist())
-    if min(first, last) <= 0.0:
-        raise UnitError("spacing = 'logarithmic' needs both ends above 0")
-    return tuple(np.geomspace(first, last, item.count).tolist())
 
 
 def _bounded(made: Callable[[float, float], Distribution], item: Any, place: VariedPath) -> Distribution:

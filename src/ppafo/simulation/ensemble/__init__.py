@@ -22,6 +22,9 @@ from ppafo.simulation.simulate import REMEDY
 COMPLETED, DIVERGED, REFUSED = 0, 1, 2
 """How a run of an ensemble ended; refused is a combination of values that no run can have."""
 
+_ROUNDING = 1.0e-9
+"""Fraction by which rounding may put the end of a run before the last time of its traces."""
+
 
 @dataclass(frozen=True, slots=True)
 class EnsembleResult:
@@ -80,14 +83,20 @@ def run_ensemble(
         raise ScenarioError(f"{base.name}: traces need a time above 0 between two samples, not {interval:g} s")
     checked = check_columns(base, columns, gauge)
     plan = plan_ensemble(checked)
-    times = _times(plan, interval if bands else 0.0)
+    times: Floats = np.empty(0)
+    if bands and plan.batches:
+        longest = max(float((intervals(batch) * (batch.clock.samples - 1)).max()) for _, batch in plan.batches)
+        times = np.arange(int(longest / interval * (1.0 + _ROUNDING)) + 1, dtype=np.float64) * interval
     request = Request(metrics, tuple(dict.fromkeys(bands)), interval, times, base.controller.custom)
     outcome = _run(plan, Outcome(checked.runs, request), threads)
-    if not errors:
-        return _result(plan, outcome, {})
-    alone = Request(metrics, (), interval, np.empty(0), base.controller.custom)
-    fine = _run(plan_ensemble(checked, finer), Outcome(checked.runs, alone), threads)
-    return _result(plan, outcome, _errors(outcome, fine))
+    estimated = {}
+    if errors:
+        alone = Request(metrics, (), interval, np.empty(0), base.controller.custom)
+        fine = _run(plan_ensemble(checked, finer), Outcome(checked.runs, alone), threads)
+        for name, values in outcome.metrics.items():
+            changes = np.where(np.isfinite(fine.metrics[name]), np.abs(fine.metrics[name] - values), np.inf)
+            estimated[name] = np.where(np.isfinite(values), MARGIN * changes, np.nan)
+    return _result(plan, outcome, estimated)
 
 
 def _run(plan: EnsemblePlan, outcome: Outcome, threads: int | None) -> Outcome:
@@ -95,15 +104,6 @@ def _run(plan: EnsemblePlan, outcome: Outcome, threads: int | None) -> Outcome:
     for members, batch in plan.batches:
         outcome.run(batch, members, threads)
     return outcome
-
-
-def _errors(outcome: Outcome, fine: Outcome) -> dict[str, Floats]:
-    """The estimated errors of metrics, from the same runs with finer steps."""
-    found = {}
-    for name, values in outcome.metrics.items():
-        changes = np.where(np.isfinite(fine.metrics[name]), np.abs(fine.metrics[name] - values), np.inf)
-        found[name] = np.where(np.isfinite(values), MARGIN * changes, np.nan)
-    return found
 
 
 def _result(plan: EnsemblePlan, outcome: Outcome, errors: dict[str, Floats]) -> EnsembleResult:
@@ -117,14 +117,6 @@ def _result(plan: EnsemblePlan, outcome: Outcome, errors: dict[str, Floats]) -> 
     return EnsembleResult(
         status, outcome.failure_time, dict(sorted(reasons.items())), outcome.metrics, times, outcome.traces, errors
     )
-
-
-def _times(plan: EnsemblePlan, every: float) -> Floats:
-    """Times of the traces [s], to the end of the longest run; none where nothing is traced."""
-    if every == 0.0 or not plan.batches:
-        return np.empty(0)
-    longest = max(float((intervals(batch) * (batch.clock.samples - 1)).max()) for _, batch in plan.batches)
-    return np.arange(int(longest / every * (1.0 + 1.0e-9)) + 1, dtype=np.float64) * every
 
 
 def _check_channel(base: Scenario, name: str) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.engine.lanes import Batch, Floats
+from ppafo.engine.lanes import Batch
 from ppafo.engine.run import Members, Run, batches_of
 from ppafo.errors import ScenarioError
 from ppafo.model.columns import Problem, at
@@ -17,7 +17,6 @@ from ppafo.model.declaration import range_rule
 from ppafo.parameters.building import actuator_problem, beyond_pressures, consistency, growth_and_problem
 from ppafo.parameters.device import VANE
 from ppafo.parameters.plant import switches_of
-from ppafo.simulation.check import unchanged
 from ppafo.simulation.clock import Clock
 from ppafo.simulation.declaration import limits, quantity_text
 from ppafo.simulation.motion_kind import MotionKind
@@ -75,9 +74,17 @@ def screen_columns(columns: Columns) -> Screen:
         if path in columns.given or not columns.declared[path].follows:
             screen.refuse(*_out_of_range(screen.columns, path))
     if screen.members.size:
-        _read_clocks(screen)
+        base, times = columns.base, {path: column for path, column in screen.columns.values.items() if path in TIMES}
+        screen.clock, problems = base.motion.motion_kind.clock(base, times) if times else (clock_of(base), ())
+        for is_bad, line in problems:
+            screen.refuse(is_bad, line)
     for rule in rules_of(columns.base.motion.motion_kind):
-        _keep(screen, rule)
+        # After each problem that some runs have, the others are checked again: their numbers may have fewer.
+        while screen.members.size:
+            found = [problem for problem in rule(screen.scenario) if np.any(problem[0])]
+            if not found:
+                break
+            screen.refuse(*found[0])
     return screen
 
 
@@ -98,30 +105,9 @@ def _out_of_range(columns: Columns, path: str) -> Problem:
     return ~(is_good & (values == np.floor(values)) if path in _WHOLE else is_good), line
 
 
-def _read_clocks(screen: Screen) -> None:
-    """Read the clocks, and drop the runs whose times do not fit together."""
-    times = {path: column for path, column in screen.columns.values.items() if path in TIMES}
-    if not times:
-        screen.clock = clock_of(screen.columns.base)
-        return
-    base = screen.columns.base
-    screen.clock, problems = base.motion.motion_kind.clock(base, times)
-    for is_bad, line in problems:
-        screen.refuse(is_bad, line)
-
-
 def _clock_of(clock: Clock, kept: Any) -> Clock:
     numbers: list[Any] = [clock.duration, clock.step, clock.output_interval, clock.period]
     return Clock(*(number[kept] if isinstance(number, np.ndarray) else number for number in numbers))
-
-
-def _keep(screen: Screen, rule: Rule) -> None:
-    """Drop the runs that break a rule; after each problem that some have, the others are checked again."""
-    while screen.members.size:
-        found = [problem for problem in rule(screen.scenario) if np.any(problem[0])]
-        if not found:
-            return
-        screen.refuse(*found[0])
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,7 +118,7 @@ class EnsemblePlan:
     reasons: dict[int, str]
 
 
-def plan_ensemble(columns: Columns, change: Callable[[Run], Run] = unchanged) -> EnsemblePlan:
+def plan_ensemble(columns: Columns, change: Callable[[Run], Run] | None = None) -> EnsemblePlan:
     """Batches of all runs that can be; each has the rows, bit for bit, that ``plan_run`` gives it alone and changed."""
     screen = screen_columns(columns)
     batches: list[tuple[Members, Batch]] = []
@@ -142,14 +128,15 @@ def plan_ensemble(columns: Columns, change: Callable[[Run], Run] = unchanged) ->
     return EnsemblePlan(tuple(batches), screen.reasons)
 
 
-def _plan_batches(screen: Screen, places: Members, change: Callable[[Run], Run]) -> list[tuple[Members, Batch]]:
+def _plan_batches(screen: Screen, places: Members, change: Callable[[Run], Run] | None) -> list[tuple[Members, Batch]]:
     """Batches of some runs that ask for one program; what cannot be planned is refused."""
     part = screen.at(places)
     while part.members.size:
         run, problems = plan_runs(part.scenario)
         bad = [problem for problem in problems if np.any(problem[0])]
         if not bad:
-            return [(part.members[members], batch) for members, batch in batches_of(change(run), part.members.size)]
+            run = run if change is None else change(run)
+            return [(part.members[members], batch) for members, batch in batches_of(run, part.members.size)]
         part.refuse(*bad[0])
     return []
 
@@ -173,7 +160,7 @@ def _inconsistent(scenario: Scenario) -> tuple[Problem, ...]:
     """Two numbers of a device that contradict each other."""
 
     def problem(path: str, relation: str, other: str, holds: Any) -> Problem:
-        first, second = _number(scenario, path), _number(scenario, other)
+        first, second = operator.attrgetter(path, other)(scenario.device)
         return np.logical_not(
             holds
         ), lambda run: f"{path} = {at(first, run):.9g} must be {relation} {other} = {at(second, run):.9g} (SI units)"
@@ -216,11 +203,6 @@ def _beyond_the_table(scenario: Scenario) -> tuple[Problem, ...]:
 def _without_growth(scenario: Scenario) -> tuple[Problem, ...]:
     """An actuator that is no vane, whose chamber 1 does not grow with the angle."""
     return () if scenario.device.actuator.kind == VANE else (growth_and_problem(scenario.device)[1],)
-
-
-def _number(scenario: Scenario, path: str) -> Floats | float:
-    number: Floats | float = operator.attrgetter(path)(scenario.device)
-    return number
 
 
 def _second_regulator_above_the_first(scenario: Scenario) -> tuple[Problem, ...]:
