@@ -242,17 +242,6 @@ def _check_path(base: Scenario, given: str, path: str, declared: Mapping[str, Qu
     raise ScenarioError(f"{base.name}: there is no number '{given}' that could vary{hint}")
 
 
-def varied_scenario(columns: Columns, clock: Clock) -> Scenario:
-    """Return the scenario that represents all runs; numbers of ``clock`` may be arrays too."""
-    numbers = {path: column for path, column in columns.values.items() if path not in TIMES}
-    scenario = with_numbers(columns.base, numbers)
-    return replace(
-        scenario,
-        run=replace(scenario.run, duration=clock.duration, step=clock.step, output_interval=clock.output_interval),
-        controller=replace(scenario.controller, period=clock.period),
-    )
-
-
 TimeTexts = Mapping[str, Mapping[str, Any]]
 """The times of a scenario by section and name, as a file gives them."""
 

@@ -9,7 +9,6 @@ from ppafo.engine.over_samples import over_samples
 from ppafo.engine.rows import rebuilt
 from ppafo.model.columns import over_runs
 from ppafo.model.declaration import Quantity
-from ppafo.parameters.device import Device
 from ppafo.simulation.declaration import Reading, kind_at, profile_settings, quantity_text
 from ppafo.simulation.scenario import ProfileChoice
 
@@ -68,11 +67,6 @@ def profile_problem(
                     f"{quantity_text(reached, 'rad')} at {moment:.6g} s"
                 )
     return ""
-
-
-def stops_of(device: Device) -> tuple[float, float]:
-    """Return both stops [rad] of a device, the lower one first."""
-    return device.actuator.angle_min, device.actuator.angle_max
 
 
 def range_text(stops: tuple[float, float]) -> str:

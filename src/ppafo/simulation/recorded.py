@@ -98,11 +98,6 @@ def supply_paths(device: Device) -> tuple[str, ...]:
     return both if supply.has_one_pressure else both[:1]
 
 
-def step_times(run: Run) -> Floats:
-    """Return the time [s] at which each step of a run begins."""
-    return run.step * np.arange(run.step_count, dtype=np.float64)
-
-
 def step_inputs(inputs: RecordedInputs, device: Device, run: Run) -> StepInputs:
     """Return what a run follows at each of its steps; ``device`` says which regulators follow the supply.
 
@@ -131,8 +126,9 @@ def _path(inputs: RecordedInputs, device: Device, run: Run) -> dict[str, Floats]
     time = inputs.recording.time - inputs.start
     angles = between_stops(inputs.recording[ANGLE], device, inputs.recording.label)
     rates = np.append(np.diff(angles) / np.diff(time), 0.0)
+    begins = run.step * np.arange(run.step_count, dtype=np.float64)
     # By the middle of a step: rounding may put a sample a little behind the step that begins with it.
-    piece = np.maximum(np.searchsorted(time, step_times(run) + 0.5 * run.step, side="right") - 1, 0)
+    piece = np.maximum(np.searchsorted(time, begins + 0.5 * run.step, side="right") - 1, 0)
     return {"path.start": time[piece], "path.level": angles[piece], "path.rate": rates[piece]}
 
 
@@ -158,7 +154,7 @@ def _input_values(inputs: RecordedInputs, name: str, run: Run) -> Floats:
     changes, a millisecond; a command over a step, as a valve answers within less.
     """
     if inputs.recording.is_held(name):
-        middle = step_times(run) + 0.5 * run.step
+        middle = run.step * np.arange(run.step_count, dtype=np.float64) + 0.5 * run.step
     else:
         together = 1 if name == COMMAND else max(1, min(run.steps_per_sample, round(LONGEST_STEP / run.step)))
         first = (np.arange(run.step_count) // together * together).astype(np.float64)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from ppafo.control.kind import OPEN_LOOP
 from ppafo.engine.lane_samples import TRACED
-from ppafo.engine.lanes import Floats, load_programs
+from ppafo.engine.lanes import Floats
 from ppafo.engine.run import TOO_MANY_PARTS
 from ppafo.errors import ScenarioError, nearest_name
 from ppafo.metrics import METRICS
@@ -88,22 +88,17 @@ def run_ensemble(
         longest = max(float((intervals(batch) * (batch.clock.samples - 1)).max()) for _, batch in plan.batches)
         times = np.arange(int(longest / interval * (1.0 + _ROUNDING)) + 1, dtype=np.float64) * interval
     request = Request(metrics, tuple(dict.fromkeys(bands)), interval, times, base.controller.custom)
-    outcome = _run(plan, Outcome(checked.runs, request), threads)
+    outcome = Outcome(checked.runs, request)
+    outcome.run_all(plan.batches, threads)
     estimated = {}
     if errors:
         alone = Request(metrics, (), interval, np.empty(0), base.controller.custom)
-        fine = _run(plan_ensemble(checked, finer), Outcome(checked.runs, alone), threads)
+        fine = Outcome(checked.runs, alone)
+        fine.run_all(plan_ensemble(checked, finer).batches, threads)
         for name, values in outcome.metrics.items():
             changes = np.where(np.isfinite(fine.metrics[name]), np.abs(fine.metrics[name] - values), np.inf)
             estimated[name] = np.where(np.isfinite(values), MARGIN * changes, np.nan)
     return _result(plan, outcome, estimated)
-
-
-def _run(plan: EnsemblePlan, outcome: Outcome, threads: int | None) -> Outcome:
-    load_programs(outcome.programs([batch for _, batch in plan.batches]))
-    for members, batch in plan.batches:
-        outcome.run(batch, members, threads)
-    return outcome
 
 
 def _result(plan: EnsemblePlan, outcome: Outcome, errors: dict[str, Floats]) -> EnsembleResult:

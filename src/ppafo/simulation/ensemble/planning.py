@@ -20,7 +20,7 @@ from ppafo.parameters.plant import switches_of
 from ppafo.simulation.clock import Clock
 from ppafo.simulation.declaration import limits, quantity_text
 from ppafo.simulation.motion_kind import MotionKind
-from ppafo.simulation.numbers import TIMES, Columns, clock_of, varied_scenario
+from ppafo.simulation.numbers import TIMES, Columns, clock_of, with_numbers
 from ppafo.simulation.plan import plan_runs
 from ppafo.simulation.scenario import Scenario
 
@@ -43,9 +43,17 @@ class Screen:
     @property
     def scenario(self) -> Scenario:
         """The scenario that represents the runs that are left. ScenarioError before the times are read."""
-        if self.clock is None:
+        clock = self.clock
+        if clock is None:
             raise ScenarioError("the times of an ensemble are not read yet")
-        return varied_scenario(self.columns, self.clock)
+        # What the clock came to stands in the place of the times that were given.
+        numbers = {path: column for path, column in self.columns.values.items() if path not in TIMES}
+        scenario = with_numbers(self.columns.base, numbers)
+        return replace(
+            scenario,
+            run=replace(scenario.run, duration=clock.duration, step=clock.step, output_interval=clock.output_interval),
+            controller=replace(scenario.controller, period=clock.period),
+        )
 
     def at(self, places: Members) -> "Screen":
         """The screen of some of these runs, which writes its reasons to the same place."""

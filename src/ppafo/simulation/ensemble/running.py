@@ -1,6 +1,6 @@
 """Runs the batches of an ensemble and reads their meters."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, final
 
@@ -11,7 +11,7 @@ from ppafo.control.kind import PythonController
 from ppafo.engine.lane_samples import FELL
 from ppafo.engine.lane_samples import REQUEST as REQUEST_ROW
 from ppafo.engine.lane_source import SAME_MOMENT
-from ppafo.engine.lanes import Batch, BatchResult, Floats, add_meters, group_of, meters_of, run_blocks
+from ppafo.engine.lanes import Batch, BatchResult, Floats, add_meters, group_of, load_programs, meters_of, run_blocks
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, row_numbers
 from ppafo.engine.run import NEVER_FAILED, Members
@@ -125,12 +125,15 @@ class Outcome:
         self.metrics = {name: np.full(runs, np.nan) for name in request.metrics}
         self.traces = {name: np.full((request.times.size, runs), np.nan) for name in request.bands}
 
-    def programs(self, batches: Iterable[Batch]) -> list[Program]:
-        """Return the programs that batches need, with their meters."""
-        first = {batch.program: batch for batch in batches}
+    def run_all(self, batches: Sequence[tuple[Members, Batch]], threads: int | None) -> None:
+        """Run batches one after the other, whose runs have these places in the ensemble."""
+        first = {batch.program: batch for _, batch in batches}
         alone = [Batch(item.program, item.clock, item.parameters[:, :1], item.states[:, :1]) for item in first.values()]
-        # Several are compiled side by side before the first batch runs; a single one as it is met.
-        return [_meter_batch(batch, self.request).batch.program for batch in alone] if len(alone) > 1 else []
+        # Several programs are compiled side by side before the first batch runs; a single one as it is met.
+        if len(alone) > 1:
+            load_programs([_meter_batch(batch, self.request).batch.program for batch in alone])
+        for members, batch in batches:
+            self.run(batch, members, threads)
 
     def run(self, plain: Batch, members: Members, threads: int | None) -> None:
         """Run a batch whose runs have these places in the ensemble."""
