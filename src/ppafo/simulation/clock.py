@@ -11,8 +11,10 @@ from ppafo.simulation.declaration import PERIOD, RATE, RUN, Reading, quantity_te
 
 MAXIMUM_STEPS = 1.0e8
 MAXIMUM_OUTPUTS = 5.0e6
+# What is measured during a delay is stored, for each run of an ensemble.
 MAXIMUM_STEPS_OF_DELAY = 1.0e5
 
+# Up to this fraction times count as equal: decimal ones are seldom whole multiples of each other in binary.
 _RELATIVE = 1.0e-9
 _DURATION, _STEP, _OUTPUT = RUN
 _LONGEST_STEP = 1.0e-3

@@ -42,6 +42,7 @@ PLAIN = ("", "1")
 FREE = quantities_of(FreeMotion)
 ANGLE = FREE[0]
 LOCKED_ANGLE = "motion.angle"
+# Without the external torque: with a leg it follows from equation (11).
 LEG = (*FREE[:2], *quantities_of(Leg))
 FOOT = {item.name: item for item in quantities_of(Leg)}
 SHANK_LEVEL = Quantity("level", "rad", "", None, -10.0, 10.0)
@@ -127,6 +128,7 @@ def profile_settings(kind: str, prescribed: Quantity) -> tuple[Quantity, ...]:
     found = []
     for item in PROFILES[kind].quantities if kind in PROFILES else ():
         lowest, highest = max(item.minimum, prescribed.minimum), min(item.maximum, prescribed.maximum)
+        # A level is a torque in a reference and an angle in a motion, so that it has no unit of its own.
         is_level = not item.unit
         found.append(replace(item, unit=prescribed.unit, minimum=lowest, maximum=highest) if is_level else item)
     return tuple(found)
@@ -212,6 +214,7 @@ def find_kinds(document: Mapping[str, Any], file: str) -> None:
         said = no_arithmetic(law, old)
         raise ScenarioError(f"{file}: {ARITHMETIC} = {quote(old)}: {said}")
     kind = kind_at(document, "motion")
+    # A kind that is missing is refused by the layout, which says what it may be.
     with refused_as(ScenarioError, f"{file}: motion.kind", KindError):
         is_known = not kind or kind in MOTIONS
     if not is_known:
@@ -221,6 +224,7 @@ def find_kinds(document: Mapping[str, Any], file: str) -> None:
     sections: dict[str, Kinds[Any]] = {"controller": CONTROLLERS, "reference": PROFILES}
     motion = section_of(document)
     path = profile_path(motion)
+    # A kind of the table's own, such as the gait of a shank, is no profile.
     if motion is not None and motion.profile is not None and kind_at(document, path) not in motion.profile.own:
         sections[path] = PROFILES
     for section, kinds in sections.items():
@@ -255,6 +259,7 @@ def check_motion_kind(kind: object, place: str) -> None:
 def kind_at(document: Mapping[str, Any], section: str) -> str:
     """Return the kind that a section names, an empty text where it does not."""
     kind = value_at(document, f"{section}.kind")
+    # Anything but a text is refused by the layout, with its place.
     return kind if isinstance(kind, str) else ""
 
 
@@ -328,10 +333,12 @@ class Reading:
             if quantity.default is None:
                 raise ScenarioError(f"{self.file}: '{path}' is missing: {quantity.summary or quantity.name}")
             return quantity.default
+        # True and false are whole numbers to Python.
         if isinstance(value, bool) or not isinstance(value, str | int | float):
             raise self.refusal(path, f"must be {_form(quantity, 1.0)}")
         try:
             result = parse_quantity(value, quantity.unit, atmosphere) if isinstance(value, str) else float(value)
+        # A whole number of a file may be larger than any float.
         except (UnitError, OverflowError) as error:
             raise self.refusal(path, str(error)) from error
         if not isinstance(value, str) and not math.isfinite(result):
@@ -351,6 +358,7 @@ def quantity_text(value: float, si_unit: str, atmosphere: float = STANDARD_ATMOS
     """Return an SI value in the unit in which people write it: degrees, psi; rounding errors are left out."""
     unit = WRITTEN_UNITS.get(si_unit, "" if si_unit in PLAIN else si_unit)
     number = from_si(value, unit, si_unit, atmosphere)
+    # A number so small that nine places would show nothing of it stays as it is.
     return format_quantity(round(number, 9) if abs(number) > _ROUND else number, unit)
 
 
@@ -372,6 +380,7 @@ def limits(quantity: Quantity, atmosphere: float) -> str:
 
     ``atmosphere`` [Pa absolute] is what gauge pressures are measured from.
     """
+    # The limits of a pressure are absolute; in gauge they would move with the atmosphere.
     unit = WRITTEN_UNITS.get(quantity.unit, quantity.unit) if quantity.unit != "Pa_a" else "Pa_a"
     unit = "" if unit in PLAIN else unit
     lower, upper = (

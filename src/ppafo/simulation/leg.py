@@ -26,6 +26,7 @@ from ppafo.simulation.vane_recording import Measured, friction_sizes, measured
 def plan_leg(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
     """Return the run of a vane that moves the foot of a leg, and what may be wrong with it."""
     leg = _leg_of(scenario)
+    # Curves were made when the file was read; these two of their numbers may have been changed since, or vary.
     if leg.curves is None:
         shank = profile_parameters(leg.shank)
     else:
@@ -104,6 +105,7 @@ def _torque_on_leg(leg: Leg, run: Run, times: Floats, rows: Mapping[str, Floats]
     """T_ex [N m] by the second row of equation (11): what the foot needs beside T_2. A blow at a stop is not in it."""
     assert run.leg is not None, "the run has the leg of its scenario"
     angle, rate, plant = rows["state.angle"], rows["state.angular_velocity"], run.plant
+    # The foot alone: inertia and weight of vane and foot plate are on the other side of T_ex.
     foot = foot_load(0.0, 0.0, leg.foot_mass, leg.foot_mass_centre, leg.foot_inertia, leg.shank_length)
     kind = shank_kind(leg)
     now = shank_over_samples(kind, run.leg.shank, times)

@@ -384,11 +384,13 @@ def request_of_dict(content: Mapping[str, Any], overrides: Iterable[str]) -> Sce
     name = content.get("name")
     file = f"scenario '{label(name)}'" if isinstance(name, str) else "scenario"
     FILE.check_depth(content, file)
+    # A copy: the scenario is loaded anew from it, whatever becomes of the caller's dictionaries.
     return ScenarioRequest(file, None, Path(), copy.deepcopy(dict(content)), tuple(overrides))
 
 
 def scenario_of(request: ScenarioRequest, layout: Layout) -> Scenario:
     """Check the keys of the file itself, put the overrides in, and then require all that is needed."""
+    # A set in the place of a scenario would else be refused key by key.
     if "default_valve" in request.content and not {"run", "controller"} & request.content.keys():
         raise ScenarioError(
             f"{request.file}: is a parameter set, not a scenario; "

@@ -194,12 +194,14 @@ def check_columns(base: Scenario, columns: Mapping[str, Any], gauge: Collection[
     """
     if base.controller.kind == PYTHON_CONTROLLER and base.controller.custom is None:
         raise ScenarioError(f"{base.name}: nothing controls the valve; give a controller (controlled_by)")
+    # Effects of other packages are known by their paths once they are loaded.
     find_effects(columns)
     declared = declared_numbers(base)
     values: dict[str, Floats] = {}
     for given, column in columns.items():
         path = chosen_path(given, base)
         _check_path(base, given, path, declared)
+        # valve.area and valves.NAME.area are one number of the chosen valve.
         if path in values:
             raise ScenarioError(f"{base.name}: '{given}' and '{path}' are the same value; give one of them")
         values[path] = np.ascontiguousarray(column, dtype=np.float64)

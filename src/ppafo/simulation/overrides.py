@@ -66,6 +66,7 @@ def apply_overrides(
     known = declared.paths(changed)
     for path in sorted(own):
         if path not in known:
+            # Where a kind is unknown too, that is the mistake.
             declared.find_kinds(changed, file)
             if path == ARITHMETIC:
                 instead = no_arithmetic(kind_at(changed, "controller"), own[path].text)
@@ -209,6 +210,7 @@ def _set(document: dict[str, Any], path: str, text: str, file: str, declared: De
         after = _setting_names(document, section, declared)
         for lost in before - after - _OF_ANY_KIND.get(section, frozenset()):
             table.pop(lost, None)
+    # Area and conductance, rate and period: given in another form as well, a value would be there twice.
     for other in other_forms(path):
         table.pop(other.rpartition(".")[2], None)
     if path == _SEED:

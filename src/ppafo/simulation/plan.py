@@ -262,9 +262,11 @@ def plan_vane(scenario: Scenario, leg: CarriedLeg | None = None) -> tuple[Run, t
     """The run of a scenario of a vane alone, with a leg or without, and what may be wrong with it."""
     device, motion, control = scenario.device, vane_motion(scenario), scenario.controller
     plant = plant_parameters(device, motion.outside_torque)
+    # The command of a Python object comes from outside the lanes.
     law = None if control.kind == PYTHON_CONTROLLER else CONTROLLERS[control.kind]
     numbers: Mapping[str, Any] = control.settings
     problems: tuple[Problem, ...] = ()
+    # A fixed-point controller has integers, which follow from its gains, its period and the range of its reference.
     if law is not None and law.plan is not None:
         bounds = profile_bounds(scenario.reference)
         numbers, problems = law.plan(numbers, control.period, plant.torque_constant, bounds)

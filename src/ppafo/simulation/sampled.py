@@ -60,6 +60,7 @@ class SampledRun:
         clock = self._batch.clock
         done = self.taken * clock.steps_per_sample
         self._block.states[self._command_row] = command
+        # The last sample of a run may have fewer steps.
         self._block.advance(min(clock.steps_per_sample, clock.step_count - done))
         self.taken += 1
 
@@ -76,6 +77,7 @@ class SampledRun:
 def run_sampled(batch: Batch, controller: PythonController) -> BatchResult:
     """Run a batch of one with a Python controller; SimulationError where it returns no finite number."""
     run = SampledRun(batch)
+    # What an earlier run left behind in the object must not steer this one.
     controller.reset()
     for _ in range(run.samples):
         command = controller.update(run.time, run.requested, run.measurement())

@@ -350,6 +350,7 @@ class Scenario:
     @property
     def graph(self) -> Graph:
         """All links, the device's first."""
+        # Sources stand before what follows them, and a scenario's numbers follow the device's.
         return {**self.device.links, **self.links}
 
     def controlled_by(self, controller: PythonController) -> "Scenario":
@@ -357,6 +358,7 @@ class Scenario:
 
         ScenarioError for a class, or for an object without these methods.
         """
+        # A class has both methods too, and would fail only when it runs.
         if isinstance(controller, type):
             name = controller.__name__
             raise ScenarioError(
@@ -369,6 +371,7 @@ class Scenario:
                     f"{self.name}: a controller of type {kind} has no method '{method}'; it needs 'reset()' and "
                     f"'update(time, reference, measurement)', the latter returning a command from -1 to 1"
                 )
+        # The settings of the law that leaves follow nothing any more.
         own = ("controller.", "timing.")
         links = {path: link for path, link in self.links.items() if not path.startswith(own)}
         return replace(self, controller=Control(PYTHON_CONTROLLER, {}, self.controller.period, controller), links=links)

@@ -156,6 +156,7 @@ def scenario_file() -> type[BaseModel]:
     A file that names no controller is compared with all of this package.
     """
     controllers, profiles = CONTROLLERS.loaded_or_own(), PROFILES.loaded()
+    # What the model depends on is given for the cache alone: a kind that is loaded meanwhile makes another model.
     return _scenario_file(tuple(controllers.items()), tuple(profiles.items()), tuple(motion_kinds()))
 
 
@@ -177,6 +178,7 @@ def _scenario_file(*_kinds: Any) -> type[BaseModel]:
         motions.append(table(f"{model_name(name)}Motion", fields))
     words = tuple(declaration.PRESSURE_WORDS)
     reference = profile_table(declaration.TORQUE_LEVEL, "Reference")
+    # The one whole number of the file: half a seed means nothing.
     seed = Annotated[int, Field(ge=0, le=LARGEST_SEED)]
     sensors = quantity_fields(declaration.SENSORS) | {"seed": (seed, Field(1, description=declaration.SEED.summary))}
     initial = table("Initial", quantity_fields(declaration.INITIAL, words))

@@ -192,33 +192,27 @@ def _bounded(made: Callable[[float, float], Distribution], item: Any, place: Var
     return made(*_bounds(item, place))
 
 
-def _log_uniform(item: declared.LogUniform, place: VariedPath) -> Distribution:
-    minimum, maximum = _bounds(item, replace(place, is_gauge=False))
-    if minimum <= 0.0:
-        raise UnitError(f"minimum = {item.minimum!r}: a log-uniform distribution needs both bounds above 0")
-    return _above(LogUniformBetween(minimum, maximum), place)
-
-
-def _above(absolute: Distribution, place: VariedPath) -> Distribution:
-    """Return a distribution of absolute pressures, whose logarithms exist, as values of a place that may be gauge."""
-    return Above(absolute, place.atmosphere) if place.is_gauge else absolute
-
-
-def _normal(item: declared.Normal, place: VariedPath) -> Distribution:
-    return NormalAround(_key(item, "mean", place), _deviation(item, place))
-
-
-def _truncated_normal(item: declared.TruncatedNormal, place: VariedPath) -> Distribution:
-    minimum, maximum = _bounds(item, place)
-    return NormalBetween(_key(item, "mean", place), _deviation(item, place), minimum, maximum)
-
-
-def _log_normal(item: declared.LogNormal, place: VariedPath) -> Distribution:
+def _logarithmic(item: declared.LogUniform | declared.LogNormal, place: VariedPath) -> Distribution:
     # Of the absolute pressure: a gauge pressure may be 0 or below, where there is no logarithm.
-    median = _key(item, "median", replace(place, is_gauge=False))
-    if median <= 0.0:
-        raise UnitError(f"median = {item.median!r} must be above 0")
-    return _above(LogNormalAround(median, item.factor), place)
+    absolute = replace(place, is_gauge=False)
+    found: Distribution
+    if isinstance(item, declared.LogUniform):
+        minimum, maximum = _bounds(item, absolute)
+        if minimum <= 0.0:
+            raise UnitError(f"minimum = {item.minimum!r}: a log-uniform distribution needs both bounds above 0")
+        found = LogUniformBetween(minimum, maximum)
+    else:
+        median = _key(item, "median", absolute)
+        if median <= 0.0:
+            raise UnitError(f"median = {item.median!r} must be above 0")
+        found = LogNormalAround(median, item.factor)
+    return Above(found, place.atmosphere) if place.is_gauge else found
+
+
+def _normal(item: declared.Normal | declared.TruncatedNormal, place: VariedPath) -> Distribution:
+    bounds = _bounds(item, place) if isinstance(item, declared.TruncatedNormal) else None
+    mean, deviation = _key(item, "mean", place), _deviation(item, place)
+    return NormalAround(mean, deviation) if bounds is None else NormalBetween(mean, deviation, *bounds)
 
 
 def _triangular(item: declared.Triangular, place: VariedPath) -> Distribution:
@@ -244,10 +238,10 @@ def _choice(item: declared.Choice, place: VariedPath) -> Distribution:
 
 _DISTRIBUTIONS: dict[str, Callable[[Any, VariedPath], Distribution]] = {
     "uniform": partial(_bounded, UniformBetween),
-    "log_uniform": _log_uniform,
+    "log_uniform": _logarithmic,
     "normal": _normal,
-    "truncated_normal": _truncated_normal,
-    "log_normal": _log_normal,
+    "truncated_normal": _normal,
+    "log_normal": _logarithmic,
     "triangular": _triangular,
     "choice": _choice,
     "whole_numbers": partial(_bounded, WholeNumbersBetween),

@@ -92,10 +92,12 @@ def run_ensemble(
     outcome.run_all(plan.batches, threads)
     estimated = {}
     if errors:
+        # For the metrics alone: nobody asks for the error of a trace.
         alone = Request(metrics, (), interval, np.empty(0), base.controller.custom)
         fine = Outcome(checked.runs, alone)
         fine.run_all(plan_ensemble(checked, finer).batches, threads)
         for name, values in outcome.metrics.items():
+            # Where the finer run has no value this one may be wrong by anything; without a value it has no error.
             changes = np.where(np.isfinite(fine.metrics[name]), np.abs(fine.metrics[name] - values), np.inf)
             estimated[name] = np.where(np.isfinite(values), MARGIN * changes, np.nan)
     return _result(plan, outcome, estimated)
@@ -103,6 +105,7 @@ def run_ensemble(
 
 def _result(plan: EnsemblePlan, outcome: Outcome, errors: dict[str, Floats]) -> EnsembleResult:
     status = np.where(outcome.is_completed, COMPLETED, DIVERGED).astype(np.int8)
+    # Runs that were refused are in no batch, so that until here they count as diverged.
     status[list(plan.reasons)] = REFUSED
     reasons = dict(plan.reasons)
     for run in np.flatnonzero(status == DIVERGED).tolist():

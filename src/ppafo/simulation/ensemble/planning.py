@@ -24,6 +24,7 @@ from ppafo.simulation.numbers import TIMES, Columns, clock_of, with_numbers
 from ppafo.simulation.plan import plan_runs
 from ppafo.simulation.scenario import Scenario
 
+# Numbers that name one of many: there is nothing between two of them.
 _WHOLE = ("sensors.seed", "wearer.person")
 
 Rule = Callable[[Scenario], tuple[Problem, ...]]

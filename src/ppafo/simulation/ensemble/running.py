@@ -168,8 +168,10 @@ class Outcome:
         result = group_of("result", task.batch.program.state_rows(), states)
         failed = result.failure_time
         self.too_many_parts[members] = result.too_many_parts != 0.0
+        # Meters stand below the rows of a plain batch, and what they come to says nothing about the run.
         completed = (failed >= NEVER_FAILED) & np.isfinite(states[:physical]).all(axis=0)
         self.is_completed[members] = completed
+        # Without a time of failure the last sample is the best that is known.
         end = task.interval * (task.samples - 1)
         time = np.where(failed < NEVER_FAILED, failed, end)
         self.failure_time[members] = np.where(completed, np.nan, time)
