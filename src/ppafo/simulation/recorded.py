@@ -104,7 +104,6 @@ def step_inputs(inputs: RecordedInputs, device: Device, run: Run) -> StepInputs:
     A run that follows the angle is one of ``with_prescribed_angle``.
     """
     command = _input_values(inputs, COMMAND, run) if inputs.has(COMMAND) else None
-    path = _path(inputs, device, run) if inputs.has(ANGLE) else {}
     # The parameters that follow a recording [SI], for every step.
     followed: dict[str, Floats] = {}
     if inputs.has(SUPPLY):
@@ -113,23 +112,21 @@ def step_inputs(inputs: RecordedInputs, device: Device, run: Run) -> StepInputs:
         followed["plant.dorsiflexion_pressure"] = _input_values(inputs, DORSIFLEXION_SUPPLY, run)
     if inputs.has(EXTERNAL_TORQUE):
         followed["plant.external_torque"] = _input_values(inputs, EXTERNAL_TORQUE, run)
-    return StepInputs(command, {**followed, **path})
+    if inputs.has(ANGLE):
+        # The straight piece of the angle that holds at each step; after the last sample the vane stands still.
+        time = inputs.recording.time - inputs.start
+        angles = between_stops(inputs.recording[ANGLE], device, inputs.recording.label)
+        rates = np.append(np.diff(angles) / np.diff(time), 0.0)
+        begins = run.step * np.arange(run.step_count, dtype=np.float64)
+        # By the middle of a step: rounding may put a sample a little behind the step that begins with it.
+        piece = np.maximum(np.searchsorted(time, begins + 0.5 * run.step, side="right") - 1, 0)
+        followed |= {"path.start": time[piece], "path.level": angles[piece], "path.rate": rates[piece]}
+    return StepInputs(command, followed)
 
 
 def with_prescribed_angle(run: Run, angle: float) -> Run:
     """Return the run with the vane on a recorded angle, which is ``angle`` [rad] at the start."""
     return replace(run, program=prescribe_recorded_angle(run.program), path=(0.0, angle, 0.0), needs_parts=True)
-
-
-def _path(inputs: RecordedInputs, device: Device, run: Run) -> dict[str, Floats]:
-    """Return the straight piece of the angle that holds at each step; after the last sample the vane stands still."""
-    time = inputs.recording.time - inputs.start
-    angles = between_stops(inputs.recording[ANGLE], device, inputs.recording.label)
-    rates = np.append(np.diff(angles) / np.diff(time), 0.0)
-    begins = run.step * np.arange(run.step_count, dtype=np.float64)
-    # By the middle of a step: rounding may put a sample a little behind the step that begins with it.
-    piece = np.maximum(np.searchsorted(time, begins + 0.5 * run.step, side="right") - 1, 0)
-    return {"path.start": time[piece], "path.level": angles[piece], "path.rate": rates[piece]}
 
 
 def between_stops(angles: Floats, device: Device, file: str) -> Floats:

@@ -276,12 +276,6 @@ class Control:
         """Return a setting by its name."""
         return attribute_among(self, name, "settings")
 
-    @property
-    def label(self) -> str:
-        """The controller in a few words."""
-        name = self.kind if self.custom is None else f"{self.kind}, {type(self.custom).__name__}"
-        return f"{name}, every {self.period:g} s"
-
 
 @dataclass(frozen=True, slots=True)
 class Assumption:
@@ -329,11 +323,13 @@ class Scenario:
 
     def __repr__(self) -> str:
         """Return name, device, valve, motion, controller and duration, a line each."""
+        control = self.controller
+        law = control.kind if control.custom is None else f"{control.kind}, {type(control.custom).__name__}"
         return (
             f"Scenario '{self.name}'\n"
             f"  device      {self.device.name}, valve {self.device.valve_name}\n"
             f"  motion      {self.motion.label}\n"
-            f"  controller  {self.controller.label}\n"
+            f"  controller  {law}, every {control.period:g} s\n"
             f"  duration    {self.run.duration:g} s, in steps of at most {self.run.step:g} s"
         )
 

@@ -3,7 +3,7 @@
 import operator
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,15 +31,14 @@ Rule = Callable[[Scenario], tuple[Problem, ...]]
 """What may be wrong with a scenario that represents many runs."""
 
 
-@final
+@dataclass(slots=True)
 class Screen:
     """The runs that are left: their places in the ensemble, their columns and clocks; and why others are not."""
 
-    def __init__(self, columns: Columns) -> None:
-        self.columns = columns
-        self.members = np.arange(columns.runs)
-        self.clock: Clock | None = None
-        self.reasons: dict[int, str] = {}
+    columns: Columns
+    members: Members
+    reasons: dict[int, str]
+    clock: Clock | None = None
 
     @property
     def scenario(self) -> Scenario:
@@ -58,10 +57,12 @@ class Screen:
 
     def at(self, places: Members) -> "Screen":
         """The screen of some of these runs, which writes its reasons to the same place."""
-        part = Screen(self.columns.only(places))
-        part.members, part.reasons = self.members[places], self.reasons
-        part.clock = None if self.clock is None else _clock_of(self.clock, places)
-        return part
+        clock = self.clock
+        if clock is not None:
+            times = clock.duration, clock.step, clock.output_interval, clock.period
+            kept: list[Any] = [time[places] if isinstance(time, np.ndarray) else time for time in times]
+            clock = Clock(*kept)
+        return Screen(self.columns.only(places), self.members[places], self.reasons, clock)
 
     def refuse(self, is_bad: Any, line: Callable[[int], str]) -> None:
         """Drop runs, by a mask over those left or one truth value for all; ``line(place)`` says why."""
@@ -70,14 +71,13 @@ class Screen:
             return
         for place in np.flatnonzero(bad):
             self.reasons[int(self.members[place])] = line(int(place))
-        self.members = self.members[~bad]
-        self.columns = self.columns.only(~bad)
-        self.clock = None if self.clock is None else _clock_of(self.clock, ~bad)
+        left = self.at(np.flatnonzero(~bad))
+        self.members, self.columns, self.clock = left.members, left.columns, left.clock
 
 
 def screen_columns(columns: Columns) -> Screen:
     """The runs whose values are in range and fit together."""
-    screen = Screen(columns)
+    screen = Screen(columns, np.arange(columns.runs), {})
     for path in columns.values:
         # A default that follows others goes where they lead it, as it does in a single run.
         if path in columns.given or not columns.declared[path].follows:
@@ -112,11 +112,6 @@ def _out_of_range(columns: Columns, path: str) -> Problem:
     above = values >= quantity.minimum if quantity.minimum_allowed else values > quantity.minimum
     is_good = np.isfinite(values) & above & (values <= quantity.maximum)
     return ~(is_good & (values == np.floor(values)) if path in _WHOLE else is_good), line
-
-
-def _clock_of(clock: Clock, kept: Any) -> Clock:
-    numbers: list[Any] = [clock.duration, clock.step, clock.output_interval, clock.period]
-    return Clock(*(number[kept] if isinstance(number, np.ndarray) else number for number in numbers))
 
 
 @dataclass(frozen=True, slots=True)

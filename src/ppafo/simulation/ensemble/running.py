@@ -293,7 +293,13 @@ def _meter_batch(plain: Batch, request: Request) -> _MeteredBatch:
     meters = sorted({meter.name: meter for kind in available.values() for meter in kind.meters}.items())
     read_from_traces = dict.fromkeys(channel for kind in available.values() for channel in kind.traced)
     interval = intervals(plain)
-    stride = _stride(interval, request) if request.bands else 1
+    stride = max(1, round(request.every / float(interval[0]))) if request.bands else 1
+    # Runs of one batch may have other steps, but traces are rows of one array.
+    if request.bands and np.abs(stride * interval - request.every).max() > _SAME * request.every:
+        raise ScenarioError(
+            f"traces every {request.every:.6g} s need an output interval that divides it in every run, not "
+            f"{interval.max():.6g} s; give run.output_interval a value that does"
+        )
     late = _late_totals(plain, available)
     falls = {FELL} if program.reacts and (late or request.bands) else set[str]()
     traced = sorted({*read_from_traces, *request.bands, *late, *falls})
@@ -322,18 +328,6 @@ def intervals(batch: Batch) -> Floats:
     """Time between two samples [s] of each run of a batch that is not metered yet."""
     timing = group_of("timing", batch.program.parameter_rows(), batch.parameters)
     return np.asarray(timing.step * batch.clock.record_every)
-
-
-def _stride(interval: Floats, request: Request) -> int:
-    """Samples between two that are kept."""
-    stride = max(1, round(request.every / float(interval[0])))
-    # Runs of one batch may have other steps, but traces are rows of one array.
-    if np.abs(stride * interval - request.every).max() > _SAME * request.every:
-        raise ScenarioError(
-            f"traces every {request.every:.6g} s need an output interval that divides it in every run, not "
-            f"{interval.max():.6g} s; give run.output_interval a value that does"
-        )
-    return stride
 
 
 def _read(task: _MeteredBatch, name: str, readings: Readings) -> Floats:
