@@ -66,6 +66,7 @@ def doctor(
 
     asked = {"--warm": warm, "--clear": clear, "--bits": bits, "--schema": schema}
     given = [option for option, value in asked.items() if value]
+    # Two of them contradict each other, or are two answers.
     if len(given) > 1:
         raise DataError(f"{given[1]}: not allowed with {given[0]}")
     if schema is not None:
@@ -139,6 +140,7 @@ def models_text(document: dict[str, Any]) -> str:
         lines.append(f"texts of programs and their forms for pages: {_megabytes(document['made_from_programs'])}")
     for item in document["programs"]:
         days = item["unused_days"]
+        # One day or several by the number as it is shown, which is rounded.
         ago = "today" if days < 1.0 else f"{days:.0f} day{'' if int(days + 0.5) == 1 else 's'} ago"
         lines.append(f"  {item['name']}  {_megabytes(item['size']):>8}  last used {ago}")
     lines += [f"left out for a day: {name}: {why}" for name, why in document["left_out"].items()]
