@@ -13,7 +13,7 @@ from ppafo.engine.rows import numbers
 from ppafo.engine.run import Run
 from ppafo.model.plant import actuator_torque, chamber_pressures
 from ppafo.model.sensors import Measurement
-from tests.judge.reference_solver import load_right_hand_side
+from tests.reference.reference_solver import load_right_hand_side
 
 PLANT_UNKNOWNS = 7
 TYPICAL_SIZES = (1.0, 1.0, 1e-4, 1e-4, 1e-4, 1e-4, 1e-4, 1.0)

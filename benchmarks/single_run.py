@@ -19,7 +19,7 @@ from benchmarks.timing import Timing, time_in_turn
 from ppafo.engine.lanes import Floats, run_batch
 from ppafo.engine.run import Run, batch_of
 from ppafo.simulation.simulate import simulate, simulate_many
-from tests.judge.reference_solver import chamber_pressures_of, plant_states, solve_reference
+from tests.reference.reference_solver import chamber_pressures_of, plant_states, solve_reference
 
 GROUP = "One closed-loop run at 1 kHz"
 CALLS_PER_REPETITION = 20
@@ -60,11 +60,11 @@ def lane_states(run: Run) -> Floats:
     return plant_states(run, run_batch(batch_of(run)))
 
 
-def pressure_error(run: Run, states: Floats, judge: Floats) -> float:
+def pressure_error(run: Run, states: Floats, reference: Floats) -> float:
     """Largest difference of both chamber pressures over the supply's gauge pressure [-]."""
     plant = run.plant
     span = max(plant.supply_pressure, plant.dorsiflexion_pressure) - plant.atmospheric_pressure
-    pairs = zip(chamber_pressures_of(run, states), chamber_pressures_of(run, judge), strict=True)
+    pairs = zip(chamber_pressures_of(run, states), chamber_pressures_of(run, reference), strict=True)
     return max(float(np.abs(ours - theirs).max()) for ours, theirs in pairs) / span
 
 
@@ -131,8 +131,8 @@ def _error_lines(run: Run, states: dict[str, Floats], say: Callable[[str], None]
     if not has_cvode():
         return [Line(f"single_run_error_{name}", GROUP, what[name], None, "", note=MISSING_EXTRA) for name in names]
     say("one run: the reference solution, rtol 1e-10")
-    judge = solve_reference(run).states
-    errors = {name: pressure_error(run, values, judge) for name, values in states.items()}
+    reference = solve_reference(run).states
+    errors = {name: pressure_error(run, values, reference) for name, values in states.items()}
     return [
         Line(
             f"single_run_error_{name}",

@@ -21,9 +21,9 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from ppafo import scenario_from_dict
 from ppafo.running import simulate
 from ppafo.simulation.scenario import Scenario
-from tests.judge.comparison import pressure_range
-from tests.judge.draws import Document, draw, logarithmic
-from tests.judge.simulator import Answer, judge
+from tests.reference.comparison import pressure_range
+from tests.reference.draws import Document, draw, logarithmic
+from tests.reference.simulator import Answer, independent_run
 
 OPEN_LOOP = ("gases", "nothing lost", "backflow", "on a stop", "slow valves", "thermal rebounds", "legs", "prescribed")
 SMALL = "small chambers"
@@ -53,10 +53,10 @@ def case(scenario: Scenario) -> tuple[float, float] | None:
     result = simulate(scenario)
     if not result.status.is_completed:
         return None
-    answer = judge(scenario)
+    answer = independent_run(scenario)
     span = pressure_range(scenario, answer)
     wrong = gap(answer, {name: result.recording[name] for name in ("pressure_1", "pressure_2")})
-    others = (judge(scenario, moved=1.0e-7), judge(scenario, tolerance=1.0e-11))
+    others = (independent_run(scenario, moved=1.0e-7), independent_run(scenario, tolerance=1.0e-11))
     doubt = max(gap(answer, {"pressure_1": one.pressure_1, "pressure_2": one.pressure_2}) for one in others)
     if wrong < SEEN * span or doubt > SURE * wrong:
         return None

@@ -3,8 +3,8 @@
     make validation                                                  out/validation/report.md
     python scripts/validation_report.py --out out/validation --long out
 
-Judges are simulators, solvers, tools and data that the package does not contain, or its own tests where these hold it
-against such. Each is run by the command that stands beside its result. One that ended is kept in the folder, and a
+References are simulators, solvers, tools and data that the package does not contain, or its own tests where these hold
+it against such. Each is run by the command that stands beside its result. One that ended is kept in the folder, and a
 second call goes on from there; ``--again`` begins anew. What takes hours is read from the folders in which its command
 left its result, below ``--long``; where there is none, the report says that it was not run.
 """
@@ -46,7 +46,7 @@ class Line:
     """One result: what was judged, by what, what came out, what was allowed, whether it agrees, the command."""
 
     what: str
-    judge: str
+    reference: str
     result: str
     allowed: str
     verdict: str
@@ -60,7 +60,7 @@ def against_reference(_long: Path) -> list[Line]:
     """Shipped scenarios against the reference solver."""
     from ppafo.simulation.loading import list_scenarios, load_scenario
     from ppafo.simulation.plan import plan_run
-    from tests.judge.reference_solver import compare_with_reference
+    from tests.reference.reference_solver import compare_with_reference
 
     found = [compare_with_reference(plan_run(load_scenario(name))) for name in list_scenarios()]
     limits = ((2e-4, "angle"), (1e-3, "worst_pressure"), (1e-4, "worst_rms"))
@@ -83,7 +83,7 @@ def _words(limits: tuple[tuple[float, str], ...]) -> list[tuple[str, str]]:
 
 def against_simulator(_long: Path) -> list[Line]:
     """Random devices against the independent simulator."""
-    command = "python scripts/judge.py --draws 330"
+    command = "python scripts/compare_with_reference.py --draws 330"
     done = _called(command)
     cells = [line[24:].split() for line in done.stdout.splitlines()[1:]]
     draws, sure, above, failed = (sum(int(cell[column]) for cell in cells) for column in range(4))
@@ -91,7 +91,7 @@ def against_simulator(_long: Path) -> list[Line]:
     return [
         Line(
             f"Time stepping, {draws} random devices and experiments of {len(cells)} families",
-            "a simulator written from docs/equations.md alone (tests/judge)",
+            "a simulator written from docs/equations.md alone (tests/reference)",
             f"{above} above the limits, {failed} failed, of {sure} determined; the worst at {worst:.2g} of a limit",
             "none above 2e-4 of the angle range, 1e-3 of the pressure range",
             AGREES if cells and not above and not failed else DIFFERS,
@@ -168,7 +168,7 @@ def alarms(long: Path) -> list[Line]:
     return [Line(what, "wearers drawn at random", result, "none", DIFFERS if stops else AGREES, command)]
 
 
-def tested(what: str, judge: str, *paths: str) -> Check:
+def tested(what: str, reference: str, *paths: str) -> Check:
     """Return a check that runs tests of the repository, which hold the package against something else."""
     command = f"python -m pytest -n 0 {' '.join(paths)}"
 
@@ -184,7 +184,7 @@ def tested(what: str, judge: str, *paths: str) -> Check:
         result = f"{passed} tests pass" + (f", {bad} fail" if bad else "")
         if skips:
             result += f"; {len(skips)} not run: {'; '.join(sorted(set(skips))[:MISSING])}"
-        return [Line(what, judge, result, "all", DIFFERS if bad else AGREES if passed else NOT_RUN, command)]
+        return [Line(what, reference, result, "all", DIFFERS if bad else AGREES if passed else NOT_RUN, command)]
 
     return check
 
@@ -195,9 +195,9 @@ def bits(_long: Path) -> list[Line]:
     done = _called(command)
     row = next((line for line in done.stdout.splitlines() if line.startswith("| this computer")), "")
     result = row.strip("| ").rpartition("| ")[2] or done.stderr.strip()
-    what, judge = "Bits on this computer: runs, and 1,000 draws of each program", "golden hashes"
+    what, reference = "Bits on this computer: runs, and 1,000 draws of each program", "golden hashes"
     verdict = NOT_RUN if not row else DIFFERS if done.returncode else AGREES
-    return [Line(what, judge, result, "all", verdict, command)]
+    return [Line(what, reference, result, "all", verdict, command)]
 
 
 SECTIONS: Mapping[str, Mapping[str, Check]] = {
@@ -225,7 +225,7 @@ SECTIONS: Mapping[str, Mapping[str, Check]] = {
         "wearer": tested(
             "The neuromuscular gait model: its parts, the first step, ten strides",
             "a simulator of its own in which MuJoCo moves the segments",
-            "tests/judge/test_wearer_against_judge.py",
+            "tests/reference/test_wearer_against_reference.py",
         ),
     },
     "The same bits elsewhere": {
@@ -310,7 +310,7 @@ def report(sections: list[tuple[str, list[Line]]]) -> str:
 
 
 def _row(line: Line, number: int) -> str:
-    cells: tuple[Any, ...] = (line.what, line.judge, line.result or "-", line.allowed or "-", line.verdict, number)
+    cells: tuple[Any, ...] = (line.what, line.reference, line.result or "-", line.allowed or "-", line.verdict, number)
     return f"| {' | '.join(str(cell).replace('|', '/') for cell in cells)} |"
 
 

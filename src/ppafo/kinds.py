@@ -164,28 +164,21 @@ def _is_there(package: str) -> bool:
     return found is not None and found.origin is not None
 
 
-@lru_cache(maxsize=1)
-def _declared() -> dict[str, dict[str, str]]:
-    """Return what folders of this package declare in ``kinds.toml``: places by name, by group."""
-    import tomllib
-    from importlib import resources
-
-    found: dict[str, dict[str, str]] = {}
-    for folder in sorted(resources.files("ppafo").iterdir(), key=lambda folder: folder.name):
-        file = folder / "kinds.toml"
-        if file.is_file():
-            for group, places in tomllib.loads(file.read_text(encoding="utf-8")).items():
-                found.setdefault(group, {}).update(places)
-    return found
-
-
 def declared_kinds(group: str) -> dict[str, str]:
     """Return the kinds of a catalogue, as ``module:KIND`` by name, that folders of this package declare for it.
 
     A catalogue cannot name what is built on it. So a folder says in its ``kinds.toml`` what it offers, as another
     package does by entry points: without the folder the kind is not known, and nothing else changes.
     """
-    return dict(_declared().get(group, {}))
+    import tomllib
+    from importlib import resources
+
+    found: dict[str, str] = {}
+    for folder in sorted(resources.files("ppafo").iterdir(), key=lambda folder: folder.name):
+        file = folder / "kinds.toml"
+        if file.is_file():
+            found |= tomllib.loads(file.read_text(encoding="utf-8")).get(group, {})
+    return found
 
 
 def kind_at(place: str) -> Any:

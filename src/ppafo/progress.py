@@ -27,11 +27,6 @@ class Progress:
     elapsed: float = 0.0
     noun: str = "runs"
 
-    @property
-    def is_complete(self) -> bool:
-        """True where all of a known total is done."""
-        return 0 < self.total == self.done
-
     def line(self) -> str:
         """Return the state in words."""
         words = [f"{self.activity} ..."] if self.activity and not self.total else [self.activity] * bool(self.activity)
@@ -73,7 +68,8 @@ class ProgressLine:
             return
         # In a file a line now and then is enough: when something new begins or ends, else every so often.
         is_late = self._clock() - self._written >= _BETWEEN_LINES
-        if is_late or progress.is_complete or progress.activity != self._activity:
+        is_complete = 0 < progress.total == progress.done
+        if is_late or is_complete or progress.activity != self._activity:
             self._stream.write(f"ppafo: {progress.line()}\n")
             self._written, self._activity = self._clock(), progress.activity
         self._stream.flush()

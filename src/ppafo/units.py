@@ -162,24 +162,19 @@ def conversion(unit: str, si_unit: str) -> tuple[Decimal, Decimal, bool]:
     if given.dimensions != wanted.dimensions:
         given_text = f"unit '{unit}'" if unit else "a number without a unit"
         raise UnitError(f"{given_text} does not fit: {_describe_unit(si_unit)}")
-    _check_kind(unit, kind, si_unit)
-    counts_from_atmosphere = kind == "g" and si_unit == _LEVEL
-    if wanted.scale == 1 and wanted.offset == 0:
-        return given.scale, given.offset, counts_from_atmosphere
-    return given.scale / wanted.scale, (given.offset - wanted.offset) / wanted.scale, counts_from_atmosphere
-
-
-def _check_kind(unit: str, kind: str, si_unit: str) -> None:
-    if si_unit not in (_LEVEL, _DIFFERENCE):
-        return
-    if not kind:
+    is_pressure = si_unit in (_LEVEL, _DIFFERENCE)
+    if is_pressure and not kind:
         name = unit or "Pa"
         raise UnitError(
             f"'{name}' does not say which pressure: write {name}_g for gauge, {name}_a for absolute "
             f"or {name}_d for a difference"
         )
-    if (kind == "d") != (si_unit == _DIFFERENCE):
+    if is_pressure and (kind == "d") != (si_unit == _DIFFERENCE):
         raise UnitError(f"'{unit}' is a {_KINDS[kind]}, {_describe_unit(si_unit)}")
+    counts_from_atmosphere = kind == "g" and si_unit == _LEVEL
+    if wanted.scale == 1 and wanted.offset == 0:
+        return given.scale, given.offset, counts_from_atmosphere
+    return given.scale / wanted.scale, (given.offset - wanted.offset) / wanted.scale, counts_from_atmosphere
 
 
 def _describe_unit(si_unit: str) -> str:

@@ -31,8 +31,8 @@ from ppafo.parameters.loading import parse_parameter_set
 from ppafo.simulation.loading import scenario_from_dict
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import PrescribedMotion
-from tests.judge.reference_solver import compare_with_reference
 from tests.page_code import block_with, code_blocks, write_package
+from tests.reference.reference_solver import compare_with_reference
 from tests.scenario_text import parse_scenario
 
 PAGES = Path(__file__).parents[2] / "docs" / "how-to"

@@ -16,7 +16,7 @@ import pytest
 from ppafo.model import plant, ports, sensors
 from ppafo.model.catalog import ACTUATORS, EFFECTS, VALVES
 from ppafo.model.declaration import Quantity
-from ppafo.model.effects.kind import Effect, Moment, equation_lines, nomenclature_lines
+from ppafo.model.effects.kind import Effect, Moment
 from ppafo.parameters import declaration, device
 from ppafo.signals.recording import CHANNELS
 
@@ -203,9 +203,14 @@ def test_an_effect_has_its_lines_in_nomenclature_and_equations(effect: Effect) -
         (ROOT / "docs" / name).read_text(encoding="utf-8") for name in ("nomenclature.md", "equations.md")
     )
     rows = [line.rpartition(" [")[0] for line in nomenclature_page.splitlines()]
-    missing = [line for line in nomenclature_lines(effect) if line not in rows]
+    lines = [f"| {symbol} | `{name}` | {unit} | {meaning} |" for symbol, name, unit, meaning in effect.symbols]
+    missing = [line for line in lines if line not in rows]
     missing = ["paste into docs/nomenclature.md, below 'Effects':", *missing] if missing else []
-    title, _, equation, _, *laws = equation_lines(effect)
+    title, equation = f"### {effect.name}: {effect.summary}", f"    {effect.equation}"
+    laws = [
+        f"- `{law.__module__}.{law.__qualname__}`: at `{port.__name__}`; {effect.source}"
+        for port, law in effect.laws.items()
+    ]
     section = equations.partition(f"\n{title}\n")[2].partition("\n#")[0]
     names = re.findall(r"`([\w.]+)`", "\n".join(laws))
     if "```math" not in section or any(f"`{name}`" not in section for name in names):

@@ -10,5 +10,5 @@ def test_every_effect_of_the_package_is_timed() -> None:
     timed = set()
     for text in ON:
         scenario = load_scenario("step-response", [text])
-        timed |= set(effects_of(scenario.device, scenario.effect_sections))
+        timed |= set(effects_of(scenario.device, {"sensors": scenario.sensors}))
     assert timed == set(EFFECTS.values())

@@ -15,7 +15,7 @@ from benchmarks.single_run import COMPETITORS, lane_states, measure_single_run, 
 from benchmarks.task import ensemble, named_rows, torque_task, volumes_of
 from benchmarks.timing import Timing, run_python, time_in_turn
 from ppafo.metrics import gas, switching, tracking
-from tests.judge.reference_solver import solve_reference
+from tests.reference.reference_solver import solve_reference
 
 MACHINE = Machine("a processor", "an OS", 2, True, "3.11.0", {"numpy": "2.0", "scikit-sundae": None})
 SHORT = 0.3
@@ -35,28 +35,28 @@ def short_run():
 
 
 @pytest.fixture(scope="module")
-def judge(short_run):
+def reference(short_run):
     return solve_reference(short_run).states
 
 
 @pytest.mark.parametrize(
     ("solver", "largest"), [("lsoda", 1e-3), ("lsoda_tight", 1e-5), ("cvode", 1e-3), ("cvode_tight", 1e-5)]
 )
-def test_every_general_purpose_solver_solves_the_same_closed_loop(short_run, judge, solver, largest):
+def test_every_general_purpose_solver_solves_the_same_closed_loop(short_run, reference, solver, largest):
     competitor = next(item for item in COMPETITORS if item.id == solver)
     states = solve_by_samples(short_run, competitor.make(short_run, competitor.tolerance))
-    assert states.shape == judge.shape
-    assert pressure_error(short_run, states, judge) < largest
+    assert states.shape == reference.shape
+    assert pressure_error(short_run, states, reference) < largest
 
 
-def test_the_lanes_solve_the_same_closed_loop(short_run, judge):
-    assert pressure_error(short_run, lane_states(short_run), judge) < 1e-4
+def test_the_lanes_solve_the_same_closed_loop(short_run, reference):
+    assert pressure_error(short_run, lane_states(short_run), reference) < 1e-4
 
 
-def test_the_pressure_error_sees_a_wrong_mass(short_run, judge):
-    wrong = judge.copy()
+def test_the_pressure_error_sees_a_wrong_mass(short_run, reference):
+    wrong = reference.copy()
     wrong[:, 2] *= 1.01
-    assert pressure_error(short_run, wrong, judge) > 1e-3
+    assert pressure_error(short_run, wrong, reference) > 1e-3
 
 
 def test_the_task_has_a_sample_every_millisecond_for_the_asked_duration():

@@ -36,9 +36,9 @@ from ppafo.walking import load_walk
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.walk import walk
 from tests.built_once import shared_library
-from tests.judge.reference_solver import compare_with_reference
 from tests.modules_under_node import compared, drawn
 from tests.page_code import block_with, write_package
+from tests.reference.reference_solver import compare_with_reference
 
 AREA = "effects.mesh.area"
 NARROW = f"{AREA}=4 mm^2"

@@ -22,7 +22,7 @@ for _ in range(5):
     env.step(env.action_space.sample())
 print("environments", "numba" in sys.modules)
 
-from tests.judge.reference_solver import solve_reference
+from tests.reference.reference_solver import solve_reference
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 solve_reference(plan_run(load_scenario("torque-task-proportional", ["run.duration=20 ms"])))

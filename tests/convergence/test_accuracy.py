@@ -9,7 +9,7 @@ import pytest
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
-from tests.judge.reference_solver import Agreement, compare_with_reference
+from tests.reference.reference_solver import Agreement, compare_with_reference
 
 LARGEST_ANGLE = 2.0e-4
 LARGEST_PRESSURE = 1.0e-3

@@ -6,7 +6,7 @@ import pytest
 
 from ppafo import load_scenario
 from ppafo.simulation.plan import plan_run
-from tests.judge.reference_solver import compare_with_reference
+from tests.reference.reference_solver import compare_with_reference
 
 EXAMPLE = Path(__file__).parents[1] / "actuators"
 

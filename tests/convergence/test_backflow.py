@@ -11,7 +11,7 @@ from ppafo.engine.run import Run, batch_of
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import FreeMotion, GasModel, PrescribedMotion, ProfileChoice, Scenario
-from tests.judge.reference_solver import measure_agreement, plant_states, solve_reference
+from tests.reference.reference_solver import measure_agreement, plant_states, solve_reference
 
 LARGEST_ANGLE = 2.0e-4
 LARGEST_PRESSURE = 1.0e-3

@@ -1,4 +1,4 @@
-"""Closed formulas, each beside its test, for the package and for the judge of random devices in ``tests/judge``.
+"""Closed formulas, each beside its test, for the package and for the independent simulator in ``tests/reference``.
 
 a = C R T / V is the rate at which a chamber of volume V fills or empties through a choked orifice of conductance C.
 What the energy balance says of fillings, emptyings and led compressions as a whole is in ``test_thermal_gas.py``.
@@ -18,8 +18,8 @@ from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
-from tests.judge.reference_solver import chamber_pressures_of, plant_states
-from tests.judge.simulator import judge
+from tests.reference.reference_solver import chamber_pressures_of, plant_states
+from tests.reference.simulator import independent_run
 
 K = 1.3
 PRODUCT = 8.314 * 298.0 / 0.044
@@ -53,13 +53,13 @@ def by_package(scenario: Scenario) -> Course:
     return {"time": record.time} | {name: record[name] for name in names}
 
 
-def by_judge(scenario: Scenario) -> Course:
-    """What the judge says."""
-    answer = judge(scenario)
+def by_reference(scenario: Scenario) -> Course:
+    """What the reference says."""
+    answer = independent_run(scenario)
     return answer._asdict() | {"angular_velocity": answer.velocity}
 
 
-@pytest.fixture(params=[by_package, by_judge], ids=["package", "judge"])
+@pytest.fixture(params=[by_package, by_reference], ids=["package", "reference"])
 def course(request: pytest.FixtureRequest) -> Simulator:
     """Who is held against the formula."""
     return request.param  # type: ignore[no-any-return]

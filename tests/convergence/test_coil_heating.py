@@ -19,7 +19,7 @@ from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.simulate import simulate
-from tests.judge.reference_solver import compare_with_reference
+from tests.reference.reference_solver import compare_with_reference
 
 SETTINGS = CoilSettings(steady_rise=80.0, time_constant=0.2, pull_in_share=0.6)
 WARM = tuple(

@@ -12,7 +12,7 @@ from ppafo.model.effects.kind import Effect, Moment, State
 from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
-from tests.judge.reference_solver import compare_with_reference, solve_reference
+from tests.reference.reference_solver import compare_with_reference, solve_reference
 
 ICE = ("effects.ice.blockage_per_gas=3e4 1/kg", "effects.ice.melting_time=30 ms")
 VENTING = (

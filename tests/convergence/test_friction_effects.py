@@ -7,7 +7,7 @@ from ppafo.model.effects.stribeck import Stribeck, more_near_standstill
 from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
-from tests.judge.reference_solver import compare_with_reference
+from tests.reference.reference_solver import compare_with_reference
 
 SEALS = (
     "effects.seal_friction.static_per_pressure=2e-6 N m/Pa",

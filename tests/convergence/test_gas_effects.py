@@ -14,7 +14,7 @@ from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.simulate import simulate
-from tests.judge.reference_solver import compare_with_reference
+from tests.reference.reference_solver import compare_with_reference
 
 OPENING = ("effects.leak_opening.pressure=150 kPa_d",)
 THERMAL = (

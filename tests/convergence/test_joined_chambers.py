@@ -28,8 +28,8 @@ from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import ProfileChoice
 from ppafo.walking.preparation import vented_state
-from tests.judge.reference_slopes import joined_thermal_rates, thermal_gas_rates
-from tests.judge.reference_solver import compare_with_reference
+from tests.reference.reference_slopes import joined_thermal_rates, thermal_gas_rates
+from tests.reference.reference_solver import compare_with_reference
 
 K, PRODUCT, ROOM, SOURCE = 1.3, 8.314 * 298.0 / 0.044, 101_325.0, 101_325.0 + 50.0 * 6_894.757
 CHOKED = math.sqrt(K / PRODUCT * (2.0 / (K + 1.0)) ** ((K + 1.0) / (K - 1.0)))

@@ -14,7 +14,7 @@ from ppafo.engine.run import NEVER_FAILED, Run, batch_of, run_together, state_ro
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
-from tests.judge.reference_solver import Agreement, measure_agreement, solve_reference
+from tests.reference.reference_solver import Agreement, measure_agreement, solve_reference
 
 MANY = 10_000
 ANY_ERROR = 1.0e9
@@ -87,10 +87,10 @@ def test_mass_balance_closes_to_rounding_and_agrees_with_the_reference(
     stored = state["mass_1"] + state["mass_2"] - run.initial.mass_1 - run.initial.mass_2
     balance = state["supplied_mass"] - state["vented_mass"] - stored
     assert abs(balance) <= 1e-10 * state["supplied_mass"]
-    judge = solve_reference(run).states[-1]
-    assert state["supplied_mass"] == pytest.approx(judge[4], rel=2e-4)
-    assert state["vented_mass"] == pytest.approx(judge[5], rel=2e-4)
-    assert state["leaked_mass"] == pytest.approx(judge[6], rel=2e-4)
+    reference = solve_reference(run).states[-1]
+    assert state["supplied_mass"] == pytest.approx(reference[4], rel=2e-4)
+    assert state["vented_mass"] == pytest.approx(reference[5], rel=2e-4)
+    assert state["leaked_mass"] == pytest.approx(reference[6], rel=2e-4)
 
 
 def test_ten_thousand_random_devices_give_numbers_and_none_fails(draws: ModuleType) -> None:

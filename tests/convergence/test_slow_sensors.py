@@ -14,7 +14,7 @@ from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, PrescribedMotion, ProfileChoice
-from tests.judge.reference_solver import compare_with_reference
+from tests.reference.reference_solver import compare_with_reference
 
 SLOW = ("sensors.angle_bandwidth=20 Hz", "sensors.pressure_bandwidth=40 Hz")
 LATE = ("sensors.delay=2.3 ms",)

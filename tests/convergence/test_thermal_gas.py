@@ -12,7 +12,7 @@ from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import GasModel, PrescribedMotion, ProfileChoice, Scenario
-from tests.judge.reference_solver import chamber_pressures_of, compare_with_reference, plant_states
+from tests.reference.reference_solver import chamber_pressures_of, compare_with_reference, plant_states
 
 LARGEST_ANGLE = 2.0e-4
 LARGEST_PRESSURE = 1.0e-3

@@ -10,7 +10,7 @@ from ppafo.analyses.validate.solve import validate
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.storage import write_csv
-from tests.judge.bench import bench
+from tests.reference.bench import bench
 
 AT_STEP = 0.1
 THERE = ("supply.pressure=55 psi_g", "supply.dorsiflexion_pressure=55 psi_g")

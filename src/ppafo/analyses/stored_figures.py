@@ -37,28 +37,20 @@ def draw_folder(folder: Path, names: list[str]) -> "dict[str, Figure]":
     if MANIFEST in names:
         return {_FIGURE: load_study_results(folder).plot()}
     if RIG_FILE in names:
-        return _draw_rig(folder, names)
+        file = folder / RIG_FILE
+        document, tables = _document(file), [name for name in names if name.endswith(".csv")]
+        # Gauge pressure of a recording counts from the atmosphere of its device.
+        zeros = {name: stated_atmosphere(file, document, "recordings", name, "device") for name in tables}
+        return {
+            name.removesuffix(".csv"): recording_figure(read_recording(folder / name), atmosphere=zero)
+            for name, zero in zeros.items()
+        }
     if NETCDF_FILE in names and MARK in names:
-        return {_FIGURE: _draw_walk(folder, names)}
+        # Of a walk its end is recorded.
+        file = folder / WALK_FILE
+        document = _document(file) if WALK_FILE in names else {}
+        return {_FIGURE: draw_stored_walk(file, document, read_recording(folder / NETCDF_FILE))}
     return {}
-
-
-def _draw_rig(folder: Path, names: list[str]) -> "dict[str, Figure]":
-    """Return a figure of each recording of the rig; gauge pressure counts from the atmosphere of its device."""
-    file = folder / RIG_FILE
-    document, tables = _document(file), [name for name in names if name.endswith(".csv")]
-    zeros = {name: stated_atmosphere(file, document, "recordings", name, "device") for name in tables}
-    return {
-        name.removesuffix(".csv"): recording_figure(read_recording(folder / name), atmosphere=zero)
-        for name, zero in zeros.items()
-    }
-
-
-def _draw_walk(folder: Path, names: list[str]) -> "Figure":
-    """Return the figure of the end of a walk."""
-    file = folder / WALK_FILE
-    document = _document(file) if WALK_FILE in names else {}
-    return draw_stored_walk(file, document, read_recording(folder / NETCDF_FILE))
 
 
 def _document(file: Path) -> dict[str, Any]:

@@ -87,6 +87,7 @@ def fraction(text: str) -> float:
     try:
         value = float(number_text(text.removesuffix("%"))) / (100.0 if text.endswith("%") else 1.0)
     except ValueError:
+        # Refused below, as a number that is out of range.
         value = math.nan
     if not 0.0 <= value <= 1.0:
         raise argparse.ArgumentTypeError(f"{text}: must be a number from 0 to 1, or a percentage")
@@ -103,6 +104,7 @@ def quantity(si_unit: str, longest: float = math.inf) -> Callable[[str], float]:
         from ppafo.errors import UnitError
         from ppafo.units import parse_quantity
 
+        # A number alone is answered with what may be meant: the same number, in units that people write.
         if si_unit in _EXAMPLES and _NUMBER.fullmatch(text.strip()):
             what, units = _EXAMPLES[si_unit]
             either = " or ".join(f"'{text.strip()} {unit}'" for unit in units)

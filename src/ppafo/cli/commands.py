@@ -158,8 +158,10 @@ def check_words(words: list[str]) -> None:
     KindError for a command of another package that is there and cannot be used.
     """
     given = [word for word in words if not word.startswith("-")]
+    # Options alone, such as --version, are for the parser.
     if not given:
         return
+    # A line of the version before gets its new form, not a guess at what may have been misspelled.
     for old, now in RENAMED.items():
         parts = old.split()
         pairs = zip(parts, words, strict=False)
@@ -181,6 +183,7 @@ def check_words(words: list[str]) -> None:
         known = tuple(dict.fromkeys((*COMMANDS, *OTHERS)))
         raise UsageError(f"there is no command '{word}'{nearest_name(word, known)}; available: {', '.join(known)}")
     command = COMMANDS.get(word)
+    # A group alone is a mistake, unless its help is asked for, which the parser prints.
     if isinstance(command, Group) and "-h" not in words and "--help" not in words:
         actions, action = list(command.actions), given[1] if len(given) > 1 else None
         if action is None:
@@ -202,6 +205,7 @@ def _check_installed(given: list[str]) -> None:
 
 def list_commands() -> str:
     """Return the commands with what each does, heading by heading, with the commands of other packages."""
+    # The summary of a command is in its function, so that the ones of other packages are loaded here.
     OTHERS.load_all()
     groups = {heading: {name: one.summary for name, one in group.items()} for heading, group in HEADINGS.items()}
     others = {name: Command("", found=verb).summary for name, verb in OTHERS.loaded().items()}

@@ -66,6 +66,7 @@ def doctor(
 
     asked = {"--warm": warm, "--clear": clear, "--bits": bits, "--schema": schema}
     given = [option for option, value in asked.items() if value]
+    # Two of them contradict each other, or are two answers.
     if len(given) > 1:
         raise DataError(f"{given[1]}: not allowed with {given[0]}")
     if schema is not None:
@@ -73,7 +74,7 @@ def doctor(
     if bits:
         return _bits()
     folder = cache.cache_folder()
-    cleared = cache.clear_kept(folder) + cache.clear(folder) if clear and folder is not None else 0
+    cleared = cache.clear(folder) if clear and folder is not None else 0
     why_not = "" if clear else cache.refusal(folder)
     if warm:
         if why_not:
@@ -139,6 +140,7 @@ def models_text(document: dict[str, Any]) -> str:
         lines.append(f"texts of programs and their forms for pages: {_megabytes(document['made_from_programs'])}")
     for item in document["programs"]:
         days = item["unused_days"]
+        # One day or several by the number as it is shown, which is rounded.
         ago = "today" if days < 1.0 else f"{days:.0f} day{'' if int(days + 0.5) == 1 else 's'} ago"
         lines.append(f"  {item['name']}  {_megabytes(item['size']):>8}  last used {ago}")
     lines += [f"left out for a day: {name}: {why}" for name, why in document["left_out"].items()]

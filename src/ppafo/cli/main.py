@@ -63,6 +63,7 @@ def build_parser(words: Sequence[str]) -> CommandParser:
     parser.add_argument("--version", action="version", version=f"ppafo {__version__}")
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", prog="ppafo", help=argparse.SUPPRESS)
     for name in dict.fromkeys((*COMMANDS, *OTHERS)):
+        # Of every other command the name alone: a verb that is not called is not imported.
         if name not in chosen[:1]:
             subparsers.add_parser(name)
             continue

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 EXIT_GOOD = 0
 EXIT_CHECK_FAILED = 1
+# As a shell has it for what SIGINT, signal 2, ended: 128 + 2.
 EXIT_INTERRUPTED = 130
 
 
@@ -43,6 +44,7 @@ def check_output(out: Path | None, command: str, kept: Mapping[str, bytes] | Non
 
 def check_new_file(path: Path) -> None:
     """Refuse a file of ``--out`` that is there: nothing in it would say whose it is."""
+    # A link that leads nowhere is there as well: it would be written through.
     if os.path.lexists(path):
         raise DataError(f"--out {path}: already exists; remove it or choose another name")
 
@@ -91,6 +93,7 @@ def deliver(found: Any, as_json: bool, out: Path | None, command: str, *, has_wr
     if out is not None:
         from ppafo.report.drawing import load_drawing
 
+        # Before anything else imports Matplotlib, so that it comes without what it does for others.
         load_drawing()
         from ppafo.report.finding import files_of
 
@@ -162,6 +165,7 @@ def export(
     **more: Any,
 ) -> Said:
     """Write the files of a scenario for another tool, and return which they are and what to do next with them."""
+    # Before the files are made: a folder that is refused must not cost their making.
     check_output(out, command)
     contents = make()
     write_files(out, contents, command)
@@ -187,6 +191,7 @@ def listing(noun: str, rows: Sequence[Mapping[str, Any]], columns: Sequence[str]
     from ppafo.report.writing import align_columns
 
     shown = [[row[name] for name in columns or row] for row in rows]
+    # A count is shown with what it counts, the name of its column.
     cells = [
         [f"{cell:,} {name}" if isinstance(cell, int) else cell for cell, name in zip(row, rows[0], strict=False)]
         for row in shown
@@ -202,6 +207,7 @@ def progress_line() -> Iterator[ProgressLine]:
     logger = logging.getLogger("ppafo")
 
     def end_line(_record: logging.LogRecord) -> bool:
+        # A filter comes before the record is written; it lets every record pass.
         line.close()
         return True
 

@@ -31,13 +31,14 @@ def simulate(scenario: Scenario, *, check: bool = False, overrides: Overrides = 
 
     chosen = load_scenario(scenario, overrides)
     folder = out if out is not None else DEFAULT_FOLDER / chosen.name
+    # Before the run, which a folder that is refused must not cost.
     with output.blame_out_option():
         check_result_folder(folder)
     from ppafo.simulation.simulate import simulate
 
     result = simulate(chosen)
+    # A run that diverged has no result to repeat; its exit code says so already.
     checked = result.check() if check and result.status.is_completed else None
-
     error = None if checked is None else checked.error
     # A vane alone runs again in milliseconds; of a walk the error is estimated by its check only.
     if checked is None and result.status.is_completed and not chosen.walks:
@@ -113,7 +114,6 @@ def list_descriptions() -> list[dict[str, Any]]:
 
 
 def _text(result: "Result", error: "ErrorEstimate | None", check: "Check | None", folder: Path) -> str:
-
     checked = [repr(check), ""] if check is not None else [] if error is None else [error.sentence, ""]
     files = ["recording.nc", "recording.csv", "run.json", "figure.png", "figure.svg", "report.html"]
     written = ", ".join(files if check is None else [*files, CHECK_FILE])

@@ -78,9 +78,8 @@ def _spot(model: Any, location: Iterable[int | str]) -> _Spot:
 
 def _kinds(node: Any) -> dict[str, Any]:
     """Return the members of a union of kinds by kind, nothing for any other type."""
-    union = get_args(node)[0] if get_origin(node) is Annotated else node
-    models = [item for item in get_args(union) if _is_model(item)] if get_origin(union) in (Union, UnionType) else []
-    return {get_args(item.model_fields["kind"].annotation)[0]: item for item in models if "kind" in item.model_fields}
+    tables = [item for item in _models_in(node) if "kind" in item.model_fields]
+    return {get_args(item.model_fields["kind"].annotation)[0]: item for item in tables}
 
 
 def _below(node: Any, part: str) -> Any:
@@ -131,17 +130,16 @@ def _models_in(node: Any) -> list[Any]:
     return [item for item in get_args(node) if _is_model(item)] if get_origin(node) in (Union, UnionType) else []
 
 
-def _unknown_choice(spot: _Spot, detail: ErrorDetails) -> str:
-    allowed = _quoted_names(detail["ctx"]["expected"].replace(" or ", ","))
-    hint = nearest_name(str(detail["input"]), allowed)
-    return f"{spot.path} = {quote(detail['input'])} is not allowed{hint}; allowed: {', '.join(allowed)}"
-
-
-def _unknown_kind(spot: _Spot, detail: ErrorDetails) -> str:
-    allowed, tag = _quoted_names(detail["ctx"]["expected_tags"]), detail["ctx"]["tag"]
-    return (
-        f"{spot.path}.kind = {quote(tag)} is not known{nearest_name(str(tag), allowed)}; allowed: {', '.join(allowed)}"
+def _unknown_word(spot: _Spot, detail: ErrorDetails) -> str:
+    """Say which words may stand there; the kind of a table is one of them."""
+    is_kind, context = detail["type"] == "union_tag_invalid", detail["ctx"]
+    given = context["tag"] if is_kind else detail["input"]
+    said = context["expected_tags"] if is_kind else context["expected"].replace(" or ", ",")
+    allowed = [name.strip(" '") for name in said.split(",")]
+    refused = (
+        f"{spot.path}.kind = {quote(given)} is not known" if is_kind else f"{spot.path} = {quote(given)} is not allowed"
     )
+    return f"{refused}{nearest_name(str(given), allowed)}; allowed: {', '.join(allowed)}"
 
 
 def _wrong_name(spot: _Spot, detail: ErrorDetails) -> str:
@@ -170,16 +168,12 @@ def _any_other(spot: _Spot, detail: ErrorDetails) -> str:
     return f"{spot.path} = {quote(detail['input'])}: {one_line(said)}"
 
 
-def _quoted_names(text: str) -> list[str]:
-    return [name.strip(" '") for name in text.split(",")]
-
-
 _GAPS = {"missing": "", "union_tag_not_found": ".kind"}
 """Types of problems that are gaps, and what follows the path of what is missing."""
 _SENTENCES: dict[str, Callable[[_Spot, ErrorDetails], str]] = {
-    "literal_error": _unknown_choice,
+    "literal_error": _unknown_word,
     "string_pattern_mismatch": _wrong_name,
-    "union_tag_invalid": _unknown_kind,
+    "union_tag_invalid": _unknown_word,
     "model_type": _not_a_table,
     "model_attributes_type": _not_a_table,
     "dict_type": _not_a_table,

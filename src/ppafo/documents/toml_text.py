@@ -1,6 +1,7 @@
 """From a name or a path to the document in a TOML file; every mistake is one clear line."""
 
 import copy
+import os
 import re
 import tomllib
 from collections.abc import Collection, Mapping
@@ -49,7 +50,8 @@ class TomlKind:
         name, path = str(name_or_path), Path(name_or_path)
         if name in self.names():
             return (self.shipped / (name + _SUFFIX)).read_bytes()
-        if path.suffix != _SUFFIX and not _exists(path):
+        is_there = os.path.exists(path)  # noqa: PTH110  # Path.exists raises where no file can have the name
+        if path.suffix != _SUFFIX and not is_there:
             hint = nearest_name(name, self.names())
             known = f"available: {', '.join(self.names())}, or " if self.names() else ""
             raise self.error(f"there is no {self.noun} '{label(name)}'{hint}; {known}give a .toml file")
@@ -103,11 +105,3 @@ def label(file: str) -> str:
     """Return what messages call a file: its name on one line, without its middle where it is very long."""
     name = one_line(file)
     return name if len(name) <= _LONGEST_LABEL else f"{name[:_KEPT_AT_EACH_END]}...{name[-_KEPT_AT_EACH_END:]}"
-
-
-def _exists(path: Path) -> bool:
-    # A name may be too long for any file system, or have a null byte.
-    try:
-        return path.exists()
-    except (OSError, ValueError):
-        return False

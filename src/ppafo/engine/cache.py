@@ -115,10 +115,6 @@ class _Wanted:
         """Compile it, beside ``path`` where that is a place."""
         return _execute(self.name, self.source, path, self.compiler.compile_text)
 
-    def load(self, path: Path) -> ModuleType:
-        """Load what was compiled beside ``path``."""
-        return _execute(self.name, self.source, path, self.compiler.run_text)
-
     def estimate(self, kept: Iterable[Path]) -> float:
         """About how long it takes to compile [s]."""
         kind = self.name.rpartition("_")[0]
@@ -176,17 +172,17 @@ def list_left_out(folder: Path) -> dict[str, str]:
 
 def list_programs(folder: Path) -> list[CachedProgram]:
     """Return the programs in a cache folder, the one that was used last first."""
-    places = [*_entries_named(folder, _PROGRAM), *_entries_named(folder / "__pycache__", _PROGRAM)]
-    return sorted((_measure_program(place) for place in places), key=lambda item: -item.used)
+    return _measured([*_entries_named(folder, _PROGRAM), *_entries_named(folder / "__pycache__", _PROGRAM)])
 
 
 def clear(folder: Path) -> int:
-    """Remove all programs, and the folder where nothing else is in it; return how many bytes that freed."""
+    """Remove all that is kept, and the folder where nothing else is in it; return how many bytes that freed."""
     freed = 0
-    for program in [*list_programs(folder), *map(_measure_program, _entries_named(folder, _ASIDE))]:
+    aside, made = _measured(_entries_named(folder, _ASIDE)), _measured(_files(folder / FOLDER))
+    for program in [*list_programs(folder), *aside, *made]:
         _remove(program.place)
         freed += 0 if os.path.lexists(program.place) else program.size
-    for emptied in (folder / "__pycache__", folder):
+    for emptied in (folder / FOLDER, folder / "__pycache__", folder):
         with contextlib.suppress(OSError):
             emptied.rmdir()
     return freed
@@ -194,16 +190,21 @@ def clear(folder: Path) -> int:
 
 def evict(folder: Path) -> None:
     """Remove programs unused for ``LONGEST_UNUSED``, those beyond ``MAXIMUM_BYTES``, and what a killed process left."""
+    _evict(list_programs(folder), MAXIMUM_BYTES)
+    for left in _measured(_entries_named(folder, _ASIDE)):
+        # A day is longer than any compilation: what is older was left by a process that was killed.
+        if time.time() - left.used > _LONGEST_ASIDE:
+            _remove(left.place)
+
+
+def _evict(programs: Iterable[CachedProgram], most: int) -> None:
+    """Remove what was unused for ``LONGEST_UNUSED`` and what is beyond ``most`` bytes, the last used coming first."""
     now, total = time.time(), 0
     # The list begins with what was used last, so that the total passes the limit at what is dropped.
-    for program in list_programs(folder):
+    for program in programs:
         total += program.size
-        if now - program.used > LONGEST_UNUSED or total > MAXIMUM_BYTES:
+        if now - program.used > LONGEST_UNUSED or total > most:
             _remove(program.place)
-    for place in _entries_named(folder, _ASIDE):
-        # A day is longer than any compilation: what is older was left by a process that was killed.
-        if now - _measure_program(place).used > _LONGEST_ASIDE:
-            _remove(place)
 
 
 def _import_program(wanted: _Wanted) -> ModuleType:
@@ -212,18 +213,19 @@ def _import_program(wanted: _Wanted) -> ModuleType:
     why_not = refusal(folder)
     if folder is None or why_not:
         logger.warning("ppafo: compiled models are not kept: %s; %s names another folder", why_not, CACHE_VARIABLE)
-        return _compile_in_memory(wanted)
-    kept = wanted.place(folder)
-    module = _load_kept_module(kept, wanted)
-    if module is not None:
-        return module
-    try:
-        with one_process(kept):
-            # Another process may have compiled it while this one waited for the lock.
-            return _load_kept_module(kept, wanted) or _compile_and_keep(kept, wanted)
-    except OSError as error:
-        logger.warning("ppafo: the compiled model is not kept in %s: %s", folder, reason(error))
-        return _compile_in_memory(wanted)
+    else:
+        kept = wanted.place(folder)
+        module = _load_kept_module(kept, wanted)
+        if module is not None:
+            return module
+        try:
+            with one_process(kept):
+                # Another process may have compiled it while this one waited for the lock.
+                return _load_kept_module(kept, wanted) or _compile_and_keep(kept, wanted)
+        except OSError as error:
+            logger.warning("ppafo: the compiled model is not kept in %s: %s", folder, reason(error))
+    with announce(wanted.estimate(()), "not kept"):
+        return wanted.compile(Path(f"<{wanted.name}>"))
 
 
 def _load_kept_module(kept: Path, wanted: _Wanted) -> ModuleType | None:
@@ -235,7 +237,8 @@ def _load_kept_module(kept: Path, wanted: _Wanted) -> ModuleType | None:
         _remove(kept)
         return None
     try:
-        module = wanted.load(kept / f"{wanted.name}.py")
+        path = kept / f"{wanted.name}.py"
+        module = _execute(wanted.name, wanted.source, path, wanted.compiler.run_text)
         os.utime(kept)
     except OSError:  # another process has removed it in this instant, or the disk is full
         return sys.modules.get(wanted.name)
@@ -266,11 +269,6 @@ def _compile_and_keep(kept: Path, wanted: _Wanted) -> ModuleType:
     finally:
         _remove(aside)
     return module
-
-
-def _compile_in_memory(wanted: _Wanted) -> ModuleType:
-    with announce(wanted.estimate(()), "not kept"):
-        return wanted.compile(Path(f"<{wanted.name}>"))
 
 
 def _execute(name: str, source: str, path: Path, execute: Callable[[str, str, ModuleType], None]) -> ModuleType:
@@ -341,12 +339,17 @@ def _entries_named(folder: Path, pattern: re.Pattern[str]) -> list[Path]:
         return []
 
 
-def _measure_program(place: Path) -> CachedProgram:
-    try:
-        files = [place] if place.is_symlink() or not place.is_dir() else [place, *place.rglob("*")]
-        return CachedProgram(place, sum(path.lstat().st_size for path in files), place.lstat().st_mtime)
-    except OSError:  # another process has removed it in this instant
-        return CachedProgram(place, 0, time.time())
+def _measured(places: Iterable[Path]) -> list[CachedProgram]:
+    """Return programs and files with their sizes, the one that was used last first."""
+    found = []
+    for place in places:
+        try:
+            files = [place] if place.is_symlink() or not place.is_dir() else [place, *place.rglob("*")]
+            size, used = sum(path.lstat().st_size for path in files), place.lstat().st_mtime
+        except OSError:  # another process has removed it in this instant
+            size, used = 0, time.time()
+        found.append(CachedProgram(place, size, used))
+    return sorted(found, key=lambda item: -item.used)
 
 
 def _remove(place: Path) -> None:
@@ -380,23 +383,18 @@ def refusal(folder: Path | None) -> str:
         above = [place.stat() for place in Path(os.path.realpath(folder)).parents]
     except (OSError, ValueError) as error:
         return f"{folder} cannot be made: {reason(error)}"
-    whose = _why_not_private(folder, found, above)
-    if whose or os.access(folder, os.W_OK | os.X_OK):
-        return whose
-    return f"{folder} cannot be written"
-
-
-def _why_not_private(folder: Path, found: os.stat_result, above: list[os.stat_result]) -> str:
+    has_users = hasattr(os, "geteuid")
     if not stat.S_ISDIR(found.st_mode):
-        return f"{folder} is {'a link' if stat.S_ISLNK(found.st_mode) else 'not a folder'}"
-    if not hasattr(os, "geteuid"):
-        return ""
-    if found.st_uid != os.geteuid():
-        return f"{folder} belongs to another user"
-    if found.st_mode & WRITTEN_BY_OTHERS:
-        return f"others can write into {folder}; 'ppafo doctor --clear' and 'chmod 700' make it safe"
-    is_exchanged = any(_can_be_exchanged(place) for place in above)
-    return f"others can put another folder in the place of {folder}" if is_exchanged else ""
+        why_not = f"{folder} is {'a link' if stat.S_ISLNK(found.st_mode) else 'not a folder'}"
+    elif has_users and found.st_uid != os.geteuid():
+        why_not = f"{folder} belongs to another user"
+    elif has_users and found.st_mode & WRITTEN_BY_OTHERS:
+        why_not = f"others can write into {folder}; 'ppafo doctor --clear' and 'chmod 700' make it safe"
+    elif has_users and any(_can_be_exchanged(place) for place in above):
+        why_not = f"others can put another folder in the place of {folder}"
+    else:
+        why_not = "" if os.access(folder, os.W_OK | os.X_OK) else f"{folder} cannot be written"
+    return why_not
 
 
 def _can_be_exchanged(place: os.stat_result) -> bool:
@@ -543,32 +541,25 @@ def kept_bytes(kind: str, made_from: str, make: Callable[[], bytes]) -> bytes:
         content = make()
         with contextlib.suppress(OSError):
             _write(place, content)
-            _evict(place.parent)
+            _evict(_measured(_files(place.parent)), MAXIMUM_MADE_BYTES)
     return content
 
 
 def kept_sizes(folder: Path) -> list[int]:
     """Return the sizes [bytes] of what is kept in the folder of the programs."""
-    sizes = []
-    for place in _files(folder / FOLDER):
-        with contextlib.suppress(OSError):  # another process has removed it in this instant
-            sizes.append(place.lstat().st_size)
-    return sizes
-
-
-def clear_kept(folder: Path) -> int:
-    """Remove all of it from the folder of the programs; return how many bytes that freed."""
-    sizes = [_remove_file(place) for place in _files(folder / FOLDER)]
-    with contextlib.suppress(OSError):
-        (folder / FOLDER).rmdir()
-    return sum(sizes)
+    return [made.size for made in _measured(_files(folder / FOLDER))]
 
 
 def _read(place: Path) -> bytes | None:
     try:
         found, above = place.lstat(), place.parent.lstat()
-        if not (stat.S_ISREG(found.st_mode) and stat.S_ISDIR(above.st_mode) and _is_own_file(found, above)):
+        if not (stat.S_ISREG(found.st_mode) and stat.S_ISDIR(above.st_mode)):
             return None
+        # It may be run: file and folder must be this user's, and nobody else may write there.
+        if hasattr(os, "geteuid"):
+            is_written = (found.st_mode | above.st_mode) & WRITTEN_BY_OTHERS
+            if is_written or not {found.st_uid, above.st_uid} <= {0, os.geteuid()}:
+                return None
         content = read_regular_file(place)
         os.utime(place)
     except OSError:
@@ -576,14 +567,6 @@ def _read(place: Path) -> bytes | None:
     # A file that was cut by a full disk, or changed, counts as not there.
     stated, rest = content[:_HASH_BYTES], content[_HASH_BYTES:]
     return rest if hashlib.sha256(rest).digest() == stated else None
-
-
-def _is_own_file(found: os.stat_result, above: os.stat_result) -> bool:
-    """Return whether a file and its folder are this user's, and nobody else can write there: it may be run."""
-    if not hasattr(os, "geteuid"):
-        return True
-    is_written = (found.st_mode | above.st_mode) & WRITTEN_BY_OTHERS
-    return {found.st_uid, above.st_uid} <= {0, os.geteuid()} and not is_written
 
 
 def _write(place: Path, content: bytes) -> None:
@@ -600,36 +583,6 @@ def _write(place: Path, content: bytes) -> None:
         aside.unlink(missing_ok=True)
 
 
-def _evict(folder: Path) -> None:
-    """Remove what was not used for long, and beyond the largest size what was not used for longest."""
-    total, now = 0, time.time()
-    for place in sorted(_files(folder), key=_last_used, reverse=True):
-        with contextlib.suppress(OSError):
-            total += place.lstat().st_size
-            if total > MAXIMUM_MADE_BYTES or now - _last_used(place) > LONGEST_UNUSED:
-                _remove_file(place)
-
-
-def _last_used(place: Path) -> float:
-    try:
-        return place.lstat().st_mtime
-    except OSError:  # another process has removed it in this instant
-        return 0.0
-
-
 def _files(folder: Path) -> list[Path]:
     """Return this module's files in a folder that is no link; what others put beside them is left alone."""
-    try:
-        return [] if folder.is_symlink() else [item for item in folder.iterdir() if _OWN_NAME.fullmatch(item.name)]
-    except OSError:
-        return []
-
-
-def _remove_file(place: Path) -> int:
-    """Remove a file; return its size, 0 where it stays."""
-    try:
-        size = place.lstat().st_size
-        place.unlink()
-    except OSError:
-        return 0
-    return size
+    return [] if folder.is_symlink() else _entries_named(folder, _OWN_NAME)

@@ -40,9 +40,6 @@ class Compiler(Protocol):
     def seconds_per_byte(self) -> float:
         """What a common computer takes for a byte of the text, until this one has compiled something [s]."""
 
-    def __hash__(self) -> int:
-        """Tells compilers apart."""
-
     def identity(self) -> str:
         """What a compiled program depends on beside its text: compiler, version, flags, processor."""
 

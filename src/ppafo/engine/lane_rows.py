@@ -58,9 +58,11 @@ class LaneRows:
         self.lanes = lanes or lanes_of(program)
         self.add: Callable[[Callable[..., Any] | type], str] = collector.add
         self.needs = collector.needs
-        self.state_at = _row_numbers(program.state_rows(), 0)
-        self.parameter_at = _row_numbers(program.parameter_rows(), len(self.state_at))
-        self.step_at = _row_numbers(program.step_rows(), len(self.state_at) + len(self.parameter_at))
+        states, parameters, of_step = program.state_rows(), program.parameter_rows(), program.step_rows()
+        self.groups = parameters | states | of_step
+        self.state_at = row_numbers(states)
+        self.parameter_at = row_numbers(parameters, len(self.state_at))
+        self.step_at = row_numbers(of_step, len(self.state_at) + len(self.parameter_at))
         numbered = self.state_at | self.parameter_at | self.step_at
         self.cells = {path: f"x[{row}, lane]" for path, row in numbered.items()}
         self.length, self.before, self.remaining, self.error = (
@@ -72,22 +74,19 @@ class LaneRows:
 
     def load(self, group: str) -> str:
         """Line that makes the NamedTuple ``group`` from its rows."""
-        groups = self.program.parameter_rows() | self.program.state_rows() | self.program.step_rows()
-        row = groups[group]
-        return f"{group} = {row_expression(row, group, self.cells, self.add)}"
+        return f"{group} = {row_expression(self.groups[group], group, self.cells, self.add)}"
 
     def store(self, group: str, name: str = "", flag: str = "") -> list[str]:
         """Lines that write the NamedTuple ``name`` (or ``group``) to the rows of ``group``; a flag may forbid it."""
         lines = []
-        for path in leaf_paths(self.program.state_rows()[group], group):
+        for path in leaf_paths(self.groups[group], group):
             value = (name or group) + path.removeprefix(group)
             lines.append(f"{self.cells[path]} = {value}" + (f" if {flag} else {path}" if flag else ""))
         return lines
 
     def keep(self, *names: str) -> list[str]:
         """Lines that keep what a phase hands on to the next ones of the step, by group."""
-        groups = self.program.step_rows()
-        return [f"{self.cells[path]} = {path}" for name in names for path in leaf_paths(groups[name], name)]
+        return [line for name in names for line in self.store(name)]
 
     def over_lanes(self, lines: list[str]) -> list[str]:
         """A loop over all lanes of the block, with the rows of effects where a function that is called needs them."""
@@ -154,23 +153,15 @@ class RunRows:
 
     def over_lanes(self, lines: list[str]) -> list[str]:
         """The lines for the run, with the rows of effects where a function that is called needs them."""
-        return self.in_turn([lines])
+        return self.over_phases([], [lines])
 
     def over_phases(self, prelude: list[str], all_phases: Phases) -> list[str]:
-        """All phases one after another, behind what they share."""
-        return self.in_turn([prelude, *all_phases], shared=1)
-
-    def in_turn(self, parts: Phases, shared: int = 0) -> list[str]:
-        """Parts of a step one after another; each begins with the groups as they are, and with the ``shared`` first."""
-        lines: list[str] = []
-        common: dict[str, str] = {}
-        for place, part in enumerate(parts):
-            own = composed_lines(part.lines if isinstance(part, RarePhase) else part, self.needs)
-            written, names = self.renamed(own, common, lines)
-            common = names if place < shared else common
-            if isinstance(part, RarePhase):
-                written = [f"if {part.cell} > 0.0:", *(f"    {line}" for line in written)]
-            lines += written
+        """All phases one after another; each begins with the groups as they are behind the prelude."""
+        lines, common = self.renamed(composed_lines(prelude, self.needs), {}, [])
+        for phase in all_phases:
+            own = composed_lines(phase.lines if isinstance(phase, RarePhase) else phase, self.needs)
+            written, _ = self.renamed(own, common, lines)
+            lines += [f"if {phase.cell} > 0.0:", *indent(written)] if isinstance(phase, RarePhase) else written
         return lines
 
     def renamed(self, lines: list[str], names: dict[str, str], before: list[str]) -> tuple[list[str], dict[str, str]]:
@@ -182,16 +173,6 @@ class RunRows:
         body = [writer.visit(item) for item in tree.body]
         text = [ast.unparse(item) for item in body if item is not None]
         return [line for item in text for line in item.split("\n")], writer.names
-
-    def loaded(self, groups: dict[str, type], whole: str) -> list[str]:
-        """Lines that take groups out of a row of them; one that is empty is not in it."""
-        return [f"{name} = {f'{whole}.{name}' if leaf_paths(row, name) else '()'}" for name, row in groups.items()]
-
-    def empty(self, group: str) -> str:
-        """Line that makes a group of zeros."""
-        row = self.groups[group]
-        zeros = dict.fromkeys(leaf_paths(row, group), "0.0")
-        return f"{group} = {row_expression(row, group, zeros, self.add)}"
 
 
 _STORED = re.compile(rf"{KEPT}\.(\w+) = \1")
@@ -205,7 +186,6 @@ class _Renaming(ast.NodeTransformer):
         self.groups = groups
         self.names = names
         self.used = used
-        self.depth = 0
 
     def visit_Assign(self, node: ast.Assign) -> ast.stmt | None:
         target, value = node.targets[0], node.value
@@ -241,11 +221,6 @@ class _Renaming(ast.NodeTransformer):
 
 Rows: TypeAlias = LaneRows | RunRows
 """Where the numbers of a step are: in the rows of a block of lanes, or under the names of a single run."""
-
-
-def _row_numbers(groups: dict[str, type], first: int) -> dict[str, int]:
-    paths = [path for name, row in groups.items() for path in leaf_paths(row, name)]
-    return {path: first + number for number, path in enumerate(paths)}
 
 
 def count_lanes(name: str, condition: str) -> list[str]:

@@ -4,7 +4,9 @@ Meters and traces stand where nothing is recorded. Their samples are the ones th
 get the whole reference too, which is looked at once before the first sample and followed from there.
 """
 
-from ppafo.engine.lane_rows import LaneRows, Rows, RunRows, indent
+from typing import Any
+
+from ppafo.engine.lane_rows import Rows, RunRows, indent
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, leaves
 from ppafo.engine.scheme.actuators import seen_with_torque, torque_at
@@ -19,7 +21,6 @@ from ppafo.model.valves.kind import VENT
 from ppafo.signals.meter import (
     SAME_LEVEL,
     FootSample,
-    MeterKind,
     Sample,
     StrideSample,
     WearerSample,
@@ -43,38 +44,38 @@ READINGS = {
 
 def control_loop(rows: Rows) -> list[str]:
     """Sense and control, at every sample; nothing where the caller sets the command."""
-    if rows.program.controller is None:
+    program, controller = rows.program, rows.program.controller
+    if controller is None:
         return []
-    return ["if step_index % steps_per_sample == 0:", *indent([*places(rows), *rows.over_lanes(sampled(rows))])]
-
-
-def sampled(rows: Rows) -> list[str]:
-    """What the controller does at a sample."""
-    controller = rows.program.controller
-    assert controller is not None, "a controller takes samples"
     groups = ("timing", "plant", "state", "controller", "controller_state", "reference")
     lines = [
         *[rows.load(group) for group in groups],
-        *(sense_gait(rows) if rows.program.walks else sense(rows)),
-        f"wanted = {rows.add(rows.program.reference.value)}(reference, step_index * timing.step)[0]",
+        *(sense_gait(rows) if program.walks else sense(rows)),
+        f"wanted = {rows.add(program.reference.value)}(reference, step_index * timing.step)[0]",
         f"command, controller_state = {rows.add(controller.update)}"
         "(controller, controller_state, wanted, seen, timing.period)",
         *rows.store("controller_state"),
         f"{rows.cells['result.command']} = command",
     ]
-    if rows.program.fails:
-        lines = [*lines[: len(groups)], *sampled_with_faults(rows, lines[len(groups) :])]
-    return lines
+    if program.fails:
+        lines = [*lines[: len(groups)], *sampled_with_faults(rows, controller.initial, lines[len(groups) :])]
+    # Once for all lanes. Histories are rings: the place is the step less the delay, modulo their length.
+    places = ["late = (step_index - signal_delay) % signal_history.shape[1]"] if program.late_signals else []
+    places += [] if program.ideal_sensors else ["sample_index = step_index // steps_per_sample"]
+    return ["if step_index % steps_per_sample == 0:", *indent([*places, *rows.over_lanes(lines)])]
 
 
-def sampled_with_faults(rows: Rows, lines: list[str]) -> list[str]:
-    """The lines of a sample where the controller may miss it or have no power, and where a valve may take it late."""
+def sampled_with_faults(rows: Rows, initial: Any, lines: list[str]) -> list[str]:
+    """The lines of a sample where the controller may miss it or have no power, and where a valve may take it late.
+
+    Without power the controller is in its ``initial`` state.
+    """
     # Most plants have no faults.
     from ppafo.model.plant_faults import is_due, is_in_brown_out, is_silenced, next_unpowered, runs_at
 
-    add, before = rows.add, rows.program.controller
-    assert before is not None, "a controller takes samples"
-    stored = dict(zip(leaf_paths(type(before.initial), "controller_state"), leaves(before.initial), strict=True))
+    add = rows.add
+    paths = leaf_paths(rows.groups["controller_state"], "controller_state")
+    stored = dict(zip(paths, leaves(initial), strict=True))
     # The state is stored by the lines below, under the condition that the controller has run.
     kept = [line for line in lines if not any(line.startswith(f"{rows.cells[path]} = ") for path in stored)]
     called = [line.replace("command, controller_state =", "ordered, after_state =") for line in kept[:-1]]
@@ -97,14 +98,6 @@ def sampled_with_faults(rows: Rows, lines: list[str]) -> list[str]:
             for path, first in stored.items()
         ],
     ]
-
-
-def places(rows: Rows) -> list[str]:
-    """Lines that find the number of the sample and where late signals lie, once for all lanes."""
-    program = rows.program
-    # Histories are rings: the place is the step less the delay, modulo their length.
-    late = ["late = (step_index - signal_delay) % signal_history.shape[1]"] if program.late_signals else []
-    return [*late, *([] if program.ideal_sensors else ["sample_index = step_index // steps_per_sample"])]
 
 
 def sense(rows: Rows) -> list[str]:
@@ -214,18 +207,10 @@ def sense_end(rows: Rows) -> list[str]:
         return []
     states = [f"{name} = {name}_after" for name in rows.program.effect_states]
     now = [f"pressure_1, pressure_2 = {pressures_of(rows, 'after')}", "angle = after.angle"]
-    return [*states, *now, *as_shown(rows), *look()]
-
-
-def look() -> list[str]:
-    """Lines that keep what late sensors look at."""
-    return [
-        f"looks = taken and abs(before + length - look_at) <= {SAME_INSTANT!r}",
-        *[
-            f"signal_history[{row}, next_place, lane] = {name} if looks else signal_history[{row}, next_place, lane]"
-            for row, name in enumerate(SIGNALS)
-        ],
-    ]
+    looks = f"looks = taken and abs(before + length - look_at) <= {SAME_INSTANT!r}"
+    cells = [f"signal_history[{row}, next_place, lane]" for row in range(len(SIGNALS))]
+    kept = [f"{cell} = {name} if looks else {cell}" for cell, name in zip(cells, SIGNALS, strict=True)]
+    return [*states, *now, *as_shown(rows), looks, *kept]
 
 
 def remember_commands(rows: Rows) -> list[str]:
@@ -265,32 +250,45 @@ TRUE_MASSES = {name: f"masses.{name}" for name in ("mass_1", "mass_2")}
 
 def measure_sample(rows: Rows, moment: str) -> list[str]:
     """Meters and traces of sample ``next_record`` at ``moment``, counted in steps."""
-    if not isinstance(rows, RunRows):
-        return [*_meter_lines(rows, moment), *_trace_lines(rows, moment)]
-    begin, update = _meter_updates(rows)
-    paths = _traced_paths(rows.program)
-    metered = [
-        "if next_record == 0:",
-        *indent([*course_lines(rows), *rows.over_lanes([*follow_lines(rows), *begin])]),
-        "else:",
-        *indent(rows.over_lanes([*follow_lines(rows), *update])),
-    ]
-    shown = [paths.get(name, name) for name in rows.program.traced]
-    return [
-        *rows.over_lanes(sample_lines(rows, moment)),
-        *(metered if rows.program.meters else []),
-        "samples.before = samples.last",
-        *rows.over_lanes([f"samples.last = {rows.outputs}(0.0, {', '.join(shown)})"]),
-    ]
+    program = rows.program
+    lines: list[str] = []
+    if program.meters:
+        begin, update = _meter_updates(rows)
+        # One run makes its sample once for meters and traces, lanes in each of their loops.
+        sample = [] if isinstance(rows, RunRows) else sample_lines(rows, moment)
+        sample += follow_lines(rows)
+        lines += [
+            "if next_record == 0:",
+            *indent([*course_lines(rows), *rows.over_lanes([*sample, *begin])]),
+            "else:",
+            *indent(rows.over_lanes([*sample, *update])),
+        ]
+    # Where a sample has channels that are no number of the state itself.
+    paths = TRACED | walk_traces(program) | (TRUE_MASSES if program.has_true_masses else {})
+    traced = [paths.get(name, name) for name in program.traced]
+    if isinstance(rows, RunRows):
+        return [
+            *rows.over_lanes(sample_lines(rows, moment)),
+            *lines,
+            "samples.before = samples.last",
+            *rows.over_lanes([f"samples.last = {rows.outputs}(0.0, {', '.join(traced)})"]),
+        ]
+    if traced:
+        # A trace with less room than samples keeps the last ones.
+        cell = "trace[next_record // trace_every % trace.shape[0], {row}, lane]"
+        kept = [f"{cell.format(row=row)} = {path}" for row, path in enumerate(traced)]
+        lines += ["if next_record % trace_every == 0:", *indent(rows.over_lanes([*sample_lines(rows, moment), *kept]))]
+    return lines
 
 
 def _meter_updates(rows: Rows) -> tuple[list[str], list[str]]:
     """Lines that begin the meters with the first sample, and those that take a further one."""
     program, add = rows.program, rows.add
     groups = program.meter_groups
+    sample = {group: "of_wearer" if kind.of_wearer else "sample" for group, kind in groups.items()}
     # A locked vane never moves: its meters of motion keep what the first sample gave them.
     moving = {group: kind for group, kind in groups.items() if not (program.is_locked and kind.of_motion)}
-    begin = [f"{group} = {add(kind.start)}(course, {_sample_for(kind)})" for group, kind in groups.items()]
+    begin = [f"{group} = {add(kind.start)}(course, {sample[group]})" for group, kind in groups.items()]
     begin += [line for group in groups for line in rows.store(group)]
     update = [rows.load(group) for group in moving]
     # What comes after a fall is not counted; of the wearer's own meter it is known when that was.
@@ -298,70 +296,9 @@ def _meter_updates(rows: Rows) -> tuple[list[str], list[str]]:
     update += ["stands = walk.fall_time < 0.0"] if stopping else []
     for group, kind in moving.items():
         later, flag = (f"{group}_later", "stands") if group in stopping else (group, "")
-        update += [f"{later} = {add(kind.update)}({group}, course, {_sample_for(kind)})"]
+        update += [f"{later} = {add(kind.update)}({group}, course, {sample[group]})"]
         update += rows.store(group, later, flag)
     return begin, update
-
-
-def _sample_for(kind: MeterKind) -> str:
-    """What a meter takes."""
-    return "of_wearer" if kind.of_wearer else "sample"
-
-
-def _meter_lines(rows: LaneRows, moment: str) -> list[str]:
-    if not rows.program.meters:
-        return []
-    begin, update = _meter_updates(rows)
-    lines = [*sample_lines(rows, moment), *follow_lines(rows)]
-    return [
-        "if next_record == 0:",
-        *indent([*course_lines(rows), *rows.over_lanes([*lines, *begin])]),
-        "else:",
-        *indent(rows.over_lanes([*lines, *update])),
-    ]
-
-
-def sample_lines(rows: Rows, moment: str) -> list[str]:
-    """Lines that make the sample of a lane."""
-    add, program = rows.add, rows.program
-    has_reference = program.has_reference and not program.walks
-    wanted = f"{add(program.reference.value)}(reference, {moment} * timing.step)[0]" if has_reference else "0.0"
-    thermal = program.is_thermal
-    warm = [f"thermal.temperature * (state.mass_{chamber} / masses.mass_{chamber})" for chamber in (1, 2)]
-    values = {
-        "number": "float(next_record)",
-        "angle": "state.angle",
-        "angular_velocity": "state.angular_velocity",
-        "pressure_1": "pressure_1",
-        "pressure_2": "pressure_2",
-        "torque": "torque",
-        "command": "result.command",
-        "reference": "wanted",
-        "temperature_1": warm[0] if thermal else "0.0",
-        "temperature_2": warm[1] if thermal else "0.0",
-    }
-    groups: tuple[str, ...] = ()
-    foot, stride, on_gait = _zeros(FootSample), _zeros(StrideSample), []
-    if program.walks:
-        groups = ("walk", "controller_state")
-        wanted, stride = _of_state(rows, REQUEST), _stride_values(rows)
-    if program.is_on_gait:
-        groups = ("shank",)
-        # By its place, for few vanes carry a leg.
-        foot_in_gait = kind_at("ppafo.model.gait:foot_in_gait")
-        on_gait = [f"foot = {add(foot_in_gait)}(shank, {moment} * timing.step, state.angle)"]
-        foot = {name: f"foot.{name}" for name in FootSample._fields}
-    values |= {"foot": _row(add(FootSample), foot), "stride": _row(add(StrideSample), stride)}
-    of_gas = (*program.gas.parameters, *program.gas.states)
-    return [
-        *[rows.load(group) for group in ("timing", "plant", "state", "result", "reference", *of_gas, *groups)],
-        *present_pressures(rows),
-        torque_line(rows, "state.angle"),
-        f"wanted = {wanted}",
-        *on_gait,
-        f"sample = {_row(add(Sample), values)}",
-        *(wearer_sample(rows) if any(kind.of_wearer for kind in program.meters) else []),
-    ]
 
 
 FELL = "walk.fall_time"
@@ -377,39 +314,74 @@ WEARER_ROWS = {
     "fall_time": FELL,
 }
 """Numbers from which the sample of a neuromuscular gait model is made, beside its time."""
+SAMPLE_TIME = "next_record * (timing.step * interval)"
+"""Expression of the time of a sample [s]."""
 
 
-def wearer_sample(rows: Rows) -> list[str]:
-    """Lines that make the sample of a neuromuscular gait model."""
-    values = {**WEARER_ROWS, "time": "next_record * (timing.step * interval)"}
-    return [rows.load("walker"), rows.load("reflexes"), f"of_wearer = {_row(rows.add(WearerSample), values)}"]
-
-
-def _zeros(row: type[FootSample] | type[StrideSample]) -> dict[str, str]:
-    """Zeros for what a run does not have."""
-    return dict.fromkeys(row._fields, "0.0")
+def sample_lines(rows: Rows, moment: str) -> list[str]:
+    """Lines that make the sample of a lane."""
+    add, program = rows.add, rows.program
+    has_reference = program.has_reference and not program.walks
+    wanted = f"{add(program.reference.value)}(reference, {moment} * timing.step)[0]" if has_reference else "0.0"
+    values = {
+        "number": "float(next_record)",
+        "angle": "state.angle",
+        "angular_velocity": "state.angular_velocity",
+        "pressure_1": "pressure_1",
+        "pressure_2": "pressure_2",
+        "torque": "torque",
+        "command": "result.command",
+        "reference": "wanted",
+        "temperature_1": "0.0",
+        "temperature_2": "0.0",
+    }
+    if program.is_thermal:
+        for chamber in (1, 2):
+            warm = f"thermal.temperature * (state.mass_{chamber} / masses.mass_{chamber})"
+            values[f"temperature_{chamber}"] = warm
+    groups: tuple[str, ...] = ()
+    foot, stride = dict.fromkeys(FootSample._fields, "0.0"), dict.fromkeys(StrideSample._fields, "0.0")
+    on_gait: list[str] = []
+    if program.walks:
+        groups = ("walk", "controller_state")
+        # Zero where the controller of this program has no such number.
+        wanted, phase, level = (
+            path if path in rows.state_at else "0.0"
+            for path in (REQUEST, TRACED_IN_WALKS["controller_phase"], TRACED_IN_WALKS["safe_state"])
+        )
+        totals = ("strides", "positive_push_off_work", "net_push_off_work", "clearances", "toe_landings")
+        stride = {
+            "supplied_mass": "state.supplied_mass",
+            **{name: f"walk.{name}" for name in totals},
+            "phase": phase,
+            "level": level,
+            "time": SAMPLE_TIME,
+        }
+    if program.is_on_gait:
+        groups = ("shank",)
+        # By its place, for few vanes carry a leg.
+        foot_in_gait = kind_at("ppafo.model.gait:foot_in_gait")
+        on_gait = [f"foot = {add(foot_in_gait)}(shank, {moment} * timing.step, state.angle)"]
+        foot = {name: f"foot.{name}" for name in FootSample._fields}
+    values |= {"foot": _row(add(FootSample), foot), "stride": _row(add(StrideSample), stride)}
+    of_gas = (*program.gas.parameters, *program.gas.states)
+    lines = [
+        *[rows.load(group) for group in ("timing", "plant", "state", "result", "reference", *of_gas, *groups)],
+        *present_pressures(rows),
+        torque_line(rows, "state.angle"),
+        f"wanted = {wanted}",
+        *on_gait,
+        f"sample = {_row(add(Sample), values)}",
+    ]
+    if any(kind.of_wearer for kind in program.meters):
+        wearer = {**WEARER_ROWS, "time": SAMPLE_TIME}
+        lines += [rows.load("walker"), rows.load("reflexes"), f"of_wearer = {_row(add(WearerSample), wearer)}"]
+    return lines
 
 
 def _row(name: str, values: dict[str, str]) -> str:
     """Expression that makes a NamedTuple."""
     return f"{name}({', '.join(f'{field}={value}' for field, value in values.items())})"
-
-
-def _stride_values(rows: Rows) -> dict[str, str]:
-    """Gait phase of a walk, and totals of its strides."""
-    totals = ("strides", "positive_push_off_work", "net_push_off_work", "clearances", "toe_landings")
-    return {
-        "supplied_mass": "state.supplied_mass",
-        **{name: f"walk.{name}" for name in totals},
-        "phase": _of_state(rows, TRACED_IN_WALKS["controller_phase"]),
-        "level": _of_state(rows, TRACED_IN_WALKS["safe_state"]),
-        "time": "next_record * (timing.step * interval)",
-    }
-
-
-def _of_state(rows: Rows, path: str) -> str:
-    """A number of the state, 0 where this program has none."""
-    return path if path in rows.state_at else "0.0"
 
 
 def walk_traces(program: Program) -> dict[str, str]:
@@ -423,25 +395,6 @@ def walk_traces(program: Program) -> dict[str, str]:
     return {name: path for name, path in found.items() if path}
 
 
-def _traced_paths(program: Program) -> dict[str, str]:
-    """Where a sample has channels that are no number of the state itself."""
-    return TRACED | walk_traces(program) | (TRUE_MASSES if program.has_true_masses else {})
-
-
-def _trace_lines(rows: LaneRows, moment: str) -> list[str]:
-    if not rows.program.traced:
-        return []
-    # A trace with less room than samples keeps the last ones.
-    place = "next_record // trace_every % trace.shape[0]"
-    paths = _traced_paths(rows.program)
-    traced = enumerate(rows.program.traced)
-    keep = [f"trace[{place}, {row}, lane] = {paths.get(name, name)}" for row, name in traced]
-    return [
-        "if next_record % trace_every == 0:",
-        *indent(rows.over_lanes([*sample_lines(rows, moment), *keep])),
-    ]
-
-
 def course_lines(rows: Rows) -> list[str]:
     """Lines that look at the whole reference before the first sample: its last value, its largest, and where it holds.
 
@@ -451,22 +404,23 @@ def course_lines(rows: Rows) -> list[str]:
     if not rows.program.follows_reference:
         return []
     cell = {name: rows.cells[f"course.{name}"] for name in ("last", "largest", "tolerance", "hold_start")}
+    value = f"{rows.add(rows.program.reference.value)}(reference, {{}} * interval * timing.step)[0]"
     given = [rows.load("timing"), rows.load("reference")]
     ends = [
         *given,
-        f"{cell['last']} = {_value(rows, 'last_record')}",
-        f"{cell['largest']} = max(abs({_value(rows, '0')}), abs({cell['last']}))",
+        f"{cell['last']} = {value.format('last_record')}",
+        f"{cell['largest']} = max(abs({value.format('0')}), abs({cell['last']}))",
         f"{cell['hold_start']} = 0.0",
     ]
     tolerance = rows.over_lanes([f"{cell['tolerance']} = {SAME_LEVEL!r} * {cell['largest']}"])
     if rows.program.reference.is_monotone:
         return [*rows.over_lanes(ends), *tolerance]
-    away = f"{rows.add(is_away)}({_value(rows, 'index')}, {cell['last']}, {cell['tolerance']})"
+    away = f"{rows.add(is_away)}({value.format('index')}, {cell['last']}, {cell['tolerance']})"
     found = f"index + 1.0 if {cell['hold_start']} == 0.0 and {away} else {cell['hold_start']}"
     return [
         *rows.over_lanes(ends),
         "for index in range(last_record):",
-        *indent(rows.over_lanes([*given, f"{cell['largest']} = max({cell['largest']}, abs({_value(rows, 'index')}))"])),
+        *indent(rows.over_lanes([*given, f"{cell['largest']} = max({cell['largest']}, abs({value.format('index')}))"])),
         *tolerance,
         "for index in range(last_record - 1, -1, -1):",
         *indent(rows.over_lanes([*given, f"{cell['hold_start']} = {found}"])),
@@ -489,7 +443,3 @@ def follow_lines(rows: Rows) -> list[str]:
         f"course = {rows.add(advance_course)}(course, sample)",
         f"{rows.cells['course.hold_start']} = course.hold_start",
     ]
-
-
-def _value(rows: Rows, number: str) -> str:
-    return f"{rows.add(rows.program.reference.value)}(reference, {number} * interval * timing.step)[0]"

@@ -70,47 +70,33 @@ def write_lanes(program: Program, collector: Collector, lanes: int = 0) -> str:
 def lane_loop(program: Program, collector: Collector, name: str, lanes: int = 0) -> str:
     """The function that runs one block of a program, of some lanes, 0 for as many as fit.
 
-    The function of one lane takes the first column of its arrays, however many there are.
+    The function of one lane takes the first column of its arrays, however many there are. Samples are ``interval``
+    steps apart, the first at 0 and the last with number ``last_record``.
     """
     link_program(program, collector)
     rows = LaneRows(program, collector, lanes)
+    begin = find_begin(rows)
+    # Most programs meet samples at the beginning of a step; others do a step from one sample to the next.
+    step = between_samples(rows) if program.samples_inside else [*at_sample(rows, "step_index"), *plant_loop(rows)]
+    start = rows.over_lanes([f"{rows.before} = 0.0"]) if program.is_parted else []
     body = [
-        COMPILED,
-        f"def {name}({ARGUMENTS}):",
-        *indent(
-            [
-                f"x = empty_rows({rows.count}, {rows.lanes})",
-                # A literal width lets the compiler unroll the loops of a small block.
-                f"width = {rows.lanes if rows.lanes <= VECTOR else 'states.shape[1]'}",
-                *over_rows(len(rows.state_at), "x[row, lane] = states[row, lane]"),
-                *over_rows(len(rows.parameter_at), f"x[{len(rows.state_at)} + row, lane] = parameters[row, lane]"),
-                *find_begin(rows),
-                *all_steps(rows),
-                *over_rows(len(rows.state_at), "states[row, lane] = x[row, lane]"),
-            ]
-        ),
-    ]
-    return "\n".join(body)
-
-
-def all_steps(rows: Rows) -> list[str]:
-    """The loop over steps, and the sample at the end of the run.
-
-    Samples are ``interval`` steps apart, the first at 0 and the last with number ``last_record``. Most programs meet
-    them at the beginning of a step; where they lie between, a step is done from one to the next.
-    """
-    whole = [*at_sample(rows, "step_index"), *plant_loop(rows)]
-    step = between_samples(rows) if rows.program.samples_inside else whole
-    start = rows.over_lanes([f"{rows.before} = 0.0"]) if rows.program.is_parted else []
-    return [
+        f"x = empty_rows({rows.count}, {rows.lanes})",
+        # A literal width lets the compiler unroll the loops of a small block.
+        f"width = {rows.lanes if rows.lanes <= VECTOR else 'states.shape[1]'}",
+        *over_rows(len(rows.state_at), "x[row, lane] = states[row, lane]"),
+        *over_rows(len(rows.parameter_at), f"x[{len(rows.state_at)} + row, lane] = parameters[row, lane]"),
+        *begin,
         "due = next_record * interval",
         "goal = 1.0",
         "for step_index in range(first_step, first_step + step_count):",
         *indent([*signals_before_start(rows), *control_loop(rows), *remember_commands(rows), *start, *step]),
+        # The sample at the end of the run.
         "if first_step + step_count == steps_in_all:",
         "    step_index = steps_in_all",
         *indent(at_sample(rows, "step_index")),
+        *over_rows(len(rows.state_at), "states[row, lane] = x[row, lane]"),
     ]
+    return "\n".join([COMPILED, f"def {name}({ARGUMENTS}):", *indent(body)])
 
 
 def between_samples(rows: Rows) -> list[str]:
@@ -127,22 +113,20 @@ def between_samples(rows: Rows) -> list[str]:
 
 def at_sample(rows: Rows, moment: str) -> list[str]:
     """What is done at a sample, if one is due at ``moment``, counted in steps."""
-    is_metered = rows.program.is_metered
-    take = measure_sample(rows, moment) if is_metered or isinstance(rows, RunRows) else record_sample(rows)
+    is_metered = bool(rows.program.meters or rows.program.traced)
     # A program without meters takes no more samples than there is room for.
     last = "last_record" if is_metered else "record.shape[0] - 1"
+    if is_metered or isinstance(rows, RunRows):
+        take = measure_sample(rows, moment)
+    else:
+        take = [
+            "for row in range(record.shape[1]):",
+            f"    for lane in range({'1' if rows.lanes == 1 else 'record.shape[2]'}):",
+            "        record[next_record, row, lane] = x[row, lane]",
+        ]
     return [
         f"if next_record <= {last} and due <= {moment} + {SAME_MOMENT!r}:",
         *indent(take),
         "    next_record += 1",
         "    due = next_record * interval",
-    ]
-
-
-def record_sample(rows: LaneRows) -> list[str]:
-    """Lines that write the state of the runs to the record."""
-    return [
-        "for row in range(record.shape[1]):",
-        f"    for lane in range({'1' if rows.lanes == 1 else 'record.shape[2]'}):",
-        "        record[next_record, row, lane] = x[row, lane]",
     ]

@@ -41,10 +41,37 @@ def find_begin(rows: Rows) -> list[str]:
 
 
 def plant_loop(rows: Rows) -> list[str]:
-    """Valve, gas and vane up to ``goal`` [-], a share of the step; 1 for programs that are not parted."""
-    if rows.program.is_parted:
-        return step_in_parts(rows)
-    return rows.over_phases([*opening(rows), *command_at_valve(rows), "length = timing.step"], phases(rows))
+    """Valve, gas and vane up to ``goal`` [-], a share of the step; 1 for programs that are not parted.
+
+    A step in parts has as many as the lane with the most of them needs.
+    """
+    program = rows.program
+    if not program.is_parted:
+        return rows.over_phases([*opening(rows), *command_at_valve(rows), "length = timing.step"], phases(rows))
+    # Places of late commands are the same for all lanes.
+    places = []
+    if program.late_commands:
+        # The dead time in whole steps and a rest: the command of one step or the next acts, by the time within the
+        # step.
+        places.append("place_before = (step_index - command_delay - 1) % command_history.shape[0]")
+        places.append("place_after = (step_index - command_delay) % command_history.shape[0]")
+    if program.late_signals:
+        places.append("next_place = (step_index + 1) % signal_history.shape[1]")
+    part = rows.over_phases([*part_opening(rows), f"length = {rows.length}"], phases(rows))
+    measured = rows.over_lanes([*part_opening(rows), *measure(rows)])
+    # Lanes that waited get their state again before it is asked whether any has something left of its step.
+    left = f"{rows.remaining} > 0.0"
+    aside, back = ([], []) if isinstance(rows, RunRows) else waiting_lanes(rows)
+    is_done = [f"if not {left}:"] if isinstance(rows, RunRows) else [*count_lanes("waiting", left), "if waiting == 0:"]
+    return [
+        *places,
+        f"for part in range({MAXIMUM_PARTS}):",
+        *indent([*measured, *aside, *part, *back, *is_done]),
+        # The else of the loop is what a run without end in sight gets.
+        "        break",
+        "else:",
+        *indent(rows.over_lanes(give_up(rows))),
+    ]
 
 
 def opening(rows: Rows) -> list[str]:
@@ -186,17 +213,26 @@ def states_ahead(rows: Rows, lines: list[str]) -> list[str]:
     for name, kind in asked:
         row = kind.row
         fields = (f"{path} + length * {moved}" for path, moved in _with_slopes(name, kind))
-        predicted += [_slopes(rows, name, kind), f"{name}_state = {rows.add(row)}({', '.join(fields)})"]
+        predicted += [
+            f"{name}_state_slopes = {rows.add(kind.slopes)}({name}, {name}_state, now)",
+            f"{name}_state = {rows.add(row)}({', '.join(fields)})",
+        ]
     return [*begun_moment(rows), *predicted]
 
 
 def feed(rows: Rows) -> list[str]:
-    """The second stage: the gas of the step, and in parts that may be refused the error of the gas."""
+    """The second stage: the gas of the step, what feeds the chambers, and in parts that may be refused its error."""
     program, add = rows.program, rows.add
     second = program.gas.second(rows, program.chambers)
     error = second.error
     lines = [rows.load(name) for name in ("begun", "gas", "shown", "passing")]
-    lines += [f"second = {second.stage}", f"change = {second.change}", *feed_lines(rows)]
+    lines += [f"second = {second.stage}", f"change = {second.change}"]
+    if program.feed is not None:
+        # What feeds the chambers comes to the end of the step, kept apart where it may be refused.
+        ((state, after),) = program.feed.stored.items()
+        fed = after if program.is_parted else state
+        lines.append(f"{fed} = {program.feed.end(rows)}")
+        lines += rows.store(fed)
     if not program.is_adaptive:
         return lines
     if program.feed is not None:
@@ -208,17 +244,6 @@ def feed(rows: Rows) -> list[str]:
     return [*lines, f"gas_error = {error}" + (f" + {second.shifted}" if moves else "")]
 
 
-def feed_lines(rows: Rows) -> list[str]:
-    """Lines that bring what feeds the chambers to the end of the step, kept apart where it may be refused."""
-    feed = rows.program.feed
-    if feed is None:
-        return []
-    ((state, after),) = feed.stored.items()
-    if rows.program.is_parted:
-        return [f"{after} = {feed.end(rows)}", *rows.keep(after)]
-    return [f"{state} = {feed.end(rows)}", *rows.store(state)]
-
-
 def finish(rows: Rows) -> list[str]:
     """The state at the end of a step or part, unless the part is refused; and the first time at which a run failed."""
     program, add = rows.program, rows.add
@@ -228,26 +253,34 @@ def finish(rows: Rows) -> list[str]:
     if not program.is_parted:
         return [*lines, *store_all(rows, ""), *judge(rows), *sense_end(rows)]
     lines += [rows.load("next_valve"), *[rows.load(name) for name in fed]]
-    if not program.is_adaptive:
-        flag = "" if program.parts_are_rare else "taken"
-        stored = [*store_all(rows, flag), *judge(rows, flag), *sense_end(rows)]
-        return [f"taken = {rows.remaining} > 0.0", *lines, *stored, *add_up(rows)]
+    flag, followed = "taken", ""
+    if program.is_adaptive:
+        positive = " and ".join(f"{mass} > 0.0" for mass in masses_after(rows, *fed))
+        followed = f" and not missed > {motion.LOST!r}"
+        lines += [
+            f"missed = max({', '.join(['error', 'gas_error', *state_errors(rows)])})",
+            "error = missed / timing.tolerance",
+            # A part with a mass below 0 or NaN counts as the worst error, and is done again, shorter.
+            f"error = error if {positive} else {motion.MAXIMUM_ERROR!r}",
+            # A run that has failed is carried to its end without more parts, so that its lane holds nobody up.
+            f"refused = {add(motion.is_refused)}(error, length) and not result.failure_time <= time",
+            f"next_length = {add(motion.next_pace)}(pace, error, length, refused, timing.step).length",
+            f"active = {rows.remaining} > 0.0",
+            f"{rows.cells['pace.length']} = next_length if active else pace.length",
+            "taken = active and not refused",
+        ]
+    else:
+        lines.insert(0, f"taken = {rows.remaining} > 0.0")
+        flag = "" if program.parts_are_rare else flag
     return [
         *lines,
-        f"missed = max({', '.join(['error', 'gas_error', *state_errors(rows)])})",
-        "error = missed / timing.tolerance",
-        # A part with a mass below 0 or NaN counts as the worst error, and is done again, shorter.
-        f"error = error if {positive(rows)} else {motion.MAXIMUM_ERROR!r}",
-        # A run that has failed is carried to its end without more parts, so that its lane holds nobody up.
-        f"refused = {add(motion.is_refused)}(error, length) and not result.failure_time <= time",
-        f"next_length = {add(motion.next_pace)}(pace, error, length, refused, timing.step).length",
-        f"active = {rows.remaining} > 0.0",
-        f"{rows.cells['pace.length']} = next_length if active else pace.length",
-        "taken = active and not refused",
-        *store_all(rows, "taken"),
-        *judge(rows, "taken", f" and not missed > {motion.LOST!r}"),
+        *store_all(rows, flag),
+        *judge(rows, flag, followed),
         *sense_end(rows),
-        *add_up(rows),
+        # Sums of part lengths miss the goal by rounding: the last part sets it.
+        f"arrives = length >= {rows.remaining} and taken or {rows.remaining} == 0.0",
+        f"{rows.before} = goal * timing.step if arrives else before + (length if taken else 0.0)",
+        f"{rows.remaining} = 0.0 if arrives else {rows.remaining}",
     ]
 
 
@@ -306,7 +339,8 @@ def advance_states(rows: Rows) -> list[str]:
         lines.append(
             f"{name}_state_after = {rows.add(kind.advance)}({name}, {name}_state, before_step, after_step, length)"
         )
-        lines += [_slopes(rows, name, kind)] if kind.tolerances and rows.program.is_adaptive else []
+        if kind.tolerances and rows.program.is_adaptive:
+            lines.append(f"{name}_state_slopes = {rows.add(kind.slopes)}({name}, {name}_state, now)")
     return lines
 
 
@@ -321,13 +355,6 @@ def state_errors(rows: Rows) -> list[str]:
             after = path.replace(f"{name}_state", f"{name}_state_after", 1)
             found.append(f"abs({after} - ({path} + length * {moved})) / {allowed!r}")
     return found
-
-
-def positive(rows: Rows) -> str:
-    """Condition that no mass is lost; false for what is no number."""
-    feed = rows.program.feed
-    names = masses_after(rows, *([] if feed is None else feed.stored.values()))
-    return " and ".join(f"{name} > 0.0" for name in names)
 
 
 def masses_after(rows: Rows, *others: str) -> list[str]:
@@ -355,18 +382,14 @@ def judge(rows: Rows, flag: str = "", followed: str = "") -> list[str]:
     """Lines that keep the first time at which a run became unphysical, or its parts could not follow (``followed``)."""
     gas = ", ".join(masses_after(rows))
     waits = f"not {flag} or " if flag else ""
+    states = (path for name, row in rows.program.effect_states.items() for path in leaf_paths(row, f"{name}_after"))
+    bounded = "".join(f" and abs({path}) < {LARGEST!r}" for path in states)
     return [
         f"possible = {waits}(abs(after.angular_velocity) < {IMPOSSIBLE_RATE} and min({gas}) > 0.0 "
-        f"and max({gas}) < {IMPOSSIBLE_MASS}{states_are_possible(rows)}{followed})",
+        f"and max({gas}) < {IMPOSSIBLE_MASS}{bounded}{followed})",
         "failed = result.failure_time if possible else min(result.failure_time, time + length)",
         f"{rows.cells['result.failure_time']} = failed",
     ]
-
-
-def states_are_possible(rows: Rows) -> str:
-    """Further conditions of a run that did not fail."""
-    paths = (path for name, row in rows.program.effect_states.items() for path in leaf_paths(row, f"{name}_after"))
-    return "".join(f" and abs({path}) < {LARGEST!r}" for path in paths)
 
 
 def begun_moment(rows: Rows) -> list[str]:
@@ -389,47 +412,10 @@ def moment(rows: Rows, name: str, state: str) -> list[str]:
     ]
 
 
-def _slopes(rows: Rows, name: str, kind: State) -> str:
-    return f"{name}_state_slopes = {rows.add(kind.slopes)}({name}, {name}_state, now)"
-
-
 def _with_slopes(name: str, kind: State) -> list[tuple[str, str]]:
     """Each number of a state, and its rate."""
     paths = leaf_paths(kind.row, f"{name}_state")
     return [(path, path.replace(f"{name}_state", f"{name}_state_slopes", 1)) for path in paths]
-
-
-def step_in_parts(rows: Rows) -> list[str]:
-    """As many parts as the lane with the most of them needs; places of late commands are the same for all lanes."""
-    places = []
-    if rows.program.late_commands:
-        # The dead time in whole steps and a rest: the command of one step or the next acts, by the time within the
-        # step.
-        places.append("place_before = (step_index - command_delay - 1) % command_history.shape[0]")
-        places.append("place_after = (step_index - command_delay) % command_history.shape[0]")
-    if rows.program.late_signals:
-        places.append("next_place = (step_index + 1) % signal_history.shape[1]")
-    part = rows.over_phases([*part_opening(rows), f"length = {rows.length}"], phases(rows))
-    return [
-        *places,
-        f"for part in range({MAXIMUM_PARTS}):",
-        *indent(rows.over_lanes([*part_opening(rows), *measure(rows)])),
-        *indent([] if isinstance(rows, RunRows) else put_aside(rows)),
-        *indent(part),
-        *indent(none_left(rows)),
-        # The else of the loop is what a run without end in sight gets.
-        "        break",
-        "else:",
-        *indent(rows.over_lanes(give_up(rows))),
-    ]
-
-
-def none_left(rows: Rows) -> list[str]:
-    """Lines that give lanes that waited their state again, and ask whether any has something left of its step."""
-    left = f"{rows.remaining} > 0.0"
-    if isinstance(rows, RunRows):
-        return [f"if not {left}:"]
-    return [*put_back(rows), *count_lanes("waiting", left), "if waiting == 0:"]
 
 
 def part_opening(rows: Rows) -> list[str]:
@@ -475,42 +461,26 @@ def measure(rows: Rows) -> list[str]:
     return [*lines, f"{rows.length} = until", f"{rows.remaining} = remaining"]
 
 
-def put_aside(rows: LaneRows) -> list[str]:
-    """Keeps the state in parts in which lanes may wait, never the first: a select for each row takes longer."""
+def waiting_lanes(rows: LaneRows) -> tuple[list[str], list[str]]:
+    """Lines that keep the state in parts in which lanes may wait, and those that give it to them again.
+
+    Never in the first part: a select for each row takes longer.
+    """
     if not rows.program.parts_are_rare:
-        return []
-    kept = f"x[{rows.aside} + row, lane] = x[row, lane]"
-    lines = [f"{cell} = {rows.cells[path]}" for path, cell in handed_aside(rows).items()]
-    lines.append(f"x[{rows.aside + len(rows.state_at)}, lane] = {rows.remaining}")
-    return ["if part > 0:", *indent([*over_rows(len(rows.state_at), kept), *rows.over_lanes(lines)])]
-
-
-def put_back(rows: LaneRows) -> list[str]:
-    """Gives lanes that waited their state again."""
-    if not rows.program.parts_are_rare:
-        return []
-    moves = f"x[{rows.aside + len(rows.state_at)}, lane] > 0.0"
-    back = f"x[row, lane] = x[row, lane] if {moves} else x[{rows.aside} + row, lane]"
-    handed = handed_aside(rows).items()
-    lines = [f"{rows.cells[path]} = {rows.cells[path]} if {moves} else {cell}" for path, cell in handed]
-    return ["if part > 0:", *indent([*over_rows(len(rows.state_at), back), *(rows.over_lanes(lines) if lines else [])])]
-
-
-def handed_aside(rows: LaneRows) -> dict[str, str]:
-    """Where what a step is handed by the one before lies aside, by its path."""
-    first = rows.aside + len(rows.state_at) + 1
+        return [], []
+    count, cells = len(rows.state_at), rows.cells
+    remaining = f"x[{rows.aside + count}, lane]"
+    # Beside the state, what a step is handed by the one before, by its path.
     paths = [path for path in rows.step_at if path.startswith(HANDED)]
-    return {path: f"x[{first + place}, lane]" for place, path in enumerate(paths)}
-
-
-def add_up(rows: Rows) -> list[str]:
-    """Lines that count the time of a part that is taken; the end of the last one is the goal to the last bit."""
-    return [
-        # Sums of part lengths miss the goal by rounding: the last part sets it.
-        f"arrives = length >= {rows.remaining} and taken or {rows.remaining} == 0.0",
-        f"{rows.before} = goal * timing.step if arrives else before + (length if taken else 0.0)",
-        f"{rows.remaining} = 0.0 if arrives else {rows.remaining}",
-    ]
+    handed = {path: f"x[{rows.aside + count + 1 + place}, lane]" for place, path in enumerate(paths)}
+    kept = [f"{cell} = {cells[path]}" for path, cell in handed.items()]
+    kept.append(f"{remaining} = {rows.remaining}")
+    moves = f"{remaining} > 0.0"
+    again = [f"{cells[path]} = {cells[path]} if {moves} else {cell}" for path, cell in handed.items()]
+    aside = over_rows(count, f"x[{rows.aside} + row, lane] = x[row, lane]")
+    back = over_rows(count, f"x[row, lane] = x[row, lane] if {moves} else x[{rows.aside} + row, lane]")
+    first, last = rows.over_lanes(kept), rows.over_lanes(again) if again else []
+    return ["if part > 0:", *indent([*aside, *first])], ["if part > 0:", *indent([*back, *last])]
 
 
 def give_up(rows: Rows) -> list[str]:

@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 
 from ppafo import interrupts
 from ppafo.control.kind import ProfileKind
-from ppafo.engine.cache import kept_bytes
+from ppafo.engine.cache import kept_bytes, load_all
 from ppafo.engine.lane_rows import VECTOR, lanes_of
 from ppafo.engine.lane_source import INLINE, SAME_MOMENT, write_lanes
-from ppafo.engine.loading import load_source, load_sources
+from ppafo.engine.loading import chosen_compiler, load_source
 from ppafo.engine.outline import Outline
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, rebuilt, row_numbers
@@ -101,14 +101,14 @@ def load_programs(programs: Iterable[Program]) -> None:
     """Load the compiled modules of programs that are all needed, so that what is compiled can be counted."""
     chosen = dict.fromkeys(programs)
     if len(chosen) > 1:
-        load_sources([_current_source(program) for program in chosen])
+        load_all([_current_source(program) for program in chosen], chosen_compiler(), load_source)
 
 
 def _current_source(program: Program) -> str:
     """The source of a program, written anew where it is out of date."""
     outline, source = write_source(program)
     # The kept text may rest on a function that a notebook has defined anew since.
-    if outline.is_current():
+    if outline.made_from.is_current():
         return source
     write_source.cache_clear()
     return write_source(program)[1]
@@ -148,9 +148,18 @@ def run_blocks(batch: Batch, take: Callable[[slice, BatchResult], None], threads
 
     def work() -> None:
         for start in waiting:
-            if not stop.is_set():
-                block = slice(start, min(start + lanes, runs))
-                take(block, _run_block(module, batch, block, stop))
+            if stop.is_set():
+                break
+            members = slice(start, min(start + lanes, runs))
+            parameters, states = batch.parameters[:, members], batch.states[:, members]
+            block = LaneBlock(module, batch.program, batch.clock, parameters, states)
+            for done in range(0, batch.clock.step_count, STEPS_PER_CALL):
+                if stop.is_set():
+                    break
+                # An interrupt is seen between two calls only: compiled code cannot be stopped.
+                interrupts.check()
+                block.advance(min(STEPS_PER_CALL, batch.clock.step_count - done))
+            take(members, block.result())
 
     # One block needs no pool of threads, and an interrupt reaches it at once.
     if workers == 1:
@@ -172,19 +181,6 @@ def join_results(results: Sequence[BatchResult]) -> BatchResult:
         return results[0]
     states = np.concatenate([result.states for result in results], axis=1)
     return BatchResult(states, np.concatenate([result.record for result in results], axis=2))
-
-
-def _run_block(module: ModuleType, batch: Batch, runs: slice, stop: threading.Event) -> BatchResult:
-    """One block from beginning to end, in calls short enough for an interrupt to be seen between them."""
-    block = LaneBlock(module, batch.program, batch.clock, batch.parameters[:, runs], batch.states[:, runs])
-    steps = batch.clock.step_count
-    for done in range(0, steps, STEPS_PER_CALL):
-        if stop.is_set():
-            break
-        interrupts.check()
-        # An interrupt is seen between two calls only: compiled code cannot be stopped.
-        block.advance(min(STEPS_PER_CALL, steps - done))
-    return block.result()
 
 
 class LaneBlock:
@@ -324,7 +320,10 @@ RECORDED_ANGLE = ProfileKind(
     value=segment_value,
     bounds=segment_bounds,
 )
-"""Not in the catalogue: a scenario file cannot name it, because its values come from a recording."""
+"""Not in the catalogue: a scenario file cannot name it, because its values come from a recording.
+
+Where it is the angle of a program, its parameters are ``path.start``, ``.level`` and ``.rate``.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -336,11 +335,6 @@ class StepInputs:
 
     command: Floats | None
     parameters: Mapping[str, Floats]
-
-
-def prescribe_recorded_angle(program: Program) -> Program:
-    """The program with a recorded angle prescribed, by the parameters ``path.start``, ``.level``, ``.rate``."""
-    return replace(program, angle=RECORDED_ANGLE)
 
 
 def replay(batch: Batch, inputs: StepInputs) -> BatchResult:

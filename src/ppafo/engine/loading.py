@@ -26,7 +26,7 @@ from typing import Annotated, Any, Protocol, TypeAlias, get_type_hints, runtime_
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.engine.cache import LEFT_OUT_FOR, cache_folder, is_kept, load_all, load_generated, note_name, refusal
+from ppafo.engine.cache import LEFT_OUT_FOR, cache_folder, is_kept, load_generated, note_name, refusal
 from ppafo.engine.compilers import OFFERED, Compiler, CompilerError
 from ppafo.errors import ProgramError, SimulationError, nearest_name, one_line
 
@@ -87,17 +87,17 @@ def array_module(functions: Iterable[Callable[..., None]]) -> str:
 
     Their parameters are annotated as ``Vector``, ``Table``, ``float`` or ``int``.
     """
-    return "\n\n".join([HEADER, *map(_function_text, functions)])
-
-
-def _function_text(function: Callable[..., None]) -> str:
     plain: dict[Any, str] = {float: FLOAT, int: INT}
-    hints = get_type_hints(function, include_extras=True)
-    types = {name: plain.get(hint) or hint.__metadata__[0] for name, hint in hints.items() if name != "return"}
-    (tree,) = ast.parse(textwrap.dedent(inspect.getsource(function))).body
-    assert isinstance(tree, ast.FunctionDef)
-    body = tree.body[1:] if ast.get_docstring(tree) is not None else tree.body
-    return entry_text(function.__name__, types, [line for item in body for line in ast.unparse(item).split("\n")])
+    entries = []
+    for function in functions:
+        hints = get_type_hints(function, include_extras=True)
+        types = {name: plain.get(hint) or hint.__metadata__[0] for name, hint in hints.items() if name != "return"}
+        (tree,) = ast.parse(textwrap.dedent(inspect.getsource(function))).body
+        assert isinstance(tree, ast.FunctionDef)
+        body = tree.body[1:] if ast.get_docstring(tree) is not None else tree.body
+        lines = [line for item in body for line in ast.unparse(item).split("\n")]
+        entries.append(entry_text(function.__name__, types, lines))
+    return "\n\n".join([HEADER, *entries])
 
 
 logger = logging.getLogger("ppafo")
@@ -153,11 +153,6 @@ def load_source(source: str) -> ModuleType:
     ProgramError where it cannot be compiled, SimulationError where no compiler works.
     """
     return _load_by(source, compilers_to_try())
-
-
-def load_sources(sources: Iterable[str]) -> None:
-    """Load the modules of texts that are all needed, so that the progress of what is compiled can be counted."""
-    load_all(sources, chosen_compiler(), load_source)
 
 
 @lru_cache(maxsize=64)

@@ -16,16 +16,7 @@ from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
 from ppafo.engine import plain_python, source_text
-from ppafo.engine.source_text import (
-    Adaptation,
-    Made,
-    Read,
-    as_it_is,
-    check_is_plain,
-    emitted_name,
-    is_row,
-    is_unchanged,
-)
+from ppafo.engine.source_text import Adaptation, Made, MadeFrom, Read, check_is_plain, emitted_name, is_row
 
 _WRITTEN_BY = (source_text, plain_python)
 """The modules that decide how a function is written; the outline has their content in it."""
@@ -36,12 +27,11 @@ class Outline:
     """Takes the place of a ``SourceCollector`` that gathers the same definitions; its text is one line, the hash."""
 
     decorator: str
-    adapt: Adaptation = as_it_is
+    adapt: Adaptation | None = None
     links: dict[Any, Any] = field(default_factory=dict)
     effects: dict[Any, tuple[str, ...]] = field(default_factory=dict)
     needs: dict[str, tuple[str, ...]] = field(default_factory=dict)
-    reads: list[Read] = field(default_factory=list)
-    functions: list[Made] = field(default_factory=list)
+    made_from: MadeFrom = field(default_factory=MadeFrom)
     numbers: dict[Any, int] = field(default_factory=dict)
     parts: list[str] = field(default_factory=list)
 
@@ -58,15 +48,12 @@ class Outline:
         made = hashlib.sha256()
         # A change in how functions are written changes the text, too.
         composers = [file_hash(module.__file__ or "") for module in _WRITTEN_BY]
-        adapted = f"{emitted_name(self.adapt)} {file_hash(self.adapt.__code__.co_filename)}"
+        adapt = self.adapt
+        adapted = "" if adapt is None else f"{emitted_name(adapt)} {file_hash(adapt.__code__.co_filename)}"
         for part in (sys.version, *composers, adapted, self.decorator, *self.parts):
             # Each part with its length, or two lists of parts could run into one another.
             made.update(f"{len(part)} {part}".encode("utf-8", "surrogatepass"))
         return f"# made from {made.hexdigest()}"
-
-    def is_current(self) -> bool:
-        """True while every name and function that was met is what it was then."""
-        return is_unchanged(self.reads, self.functions)
 
     def _described(self, value: Any, inside: Any = None) -> str:
         """What a value is in the text, read ``inside`` a function; what is described is numbered."""
@@ -78,8 +65,15 @@ class Outline:
             # Numbered before it is described: a function that calls itself ends here.
             if value not in self.numbers:
                 self.numbers[value] = len(self.numbers)
-                describe = self._function if isinstance(value, FunctionType) else self._row
-                self.parts.append(f"{self.numbers[value]} is {describe(value)}")
+                if isinstance(value, FunctionType):
+                    described = self._function(value)
+                else:
+                    defaults = {name: self._described(given) for name, given in value._field_defaults.items()}
+                    file = getattr(sys.modules.get(value.__module__), "__file__", None) or ""
+                    described = repr(
+                        (emitted_name(value), value._fields, defaults, file_hash(file), self._declared(value))
+                    )
+                self.parts.append(f"{self.numbers[value]} is {described}")
             return f"item {self.numbers[value]}"
         if isinstance(value, tuple):
             kind = self._described(type(value)) if is_row(type(value)) else "tuple"
@@ -91,11 +85,6 @@ class Outline:
             return f"module {value.__name__}"
         return f"{type(value).__qualname__} {getattr(value, '__module__', '')} {getattr(value, '__qualname__', '')}"
 
-    def _row(self, row: Any) -> str:
-        defaults = {name: self._described(value) for name, value in row._field_defaults.items()}
-        file = getattr(sys.modules.get(row.__module__), "__file__", None) or ""
-        return repr((emitted_name(row), row._fields, defaults, file_hash(file), self._declared(row)))
-
     def _declared(self, item: Any) -> list[str]:
         """Rows that the annotations of a function or a row name: ``_replace`` and ``each`` write out their fields."""
         kinds = (kind for kind in item.__annotations__.values() if is_row(kind))
@@ -104,7 +93,7 @@ class Outline:
     def _function(self, function: FunctionType) -> str:
         code, named_defaults = function.__code__, dict(function.__kwdefaults__ or {})
         made = Made(function=function, code=code, defaults=function.__defaults__, named_defaults=named_defaults)
-        self.functions.append(made)
+        self.made_from.functions.append(made)
         given = self._described(function.__defaults__), self._described(tuple(named_defaults.items()))
         codes = list(_codes(code))
         names = sorted({name for inner in codes for name in inner.co_names})
@@ -140,7 +129,7 @@ class Outline:
             found = getattr(above[-1], name, self) if above else scope.get(name, self)
             if found is self:
                 continue
-            self.reads.append(Read(scope, name, found))
+            self.made_from.reads.append(Read(scope, name, found))
             yield name, found
             if isinstance(found, ModuleType) and found not in above:
                 for inner, value in self._read(vars(found), names, (*above, found)):

@@ -6,9 +6,10 @@ a loop whose end depends on a number or a power, is called sample by sample.
 """
 
 import ast
+import operator
 from collections import namedtuple
 from collections.abc import Callable
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,7 @@ def over_samples(function: Callable[..., Any], *given: Any) -> Any:
     """
     # A form that was made from a function that has changed since is made anew.
     found = _composed(function)
-    if found is not None and not found[0].is_current():
+    if found is not None and not found[0].made_from.is_current():
         _composed.cache_clear()
         found = _composed(function)
     return called_over_samples(function, (None if found is None else found[1]), *given)
@@ -69,15 +70,15 @@ def _one_by_one(function: Callable[..., Any], given: tuple[Any, ...]) -> Any:
     if not columns:
         return function(*given)
 
-    def at(sample: int) -> Any:
+    results = []
+    for sample in range(columns[0].size):
         numbers = [[value[sample] if isinstance(value, np.ndarray) else value for value in row] for row in flat]
         parts = (
             rebuilt(type(item), map(float, row)) if isinstance(item, tuple) else float(row[0])
             for item, row in zip(given, numbers, strict=True)
         )
-        return function(*parts)
-
-    return _gathered([at(sample) for sample in range(columns[0].size)])
+        results.append(function(*parts))
+    return _gathered(results)
 
 
 def _gathered(results: list[Any]) -> Any:
@@ -95,28 +96,20 @@ def _chosen(test: Any, yes: Callable[[], Any], no: Callable[[], Any]) -> Any:
 
 
 def _where(test: Any, yes: Any, no: Any) -> Any:
+    if not isinstance(test, np.ndarray):
+        return yes if test else no
     if isinstance(yes, tuple):
         parts = [_where(test, one, other) for one, other in zip(yes, no, strict=True)]
         return type(yes)(*parts) if hasattr(yes, "_fields") else tuple(parts)
     return np.where(test, yes, no)
 
 
-def _largest(first: Any, *others: Any) -> Any:
-    """The largest as Python has it: of equal numbers the first, also of 0 and -0."""
+def _extreme(is_beyond: Callable[[Any, Any], Any], first: Any, *others: Any) -> Any:
+    """The largest or smallest as Python has it: of equal numbers the first, also of 0 and -0."""
     for other in others:
         # A strict comparison, as Python's max has it; np.maximum would take 0.0 over -0.0, and spread NaN.
-        first = _either(other > first, other, first)
+        first = _where(is_beyond(other, first), other, first)
     return first
-
-
-def _smallest(first: Any, *others: Any) -> Any:
-    for other in others:
-        first = _either(other < first, other, first)
-    return first
-
-
-def _either(test: Any, yes: Any, no: Any) -> Any:
-    return np.where(test, yes, no) if isinstance(test, np.ndarray) else (yes if test else no)
 
 
 def _without_fraction(number: Any) -> Any:
@@ -135,8 +128,8 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {
     "_not": np.logical_not,
     "_quotient": np.divide,
     "_root": np.sqrt,
-    "max": _largest,
-    "min": _smallest,
+    "max": partial(_extreme, operator.gt),
+    "min": partial(_extreme, operator.lt),
     "int": _without_fraction,
     "float": _as_float,
 }

@@ -8,7 +8,7 @@ import ast
 import linecache
 import re
 import threading
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -81,15 +81,10 @@ def parse_module(text: str, path: str = "<unknown>") -> ast.Module:
 
 def check_grammar(tree: ast.FunctionDef, file: str) -> None:
     """Refuse what cannot be compiled, the first of it in the file. ProgramError names the file and the line."""
-    problems = list(_problems(tree))
-    if problems:
-        where, problem = min(problems, key=lambda item: (item[0].lineno, item[0].col_offset))
-        raise refusal(file, where, problem)
-
-
-def _problems(tree: ast.FunctionDef) -> Iterator[tuple[ast.stmt | ast.expr | ast.keyword, str]]:
+    problems: list[tuple[ast.stmt | ast.expr | ast.keyword, str]] = []
     if tree.args.vararg or tree.args.kwarg or getattr(tree, "type_params", None):
-        yield tree, f"'{tree.name}' takes any number of arguments, which cannot be compiled; name each of them"
+        problem = f"'{tree.name}' takes any number of arguments, which cannot be compiled; name each of them"
+        problems.append((tree, problem))
     left_away: set[ast.AST] = set()
     for node in (node for statement in tree.body for node in ast.walk(statement)):
         if isinstance(node, ast.AnnAssign):  # Python does not run the annotation of a local name
@@ -97,9 +92,11 @@ def _problems(tree: ast.FunctionDef) -> Iterator[tuple[ast.stmt | ast.expr | ast
         elif isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
             left_away.add(node.value)
         elif isinstance(node, ast.stmt | ast.expr | ast.keyword) and node not in left_away:
-            problem = _problem(node)
-            if problem:
-                yield node, problem
+            problems.append((node, _problem(node)))
+    found = [(where, problem) for where, problem in problems if problem]
+    if found:
+        where, problem = min(found, key=lambda item: (item[0].lineno, item[0].col_offset))
+        raise refusal(file, where, problem)
 
 
 def _problem(node: ast.AST) -> str:
@@ -231,12 +228,10 @@ def mistake(said: str, source: str) -> ProgramError:
     number = min(numbers, default=0)
     text = lines[number - 1].strip() if 0 < number <= len(lines) else ""
     found = place_in(lines, number) or _find_called(lines, text)
-    if found is None:
-        return ProgramError(
-            f"the model cannot be compiled: {_told_problem(Report(said=said, source=source, text=text, written=text))}"
-        )
-    written = linecache.getline(found.file, found.line).strip()
+    written = linecache.getline(found.file, found.line).strip() if found else ""
     problem = _told_problem(Report(said=said, source=source, text=text, written=written or text))
+    if found is None:
+        return ProgramError(f"the model cannot be compiled: {problem}")
     return refusal(found.file, _line_of(said, found), problem)
 
 
@@ -277,73 +272,46 @@ def _line_of(report: str, place: Place) -> int:
 
 
 def _told_problem(report: Report) -> str:
-    tellers: tuple[Callable[[Report], str], ...] = (_attribute, _returns, _operator, _arguments, _unpack)
-    for teller in tellers:
-        problem = teller(report)
-        if problem:
-            return problem
-    lines = [line.strip() for line in report.said.splitlines() if line.strip()]
-    # Lines that every report of Numba has and that tell a user nothing.
-    lines = [line for line in lines if not line.startswith(("Failed in nopython", "During:", "File ", "- Resolution"))]
-    where = f"'{report.written}' cannot be compiled: " if report.written else ""
-    return where + one_line(lines[0] if lines else "no reason given")[:_LONGEST]
+    """What a report of Numba says is wrong, in words; its first line where it is of a kind that is not known here."""
+    said, written = report.said, report.written
+    if found := re.search(r"Unknown attribute '(\w+)' of type (.+)", said):
+        problem = _without_attribute(report, found[1], found[2])
+    elif found := re.search(r"Can't unify return type from the following types: (.+)", said):
+        kinds = sorted({kind_of(kind) for kind in _split(found[1])})
+        problem = f"the ways through the function return different things: {' or '.join(kinds)}"
+    elif (found := re.search(r">>> (\w+)\((.*)\)", said)) and "No implementation of function" in said:
+        operator, kinds = found[1], [kind_of(kind) for kind in _split(found[2])]
+        what = f"'{_SIGNS[operator]}'" if operator in _SIGNS else f"{operator}()"
+        problem = f"{what} cannot be compiled for {' and '.join(kinds)}, in '{written}'"
+    elif found := re.search(r"to signature '\((.*)\)' due to \"TypeError: (.+)\"", said):
+        called, given = re.search(r"def (\w+)", written), re.search(r"\w(\([^=]*\))$", report.text)
+        engine = f"the engine calls it with {given[1]}: " if called and given else ""
+        problem = f"{called[1] if called else written}({found[1]}): {engine}{found[2].rstrip('.')}"
+    elif found := re.search(
+        r"failed to unpack (.+)|Tuple '.*' length (?:mismatch|does not match)|wrong tuple length", said
+    ):
+        kind = f", not {kind_of(found[1])}" if found[1] else ""
+        problem = f"'{written}' needs as many values as there are names{kind}"
+    else:
+        lines = [line.strip() for line in said.splitlines() if line.strip()]
+        # Lines that every report of Numba has and that tell a user nothing.
+        same = ("Failed in nopython", "During:", "File ", "- Resolution")
+        lines = [line for line in lines if not line.startswith(same)]
+        where = f"'{written}' cannot be compiled: " if written else ""
+        problem = where + one_line(lines[0] if lines else "no reason given")[:_LONGEST]
+    return problem
 
 
-def _attribute(report: Report) -> str:
-    found = re.search(r"Unknown attribute '(\w+)' of type (.+)", report.said)
-    if found is None:
-        return ""
-    name, kind = found.groups()
+def _without_attribute(report: Report, name: str, kind: str) -> str:
+    """What to say of a value of a kind that has no such attribute, with those that it has."""
     if kind.startswith("Module"):
         return f"'math.{name}' cannot be compiled"
     owner = re.search(rf"([\w.]+)\.{name}\b", report.text)
     what = owner[1] if owner else "it"
-    fields = _fields(report.source, kind)
+    rows = dict(_ROW.findall(report.source))
+    fields = re.findall(r"\w+", rows.get(kind.partition("(")[0], ""))
     hint = nearest_name(name, fields) or (f"; it has {', '.join(fields)}" if fields else "")
     return f"{what} has no '{name}'{hint}" if fields else f"{what} is {kind_of(kind)} and has no '{name}'"
-
-
-def _fields(source: str, kind: str) -> list[str]:
-    rows = {name: fields for name, fields in _ROW.findall(source)}
-    return re.findall(r"\w+", rows.get(kind.partition("(")[0], ""))
-
-
-def _returns(report: Report) -> str:
-    found = re.search(r"Can't unify return type from the following types: (.+)", report.said)
-    if found is None:
-        return ""
-    kinds = sorted({kind_of(kind) for kind in _split(found[1])})
-    return f"the ways through the function return different things: {' or '.join(kinds)}"
-
-
-def _operator(report: Report) -> str:
-    found = re.search(r">>> (\w+)\((.*)\)", report.said)
-    if found is None or "No implementation of function" not in report.said:
-        return ""
-    name, kinds = found[1], [kind_of(kind) for kind in _split(found[2])]
-    what = f"'{_SIGNS[name]}'" if name in _SIGNS else f"{name}()"
-    return f"{what} cannot be compiled for {' and '.join(kinds)}, in '{report.written}'"
-
-
-def _arguments(report: Report) -> str:
-    found = re.search(r"to signature '\((.*)\)' due to \"TypeError: (.+)\"", report.said)
-    if found is None:
-        return ""
-    called = re.search(r"def (\w+)", report.written)
-    given = re.search(r"\w(\([^=]*\))$", report.text)
-    engine = f"the engine calls it with {given[1]}: " if called and given else ""
-    name = called[1] if called else report.written
-    return f"{name}({found[1]}): {engine}{found[2].rstrip('.')}"
-
-
-def _unpack(report: Report) -> str:
-    found = re.search(
-        r"failed to unpack (.+)|Tuple '.*' length (?:mismatch|does not match)|wrong tuple length", report.said
-    )
-    if found is None:
-        return ""
-    kind = f", not {kind_of(found[1])}" if found[1] else ""
-    return f"'{report.written}' needs as many values as there are names{kind}"
 
 
 def kind_of(kind: str) -> str:

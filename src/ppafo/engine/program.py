@@ -4,7 +4,7 @@ import math
 from collections import namedtuple
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, lru_cache
+from functools import lru_cache
 from typing import Any, NamedTuple, get_type_hints
 
 from ppafo.control.kind import OPEN_LOOP, ControllerKind, ProfileKind
@@ -101,6 +101,7 @@ class Program:
 
     def parameter_rows(self) -> dict[str, type]:
         """Groups of parameter rows of this program, in order."""
+        shank = self.shank
         return {
             "timing": LaneTiming,
             "plant": self.actuator.plant,
@@ -112,16 +113,10 @@ class Program:
             "sensors": SensorParameters,
             **({} if self.leg is None else self.leg.parameters),
             **({} if self.feed is None else self.feed.parameters),
-            **self._leg_rows,
+            # By its place, for few vanes carry a leg.
+            **({"load": kind_at("ppafo.model.leg:FootLoad"), "shank": shank.parameters} if shank is not None else {}),
             **{effect.name: effect.parameters for effect in self.effects},
         }
-
-    @property
-    def _leg_rows(self) -> dict[str, type]:
-        """Groups of parameter rows of a leg on the vane; by its place, for few vanes carry one."""
-        if self.shank is None:
-            return {}
-        return {"load": kind_at("ppafo.model.leg:FootLoad"), "shank": self.shank.parameters}
 
     @property
     def is_on_gait(self) -> bool:
@@ -206,11 +201,6 @@ class Program:
         return {f"{kind.name}_meter": kind for kind in self.meters}
 
     @property
-    def is_metered(self) -> bool:
-        """True where there is something to do at a sample beside control."""
-        return bool(self.meters or self.traced)
-
-    @property
     def has_reference(self) -> bool:
         """True where the controller follows a reference; a constant command follows none."""
         return self.controller is None or self.controller.name != OPEN_LOOP
@@ -256,7 +246,8 @@ class Program:
         free = FreePart if self.leg is None else self.leg.begun
         begun = free if self.angle is None else (NoParameters if self.is_locked else PrescribedStep)
         gas = self.gas.begun(self) if self.feed is None else self.feed.begun(self)
-        shown = _shown_by(self.valve.connect)
+        # In the order of declaration: plant, what the valve shows beside its openings, result.
+        _, shown, _ = get_type_hints(self.valve.connect).values()
         return {
             **({} if self.leg is None else self.leg.led),
             **({"held": HeldChambers} if self.hands_chambers_on else {}),
@@ -330,7 +321,7 @@ def composed_with(function: Callable[..., Any], effects: Sequence[Effect]) -> Co
     if not effects:
         return None
     collector, composed = _composed_with(function, tuple(effects))
-    if collector.is_current():
+    if collector.made_from.is_current():
         return composed
     _composed_with.cache_clear()
     return _composed_with(function, tuple(effects))[1]
@@ -384,11 +375,3 @@ def place_over_samples(
         return called_over_samples(composed.function, composed.of_columns, *of_effects, *own)
 
     return called
-
-
-@cache
-def _shown_by(connect: Any) -> Any:
-    """The class of what a valve shows beside its openings, from the function that connects it."""
-    # In the order of declaration: plant, what the valve shows, result.
-    _, shown, _ = get_type_hints(connect).values()
-    return shown

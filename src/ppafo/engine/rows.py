@@ -44,10 +44,10 @@ def _leaf_paths(row: Any, prefix: str) -> tuple[str, ...]:
     return tuple(path for way, inner in members(row) for path in _leaf_paths(inner, f"{prefix}{way}"))
 
 
-def row_numbers(groups: Mapping[str, type]) -> dict[str, int]:
-    """Row of every number of some groups of rows, by its path such as ``state.angle``."""
+def row_numbers(groups: Mapping[str, type], first: int = 0) -> dict[str, int]:
+    """Row of every number of some groups of rows, by its path such as ``state.angle``, from row ``first`` on."""
     paths = [path for name, row in groups.items() for path in leaf_paths(row, name)]
-    return {path: number for number, path in enumerate(paths)}
+    return {path: number for number, path in enumerate(paths, first)}
 
 
 def row_expression(row: Any, path: str, cells: dict[str, str], name_of: Callable[[type], str]) -> str:
@@ -88,13 +88,11 @@ def rebuild(row: type, values: "np.ndarray[Any, Any] | list[float]") -> Any:
     return rebuilt(row, [float(value) for value in values])
 
 
-def rebuilt(row: type, values: Iterable[Any]) -> Any:
-    """The NamedTuple whose numbers, floats or arrays, are ``values``; the inverse of ``leaves``."""
-    return _rebuild(row, iter(values))
-
-
-def _rebuild(row: Any, values: Any) -> Any:
+def rebuilt(row: Any, values: Iterable[Any]) -> Any:
+    """The NamedTuple whose numbers, floats or arrays, are the next of ``values``; the inverse of ``leaves``."""
+    # Of an iterator this is the iterator itself: nested rows go on where the one before ended.
+    rest = iter(values)
     if is_number(row):
-        return next(values)
-    inner = [_rebuild(kind, values) for _, kind in members(row)]
+        return next(rest)
+    inner = [rebuilt(kind, rest) for _, kind in members(row)]
     return row(*inner) if is_row(row) else tuple(inner)

@@ -201,7 +201,10 @@ def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:
         groups = np.split(order, np.cumsum(np.bincount(group.reshape(-1), minlength=len(clocks)))[:-1])
     batches = []
     for clock, members in zip(clocks, groups, strict=True):
-        own, ticks = _program_and_clock(program, clock)
+        needs_parts, step_count, steps_per_sample, every, signal_delay, command_delay = clock.tolist()
+        own = replace(program, is_adaptive=bool(needs_parts), samples_inside=not every.is_integer())
+        every = every if own.samples_inside else int(every)
+        ticks = Clock(int(step_count), int(steps_per_sample), every, int(signal_delay), int(command_delay))
         ordered = members[_alike_together(run, runs, members)] if own.is_adaptive and members.size > 1 else members
         batches.append((ordered, Batch(own, ticks, parameters[:, ordered], states[:, ordered])))
     return batches
@@ -219,14 +222,6 @@ def _alike_together(run: Run, runs: int, members: Members) -> Members:
     )
     duration = np.broadcast_to(gas / (plant.valve_conductance * plant.gas_product), (runs,))
     return np.argsort(duration[members], kind="stable")
-
-
-def _program_and_clock(program: Program, counts: Floats) -> tuple[Program, Clock]:
-    """The program and clock of runs with the same numbers, as ``batches_of`` lists them."""
-    needs_parts, step_count, steps_per_sample, record_every, signal_delay, command_delay = counts.tolist()
-    own = replace(program, is_adaptive=bool(needs_parts), samples_inside=not record_every.is_integer())
-    every = record_every if own.samples_inside else int(record_every)
-    return own, Clock(int(step_count), int(steps_per_sample), every, int(signal_delay), int(command_delay))
 
 
 def gas_at_start(run: Run) -> Any:

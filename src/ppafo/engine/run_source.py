@@ -11,7 +11,7 @@ from ppafo.engine.lane_samples import control_loop, remember_commands, signals_b
 from ppafo.engine.lane_source import at_sample, between_samples
 from ppafo.engine.lane_step import find_begin, plant_loop
 from ppafo.engine.program import Program, link_program
-from ppafo.engine.rows import leaf_paths
+from ppafo.engine.rows import leaf_paths, row_expression
 from ppafo.engine.source_text import Collector
 
 LOOP_ARRAYS = {"signal_history": 3, "command_history": 2}
@@ -35,27 +35,23 @@ def run_loop(program: Program, collector: Collector, outputs: str, in_parts: Pro
     link_program(program, collector)
     rows = RunRows(program, collector, outputs)
     others = [] if in_parts is None else [RunRows(in_parts, collector, outputs)]
-    states = [group for group, row in program.state_rows().items() if leaf_paths(row, group)]
-    body = [
-        repr("What the run is made of, and where it stands."),
-        *rows.loaded(program.parameter_rows(), "parameters"),
-        *rows.loaded(program.state_rows(), "states"),
-        *find_begin(rows),
-        *_all_steps(rows, others),
-        repr("Where it stands now."),
-        *[f"states.{group} = {group}" for group in states],
-    ]
+    body = [repr("What the run is made of, and where it stands.")]
+    for whole, groups in (("parameters", program.parameter_rows()), ("states", program.state_rows())):
+        # A group without numbers is not in the row of all.
+        body += [f"{name} = {f'{whole}.{name}' if leaf_paths(row, name) else '()'}" for name, row in groups.items()]
+    body += [*find_begin(rows), *_all_steps(rows, others), repr("Where it stands now.")]
+    body += [f"states.{name} = {name}" for name, row in program.state_rows().items() if leaf_paths(row, name)]
     text = "\n".join(body)
     # C wants a struct to exist before one of its members is set.
-    first = [
-        item.empty(group)
-        for item in (rows, *others)
-        for group in item.program.step_rows()
-        if re.search(rf"{KEPT}\.{group}\.[\w.]+(\[\d+\])? = ", text)
-    ]
+    first = []
+    for item in (rows, *others):
+        for group, row in item.program.step_rows().items():
+            if re.search(rf"{KEPT}\.{group}\.[\w.]+(\[\d+\])? = ", text):
+                zeros = dict.fromkeys(leaf_paths(row, group), "0.0")
+                first.append(f"{group} = {row_expression(row, group, zeros, collector.add)}")
     given = ["states", "parameters", "samples", *LOOP_ARRAYS, *LOOP_NUMBERS, *([NEEDS_PARTS] if others else [])]
-    row = f"{outputs} = namedtuple({outputs!r}, {['time', *program.traced]!r})"
-    whole = "\n".join([row, f"def advance({', '.join(given)}):", *indent([*dict.fromkeys(first), *body])])
+    sample = f"{outputs} = namedtuple({outputs!r}, {['time', *program.traced]!r})"
+    whole = "\n".join([sample, f"def advance({', '.join(given)}):", *indent([*dict.fromkeys(first), *body])])
     # A single run is lane 0 of the histories, and its groups are local names.
     return re.sub(r"\blane\b", "0", re.sub(rf"\b{KEPT}\.", "", whole))
 
@@ -67,10 +63,15 @@ def _all_steps(rows: RunRows, others: list[RunRows]) -> list[str]:
     begin = [*signals_before_start(rows), *control, *remember_commands(rows)]
     if program.is_parted or others:
         begin.append(f"{rows.before} = 0.0")
-    if program.samples_inside:
-        sample, step = [], _chosen(between_samples(rows), [between_samples(item) for item in others])
-    else:
-        sample, step = at_sample(rows, "step_index"), _chosen(plant_loop(rows), [plant_loop(item) for item in others])
+    sample = [] if program.samples_inside else at_sample(rows, "step_index")
+    whole, *in_parts = [
+        between_samples(item) if program.samples_inside else plant_loop(item) for item in (rows, *others)
+    ]
+    step = [repr("A step of valve, gas and vane."), *whole]
+    if in_parts:
+        parted = [repr("A step of valve, gas and vane, in parts that its error allows."), *in_parts[0]]
+        once = [repr("A step of valve, gas and vane as a whole."), *whole]
+        step = [f"if {NEEDS_PARTS} == 1:", *indent(parted), "else:", *indent(once)]
     at_end = at_sample(rows, "step_index")
     return [
         "due = next_record * interval",
@@ -84,12 +85,3 @@ def _all_steps(rows: RunRows, others: list[RunRows]) -> list[str]:
         "    if step_index < beyond:",
         *indent(step, 2),
     ]
-
-
-def _chosen(whole: list[str], in_parts: list[list[str]]) -> list[str]:
-    """A whole step, or one in parts where the settings ask for that."""
-    if not in_parts:
-        return [repr("A step of valve, gas and vane."), *whole]
-    parted = [repr("A step of valve, gas and vane, in parts that its error allows."), *in_parts[0]]
-    once = [repr("A step of valve, gas and vane as a whole."), *whole]
-    return [f"if {NEEDS_PARTS} == 1:", *indent(parted), "else:", *indent(once)]

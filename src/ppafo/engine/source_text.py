@@ -238,9 +238,18 @@ class Composer(ast.NodeTransformer):
         return ast.Call(ast.Name(self.add(row), ast.Load()), values, [])
 
     def value_of(self, node: ast.expr) -> Any:
-        """What a name or ``module.name`` stands for outside the function. ProgramError where it has no value."""
-        if isinstance(node, ast.Name):
-            return self.global_value(node)
+        """What a name or ``module.name`` stands for now outside the function. ProgramError where it has no value."""
+        if isinstance(node, ast.Name) and node.id not in self.local:
+            scope = self.function.__globals__
+            if node.id in scope:
+                self.note(scope, node.id, scope[node.id])
+                return scope[node.id]
+            if node.id in COMPILED_BUILTINS:
+                return getattr(builtins, node.id)
+            if hasattr(builtins, node.id):
+                raise self.refuse(node, f"'{node.id}' cannot be compiled")
+            hint = nearest_name(node.id, [*self.local, *scope, *COMPILED_BUILTINS])
+            raise self.refuse(node, f"there is no '{node.id}'{hint}")
         if not isinstance(node, ast.Attribute):
             return _INSIDE
         owner = self.value_of(node.value)
@@ -252,21 +261,6 @@ class Composer(ast.NodeTransformer):
         value = getattr(owner, node.attr)
         self.note(vars(owner), node.attr, value)
         return value
-
-    def global_value(self, node: ast.Name) -> Any:
-        """What a global name stands for now. ProgramError where it has no value."""
-        if node.id in self.local:
-            return _INSIDE
-        scope = self.function.__globals__
-        if node.id in scope:
-            self.note(scope, node.id, scope[node.id])
-            return scope[node.id]
-        if node.id not in COMPILED_BUILTINS:
-            if hasattr(builtins, node.id):
-                raise self.refuse(node, f"'{node.id}' cannot be compiled")
-            hint = nearest_name(node.id, [*self.local, *scope, *COMPILED_BUILTINS])
-            raise self.refuse(node, f"there is no '{node.id}'{hint}")
-        return getattr(builtins, node.id)
 
     def stand_in(self, value: Any, node: ast.expr) -> ast.expr:
         """What is written for a value from outside. ProgramError where it is nothing that can be compiled.
@@ -366,42 +360,39 @@ def composed_lines(lines: Iterable[str], needs: Mapping[str, tuple[str, ...]]) -
     return [calls.sub(lambda call: f"{call[0]}{', '.join(needs[call[1]])}, ", line) for line in lines]
 
 
-def is_unchanged(reads: Iterable[Read], functions: Iterable[Made]) -> bool:
-    """True while every name stands for what it stood for, and every function is what it was."""
-    return all(read.scope.get(read.name, read) is read.value for read in reads) and all(
-        made.function.__code__ is made.code
-        and made.function.__defaults__ is made.defaults
-        and (made.function.__kwdefaults__ or {}) == made.named_defaults
-        for made in functions
-    )
+@dataclass(slots=True)
+class MadeFrom:
+    """What was read and composed for a text."""
+
+    reads: list[Read] = field(default_factory=list)
+    functions: list[Made] = field(default_factory=list)
+
+    def is_current(self) -> bool:
+        """True while every name stands for what it stood for, and every function is what it was."""
+        return all(read.scope.get(read.name, read) is read.value for read in self.reads) and all(
+            made.function.__code__ is made.code
+            and made.function.__defaults__ is made.defaults
+            and (made.function.__kwdefaults__ or {}) == made.named_defaults
+            for made in self.functions
+        )
 
 
 Adaptation = Callable[[FunctionType, ast.FunctionDef], ast.FunctionDef]
 """Makes a definition one of the part of Python that is compiled; it is handed a copy of its own."""
 
 
-def as_it_is(_function: FunctionType, tree: ast.FunctionDef) -> ast.FunctionDef:
-    """The definition itself."""
-    return tree
-
-
 class Collector(Protocol):
     """Gathers definitions for the module around them: a ``SourceCollector`` writes them, an ``Outline`` hashes them."""
 
-    @property
-    def links(self) -> dict[Any, Any]:
-        """What stands for others: under a pair of functions for its second inside its first alone.
+    links: dict[Any, Any]
+    """What stands for others: under a pair of functions for its second inside its first alone.
 
-        Under a row and ``"_replace"`` is the class that ``row._replace`` makes.
-        """
-
-    @property
-    def effects(self) -> dict[Any, tuple[str, ...]]:
-        """Laws of effects, each with the effect's structs that it takes, by the names of its parameters."""
-
-    @property
-    def needs(self) -> dict[str, tuple[str, ...]]:
-        """Rows of effects that functions of the module are handed before their own arguments, by emitted name."""
+    Under a row and ``"_replace"`` is the class that ``row._replace`` makes.
+    """
+    effects: dict[Any, tuple[str, ...]]
+    """Laws of effects, each with the effect's structs that it takes, by the names of its parameters."""
+    needs: dict[str, tuple[str, ...]]
+    """Rows of effects that functions of the module are handed before their own arguments, by emitted name."""
 
     def add(self, item: Callable[..., Any] | type) -> str:
         """Add a function or NamedTuple class and all that it needs; return the name it has in the module."""
@@ -420,11 +411,10 @@ class SourceCollector:
     """
 
     decorator: str
-    adapt: Adaptation = as_it_is
+    adapt: Adaptation | None = None
     definitions: dict[str, str] = field(default_factory=dict)
     owners: dict[str, Any] = field(default_factory=dict)
-    reads: list[Read] = field(default_factory=list)
-    functions: list[Made] = field(default_factory=list)
+    made_from: MadeFrom = field(default_factory=MadeFrom)
     links: dict[Any, Any] = field(default_factory=dict)
     effects: dict[Any, tuple[str, ...]] = field(default_factory=dict)
     needs: dict[str, tuple[str, ...]] = field(default_factory=dict)
@@ -456,10 +446,6 @@ class SourceCollector:
         """All definitions, callees first."""
         return "\n\n\n".join(self.definitions.values())
 
-    def is_current(self) -> bool:
-        """True while every name and function that was composed is what it was then."""
-        return is_unchanged(self.reads, self.functions)
-
     def _function_text(self, function: Any, name: str) -> str:
         tree = parse_definition(function, self.adapt)
         file = function.__code__.co_filename
@@ -470,13 +456,13 @@ class SourceCollector:
             named_defaults=dict(function.__kwdefaults__ or {}),
         )
         # A function is noted before its body is read, so that one met again inside it calls itself.
-        if any(known.function is function for known in self.functions):
+        if any(known.function is function for known in self.made_from.functions):
             raise refusal(file, tree, f"'{function.__name__}' calls itself, which cannot be compiled")
-        self.functions.append(made)
+        self.made_from.functions.append(made)
         composer = Composer(
             function,
             lambda item: self._add_inside(function, item),
-            lambda scope, read, value: self.reads.append(Read(scope, read, value)),
+            lambda scope, read, value: self.made_from.reads.append(Read(scope, read, value)),
             lambda callee: self.needs.get(callee, ()),
             lambda row: self.links.get((row, "_replace"), row),
         )
@@ -547,7 +533,7 @@ def place_of(item: Any) -> str:
     return f"module {item.__module__}" if code is None else place(code.co_filename, code.co_firstlineno)
 
 
-def parse_definition(function: FunctionType, adapt: Adaptation = as_it_is) -> ast.FunctionDef:
+def parse_definition(function: FunctionType, adapt: Adaptation | None = None) -> ast.FunctionDef:
     """The definition of a plain function with the lines of its file; refused where it is not what Python runs.
 
     ProgramError where the definition cannot be read or is not what Python runs.
@@ -568,7 +554,7 @@ def parse_definition(function: FunctionType, adapt: Adaptation = as_it_is) -> as
     if tree.decorator_list:
         raise refusal(file, tree, f"'{name}' is decorated, which cannot be compiled; remove the decorator")
     # A copy, since the tree is compared with what Python runs below.
-    adapted = adapt(function, tree if adapt is as_it_is else deepcopy(tree))
+    adapted = tree if adapt is None else adapt(function, deepcopy(tree))
     check_grammar(adapted, file)
     if _shape(code) not in (_shape(item) for item in _code_of(tree, function)):
         changed = "is not what its source text says; the file has changed since it was loaded: start again"

@@ -1,48 +1,35 @@
 """Gas and work: what a task costs, and what it gives."""
 
 import math
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from ppafo.metrics.metric import Floats, MetricKind, Readings
+from ppafo.metrics.metric import Floats, MetricKind, ReadAt, Readings
 from ppafo.model.columns import choose
 from ppafo.signals import Recording
 from ppafo.signals.meter import Course, MeterKind, Sample
 
 
-def _gain(recording: Recording, name: str) -> float:
+def gain(recording: Recording, channel: str) -> float:
+    """What a total of a recording, one of its channels, grows by from the first sample to the last, in its unit."""
     # A total counts from the start of the run, and a recording may be a part of one.
-    values = recording[name]
+    values = recording[channel]
     return float(values[-1] - values[0])
-
-
-def gas_supplied(recording: Recording) -> float:
-    """Gas taken from the supply [kg]."""
-    return _gain(recording, "supplied_mass")
-
-
-def gas_vented(recording: Recording) -> float:
-    """Gas let out to the atmosphere [kg]."""
-    return _gain(recording, "vented_mass")
-
-
-def gas_leaked(recording: Recording) -> float:
-    """Gas leaked from chamber to chamber [kg], in either direction."""
-    return _gain(recording, "leaked_mass")
 
 
 def gas_imbalance(recording: Recording) -> float:
     """Supplied less vented less stored gas [kg]; what a simulation loses or invents, near 0 for a sound one."""
     # What leaks goes from one chamber to the other: it leaves neither sum.
-    stored = _gain(recording, "mass_1") + _gain(recording, "mass_2")
-    return gas_supplied(recording) - gas_vented(recording) - stored
+    stored = gain(recording, "mass_1") + gain(recording, "mass_2")
+    return gain(recording, "supplied_mass") - gain(recording, "vented_mass") - stored
 
 
 def energy_imbalance(recording: Recording) -> float:
     """Enthalpy supplied less vented, and heat, less work and stored energy [J]; what a simulation loses or invents."""
-    taken = _gain(recording, "supplied_enthalpy") - _gain(recording, "vented_enthalpy") + _gain(recording, "wall_heat")
-    return taken - _gain(recording, "gas_work") - _gain(recording, "gas_energy")
+    taken = gain(recording, "supplied_enthalpy") - gain(recording, "vented_enthalpy") + gain(recording, "wall_heat")
+    return taken - gain(recording, "gas_work") - gain(recording, "gas_energy")
 
 
 def largest_pressure(recording: Recording) -> float:
@@ -65,7 +52,7 @@ def mechanical_work(recording: Recording) -> float:
 
 def work_per_gas(recording: Recording) -> float | None:
     """Mechanical work per gas taken from the supply [J/kg]; None where none was taken."""
-    gas = gas_supplied(recording)
+    gas = gain(recording, "supplied_mass")
     return mechanical_work(recording) / gas if gas > 0.0 else None
 
 
@@ -73,7 +60,7 @@ def gas_per_work(recording: Recording) -> float | None:
     """Gas taken from the supply per mechanical work [kg/J]; None where the actuator gave no work."""
     # A task that takes work from the leg would have a ratio below 0, which would rank as the best.
     work = mechanical_work(recording)
-    return gas_supplied(recording) / work if work > 0.0 else None
+    return gain(recording, "supplied_mass") / work if work > 0.0 else None
 
 
 class LargestPressure(NamedTuple):
@@ -139,24 +126,6 @@ def update_work(state: Work, course: Course, sample: Sample) -> Work:
 WORK = MeterKind("work", Work, start_work, update_work, of_motion=True)
 
 
-# What reads a run is compiled into exported libraries: plain functions, no closures.
-
-
-def read_gas_supplied(readings: Readings) -> Floats:
-    """``gas_supplied`` [kg]."""
-    return readings.gains["supplied_mass"]
-
-
-def read_gas_vented(readings: Readings) -> Floats:
-    """``gas_vented`` [kg]."""
-    return readings.gains["vented_mass"]
-
-
-def read_gas_leaked(readings: Readings) -> Floats:
-    """``gas_leaked`` [kg]."""
-    return readings.gains["leaked_mass"]
-
-
 def read_gas_imbalance(readings: Readings) -> Floats:
     """``gas_imbalance`` [kg]."""
     stored = readings.gains["mass_1"] + readings.gains["mass_2"]
@@ -170,35 +139,7 @@ def read_energy_imbalance(readings: Readings) -> Floats:
     return taken - gains["gas_work"] - gains["gas_energy"]
 
 
-def read_largest_pressure(readings: Readings) -> Floats:
-    """``largest_pressure`` [Pa absolute]."""
-    pressure: Floats = readings.meters[LARGEST_PRESSURE.name].pressure
-    return pressure
-
-
-def read_lowest_temperature(readings: Readings) -> Floats:
-    """``lowest_temperature`` [K]."""
-    temperature: Floats = readings.meters[LOWEST_TEMPERATURE.name].temperature
-    return temperature
-
-
-def read_mechanical_work(readings: Readings) -> Floats:
-    """``mechanical_work`` [J]."""
-    work: Floats = readings.meters[WORK.name].work
-    return work
-
-
-def read_work_per_gas(readings: Readings) -> Floats:
-    """``work_per_gas`` [J/kg]."""
-    return _ratio(read_mechanical_work(readings), readings.gains["supplied_mass"])
-
-
-def read_gas_per_work(readings: Readings) -> Floats:
-    """``gas_per_work`` [kg/J]."""
-    return _ratio(readings.gains["supplied_mass"], read_mechanical_work(readings))
-
-
-def _ratio(above: Floats, below: Floats) -> Floats:
+def ratio(above: Floats, below: Floats) -> Floats:
     """One over the other; nan where the other is not above 0."""
     # nan where a recording has None: a column has no other word for it.
     found: Floats = above / choose(below > 0.0, below, math.nan)
@@ -207,22 +148,18 @@ def _ratio(above: Floats, below: Floats) -> Floats:
 
 _BALANCE = ("supplied_mass", "vented_mass", "mass_1", "mass_2")
 ENERGIES = ("supplied_enthalpy", "vented_enthalpy", "wall_heat", "gas_work", "gas_energy")
-_MOTION = ("torque", "angle")
 _EFFORT = ("torque", "angle", "supplied_mass")
-_PRESSURES = ("pressure_1", "pressure_2")
-_TEMPERATURES = ("temperature_1", "temperature_2")
+
+
+def _gas(name: str, channel: str, summary: str) -> MetricKind:
+    """What a total of gas has grown by."""
+    return MetricKind(name, "kg", summary, (channel,), partial(gain, channel=channel), ReadAt((f"gains.{channel}",)))
+
 
 METRICS = (
-    MetricKind("gas_supplied", "kg", "gas taken from the supply", ("supplied_mass",), gas_supplied, read_gas_supplied),
-    MetricKind("gas_vented", "kg", "gas let out to the atmosphere", ("vented_mass",), gas_vented, read_gas_vented),
-    MetricKind(
-        "gas_leaked",
-        "kg",
-        "gas leaked from chamber to chamber, in either direction",
-        ("leaked_mass",),
-        gas_leaked,
-        read_gas_leaked,
-    ),
+    _gas("gas_supplied", "supplied_mass", "gas taken from the supply"),
+    _gas("gas_vented", "vented_mass", "gas let out to the atmosphere"),
+    _gas("gas_leaked", "leaked_mass", "gas leaked from chamber to chamber, in either direction"),
     MetricKind(
         "gas_imbalance",
         "kg",
@@ -243,27 +180,27 @@ METRICS = (
         "largest_pressure",
         "Pa",
         "largest pressure in a chamber",
-        _PRESSURES,
+        ("pressure_1", "pressure_2"),
         largest_pressure,
-        read_largest_pressure,
+        ReadAt(("meters.largest_pressure.pressure",)),
         (LARGEST_PRESSURE,),
     ),
     MetricKind(
         "lowest_temperature",
         "K",
         "lowest temperature of the gas in either chamber, of a gas with an energy balance",
-        _TEMPERATURES,
+        ("temperature_1", "temperature_2"),
         lowest_temperature,
-        read_lowest_temperature,
+        ReadAt(("meters.lowest_temperature.temperature",)),
         (LOWEST_TEMPERATURE,),
     ),
     MetricKind(
         "mechanical_work",
         "J",
         "work of the actuator on the joint",
-        _MOTION,
+        ("torque", "angle"),
         mechanical_work,
-        read_mechanical_work,
+        ReadAt(("meters.work.work",)),
         (WORK,),
     ),
     MetricKind(
@@ -272,7 +209,7 @@ METRICS = (
         "work per supplied gas",
         _EFFORT,
         work_per_gas,
-        read_work_per_gas,
+        ReadAt(("meters.work.work", "gains.supplied_mass"), ratio),
         (WORK,),
     ),
     MetricKind(
@@ -281,7 +218,7 @@ METRICS = (
         "supplied gas per work",
         _EFFORT,
         gas_per_work,
-        read_gas_per_work,
+        ReadAt(("gains.supplied_mass", "meters.work.work"), ratio),
         (WORK,),
     ),
 )

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -59,15 +60,37 @@ class Readings:
 
 
 @dataclass(frozen=True, slots=True)
+class ReadAt:
+    """Reads a metric that is a number at a place of the readings, ``gains.supplied_mass``, or a function of several.
+
+    Declared, so that an exported library has one expression for it and no function of its own.
+    """
+
+    places: tuple[str, ...]
+    function: Callable[..., Floats] | None = None
+
+    def __call__(self, readings: Readings) -> Floats:
+        """The metric of metered runs (runs,)."""
+        row: Any = readings
+        numbers = [reduce(_entry, place.split("."), row) for place in self.places]
+        found: Floats = numbers[0] if self.function is None else self.function(*numbers)
+        return found
+
+
+def _entry(row: Any, name: str) -> Any:
+    return row[name] if isinstance(row, Mapping) else getattr(row, name)
+
+
+@dataclass(frozen=True, slots=True)
 class MetricKind:
     """A metric in the catalogue: the channels it needs, and a pure function that gives the value.
 
     ``compute(recording)`` returns None where the recording has the channels but not what the metric is about, for
     example no hold for the error on the hold. ``read(readings)`` returns the same for many runs (runs,), nan in place
-    of None, from the meters in ``meters`` and the traces of the channels in ``traced``; without a trace it is plain
-    arithmetic with the functions of ``model.columns``, which is translated too. It is asked only of runs that have the
-    channels, and what is in ``needs``. Without ``compute`` it is counted while a run goes on, and no recording of its
-    channels alone has it.
+    of None, from the meters in ``meters`` and the traces of the channels in ``traced``; without a trace it is a
+    ``ReadAt``, or a plain function, no closure, of arithmetic with the functions of ``model.columns``, which is
+    translated too. It is asked only of runs that have the channels, and what is in ``needs``. Without ``compute`` it is
+    counted while a run goes on, and no recording of its channels alone has it.
     """
 
     name: str

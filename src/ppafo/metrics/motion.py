@@ -1,10 +1,11 @@
 """How the vane moves."""
 
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from ppafo.metrics.metric import LED_SHANK, Floats, MetricKind, Readings
+from ppafo.metrics.metric import LED_SHANK, Floats, MetricKind, ReadAt, Readings
 from ppafo.model.columns import root
 from ppafo.signals import Recording
 from ppafo.signals.meter import Course, MeterKind, Sample
@@ -26,8 +27,8 @@ def largest_speed(recording: Recording) -> float:
     return float(np.max(np.abs(recording["angular_velocity"])))
 
 
-def _time_of_fraction(recording: Recording, fraction: float) -> float | None:
-    """Return the time [s] at which a fraction of the way from the first to the last angle is first done, by a line."""
+def time_of_fraction(recording: Recording, fraction: float) -> float | None:
+    """Time [s] at which a fraction of the way from the first to the last angle is first done; None without a move."""
     travelled = recording["angle"] - recording["angle"][0]
     if abs(travelled[-1]) < _STANDSTILL:
         return None
@@ -37,70 +38,40 @@ def _time_of_fraction(recording: Recording, fraction: float) -> float | None:
     return float(np.interp(fraction, done[after - 1 : after + 1], recording.time[after - 1 : after + 1]))
 
 
-def departure_time(recording: Recording) -> float | None:
-    """Time [s] at which 1 % of the way from the first to the last angle is done; None without a move."""
-    return _time_of_fraction(recording, TRAVEL_FRACTION)
-
-
-def arrival_time(recording: Recording) -> float | None:
-    """Time [s] at which 99 % of the way from the first to the last angle is done; None without a move."""
-    return _time_of_fraction(recording, 1.0 - TRAVEL_FRACTION)
-
-
-class AngleRange(NamedTuple):
-    """Smallest and largest angle [rad]."""
+class Extremes(NamedTuple):
+    """Smallest and largest angle [rad], largest absolute angular velocity [rad/s]."""
 
     smallest: float
     largest: float
-
-
-def start_angle_range(course: Course, sample: Sample) -> AngleRange:
-    """The angle of the first sample, twice."""
-    return AngleRange(sample.angle, sample.angle)
-
-
-def update_angle_range(state: AngleRange, course: Course, sample: Sample) -> AngleRange:
-    """The range with the next sample in it."""
-    return AngleRange(min(state.smallest, sample.angle), max(state.largest, sample.angle))
-
-
-ANGLE_RANGE = MeterKind("angle_range", AngleRange, start_angle_range, update_angle_range, of_motion=True)
-
-
-class LargestSpeed(NamedTuple):
-    """Largest absolute angular velocity [rad/s]."""
-
     speed: float
 
 
-def start_largest_speed(course: Course, sample: Sample) -> LargestSpeed:
-    """The speed of the first sample."""
-    return LargestSpeed(abs(sample.angular_velocity))
+def start_extremes(course: Course, sample: Sample) -> Extremes:
+    """Angle and speed of the first sample."""
+    return Extremes(sample.angle, sample.angle, abs(sample.angular_velocity))
 
 
-def update_largest_speed(state: LargestSpeed, course: Course, sample: Sample) -> LargestSpeed:
-    """The larger one of that and the speed of the next sample."""
-    return LargestSpeed(max(state.speed, abs(sample.angular_velocity)))
+def update_extremes(state: Extremes, course: Course, sample: Sample) -> Extremes:
+    """The extremes with the next sample among them."""
+    return Extremes(
+        smallest=min(state.smallest, sample.angle),
+        largest=max(state.largest, sample.angle),
+        speed=max(state.speed, abs(sample.angular_velocity)),
+    )
 
 
-LARGEST_SPEED = MeterKind("largest_speed", LargestSpeed, start_largest_speed, update_largest_speed, of_motion=True)
+EXTREMES = MeterKind("extremes", Extremes, start_extremes, update_extremes, of_motion=True)
 
 
 def read_angle_range(readings: Readings) -> Floats:
     """``angle_range`` [rad]."""
-    state = readings.meters[ANGLE_RANGE.name]
+    state = readings.meters[EXTREMES.name]
     span: Floats = state.largest - state.smallest
     return span
 
 
-def read_largest_speed(readings: Readings) -> Floats:
-    """``largest_speed`` [rad/s]."""
-    speed: Floats = readings.meters[LARGEST_SPEED.name].speed
-    return speed
-
-
-def _read_time_of_fraction(readings: Readings, fraction: float) -> Floats:
-    """As ``_time_of_fraction``, of traces (samples, runs): the first angle is judged by the last."""
+def read_time_of_fraction(readings: Readings, fraction: float) -> Floats:
+    """As ``time_of_fraction`` [s], of traces (samples, runs): the first angle is judged by the last."""
     travelled = readings.traces["angle"] - readings.traces["angle"][0]
     moves = np.abs(travelled[-1]) >= _STANDSTILL
     done = travelled / np.where(moves, travelled[-1], np.nan)
@@ -110,16 +81,6 @@ def _read_time_of_fraction(readings: Readings, fraction: float) -> Floats:
     before, reached = done[after - 1, runs], done[after, runs]
     part = (fraction - before) / (reached - before)
     return np.asarray((after - 1 + part) * readings.interval)
-
-
-def read_departure_time(readings: Readings) -> Floats:
-    """``departure_time`` [s]."""
-    return _read_time_of_fraction(readings, TRAVEL_FRACTION)
-
-
-def read_arrival_time(readings: Readings) -> Floats:
-    """``arrival_time`` [s]."""
-    return _read_time_of_fraction(readings, 1.0 - TRAVEL_FRACTION)
 
 
 def foot_angle_error(recording: Recording) -> float:
@@ -165,10 +126,11 @@ def read_foot_angle_error(readings: Readings) -> Floats:
     return root(readings.meters[FOOT_ERROR.name].total / (readings.samples - 1))
 
 
-def read_toe_clearance_error(readings: Readings) -> Floats:
-    """``toe_clearance_error`` [m]."""
-    lowest: Floats = readings.meters[FOOT_ERROR.name].lowest
-    return lowest
+def _time(name: str, fraction: float, summary: str) -> MetricKind:
+    """The time at which a fraction of the move is done, of runs with all of their samples."""
+    compute = partial(time_of_fraction, fraction=fraction)
+    read = partial(read_time_of_fraction, fraction=fraction)
+    return MetricKind(name, "s", summary, ("angle",), compute, read, traced=("angle",))
 
 
 METRICS = (
@@ -188,7 +150,7 @@ METRICS = (
         "lowest height of the toes over the measured gait's, below 0 where lower",
         ("toe_difference",),
         toe_clearance_error,
-        read_toe_clearance_error,
+        ReadAt(("meters.foot_error.lowest",)),
         (FOOT_ERROR,),
         needs=(LED_SHANK,),
     ),
@@ -199,7 +161,7 @@ METRICS = (
         ("angle",),
         angle_range,
         read_angle_range,
-        (ANGLE_RANGE,),
+        (EXTREMES,),
     ),
     MetricKind(
         "largest_speed",
@@ -207,25 +169,9 @@ METRICS = (
         "largest absolute angular velocity",
         ("angular_velocity",),
         largest_speed,
-        read_largest_speed,
-        (LARGEST_SPEED,),
+        ReadAt(("meters.extremes.speed",)),
+        (EXTREMES,),
     ),
-    MetricKind(
-        "departure_time",
-        "s",
-        "time at which 1 % of the move is done",
-        ("angle",),
-        departure_time,
-        read_departure_time,
-        traced=("angle",),
-    ),
-    MetricKind(
-        "arrival_time",
-        "s",
-        "time at which 99 % of the move is done",
-        ("angle",),
-        arrival_time,
-        read_arrival_time,
-        traced=("angle",),
-    ),
+    _time("departure_time", TRAVEL_FRACTION, "time at which 1 % of the move is done"),
+    _time("arrival_time", 1.0 - TRAVEL_FRACTION, "time at which 99 % of the move is done"),
 )

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from ppafo.metrics.metric import LED, REQUEST, STEADY, WALK, Floats, MetricKind, Readings
+from ppafo.metrics.metric import LED, REQUEST, STEADY, WALK, Floats, MetricKind, ReadAt, Readings
 from ppafo.model.columns import choose, larger, root
 from ppafo.model.helping import HELPS, PUSH_OFF
 from ppafo.signals.meter import Course, MeterKind, Sample, StrideSample
@@ -188,52 +188,6 @@ def mean_of(total: Floats, count: Floats) -> Floats:
     return found
 
 
-# What reads a meter is compiled into exported libraries: plain functions, no closures.
-
-
-def _gas(readings: Readings) -> Floats:
-    counted = readings.meters["strides"].counted
-    return mean_of(counted.sums.gas, counted.counted)
-
-
-def _positive_work(readings: Readings) -> Floats:
-    counted = readings.meters["strides"].counted
-    return mean_of(counted.sums.positive_push_off_work, counted.counted)
-
-
-def _net_work(readings: Readings) -> Floats:
-    counted = readings.meters["strides"].counted
-    return mean_of(counted.sums.net_push_off_work, counted.counted)
-
-
-def _clearance(readings: Readings) -> Floats:
-    counted = readings.meters["strides"].counted
-    return mean_of(counted.sums.toe_clearance, counted.counted)
-
-
-def _landing(readings: Readings) -> Floats:
-    counted = readings.meters["strides"].counted
-    return mean_of(counted.sums.toe_landing, counted.counted)
-
-
-def _counted(readings: Readings) -> Floats:
-    counted = readings.meters["strides"].counted
-    found: Floats = counted.counted
-    return found
-
-
-def _whole(readings: Readings) -> Floats:
-    counted = readings.meters["strides"].counted
-    found: Floats = counted.whole
-    return found
-
-
-def _helped(readings: Readings) -> Floats:
-    counted = readings.meters["strides"].counted
-    found: Floats = counted.helped
-    return found
-
-
 def _vented(readings: Readings) -> Floats:
     counted = readings.meters["strides"].counted
     found: Floats = counted.whole - counted.helped
@@ -262,19 +216,26 @@ def _kind(name: str, unit: str, summary: str, read: Callable[[Readings], Floats]
     return MetricKind(name, unit, summary, (), None, read, (METER,), needs=(WALK, *needs))
 
 
-def _mean(name: str, read: Callable[[Readings], Floats], *needs: str) -> MetricKind:
+def _mean(name: str, *needs: str) -> MetricKind:
     """A mean over the strides with help, without the first ones; on a course it would be over other strides."""
     item = PER_STRIDE[name]
+    read = ReadAt((f"meters.strides.counted.sums.{name}", "meters.strides.counted.counted"), mean_of)
     return _kind(name, item.unit, f"{item.summary}, mean", read, STEADY, *needs)
 
 
 METRICS = (
-    _mean("gas", _gas),
-    _mean("positive_push_off_work", _positive_work),
-    _mean("net_push_off_work", _net_work),
-    _mean("toe_clearance", _clearance, LED),
-    _mean("toe_landing", _landing),
-    _kind("counted_strides", "-", "strides over which the means are taken", _counted, STEADY),
+    _mean("gas"),
+    _mean("positive_push_off_work"),
+    _mean("net_push_off_work"),
+    _mean("toe_clearance", LED),
+    _mean("toe_landing"),
+    _kind(
+        "counted_strides",
+        "-",
+        "strides over which the means are taken",
+        ReadAt(("meters.strides.counted.counted",)),
+        STEADY,
+    ),
     _kind(
         "push_off_error",
         "N m",
@@ -283,8 +244,13 @@ METRICS = (
         STEADY,
         REQUEST,
     ),
-    _kind("strides", "-", "whole strides of the walk", _whole),
-    _kind("helped_strides", "-", "whole strides with help from strike to strike", _helped),
+    _kind("strides", "-", "whole strides of the walk", ReadAt(("meters.strides.counted.whole",))),
+    _kind(
+        "helped_strides",
+        "-",
+        "whole strides with help from strike to strike",
+        ReadAt(("meters.strides.counted.helped",)),
+    ),
     _kind(
         "vented_strides",
         "-",

@@ -8,15 +8,17 @@ than the time between two commands changes less often than ordered; so does a sp
 """
 
 import math
+from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from ppafo.metrics.metric import Floats, MetricKind, Readings, hold, ramp, spans
+from ppafo.metrics.metric import Floats, MetricKind, ReadAt, Readings, hold, ramp, spans
 from ppafo.model.columns import choose, larger, truncated
 from ppafo.model.valves.kind import VENTS_ABOVE
 from ppafo.signals import Recording
-from ppafo.signals.meter import Course, MeterKind, Sample, starts_hold
+from ppafo.signals.meter import Course, MeterKind, Sample
 
 OSCILLATION_THRESHOLD = 0.05
 """Smallest swing that counts as an oscillation, as a fraction of the largest absolute reference."""
@@ -60,22 +62,13 @@ def reversals(values: Floats, swing: float) -> int:
     return count
 
 
-def _oscillations(recording: Recording, part: slice | None) -> float | None:
-    largest = float(np.max(np.abs(recording["reference"])))
+def oscillations(recording: Recording, part_of: Callable[[Recording], slice | None]) -> float | None:
+    """Number of torque reversals in a part of the task that swing over 5 % of the largest reference; None without."""
+    part, largest = part_of(recording), float(np.max(np.abs(recording["reference"])))
     # Without a reference there is nothing that the smallest swing could be a fraction of.
     if part is None or largest == 0.0:
         return None
     return float(reversals(recording["torque"][part], OSCILLATION_THRESHOLD * largest))
-
-
-def oscillations_ramp(recording: Recording) -> float | None:
-    """Number of torque reversals on the ramp that swing over 5 % of the largest reference."""
-    return _oscillations(recording, ramp(recording))
-
-
-def oscillations_hold(recording: Recording) -> float | None:
-    """Number of torque reversals on the hold that swing over 5 % of the largest reference."""
-    return _oscillations(recording, hold(recording))
 
 
 class Switchings(NamedTuple):
@@ -156,18 +149,12 @@ def update_oscillations(state: Oscillations, course: Course, sample: Sample) -> 
     """One sample more; the first one of the hold is the last one of the ramp too."""
     torque = sample.torque
     swing = next_swing(state.swing, torque, OSCILLATION_THRESHOLD * course.largest)
-    anew = starts_hold(course, sample)
+    anew = course.hold_start == sample.number
     begun = Swing(torque if anew else swing.play, UNDECIDED if anew else swing.turns, torque if anew else swing.highest)
     return Oscillations(begun, swing.turns if anew else state.turns_on_ramp)
 
 
 OSCILLATIONS = MeterKind("oscillations", Oscillations, start_oscillations, update_oscillations, True)
-
-
-def read_switchings(readings: Readings) -> Floats:
-    """``switchings``, the number of changes of state of both valves."""
-    changes: Floats = readings.meters[SWITCHINGS.name].changes
-    return changes
 
 
 def read_oscillations_ramp(readings: Readings) -> Floats:
@@ -195,7 +182,7 @@ METRICS = (
         "valves switched on or off by the command, each of a pair counted: a reversal is 2",
         ("command",),
         switchings,
-        read_switchings,
+        ReadAt(("meters.switchings.changes",)),
         (SWITCHINGS,),
     ),
     MetricKind(
@@ -203,7 +190,7 @@ METRICS = (
         "-",
         f"{_REVERSALS}, on the ramp",
         _NEEDED,
-        oscillations_ramp,
+        partial(oscillations, part_of=ramp),
         read_oscillations_ramp,
         (OSCILLATIONS,),
     ),
@@ -212,7 +199,7 @@ METRICS = (
         "-",
         f"{_REVERSALS}, on the hold",
         _NEEDED,
-        oscillations_hold,
+        partial(oscillations, part_of=hold),
         read_oscillations_hold,
         (OSCILLATIONS,),
     ),

@@ -1,13 +1,15 @@
 """How well the torque follows its reference."""
 
+from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from ppafo.metrics.metric import Floats, MetricKind, Readings, hold, ramp, spans
+from ppafo.metrics.metric import Floats, MetricKind, ReadAt, Readings, hold, ramp, spans
 from ppafo.model.columns import root
 from ppafo.signals import Recording
-from ppafo.signals.meter import Course, MeterKind, Sample, ends_before_hold
+from ppafo.signals.meter import Course, MeterKind, Sample
 
 _NEEDED = ("torque", "reference")
 
@@ -22,27 +24,17 @@ def settled_error(final: Floats, on_hold: Floats, reversals: Floats) -> Floats:
     return np.where((reversals >= SUSTAINED) & (on_hold > final), on_hold, final)
 
 
-def _rms(recording: Recording, part: slice) -> float:
+def rms_error(recording: Recording, part_of: Callable[[Recording], slice | None] | None = None) -> float | None:
+    """Root of the time average of (reference - torque)^2 [N m] in all or a part; None where it has no such part.
+
+    By the trapezoidal rule, so that any sampling will do.
+    """
+    part = slice(None) if part_of is None else part_of(recording)
+    if part is None:
+        return None
     # Over time and not over samples: a recording may have more of them where more happens.
     time, error = recording.time[part], (recording["reference"] - recording["torque"])[part]
     return float(np.sqrt(np.trapezoid(error**2, time) / float(time[-1] - time[0])))
-
-
-def rms_error(recording: Recording) -> float:
-    """Root of the time average of (reference - torque)^2 [N m], by the trapezoidal rule: any sampling will do."""
-    return _rms(recording, slice(None))
-
-
-def rms_error_ramp(recording: Recording) -> float | None:
-    """``rms_error`` [N m] until the reference reaches the level it keeps."""
-    part = ramp(recording)
-    return None if part is None else _rms(recording, part)
-
-
-def rms_error_hold(recording: Recording) -> float | None:
-    """``rms_error`` [N m] from where the reference stays at its final level."""
-    part = hold(recording)
-    return None if part is None else _rms(recording, part)
 
 
 def peak_error(recording: Recording) -> float:
@@ -75,7 +67,8 @@ def update_squared_error(state: SquaredError, course: Course, sample: Sample) ->
     square = error * error
     # In intervals: all have one length, which cancels where the sum is read.
     piece = 0.5 * (state.last + square)
-    is_before = ends_before_hold(course, sample)
+    # The reference did not rest yet at the sample before this one.
+    is_before = course.hold_start >= sample.number
     return SquaredError(
         square, state.before_hold + (piece if is_before else 0.0), state.on_hold + (0.0 if is_before else piece)
     )
@@ -84,42 +77,26 @@ def update_squared_error(state: SquaredError, course: Course, sample: Sample) ->
 SQUARED_ERROR = MeterKind("squared_error", SquaredError, start_squared_error, update_squared_error, True)
 
 
-class PeakError(NamedTuple):
-    """Largest absolute error [N m]."""
+class AbsoluteError(NamedTuple):
+    """Absolute error [N m]: the largest, and the one of the last sample so far."""
 
-    error: float
+    largest: float
+    last: float
 
 
-def start_peak_error(course: Course, sample: Sample) -> PeakError:
+def start_absolute_error(course: Course, sample: Sample) -> AbsoluteError:
     """The error of the first sample."""
-    return PeakError(abs(sample.reference - sample.torque))
+    error = abs(sample.reference - sample.torque)
+    return AbsoluteError(error, error)
 
 
-def update_peak_error(state: PeakError, course: Course, sample: Sample) -> PeakError:
-    """The larger one of that and the error of the next sample."""
-    return PeakError(max(state.error, abs(sample.reference - sample.torque)))
+def update_absolute_error(state: AbsoluteError, course: Course, sample: Sample) -> AbsoluteError:
+    """The larger one of that and the error of the next sample, and this one."""
+    error = abs(sample.reference - sample.torque)
+    return AbsoluteError(max(state.largest, error), error)
 
 
-PEAK_ERROR = MeterKind("peak_error", PeakError, start_peak_error, update_peak_error)
-
-
-class FinalError(NamedTuple):
-    """Absolute error of the last sample so far [N m]."""
-
-    error: float
-
-
-def start_final_error(course: Course, sample: Sample) -> FinalError:
-    """The error of the first sample."""
-    return FinalError(abs(sample.reference - sample.torque))
-
-
-def update_final_error(state: FinalError, course: Course, sample: Sample) -> FinalError:
-    """The error of the next sample."""
-    return FinalError(abs(sample.reference - sample.torque))
-
-
-FINAL_ERROR = MeterKind("final_error", FinalError, start_final_error, update_final_error)
+ABSOLUTE_ERROR = MeterKind("absolute_error", AbsoluteError, start_absolute_error, update_absolute_error)
 
 
 def read_rms_error(readings: Readings) -> Floats:
@@ -140,32 +117,44 @@ def read_rms_error_hold(readings: Readings) -> Floats:
     return root(readings.meters[SQUARED_ERROR.name].on_hold / length)
 
 
-def read_peak_error(readings: Readings) -> Floats:
-    """``peak_error`` [N m]."""
-    error: Floats = readings.meters[PEAK_ERROR.name].error
-    return error
-
-
-def read_final_error(readings: Readings) -> Floats:
-    """``final_error`` [N m]."""
-    error: Floats = readings.meters[FINAL_ERROR.name].error
-    return error
-
-
 _RMS = "root-mean-square torque error"
 
 METRICS = (
     MetricKind("rms_error", "N m", _RMS, _NEEDED, rms_error, read_rms_error, (SQUARED_ERROR,)),
     MetricKind(
-        "rms_error_ramp", "N m", f"{_RMS} on the ramp", _NEEDED, rms_error_ramp, read_rms_error_ramp, (SQUARED_ERROR,)
+        "rms_error_ramp",
+        "N m",
+        f"{_RMS} on the ramp",
+        _NEEDED,
+        partial(rms_error, part_of=ramp),
+        read_rms_error_ramp,
+        (SQUARED_ERROR,),
     ),
     MetricKind(
-        "rms_error_hold", "N m", f"{_RMS} on the hold", _NEEDED, rms_error_hold, read_rms_error_hold, (SQUARED_ERROR,)
+        "rms_error_hold",
+        "N m",
+        f"{_RMS} on the hold",
+        _NEEDED,
+        partial(rms_error, part_of=hold),
+        read_rms_error_hold,
+        (SQUARED_ERROR,),
     ),
     MetricKind(
-        "peak_error", "N m", "largest absolute torque error", _NEEDED, peak_error, read_peak_error, (PEAK_ERROR,)
+        "peak_error",
+        "N m",
+        "largest absolute torque error",
+        _NEEDED,
+        peak_error,
+        ReadAt(("meters.absolute_error.largest",)),
+        (ABSOLUTE_ERROR,),
     ),
     MetricKind(
-        "final_error", "N m", "absolute torque error at the end", _NEEDED, final_error, read_final_error, (FINAL_ERROR,)
+        "final_error",
+        "N m",
+        "absolute torque error at the end",
+        _NEEDED,
+        final_error,
+        ReadAt(("meters.absolute_error.last",)),
+        (ABSOLUTE_ERROR,),
     ),
 )

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
-from ppafo.metrics.metric import REACTS, WALK, Floats, MetricKind, Readings
+from ppafo.metrics.metric import REACTS, WALK, Floats, MetricKind, ReadAt, Readings
 from ppafo.metrics.strides import NOT_YET, SETTLING, mean_of
 from ppafo.model.columns import choose, larger
 from ppafo.signals.meter import Course, MeterKind, WearerSample
@@ -76,88 +76,53 @@ def _walked_time(readings: Readings) -> Floats:
     return found
 
 
-def _strides(readings: Readings) -> Floats:
-    totals = readings.meters["wearer"]
+def counted_strides(totals: WearerTotals) -> Floats:
+    """Number of whole strides without the first ones."""
     found: Floats = choose(totals.first.time >= 0.0, totals.last.strides - totals.first.strides, 0.0)
     return found
 
 
-# What reads a meter is compiled into exported libraries: plain functions, no closures.
-
-
-def _per_stride(readings: Readings, gained: Floats) -> Floats:
+def per_stride(totals: WearerTotals, last: Floats, first: Floats) -> Floats:
     """Mean over the strides of what a total gained in them."""
-    return mean_of(gained, _strides(readings))
+    return mean_of(last - first, counted_strides(totals))
 
 
-def _per_second(readings: Readings, gained: Floats) -> Floats:
+def per_second(totals: WearerTotals, last: Floats, first: Floats) -> Floats:
     """What a total gained over the time of the strides."""
-    totals = readings.meters["wearer"]
     # Both sides of a choice are computed: the divisor is never 0.
-    in_time = gained / larger(totals.last.time - totals.first.time, 1.0e-9)
-    found: Floats = choose(_strides(readings) > 0.5, in_time, math.nan)
+    in_time = (last - first) / larger(totals.last.time - totals.first.time, 1.0e-9)
+    found: Floats = choose(counted_strides(totals) > 0.5, in_time, math.nan)
     return found
-
-
-def _walking_speed(readings: Readings) -> Floats:
-    totals = readings.meters["wearer"]
-    return _per_second(readings, totals.last.way - totals.first.way)
-
-
-def _stride_time(readings: Readings) -> Floats:
-    totals = readings.meters["wearer"]
-    return _per_stride(readings, totals.last.time - totals.first.time)
-
-
-def _lowest_toes(readings: Readings) -> Floats:
-    totals = readings.meters["wearer"]
-    return _per_stride(readings, totals.last.clearances - totals.first.clearances)
-
-
-def _muscle_work(readings: Readings) -> Floats:
-    totals = readings.meters["wearer"]
-    return _per_stride(readings, totals.last.muscle_work - totals.first.muscle_work)
-
-
-def _muscle_power(readings: Readings) -> Floats:
-    totals = readings.meters["wearer"]
-    return _per_second(readings, totals.last.muscle_work - totals.first.muscle_work)
-
-
-def _metabolic_power_umberger(readings: Readings) -> Floats:
-    totals = readings.meters["wearer"]
-    return _per_second(readings, totals.last.umberger - totals.first.umberger)
-
-
-def _metabolic_power_bhargava(readings: Readings) -> Floats:
-    totals = readings.meters["wearer"]
-    return _per_second(readings, totals.last.bhargava - totals.first.bhargava)
 
 
 def _kind(name: str, unit: str, summary: str, read: Callable[[Readings], Floats]) -> MetricKind:
     return MetricKind(name, unit, summary, (), None, read, (METER,), needs=(WALK, REACTS))
 
 
+def _mean(name: str, unit: str, summary: str, total: str, over: Callable[..., Floats]) -> MetricKind:
+    """A mean over whole strides without the first ones of what a total of the samples gains."""
+    places = ("meters.wearer", f"meters.wearer.last.{total}", f"meters.wearer.first.{total}")
+    return _kind(name, unit, summary, ReadAt(places, over))
+
+
 METRICS = (
     _kind("stays_up", "-", "1 of a wearer who walks on to the end, 0 of one who falls", _stays_up),
     _kind("fall_time", "s", "time at which the wearer falls", _fall_time),
     _kind("walked_time", "s", "time until the wearer falls, or until the end", _walked_time),
-    _kind("walking_speed", "m/s", "speed, mean over whole strides without the first ones", _walking_speed),
-    _kind("stride_time", "s", "time of a stride, mean over whole strides without the first ones", _stride_time),
-    _kind(
+    _mean("walking_speed", "m/s", "speed, mean over whole strides without the first ones", "way", per_second),
+    _mean("stride_time", "s", "time of a stride, mean over whole strides without the first ones", "time", per_stride),
+    _mean(
         "lowest_toes",
         "m",
         "lowest toe height above ground in mid-swing, mean over the strides",
-        _lowest_toes,
+        "clearances",
+        per_stride,
     ),
-    _kind(
-        "muscle_work",
-        "J",
-        "work of all muscles of both legs as they shorten, in one stride",
-        _muscle_work,
+    _mean(
+        "muscle_work", "J", "work of all muscles of both legs as they shorten, in one stride", "muscle_work", per_stride
     ),
-    _kind("muscle_power", "W", "mean power of all muscles of both legs as they shorten", _muscle_power),
-    _kind("metabolic_power_umberger", "W", "metabolic rate of all muscles, Umberger 2010", _metabolic_power_umberger),
-    _kind("metabolic_power_bhargava", "W", "metabolic rate of all muscles, Bhargava 2004", _metabolic_power_bhargava),
+    _mean("muscle_power", "W", "mean power of all muscles of both legs as they shorten", "muscle_work", per_second),
+    _mean("metabolic_power_umberger", "W", "metabolic rate of all muscles, Umberger 2010", "umberger", per_second),
+    _mean("metabolic_power_bhargava", "W", "metabolic rate of all muscles, Bhargava 2004", "bhargava", per_second),
 )
 """Those of a neuromuscular gait model; gas and the others of a walk are in ``strides``."""

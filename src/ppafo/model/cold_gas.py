@@ -9,7 +9,6 @@ enthalpy takes it along.
 """
 
 import math
-from bisect import bisect_right
 from typing import NamedTuple
 
 from ppafo.constants import GRAMS_PER_KILOGRAM
@@ -21,6 +20,7 @@ from ppafo.model.source import (
     Column,
     FluidTable,
     Regulator,
+    between,
     bottle_content,
     bottle_rates,
     content_energy,
@@ -30,6 +30,7 @@ from ppafo.model.source import (
     gas_density,
     gas_specific_energy,
     has_liquid,
+    place_among,
     regulator_flow_limit,
 )
 
@@ -133,18 +134,12 @@ def gas_enthalpy(table: FluidTable, temperature: float, pressure: float) -> floa
 
 def enthalpy_at(line: Isobar, temperature: float) -> float:
     """Specific enthalpy [J/kg] on an isobar at a temperature [K]; its ends hold outside it."""
-    return _along(line.temperatures, line.enthalpies, temperature)
+    return between(line.enthalpies, place_among(line.temperatures, temperature))
 
 
 def temperature_at(line: Isobar, enthalpy: float) -> float:
     """Temperature [K] on an isobar at a specific enthalpy [J/kg]; below its first node the gas is wet and as cold."""
-    return _along(line.enthalpies, line.temperatures, enthalpy)
-
-
-def _along(nodes: Column, values: Column, at: float) -> float:
-    index = min(max(bisect_right(nodes, at) - 1, 0), len(nodes) - 2)
-    weight = min(max((at - nodes[index]) / (nodes[index + 1] - nodes[index]), 0.0), 1.0)
-    return (1.0 - weight) * values[index] + weight * values[index + 1]
+    return between(line.temperatures, place_among(line.enthalpies, enthalpy))
 
 
 def enthalpy_behind(line: Isobar, passage: Passage, part_temperature: float, enthalpy: float) -> float:
@@ -241,7 +236,9 @@ def advance_supply(
             f"so that the walk ends before the bottle is bare"
         )
     flow = mass / step
-    parts = parts_of(table, line, supply, state.mass - mass, flow, step)
+    # Heun's rule is stable up to 2 over the fastest rate; a tenth of that keeps it accurate too.
+    fastest = max(following_rates(table, line, supply, state.mass - mass, flow).values())
+    parts = max(1, math.ceil(step * fastest / LARGEST_CHANGE))
     length = step / parts
     after = state
     for part in range(parts):
@@ -256,12 +253,6 @@ def advance_supply(
         after = SupplyState._make(value + 0.5 * length * (one + other) for value, one, other in rates)
     # The mass itself, so that what left the bottle came through the regulator or is ice, to the last digit.
     return after._replace(mass=state.mass - mass - (after.ice - state.ice))
-
-
-def parts_of(table: FluidTable, line: Isobar, supply: ColdSupply, mass: float, flow: float, step: float) -> int:
-    """Into how many parts a step [s] goes with at least a mass [kg] in the bottle, so that no temperature swings up."""
-    # Heun's rule is stable up to 2 over the fastest rate; a tenth of that keeps it accurate too.
-    return max(1, math.ceil(step * max(following_rates(table, line, supply, mass, flow).values()) / LARGEST_CHANGE))
 
 
 def following_rates(table: FluidTable, line: Isobar, supply: ColdSupply, mass: float, flow: float) -> dict[str, float]:

@@ -29,7 +29,12 @@ def over_runs(function: Callable[..., Result], *arguments: Any) -> Result:
     # A function that branches takes no arrays; one call for each distinct combination gives each run the bits that it
     # has alone.
     distinct, places = _distinct(varied)
-    gathered: Result = _gather([function(*_fill(arguments, values)) for values in distinct], places)
+    results = []
+    for values in distinct:
+        # Arrays give way to the numbers of one combination, in their order; all else is handed on as it is.
+        own = iter(values)
+        results.append(function(*(next(own) if isinstance(given, np.ndarray) else given for given in arguments)))
+    gathered: Result = _gather(results, places)
     return gathered
 
 
@@ -96,12 +101,6 @@ def _distinct(columns: Sequence[NDArray[np.float64]]) -> tuple[Iterable[Sequence
         return np.stack(columns, axis=1).tolist(), np.arange(columns[0].size)
     rows, places = np.unique(np.stack(columns, axis=1), axis=0, return_inverse=True)
     return rows.tolist(), places.reshape(-1)
-
-
-def _fill(arguments: Sequence[Any], values: Sequence[float]) -> list[Any]:
-    given = iter(values)
-    # Arrays give way to the numbers of one combination, in their order; all else is handed on as it is.
-    return [next(given) if isinstance(argument, np.ndarray) else argument for argument in arguments]
 
 
 def _gather(results: Sequence[Any], places: NDArray[np.intp]) -> Any:

@@ -42,22 +42,16 @@ def specific_gas_constant(universal_gas_constant: float, molar_mass: float) -> f
 
 def critical_pressure_ratio(heat_capacity_ratio: float) -> float:
     """Downstream over upstream pressure [-] at and below which flow is choked; the inverse of the paper's 1.832."""
-    return over_runs(_critical_ratio, heat_capacity_ratio)
-
-
-def _critical_ratio(k: float) -> float:
-    return power(2.0 / (k + 1.0), k / (k - 1.0))
+    k = heat_capacity_ratio
+    return over_runs(power, 2.0 / (k + 1.0), k / (k - 1.0))
 
 
 def choked_flow_constant(heat_capacity_ratio: float, gas_constant: float, temperature: float) -> float:
     """C1 [s/m] of equation (6), with the exponent (k + 1)/(k - 1); ``gas_constant`` is R/M."""
     # With this exponent the paper's own value, 0.00281 s/m, comes out.
-    choked = over_runs(_choked_power, heat_capacity_ratio)
-    return root(heat_capacity_ratio / (gas_constant * temperature) * choked)
-
-
-def _choked_power(k: float) -> float:
-    return power(2.0 / (k + 1.0), (k + 1.0) / (k - 1.0))
+    k = heat_capacity_ratio
+    choked = over_runs(power, 2.0 / (k + 1.0), (k + 1.0) / (k - 1.0))
+    return root(k / (gas_constant * temperature) * choked)
 
 
 def subsonic_flow_constant(heat_capacity_ratio: float, gas_constant: float, temperature: float) -> float:

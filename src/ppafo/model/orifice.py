@@ -191,8 +191,12 @@ A curve that is best by relative least squares crosses the exact function of hel
 
 def isentropic_curve(heat_capacity_ratio: float, linear_ratio: float) -> FlowCurve:
     """Fitted curve [-] of equations (6), (7) for a gas, within 3e-7 of the exact function below ``linear_ratio``."""
-    coefficients = over_runs(_remembered_coefficients, heat_capacity_ratio)
-    return _curve(critical_pressure_ratio(heat_capacity_ratio), linear_ratio, coefficients)
+    return FlowCurve(
+        critical_ratio=critical_pressure_ratio(heat_capacity_ratio),
+        linear_ratio=linear_ratio,
+        linear_slope=1.0 / (1.0 - linear_ratio),
+        coefficients=over_runs(_remembered_coefficients, heat_capacity_ratio),
+    )
 
 
 def iso6358_curve(critical_ratio: float, linear_ratio: float) -> FlowCurve:
@@ -208,7 +212,12 @@ def iso6358_curve(critical_ratio: float, linear_ratio: float) -> FlowCurve:
     for place in range(TERMS):
         coefficients = _with_item(coefficients, place, unscaled[place] * factor)
         factor = factor * scale
-    return _curve(critical_ratio, linear_ratio, coefficients)
+    return FlowCurve(
+        critical_ratio=critical_ratio,
+        linear_ratio=linear_ratio,
+        linear_slope=1.0 / (1.0 - linear_ratio),
+        coefficients=coefficients,
+    )
 
 
 def _isentropic_coefficients(heat_capacity_ratio: float) -> Terms:
@@ -303,13 +312,4 @@ def _with_item(items: Terms, place: int, value: float) -> Terms:
         value if place == 4 else items[4],
         value if place == 5 else items[5],
         value if place == 6 else items[6],
-    )
-
-
-def _curve(critical_ratio: float, linear_ratio: float, coefficients: Terms) -> FlowCurve:
-    return FlowCurve(
-        critical_ratio=critical_ratio,
-        linear_ratio=linear_ratio,
-        linear_slope=1.0 / (1.0 - linear_ratio),
-        coefficients=coefficients,
     )

@@ -113,10 +113,6 @@ def _of_chambers(part: str, kind: str, summary: str, own: Mapping[str, Quantity]
     ]
 
 
-def _share(summary: str) -> Quantity:
-    return Quantity("share", "1", summary, 0.1, 0.0, 1.0)
-
-
 _CATALOGUE = [
     *_of_chambers(
         "valve",
@@ -138,7 +134,7 @@ _CATALOGUE = [
         "hose",
         "kinked",
         "is narrow: the hose of chamber",
-        {"kinked_share": _share("what is left of its conductance")},
+        {"kinked_share": Quantity("share", "1", "what is left of its conductance", 0.1, 0.0, 1.0)},
         "kinked_time",
     ),
     *_of_chambers(
@@ -159,7 +155,7 @@ _CATALOGUE = [
         "regulator",
         "frozen",
         "lets little through: the regulator of chamber",
-        {"frozen_share": _share("what is left of its flow")},
+        {"frozen_share": Quantity("share", "1", "what is left of its flow", 0.1, 0.0, 1.0)},
         "frozen_time",
     ),
     PlantFault(

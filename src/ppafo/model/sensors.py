@@ -311,7 +311,9 @@ def measure_gait(
         smooth_pressure_1=smooth_1,
         smooth_pressure_2=smooth_2,
     )
-    return measurement_of(remembered, torque_constant), remembered
+    # The torque follows from the readings, right or wrong.
+    shown = late_measurement(shown_heel, shown_toe, shown_angle, shown_1, shown_2, torque_constant)
+    return shown, remembered
 
 
 def samples_late(fault: Fault, time: float, sample: int) -> int:
@@ -324,7 +326,7 @@ def samples_late(fault: Fault, time: float, sample: int) -> int:
 def late_measurement(
     heel_force: float, toe_force: float, angle: float, pressure_1: float, pressure_2: float, torque_constant: float
 ) -> GaitMeasurement:
-    """What a controller gets of readings that arrive late: forces [N], angle [rad], pressures [Pa]."""
+    """What a controller gets of readings, late ones too: forces [N], angle [rad], pressures [Pa]."""
     return GaitMeasurement(
         angle=angle,
         pressure_1=pressure_1,
@@ -332,11 +334,4 @@ def late_measurement(
         torque=torque_constant * (pressure_1 - pressure_2),
         heel_force=heel_force,
         toe_force=toe_force,
-    )
-
-
-def measurement_of(shown: GaitSeen, torque_constant: float) -> GaitMeasurement:
-    """What a controller gets of what the sensors show; its torque follows from the readings, right or wrong."""
-    return late_measurement(
-        shown.heel_force, shown.toe_force, shown.angle, shown.pressure_1, shown.pressure_2, torque_constant
     )

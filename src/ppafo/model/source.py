@@ -85,7 +85,7 @@ def gas_specific_energy(table: FluidTable, temperature: float, density: float) -
 
 def nodes_around(table: FluidTable, temperature: float) -> Nodes:
     """Place of a temperature [K] among the table's; the ends of the table hold outside it."""
-    return _place(table.temperatures, temperature)
+    return place_among(table.temperatures, temperature)
 
 
 def across(rows: tuple[Column, ...], table: FluidTable, nodes: Nodes, density: float) -> float:
@@ -95,7 +95,7 @@ def across(rows: tuple[Column, ...], table: FluidTable, nodes: Nodes, density: f
     """
     index, weight = nodes
     fraction = min(density / between(table.densest, nodes), 1.0)
-    place = _place(table.fractions, fraction)
+    place = place_among(table.fractions, fraction)
     return (1.0 - weight) * between(rows[index], place) + weight * between(rows[index + 1], place)
 
 
@@ -105,7 +105,8 @@ def between(column: Column, nodes: Nodes) -> float:
     return (1.0 - weight) * column[index] + weight * column[index + 1]
 
 
-def _place(nodes: Column, at: float) -> Nodes:
+def place_among(nodes: Column, at: float) -> Nodes:
+    """Place of a number among nodes of its own unit; the ends hold outside them."""
     index = min(max(bisect_right(nodes, at) - 1, 0), len(nodes) - 2)
     weight = (at - nodes[index]) / (nodes[index + 1] - nodes[index])
     return index, min(max(weight, 0.0), 1.0)

@@ -140,7 +140,8 @@ def actuator_problem(actuator: Actuator) -> str:
         dead_volume_1=actuator.dead_volume_1,
         dead_volume_2=actuator.dead_volume_2,
     )
-    problem, table = ACTUATORS[actuator.kind].problem(actuator, stops), actuator.table
+    kind, table = ACTUATORS[actuator.kind], actuator.table
+    problem = "" if kind.problem is None else kind.problem(actuator, stops)
     if problem or table is None:
         return problem
     if table.first_angle <= stops.angle_min + _SAME and stops.angle_max <= table.last_angle + _SAME:

@@ -183,7 +183,16 @@ def parse_parameter_set(content: bytes, file: str, folder: Path | None = None) -
     Where its actuator has a file, that is looked for from ``folder``. ParameterError for one that is not usable.
     """
     document = _FILE.parse(content, file)
-    _load_kinds(document)
+    # The valves, the actuator and the effects that a set names, other packages' too, are loaded before it is checked.
+    valves, actuator, effects = (document.get(name) for name in ("valves", "actuator", SECTION))
+    for valve in valves.values() if isinstance(valves, dict) else ():
+        kind = valve.get("kind") if isinstance(valve, dict) else None
+        if isinstance(kind, str):
+            VALVES.get(kind)
+    # An actuator without a kind is a vane.
+    if isinstance(actuator, dict) and isinstance(actuator.setdefault("kind", VANE), str):
+        ACTUATORS.get(actuator["kind"])
+    find_effects(f"{SECTION}.{name}" for name in (effects if isinstance(effects, dict) else ()))
     parsed: Any = validate(parameter_file(), document, file, ParameterError, whole_parameter_file)
     parameter_set = _flatten(parsed, file, folder or Path())
     chosen_valve(parameter_set, None)
@@ -197,21 +206,6 @@ def parse_parameter_set(content: bytes, file: str, folder: Path | None = None) -
         with refused_as(ParameterError, f"{parameter_set.file}: {path}.unit", UnitError):
             check_unit(entry.unit)
     return parameter_set
-
-
-def _load_kinds(document: dict[str, Any]) -> None:
-    """Load the valves, the actuator and the effects that a set names, other packages' too, before it is checked.
-
-    An actuator without a kind is a vane.
-    """
-    valves, actuator, effects = (document.get(name) for name in ("valves", "actuator", SECTION))
-    for valve in valves.values() if isinstance(valves, dict) else ():
-        kind = valve.get("kind") if isinstance(valve, dict) else None
-        if isinstance(kind, str):
-            VALVES.get(kind)
-    if isinstance(actuator, dict) and isinstance(actuator.setdefault("kind", VANE), str):
-        ACTUATORS.get(actuator["kind"])
-    find_effects(f"{SECTION}.{name}" for name in (effects if isinstance(effects, dict) else ()))
 
 
 def _flatten(parsed: Any, file: str, folder: Path) -> ParameterSet:
@@ -257,10 +251,6 @@ def _leaves(node: object, path: str) -> Iterator[tuple[str, object]]:
 
 def parameter_set_toml(parameter_set: ParameterSet) -> str:
     """Return the TOML text of a set: head, citation, every value with its provenance, accepted contradictions."""
-    return "\n".join(_lines(parameter_set)) + "\n"
-
-
-def _lines(parameter_set: ParameterSet) -> Iterator[str]:
     head = {
         "name": parameter_set.name,
         "title": parameter_set.title,
@@ -269,12 +259,12 @@ def _lines(parameter_set: ParameterSet) -> Iterator[str]:
         "parent": parameter_set.parent,
         "notes": parameter_set.notes,
     }
-    yield from _assignments({"schema_version": 1, **{key: value for key, value in head.items() if value}})
+    lines = [*_assignments({"schema_version": 1, **{key: value for key, value in head.items() if value}})]
     if parameter_set.citation is not None:
-        yield from ("", "[citation]", *_assignments(parameter_set.citation.model_dump(exclude_defaults=True)))
+        lines += ("", "[citation]", *_assignments(parameter_set.citation.model_dump(exclude_defaults=True)))
     if parameter_set.actuator_kind != VANE:
         file = {"file": parameter_set.actuator_file} if parameter_set.actuator_file else {}
-        yield from ("", "[actuator]", *_assignments({"kind": parameter_set.actuator_kind, **file}))
+        lines += ("", "[actuator]", *_assignments({"kind": parameter_set.actuator_kind, **file}))
     # Section by section, in the order in which the sections first occur.
     entries = parameter_set.entries()
     sections = list(dict.fromkeys(path.rpartition(".")[0] for path in entries))
@@ -283,14 +273,15 @@ def _lines(parameter_set: ParameterSet) -> Iterator[str]:
         valve = path.split(".")[1] if path.startswith("valves.") else ""
         if valve and valve not in begun:
             begun.add(valve)
-            yield from _valve(parameter_set, valve)
-        yield from ("", f"[{path}]", *_assignments(entries[path].model_dump(exclude_defaults=True)))
+            lines += _valve(parameter_set, valve)
+        lines += ("", f"[{path}]", *_assignments(entries[path].model_dump(exclude_defaults=True)))
     # A valve of which nothing but its kind is known has a table all the same.
     for valve in parameter_set.valve_kinds:
         if valve not in begun:
-            yield from _valve(parameter_set, valve)
+            lines += _valve(parameter_set, valve)
     for finding, reason in parameter_set.accepted.items():
-        yield from ("", "[[accepted]]", *_assignments({"finding": finding, "reason": reason}))
+        lines += ("", "[[accepted]]", *_assignments({"finding": finding, "reason": reason}))
+    return "\n".join(lines) + "\n"
 
 
 def _valve(parameter_set: ParameterSet, valve: str) -> Iterator[str]:

@@ -247,24 +247,6 @@ def entry_text(entry: Entry | TextEntry | FlagEntry) -> str:
 SOURCE = "override"
 
 
-@dataclass(frozen=True, slots=True)
-class _Order:
-    """An override by its path in the set, as it was typed."""
-
-    path: str
-    given: Given
-
-    def typed_path(self, path: str) -> str:
-        """Return a path of the set in the way in which this override was typed."""
-        if not self.given.typed.startswith(CHOSEN_VALVE):
-            return path
-        return one_path(path, self.path.split(".")[1])
-
-    def refusal(self, why: object) -> ParameterError:
-        """Return the error that quotes the override as it was typed."""
-        return ParameterError(f"override '{self.given}': {why}")
-
-
 def apply_overrides(parameter_set: ParameterSet, overrides: Iterable[str], valve: str | None = None) -> ParameterSet:
     """Return the set with values replaced; each override is a text such as ``valve.area=12.6mm^2``, in any order.
 
@@ -290,7 +272,7 @@ def apply_overrides(parameter_set: ParameterSet, overrides: Iterable[str], valve
     first = [path for path in (SPECIES_PATH, ATMOSPHERE_PATH) if path in given]
     every = {**{path: given[path] for path in first}, **given, **followers}
     for path, item in every.items():
-        parameter_set = _CHANGES.get(path, _with_number)(parameter_set, _Order(path, item))
+        parameter_set = _CHANGES.get(path, _with_number)(parameter_set, path, item)
     return parameter_set
 
 
@@ -299,42 +281,43 @@ def overridden_paths(parameter_set: ParameterSet) -> frozenset[str]:
     return frozenset(path for path, entry in parameter_set.entries().items() if entry.source == SOURCE)
 
 
-def _with_number(parameter_set: ParameterSet, order: _Order) -> ParameterSet:
-    path, given = order.path, order.given
+def _with_number(parameter_set: ParameterSet, path: str, given: Given) -> ParameterSet:
     find_effects([path])
     declared = parameter_set.declarations()
     if path not in declared:
         # So that the hint knows the values of effects that no set of this run has named.
         EFFECTS.load_own()
         declared = parameter_set.declarations()
-        allowed = [order.typed_path(known) for known in (*declared, SPECIES_PATH, RELIEVING_PATH)]
+        allowed = [*declared, SPECIES_PATH, RELIEVING_PATH]
+        if given.typed.startswith(CHOSEN_VALVE):
+            allowed = [one_path(known, path.split(".")[1]) for known in allowed]
         # Nothing is spelt alike: values of the same section stand for what there is.
         near = [name for name in allowed if name.startswith(f"{given.typed.partition('.')[0]}.")] or allowed
         hint = nearest_name(given.typed, allowed) or f"; for example {', '.join(near[:6])}"
-        raise order.refusal(f"{parameter_set.file} has no value '{given.typed}'{hint}")
+        raise ParameterError(f"override '{given}': {parameter_set.file} has no value '{given.typed}'{hint}")
     try:
         value, unit = split_quantity(given.text)
         entry = Entry(value=value, unit=unit, origin="assumed", source=SOURCE, note=_before(parameter_set, path))
         entry_in_si(entry, declared[path], atmospheric_pressure(parameter_set))
     except UnitError as error:
-        raise order.refusal(error) from error
+        raise ParameterError(f"override '{given}': {error}") from error
     kept = {key: old for key, old in parameter_set.numbers.items() if key not in other_forms(path)}
     return replace(parameter_set, numbers={**kept, path: entry})
 
 
-def _with_species(parameter_set: ParameterSet, order: _Order) -> ParameterSet:
-    path, text = order.path, order.given.text
-    species = SPECIES.get(text)
+def _with_species(parameter_set: ParameterSet, path: str, given: Given) -> ParameterSet:
+    species = SPECIES.get(given.text)
     if species is None:
-        raise order.refusal(f"unknown gas{nearest_name(text, SPECIES)}; available: {', '.join(SPECIES)}")
-    note = f"follows from the override {path}={text}"
+        hint = nearest_name(given.text, SPECIES)
+        raise ParameterError(f"override '{given}': unknown gas{hint}; available: {', '.join(SPECIES)}")
+    note = f"follows from the override {path}={given.text}"
     constants = {"gas.molar_mass": (species.molar_mass, "kg/mol")}
     constants["gas.heat_capacity_ratio"] = (species.heat_capacity_ratio, "")
     numbers = {
         key: Entry(value=value, unit=unit, origin="datasheet", source=species.source, note=note)
         for key, (value, unit) in constants.items()
     }
-    chosen = TextEntry(value=text, origin="assumed", source=SOURCE, note=_before(parameter_set, path))
+    chosen = TextEntry(value=given.text, origin="assumed", source=SOURCE, note=_before(parameter_set, path))
     return replace(
         parameter_set,
         numbers={**parameter_set.numbers, **numbers},
@@ -342,12 +325,11 @@ def _with_species(parameter_set: ParameterSet, order: _Order) -> ParameterSet:
     )
 
 
-def _with_relieving(parameter_set: ParameterSet, order: _Order) -> ParameterSet:
-    if order.given.text not in _FLAGS:
-        raise order.refusal(f"must be {' or '.join(_FLAGS)}")
-    note = _before(parameter_set, order.path)
-    entry = FlagEntry(value=_FLAGS[order.given.text], origin="assumed", source=SOURCE, note=note)
-    return replace(parameter_set, flags={**parameter_set.flags, order.path: entry})
+def _with_relieving(parameter_set: ParameterSet, path: str, given: Given) -> ParameterSet:
+    if given.text not in _FLAGS:
+        raise ParameterError(f"override '{given}': must be {' or '.join(_FLAGS)}")
+    entry = FlagEntry(value=_FLAGS[given.text], origin="assumed", source=SOURCE, note=_before(parameter_set, path))
+    return replace(parameter_set, flags={**parameter_set.flags, path: entry})
 
 
 _FLAGS = {"true": True, "false": False}

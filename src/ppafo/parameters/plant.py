@@ -1,7 +1,7 @@
 """From a device to the numbers that the plant and its effects compute with."""
 
 from collections import namedtuple
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any, NamedTuple, cast
 
@@ -196,6 +196,5 @@ def _names(actuator_kind: str) -> dict[str, tuple[str, ...]]:
     return found | {"gas": (*found["gas"], "specific_gas_constant")}
 
 
-@cache
-def _part(section: str, names: tuple[str, ...]) -> Any:
-    return namedtuple(section, names)
+_part: Callable[[str, tuple[str, ...]], Any] = cache(namedtuple)
+"""Classes of the parts of a device that effects see."""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.metrics import METRICS, Metric
+from ppafo.metrics import Metric
 from ppafo.units import from_si
 
 Floats = NDArray[np.float64]
@@ -79,12 +79,6 @@ def display_value(value: float, quantity: str, atmosphere: float = STANDARD_ATMO
     return float(value) if si == unit or not math.isfinite(value) else from_si(float(value), unit, si, atmosphere)
 
 
-def rounded_text(value: float, quantity: str, digits: int) -> str:
-    """Return a value in SI as text in the unit in which it is shown, without the sign of what is rounded to zero."""
-    text = f"{display_value(value, quantity):.{digits}f}"
-    return text.removeprefix("-") if float(text) == 0.0 else text
-
-
 def display_difference(value: float, quantity: str) -> float:
     """Return a difference of two values in SI in the unit in which it is shown."""
     # The zero of gauge pressures and of degrees Celsius falls out.
@@ -98,12 +92,6 @@ def display_values(values: Floats, quantity: str) -> Floats:
     return values if (zero, one) == (0.0, 1.0) else zero + (one - zero) * values
 
 
-def title_with_unit(words: str, quantity: str) -> str:
-    """Return a name with the unit in which its quantity is shown: ``Gas supplied (g)``."""
-    unit = display_unit(quantity)
-    return f"{words} ({unit})" if unit else words
-
-
 def quantity_text(value: float, quantity: str, form: str = ".3g") -> str:
     """Return a value in SI as text with the unit in which it is shown."""
     return f"{display_value(value, quantity):{form}} {display_unit(quantity)}".rstrip()
@@ -113,9 +101,9 @@ _OF_GAS = {"kg": "gas mass", "kg/J": "gas mass per energy"}
 """Masses among the metrics are masses of gas."""
 
 
-def metric_quantity(name: str) -> str:
-    """Return the kind of quantity of a metric, empty for a plain number."""
-    return _quantity(METRICS[name].unit)
+def metric_quantity(si_unit: str) -> str:
+    """Return the kind of quantity of a metric or channel that has a unit in SI, empty for a plain number."""
+    return _OF_GAS.get(si_unit) or quantity_of_unit(si_unit)
 
 
 def metric_words(name: str) -> str:
@@ -142,17 +130,13 @@ def metric_level(value: float, si_unit: str, atmosphere: float = STANDARD_ATMOSP
 
     Pressures are gauge ones and count from ``atmosphere`` [Pa absolute].
     """
-    quantity = _quantity(si_unit)
+    quantity = metric_quantity(si_unit)
     return display_value(value, quantity, atmosphere), display_unit(quantity) or si_unit.removeprefix("-")
 
 
 def metric_change(value: float, si_unit: str) -> tuple[float, str]:
     """Return a difference of two values of a metric or channel, and its unit, as people are shown them."""
-    quantity = _quantity(si_unit)
+    quantity = metric_quantity(si_unit)
     return display_difference(value, quantity), display_unit(quantity).replace("psi_g", "psi") or si_unit.removeprefix(
         "-"
     )
-
-
-def _quantity(unit: str) -> str:
-    return _OF_GAS.get(unit) or quantity_of_unit(unit)

@@ -108,7 +108,8 @@ TIME = Kind("Time", "s", "time")
 
 def of_metric(name: str, form: str = ".4g") -> Kind:
     """Return what a metric is."""
-    return Kind(metric_words(name), METRICS[name].unit, metric_quantity(name), form)
+    unit = METRICS[name].unit
+    return Kind(metric_words(name), unit, metric_quantity(unit), form)
 
 
 def of_path(path: str, unit: str, form: str = ".6g") -> Kind:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ppafo.report.kind import Kind
-from ppafo.report.style import BLUE, VERMILION, house_style, label_lines, mark_kind
+from ppafo.report.style import BLUE, VERMILION, house_style, mark_kind
 from ppafo.signals import RecordingKind
 
 if TYPE_CHECKING:
@@ -166,7 +166,8 @@ def _draw(axes: "Axes", panel: Panel) -> Any:
     # A text carries its words itself.
     if panel.legend and any(mark.label for mark in panel.marks if mark.shape != "text"):
         if panel.legend == "above":
-            label_lines(axes)
+            # Above the axes, out of the way of the data.
+            axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, borderaxespad=0.1, handlelength=1.6)
         elif panel.legend == "figure":
             names = axes.get_legend_handles_labels()
             axes.figure.legend(*names, loc="outside upper left", ncols=3, columnspacing=1.4, handlelength=1.4)

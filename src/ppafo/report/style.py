@@ -126,11 +126,6 @@ def mark_kind(figure: "Figure", kind: RecordingKind) -> None:
     figure.text(0.972, 1.0 - 0.12 * inch, kind, ha="right", va="top", color=GREY, fontsize=9, style="italic")
 
 
-def label_lines(axes: "Axes") -> None:
-    """Name the lines of an axes above it, out of the way of the data."""
-    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, borderaxespad=0.1, handlelength=1.6)
-
-
 @dataclass(frozen=True, slots=True)
 class Margins:
     """Inches around the panels, between rows and between columns, and from a panel to the name of its value axis."""

@@ -102,13 +102,10 @@ def is_at_limit(values: Floats, plateau: Plateau) -> bool:
     before = min(plateau.first, _BEFORE)
     steps = np.abs(values[before:] - values[:-before]) if before else np.zeros(1)
     runs_into = float(steps[plateau.first - before]) > _ABRUPT_FRACTION * float(steps.max())
-    return is_noisy(values[values != plateau.value]) or runs_into
-
-
-def is_noisy(values: Floats) -> bool:
-    """Return whether the values go up and down from sample to sample, as no smooth curve does."""
-    ways = np.sign(np.diff(values))
-    return ways.size > 1 and float((ways[1:] * ways[:-1] < 0.0).mean()) > _NOISY_FRACTION
+    # Off the plateau, noise goes up and down from sample to sample, as no smooth curve does.
+    ways = np.sign(np.diff(values[values != plateau.value]))
+    is_noisy = ways.size > 1 and float((ways[1:] * ways[:-1] < 0.0).mean()) > _NOISY_FRACTION
+    return is_noisy or runs_into
 
 
 def scatters(values: Floats) -> bool:

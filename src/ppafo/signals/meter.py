@@ -111,16 +111,6 @@ def advance_course(course: Course, sample: Sample) -> Course:
     )
 
 
-def ends_before_hold(course: Course, sample: Sample) -> bool:
-    """True where the reference did not rest yet at the sample before this one."""
-    return course.hold_start >= sample.number
-
-
-def starts_hold(course: Course, sample: Sample) -> bool:
-    """True at the first sample of the hold."""
-    return course.hold_start == sample.number
-
-
 @dataclass(frozen=True, slots=True)
 class MeterKind:
     """Something worked out from samples: ``state`` is a NamedTuple class of floats, so are its nested ones.

@@ -197,7 +197,16 @@ class Recording:
         if not self.label or not self.label.isprintable():
             raise DataError(f"the label of a recording is one line of text, not {self.label!r}")
         recording_kind(self.kind)
-        _check_time(self)
+        if self.time.size == 0:
+            raise DataError(f"{self.label}: has no samples")
+        _check_finite(self, "time", self.time)
+        stalled = np.flatnonzero(self.time[1:] <= self.time[:-1])
+        if stalled.size:
+            index = int(stalled[0]) + 1
+            raise DataError(
+                f"{self.label}: time must increase from sample to sample, but {self.time[index]:g} s (sample "
+                f"{index + 1}) follows {self.time[index - 1]:g} s"
+            )
         for name in self.channels:
             _check_channel(self, name)
 
@@ -308,20 +317,6 @@ def between_samples(recording: Recording, name: str, times: Floats, start: float
         # The last sample at or before each time: a command holds from the instant at which it was given.
         return values[np.maximum(np.searchsorted(own_times, times, side="right") - 1, 0)]
     return np.interp(times, own_times, values)
-
-
-def _check_time(recording: Recording) -> None:
-    time = recording.time
-    if time.size == 0:
-        raise DataError(f"{recording.label}: has no samples")
-    _check_finite(recording, "time", time)
-    stalled = np.flatnonzero(time[1:] <= time[:-1])
-    if stalled.size:
-        index = int(stalled[0]) + 1
-        raise DataError(
-            f"{recording.label}: time must increase from sample to sample, but {time[index]:g} s (sample {index + 1}) "
-            f"follows {time[index - 1]:g} s"
-        )
 
 
 def _check_channel(recording: Recording, name: str) -> None:

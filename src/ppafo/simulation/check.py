@@ -9,7 +9,6 @@ numerically sensitive. They hold for one run among many, and a check says so.
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -36,8 +35,6 @@ ALLOWED_CHANGE = 1.0e-3
 """Largest change of a metric that counts as none, as a fraction of its value or of the range of its quantity."""
 
 FINER, MOVED_START, MOVED_MEASUREMENT = "finer steps", "start moved", "measurement moved"
-Shown = Callable[[float, str], tuple[float, str]]
-"""A value in SI units and its unit, as people are shown them."""
 _MOVES = frozenset({MOVED_START, MOVED_MEASUREMENT})
 
 DRAWS = 4
@@ -155,11 +152,18 @@ class Check:
         from ppafo.report.writing import align_columns
 
         names = list(self.metrics[0].changes) if self.metrics else []
-        above = partial(metric_level, atmosphere=self.atmosphere)
-        rows = [_cells(row, names, above, metric_change) for row in self.metrics]
-        rows += [_cells(row, names, metric_change, metric_change) for row in self.courses]
+        shown = [(row, metric_level(row.value, row.unit, self.atmosphere)) for row in self.metrics]
+        # The value of a course is a range, which does not count from the atmosphere.
+        shown += [(row, metric_change(row.value, row.unit)) for row in self.courses]
+        rows = [["", "value", *names, ""]]
+        for row, (value, unit) in shown:
+            changes = [
+                f"{metric_change(row.changes[name], row.unit)[0]:+.1e}" if row.changes[name] else "0" for name in names
+            ]
+            verdict = "" if row.is_determined else "sensitive"
+            rows.append([row.name, f"{value:.4g} {unit}".rstrip(), *changes, verdict])
         head = f"Check of '{self.scenario}': what changes in runs that should be the same"
-        return "\n".join([head, *align_columns([["", "value", *names, ""], *rows]), "", self.sentence])
+        return "\n".join([head, *align_columns(rows), "", self.sentence])
 
     def document(self) -> dict[str, Any]:
         """Return the check as data that JSON can hold, in SI units."""
@@ -170,13 +174,6 @@ class Check:
             for group, found in rows.items()
         }
         return {"is_determined": self.is_determined, "sentence": self.sentence, **document, **judged}
-
-
-def _cells(row: NumberCheck, names: list[str], level: Shown, change: Shown) -> list[str]:
-    """The row of a number: its ``level``, each ``change`` of it, and what they come to."""
-    value, unit = level(row.value, row.unit)
-    changes = [f"{change(row.changes[name], row.unit)[0]:+.1e}" if row.changes[name] else "0" for name in names]
-    return [row.name, f"{value:.4g} {unit}".rstrip(), *changes, "" if row.is_determined else "sensitive"]
 
 
 class Ran(Protocol):
@@ -201,11 +198,6 @@ class Ran(Protocol):
 
 Again = Callable[[Sequence[Run]], Sequence[Ran]]
 """What runs other plans of the same scenario."""
-
-
-def unchanged(run: Run) -> Run:
-    """Return a run as it is planned."""
-    return run
 
 
 def finer(run: Run) -> Run:

@@ -11,8 +11,10 @@ from ppafo.simulation.declaration import PERIOD, RATE, RUN, Reading, quantity_te
 
 MAXIMUM_STEPS = 1.0e8
 MAXIMUM_OUTPUTS = 5.0e6
+# What is measured during a delay is stored, for each run of an ensemble.
 MAXIMUM_STEPS_OF_DELAY = 1.0e5
 
+# Up to this fraction times count as equal: decimal ones are seldom whole multiples of each other in binary.
 _RELATIVE = 1.0e-9
 _DURATION, _STEP, _OUTPUT = RUN
 _LONGEST_STEP = 1.0e-3
@@ -43,11 +45,31 @@ def read_clock(reading: Reading) -> Clock:
         sampling, period = _PERIOD_PATH, reading.number(_PERIOD_PATH, PERIOD)
     else:
         raise ScenarioError(f"{reading.file}: '{_RATE_PATH}' is missing: give for example rate = '1 kHz', or a period")
-    step = _read_step(reading, duration, sampling, period)
-    output = _read_output(reading, duration, step) or output_unless_given(duration, period, step)
-    clock = Clock(duration, dividing_step(period, step), output, period)
-    _check_size(reading, clock)
-    return clock
+    has_output = value_at(reading.document, _OUTPUT_PATH) is not None
+    if value_at(reading.document, _STEP_PATH) is not None:
+        step = reading.number(_STEP_PATH, _STEP)
+        _not_above(reading, _STEP_PATH, step, sampling, period)
+        _not_above(reading, _STEP_PATH, step, _DURATION_PATH, duration)
+    elif has_output:
+        step = step_with_output(duration, period, reading.number(_OUTPUT_PATH, _OUTPUT))
+    else:
+        step = step_unless_given(duration, period)
+
+    output = _read_output(reading, duration, step) if has_output else output_unless_given(duration, period, step)
+    used = dividing_step(period, step)
+    if duration / used > MAXIMUM_STEPS:
+        raise reading.refusal(
+            _DURATION_PATH,
+            f"with a step of {quantity_text(used, 's')} the run has {duration / used:.3g} steps, at most "
+            f"{MAXIMUM_STEPS:.0e} are allowed: shorten the run or take a larger {_STEP_PATH}",
+        )
+    if duration / output > MAXIMUM_OUTPUTS:
+        raise reading.refusal(
+            _DURATION_PATH,
+            f"recorded every {quantity_text(output, 's')} the run has {duration / output:.3g} samples, at most "
+            f"{MAXIMUM_OUTPUTS:.0e} are allowed: take a larger {_OUTPUT_PATH}",
+        )
+    return Clock(duration, used, output, period)
 
 
 def links_of_times(document: Mapping[str, Any]) -> Graph:
@@ -96,37 +118,8 @@ def nearest_whole(number: Number) -> Number:
     return found
 
 
-def _check_size(reading: Reading, clock: Clock) -> None:
-    duration, used, output = clock.duration, clock.step, clock.output_interval
-    if duration / used > MAXIMUM_STEPS:
-        raise reading.refusal(
-            _DURATION_PATH,
-            f"with a step of {quantity_text(used, 's')} the run has {duration / used:.3g} steps, at most "
-            f"{MAXIMUM_STEPS:.0e} are allowed: shorten the run or take a larger {_STEP_PATH}",
-        )
-    if duration / output > MAXIMUM_OUTPUTS:
-        raise reading.refusal(
-            _DURATION_PATH,
-            f"recorded every {quantity_text(output, 's')} the run has {duration / output:.3g} samples, at most "
-            f"{MAXIMUM_OUTPUTS:.0e} are allowed: take a larger {_OUTPUT_PATH}",
-        )
-
-
-def _read_step(reading: Reading, duration: float, sampling: str, period: float) -> float:
-    if value_at(reading.document, _STEP_PATH) is None:
-        if value_at(reading.document, _OUTPUT_PATH) is None:
-            return step_unless_given(duration, period)
-        return step_with_output(duration, period, reading.number(_OUTPUT_PATH, _OUTPUT))
-    step = reading.number(_STEP_PATH, _STEP)
-    _not_above(reading, _STEP_PATH, step, sampling, period)
-    _not_above(reading, _STEP_PATH, step, _DURATION_PATH, duration)
-    return step
-
-
-def _read_output(reading: Reading, duration: float, step: float) -> float | None:
-    """Return the time between two recorded samples, None where every step is to be recorded."""
-    if value_at(reading.document, _OUTPUT_PATH) is None:
-        return None
+def _read_output(reading: Reading, duration: float, step: float) -> float:
+    """Return the time between two recorded samples: no less than a step, and a whole fraction of the duration."""
     output = reading.number(_OUTPUT_PATH, _OUTPUT)
     if output < step * (1.0 - _RELATIVE):
         raise reading.refusal(

@@ -42,6 +42,7 @@ PLAIN = ("", "1")
 FREE = quantities_of(FreeMotion)
 ANGLE = FREE[0]
 LOCKED_ANGLE = "motion.angle"
+# Without the external torque: with a leg it follows from equation (11).
 LEG = (*FREE[:2], *quantities_of(Leg))
 FOOT = {item.name: item for item in quantities_of(Leg)}
 SHANK_LEVEL = Quantity("level", "rad", "", None, -10.0, 10.0)
@@ -124,7 +125,13 @@ def controller_settings(kind: str) -> tuple[Quantity, ...]:
 
 def profile_settings(kind: str, prescribed: Quantity) -> tuple[Quantity, ...]:
     """Return the settings of a profile; a level, which has no unit of its own, gets the unit of what is prescribed."""
-    return tuple(_level(item, prescribed) for item in PROFILES[kind].quantities) if kind in PROFILES else ()
+    found = []
+    for item in PROFILES[kind].quantities if kind in PROFILES else ():
+        lowest, highest = max(item.minimum, prescribed.minimum), min(item.maximum, prescribed.maximum)
+        # A level is a torque in a reference and an angle in a motion, so that it has no unit of its own.
+        is_level = not item.unit
+        found.append(replace(item, unit=prescribed.unit, minimum=lowest, maximum=highest) if is_level else item)
+    return tuple(found)
 
 
 def gas_settings(kind: str) -> tuple[Quantity, ...]:
@@ -207,6 +214,7 @@ def find_kinds(document: Mapping[str, Any], file: str) -> None:
         said = no_arithmetic(law, old)
         raise ScenarioError(f"{file}: {ARITHMETIC} = {quote(old)}: {said}")
     kind = kind_at(document, "motion")
+    # A kind that is missing is refused by the layout, which says what it may be.
     with refused_as(ScenarioError, f"{file}: motion.kind", KindError):
         is_known = not kind or kind in MOTIONS
     if not is_known:
@@ -216,6 +224,7 @@ def find_kinds(document: Mapping[str, Any], file: str) -> None:
     sections: dict[str, Kinds[Any]] = {"controller": CONTROLLERS, "reference": PROFILES}
     motion = section_of(document)
     path = profile_path(motion)
+    # A kind of the table's own, such as the gait of a shank, is no profile.
     if motion is not None and motion.profile is not None and kind_at(document, path) not in motion.profile.own:
         sections[path] = PROFILES
     for section, kinds in sections.items():
@@ -250,6 +259,7 @@ def check_motion_kind(kind: object, place: str) -> None:
 def kind_at(document: Mapping[str, Any], section: str) -> str:
     """Return the kind that a section names, an empty text where it does not."""
     kind = value_at(document, f"{section}.kind")
+    # Anything but a text is refused by the layout, with its place.
     return kind if isinstance(kind, str) else ""
 
 
@@ -259,17 +269,6 @@ def value_at(document: Mapping[str, Any], path: str) -> Any:
     for part in path.split("."):
         node = node.get(part) if isinstance(node, Mapping) else None
     return node
-
-
-def _level(quantity: Quantity, prescribed: Quantity) -> Quantity:
-    if quantity.unit:
-        return quantity
-    return replace(
-        quantity,
-        unit=prescribed.unit,
-        minimum=max(quantity.minimum, prescribed.minimum),
-        maximum=min(quantity.maximum, prescribed.maximum),
-    )
 
 
 @functools.cache
@@ -334,7 +333,18 @@ class Reading:
             if quantity.default is None:
                 raise ScenarioError(f"{self.file}: '{path}' is missing: {quantity.summary or quantity.name}")
             return quantity.default
-        result = self._in_si(path, value, quantity, atmosphere)
+        # True and false are whole numbers to Python.
+        if isinstance(value, bool) or not isinstance(value, str | int | float):
+            raise self.refusal(path, f"must be {_form(quantity, 1.0)}")
+        try:
+            result = parse_quantity(value, quantity.unit, atmosphere) if isinstance(value, str) else float(value)
+        # A whole number of a file may be larger than any float.
+        except (UnitError, OverflowError) as error:
+            raise self.refusal(path, str(error)) from error
+        if not isinstance(value, str) and not math.isfinite(result):
+            raise self.refusal(path, "is not a finite number")
+        if not isinstance(value, str) and quantity.unit not in PLAIN:
+            raise self.refusal(path, f"a number without a unit; must be {_form(quantity, result)}")
         if not is_within(result, quantity):
             raise self.refusal(path, range_rule(quantity, limits(quantity, atmosphere)))
         return result
@@ -343,26 +353,12 @@ class Reading:
         """Return all values of a section by name, in SI."""
         return {item.name: self.number(f"{section}.{item.name}", item) for item in quantities}
 
-    def _in_si(self, path: str, value: object, quantity: Quantity, atmosphere: float) -> float:
-        if isinstance(value, bool) or not isinstance(value, str | int | float):
-            raise self.refusal(path, f"must be {_form(quantity, 1.0)}")
-        try:
-            if isinstance(value, str):
-                return parse_quantity(value, quantity.unit, atmosphere)
-            number = float(value)
-        except (UnitError, OverflowError) as error:
-            raise self.refusal(path, str(error)) from error
-        if not math.isfinite(number):
-            raise self.refusal(path, "is not a finite number")
-        if quantity.unit not in PLAIN:
-            raise self.refusal(path, f"a number without a unit; must be {_form(quantity, number)}")
-        return number
-
 
 def quantity_text(value: float, si_unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> str:
     """Return an SI value in the unit in which people write it: degrees, psi; rounding errors are left out."""
     unit = WRITTEN_UNITS.get(si_unit, "" if si_unit in PLAIN else si_unit)
     number = from_si(value, unit, si_unit, atmosphere)
+    # A number so small that nine places would show nothing of it stays as it is.
     return format_quantity(round(number, 9) if abs(number) > _ROUND else number, unit)
 
 
@@ -384,6 +380,7 @@ def limits(quantity: Quantity, atmosphere: float) -> str:
 
     ``atmosphere`` [Pa absolute] is what gauge pressures are measured from.
     """
+    # The limits of a pressure are absolute; in gauge they would move with the atmosphere.
     unit = WRITTEN_UNITS.get(quantity.unit, quantity.unit) if quantity.unit != "Pa_a" else "Pa_a"
     unit = "" if unit in PLAIN else unit
     lower, upper = (

@@ -1,7 +1,7 @@
 """A foot on a shank that is led, without ground: what it adds to the plan of a vane and to what a run records."""
 
 from collections.abc import Mapping
-from typing import Any
+from functools import partial
 
 import numpy as np
 
@@ -26,21 +26,23 @@ from ppafo.simulation.vane_recording import Measured, friction_sizes, measured
 def plan_leg(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
     """Return the run of a vane that moves the foot of a leg, and what may be wrong with it."""
     leg = _leg_of(scenario)
+    # Curves were made when the file was read; these two of their numbers may have been changed since, or vary.
+    if leg.curves is None:
+        shank = profile_parameters(leg.shank)
+    else:
+        shank = leg.curves._replace(start=leg.shank.start, toe_lever=leg.toe_lever)
 
     def put_on(plant: PlantParameters) -> tuple[PlantParameters, LedLeg]:
         foot = leg.foot_mass, leg.foot_mass_centre, leg.foot_inertia
         load = foot_load(plant.inertia, plant.gravity_torque, *foot, leg.shank_length)
-        return with_load(plant, load), LedLeg(load, shank_parameters(leg))
+        return with_load(plant, load), LedLeg(load, shank)
 
     return plan_vane(scenario, CarriedLeg(shank_kind(leg), put_on))
 
 
 def measured_leg(scenario: Scenario, run: Run, times: Floats, rows: Mapping[str, Floats]) -> Measured:
     """Return recording and metrics of a vane that moves the foot of a leg."""
-
-    def external_torque(torque: Floats) -> Floats:
-        return _torque_on_leg(_leg_of(scenario), run, times, rows, torque)
-
+    external_torque = partial(_torque_on_leg, _leg_of(scenario), run, times, rows)
     return measured(scenario, run, times, rows, external_torque, _leg_channels(run, times, rows["state.angle"]))
 
 
@@ -53,13 +55,6 @@ def _leg_of(scenario: Scenario) -> Leg:
 def shank_kind(leg: Leg) -> ProfileKind:
     """What leads the shank of a leg."""
     return PROFILES[leg.shank.kind] if leg.curves is None else GAIT_SHANK
-
-
-def shank_parameters(leg: Leg) -> Any:
-    """Parameters of what leads the shank of a leg; its settings may be arrays (runs,)."""
-    if leg.curves is None:
-        return profile_parameters(leg.shank)
-    return leg.curves._replace(start=leg.shank.start, toe_lever=leg.toe_lever)
 
 
 def foot_load(
@@ -110,6 +105,7 @@ def _torque_on_leg(leg: Leg, run: Run, times: Floats, rows: Mapping[str, Floats]
     """T_ex [N m] by the second row of equation (11): what the foot needs beside T_2. A blow at a stop is not in it."""
     assert run.leg is not None, "the run has the leg of its scenario"
     angle, rate, plant = rows["state.angle"], rows["state.angular_velocity"], run.plant
+    # The foot alone: inertia and weight of vane and foot plate are on the other side of T_ex.
     foot = foot_load(0.0, 0.0, leg.foot_mass, leg.foot_mass_centre, leg.foot_inertia, leg.shank_length)
     kind = shank_kind(leg)
     now = shank_over_samples(kind, run.leg.shank, times)

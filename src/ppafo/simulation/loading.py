@@ -11,13 +11,11 @@ from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
-from pydantic_core import ErrorDetails
 
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.documents.models import all_problems, is_gap
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, ScenarioError, nearest_name, one_line
-from ppafo.model.declaration import Quantity
 from ppafo.parameters import ParameterSet, build_device, list_sets, load_parameter_set
 from ppafo.parameters import apply_overrides as apply_device_overrides
 from ppafo.parameters.declaration import RELIEVING_PATH
@@ -50,7 +48,7 @@ from ppafo.simulation.declaration import (
     value_at,
 )
 from ppafo.simulation.motion_kind import MOTIONS
-from ppafo.simulation.overrides import OverriddenDocument, apply_overrides, device_paths, scenario_paths
+from ppafo.simulation.overrides import OverriddenDocument, apply_overrides, device_paths
 from ppafo.simulation.profiles import read_profile
 from ppafo.simulation.scenario import (
     Assumption,
@@ -110,18 +108,21 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
     device = read_device(reading, hardware)
     clock = read_clock(reading)
     law = kind_at(document, "controller")
-    motion = MOTIONS[kind_at(document, "motion")].section
-    assert motion is not None, "walks are built from another layout"
+    section = MOTIONS[kind_at(document, "motion")].section
+    assert section is not None, "walks are built from another layout"
     before = Reading(request.file, request.content)
+    run = RunSettings(
+        clock.duration, clock.step, clock.output_interval, tolerance=reading.number("run.tolerance", ACCURACY)
+    )
+    motion = section.read(reading, device, clock.duration, clock.step, request.folder)
+    initial, links = _initial(reading, device.supply)
     scenario = Scenario(
         name=document["name"],
         description=document.get("description", ""),
         device=device,
-        run=RunSettings(
-            clock.duration, clock.step, clock.output_interval, tolerance=reading.number("run.tolerance", ACCURACY)
-        ),
-        motion=motion.read(reading, device, clock.duration, clock.step, request.folder),
-        initial=Initial(*(_initial_pressure(reading, item, device.supply) for item in INITIAL)),
+        run=run,
+        motion=motion,
+        initial=initial,
         controller=Control(law, reading.section("controller", controller_settings(law)), clock.period),
         reference=_reference(reading),
         sensors=_sensors(reading, clock),
@@ -129,7 +130,7 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
         origin=Origin(request.path, document["device"]["set"], hardware.valve, request.overrides, request.content),
         gas_model=read_gas_model(reading),
         supply_line=read_supply_line(reading, device),
-        links=_links_at_start(reading),
+        links=links,
     )
     # Refuse what only a vane has.
     try:
@@ -185,35 +186,29 @@ def _of_device(reading: Reading, error: ParameterError) -> ParameterError:
     return ParameterError(f"{reading.file}: [device]: {one_line(error)}")
 
 
-def _initial_pressure(reading: Reading, quantity: Quantity, supply: Supply) -> float:
-    """Return the pressure [Pa absolute] of a chamber at the start, from a number or a word."""
-    path = f"initial.{quantity.name}"
-    value = value_at(reading.document, path)
-    word = AT_REST if value is None else value
-    if isinstance(word, str) and word.strip() in PRESSURE_WORDS:
-        return float(_link_of_word(word).number(lambda source: getattr(supply, source.removeprefix("supply."))))
-    if isinstance(word, str) and not any(character.isdigit() for character in word):
-        words = ", ".join(PRESSURE_WORDS)
-        hint = nearest_name(word, PRESSURE_WORDS)
-        raise reading.refusal(path, f"is neither a pressure such as '50 psi_g' nor one of {words}{hint}")
-    return reading.number(path, quantity, supply.atmospheric_pressure)
+def _initial(reading: Reading, supply: Supply) -> tuple[Initial, Graph]:
+    """Return the pressures [Pa absolute] of the chambers at the start, and which pressures of the supply they follow.
 
-
-def _link_of_word(word: str) -> Follows:
-    """Return which pressure of the supply a word such as ``atmosphere`` stands for."""
-    return follows(f"supply.{PRESSURE_WORDS[word.strip()]}")
-
-
-def _links_at_start(reading: Reading) -> Graph:
-    """Return which pressures of the supply those at the start follow: those of a word, or in gauge."""
-    found = {}
-    for item in INITIAL:
-        path = f"initial.{item.name}"
+    Each is a number or a word; a word follows its pressure, a number in gauge the atmosphere.
+    """
+    pressures: list[float] = []
+    found: dict[str, tuple[Follows, ...]] = {}
+    for quantity in INITIAL:
+        path = f"initial.{quantity.name}"
         value = value_at(reading.document, path)
-        word = AT_REST if value is None else str(value)
-        is_word = word.strip() in PRESSURE_WORDS
-        found[path] = (_link_of_word(word),) if is_word else gauge_link(path, *split_quantity(word))
-    return {path: links for path, links in found.items() if links}
+        word = AT_REST if value is None else value
+        if isinstance(word, str) and word.strip() in PRESSURE_WORDS:
+            name = PRESSURE_WORDS[word.strip()]
+            pressures.append(float(getattr(supply, name)))
+            found[path] = (follows(f"supply.{name}"),)
+            continue
+        if isinstance(word, str) and not any(character.isdigit() for character in word):
+            words = ", ".join(PRESSURE_WORDS)
+            hint = nearest_name(word, PRESSURE_WORDS)
+            raise reading.refusal(path, f"is neither a pressure such as '50 psi_g' nor one of {words}{hint}")
+        pressures.append(reading.number(path, quantity, supply.atmospheric_pressure))
+        found[path] = gauge_link(path, *split_quantity(str(word)))
+    return Initial(*pressures), {path: links for path, links in found.items() if links}
 
 
 def _reference(reading: Reading) -> ProfileChoice:
@@ -252,7 +247,7 @@ def read_assumptions(
     for path, note in notes.items():
         value, earlier = _value(reading, hardware, path), _value(before, hardware, path)
         if value is None and earlier is None:
-            hint = nearest_name(path, [*scenario_paths(reading.document), *device_paths()])
+            hint = nearest_name(path, [*OF_A_VANE.paths(reading.document), *device_paths()])
             raise ScenarioError(
                 f"{reading.file}: [{_SECTION}] names '{one_line(path)}', which has no value in this scenario{hint}"
             )
@@ -266,25 +261,19 @@ def read_assumptions(
 def _value(reading: Reading, hardware: Hardware, path: str) -> str | None:
     """Return the value at a path as written in the file or, where it has none, the default; None without either."""
     given = value_at(reading.document, path)
-    if path in scenario_paths(reading.document) and given is not None:
+    if given is not None and path in OF_A_VANE.paths(reading.document):
         return str(given)
     quantity = quantities(reading.document).get(path)
-    return _device_value(hardware, path) if quantity is None else _default(quantity)
-
-
-def _device_value(hardware: Hardware, path: str) -> str | None:
-    full = f"valves.{hardware.valve}.{path.removeprefix('valve.')}" if path.startswith("valve.") else path
-    entry = hardware.parameter_set.entries().get(full)
-    quantity = hardware.parameter_set.declarations().get(full)
-    if entry is not None:
-        return entry_text(entry)
-    if path == RELIEVING_PATH:
-        return "false"
-    return None if quantity is None else _default(quantity)
-
-
-def _default(quantity: Quantity) -> str | None:
-    return None if quantity.default is None else quantity_text(quantity.default, quantity.unit)
+    if quantity is None:
+        # What is not of the scenario is of its device, where the valve has a name.
+        full = f"valves.{hardware.valve}.{path.removeprefix('valve.')}" if path.startswith("valve.") else path
+        entry = hardware.parameter_set.entries().get(full)
+        if entry is not None:
+            return entry_text(entry)
+        if path == RELIEVING_PATH:
+            return "false"
+        quantity = hardware.parameter_set.declarations().get(full)
+    return None if quantity is None or quantity.default is None else quantity_text(quantity.default, quantity.unit)
 
 
 def read_gas_model(reading: Reading) -> GasModel | None:
@@ -395,11 +384,13 @@ def request_of_dict(content: Mapping[str, Any], overrides: Iterable[str]) -> Sce
     name = content.get("name")
     file = f"scenario '{label(name)}'" if isinstance(name, str) else "scenario"
     FILE.check_depth(content, file)
+    # A copy: the scenario is loaded anew from it, whatever becomes of the caller's dictionaries.
     return ScenarioRequest(file, None, Path(), copy.deepcopy(dict(content)), tuple(overrides))
 
 
 def scenario_of(request: ScenarioRequest, layout: Layout) -> Scenario:
     """Check the keys of the file itself, put the overrides in, and then require all that is needed."""
+    # A set in the place of a scenario would else be refused key by key.
     if "default_valve" in request.content and not {"run", "controller"} & request.content.keys():
         raise ScenarioError(
             f"{request.file}: is a parameter set, not a scenario; "
@@ -410,12 +401,11 @@ def scenario_of(request: ScenarioRequest, layout: Layout) -> Scenario:
     declared.find_kinds(request.content, request.file)
     # What is wrong in the file itself is said as such; what it lacks an override may give.
     if request.overrides:
-        wrong = [item for item in _problems(request.content, layout) if not is_gap(item)]
-        _refuse(wrong, request, layout, request.content)
+        _check_layout(request.content, request.file, layout, may_have_gaps=True)
     changed = apply_overrides(request.content, request.overrides, request.file, declared)
     # Overrides may name kinds that the file does not.
     declared.find_kinds(changed.document, request.file)
-    _refuse(_problems(changed.document, layout), request, layout, changed.document)
+    _check_layout(changed.document, request.file, layout)
     paths = [f"{section}.{name}" for section in FORMS for name in value_at(changed.document, section) or ()]
     pair = in_two_forms(paths)
     if pair is not None:
@@ -423,19 +413,16 @@ def scenario_of(request: ScenarioRequest, layout: Layout) -> Scenario:
     return layout.build(request, changed)
 
 
-def _problems(document: dict[str, Any], layout: Layout) -> list[ErrorDetails]:
-    """Return unknown keys, unknown kinds and gaps."""
+def _check_layout(document: dict[str, Any], file: str, layout: Layout, may_have_gaps: bool = False) -> None:
+    """Raise ScenarioError for unknown keys and kinds, and for gaps unless there may be some."""
+    # The whole layout has every kind of everything: it is made for a message alone.
     for model in (layout.model, layout.whole):
         try:
             model(document).model_validate(document)
         except ValidationError as error:
             found = error.errors(include_url=False)
         else:
-            return []
-    return found
-
-
-def _refuse(problems: list[ErrorDetails], request: ScenarioRequest, layout: Layout, document: dict[str, Any]) -> None:
-    # The whole layout has every kind of everything: it is made for a message alone.
+            return
+    problems = [item for item in found if not (may_have_gaps and is_gap(item))]
     if problems:
-        raise ScenarioError(f"{request.file}: {all_problems(problems, layout.whole(document))}")
+        raise ScenarioError(f"{file}: {all_problems(problems, layout.whole(document))}")

@@ -33,7 +33,7 @@ from ppafo.simulation.declaration import (
     value_at,
 )
 from ppafo.simulation.motion_kind import MotionKind, MotionSection, ProfileTable
-from ppafo.simulation.profiles import TOLERANCE, profile_problem, range_text, read_profile, stops_of
+from ppafo.simulation.profiles import TOLERANCE, profile_problem, range_text, read_profile
 from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion, ProfileChoice, Scenario
 from ppafo.simulation.schema import profile_table, shank_table
 
@@ -77,11 +77,9 @@ _OF_ALL_VANES: dict[str, Any] = {
 
 def _read_angle(reading: Reading, device: Device) -> float:
     """Return the angle [rad] of the vane; ScenarioError where it is not between the stops of the device."""
-    angle = reading.number(LOCKED_ANGLE, ANGLE)
-    if not (device.actuator.angle_min - TOLERANCE <= angle <= device.actuator.angle_max + TOLERANCE):
-        raise reading.refusal(
-            LOCKED_ANGLE, f"must be between the stops of {device.name}, {range_text(stops_of(device))}"
-        )
+    angle, stops = reading.number(LOCKED_ANGLE, ANGLE), (device.actuator.angle_min, device.actuator.angle_max)
+    if not stops[0] - TOLERANCE <= angle <= stops[1] + TOLERANCE:
+        raise reading.refusal(LOCKED_ANGLE, f"must be between the stops of {device.name}, {range_text(stops)}")
     return angle
 
 
@@ -126,7 +124,8 @@ LOCKED_MOTION = MotionKind(
 
 def _read_prescribed(reading: Reading, device: Device, duration: float, step: float, _folder: Path) -> PrescribedMotion:
     profile = read_profile(reading, _PROFILE, ANGLE_LEVEL)
-    problem = profile_problem(device.name, stops_of(device), profile, duration, step)
+    stops = device.actuator.angle_min, device.actuator.angle_max
+    problem = profile_problem(device.name, stops, profile, duration, step)
     if problem:
         raise ScenarioError(f"{reading.file}: {problem}")
     return PrescribedMotion(profile)

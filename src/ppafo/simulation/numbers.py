@@ -26,7 +26,7 @@ TIMES = ("run.duration", "run.step", "run.output_interval", "controller.rate", "
 
 _DEVICE_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow")
 _OF_DEVICE = (*_DEVICE_SECTIONS, "valve", EFFECT_SETTINGS)
-_ORIFICES = {"actuator.leak": ("device", "actuator", "leak"), "valve": ("device", "valve", "orifice")}
+_ORIFICES = {"valve": ("device", "valve", "orifice"), "actuator.leak": ("device", "actuator", "leak")}
 
 _TEXTS = (
     *TEXTS,
@@ -194,12 +194,14 @@ def check_columns(base: Scenario, columns: Mapping[str, Any], gauge: Collection[
     """
     if base.controller.kind == PYTHON_CONTROLLER and base.controller.custom is None:
         raise ScenarioError(f"{base.name}: nothing controls the valve; give a controller (controlled_by)")
+    # Effects of other packages are known by their paths once they are loaded.
     find_effects(columns)
     declared = declared_numbers(base)
     values: dict[str, Floats] = {}
     for given, column in columns.items():
         path = chosen_path(given, base)
         _check_path(base, given, path, declared)
+        # valve.area and valves.NAME.area are one number of the chosen valve.
         if path in values:
             raise ScenarioError(f"{base.name}: '{given}' and '{path}' are the same value; give one of them")
         values[path] = np.ascontiguousarray(column, dtype=np.float64)
@@ -208,7 +210,16 @@ def check_columns(base: Scenario, columns: Mapping[str, Any], gauge: Collection[
         raise ScenarioError(
             f"{base.name}: an ensemble needs columns of one length, one value for each run, not {shapes or 'none'}"
         )
-    _check_together(base, values)
+    pair = in_two_forms(values)
+    if pair is not None:
+        raise ScenarioError(f"{base.name}: '{pair[0]}' and '{pair[1]}' vary: {either(pair[0])}")
+    for section in _ORIFICES:
+        form = [f"{section}.{name}" for name in other_form(base.device, section)]
+        missing = [path for path in form if path not in values]
+        if missing and len(missing) < len(form):
+            raise ScenarioError(
+                f"{base.name}: {section} is given in the other form; to vary {' or '.join(form)} give a column for both"
+            )
     every = moving_together(base, absolute(base, values, gauge))
     return Columns(base, every, {path: declared[path] for path in every}, frozenset(values))
 
@@ -231,30 +242,6 @@ def _check_path(base: Scenario, given: str, path: str, declared: Mapping[str, Qu
         )
     hint = nearest_name(path, declared) or f"; for example {', '.join(list(declared)[:6])}"
     raise ScenarioError(f"{base.name}: there is no number '{given}' that could vary{hint}")
-
-
-def _check_together(base: Scenario, values: Mapping[str, Floats]) -> None:
-    pair = in_two_forms(values)
-    if pair is not None:
-        raise ScenarioError(f"{base.name}: '{pair[0]}' and '{pair[1]}' vary: {either(pair[0])}")
-    for section in ("valve", "actuator.leak"):
-        form = [f"{section}.{name}" for name in other_form(base.device, section)]
-        missing = [path for path in form if path not in values]
-        if missing and len(missing) < len(form):
-            raise ScenarioError(
-                f"{base.name}: {section} is given in the other form; to vary {' or '.join(form)} give a column for both"
-            )
-
-
-def varied_scenario(columns: Columns, clock: Clock) -> Scenario:
-    """Return the scenario that represents all runs; numbers of ``clock`` may be arrays too."""
-    numbers = {path: column for path, column in columns.values.items() if path not in TIMES}
-    scenario = with_numbers(columns.base, numbers)
-    return replace(
-        scenario,
-        run=replace(scenario.run, duration=clock.duration, step=clock.step, output_interval=clock.output_interval),
-        controller=replace(scenario.controller, period=clock.period),
-    )
 
 
 TimeTexts = Mapping[str, Mapping[str, Any]]

@@ -66,6 +66,7 @@ def apply_overrides(
     known = declared.paths(changed)
     for path in sorted(own):
         if path not in known:
+            # Where a kind is unknown too, that is the mistake.
             declared.find_kinds(changed, file)
             if path == ARITHMETIC:
                 instead = no_arithmetic(kind_at(changed, "controller"), own[path].text)
@@ -172,11 +173,6 @@ def _with_one_path_each(document: Mapping[str, Any], file: str, declared: Declar
     return changed
 
 
-def scenario_paths(document: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return every path of the scenario that an override can set, for the kinds that the document names."""
-    return OF_A_VANE.paths(document)
-
-
 def device_paths() -> tuple[str, ...]:
     """Return every path of the device that an override can set, with ``valve`` for the one that is chosen."""
     sections = [path for path in device_quantities({}) if not path.startswith("reported.")]
@@ -214,15 +210,19 @@ def _set(document: dict[str, Any], path: str, text: str, file: str, declared: De
         after = _setting_names(document, section, declared)
         for lost in before - after - _OF_ANY_KIND.get(section, frozenset()):
             table.pop(lost, None)
+    # Area and conductance, rate and period: given in another form as well, a value would be there twice.
     for other in other_forms(path):
         table.pop(other.rpartition(".")[2], None)
-    if path != _SEED:
-        table[name] = _with_unit_of_gain(document, path, text, declared)
+    if path == _SEED:
+        try:
+            table[name] = int(number_text(text))
+        except ValueError as error:
+            raise ScenarioError(f"override '{path}={text}': must be a whole number") from error
         return
-    try:
-        table[name] = int(number_text(text))
-    except ValueError as error:
-        raise ScenarioError(f"override '{path}={text}': must be a whole number") from error
+    # Papers print gains on the torque without units, so one without gets its SI unit.
+    quantity = declared.quantities(document).get(path)
+    is_gain = quantity is not None and path.startswith("controller.") and "(N m" in quantity.unit
+    table[name] = f"{text} {quantity.unit}" if quantity is not None and is_gain and _NUMBER.fullmatch(text) else text
 
 
 def _setting_names(document: dict[str, Any], section: str, declared: Declared) -> frozenset[str]:
@@ -230,10 +230,3 @@ def _setting_names(document: dict[str, Any], section: str, declared: Declared) -
     prefix = f"{section}."
     paths = [path.removeprefix(prefix) for path in declared.paths(document) if path.startswith(prefix)]
     return frozenset(path.partition(".")[0] for path in paths) - {"kind"}
-
-
-def _with_unit_of_gain(document: dict[str, Any], path: str, text: str, declared: Declared) -> str:
-    """Return the text with the SI unit of a gain on the torque where it has none: papers print gains without units."""
-    quantity = declared.quantities(document).get(path)
-    is_gain = quantity is not None and path.startswith("controller.") and "(N m" in quantity.unit
-    return f"{text} {quantity.unit}" if quantity is not None and is_gain and _NUMBER.fullmatch(text) else text

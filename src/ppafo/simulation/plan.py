@@ -15,7 +15,7 @@ from ppafo.control.kind import ControllerKind, ProfileKind
 from ppafo.engine.components import GasScheme
 from ppafo.engine.program import NoParameters, Program
 from ppafo.engine.rows import rebuilt
-from ppafo.engine.run import Run, WornLeg
+from ppafo.engine.run import Lines, Run, WornLeg
 from ppafo.engine.scheme.actuators import volumes_of
 from ppafo.engine.scheme.isothermal_gas import ISOTHERMAL
 from ppafo.engine.scheme.pneumatics import KEPT_OF_PRESSURE, is_slow
@@ -69,8 +69,6 @@ MAXIMUM_STEPS = 1.0e9
 
 WHOLE = 1.0e-9
 """Relative difference up to which a number of steps is a whole one."""
-
-_ROUNDING = 1.0e-9
 
 
 def plan_run(scenario: Scenario) -> Run:
@@ -160,9 +158,10 @@ def compose_run(
     plant, leg = (plant, None) if components.leg is None else components.leg.put_on(plant)
     lines = None
     if components.supply_lines is not None:
-        from ppafo.simulation.supply_lines import initial_lines
+        # Most scenarios have constant supply pressures and load none of this.
+        from ppafo.simulation.supply_lines import lines_at_start
 
-        lines = initial_lines(plant, components.supply_lines)
+        lines = Lines(components.supply_lines, lines_at_start(plant, components.supply_lines))
     controller: Any = ()
     if components.controller is not None:
         law, given = components.controller, components.settings
@@ -181,7 +180,7 @@ def compose_run(
         valve_orifice=exact_orifice(components.device.valve.orifice, components.device),
         leak_orifice=exact_orifice(components.device.actuator.leak, components.device),
         initial=start(plant),
-        valve=valve_parameters(components.valve, settings),
+        valve=over_runs(lambda *values: components.valve.prepare(type(settings)(*values)), *settings),
         controller=controller,
         reference=profile_parameters(components.reference),
         path=() if components.path is None else profile_parameters(components.path),
@@ -263,9 +262,11 @@ def plan_vane(scenario: Scenario, leg: CarriedLeg | None = None) -> tuple[Run, t
     """The run of a scenario of a vane alone, with a leg or without, and what may be wrong with it."""
     device, motion, control = scenario.device, vane_motion(scenario), scenario.controller
     plant = plant_parameters(device, motion.outside_torque)
+    # The command of a Python object comes from outside the lanes.
     law = None if control.kind == PYTHON_CONTROLLER else CONTROLLERS[control.kind]
     numbers: Mapping[str, Any] = control.settings
     problems: tuple[Problem, ...] = ()
+    # A fixed-point controller has integers, which follow from its gains, its period and the range of its reference.
     if law is not None and law.plan is not None:
         bounds = profile_bounds(scenario.reference)
         numbers, problems = law.plan(numbers, control.period, plant.torque_constant, bounds)
@@ -277,11 +278,12 @@ def plan_vane(scenario: Scenario, leg: CarriedLeg | None = None) -> tuple[Run, t
         reference=scenario.reference,
         path=motion.profile,
         sensors=sensor_parameters(scenario),
-        has_ideal_sensors=has_ideal_sensors(scenario),
+        # A delay alone leaves the sensors ideal: the lanes then read an earlier state.
+        has_ideal_sensors=not any(first(flaw) for flaw in scenario.sensors.flaws[1:]),
         thermal=scenario.gas_model,
         supply_lines=scenario.supply_lines,
         signal_delay=scenario.sensors.delay,
-        sections=scenario.effect_sections,
+        sections={"sensors": scenario.sensors},
         leg=leg,
     )
     run = compose_run(
@@ -312,15 +314,6 @@ def relative_tolerance(tolerance: float) -> float:
     return tolerance / KEPT_OF_PRESSURE
 
 
-def valve_parameters(valve: ValveModel, settings: Any) -> Any:
-    """Parameters of a valve from its settings in SI units, a NamedTuple whose numbers may be arrays (runs,)."""
-
-    def prepare(*values: float) -> Any:
-        return valve.prepare(type(settings)(*values))
-
-    return over_runs(prepare, *settings)
-
-
 def too_many_steps(scenario: Scenario, step: float, step_count: int) -> Problem:
     """Runs that take more steps [s] than can be waited for."""
 
@@ -332,11 +325,6 @@ def too_many_steps(scenario: Scenario, step: float, step_count: int) -> Problem:
         )
 
     return step_count > MAXIMUM_STEPS, line
-
-
-def has_ideal_sensors(scenario: Scenario) -> bool:
-    """True where the controller sees what is there, without noise or rounding."""
-    return not any(first(flaw) for flaw in scenario.sensors.flaws[1:])
 
 
 def sensor_parameters(scenario: Scenario) -> SensorParameters:

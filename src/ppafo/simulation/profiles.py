@@ -1,6 +1,5 @@
 """Functions of time of a scenario: read from its file, as the engine takes them, and their values and bounds."""
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,6 @@ from ppafo.engine.over_samples import over_samples
 from ppafo.engine.rows import rebuilt
 from ppafo.model.columns import over_runs
 from ppafo.model.declaration import Quantity
-from ppafo.parameters.device import Device
 from ppafo.simulation.declaration import Reading, kind_at, profile_settings, quantity_text
 from ppafo.simulation.scenario import ProfileChoice
 
@@ -51,33 +49,24 @@ def profile_problem(
     device: str, stops: tuple[float, float], profile: ProfileChoice, duration: float, step: float
 ) -> str:
     """Return where a profile leaves the stops [rad] of a device, named by ``device``; an empty text if nowhere."""
-    for time, angle in _angles(profile, duration, step):
-        if not stops[0] - TOLERANCE <= angle <= stops[1] + TOLERANCE:
-            return (
-                f"[motion.profile] leaves the stops of {device}, {range_text(stops)}: it is at "
-                f"{quantity_text(angle, 'rad')} at {time:.6g} s"
-            )
-    return ""
-
-
-def _angles(profile: ProfileChoice, duration: float, step: float) -> Iterator[tuple[float, float]]:
-    """Yield times and angles [rad]: those that the engine asks for, and the crests between them."""
-    kind = PROFILES[profile.kind]
-    parameters = rebuilt(kind.parameters, [profile.settings[item.name] for item in kind.quantities])
+    kind, parameters = PROFILES[profile.kind], profile_parameters(profile)
+    # The times that the engine asks for, as far as they can be gone through one by one.
     count = max(1, min(MAXIMUM_CHECKED_TIMES, round(duration / step)))
     for number in range(count + 1):
         time = duration * number / count
         angle, rate, acceleration = kind.value(parameters, time)
-        yield time, angle
+        places = [(time, angle)]
         # Where a parabola through this time turns: a crest between two times must not escape the check.
         away = -rate / acceleration if acceleration else 0.0
         if 0.0 < away < min(duration / count, duration - time):
-            yield time + away, angle + 0.5 * rate * away
-
-
-def stops_of(device: Device) -> tuple[float, float]:
-    """Return both stops [rad] of a device, the lower one first."""
-    return device.actuator.angle_min, device.actuator.angle_max
+            places.append((time + away, angle + 0.5 * rate * away))
+        for moment, reached in places:
+            if not stops[0] - TOLERANCE <= reached <= stops[1] + TOLERANCE:
+                return (
+                    f"[motion.profile] leaves the stops of {device}, {range_text(stops)}: it is at "
+                    f"{quantity_text(reached, 'rad')} at {moment:.6g} s"
+                )
+    return ""
 
 
 def range_text(stops: tuple[float, float]) -> str:

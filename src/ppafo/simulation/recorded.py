@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ppafo.engine.lanes import StepInputs, prescribe_recorded_angle
+from ppafo.engine.lanes import RECORDED_ANGLE, StepInputs
 from ppafo.engine.run import Run
 from ppafo.errors import DataError
 from ppafo.parameters.device import VANE, Device, Orifice
@@ -98,18 +98,12 @@ def supply_paths(device: Device) -> tuple[str, ...]:
     return both if supply.has_one_pressure else both[:1]
 
 
-def step_times(run: Run) -> Floats:
-    """Return the time [s] at which each step of a run begins."""
-    return run.step * np.arange(run.step_count, dtype=np.float64)
-
-
 def step_inputs(inputs: RecordedInputs, device: Device, run: Run) -> StepInputs:
     """Return what a run follows at each of its steps; ``device`` says which regulators follow the supply.
 
     A run that follows the angle is one of ``with_prescribed_angle``.
     """
     command = _input_values(inputs, COMMAND, run) if inputs.has(COMMAND) else None
-    path = _path(inputs, device, run) if inputs.has(ANGLE) else {}
     # The parameters that follow a recording [SI], for every step.
     followed: dict[str, Floats] = {}
     if inputs.has(SUPPLY):
@@ -118,22 +112,22 @@ def step_inputs(inputs: RecordedInputs, device: Device, run: Run) -> StepInputs:
         followed["plant.dorsiflexion_pressure"] = _input_values(inputs, DORSIFLEXION_SUPPLY, run)
     if inputs.has(EXTERNAL_TORQUE):
         followed["plant.external_torque"] = _input_values(inputs, EXTERNAL_TORQUE, run)
-    return StepInputs(command, {**followed, **path})
+    if inputs.has(ANGLE):
+        # The straight piece of the angle that holds at each step; after the last sample the vane stands still.
+        time = inputs.recording.time - inputs.start
+        angles = between_stops(inputs.recording[ANGLE], device, inputs.recording.label)
+        rates = np.append(np.diff(angles) / np.diff(time), 0.0)
+        begins = run.step * np.arange(run.step_count, dtype=np.float64)
+        # By the middle of a step: rounding may put a sample a little behind the step that begins with it.
+        piece = np.maximum(np.searchsorted(time, begins + 0.5 * run.step, side="right") - 1, 0)
+        followed |= {"path.start": time[piece], "path.level": angles[piece], "path.rate": rates[piece]}
+    return StepInputs(command, followed)
 
 
 def with_prescribed_angle(run: Run, angle: float) -> Run:
     """Return the run with the vane on a recorded angle, which is ``angle`` [rad] at the start."""
-    return replace(run, program=prescribe_recorded_angle(run.program), path=(0.0, angle, 0.0), needs_parts=True)
-
-
-def _path(inputs: RecordedInputs, device: Device, run: Run) -> dict[str, Floats]:
-    """Return the straight piece of the angle that holds at each step; after the last sample the vane stands still."""
-    time = inputs.recording.time - inputs.start
-    angles = between_stops(inputs.recording[ANGLE], device, inputs.recording.label)
-    rates = np.append(np.diff(angles) / np.diff(time), 0.0)
-    # By the middle of a step: rounding may put a sample a little behind the step that begins with it.
-    piece = np.maximum(np.searchsorted(time, step_times(run) + 0.5 * run.step, side="right") - 1, 0)
-    return {"path.start": time[piece], "path.level": angles[piece], "path.rate": rates[piece]}
+    program = replace(run.program, angle=RECORDED_ANGLE)
+    return replace(run, program=program, path=(0.0, angle, 0.0), needs_parts=True)
 
 
 def between_stops(angles: Floats, device: Device, file: str) -> Floats:
@@ -158,7 +152,7 @@ def _input_values(inputs: RecordedInputs, name: str, run: Run) -> Floats:
     changes, a millisecond; a command over a step, as a valve answers within less.
     """
     if inputs.recording.is_held(name):
-        middle = step_times(run) + 0.5 * run.step
+        middle = run.step * np.arange(run.step_count, dtype=np.float64) + 0.5 * run.step
     else:
         together = 1 if name == COMMAND else max(1, min(run.steps_per_sample, round(LONGEST_STEP / run.step)))
         first = (np.arange(run.step_count) // together * together).astype(np.float64)

@@ -60,6 +60,7 @@ class SampledRun:
         clock = self._batch.clock
         done = self.taken * clock.steps_per_sample
         self._block.states[self._command_row] = command
+        # The last sample of a run may have fewer steps.
         self._block.advance(min(clock.steps_per_sample, clock.step_count - done))
         self.taken += 1
 
@@ -76,10 +77,20 @@ class SampledRun:
 def run_sampled(batch: Batch, controller: PythonController) -> BatchResult:
     """Run a batch of one with a Python controller; SimulationError where it returns no finite number."""
     run = SampledRun(batch)
+    # What an earlier run left behind in the object must not steer this one.
     controller.reset()
     for _ in range(run.samples):
         command = controller.update(run.time, run.requested, run.measurement())
-        run.go_on(_clip_command(command, controller, run.time, batch.program.walks))
+        # A comparison that was meant to be a command is a bool, which Python takes for a whole number.
+        is_number = isinstance(command, int | float | np.floating) and not isinstance(command, bool)
+        if not is_number or not math.isfinite(command):
+            raise SimulationError(
+                f"{type(controller).__name__}.update returned {command!r} at t = {run.time:.6g} s; it must return a "
+                f"finite number"
+            )
+        # Above what opens the valve fully there is one more command, of a walk: both chambers are vented.
+        is_vent = batch.program.walks and command > VENTS_ABOVE
+        run.go_on(VENT if is_vent else max(-1.0, min(1.0, float(command))))
     return run.result()
 
 
@@ -98,15 +109,6 @@ def _group(batch: Batch, name: str) -> Any:
     """The NamedTuple of a group of parameters of the one run, with floats."""
     values: Any = batch.parameters[:, 0].tolist()
     return group_of(name, batch.program.parameter_rows(), values)
-
-
-def _clip_command(command: object, controller: PythonController, time: float, walks: bool) -> float:
-    """The command within -1 to 1; in a walk also the one that vents both chambers."""
-    name = type(controller).__name__
-    # A comparison that was meant to be a command is a bool, which Python takes for a whole number.
-    if isinstance(command, bool) or not isinstance(command, int | float | np.floating) or not math.isfinite(command):
-        raise SimulationError(f"{name}.update returned {command!r} at t = {time:.6g} s; it must return a finite number")
-    return VENT if walks and command > VENTS_ABOVE else max(-1.0, min(1.0, float(command)))
 
 
 def _measurement_source(batch: Batch, block: LaneBlock) -> Callable[[int], Measurement]:

@@ -276,12 +276,6 @@ class Control:
         """Return a setting by its name."""
         return attribute_among(self, name, "settings")
 
-    @property
-    def label(self) -> str:
-        """The controller in a few words."""
-        name = self.kind if self.custom is None else f"{self.kind}, {type(self.custom).__name__}"
-        return f"{name}, every {self.period:g} s"
-
 
 @dataclass(frozen=True, slots=True)
 class Assumption:
@@ -329,11 +323,13 @@ class Scenario:
 
     def __repr__(self) -> str:
         """Return name, device, valve, motion, controller and duration, a line each."""
+        control = self.controller
+        law = control.kind if control.custom is None else f"{control.kind}, {type(control.custom).__name__}"
         return (
             f"Scenario '{self.name}'\n"
             f"  device      {self.device.name}, valve {self.device.valve_name}\n"
             f"  motion      {self.motion.label}\n"
-            f"  controller  {self.controller.label}\n"
+            f"  controller  {law}, every {control.period:g} s\n"
             f"  duration    {self.run.duration:g} s, in steps of at most {self.run.step:g} s"
         )
 
@@ -343,11 +339,6 @@ class Scenario:
         return None if self.supply_line is None else self.supply_line.row(self.device.supply)
 
     @property
-    def effect_sections(self) -> dict[str, Any]:
-        """Settings of effects beside the device's, by section."""
-        return {"sensors": self.sensors}
-
-    @property
     def walks(self) -> bool:
         """True where a leg walks with the device, false for a vane alone."""
         return self.motion.motion_kind.walk is not None
@@ -355,6 +346,7 @@ class Scenario:
     @property
     def graph(self) -> Graph:
         """All links, the device's first."""
+        # Sources stand before what follows them, and a scenario's numbers follow the device's.
         return {**self.device.links, **self.links}
 
     def controlled_by(self, controller: PythonController) -> "Scenario":
@@ -362,6 +354,7 @@ class Scenario:
 
         ScenarioError for a class, or for an object without these methods.
         """
+        # A class has both methods too, and would fail only when it runs.
         if isinstance(controller, type):
             name = controller.__name__
             raise ScenarioError(
@@ -374,6 +367,7 @@ class Scenario:
                     f"{self.name}: a controller of type {kind} has no method '{method}'; it needs 'reset()' and "
                     f"'update(time, reference, measurement)', the latter returning a command from -1 to 1"
                 )
+        # The settings of the law that leaves follow nothing any more.
         own = ("controller.", "timing.")
         links = {path: link for path, link in self.links.items() if not path.startswith(own)}
         return replace(self, controller=Control(PYTHON_CONTROLLER, {}, self.controller.period, controller), links=links)

@@ -77,18 +77,6 @@ def motion_kinds() -> dict[str, MotionKind]:
     return {name: MOTIONS[name] for name in VANE_MOTIONS} | others
 
 
-def _motion() -> Any:
-    models = []
-    for name, kind in motion_kinds().items():
-        assert kind.section is not None, "kinds of motion of a vane"
-        fields = kind_field(name, kind.section.summary) | quantity_fields(kind.section.numbers)
-        profile = kind.section.profile
-        if profile is not None:
-            fields[profile.name] = (profile.layout(), Field(description=profile.summary))
-        models.append(table(f"{model_name(name)}Motion", fields))
-    return one_of(models)
-
-
 def shank_table() -> Any:
     """Return the section of the shank of a leg."""
     gait = {"gait": (str, Field(min_length=1, description="name of a gait, or a path relative to this file"))}
@@ -168,6 +156,7 @@ def scenario_file() -> type[BaseModel]:
     A file that names no controller is compared with all of this package.
     """
     controllers, profiles = CONTROLLERS.loaded_or_own(), PROFILES.loaded()
+    # What the model depends on is given for the cache alone: a kind that is loaded meanwhile makes another model.
     return _scenario_file(tuple(controllers.items()), tuple(profiles.items()), tuple(motion_kinds()))
 
 
@@ -179,8 +168,17 @@ def whole_scenario_file() -> type[BaseModel]:
 
 @functools.lru_cache(maxsize=4)
 def _scenario_file(*_kinds: Any) -> type[BaseModel]:
+    motions = []
+    for name, kind in motion_kinds().items():
+        assert kind.section is not None, "kinds of motion of a vane"
+        fields = kind_field(name, kind.section.summary) | quantity_fields(kind.section.numbers)
+        profile = kind.section.profile
+        if profile is not None:
+            fields[profile.name] = (profile.layout(), Field(description=profile.summary))
+        motions.append(table(f"{model_name(name)}Motion", fields))
     words = tuple(declaration.PRESSURE_WORDS)
     reference = profile_table(declaration.TORQUE_LEVEL, "Reference")
+    # The one whole number of the file: half a seed means nothing.
     seed = Annotated[int, Field(ge=0, le=LARGEST_SEED)]
     sensors = quantity_fields(declaration.SENSORS) | {"seed": (seed, Field(1, description=declaration.SEED.summary))}
     initial = table("Initial", quantity_fields(declaration.INITIAL, words))
@@ -189,7 +187,7 @@ def _scenario_file(*_kinds: Any) -> type[BaseModel]:
             table("Run", quantity_fields((*declaration.RUN, declaration.ACCURACY))),
             Field(description="times of the run, and its accuracy"),
         ),
-        "motion": (_motion(), Field(description="what the vane does")),
+        "motion": (one_of(motions), Field(description="what the vane does")),
         "initial": optional(initial, "state of the gas at the start; atmosphere unless given"),
         "controller": (
             controller_table(CONTROLLERS.loaded(), "Controller"),

@@ -109,6 +109,7 @@ def gas_channels(gas: Gas, run: Run, rows: Mapping[str, Floats]) -> dict[str, tu
     if not run.program.is_thermal:
         return found
     for chamber in (1, 2):
+        # The state has the mass that would have this pressure at the temperature of the room.
         warmth = rows[f"state.mass_{chamber}"] / rows[f"masses.mass_{chamber}"]
         found[f"temperature_{chamber}"] = (gas.temperature * warmth, "K")
     per_content = energy_per_content(run.plant.gas_product, gas.heat_capacity_ratio)

@@ -106,18 +106,15 @@ def in_si(column: Column, values: Floats, atmosphere: float) -> Floats:
 
     with refused_as(DataError, f"column '{column.name} [{column.unit}]'", UnitError):
         if column.unit != column.si_unit:
-            given, wanted = (_for_conversion(unit) for unit in (column.unit, column.si_unit))
+            given, wanted = (_SPELT.get(unit, unit) for unit in (column.unit, column.si_unit))
             return np.array([to_si(value, given, wanted, atmosphere) for value in values.tolist()])
         if column.name not in CHANNELS:
-            check_unit(_for_conversion(column.unit))
+            check_unit(_SPELT.get(column.unit, column.unit))
     return values
 
 
-def _for_conversion(unit: str) -> str:
-    """Return the unit as ``ppafo.units`` spells it: there a pressure says its kind and a plain number has no unit."""
-    return {"Pa": _LEVEL, PLAIN_NUMBER: ""}.get(unit, unit)
-
-
+_SPELT = {"Pa": _LEVEL, PLAIN_NUMBER: ""}
+"""Units as ``ppafo.units`` spells them: there a pressure says its kind and a plain number has no unit."""
 _MARKS: dict[RecordingKind, str] = {
     "simulated": "# simulated: a model's own output, not measured",
     "synthetic": "# synthetic: made by a model to stand for a measurement",

@@ -227,8 +227,14 @@ def _place(name: str, item: MappedChannel, names: list[str], first: list[str]) -
 
 def _number(cell: str, thousands: str | None, decimal: str, column: str, line: int) -> float:
     text = cell.strip()
-    if thousands is not None:
-        text = _without_groups(text, thousands, column, line)
+    if thousands is not None and _MARKS[thousands] in text:
+        grouped = _GROUPED[thousands].match(text)
+        if grouped is None:
+            # Without its mark 1.5 would be 15.
+            shown = one_line(text)[:_LONGEST_SHOWN]
+            wanted = f'does not have groups of three digits, as thousands = "{thousands}" says'
+            raise DataError(f"line {line}, column {column!r}: {shown!r} {wanted}")
+        text = grouped.group().replace(_MARKS[thousands], "") + text[grouped.end() :]
     if decimal != "point":
         # A point that is left is no mark of this file; what no number has in it makes the text none.
         text = text.replace(".", "?").replace(_MARKS[decimal], ".")
@@ -239,20 +245,6 @@ def _number(cell: str, thousands: str | None, decimal: str, column: str, line: i
         remedy = '; give decimal = "comma"' if "," in cell and _NUMBER.fullmatch(with_point) else ""
         raise DataError(f"line {line}, column {column!r}: {shown!r} is not a finite number{remedy}")
     return value
-
-
-def _without_groups(text: str, thousands: str, column: str, line: int) -> str:
-    """Return the text of a number without the marks between its groups of digits."""
-    mark = _MARKS[thousands]
-    if mark not in text:
-        return text
-    grouped = _GROUPED[thousands].match(text)
-    if grouped is None:
-        # Without its mark 1.5 would be 15.
-        shown = one_line(text)[:_LONGEST_SHOWN]
-        wanted = f'does not have groups of three digits, as thousands = "{thousands}" says'
-        raise DataError(f"line {line}, column {column!r}: {shown!r} {wanted}")
-    return grouped.group().replace(mark, "") + text[grouped.end() :]
 
 
 def _channel(name: str, item: MappedChannel, numbers: Floats, count: int, atmosphere: float) -> Channel:

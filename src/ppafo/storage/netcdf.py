@@ -30,7 +30,7 @@ def dataset_of(recording: Recording, scenario: Mapping[str, Any] | None = None) 
     import xarray
 
     variables = {name: (TIME, recording[name], channel_attributes(recording, name)) for name in recording.names}
-    coordinates = {TIME: (TIME, recording.time, time_attributes())}
+    coordinates = {TIME: (TIME, recording.time, _TIME_ATTRIBUTES)}
     return xarray.Dataset(variables, coordinates, global_attributes(recording, scenario))
 
 
@@ -42,9 +42,7 @@ def global_attributes(recording: Recording, scenario: Mapping[str, Any] | None) 
     return attributes
 
 
-def time_attributes() -> dict[str, str]:
-    """Return the attributes of the time."""
-    return {"units": TIME_UNIT, "long_name": "time"}
+_TIME_ATTRIBUTES = {"units": TIME_UNIT, "long_name": "time"}
 
 
 def channel_attributes(recording: Recording, name: str) -> dict[str, str]:
@@ -92,7 +90,7 @@ def netcdf_bytes(recording: Recording, scenario: Mapping[str, Any] | None = None
         file.dimensions = {TIME: len(recording)}
         file.attrs.update(global_attributes(recording, scenario))
         time = file.create_variable(TIME, (TIME,), data=recording.time)
-        time.attrs.update(time_attributes())
+        time.attrs.update(_TIME_ATTRIBUTES)
         for name in recording.names:
             variable = file.create_variable(name, (TIME,), data=recording[name])
             variable.attrs.update(channel_attributes(recording, name))

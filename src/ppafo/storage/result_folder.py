@@ -6,10 +6,10 @@ file, and only files that still have theirs are replaced: neither what somebody 
 lists is ever removed.
 """
 
-import hashlib
 import os
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from hashlib import sha256
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -86,7 +86,7 @@ def add_to_folder(folder: Path, contents: Mapping[str, bytes]) -> None:
 
 
 def _hashes(contents: Mapping[str, bytes]) -> dict[str, str]:
-    return {name: _checksum(content) for name, content in sorted(contents.items())}
+    return {name: sha256(content).hexdigest() for name, content in sorted(contents.items())}
 
 
 def write_marked_folder(folder: Path, contents: Mapping[str, bytes], command: str) -> None:
@@ -112,23 +112,17 @@ def check_owned_folder(folder: Path, kind: FolderKind, kept: Mapping[str, bytes]
     if not is_folder and os.path.lexists(folder):
         raise DataError(f"{folder}: is a file; a {kind.noun} needs a folder")
     present = {entry.name for entry in _listed(folder)} if is_folder else set()
-    if present:
-        _check_own(folder, kind, kept, present)
-    check_folder_can_be_replaced(folder)
-
-
-def _check_own(folder: Path, kind: FolderKind, kept: Mapping[str, bytes], present: Collection[str]) -> None:
-    """Refuse a folder that is not empty, unless all in it is as an earlier result of this kind left it."""
-    if kind.mark not in present:
+    if present and kind.mark not in present:
         raise DataError(f"{folder}: is not empty and not a {kind.noun} (it has no {kind.mark}); choose another folder")
-    hashes = kind.document_of(folder).get(_HASHES)
+    # What is not empty must be as an earlier result of this kind left it.
+    hashes = kind.document_of(folder).get(_HASHES) if present else {}
     if not isinstance(hashes, dict):
         raise DataError(
             f"{folder / kind.mark}: states no hashes of its files, as earlier versions of ppafo did not; remove the "
             "folder yourself, or choose another one"
         )
     # Before hashes are compared: a file of somebody else's is the likelier and the clearer reason.
-    foreign = sorted(_foreign(folder, {*hashes, kind.mark}))
+    foreign = sorted(_foreign(folder, {*hashes, kind.mark})) if present else []
     if foreign:
         raise DataError(
             f"{folder}: contains files that are not part of its {kind.noun} ({_some(foreign)}); move them or use "
@@ -140,6 +134,7 @@ def _check_own(folder: Path, kind: FolderKind, kept: Mapping[str, bytes], presen
             f"{folder}: contains files that were changed since its {kind.noun} was written ({_some(changed)}); move "
             "them or use another folder"
         )
+    check_folder_can_be_replaced(folder)
 
 
 def write_owned_folder(folder: Path, contents: Mapping[str, bytes], kind: FolderKind) -> None:
@@ -168,7 +163,7 @@ def _is_changed(path: Path, stated: str, kept: bytes | None) -> bool:
         content = read_regular_file(path)
     except OSError:
         return True  # a link to nowhere, a pipe: not what was written
-    return content != kept and _checksum(content) != stated
+    return content != kept and sha256(content).hexdigest() != stated
 
 
 def _listed(folder: Path) -> list[Path]:
@@ -214,17 +209,18 @@ def write_result(
     place = Path(folder)
     netcdf = netcdf_bytes(recording, document.get("scenario"))
     contents = {NETCDF_FILE: netcdf, CSV_FILE: csv_bytes(recording), **attachments}
+    hashes = _hashes(contents)
     described = {
         "format": FORMAT,
         "schema_version": SCHEMA_VERSION,
         "files": sorted([*contents, RUN_FILE]),
-        _HASHES: _hashes(contents),
+        _HASHES: hashes,
         "recording": {
             "label": recording.label,
             "samples": len(recording),
             "kind": recording.kind,
             "channels": {name: recording.unit(name) for name in recording.names},
-            "sha256": _checksum(netcdf),
+            "sha256": hashes[NETCDF_FILE],
         },
         **document,
     }
@@ -243,16 +239,12 @@ def read_result(folder: str | Path) -> StoredResult:
     if not place.is_dir():
         raise DataError(f"{folder}: is not a folder")
     document = read_document(place)
-    if _checksum(read_bytes(place / NETCDF_FILE)) != document["recording"].get("sha256"):
+    if sha256(read_bytes(place / NETCDF_FILE)).hexdigest() != document["recording"].get("sha256"):
         # Refused before it is opened: the HDF5 library can hang on a damaged one.
         raise DataError(
             f"{place / NETCDF_FILE}: is not the file that was written with {RUN_FILE}; run the scenario again"
         )
     return StoredResult(place, read_netcdf(place / NETCDF_FILE), document)
-
-
-def _checksum(content: bytes) -> str:
-    return hashlib.sha256(content).hexdigest()
 
 
 def read_document(folder: str | Path) -> dict[str, Any]:
@@ -282,17 +274,18 @@ def read_recording(path: str | Path, atmosphere: float = STANDARD_ATMOSPHERE) ->
     Gauge pressure in a CSV file counts from ``atmosphere`` [Pa absolute]. DataError for a file that is not usable.
     """
     place = Path(path)
+    if place.is_dir() and (place / RUN_FILE).exists():
+        return read_result(place).recording
     if place.is_dir():
-        recording = place / WALK_RECORDING
-        if recording.is_file() and not (place / RUN_FILE).exists():
-            return _of_strangers(recording)
-        if not (place / RUN_FILE).exists():
+        if not (place / WALK_RECORDING).is_file():
             raise DataError(
                 f"{place}: contains no result of a walk or a simulation (no {WALK_RECORDING}, no {RUN_FILE})"
             )
-        return read_result(place).recording
+        place /= WALK_RECORDING
     if place.suffix == ".nc":
-        return _of_strangers(place)
+        # The HDF5 library can crash on a damaged file, or go round in it for ever, and would take this process with it.
+        check_can_be_read(place, "ppafo.storage.netcdf", "read_netcdf", "h5py")
+        return read_netcdf(place)
     if place.suffix == ".csv":
         found = read_csv(place, atmosphere=atmosphere)
         run_file = place.parent / RUN_FILE
@@ -304,12 +297,3 @@ def read_recording(path: str | Path, atmosphere: float = STANDARD_ATMOSPHERE) ->
             kind = recording_kind(str(described.get("kind", found.kind)))
         return replace(found, label=str(described.get("label", found.label)), kind=kind)
     raise DataError(f"{path}: is neither a .nc or .csv file nor a result folder")
-
-
-def _of_strangers(path: Path) -> Recording:
-    """Return the recording in a NetCDF file that another process has read first.
-
-    The HDF5 library can crash on a damaged file, or go round in it for ever, and would take this process with it.
-    """
-    check_can_be_read(path, "ppafo.storage.netcdf", "read_netcdf", "h5py")
-    return read_netcdf(path)

@@ -2,7 +2,6 @@
 
 import copy
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -63,9 +62,8 @@ def load_study(
         # What the command line changes is written into the document, as if it stood in the file.
         if overrides:
             for table, item in zip(document["configurations"], parsed.configurations, strict=True):
-                loaded = _configuration(item, source.folder).scenario
-                with _refused_in(item):
-                    table["overrides"] = list(reloaded(loaded, overrides).origin.overrides)
+                changed = _configuration(item, source.folder, overrides).scenario
+                table["overrides"] = list(changed.origin.overrides)
         if given and parsed.sample is None:
             raise StudyError(
                 "has no [sample], so the number of runs follows from its grid and nothing is random: it takes neither "
@@ -155,14 +153,11 @@ def _check_set_or_varied(parsed: declared.StudyFile, configurations: Sequence[Co
             )
 
 
-def _configuration(item: declared.Configuration, folder: Path) -> Configuration:
-    with _refused_in(item):
-        return Configuration(item.name, load_scenario(placed(item.scenario, folder), item.overrides))
-
-
-def _refused_in(item: declared.Configuration) -> AbstractContextManager[None]:
-    """Return what names the configuration in errors about it."""
-    return refused_as(StudyError, f"configuration '{item.name}'", ScenarioError, ParameterError, DataError)
+def _configuration(item: declared.Configuration, folder: Path, overrides: Sequence[str] = ()) -> Configuration:
+    """Return a configuration whose scenario has its own overrides and, over these, others."""
+    with refused_as(StudyError, f"configuration '{item.name}'", ScenarioError, ParameterError, DataError):
+        scenario = load_scenario(placed(item.scenario, folder), item.overrides)
+        return Configuration(item.name, reloaded(scenario, overrides) if overrides else scenario)
 
 
 def _check_requests(parsed: declared.StudyFile) -> None:

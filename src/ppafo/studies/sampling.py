@@ -39,25 +39,21 @@ def uniform_numbers(sample: Sample, dimensions: int, first: int, count: int) -> 
     """Return numbers in (0, 1), shape (count, dimensions), for the draws from ``first`` on."""
     if sample.method == "sobol":
         return _sobol(sample, dimensions, first, count)
-    uniform = _random(sample.seed, dimensions, first, count)
+    # Philox numbers: a draw takes a whole number of its steps of four words.
+    steps = -(-dimensions // _WORDS_PER_STEP)
+    generator = np.random.Philox(key=sample.seed)
+    generator.advance(first * steps)
+    words = np.asarray(generator.random_raw(count * steps * _WORDS_PER_STEP), dtype=np.uint64)
+    # Middles of 2**53 equal cells: neither 0 nor 1 is drawn, whose normal scores would be infinite.
+    top = (words >> np.uint64(64 - _FRACTION_BITS)).astype(np.float64)
+    uniform = np.clip((top + 0.5) * 2.0**-_FRACTION_BITS, None, 1.0 - 2.0**-_FRACTION_BITS)
+    uniform = uniform.reshape(count, steps * _WORDS_PER_STEP)[:, :dimensions]
     if sample.method != "latin_hypercube":
         return uniform
     # A Latin hypercube: in every dimension each of the ``runs`` strata holds one draw.
     draws = np.arange(first, first + count, dtype=np.uint64)
     strata = np.stack([permute(draws, sample.runs, sample.seed, axis) for axis in range(dimensions)], axis=1)
     return (strata.astype(np.float64) + uniform) / sample.runs
-
-
-def _random(seed: int, dimensions: int, first: int, count: int) -> Floats:
-    """Return Philox numbers: a draw takes a whole number of its steps of four words."""
-    steps = -(-dimensions // _WORDS_PER_STEP)
-    generator = np.random.Philox(key=seed)
-    generator.advance(first * steps)
-    words = np.asarray(generator.random_raw(count * steps * _WORDS_PER_STEP), dtype=np.uint64)
-    # Middles of 2**53 equal cells: neither 0 nor 1 is drawn, whose normal scores would be infinite.
-    top = (words >> np.uint64(64 - _FRACTION_BITS)).astype(np.float64)
-    uniform = np.clip((top + 0.5) * 2.0**-_FRACTION_BITS, None, 1.0 - 2.0**-_FRACTION_BITS)
-    return uniform.reshape(count, steps * _WORDS_PER_STEP)[:, :dimensions]
 
 
 _ENGINES: dict[tuple[int, int], Any] = {}
@@ -90,20 +86,16 @@ def permute(numbers: Words, size: int, seed: int, stream: int) -> Words:
     """Return the places of numbers below ``size``; another seed or stream is another permutation."""
     half = np.uint64(max(1, -(-(size - 1).bit_length() // 2)))
     keys = _mix(np.arange(1, _ROUNDS + 1, dtype=np.uint64) + np.uint64((seed << 24) + (stream << 8)))
-    result = _through_rounds(numbers, half, keys)
-    outside = np.flatnonzero(result >= size)
+    mask = (np.uint64(1) << half) - np.uint64(1)
+    result, outside = numbers.copy(), np.arange(numbers.size)
+    # The network permutes a power of four of numbers, so those that end above the size go through it again.
     while outside.size:
-        result[outside] = _through_rounds(result[outside], half, keys)
+        left, right = result[outside] >> half, result[outside] & mask
+        for key in keys:
+            left, right = right, left ^ (_mix(right ^ key) & mask)
+        result[outside] = (left << half) | right
         outside = outside[result[outside] >= size]
     return result
-
-
-def _through_rounds(numbers: Words, half: np.uint64, keys: Words) -> Words:
-    mask = (np.uint64(1) << half) - np.uint64(1)
-    left, right = numbers >> half, numbers & mask
-    for key in keys:
-        left, right = right, left ^ (_mix(right ^ key) & mask)
-    return (left << half) | right
 
 
 def _mix(words: Words) -> Words:

@@ -54,11 +54,18 @@ def valid_outputs(outputs: declared.Outputs, scenarios: Sequence[Scenario]) -> O
     for name, reason in missing.items() if outputs.metrics != "all" else ():
         raise StudyError(f"outputs: no scenario has '{name}': {reason}")
     metrics = tuple(name for name in metrics if name not in missing)
+    with refused_as(StudyError, f"outputs.every = {outputs.every!r}", UnitError):
+        every = parse_quantity(outputs.every, "s")
+    shortest = min(scenario.run.duration for scenario in scenarios)
+    if channels and not 0.0 < every <= shortest:
+        raise StudyError(
+            f"outputs.every = {outputs.every!r} must be more than 0 s and at most run.duration, {shortest:g} s"
+        )
     return Outputs(
         metrics=metrics,
         trajectories=outputs.trajectories,
         bands=outputs.bands,
-        every=_interval(outputs, scenarios),
+        every=every,
         quantiles=tuple(sorted(set(outputs.quantiles))),
         errors=outputs.errors,
     )
@@ -74,19 +81,6 @@ def _check_names(key: str, given: Sequence[str], known: Collection[str], shown: 
     repeated = first_twice(given)
     if repeated is not None:
         raise StudyError(f"outputs.{key}: '{repeated}' is named twice")
-
-
-def _interval(outputs: declared.Outputs, scenarios: Sequence[Scenario]) -> float:
-    with refused_as(StudyError, f"outputs.every = {outputs.every!r}", UnitError):
-        every = parse_quantity(outputs.every, "s")
-    if not (outputs.trajectories or outputs.bands):
-        return every
-    shortest = min(scenario.run.duration for scenario in scenarios)
-    if not 0.0 < every <= shortest:
-        raise StudyError(
-            f"outputs.every = {outputs.every!r} must be more than 0 s and at most run.duration, {shortest:g} s"
-        )
-    return every
 
 
 SamplingMethod = Literal["random", "latin_hypercube", "sobol"]

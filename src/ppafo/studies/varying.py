@@ -166,12 +166,19 @@ def axis_or_distribution(item: declared.Varied, place: VariedPath) -> Axis | Dra
         raise UnitError(f"kind = 'whole_numbers' is for {' and '.join(WHOLE)} alone; use 'choice' or 'uniform'")
     if is_counted and item.kind not in ("grid", "list", "choice", "whole_numbers"):
         raise UnitError(f"kind = '{item.kind}' gives no whole numbers, which '{item.path}' needs; use 'whole_numbers'")
-    if isinstance(item, declared.Grid):
-        return Axis(item.path, _all_whole(item.path, _grid(item, place)))
     if isinstance(item, declared.Listed):
         levels = tuple(_level("values", value, place) for value in item.values)
         return Axis(item.path, _all_whole(item.path, levels))
-    return Drawn(item.path, _DISTRIBUTIONS[item.kind](item, place))
+    if not isinstance(item, declared.Grid):
+        return Drawn(item.path, _DISTRIBUTIONS[item.kind](item, place))
+    first, last = _key(item, "first", place), _key(item, "last", place)
+    if first == last:
+        raise UnitError(f"first and last are both {item.first!r}; a grid needs two different ends")
+    is_logarithmic = item.spacing == "logarithmic"
+    if is_logarithmic and min(first, last) <= 0.0:
+        raise UnitError("spacing = 'logarithmic' needs both ends above 0")
+    spaced = np.geomspace if is_logarithmic else np.linspace
+    return Axis(item.path, _all_whole(item.path, tuple(spaced(first, last, item.count).tolist())))
 
 
 def _all_whole(path: str, values: tuple[float, ...]) -> tuple[float, ...]:
@@ -181,48 +188,31 @@ def _all_whole(path: str, values: tuple[float, ...]) -> tuple[float, ...]:
     return values
 
 
-def _grid(item: declared.Grid, place: VariedPath) -> tuple[float, ...]:
-    first, last = _key(item, "first", place), _key(item, "last", place)
-    if first == last:
-        raise UnitError(f"first and last are both {item.first!r}; a grid needs two different ends")
-    if item.spacing == "linear":
-        return tuple(np.linspace(first, last, item.count).tolist())
-    if min(first, last) <= 0.0:
-        raise UnitError("spacing = 'logarithmic' needs both ends above 0")
-    return tuple(np.geomspace(first, last, item.count).tolist())
-
-
 def _bounded(made: Callable[[float, float], Distribution], item: Any, place: VariedPath) -> Distribution:
     return made(*_bounds(item, place))
 
 
-def _log_uniform(item: declared.LogUniform, place: VariedPath) -> Distribution:
-    minimum, maximum = _bounds(item, replace(place, is_gauge=False))
-    if minimum <= 0.0:
-        raise UnitError(f"minimum = {item.minimum!r}: a log-uniform distribution needs both bounds above 0")
-    return _above(LogUniformBetween(minimum, maximum), place)
-
-
-def _above(absolute: Distribution, place: VariedPath) -> Distribution:
-    """Return a distribution of absolute pressures, whose logarithms exist, as values of a place that may be gauge."""
-    return Above(absolute, place.atmosphere) if place.is_gauge else absolute
-
-
-def _normal(item: declared.Normal, place: VariedPath) -> Distribution:
-    return NormalAround(_key(item, "mean", place), _deviation(item, place))
-
-
-def _truncated_normal(item: declared.TruncatedNormal, place: VariedPath) -> Distribution:
-    minimum, maximum = _bounds(item, place)
-    return NormalBetween(_key(item, "mean", place), _deviation(item, place), minimum, maximum)
-
-
-def _log_normal(item: declared.LogNormal, place: VariedPath) -> Distribution:
+def _logarithmic(item: declared.LogUniform | declared.LogNormal, place: VariedPath) -> Distribution:
     # Of the absolute pressure: a gauge pressure may be 0 or below, where there is no logarithm.
-    median = _key(item, "median", replace(place, is_gauge=False))
-    if median <= 0.0:
-        raise UnitError(f"median = {item.median!r} must be above 0")
-    return _above(LogNormalAround(median, item.factor), place)
+    absolute = replace(place, is_gauge=False)
+    found: Distribution
+    if isinstance(item, declared.LogUniform):
+        minimum, maximum = _bounds(item, absolute)
+        if minimum <= 0.0:
+            raise UnitError(f"minimum = {item.minimum!r}: a log-uniform distribution needs both bounds above 0")
+        found = LogUniformBetween(minimum, maximum)
+    else:
+        median = _key(item, "median", absolute)
+        if median <= 0.0:
+            raise UnitError(f"median = {item.median!r} must be above 0")
+        found = LogNormalAround(median, item.factor)
+    return Above(found, place.atmosphere) if place.is_gauge else found
+
+
+def _normal(item: declared.Normal | declared.TruncatedNormal, place: VariedPath) -> Distribution:
+    bounds = _bounds(item, place) if isinstance(item, declared.TruncatedNormal) else None
+    mean, deviation = _key(item, "mean", place), _deviation(item, place)
+    return NormalAround(mean, deviation) if bounds is None else NormalBetween(mean, deviation, *bounds)
 
 
 def _triangular(item: declared.Triangular, place: VariedPath) -> Distribution:
@@ -248,10 +238,10 @@ def _choice(item: declared.Choice, place: VariedPath) -> Distribution:
 
 _DISTRIBUTIONS: dict[str, Callable[[Any, VariedPath], Distribution]] = {
     "uniform": partial(_bounded, UniformBetween),
-    "log_uniform": _log_uniform,
+    "log_uniform": _logarithmic,
     "normal": _normal,
-    "truncated_normal": _truncated_normal,
-    "log_normal": _log_normal,
+    "truncated_normal": _normal,
+    "log_normal": _logarithmic,
     "triangular": _triangular,
     "choice": _choice,
     "whole_numbers": partial(_bounded, WholeNumbersBetween),

@@ -74,7 +74,16 @@ def drawn_values(study: Study, runs: NDArray[np.int64]) -> dict[str, Floats]:
         point, place = np.divmod(point, len(axis.values))
         columns[axis.path] = np.asarray(axis.values)[place]
     if study.drawn:
-        uniform = _uniform_numbers(study, draw)
+        dimensions = len(study.drawn)
+        # Of a small sample all numbers are made and these taken, of a large one only the stretches that are needed.
+        if study.sample.runs <= MAXIMUM_RUNS_OF_CHUNK:
+            uniform = uniform_numbers(study.sample, dimensions, 0, study.sample.runs)[draw]
+        else:
+            starts = np.flatnonzero(np.diff(draw, prepend=draw[0] - 2) != 1)
+            parts = np.split(draw, starts[1:])
+            uniform = np.concatenate(
+                [uniform_numbers(study.sample, dimensions, int(part[0]), part.size) for part in parts]
+            )
         uniform = uniform if study.scores is None else correlate(uniform, study.scores)
         rows = np.ascontiguousarray(uniform.T)
         columns |= {item.path: item.distribution.values(row) for item, row in zip(study.drawn, rows, strict=True)}
@@ -85,13 +94,3 @@ def varied_columns(study: Study, configuration: Configuration, values: dict[str,
     """Return the values that the runs of a configuration get."""
     own = {path: column for path, column in values.items() if study.varies(path, configuration.name)}
     return with_followers(own, study.same_in(configuration.name))
-
-
-def _uniform_numbers(study: Study, draws: NDArray[np.int64]) -> Floats:
-    """Return the uniform numbers of some draws: of a small sample all and from these, of a large one in stretches."""
-    dimensions = len(study.drawn)
-    if study.sample.runs <= MAXIMUM_RUNS_OF_CHUNK:
-        return uniform_numbers(study.sample, dimensions, 0, study.sample.runs)[draws]
-    starts = np.flatnonzero(np.diff(draws, prepend=draws[0] - 2) != 1)
-    stretches = np.split(draws, starts[1:])
-    return np.concatenate([uniform_numbers(study.sample, dimensions, int(part[0]), part.size) for part in stretches])

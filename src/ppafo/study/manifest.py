@@ -82,7 +82,11 @@ def _code(code: CodeType) -> Iterator[object]:
 def _plain_setting(value: object, inside: Inside) -> Any:
     """Return a setting as data that JSON can hold; one that holds itself, or lies too deep, is its type's name."""
     if value is None or isinstance(value, str | bytes | bool | numbers.Number | np.generic):
-        return _number_or_text(value)
+        bare = value.item() if isinstance(value, np.generic) else value
+        bare = hashlib.sha256(bare).hexdigest()[:_DIGITS] if isinstance(bare, bytes) else bare
+        # JSON has no complex numbers, and no infinite ones.
+        is_plain = bare is None or isinstance(bare, str | int) or (isinstance(bare, float) and math.isfinite(bare))
+        return bare if is_plain else repr(bare)
     if isinstance(value, type | FunctionType):
         return _written(value, (value,))
     if id(value) in inside or len(inside) >= _DEEPEST:
@@ -99,15 +103,6 @@ def _plain_setting(value: object, inside: Inside) -> Any:
     digest = hashlib.sha256(json.dumps(plainly).encode()).hexdigest()
     # Weights of a network, a long table of gains: that they are the same matters, not every one of them.
     return plainly if len(plainly) <= _LONGEST else {"items": len(plainly), "sha256": digest}
-
-
-def _number_or_text(value: object) -> Any:
-    if isinstance(value, bytes):
-        return hashlib.sha256(value).hexdigest()[:_DIGITS]
-    bare = value.item() if isinstance(value, np.generic) else value
-    # JSON has no complex numbers, and no infinite ones.
-    is_plain = bare is None or isinstance(bare, str | int) or (isinstance(bare, float) and math.isfinite(bare))
-    return bare if is_plain else repr(bare)
 
 
 MANIFEST = "study.json"

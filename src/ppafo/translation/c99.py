@@ -37,6 +37,7 @@ from ppafo.translation.typed import (
     Term,
     Type,
     is_empty,
+    types_in,
 )
 from ppafo.translation.walk import walk_module
 
@@ -82,6 +83,8 @@ _HELPERS = {
     "min": "ppafo_smaller",
     "max": "ppafo_larger",
     "abs": "ppafo_whole_size",
+    # Signed overflow is undefined in C: the product of unsigned numbers wraps, as Python's text says.
+    "*": "ppafo_wrapped_product",
     "//": "ppafo_floor_quotient",
     "%": "ppafo_floor_remainder",
 }
@@ -123,30 +126,96 @@ class CTerms:
 
     def term(self, item: Term, least: int = 0) -> str:
         """A term as text, in brackets where what is around it binds more than ``least``."""
-        text, level = self.written(item)
-        return f"({text})" if level < least else text
-
-    def written(self, item: Term) -> tuple[str, int]:
-        """A term as text, and how strongly it holds together."""
+        text, level = self.worked_out(item)
         # An int of 32 bits would carry digits that the small processor does not have.
         if item.type == INT16 and item.kind in _WORKED_OUT:
             # Arithmetic on 16 bits gives an int in C, which has 16 or 32.
-            return f"(int16_t)({self.worked_out(item)[0]})", _SIGN
-        return self.worked_out(item)
+            text, level = f"(int16_t)({text})", _SIGN
+        return f"({text})" if level < least else text
 
     def worked_out(self, item: Term) -> tuple[str, int]:
-        """A term as C works it out."""
-        writer: Callable[[Term], tuple[str, int]] | None = getattr(self, f"_of_{item.kind}", None)
-        if writer is not None:
-            return writer(item)
-        if item.kind in _HELPERS and (item.type == INT or item.kind != "abs"):
-            return self.helper(item), _ATOM
-        if item.kind in _OF_C:
-            return f"{_OF_C[item.kind]}({', '.join(map(self.term, item.parts))})", _ATOM
-        if item.kind == "*" and item.type == INT:
-            # Signed overflow is undefined in C: the product is made of unsigned numbers, and wraps as Python's text
-            # says.
-            return f"ppafo_wrapped_product({self.term(item.parts[0])}, {self.term(item.parts[1])})", _ATOM
+        """A term as C works it out, and how strongly its text holds together."""
+        match item.kind:
+            case "number":
+                return self.number(item)
+            case "convert":
+                return self.conversion(item)
+            case "negative" | "not":
+                return f"{'-' if item.kind == 'negative' else '!'}{self.term(item.parts[0], _ATOM)}", _SIGN
+            case "choice":
+                test, yes, no = (self.term(part, _CHOICE + 1) for part in item.parts)
+                return f"{test} ? {yes} : {no}", _CHOICE
+        text = self.place(item) or self.call(item)
+        return (text, _ATOM) if text else self.operation(item)
+
+    def place(self, item: Term) -> str:
+        """A name, or what a place in a row, a tuple or an array holds; empty for any other term."""
+        match item.kind:
+            case "name":
+                text = self.name(item.detail)
+            case "field":
+                kind, sign = item.parts[0].type, "."
+                if isinstance(kind, Shared):
+                    kind, sign = kind.row, "->"
+                assert isinstance(kind, Row)
+                text = f"{self.term(item.parts[0], _ATOM)}{sign}{member_name(kind, item.detail)}"
+            case "item":
+                place = str(item.detail) if len(item.parts) == 1 else self.term(item.parts[1])
+                kind = item.parts[0].type
+                is_uniform = isinstance(kind, Items) and kind.is_uniform
+                text = f"{self.term(item.parts[0], _ATOM)}.item{f'[{place}]' if is_uniform else f'_{place}'}"
+            case "element":
+                text = self.element(item)
+            case "extent":
+                text = f"{self.name(item.parts[0].detail)}.extent[{item.detail}]"
+            case _:
+                text = ""
+        return text
+
+    def element(self, item: Term) -> str:
+        """An element of an array, whose first place may have a name."""
+        owner, first, *further = item.parts
+        assert isinstance(owner.type, Array)
+        name, names = self.name(owner.detail), self.places.get(owner.detail, ())
+        is_local = bool(owner.type.shape)
+        least = 9 if further and not is_local else 0
+        index = names[first.detail] if names and first.kind == "number" else self.term(first, least)
+        if is_local:
+            return f"{name}[{index}]{''.join(f'[{self.term(place)}]' for place in further)}"
+        for number, place in enumerate(further, 1):
+            # Arrays are one block of memory: the last index runs fastest, and extents are known only at run time.
+            index = f"{index if number == 1 else f'({index})'} * {name}.extent[{number}] + {self.term(place, 9)}"
+        return f"{name}.values[{index}]"
+
+    def call(self, item: Term) -> str:
+        """A call of a function of the module, the prelude or the C library; empty for any other term."""
+        if item.kind in ("min", "max") and item.type in (INT, INT16, INT32):
+            # The second operand first, as Python's min and max have it for equal numbers.
+            first, second = (self.term(part, 6) for part in item.parts)
+            return f"({second} {'<' if item.kind == 'min' else '>'} {first} ? {second} : {first})"
+        if item.kind == "call":
+            function = self.functions.get(item.detail, item.detail)
+        elif item.kind == "build":
+            function = f"make_{self.type_name(item.type)}"
+            self.made(item.type)
+        elif item.kind == "part":
+            function = PART
+        elif item.kind in _HELPERS and (item.type == INT or item.kind not in ("abs", "*")):
+            function = _HELPERS[item.kind]
+        elif item.kind in _OF_C:
+            function = _OF_C[item.kind]
+        else:
+            return ""
+        given = [self.term(part) for part in item.parts if not is_empty(part.type)]
+        if item.kind == "part":
+            # What each first place has: the product of the further extents.
+            assert isinstance(item.type, Array)
+            sizes = (f"{given[0]}.extent[{at}]" for at in range(1, item.type.dimensions))
+            given.append(" * ".join(sizes) or "1")
+        return f"{function}({', '.join(given)})"
+
+    def operation(self, item: Term) -> tuple[str, int]:
+        """An operator between two terms, and its level."""
         # Operators that many misread get brackets around their operands, sums and products only where they need them.
         level = _LEVELS.get(item.kind, 0)
         inner = level if level >= _LEVELS["+"] else _LEVELS["+"] if level else _SIGN
@@ -156,17 +225,8 @@ class CTerms:
             left, right = self.term(item.parts[0], inner), self.term(item.parts[1], inner + 1)
         return f"{left} {_WORDS.get(item.kind, item.kind)} {right}", level or _CHOICE
 
-    def helper(self, item: Term) -> str:
-        """A call of a function of the prelude."""
-        given = ", ".join(self.term(part) for part in item.parts)
-        if item.kind in ("min", "max") and item.type in (INT, INT16, INT32):
-            first, second = (self.term(part, 6) for part in item.parts)
-            # The second operand first, as Python's min and max have it for equal numbers.
-            sign = "<" if item.kind == "min" else ">"
-            return f"({second} {sign} {first} ? {second} : {first})"
-        return f"{_HELPERS[item.kind]}({given})"
-
-    def _of_number(self, item: Term) -> tuple[str, int]:
+    def number(self, item: Term) -> tuple[str, int]:
+        """A number as a literal, and how strongly it holds together."""
         value = item.detail
         if item.type == BOOL:
             return ("true" if value else "false"), _ATOM
@@ -183,60 +243,6 @@ class CTerms:
             return ("(double)INFINITY", _SIGN) if value > 0.0 else ("-(double)INFINITY", _SIGN)
         return repr(float(value)), _ATOM if math.copysign(1.0, value) > 0.0 else _SIGN
 
-    def _of_name(self, item: Term) -> tuple[str, int]:
-        return self.name(item.detail), _ATOM
-
-    def _of_field(self, item: Term) -> tuple[str, int]:
-        kind, sign = item.parts[0].type, "."
-        if isinstance(kind, Shared):
-            kind, sign = kind.row, "->"
-        assert isinstance(kind, Row)
-        return f"{self.term(item.parts[0], _ATOM)}{sign}{member_name(kind, item.detail)}", _ATOM
-
-    def _of_item(self, item: Term) -> tuple[str, int]:
-        owner = self.term(item.parts[0], _ATOM)
-        kind = item.parts[0].type
-        place = str(item.detail) if len(item.parts) == 1 else self.term(item.parts[1])
-        is_uniform = isinstance(kind, Items) and kind.is_uniform
-        return (f"{owner}.item[{place}]" if is_uniform else f"{owner}.item_{place}"), _ATOM
-
-    def _of_element(self, item: Term) -> tuple[str, int]:
-        owner, *places = item.parts
-        assert isinstance(owner.type, Array)
-        name = self.name(owner.detail)
-        if owner.type.shape:
-            further = "".join(f"[{self.term(place)}]" for place in places[1:])
-            return f"{name}[{self.place(owner, places[0])}]{further}", _ATOM
-        index = self.place(owner, places[0], 9 if len(places) > 1 else 0)
-        for number, place in enumerate(places[1:], 1):
-            # Arrays are one block of memory: the last index runs fastest, and extents are known only at run time.
-            index = f"{index if number == 1 else f'({index})'} * {name}.extent[{number}] + {self.term(place, 9)}"
-        return f"{name}.values[{index}]", _ATOM
-
-    def place(self, owner: Term, place: Term, least: int = 0) -> str:
-        """The first place in an array, by its name where it has one."""
-        names = self.places.get(owner.detail, ())
-        return names[place.detail] if names and place.kind == "number" else self.term(place, least)
-
-    def _of_part(self, item: Term) -> tuple[str, int]:
-        owner, first, beyond = item.parts
-        assert isinstance(owner.type, Array)
-        name = self.name(owner.detail)
-        size = " * ".join(f"{name}.extent[{at}]" for at in range(1, owner.type.dimensions)) or "1"
-        return f"{PART}({name}, {self.term(first)}, {self.term(beyond)}, {size})", _ATOM
-
-    def _of_extent(self, item: Term) -> tuple[str, int]:
-        return f"{self.name(item.parts[0].detail)}.extent[{item.detail}]", _ATOM
-
-    def _of_build(self, item: Term) -> tuple[str, int]:
-        name = self.type_name(item.type)
-        self.made(item.type)
-        return f"make_{name}({', '.join(self.term(part) for part in item.parts if not is_empty(part.type))})", _ATOM
-
-    def _of_call(self, item: Term) -> tuple[str, int]:
-        name = self.functions.get(item.detail, item.detail)
-        return f"{name}({', '.join(self.term(part) for part in item.parts)})", _ATOM
-
     def listed(self, item: Term) -> str:
         """A struct or tuple as an initialiser: its numbers in braces, and inner structs likewise."""
         if item.kind != "build":
@@ -245,11 +251,8 @@ class CTerms:
         is_array = isinstance(item.type, Items) and item.type.is_uniform
         return f"{{{{{text}}}}}" if is_array else f"{{{text}}}"
 
-    def _of_choice(self, item: Term) -> tuple[str, int]:
-        test, yes, no = (self.term(part, _CHOICE + 1) for part in item.parts)
-        return f"{test} ? {yes} : {no}", _CHOICE
-
-    def _of_convert(self, item: Term) -> tuple[str, int]:
+    def conversion(self, item: Term) -> tuple[str, int]:
+        """A value as another type, and how strongly its text holds together."""
         given = item.parts[0]
         if item.type in (INT16, INT32):
             text = f"({self.term(given, _CHOICE + 1)} ? 1 : 0)" if given.type == BOOL else self.term(given, _SIGN)
@@ -261,12 +264,6 @@ class CTerms:
             one, none = ("1.0", "0.0") if item.type == FLOAT else ("INT64_C(1)", "INT64_C(0)")
             return f"{self.term(given, _CHOICE + 1)} ? {one} : {none}", _CHOICE
         return f"(double){self.term(given, _SIGN)}", _SIGN
-
-    def _of_negative(self, item: Term) -> tuple[str, int]:
-        return f"-{self.term(item.parts[0], _ATOM)}", _SIGN
-
-    def _of_not(self, item: Term) -> tuple[str, int]:
-        return f"!{self.term(item.parts[0], _ATOM)}", _SIGN
 
 
 WIDTH = 118
@@ -395,19 +392,11 @@ class _Writer:
     places: Mapping[str, Sequence[str]]
     functions: Mapping[str, str]
     reading: Reading | None = None
-    structs: list[Type] = field(default_factory=list)
+    structs: list[Items | Row] = field(default_factory=list)
     made: set[Type] = field(default_factory=set)
     names: dict[Type, str] = field(default_factory=dict)
     locals: dict[str, set[str]] = field(default_factory=dict)
     owner: str = ""
-
-    def places_in(self, function: str) -> Mapping[str, Sequence[str]]:
-        """Names for the first places of the arrays of a function."""
-        own = f"{function}."
-        return {
-            **self.places,
-            **{key.removeprefix(own): names for key, names in self.places.items() if key.startswith(own)},
-        }
 
     def type_name(self, kind: Type) -> str:
         """Name of a type in C; a struct is written where it is met first."""
@@ -419,6 +408,7 @@ class _Writer:
             return f"{self.type_name(kind.row)} *"
         if self.reading is not None and isinstance(kind, Row) and kind.name in self.reading.declared:
             return self.reading.declared[kind.name]
+        assert isinstance(kind, Items | Row)
         if kind not in self.names:
             wanted = own = self.struct_name(kind)
             number = 1
@@ -426,29 +416,22 @@ class _Writer:
                 number += 1
                 own = f"{wanted}_{number}"
             self.names[kind] = own
-            for inner in _inside(kind):
-                self.type_name(inner)
+            for inner in types_in(kind):
+                if not is_empty(inner):
+                    self.type_name(inner)
             self.structs.append(kind)
         return self.names[kind]
 
-    def struct_name(self, kind: Type) -> str:
+    def struct_name(self, kind: Items | Row) -> str:
         """What a struct would be called if no other were."""
         if isinstance(kind, Row):
             return kind.name if self.reading is None else self.reading.names.get(kind.name, kind.name)
-        assert isinstance(kind, Items)
         if kind.is_uniform:
             return f"{self.type_name(kind.types[0]).removesuffix('_t')}s_{len(kind.types)}"
         owner = self.owner if self.reading is None else self.reading.names.get(self.owner, self.owner)
         return f"{owner}_result"
 
-    def members(self, kind: Type) -> list[tuple[str, Type]]:
-        """Members of a struct that hold something, by their names in C."""
-        if isinstance(kind, Row):
-            return [(member_name(kind, name), inner) for name, inner in kind.fields if not is_empty(inner)]
-        assert isinstance(kind, Items)
-        return [(f"item_{place}", inner) for place, inner in enumerate(kind.types) if not is_empty(inner)]
-
-    def written_struct(self, kind: Type) -> list[str]:
+    def written_struct(self, kind: Items | Row) -> list[str]:
         """A struct, and the function that makes one; where people read, only one that is called."""
         name = self.names[kind]
         if isinstance(kind, Items) and kind.is_uniform:
@@ -457,10 +440,14 @@ class _Writer:
             given = [f"{inner}{TIED}item_{place}" for place in range(count)]
             made, fill = "made", [f"made.item[{place}] = item_{place};" for place in range(count)]
         else:
-            members = [(own, f"{self.type_name(inner)}{TIED}{own}") for own, inner in self.members(kind)]
-            types = {name, *(self.type_name(inner) for _, inner in self.members(kind))}
-            given_as = {own: c_name(own, [other for other, _ in members], types) for own, _ in members}
-            given = [f"{self.type_name(inner)}{TIED}{given_as[own]}" for own, inner in self.members(kind)]
+            if isinstance(kind, Row):
+                named = [(member_name(kind, own), inner) for own, inner in kind.fields]
+            else:
+                named = [(f"item_{place}", inner) for place, inner in enumerate(types_in(kind))]
+            held = {own: self.type_name(inner) for own, inner in named if not is_empty(inner)}
+            members = [(own, f"{inner}{TIED}{own}") for own, inner in held.items()]
+            given_as = {own: c_name(own, held, {name, *held.values()}) for own in held}
+            given = [f"{inner}{TIED}{given_as[own]}" for own, inner in held.items()]
             made = c_name("made", given_as.values(), given_as.values())
             fill = [f"{made}.{own} = {given_as[own]};" for own, _ in members]
         said = _comment(self.documents.get(kind.name, "")) if isinstance(kind, Row) else ""
@@ -482,7 +469,9 @@ class _Writer:
         """One function with its comment."""
         self.owner = item.source
         writer = _Body(self, item, scopes_of(item))
-        body = writer.text()
+        # An unused parameter is a warning, and warnings are errors where people read the export.
+        unused = [name for name, _ in item.parameters if name not in writer.scopes.read]
+        body = [*(f"    (void){writer.name(name)};" for name in unused), *writer.block(item.body, 1)]
         self.locals[item.name] = writer.used
         returns = "void" if item.returns is None else self.type_name(item.returns)
         changed = writer.scopes.changes.get(id(item.body), {})
@@ -505,10 +494,9 @@ class _Body:
 
     def __init__(self, writer: _Writer, item: Function, scopes: Scopes) -> None:
         self.writer = writer
-        self.terms = CTerms(
-            writer.type_name, self.name, writer.places_in(item.source), writer.functions, writer.made.add
-        )
-        self.item = item
+        of_all, own = writer.places, f"{item.source}."
+        of_one = {key.removeprefix(own): names for key, names in of_all.items() if key.startswith(own)}
+        self.terms = CTerms(writer.type_name, self.name, {**of_all, **of_one}, writer.functions, writer.made.add)
         self.scopes = scopes
         self.kinds: dict[str, Type] = dict(item.parameters) | scopes.types
         self.written: dict[str, str] = {}
@@ -521,31 +509,61 @@ class _Body:
             self.used.add(self.written[name])
         return self.written[name]
 
-    def text(self) -> list[str]:
-        # An unused parameter is a warning, and warnings are errors where people read the export.
-        unused = [name for name, _ in self.item.parameters if name not in self.scopes.read]
-        return [*(f"    (void){self.name(name)};" for name in unused), *self.block(self.item.body, 1)]
-
     def block(self, body: tuple[Statement, ...], level: int) -> list[str]:
         """Some statements, with what must be declared before them."""
-        margin = "    " * level
-        lines = [f"{margin}{self.declared(name)};" for name in self.scopes.at_start(body)]
+        lines: list[str] = []
+        for name in self.scopes.before.get(id(body), []):
+            kind = self.kinds[name]
+            if name in self.scopes.read and not is_empty(kind):
+                # A number begins as 0, so that no compiler fears for it.
+                begin = {typed.BOOL: " = false", FLOAT: " = 0.0"}
+                value = begin.get(kind, " = 0") if isinstance(kind, typed.Scalar) else ""
+                lines.append(f"{'    ' * level}{self.writer.type_name(kind)} {self.name(name)}{value};")
         for statement in body:
-            writer: Callable[..., Iterator[str]] = getattr(self, f"write_{type(statement).__name__.lower()}")
-            lines += writer(statement, level)
+            lines += self.statement(statement, level)
         return lines
 
-    def declared(self, name: str) -> str:
-        """A declaration without a value of its own: a number begins as 0, so that no compiler fears for it."""
-        kind = self.kinds[name]
-        begin = {"bool": " = false", "float": " = 0.0"}
-        value = begin.get(kind.name, " = 0") if isinstance(kind, typed.Scalar) else ""
-        return f"{self.writer.type_name(kind)} {self.name(name)}{value}"
+    def statement(self, item: Statement, level: int) -> Iterator[str]:
+        """A statement with its blocks, line by line."""
+        match item:
+            case typed.Assign():
+                yield from self.assignment(item, level)
+            case typed.Store():
+                yield from self.store(item, level)
+            case typed.Return():
+                yield from self.end(item, level)
+            case typed.Count():
+                yield from self.counted_loop(item, level)
+            case typed.If() | typed.While():
+                word = "while" if isinstance(item, typed.While) else "if"
+                yield from self.line(f"{word} ({self.terms.term(item.test)}) {{", level)
+                yield from self.block(item.body, level + 1)
+                if isinstance(item, typed.If) and item.otherwise:
+                    yield from self.line("} else {", level)
+                    yield from self.block(item.otherwise, level + 1)
+                yield from self.line("}", level)
+            case _:
+                yield from self.line(self.plain_line(item), level)
+
+    def plain_line(self, item: typed.Note | typed.Reserve | typed.Perform | typed.Leave) -> str:
+        """A statement that is one line as it stands."""
+        match item:
+            case typed.Note():
+                return _comment(item.text)
+            case typed.Reserve():
+                extents = "".join(f"[{extent}]" for extent in item.type.shape)
+                return f"PPAFO_ALIGNED double {self.name(item.name)}{extents};"
+            case typed.Perform():
+                name = self.writer.functions.get(item.function, item.function)
+                return f"{name}({', '.join(map(self.terms.term, item.given))});"
+            case typed.Leave():
+                return f"{item.word};"
 
     def line(self, text: str, level: int) -> Iterator[str]:
         yield from _wrapped("    " * level + text, "    " * (level + 1))
 
-    def write_assign(self, item: typed.Assign, level: int) -> Iterator[str]:
+    def assignment(self, item: typed.Assign, level: int) -> Iterator[str]:
+        """A name gets a value; a name that lives from here on is declared with it."""
         # What nobody reads is not written: a compiler would warn of it.
         if item.name in self.scopes.read and not is_empty(item.value.type):
             starts = self.scopes.first.get(id(item), "")
@@ -554,29 +572,20 @@ class _Body:
             value = self.terms.listed(item.value) if is_listed else self.terms.term(item.value)
             yield from self.line(f"{declared.replace('let ', '')}{self.name(item.name)} = {value};", level)
 
-    def write_note(self, item: typed.Note, level: int) -> Iterator[str]:
-        yield from self.line(_comment(item.text), level)
-
-    def write_reserve(self, item: typed.Reserve, level: int) -> Iterator[str]:
-        extents = "".join(f"[{extent}]" for extent in item.type.shape)
-        yield from self.line(f"PPAFO_ALIGNED double {self.name(item.name)}{extents};", level)
-
-    def write_store(self, item: typed.Store, level: int) -> Iterator[str]:
+    def store(self, item: typed.Store, level: int) -> Iterator[str]:
+        """An element of an array or a field of a row gets a value."""
         value = item.value
         # Member by member reads better, but only where no member is read on the right.
         is_read = self.writer.reading is not None and not value.reads & item.element.reads
         if is_read and value.kind == "build" and isinstance(value.type, Row):
             for (name, kind), part in zip(value.type.fields, value.parts, strict=True):
                 if not is_empty(kind):
-                    yield from self.write_store(typed.Store(Term("field", kind, (item.element,), name), part), level)
+                    yield from self.store(typed.Store(Term("field", kind, (item.element,), name), part), level)
             return
         yield from self.line(f"{self.terms.term(item.element)} = {self.terms.term(item.value)};", level)
 
-    def write_perform(self, item: typed.Perform, level: int) -> Iterator[str]:
-        name = self.writer.functions.get(item.function, item.function)
-        yield from self.line(f"{name}({', '.join(map(self.terms.term, item.given))});", level)
-
-    def write_return(self, item: typed.Return, level: int) -> Iterator[str]:
+    def end(self, item: typed.Return, level: int) -> Iterator[str]:
+        """The end of a function; where people read, a struct that is returned has a name."""
         if item.value.kind == "build" and self.writer.reading is not None:
             made = c_name("made", self.kinds, {*self.writer.outer, *map(self.name, self.kinds)})
             kind = self.writer.type_name(item.value.type)
@@ -585,23 +594,7 @@ class _Body:
             return
         yield from self.line(f"return {self.terms.term(item.value)};", level)
 
-    def write_leave(self, item: typed.Leave, level: int) -> Iterator[str]:
-        yield from self.line(f"{item.word};", level)
-
-    def write_if(self, item: typed.If, level: int) -> Iterator[str]:
-        yield from self.line(f"if ({self.terms.term(item.test)}) {{", level)
-        yield from self.block(item.body, level + 1)
-        if item.otherwise:
-            yield from self.line("} else {", level)
-            yield from self.block(item.otherwise, level + 1)
-        yield from self.line("}", level)
-
-    def write_while(self, item: typed.While, level: int) -> Iterator[str]:
-        yield from self.line(f"while ({self.terms.term(item.test)}) {{", level)
-        yield from self.block(item.body, level + 1)
-        yield from self.line("}", level)
-
-    def write_count(self, item: typed.Count, level: int) -> Iterator[str]:
+    def counted_loop(self, item: typed.Count, level: int) -> Iterator[str]:
         """A loop that counts; a name that lives beyond it gets the number from a counter of its own."""
         name = self.name(item.name)
         is_own = id(item) in self.scopes.counted or item.name not in self.scopes.read
@@ -632,14 +625,6 @@ def _together(members: Iterable[str]) -> list[str]:
     for kind, group in itertools.groupby((text.split(TIED) for text in members), key=lambda pair: pair[0]):
         lines += _wrapped(f"    {kind} {', '.join(pair[1] for pair in group)};", " " * 8)
     return lines
-
-
-def _inside(kind: Type) -> list[Type]:
-    """Types of what a row or tuple is made of that are no numbers."""
-    if isinstance(kind, Row):
-        kind = Items(tuple(item for _, item in kind.fields))
-    inner = kind.types if isinstance(kind, Items) else ()
-    return [item for item in inner if not isinstance(item, typed.Scalar) and not is_empty(item)]
 
 
 def _wrapped(line: str, further: str = "    ") -> list[str]:

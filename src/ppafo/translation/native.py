@@ -207,17 +207,16 @@ def load_entries(library: Path, entries: Entries) -> dict[str, NativeEntry]:
             "the compiler joins or reorders sums and products, so that results would differ from other compilers' "
             "(look for -ffp-contract or -ffast-math in its wrapper or in the environment)"
         )
-    return {name: _entry(loaded[f"{name}{_PACKED}"], types) for name, types in entries.items()}
-
-
-def _entry(function: Any, types: Sequence[Type]) -> NativeEntry:
-    # An array is a pointer and its extents; the rest of three extents is padding.
-    dimensions = tuple(kind.dimensions for kind in types if isinstance(kind, Array))
-    function.restype = None
-    function.argtypes = [ctypes.c_void_p, *(_NUMBERS[kind] for kind in types if isinstance(kind, Scalar))]
-    return NativeEntry(
-        function, dimensions, struct.Struct("".join(f"P{count}q{8 * (3 - count)}x" for count in dimensions))
-    )
+    found = {}
+    for name, types in entries.items():
+        function = loaded[f"{name}{_PACKED}"]
+        function.restype = None
+        function.argtypes = [ctypes.c_void_p, *(_NUMBERS[kind] for kind in types if isinstance(kind, Scalar))]
+        # An array is a pointer and its extents; the rest of three extents is padding.
+        dimensions = tuple(kind.dimensions for kind in types if isinstance(kind, Array))
+        layout = struct.Struct("".join(f"P{count}q{8 * (3 - count)}x" for count in dimensions))
+        found[name] = NativeEntry(function, dimensions, layout)
+    return found
 
 
 FOR_GCC = ("-fno-thread-jumps", "-fno-ssa-phiopt", "-fno-tree-pre", "--param", "sra-max-scalarization-size-Ospeed=4096")
@@ -284,22 +283,20 @@ class CCompiler:
         """Take a composed text to C and compile it; the library stays beside ``path`` where that is a place."""
         translated = translated_text(source)
         if Path(path).is_absolute():
-            self._build(translated, Path(path).parent)
+            _compiled(translated, Path(path).parent, self.command, self.flags)
             self.run_text(source, path, module)
             return
         try:
             # A loaded library may be removed on Unix; on Windows its file stays until the process ends.
             with tempfile.TemporaryDirectory(prefix="ppafo-", ignore_cleanup_errors=True) as folder:
-                _fill(module, self._build(translated, Path(folder)), entries_of(source))
+                library = _compiled(translated, Path(folder), self.command, self.flags)
+                _fill(module, library, entries_of(source))
         except OSError as error:
             raise CompilerError(f"what {self.name} makes cannot be kept for an instant: {reason(error)}") from error
 
     def run_text(self, source: str, path: str, module: ModuleType) -> None:
         """Load the library beside ``path``."""
         _fill(module, Path(path).with_name(_LIBRARY_FILE), entries_of(source))
-
-    def _build(self, source: str, folder: Path) -> Path:
-        return _compiled(source, folder, self.command, self.flags)
 
 
 def compiler(name: str) -> CCompiler:
@@ -383,14 +380,10 @@ def build(
     return module
 
 
-def _is_mounted_without_execution(folder: Path) -> bool:
-    # Windows has no such mounts, nor the flag.
-    return hasattr(os, "ST_NOEXEC") and bool(os.statvfs(folder).f_flag & os.ST_NOEXEC)
-
-
 def _compiled(source: str, folder: Path, command: Sequence[str], flags: Sequence[str]) -> Path:
     """The library that a compiler makes of C, in a folder."""
-    if _is_mounted_without_execution(folder):
+    # Windows has no mounts without execution, nor the flag.
+    if hasattr(os, "ST_NOEXEC") and os.statvfs(folder).f_flag & os.ST_NOEXEC:
         raise CompilerError(f"libraries in {folder.parent} cannot be loaded (it is mounted noexec)", *COMPILERS)
     written, library = folder / "program.c", folder / _LIBRARY_FILE
     written.write_text(source, encoding="utf-8")

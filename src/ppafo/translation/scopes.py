@@ -1,11 +1,11 @@
 """Which assignments of a function are needed, and where its names are declared: as far in and as late as can be."""
 
 import ast
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 
 from ppafo.translation import typed
-from ppafo.translation.typed import Function, Statement, Term, Type, is_empty
+from ppafo.translation.typed import Function, Statement, Term, Type
 
 Block = tuple[Statement, ...]
 
@@ -26,10 +26,6 @@ class Scopes:
     inside: dict[int, set[str]] = field(default_factory=dict)
     changes: dict[int, dict[str, int]] = field(default_factory=dict)
 
-    def at_start(self, body: Block) -> list[str]:
-        """Names that are declared before the first line of a block."""
-        return [name for name in self.before.get(id(body), []) if name in self.read and not is_empty(self.types[name])]
-
     def look(self, body: Block) -> tuple[set[str], dict[str, int]]:
         """Note which names each statement mentions, itself and in its blocks, and how often a block changes each."""
         every: set[str] = set()
@@ -44,8 +40,10 @@ class Scopes:
                 # Types were joined in the walk: each assignment of a name has the same one.
                 self.types[made[0]] = made[1]
                 changes[made[0]] = changes.get(made[0], 0) + 1
-            for name in _set_in(statement):
-                changes[name] = changes.get(name, 0) + 1
+            if isinstance(statement, typed.Store) and statement.element.kind != "element":
+                # A row of which a field is set changes too.
+                for name in statement.element.reads:
+                    changes[name] = changes.get(name, 0) + 1
             for inner in _blocks(statement):
                 names, inner_changes = self.look(inner)
                 within |= names
@@ -139,11 +137,6 @@ def needed(body: Block, after: frozenset[str], leaving: frozenset[str] = frozens
     return tuple(kept[::-1]), live
 
 
-def _names_of(statement: Statement) -> frozenset[str]:
-    """Names that a statement itself reads."""
-    return frozenset().union(*(term.reads for term in _terms(statement)))
-
-
 def scopes_of(function: Function) -> Scopes:
     """Where each local name of a function is declared."""
     found = Scopes()
@@ -168,12 +161,6 @@ def _made(statement: Statement) -> tuple[str, Type] | None:
     return (statement.name, typed.INT) if isinstance(statement, typed.Count) else None
 
 
-def _set_in(statement: Statement) -> frozenset[str]:
-    """The name of a row of which a statement sets a field."""
-    is_field = isinstance(statement, typed.Store) and statement.element.kind != "element"
-    return statement.element.reads if isinstance(statement, typed.Store) and is_field else frozenset()
-
-
 def _blocks(statement: Statement) -> list[Block]:
     """Blocks in a statement."""
     if isinstance(statement, typed.If):
@@ -181,17 +168,20 @@ def _blocks(statement: Statement) -> list[Block]:
     return [statement.body] if isinstance(statement, typed.Count | typed.While) else []
 
 
-def _terms(statement: Statement) -> list[Term]:
-    """Terms of a statement itself, not of its blocks."""
+def _names_of(statement: Statement) -> frozenset[str]:
+    """Names that a statement itself reads, not those of its blocks."""
+    terms: tuple[Term, ...] = ()
     if isinstance(statement, typed.Assign | typed.Return):
-        return [statement.value]
-    if isinstance(statement, typed.Store):
-        return [statement.element, statement.value]
-    if isinstance(statement, typed.Perform):
-        return list(statement.given)
-    if isinstance(statement, typed.Count):
-        return [statement.start, statement.stop]
-    return [statement.test] if isinstance(statement, typed.If | typed.While) else []
+        terms = (statement.value,)
+    elif isinstance(statement, typed.Store):
+        terms = statement.element, statement.value
+    elif isinstance(statement, typed.Perform):
+        terms = statement.given
+    elif isinstance(statement, typed.Count):
+        terms = statement.start, statement.stop
+    elif isinstance(statement, typed.If | typed.While):
+        terms = (statement.test,)
+    return frozenset().union(*(term.reads for term in terms))
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,29 +197,32 @@ class Names:
         """The names of a definition."""
         nodes = list(_nodes(definition))
         named = [node for node in nodes if isinstance(node, ast.Name)]
-        every = {node.id for node in named} | {node.arg for node in nodes if isinstance(node, ast.arg)}
+        every = {node.id for node in named}
         read = {node.id for node in named if isinstance(node.ctx, ast.Load)}
-        return cls(frozenset(every), frozenset(read), frozenset(_counters(nodes)))
+        # What counts holds nothing but the numbers of loops that count up from 0 or more.
+        loops = [node for node in nodes if isinstance(node, ast.For) and _counts_up(node)]
+        counting = [node.target.id for node in loops if isinstance(node.target, ast.Name)]
+        stored = [node.id for node in named if isinstance(node.ctx, ast.Store)]
+        given = {node.arg for node in nodes if isinstance(node, ast.arg)}
+        counters = {name for name in counting if counting.count(name) == stored.count(name)} - given
+        return cls(frozenset(every | given), frozenset(read), frozenset(counters))
 
 
 def changed(body: Iterable[ast.stmt]) -> set[str]:
     """Names that some statements give values."""
     found: set[str] = set()
     for statement in body:
+        targets: list[ast.expr] = []
         if isinstance(statement, ast.Assign):
-            found.update(
-                item.id for target in statement.targets for item in _parts(target) if isinstance(item, ast.Name)
-            )
+            targets = statement.targets
         elif isinstance(statement, ast.AugAssign | ast.For):
-            found.update(item.id for item in _parts(statement.target) if isinstance(item, ast.Name))
+            targets = [statement.target]
+        for target in targets:
+            parts = target.elts if isinstance(target, ast.Tuple) else [target]
+            found.update(part.id for part in parts if isinstance(part, ast.Name))
         if isinstance(statement, ast.If | ast.For | ast.While):
             found |= changed(statement.body) | changed(statement.orelse)
     return found
-
-
-def _parts(target: ast.expr) -> list[ast.expr]:
-    """What is on the left of an assignment, one by one."""
-    return target.elts if isinstance(target, ast.Tuple) else [target]
 
 
 def _nodes(definition: ast.FunctionDef) -> Iterator[ast.AST]:
@@ -254,15 +247,6 @@ def _nodes(definition: ast.FunctionDef) -> Iterator[ast.AST]:
 
 
 _WITH_PARTS = (ast.expr, ast.stmt, ast.arguments)
-
-
-def _counters(nodes: Sequence[ast.AST]) -> set[str]:
-    """Names that hold nothing but the numbers of loops that count up from 0 or more, of all nodes of a definition."""
-    loops = [node for node in nodes if isinstance(node, ast.For) and _counts_up(node)]
-    names = [node.target.id for node in loops if isinstance(node.target, ast.Name)]
-    given = [item.arg for item in nodes if isinstance(item, ast.arg)]
-    stored = [node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)]
-    return {name for name in names if names.count(name) == stored.count(name) and name not in given}
 
 
 def _counts_up(node: ast.For) -> bool:

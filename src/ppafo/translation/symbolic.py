@@ -40,10 +40,11 @@ _COMPARISONS: dict[str, Callable[[Any, Any], Any]] = {
     **{"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge},
     **{"==": operator.eq, "!=": operator.ne},
 }
-_ARITHMETIC: dict[str, Callable[[Any, Any], Any]] = {
+_ARITHMETIC: dict[str, Callable[..., Any]] = {
     **{"+": operator.add, "-": operator.sub, "*": operator.mul, "//": operator.floordiv, "%": operator.mod},
     **{"&": operator.and_, "|": operator.or_, "^": operator.xor, ">>": operator.rshift},
     "/": _quotient,
+    "negative": operator.neg,
 }
 _WHOLE_ONLY = frozenset({"//", "%", "&", "|", "^", ">>"})
 
@@ -103,7 +104,7 @@ def symbolic(
     rows = {effect.name: row for effect, row in (acting or {}).items()}
     effects = tuple(acting or ())
     # A function of the model that has changed since, as in a notebook, is walked again.
-    if not _walked(function, given, effects).collector.is_current():
+    if not _walked(function, given, effects).collector.made_from.is_current():
         _walked.cache_clear()
     walked = _walked(function, given, effects)
     return Symbolic(walked, before, compare, tuple(rows[name] for name in walked.collector.needs.get(walked.name, ())))
@@ -158,10 +159,8 @@ def _type_of(item: Any, collector: SourceCollector) -> Type:
     return Items(tuple(_type_of(kind, collector) for _, kind in members(item)))
 
 
-@lru_cache(maxsize=256)
-def _row_class(name: str, fields: tuple[str, ...]) -> Any:
-    """A class of rows whose fields hold expressions."""
-    return namedtuple(name, fields)
+_row_class: Callable[[str, tuple[str, ...]], Any] = lru_cache(maxsize=256)(namedtuple)
+"""Classes of rows whose fields hold expressions."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -224,40 +223,39 @@ class _Call:
         if term.kind in ("name", "number"):
             return names.get(term.detail) if term.kind == "name" else term.detail
         parts = [self.value(part, names) for part in term.parts]
+        match term.kind:
+            case "call":
+                found = self.home.result(self.home.walked.functions[term.detail], parts)
+            case "build" if isinstance(term.type, Row):
+                found = _row_class(term.type.name, tuple(name for name, _ in term.type.fields))(*parts)
+            case "build":
+                found = tuple(parts)
+            case "field":
+                found = getattr(parts[0], term.detail)
+            case "item":
+                found = parts[0][parts[1] if len(parts) > 1 else term.detail]
+            case "choice":
+                found = self.chosen(*parts)
+            case "min" | "max":
+                found = self.extreme(term, *parts)
+            case _:
+                found = self.calculated(term, parts)
+        return found
+
+    def calculated(self, term: Term, parts: list[Any]) -> Any:
+        """A number or truth value that is worked out from others."""
+        if term.kind in _COMPARISONS:
+            return self.compared(term.kind, parts[0], parts[1], _text(term))
+        if term.kind in ("and", "or"):
+            return _linked(term.kind, *parts)
         writer: Callable[..., Any] | None = getattr(self, f"_of_{term.kind}", None)
         if writer is not None:
             return writer(term, *parts)
-        if term.kind in _COMPARISONS:
-            return self.compared(term.kind, parts[0], parts[1], _text(term))
-        if term.kind in ("min", "max"):
-            return self.extreme(term, *parts)
-        if term.kind in ("and", "or"):
-            return _linked(term.kind, *parts)
         if term.kind not in _ARITHMETIC:
             raise self.refused(f"'{term.kind}' of the lane loop")
         if term.kind in _WHOLE_ONLY and not all(isinstance(part, int) for part in parts):
             raise self.refused(f"'{_text(term)}' of whole numbers")
         return _ARITHMETIC[term.kind](*parts)
-
-    def _of_call(self, term: Term, *given: Any) -> Any:
-        return self.home.result(self.home.walked.functions[term.detail], list(given))
-
-    def _of_build(self, term: Term, *parts: Any) -> Any:
-        if not isinstance(term.type, Row):
-            return parts
-        return _row_class(term.type.name, tuple(name for name, _ in term.type.fields))(*parts)
-
-    def _of_field(self, term: Term, owner: Any) -> Any:
-        return getattr(owner, term.detail)
-
-    def _of_item(self, term: Term, owner: Any, place: int | None = None) -> Any:
-        return owner[term.detail if place is None else place]
-
-    def _of_choice(self, _term: Term, test: Any, yes: Any, no: Any) -> Any:
-        return self.chosen(test, yes, no)
-
-    def _of_negative(self, _term: Term, given: Any) -> Any:
-        return -given
 
     def _of_not(self, _term: Term, given: Any) -> Any:
         import casadi

@@ -213,16 +213,12 @@ class Module:
 
 def is_empty(kind: Type) -> bool:
     """True for what holds no number: a function, a row or a tuple of nothing."""
-    if isinstance(kind, Row):
-        return all(is_empty(inner) for _, inner in kind.fields)
-    if isinstance(kind, Items):
-        return all(map(is_empty, kind.types))
-    return isinstance(kind, Handed)
+    return all(map(is_empty, types_in(kind))) if isinstance(kind, Items | Row) else isinstance(kind, Handed)
 
 
-def count_of(kind: Items | Row) -> int:
-    """Items of a tuple, or fields of a row."""
-    return len(kind.types) if isinstance(kind, Items) else len(kind.fields)
+def types_in(kind: Items | Row) -> tuple[Type, ...]:
+    """Types of the items of a tuple, or of the fields of a row."""
+    return kind.types if isinstance(kind, Items) else tuple(inner for _, inner in kind.fields)
 
 
 def joined(one: Type, other: Type) -> Type | None:
@@ -247,10 +243,8 @@ def mixes(one: Type, other: Type) -> bool:
     """True where one has a whole number or truth value in the place of a float: -0 and large ones would differ."""
     if isinstance(one, Scalar) and isinstance(other, Scalar):
         return one != other and FLOAT in (one, other)
-    if isinstance(one, Row) and isinstance(other, Row):
-        return any(mixes(inner, outer) for (_, inner), (_, outer) in zip(one.fields, other.fields, strict=True))
-    if isinstance(one, Items) and isinstance(other, Items):
-        return any(mixes(*pair) for pair in zip(one.types, other.types, strict=True))
+    if isinstance(one, Items | Row) and isinstance(other, Items | Row):
+        return any(mixes(*pair) for pair in zip(types_in(one), types_in(other), strict=True))
     return False
 
 
@@ -262,17 +256,9 @@ def converted(term: Term, kind: Type) -> Term:
         if term.kind == "number":
             return Term("number", kind, (), float(term.detail) if kind == FLOAT else int(term.detail))
         return Term("convert", kind, (term,))
-    return Term("build", kind, tuple(converted(part, inner) for part, inner in parts_of(term, kind)))
-
-
-def parts_of(term: Term, kind: Type) -> list[tuple[Term, Type]]:
-    """The values in a row or tuple, each with the type that it has in another one of the same form."""
-    if isinstance(term.type, Row) and isinstance(kind, Row):
-        pairs = zip(term.type.fields, kind.fields, strict=True)
-        return [(field_of(term, name), inner) for (name, _), (_, inner) in pairs]
-    assert isinstance(term.type, Items)
-    assert isinstance(kind, Items)
-    return [(item_of(term, place), inner) for place, inner in enumerate(kind.types)]
+    assert isinstance(kind, Items | Row)
+    parts = (converted(item_of(term, place), inner) for place, inner in enumerate(types_in(kind)))
+    return Term("build", kind, tuple(parts))
 
 
 def field_of(term: Term, name: str) -> Term:

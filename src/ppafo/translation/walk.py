@@ -9,6 +9,7 @@ import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field
+from itertools import chain
 from typing import Any
 
 from ppafo.engine.plain_python import parse_module, place_in, refusal
@@ -33,10 +34,10 @@ from ppafo.translation.typed import (
     Term,
     Type,
     converted,
-    count_of,
     entries_of,
     is_empty,
     joined,
+    types_in,
 )
 
 SIGN_OF: dict[type[ast.AST], str] = {
@@ -151,7 +152,7 @@ class Expressions:
             return self.element(owner, owner.type, node)
         if not isinstance(owner.type, Items | Row):
             raise self.refused(node, f"'{ast.unparse(node.value)}' has no items")
-        count = count_of(owner.type)
+        count = len(types_in(owner.type))
         if isinstance(node.slice, ast.Slice):
             parts = tuple(typed.item_of(owner, place) for place in range(count)[self.part(node.slice)])
             return Term("build", Items(tuple(part.type for part in parts)), parts)
@@ -170,7 +171,14 @@ class Expressions:
         if owner.kind != "name":
             raise self.refused(node, f"'{ast.unparse(node)}' is taken of an array without a name")
         if isinstance(node.slice, ast.Slice):
-            return self.part_of_array(owner, kind, node.slice)
+            begin, end = node.slice.lower, node.slice.upper
+            if begin is None or end is None or node.slice.step is not None or kind.shape:
+                problem = f"'{ast.unparse(node.slice)}' is not from one place of an array up to another"
+                raise self.refused(node.slice, problem)
+            # These are in it: what is beyond is not looked for.
+            count = Term("extent", INT, (owner,), 0)
+            bounds = (self.from_start(self.whole(item), count) for item in (begin, end))
+            return Term("part", Array(kind.dimensions), (owner, *bounds))
         places = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
         extents = kind.shape or (None,) * kind.dimensions
         if len(places) != len(extents):
@@ -180,14 +188,6 @@ class Expressions:
             count = Term("extent", INT, (owner,), at) if extent is None else Term("number", INT, (), extent)
             given.append(self.from_start(self.whole(place), count))
         return Term("element", FLOAT, (owner, *given))
-
-    def part_of_array(self, owner: Term, kind: Array, node: ast.Slice) -> Term:
-        """The places of an array from one up to another, which are in it: what is beyond is not looked for."""
-        if node.lower is None or node.upper is None or node.step is not None or kind.shape:
-            raise self.refused(node, f"'{ast.unparse(node)}' is not from one place of an array up to another")
-        count = Term("extent", INT, (owner,), 0)
-        first, beyond = (self.from_start(self.whole(item), count) for item in (node.lower, node.upper))
-        return Term("part", Array(kind.dimensions), (owner, first, beyond))
 
     def from_start(self, place: Term, count: Term) -> Term:
         """A place counted from the start, where Python counts a negative one from the end."""
@@ -211,17 +211,17 @@ class Expressions:
         return item.kind == "extent" or (item.kind == "convert" and item.parts[0].type == BOOL)
 
     def _of_tuple(self, node: ast.Tuple) -> Term:
-        parts = tuple(part for item in node.elts for part in self.items(item))
-        return Term("build", Items(tuple(part.type for part in parts)), parts)
-
-    def items(self, node: ast.expr) -> list[Term]:
-        """What an item of a tuple that is written out stands for: itself, or with a star all that it holds."""
-        if not isinstance(node, ast.Starred):
-            return [self.term(node)]
-        whole = self.term(node.value)
-        if not isinstance(whole.type, Items | Row):
-            raise self.refused(node, f"'{ast.unparse(node)}' is no tuple")
-        return [typed.item_of(whole, place) for place in range(count_of(whole.type))]
+        parts: list[Term] = []
+        for item in node.elts:
+            if not isinstance(item, ast.Starred):
+                parts.append(self.term(item))
+                continue
+            # With a star it stands for all that it holds.
+            whole = self.term(item.value)
+            if not isinstance(whole.type, Items | Row):
+                raise self.refused(item, f"'{ast.unparse(item)}' is no tuple")
+            parts += [typed.item_of(whole, place) for place in range(len(types_in(whole.type)))]
+        return Term("build", Items(tuple(part.type for part in parts)), tuple(parts))
 
     def _of_unaryop(self, node: ast.UnaryOp) -> Term:
         if isinstance(node.op, ast.Not):
@@ -233,7 +233,12 @@ class Expressions:
 
     def _of_binop(self, node: ast.BinOp) -> Term:
         if isinstance(node.op, ast.Pow) and "pow" in self.library:
-            return self.power(node)
+            parts = tuple(self.scalar(item, FLOAT) for item in (node.left, node.right))
+            # Compilers replace powers of literals by products or roots, whose last bits differ from the library's.
+            if any((part.parts[0] if part.kind == "negative" else part).kind == "number" for part in parts):
+                problem = "a power of a number or by a number that is written out"
+                raise self.refused(node, f"'{ast.unparse(node)}', {problem}")
+            return Term("pow", FLOAT, parts)
         sign = SIGN_OF.get(type(node.op), "")
         left, right = self.scalar(node.left, INT), self.scalar(node.right, INT)
         is_whole = left.type == right.type == INT
@@ -244,14 +249,6 @@ class Expressions:
             raise self.refused(node, f"'{ast.unparse(node)}' shifts by what is not written out as 0 to 63")
         kind = INT if is_whole and sign != "/" else FLOAT
         return Term(sign, kind, (converted(left, kind), converted(right, kind)))
-
-    def power(self, node: ast.BinOp) -> Term:
-        """A power of floats; compilers make something else of one whose base or exponent they see."""
-        parts = tuple(self.scalar(item, FLOAT) for item in (node.left, node.right))
-        # Compilers replace powers of literals by products or roots, whose last bits differ from the library's.
-        if any((part.parts[0] if part.kind == "negative" else part).kind == "number" for part in parts):
-            raise self.refused(node, f"'{ast.unparse(node)}', a power of a number or by a number that is written out")
-        return Term("pow", FLOAT, parts)
 
     def _of_boolop(self, node: ast.BoolOp) -> Term:
         parts = [self.term(item) for item in node.values]
@@ -305,23 +302,19 @@ class Expressions:
     def _of_call(self, node: ast.Call) -> Term:
         name = self.name_called(node)
         if name in self.rows:
-            return self.build(name, node)
+            fields = self.rows[name]
+            stated = dict(zip(fields, map(self.term, node.args), strict=False))
+            stated |= {str(item.arg): self.term(item.value) for item in node.keywords}
+            if set(stated) != set(fields):
+                raise self.refused(node, f"'{ast.unparse(node)}' does not give every field")
+            parts = tuple(stated[item] for item in fields)
+            return Term("build", Row(name, tuple(zip(fields, (part.type for part in parts), strict=True))), parts)
         if name in self.definitions:
             function, given = self.called(name, node)
             if function.returns is None:
                 raise self.refused(node, f"'{name}' returns nothing")
             return Term("call", function.returns, given, function.name)
         return self.built_in(name, node)
-
-    def build(self, name: str, node: ast.Call) -> Term:
-        """A row from its fields."""
-        fields = self.rows[name]
-        given = dict(zip(fields, map(self.term, node.args), strict=False))
-        given |= {str(item.arg): self.term(item.value) for item in node.keywords}
-        if set(given) != set(fields):
-            raise self.refused(node, f"'{ast.unparse(node)}' does not give every field")
-        parts = tuple(given[item] for item in fields)
-        return Term("build", Row(name, tuple((item, given[item].type) for item in fields)), parts)
 
     def called(self, name: str, node: ast.Call) -> tuple[Function, tuple[Term, ...]]:
         """Another function of the module that is called, and what it is handed."""
@@ -356,23 +349,16 @@ class Expressions:
             kind = self.term(node.args[0]).type
             if not isinstance(kind, Items | Row):
                 raise self.refused(node, f"'{ast.unparse(node.args[0])}' has no items")
-            return Term("number", INT, (), count_of(kind))
+            return Term("number", INT, (), len(types_in(kind)))
         if own == "bool":
             return self.condition(node.args[0])
-        values = [self.scalar(item, least) for item in node.args]
-        if own == "float":
-            return values[0]
-        if own == "int":
-            return values[0] if values[0].type == INT else Term("convert", INT, (values[0],))
-        return self.joined_by(own, values, node)
-
-    def joined_by(self, own: str, values: list[Term], node: ast.Call) -> Term:
-        """The size or root of one number, or the smallest or largest of several of one type."""
+        made, *others = [self.scalar(item, least) for item in node.args]
+        kind = made.type
+        if own in ("float", "int"):
+            return made if own == "float" or kind == INT else Term("convert", INT, (made,))
         # Python's min returns the number as it is, an int or a float: C has one type for both.
-        if len({value.type for value in values}) > 1:
+        if any(other.type != kind for other in others):
             raise self.refused(node, f"'{ast.unparse(node)}', a choice between a whole number and a float")
-        kind = values[0].type
-        made, *others = [converted(value, kind) for value in values]
         if not others:
             return Term(own, kind, (made,))
         for other in others:
@@ -470,6 +456,7 @@ class _FunctionWalk:
 
     def __init__(self, module: _ModuleWalk, definition: ast.FunctionDef) -> None:
         self.module = module
+        self.refused = module.refused
         self.definition = definition
         self.types: dict[str, Type] = {}
         if definition.name not in module.found:
@@ -518,22 +505,30 @@ class _FunctionWalk:
         is_entry = self.returns is None and self.module.entries.get(self.definition.name) == types
         return Function(name, self.definition.name, kept, self.returns, needed(body, frozenset())[0], bound, is_entry)
 
-    def refused(self, where: ast.AST, problem: str) -> ProgramError:
-        """The error for a place in this function."""
-        return self.module.refused(where, problem)
-
     def block(self, body: Sequence[ast.stmt]) -> tuple[Statement, ...]:
         """Some statements."""
-        found: list[Statement] = []
-        for node in body:
-            handler: Callable[[Any], list[Statement]] | None = getattr(self, f"do_{type(node).__name__.lower()}", None)
-            if handler is None:
-                raise self.refused(node, f"'{ast.unparse(node).splitlines()[0]}' is no statement of the subset")
-            found += handler(node)
-        return tuple(found)
+        return tuple(chain.from_iterable(map(self.statement, body)))
 
-    def do_pass(self, _node: ast.Pass) -> list[Statement]:
-        return []
+    def statement(self, node: ast.stmt) -> list[Statement]:
+        """What a statement of Python becomes."""
+        match node:
+            case ast.Pass():
+                return []
+            case ast.Continue():
+                return [typed.Leave("continue")]
+            case ast.Break():
+                marks = [self.assign(self.flag, Term("number", BOOL, (), True), node)] if self.flag else []
+                return [*marks, typed.Leave("break")]
+            case ast.If():
+                test = self.values.condition(node.test)
+                return [typed.If(test, self.block(node.body), self.block(node.orelse))]
+            case ast.While():
+                lasting = self.values.condition(node.test)
+                return self.loop(node, lambda: typed.While(lasting, self.block(node.body)))
+        handler: Callable[[Any], list[Statement]] | None = getattr(self, f"do_{type(node).__name__.lower()}", None)
+        if handler is None:
+            raise self.refused(node, f"'{ast.unparse(node).splitlines()[0]}' is no statement of the subset")
+        return handler(node)
 
     def do_expr(self, node: ast.Expr) -> list[Statement]:
         if isinstance(node.value, ast.Constant):
@@ -547,13 +542,6 @@ class _FunctionWalk:
         self.writes = node
         return [typed.Perform(function.name, given)]
 
-    def do_break(self, node: ast.Break) -> list[Statement]:
-        marks = [self.assign(self.flag, Term("number", BOOL, (), True), node)] if self.flag else []
-        return [*marks, typed.Leave("break")]
-
-    def do_continue(self, _node: ast.Continue) -> list[Statement]:
-        return [typed.Leave("continue")]
-
     def do_return(self, node: ast.Return) -> list[Statement]:
         if node.value is None:
             raise self.refused(node, "'return' without a value")
@@ -566,14 +554,6 @@ class _FunctionWalk:
         self.has_widened |= self.returns is not None and kind != self.returns
         self.returns = kind
         return [typed.Return(converted(value, kind))]
-
-    def do_if(self, node: ast.If) -> list[Statement]:
-        test = self.values.condition(node.test)
-        return [typed.If(test, self.block(node.body), self.block(node.orelse))]
-
-    def do_while(self, node: ast.While) -> list[Statement]:
-        test = self.values.condition(node.test)
-        return self.loop(node, lambda: typed.While(test, self.block(node.body)))
 
     def do_for(self, node: ast.For) -> list[Statement]:
         if not isinstance(node.target, ast.Name):
@@ -640,10 +620,15 @@ class _FunctionWalk:
     def do_assign(self, node: ast.Assign) -> list[Statement]:
         if len(node.targets) != 1:
             raise self.refused(node, "one value for several names")
-        target = node.targets[0]
-        if isinstance(target, ast.Name) and isinstance(node.value, ast.Call) and _is_empty_array(node.value):
-            return [self.reserve(target.id, node.value)]
-        value = self.values.term(node.value)
+        target, given = node.targets[0], node.value
+        called = given.func if isinstance(given, ast.Call) else None
+        if isinstance(target, ast.Name) and isinstance(called, ast.Name) and called.id == "empty_rows":
+            # A local array, whose shape is a literal.
+            assert isinstance(given, ast.Call)
+            kind = Array(2, tuple(map(ast.literal_eval, given.args)))
+            self.note_type(target.id, kind, given)
+            return [typed.Reserve(target.id, kind)]
+        value = self.values.term(given)
         return (
             self.assign_items(target, value, node) if isinstance(target, ast.Tuple) else self.put(target, value, node)
         )
@@ -677,12 +662,6 @@ class _FunctionWalk:
             self.writes = target
         return typed.Store(element, converted(value, element.type))
 
-    def reserve(self, name: str, node: ast.Call) -> Statement:
-        """A local array, whose shape is a literal."""
-        kind = Array(2, tuple(ast.literal_eval(extent) for extent in node.args))
-        self.note_type(name, kind, node)
-        return typed.Reserve(name, kind)
-
     def assign(self, name: str, value: Term, node: ast.AST) -> Statement:
         """A name gets a value, as the type that holds all that it ever gets."""
         self.note_type(name, value.type, node)
@@ -711,8 +690,7 @@ class _FunctionWalk:
         names = [item.id for item in target.elts if isinstance(item, ast.Name)]
         is_stored = len(names) < len(target.elts)
         kind = value.type
-        length = len(kind.types) if isinstance(kind, Items) else len(kind.fields) if isinstance(kind, Row) else -1
-        if length != len(target.elts):
+        if not isinstance(kind, Items | Row) or len(types_in(kind)) != len(target.elts):
             raise self.refused(node, f"'{ast.unparse(target)}' does not fit what is on the right")
         before: list[Statement] = []
         if value.kind != "build" or value.reads & set(names) or (is_stored and value.reads):
@@ -725,8 +703,3 @@ class _FunctionWalk:
             if not isinstance(item, ast.Name) or item.id in self.read
             for statement in self.put(item, typed.item_of(value, at), node)
         ]
-
-
-def _is_empty_array(node: ast.Call) -> bool:
-    """True for ``empty_rows(...)``."""
-    return isinstance(node.func, ast.Name) and node.func.id == "empty_rows"

@@ -10,7 +10,20 @@ from typing import NamedTuple, TypeAlias
 
 from ppafo.errors import ProgramError
 from ppafo.translation import typed
-from ppafo.translation.typed import BOOL, INT, INT16, INT32, Function, Items, Module, Row, Statement, Term, Type
+from ppafo.translation.typed import (
+    BOOL,
+    INT,
+    INT16,
+    INT32,
+    Function,
+    Items,
+    Module,
+    Row,
+    Statement,
+    Term,
+    Type,
+    types_in,
+)
 
 # Loops are gone through turn by turn: more would take long, and no fixed-point law has them.
 MOST_TURNS = 64
@@ -105,8 +118,7 @@ class _Ranges:
         if isinstance(kind, Row | Items):
             assert not isinstance(value, Interval)
             self.parts[kind] = hull(self.parts.get(kind, value), value)
-            inner = [inner for _, inner in kind.fields] if isinstance(kind, Row) else kind.types
-            for part, own in zip(inner, value, strict=True):
+            for part, own in zip(types_in(kind), value, strict=True):
                 self.note(part, own)
 
     def run(self, item: Function, body: tuple[Statement, ...], names: Names, found: list[Range]) -> None:
@@ -130,7 +142,9 @@ class _Ranges:
 
     def count(self, item: Function, loop: typed.Count, names: Names, found: list[Range]) -> None:
         """A loop, turn by turn: after it names hold what they may hold after any number of turns that it can take."""
-        start, stop = (self.number(item, part, names) for part in (loop.start, loop.stop))
+        start, stop = (self.value(item, part, names) for part in (loop.start, loop.stop))
+        assert isinstance(start, Interval)
+        assert isinstance(stop, Interval)
         if start.low != start.high or stop.high - start.low > MOST_TURNS:
             raise _refused(item, f"a loop of more than {MOST_TURNS} turns, or whose beginning is not written out")
         # A loop without a turn leaves the counter as it was; it has a width all the same.
@@ -148,23 +162,6 @@ class _Ranges:
 
     def value(self, item: Function, term: Term, names: Names) -> Range:
         """The range of a term; kept is the range over all times that it is worked out."""
-        found = self.found(item, term, names)
-        self.note(term.type, found)
-        if isinstance(found, Interval):
-            # A term in a loop or in a function that is called twice is worked out for several ranges.
-            known = self.terms.get(id(term), found)
-            self.terms[id(term)] = whole = Interval(min(known.low, found.low), max(known.high, found.high))
-            if term.type == INT and _width(whole) is None:
-                raise _refused(item, f"a value from {whole.low} to {whole.high}, beyond 32 bits")
-        return found
-
-    def number(self, item: Function, term: Term, names: Names) -> Interval:
-        found = self.value(item, term, names)
-        assert isinstance(found, Interval)
-        return found
-
-    def found(self, item: Function, term: Term, names: Names) -> Range:
-        """What a term of each kind comes to."""
         parts = tuple(self.value(item, part, names) for part in term.parts)
         if term.kind == "name":
             found = names[term.detail]
@@ -182,6 +179,13 @@ class _Ranges:
             found = hull(parts[1], parts[2])
         else:
             found = _calculated(item, term, [part for part in parts if isinstance(part, Interval)])
+        self.note(term.type, found)
+        if isinstance(found, Interval):
+            # A term in a loop or in a function that is called twice is worked out for several ranges.
+            known = self.terms.get(id(term), found)
+            self.terms[id(term)] = every = Interval(min(known.low, found.low), max(known.high, found.high))
+            if term.type == INT and _width(every) is None:
+                raise _refused(item, f"a value from {every.low} to {every.high}, beyond 32 bits")
         return found
 
 
@@ -256,26 +260,29 @@ class _Narrowing:
         return self.type_of(kind, self.ranges.names[self.item.name, name])
 
     def block(self, body: tuple[Statement, ...], returns: Type) -> tuple[Statement, ...]:
-        """Some statements; what was never gone through cannot happen and is left out."""
-        return tuple(self.statement(item, returns) for item in body)
-
-    def statement(self, item: Statement, returns: Type) -> Statement:
-        if isinstance(item, typed.Assign):
-            return typed.Assign(item.name, converted(self.term(item.value), self.of_name(item.name, item.value.type)))
-        if isinstance(item, typed.Return):
-            return typed.Return(converted(self.term(item.value), returns))
-        if isinstance(item, typed.If):
-            bodies = (self.block(body, returns) for body in (item.body, item.otherwise))
-            return typed.If(self.term(item.test), *bodies)
-        assert isinstance(item, typed.Count)
-        kind = self.of_name(item.name, INT)
-        start, stop = (converted(self.term(part), kind) for part in (item.start, item.stop))
-        return typed.Count(item.name, start, stop, item.step, self.block(item.body, returns))
+        """Some statements, with widths."""
+        made: list[Statement] = []
+        for item in body:
+            if isinstance(item, typed.Assign):
+                kind = self.of_name(item.name, item.value.type)
+                made.append(typed.Assign(item.name, converted(self.term(item.value), kind)))
+            elif isinstance(item, typed.Return):
+                made.append(typed.Return(converted(self.term(item.value), returns)))
+            elif isinstance(item, typed.If):
+                bodies = (self.block(inner, returns) for inner in (item.body, item.otherwise))
+                made.append(typed.If(self.term(item.test), *bodies))
+            else:
+                assert isinstance(item, typed.Count)
+                kind = self.of_name(item.name, INT)
+                start, stop = (converted(self.term(part), kind) for part in (item.start, item.stop))
+                made.append(typed.Count(item.name, start, stop, item.step, self.block(item.body, returns)))
+        return tuple(made)
 
     def term(self, term: Term) -> Term:
         """A term with a width that holds its value and all that it is worked out from."""
         if term.kind == "call":
-            wanted = [kind for _, kind in _Narrowing(self.ranges, self.ranges.functions[term.detail]).parameters()]
+            callee = _Narrowing(self.ranges, self.ranges.functions[term.detail])
+            wanted = [callee.of_name(*parameter) for parameter in callee.item.parameters]
             parts = tuple(converted(self.term(part), kind) for part, kind in zip(term.parts, wanted, strict=True))
             found = self.ranges.returned[term.detail]
             return replace(term, type=self.type_of(term.type, found), parts=parts)
@@ -284,17 +291,14 @@ class _Narrowing:
         parts = tuple(map(self.term, term.parts))
         if term.kind in ("field", "item"):
             owner = parts[0].type
+            assert isinstance(owner, Items | Row)
             kind = dict(owner.fields)[term.detail] if isinstance(owner, Row) else None
-            return replace(term, type=kind or _types(owner)[term.detail], parts=parts)
+            return replace(term, type=kind or types_in(owner)[term.detail], parts=parts)
         if term.kind == "build":
             whole = self.type_of(term.type, self.ranges.parts[term.type])
-            inner = [own for _, own in whole.fields] if isinstance(whole, Row) else _types(whole)
-            return replace(term, type=whole, parts=tuple(map(converted, parts, inner)))
+            assert isinstance(whole, Items | Row)
+            return replace(term, type=whole, parts=tuple(map(converted, parts, types_in(whole))))
         return self.calculated(term, parts)
-
-    def parameters(self) -> list[tuple[str, Type]]:
-        """Parameters with widths."""
-        return [(name, self.of_name(name, kind)) for name, kind in self.item.parameters]
 
     def calculated(self, term: Term, parts: tuple[Term, ...]) -> Term:
         """A term that works something out, in the widest type of its parts and its value."""
@@ -315,11 +319,6 @@ class _Narrowing:
         elif term.kind == "choice" and not isinstance(term.type, typed.Scalar):
             own = whole[0].type
         return replace(term, type=own, parts=(*parts[: len(parts) - len(whole)], *whole))
-
-
-def _types(kind: Type) -> tuple[Type, ...]:
-    assert isinstance(kind, Items)
-    return kind.types
 
 
 def converted(term: Term, kind: Type) -> Term:

@@ -18,7 +18,7 @@ from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import SimulationError
 from ppafo.model import orifice
 from ppafo.model.valves.proportional import IDEAL
-from tests.judge.reference_slopes import right_hand_side_source
+from tests.reference.reference_slopes import right_hand_side_source
 
 START = """
 import sys, time

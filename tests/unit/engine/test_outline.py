@@ -78,7 +78,7 @@ def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], ty
 def outlined(function: Any) -> str:
     outline = Outline("")
     assert outline.add(function) == SourceCollector("").add(function)
-    assert outline.is_current()
+    assert outline.made_from.is_current()
     return outline.text()
 
 
@@ -175,9 +175,9 @@ def test_a_rebound_name_is_noticed(write: Callable[[str], types.ModuleType]) -> 
     module = write(LAW)
     outline = Outline("")
     outline.add(module.law)
-    assert outline.is_current()
+    assert outline.made_from.is_current()
     module.__dict__["GAIN"] = 5.0
-    assert not outline.is_current()
+    assert not outline.made_from.is_current()
 
 
 def outline_of(program: Program, count: int = 0) -> str:
@@ -216,8 +216,8 @@ def test_another_law_or_another_number_of_lanes_is_another_program() -> None:
 def test_every_function_of_a_program_that_changes_gives_another_program(monkeypatch: pytest.MonkeyPatch) -> None:
     outline = Outline(INLINE)
     before = write_lanes(PROGRAM, outline)
-    assert len(outline.functions) > 30
-    for made in outline.functions:
+    assert len(outline.made_from.functions) > 30
+    for made in outline.made_from.functions:
         with monkeypatch.context() as patch:
             patch.setattr(made.function, "__code__", (lambda *_given: 0.0).__code__)
             assert outline_of(PROGRAM) != before, made.function.__qualname__

@@ -12,7 +12,7 @@ from ppafo.engine.run import Run
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from tests.compilers_here import compilers_here
-from tests.judge.reference_solver import load_right_hand_side, solve_reference
+from tests.reference.reference_solver import load_right_hand_side, solve_reference
 
 POINTS = 2000
 THERMAL = (

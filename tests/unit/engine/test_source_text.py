@@ -388,9 +388,9 @@ def test_a_rebound_number_or_function_is_noticed(write: Write) -> None:
         module = write(text)
         collector = SourceCollector("")
         collector.add(module.law)
-        assert collector.is_current()
+        assert collector.made_from.is_current()
         exec(change, vars(module))
-        assert not collector.is_current(), change
+        assert not collector.made_from.is_current(), change
 
 
 def compiled_law(module: types.ModuleType, call: str = "law(measurement, x[0])") -> None:

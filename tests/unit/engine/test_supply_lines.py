@@ -36,7 +36,7 @@ from ppafo.model.regulator import LineState, SupplyLines, line_pressures
 from ppafo.parameters import load_device
 from ppafo.parameters.plant import plant_parameters
 from ppafo.simulation.scenario import RegulatedLine, SupplyLine
-from ppafo.simulation.supply_lines import initial_lines
+from ppafo.simulation.supply_lines import lines_at_start
 from ppafo.walking import load_walk
 from ppafo.walking.motion import with_duration
 from ppafo.walking.planning import plan_walk
@@ -61,13 +61,6 @@ class Filled(NamedTuple):
     lines: LineState
 
 
-def full_lines(plant: PlantParameters, lines: SupplyLines) -> LineState:
-    """Both lines as a run begins with them."""
-    given = initial_lines(plant, lines)
-    assert given is not None
-    return given.initial
-
-
 def open_ports(plant: PlantParameters) -> tuple[SinglePort, SinglePort]:
     """Both chambers joined to their supplies."""
     port_1 = SinglePort(plant.valve_conductance, plant.supply_pressure, 1.0, 1.0)
@@ -88,7 +81,7 @@ def end_of(plant: PlantParameters, begun: MovingGas, ports: tuple[SinglePort, Si
 
 def filled(plant: PlantParameters, lines: SupplyLines, step: float) -> Filled:
     """Both chambers filled at once from full lines, the vane held."""
-    state, gas = vented_state(plant, ANGLE, 0.0), full_lines(plant, lines)
+    state, gas = vented_state(plant, ANGLE, 0.0), lines_at_start(plant, lines)
     for _ in range(round(DURATION / step)):
         ports = open_ports(plant_at_line_pressures(plant, lines, gas))
         begun = begin_fed_gas(plant, lines, gas, state, ANGLE, flowing_now(plant, state, ports), step)
@@ -124,7 +117,7 @@ def solved(dorsiflexion: float, lines: SupplyLines) -> tuple[float, ...]:
         second = regulator_flow(level, line_2, lines.droop_2, lines.largest_flow_2)
         return [fed_1 - leak, fed_2 + leak, bottle - second - fed_1, second - fed_2, bottle]
 
-    begin, gas = vented_state(plant, ANGLE, 0.0), full_lines(plant, lines)
+    begin, gas = vented_state(plant, ANGLE, 0.0), lines_at_start(plant, lines)
     start = [begin.mass_1, begin.mass_2, gas.mass_1, gas.mass_2, 0.0]
     solution = solve_ivp(rates, (0.0, DURATION), start, method="Radau", rtol=1e-10, atol=1e-15, max_step=1e-4)
     assert solution.success
@@ -161,7 +154,7 @@ def test_a_filling_with_largest_flows_comes_to_that_of_the_solver() -> None:
 @pytest.mark.parametrize("step", [1.0e-3, 1.0e-4])
 def test_what_came_through_is_in_lines_and_chambers(step: float) -> None:
     plant = device()
-    made, full, begin = filled(plant, LINES, step), full_lines(plant, LINES), vented_state(plant, ANGLE, 0.0)
+    made, full, begin = filled(plant, LINES, step), lines_at_start(plant, LINES), vented_state(plant, ANGLE, 0.0)
     gained = made.state.mass_1 - begin.mass_1 + made.state.mass_2 - begin.mass_2
     gained += made.lines.mass_1 - full.mass_1 + made.lines.mass_2 - full.mass_2
     assert made.lines.regulated_mass == pytest.approx(gained, rel=1e-12)

@@ -65,7 +65,7 @@ def test_an_empty_bottle_runs_and_gives_nothing(name: str) -> None:
 
 def test_a_leaking_step_with_an_empty_bottle_agrees_with_the_reference_solver() -> None:
     pytest.importorskip("sksundae", reason="the reference solver needs scikit-sundae")
-    from tests.judge.reference_solver import compare_with_reference
+    from tests.reference.reference_solver import compare_with_reference
 
     filled = ("initial.pressure_1=30 psi_g", "run.duration=0.3 s")
     agreement = compare_with_reference(plan_run(ppafo.load_scenario("step-response", [*EMPTY, *filled])))

@@ -24,7 +24,7 @@ from ppafo.simulation.numbers import check_columns
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import FreeMotion, Scenario
 from ppafo.simulation.simulate import simulate
-from tests.judge.reference_solver import compare_with_reference
+from tests.reference.reference_solver import compare_with_reference
 
 GAIT = "falisse2019-subject1"
 OPEN = {"kind": "constant", "command": 1, "rate": "1 kHz"}

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 
 from ppafo.errors import ParameterError, PpafoError, ScenarioError
 from ppafo.loading import reloaded
+from ppafo.simulation.declaration import OF_A_VANE
 from ppafo.simulation.loading import (
     device_paths,
     load_scenario,
     scenario_from_dict,
-    scenario_paths,
     split_override,
 )
 from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, ProfileChoice
@@ -143,7 +143,7 @@ def test_an_override_is_split_at_its_first_equals_sign() -> None:
     assert split_override("description=a = b") == ("description", "a = b")
 
 
-PATHS = [*scenario_paths(load_scenario(TASK).origin.content), *device_paths()]
+PATHS = [*OF_A_VANE.paths(load_scenario(TASK).origin.content), *device_paths()]
 
 
 @settings(max_examples=300)

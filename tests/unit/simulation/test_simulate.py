@@ -28,7 +28,7 @@ from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import PrescribedMotion, ProfileChoice, Scenario
 from ppafo.simulation.simulate import REMEDY, simulate_many
 from ppafo.walking.result import _status as walk_status
-from tests.judge.reference_solver import compare_with_reference
+from tests.reference.reference_solver import compare_with_reference
 
 CHANNELS = {
     "angle",

@@ -14,7 +14,7 @@ from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import scenario_document
-from tests.judge.reference_solver import compare_with_reference
+from tests.reference.reference_solver import compare_with_reference
 
 LINES = ("supply_line.plantarflexion.droop=3e6 Pa s/kg",)
 WARM = (

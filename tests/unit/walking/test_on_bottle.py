@@ -17,7 +17,7 @@ from ppafo.walking.motion import walk_of, with_duration
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.result import WalkResult
 from ppafo.walking.walk import bottle_life, compare_walks, with_device_off
-from tests.judge import bottle as independent
+from tests.reference import bottle as independent
 
 WALK, BOTTLE = "solenoid-regulators", "paper-co2-9oz"
 SMALL = ["bottle.fill=0.15", "bottle.temperature=262 K"]
@@ -71,7 +71,7 @@ def test_an_independent_simulator_coupled_at_every_stage_says_the_same(
 ) -> None:
     pytest.importorskip("CoolProp.CoolProp", reason="needs the extra 'properties'")
     monkeypatch.setattr(independent, "STEP", 2.5e-4)
-    gaps = independent.differences(small, independent.judge(small, 1.2))
+    gaps = independent.differences(small, independent.independent_run(small, 1.2))
     assert gaps["regulated_mass"] < 1e-3 * 1.5e-3
     assert max(gaps[f"{name}_temperature"] for name in ("bottle", "regulator", "hose", "gas")) < 0.12
     assert max(gaps[f"{name}_rms"] for name in ("line_pressure_1", "pressure_1", "pressure_2")) < 200.0

@@ -1,7 +1,7 @@
 """An identification: estimates and checks in the units of the set, the new set, the figures."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -107,6 +107,7 @@ def trajectory_panels(measurement: Recording, model: Recording, atmosphere: floa
         raise DataError(f"{model.label}: is not at the times of {measurement.label}")
     panels: list[Panel] = []
     times, some = measurement.time, slice(None, None, -(-measurement.time.size // _MAXIMUM_DOTS))
+    ends = times[[0, -1]]
     circles = {"linestyle": "", "marker": "o", "markersize": 3.6, "markerfacecolor": "none", "markeredgewidth": 0.7}
     for name in (name for name in _CHANNELS if name in measurement):
         kind, look = _CHANNELS[name]
@@ -118,7 +119,7 @@ def trajectory_panels(measurement: Recording, model: Recording, atmosphere: floa
             Mark("line", times, fitted, (), "model", look.colour, {"linewidth": 1.2}),
         ]
         legend = "" if panels else "above"
-        panels.append(Panel(TIME, kind, marks, legend=legend, then=_set_time(measurement), shares_x=True))
+        panels.append(Panel(TIME, kind, marks, legend=legend, then=lambda axes: axes.set_xlim(*ends), shares_x=True))
         left = [
             Mark("line", times, fitted - samples, colour=look.colour, style=_DOTS),
             Mark("level", (), 0.0, colour=GREY, style={"linewidth": 0.8}),
@@ -129,10 +130,6 @@ def trajectory_panels(measurement: Recording, model: Recording, atmosphere: floa
 
 
 _DOTS = {"linestyle": "", "marker": ".", "markersize": 1.6}
-
-
-def _set_time(measurement: Recording) -> "Callable[[Axes], object]":
-    return lambda axes: axes.set_xlim(measurement.time[0], measurement.time[-1])
 
 
 def _centre(axes: "Axes") -> None:

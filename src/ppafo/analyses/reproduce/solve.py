@@ -28,9 +28,9 @@ from ppafo.parameters.audit import audit
 from ppafo.parameters.overrides import override_set
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.report.finding import Finding
-from ppafo.simulation.declaration import value_at
+from ppafo.simulation.declaration import OF_A_VANE, value_at
 from ppafo.simulation.loading import load_scenario
-from ppafo.simulation.overrides import apply_overrides, chosen_by, is_of_device, scenario_paths, unknown_value
+from ppafo.simulation.overrides import apply_overrides, chosen_by, is_of_device, unknown_value
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Result, simulate
 
@@ -154,7 +154,7 @@ def _scenarios(overrides: Sequence[str]) -> dict[str, Scenario]:
             name: apply_overrides(load_scenario(name).origin.content, earlier, name).document
             for name, earlier in meant.items()
         }
-        known = tuple(dict.fromkeys(known for item in documents.values() for known in scenario_paths(item)))
+        known = tuple(dict.fromkeys(known for item in documents.values() for known in OF_A_VANE.paths(item)))
         if path not in known and not is_of_device(path) and not chosen_by(path, kinds):
             raise unknown_value(override, known, f"{', '.join(EXPERIMENTS)} have")
         # A scenario that has a section for the value; the device is in all of them.
@@ -162,7 +162,7 @@ def _scenarios(overrides: Sequence[str]) -> dict[str, Scenario]:
         having = [
             name
             for name, document in documents.items()
-            if (not section or value_at(document, section) is not None) and path in scenario_paths(document)
+            if (not section or value_at(document, section) is not None) and path in OF_A_VANE.paths(document)
         ]
         for name in having or EXPERIMENTS:
             meant[name].append(override)

@@ -255,6 +255,8 @@ def _map(results: StudyResults, grid: Sequence[str], metric: str, name: str, is_
         places.append(np.arange(levels.size) if is_listed else levels)
 
     def mark_axes(axes: "Axes") -> None:
+        from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+
         axes.grid(visible=False)
         for path, levels, axis in zip(grid, (columns, rows), (axes.xaxis, axes.yaxis), strict=True):
             if items[path]["kind"] == "list":
@@ -262,7 +264,10 @@ def _map(results: StudyResults, grid: Sequence[str], metric: str, name: str, is_
                 axis.set_ticks(np.arange(levels.size), [f"{value:g}" for value in shown])
             elif items[path].get("spacing") == "logarithmic":
                 (axes.set_xscale if axis is axes.xaxis else axes.set_yscale)("log")
-                _mark_plainly(axis)
+                # Plain numbers at 1, 2 and 5 of every decade.
+                axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+                axis.set_major_formatter(StrMethodFormatter("{x:g}"))
+                axis.set_minor_formatter(NullFormatter())
 
     marks = (Mark("map", places[0], places[1], kind.values(mean)),)
     return Panel(kinds[0], kinds[1], marks, name if is_compared else "", scale=kind, then=mark_axes)
@@ -275,15 +280,6 @@ def _points(results: StudyResults, device: Sequence[str], metric: str, name: str
     marks = (Mark("points", x, y, kind.values(values)),)
     across, upward = (_kind(results, path) for path in device)
     return Panel(across, upward, marks, name if is_compared else "", scale=kind)
-
-
-def _mark_plainly(axis: Any) -> None:
-    """Put plain numbers at 1, 2 and 5 of every decade."""
-    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
-
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axis.set_major_formatter(StrMethodFormatter("{x:g}"))
-    axis.set_minor_formatter(NullFormatter())
 
 
 def _band(results: StudyResults, channel: str, names: Sequence[str]) -> Panel:

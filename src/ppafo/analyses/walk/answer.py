@@ -10,7 +10,6 @@ import numpy as np
 
 from ppafo.analyses.walk.course import (
     bottle_data,
-    bottle_files,
     bottle_parts,
     bottle_remark,
     course_data,
@@ -285,7 +284,6 @@ def finding_of(comparison: Comparison) -> Finding[WalkPair]:
             "mean-stride.csv": lambda: mean_stride_csv(worn),
             "mean-stride-off.csv": lambda: mean_stride_csv(bare),
             **course_files(comparison),
-            **bottle_files(worn),
         },
         live=lambda: live_part([configuration]),
     )

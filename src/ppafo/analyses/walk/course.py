@@ -103,12 +103,6 @@ def bottle_data(worn: WalkResult) -> dict[str, Any]:
     }
 
 
-def bottle_files(worn: WalkResult) -> dict[str, Callable[[], bytes]]:
-    """Return the file with the course of the bottle; nothing without one."""
-    supply = worn.supply
-    return {} if supply is None else {"bottle.csv": lambda: marked_csv_bytes(supply.recording)}
-
-
 _DURATION, _TORQUE, _GAS = (Kind(quantity=name, form=".3g") for name in ("duration", "torque", "gas mass"))
 _SHARE, _WARMTH, _PRESSURE = (Kind(quantity=name, form=".0f") for name in ("fraction", "temperature", "pressure"))
 _NUMBERS: tuple[Row, ...] = (
@@ -192,13 +186,15 @@ def course_pictures(comparison: Comparison) -> tuple[Part, ...]:
 
 
 def course_files(comparison: Comparison) -> dict[str, Callable[[], bytes]]:
-    """Return the files of a course: its segments with and without the device."""
-    if walk_of(comparison.with_device.scenario).course is None:
-        return {}
-    return {
-        "segments.csv": lambda: segments_csv(comparison.with_device.segments),
-        "segments-off.csv": lambda: segments_csv(comparison.without_device.segments),
-    }
+    """Return the files of a course, its segments with and without the device, and of a bottle over the walk."""
+    found: dict[str, Callable[[], bytes]] = {}
+    if walk_of(comparison.with_device.scenario).course is not None:
+        found["segments.csv"] = lambda: segments_csv(comparison.with_device.segments)
+        found["segments-off.csv"] = lambda: segments_csv(comparison.without_device.segments)
+    supply = comparison.with_device.supply
+    if supply is not None:
+        found["bottle.csv"] = lambda: marked_csv_bytes(supply.recording)
+    return found
 
 
 def segments_csv(segments: Sequence[SegmentResult]) -> bytes:

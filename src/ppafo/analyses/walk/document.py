@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ppafo.documents.json_text import plain
-from ppafo.report.display_units import rounded_text, title_with_unit
+from ppafo.report.display_units import display_unit, display_value
 from ppafo.report.finding import Column, columns_of
 from ppafo.simulation.scenario import UNITS, Scenario
 from ppafo.version import __version__
@@ -75,8 +75,16 @@ WOULD_DRAG = "would drag"
 def number_texts(row: Row, values: Iterable[float | str | None]) -> tuple[str | None, ...]:
     """Return the title with its unit, and values [SI] as text; a text and None stay what they are."""
     _, title, quantity, digits = row
-    texts = (one if one is None or isinstance(one, str) else rounded_text(one, quantity, digits) for one in values)
-    return (title_with_unit(title, quantity), *texts)
+    texts: list[str | None] = []
+    for one in values:
+        if one is None or isinstance(one, str):
+            texts.append(one)
+            continue
+        text = f"{display_value(one, quantity):.{digits}f}"
+        # Without the sign of what is rounded to zero.
+        texts.append(text.removeprefix("-") if float(text) == 0.0 else text)
+    unit = display_unit(quantity)
+    return (f"{title} ({unit})" if unit else title, *texts)
 
 
 def toes(height: float | None) -> float | str | None:

@@ -137,6 +137,7 @@ def sweep(
     from ppafo.analyses.sweep.solve import sweep_into_folder
     from ppafo.report.drawing import load_drawing
 
+    # Before anything else imports Matplotlib, so that it comes without what it does for others.
     load_drawing()
     return sweep_into_folder(
         study,

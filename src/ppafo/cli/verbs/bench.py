@@ -47,6 +47,7 @@ def rig_simulate(
     from ppafo.cli.output import Said, blame_out_option
     from ppafo.rig.experiments import NOTICE, check_rig_folder, find_experiment, record, write_rig_recording
 
+    # An unknown name and a refused folder are told before anything runs.
     find_experiment(experiment)
     with blame_out_option():
         check_rig_folder(out, experiment)

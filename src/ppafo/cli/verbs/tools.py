@@ -57,6 +57,7 @@ def export_fmu(
 
     made = {"loop": closed_loop, "plant": plant_alone}[interface]
     chosen = [host_platform()] if platforms is None else platforms.split(",")
+    # On a computer that no platform of a unit is for, it has its sources alone.
     wanted = list(dict.fromkeys(one.strip() for one in chosen if one is not None))
 
     def unit() -> Mapping[str, bytes]:
@@ -65,6 +66,7 @@ def export_fmu(
     def following(file: Path) -> str:
         return f"fmpy simulate {shlex.quote(str(file))} --show-plot"
 
+    # A folder may be named like a unit too; it then gets the unit among its files.
     if out.suffix == ".fmu" and not out.is_dir():
         return export_file(out, lambda: next(iter(unit().values())), following(out))
     return export(out, "export fmu", unit, lambda files: following(out / files[0]))

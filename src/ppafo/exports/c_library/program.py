@@ -26,7 +26,7 @@ from ppafo.engine.run_source import LOOP_ARRAYS, LOOP_NUMBERS, run_loop
 from ppafo.engine.source_text import Collector, SourceCollector, composed_lines
 from ppafo.exports.c_library.boundary import Arrays, Boundary, Structs, struct_of, struct_of_numbers
 from ppafo.metrics import METRICS
-from ppafo.metrics.metric import WALK, MetricKind, Readings
+from ppafo.metrics.metric import WALK, MetricKind, ReadAt, Readings
 from ppafo.model.columns import over_runs
 from ppafo.simulation.ensemble.running import (
     ThermalTotals,
@@ -321,6 +321,13 @@ def _enumeration(said: str, names: Sequence[str], first: int = 0) -> str:
     return f"/* {said} */\nenum {{\n{lines}\n}};\n"
 
 
+def _read_expression(read: Callable[[Readings], Any], add: Callable[[Any], str]) -> str:
+    if not isinstance(read, ReadAt):
+        return f"{add(read)}(readings)"
+    numbers = ", ".join(f"readings.{place}" for place in read.places)
+    return numbers if read.function is None else f"{add(read.function)}({numbers})"
+
+
 def metrics_entry(item: ExportedProgram, collector: Collector, boundary: Boundary) -> str:
     """The metrics of a run, from its first and its last states."""
     program, groups = item.program, item.program.state_rows()
@@ -351,7 +358,7 @@ def metrics_entry(item: ExportedProgram, collector: Collector, boundary: Boundar
     lines += [
         f"readings = Readings(meters=Meters({meters}), course={course}, samples=samples, gains={add(kind)}({gains}))",
         *(
-            f"{boundary.cell('found', place, metric.name)} = {add(metric.read)}(readings)"
+            f"{boundary.cell('found', place, metric.name)} = {_read_expression(metric.read, add)}"
             for place, metric in enumerate(item.metrics)
         ),
     ]

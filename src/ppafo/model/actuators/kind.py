@@ -70,14 +70,15 @@ class ActuatorKind:
 
     ``settings`` is a NamedTuple class that declares the numbers, each an ``Annotated[float, Number(...)]``.
 
-    ``problem(settings, range)`` says in words what of the numbers does not fit together; empty where all of it does.
+    ``problem(settings, range)`` says in words what of the numbers does not fit together; empty where all of it does,
+    None where the declared limits say all.
     """
 
     name: str
     summary: str
     settings: type
     model: ActuatorModel
-    problem: Callable[[Any, Range], str]
+    problem: Callable[[Any, Range], str] | None = None
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
@@ -92,33 +93,20 @@ class ShapedPlant(Protocol):
     scale errors, and laws that were made for a vane rely on them.
     """
 
-    @property
-    def shape(self) -> Any:
-        """The numbers of the kind."""
-
-    @property
-    def gas_product(self) -> float:
-        """R T / M [J/kg]."""
-
-    @property
-    def supply_pressure(self) -> float:
-        """Pressure of the supply of chamber 1 [Pa]."""
-
-    @property
-    def dorsiflexion_pressure(self) -> float:
-        """Pressure of the supply of chamber 2 [Pa]."""
-
-    @property
-    def atmospheric_pressure(self) -> float:
-        """Pressure of the atmosphere [Pa]."""
-
-    @property
-    def gravity_torque(self) -> float:
-        """Largest gravity torque [N m]."""
-
-    @property
-    def external_torque(self) -> float:
-        """Torque T_ex [N m]."""
+    shape: Any
+    """Numbers of the kind."""
+    gas_product: float
+    """R T / M [J/kg]."""
+    supply_pressure: float
+    """Pressure of the supply of chamber 1 [Pa]."""
+    dorsiflexion_pressure: float
+    """Pressure of the supply of chamber 2 [Pa]."""
+    atmospheric_pressure: float
+    """Pressure of the atmosphere [Pa]."""
+    gravity_torque: float
+    """Largest gravity torque [N m]."""
+    external_torque: float
+    """Torque T_ex [N m]."""
 
 
 class AtRest(NamedTuple):

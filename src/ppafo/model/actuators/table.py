@@ -255,15 +255,10 @@ def prepare(settings: TableSettings, stops: Range, table: Table) -> Measured:
     )
 
 
-def problem(settings: TableSettings, stops: Range) -> str:
-    """Nothing: the file is judged where it is read."""
-    return ""
-
-
 KIND = ActuatorKind(
     name="table",
     summary="An actuator that was measured: volumes over angle and pressure, from a CSV file.",
     settings=TableSettings,
+    # The file is judged where it is read.
     model=ActuatorModel(Measured, prepare, chambers, pressures, torque, table=Table),
-    problem=problem,
 )

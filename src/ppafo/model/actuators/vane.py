@@ -26,11 +26,6 @@ def prepare(_settings: Any, _stops: Range) -> None:
     """Nothing: the numbers of a vane stand in the plant itself."""
 
 
-def problem(_settings: Any, _stops: Range) -> str:
-    """Nothing: the declared limits say all."""
-    return ""
-
-
 MODEL = ActuatorModel(None, prepare, chambers, chamber_pressures, torque)
 SMALLEST_VOLUME = 1e-18
 """A cube of a micrometre [m^3]: less is a slip, and what is divided by it leaves the range of floats."""
@@ -48,5 +43,4 @@ KIND = ActuatorKind(
     summary="A vane between two chambers whose volumes run linearly with the angle.",
     settings=VaneSettings,
     model=MODEL,
-    problem=problem,
 )

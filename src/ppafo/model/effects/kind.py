@@ -140,20 +140,6 @@ class Effect:
         return found
 
 
-def nomenclature_lines(effect: Effect) -> list[str]:
-    """Return the lines that an effect has in the table of the nomenclature."""
-    return [f"| {symbol} | `{name}` | {unit} | {meaning} |" for symbol, name, unit, meaning in effect.symbols]
-
-
-def equation_lines(effect: Effect) -> list[str]:
-    """Return what the page of the equations says of an effect: its laws by port, its equation and its source."""
-    laws = [
-        f"- `{law.__module__}.{law.__qualname__}`: at `{port.__name__}`; {effect.source}"
-        for port, law in effect.laws.items()
-    ]
-    return [f"### {effect.name}: {effect.summary}", "", f"    {effect.equation}", "", *laws]
-
-
 def effect_problem(effect: Effect) -> str:
     """Return what is wrong with an effect as a value, in words; empty where nothing is."""
     return next(_problems(effect), "")

@@ -1,6 +1,6 @@
 """A leak that opens: below some pressure between the chambers the seal of the vane is tight."""
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from ppafo.model.declaration import Number
 from ppafo.model.effects.kind import Effect
@@ -23,11 +23,6 @@ class LeakSettings(NamedTuple):
     rise: Annotated[float, Number("", "excess at which half of the leak is open, over that pressure", 1.0, 0.01, 100.0)]
 
 
-def prepare(settings: LeakSettings, _device: Any) -> LeakOpening:
-    """Parameters from the settings."""
-    return LeakOpening(settings.pressure, settings.rise)
-
-
 def lifted(conductance: float, pressure_1: float, pressure_2: float, leak_opening: LeakOpening) -> float:
     """Conductance [kg/(s Pa)] of the leak: ``C e / (e + w P_o)`` with ``e = |P_1 - P_2| - P_o``, and 0 below ``P_o``.
 
@@ -47,7 +42,7 @@ EFFECT = Effect(
     summary="A leak between the chambers that opens at a pressure.",
     settings=LeakSettings,
     parameters=LeakOpening,
-    prepare=prepare,
+    prepare=None,
     switch=("pressure",),
     laws={leakage_path: lifted},
     source="assumed: a lip that the gas lifts against a constant preload, to be fitted to an actuator",

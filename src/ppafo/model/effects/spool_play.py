@@ -1,6 +1,6 @@
 """Play of a spool behind its command, which makes a hysteresis: it moves only when the command has crossed the play."""
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from ppafo.model.declaration import Number
 from ppafo.model.effects.kind import Effect, Moment, State
@@ -24,11 +24,6 @@ class PlaySettings(NamedTuple):
     """The play between command and spool."""
 
     width: Annotated[float, Number("", "whole width of the play over the full command, 0 for none", 0.0, 0.0, 0.5)]
-
-
-def prepare(settings: PlaySettings, _device: Any) -> SpoolPlay:
-    """Parameters from the setting."""
-    return SpoolPlay(settings.width)
 
 
 def spool_position(position: float, command: float, play_width: float) -> float:
@@ -78,7 +73,7 @@ EFFECT = Effect(
     summary="Play between command and spool of the valve.",
     settings=PlaySettings,
     parameters=SpoolPlay,
-    prepare=prepare,
+    prepare=None,
     switch=("width",),
     laws={at_valve: behind_play},
     source="the play operator of hysteresis; the simulated test bench has it too",

@@ -3,6 +3,7 @@
 A command goes from -1 to 1 as equation (8) says; one value stands for free motion.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -83,6 +84,11 @@ class ValveKind:
     def quantities(self) -> tuple[Quantity, ...]:
         """What its settings declare."""
         return quantities_of(self.settings)
+
+
+def never(valve: Any, state: Any, command: float, time: float) -> float:
+    """Time [s] of the next change of a valve that changes with its command alone: none between two commands."""
+    return math.inf
 
 
 # Beyond full opening, so that one number says both, and no rounding of -1 to 1 comes near it.

@@ -19,7 +19,7 @@ from ppafo.model.plant import (
     single_port_flow_slopes,
     single_ports,
 )
-from ppafo.model.valves.kind import ValveKind, ValveModel
+from ppafo.model.valves.kind import ValveKind, ValveModel, never
 
 # From shut to open within 1 ps, below any step; two instants within 10 ps are one; and a quotient of zeros is finite.
 NO_SLEW_LIMIT = 1.0e12
@@ -164,11 +164,6 @@ def rates_ideal(valve: IdealProportional, state: NoValveState, command: float) -
     return NoValveState(0.0)
 
 
-def never_ideal(valve: IdealProportional, state: NoValveState, command: float, time: float) -> float:
-    """Time [s] of the next change: none between two commands."""
-    return math.inf
-
-
 def settle_ideal(valve: IdealProportional, state: NoValveState, command: float, time: float) -> NoValveState:
     """Opening [-] that the command requests, taken at once."""
     return NoValveState(opening_of_command(command, valve.dead_band))
@@ -311,7 +306,7 @@ IDEAL = ValveModel(
     command_delay=dead_time,
     instant=instant_ideal,
     rates=rates_ideal,
-    next_event=never_ideal,
+    next_event=never,
     settle=settle_ideal,
 )
 

@@ -5,13 +5,12 @@ foot moves freely. A coil accepts a change at most once in every switching inter
 the opening or closing delay, and is lost if the coil is commanded otherwise before that.
 """
 
-import math
 from typing import Annotated, Any, NamedTuple
 
 from ppafo.model.declaration import Number
 from ppafo.model.plant import Openings, PlantParameters, SinglePort, single_port_flow, single_port_flow_slopes
 from ppafo.model.ports import exhaust_path, opening_time, supply_path
-from ppafo.model.valves.kind import VENTS_ABOVE, ValveKind, ValveModel
+from ppafo.model.valves.kind import VENTS_ABOVE, ValveKind, ValveModel, never
 
 # Long ago, never, and two instants that are one [s]: times of a run are sums of floats, good to far below 1 ns.
 NEVER = -1.0e9
@@ -163,11 +162,6 @@ def rates_ideal(valve: IdealSolenoid, state: PairPositions, command: float) -> P
     return PairPositions(0.0, 0.0)
 
 
-def never_ideal(valve: IdealSolenoid, state: PairPositions, command: float, time: float) -> float:
-    """Time [s] of the next change: none between two commands."""
-    return math.inf
-
-
 def settle_ideal(valve: IdealSolenoid, state: PairPositions, command: float, time: float) -> PairPositions:
     """Positions [-] that the command requests, taken at once."""
     return PairPositions(*coil_commands(command))
@@ -231,7 +225,7 @@ IDEAL = ValveModel(
     command_delay=no_dead_time,
     instant=instant_ideal,
     rates=rates_ideal,
-    next_event=never_ideal,
+    next_event=never,
     settle=settle_ideal,
 )
 

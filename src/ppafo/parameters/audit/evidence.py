@@ -87,10 +87,6 @@ class Interval(NamedTuple):
         """Return whether one number could be meant by both."""
         return self.low <= other.high and other.low <= self.high
 
-    def common(self, other: "Interval") -> "Interval":
-        """Return the part that both share; only for ranges that meet."""
-        return Interval(max(self.low, other.low), min(self.high, other.high))
-
 
 @dataclass(frozen=True, slots=True)
 class Evidence:

@@ -28,7 +28,7 @@ def check_inertia(evidence: Evidence) -> Iterator[Finding]:
     decay_path, decay = _decay_rate(evidence)
     if inertia is None:
         return
-    implied = []
+    agreeing = []
     for product, rate_path, rate, name in (
         (_DAMPING, decay_path, decay, "damping"),
         (_FRICTION, _DECELERATION, evidence.magnitude(_DECELERATION), "dynamic friction"),
@@ -36,11 +36,31 @@ def check_inertia(evidence: Evidence) -> Iterator[Finding]:
         reported = evidence.magnitude(product)
         if reported is None or rate is None or inertia.times(rate).meets(reported):
             continue
-        implied.append(reported.over(rate))
-        yield _product(evidence, product, rate_path, name, _middle(rate))
+        agreeing.append(reported.over(rate))
+        given, number = evidence.number(_INERTIA) or 0.0, evidence.number(product) or 0.0
+        expected, needed = given * _middle(rate), number / _middle(rate)
+        ratio, unit = evidence.values_of(rate_path)[0], evidence.declared[product].unit
+        yield Finding(
+            id=f"{name.replace(' ', '-')}-against-inertia",
+            severity="error",
+            title=f"{name} is not the product of inertia and the reported ratio",
+            values=evidence.values_of(product, _INERTIA, rate_path),
+            sides=(
+                Side(f"reported {name}", number, unit),
+                Side("inertia times ratio", expected, unit),
+                Side("inertia that would agree", needed, "kg m^2"),
+            ),
+            paragraph=(
+                f"Inertia {evidence.in_set_unit(_INERTIA, given)} times {abs(float(ratio.value)):g} {ratio.unit} is "
+                f"{evidence.in_set_unit(product, expected)}, reported is {evidence.in_set_unit(product, number)}: "
+                f"a factor {number / expected:.3g}. Would be consistent with an inertia of "
+                f"{evidence.in_set_unit(_INERTIA, needed)}, or with {evidence.in_set_unit(product, expected)} as the "
+                f"{name}."
+            ),
+        )
     # One inertia can be tested only where both products disagree with the reported one.
-    if len(implied) > 1:
-        yield from _one_inertia(evidence, implied[0], implied[1], decay_path)
+    if len(agreeing) > 1:
+        yield from _one_inertia(evidence, agreeing[0], agreeing[1], decay_path)
 
 
 def _decay_rate(evidence: Evidence) -> tuple[str, Interval | None]:
@@ -60,37 +80,11 @@ def _middle(interval: Interval) -> float:
     return 0.5 * (interval.low + interval.high)
 
 
-def _product(evidence: Evidence, product: str, rate_path: str, name: str, rate: float) -> Finding:
-    inertia, reported = evidence.number(_INERTIA) or 0.0, evidence.number(product) or 0.0
-    expected, implied = inertia * rate, reported / rate
-    unit = evidence.declared[product].unit
-    ratio = evidence.values_of(rate_path)[0]
-    return Finding(
-        id=f"{name.replace(' ', '-')}-against-inertia",
-        severity="error",
-        title=f"{name} is not the product of inertia and the reported ratio",
-        values=evidence.values_of(product, _INERTIA, rate_path),
-        sides=(
-            Side(f"reported {name}", reported, unit),
-            Side("inertia times ratio", expected, unit),
-            Side("inertia that would agree", implied, "kg m^2"),
-        ),
-        paragraph=(
-            f"Inertia {evidence.in_set_unit(_INERTIA, inertia)} times {abs(float(ratio.value)):g} {ratio.unit} is "
-            f"{evidence.in_set_unit(product, expected)}, reported is "
-            f"{evidence.in_set_unit(product, reported)}: a factor "
-            f"{reported / expected:.3g}. Would be consistent with an inertia of "
-            f"{evidence.in_set_unit(_INERTIA, implied)}, or with "
-            f"{evidence.in_set_unit(product, expected)} as the {name}."
-        ),
-    )
-
-
 def _one_inertia(evidence: Evidence, damping: Interval, friction: Interval, decay_path: str) -> Iterator[Finding]:
     """Look for one inertia within the reported digits of both products, first the reported one with a moved point."""
     if not damping.meets(friction):
         return
-    common = damping.common(friction)
+    common = Interval(max(damping.low, friction.low), min(damping.high, friction.high))
     reported = evidence.number(_INERTIA) or 0.0
     shifted = [reported * 10.0**shift for shift in _SHIFTS if common.low <= reported * 10.0**shift <= common.high]
     # A moved decimal point is the likeliest slip; else the middle of what both allow.

@@ -1,16 +1,16 @@
 """Are the values of a set possible: dimensions, ranges, the named gas, and the error of the ideal gas law?"""
 
+import contextlib
 import math
 from collections.abc import Iterator
 
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
 from ppafo.errors import UnitError
-from ppafo.model.declaration import Quantity
 from ppafo.model.effects.second_virial import SECOND_VIRIAL
 from ppafo.model.gas import SPECIES
 from ppafo.parameters.audit.evidence import Evidence, Finding, Side
 from ppafo.parameters.declaration import is_within
-from ppafo.parameters.parameter_set import Entry, entry_in_si, number_in_si, number_text
+from ppafo.parameters.parameter_set import entry_in_si, number_in_si, number_text
 from ppafo.parameters.publications.publication import FILE, read_publication
 from ppafo.units import to_si
 
@@ -66,7 +66,8 @@ def check_dimensions(evidence: Evidence) -> Iterator[Finding]:
         quantity = evidence.declared[path]
         unit = quantity.unit
         inverse_unit = f"1/({unit})" if " " in unit or "/" in unit else f"1/{unit}"
-        if _fits(entry, quantity, evidence.atmosphere()):
+        with contextlib.suppress(UnitError):
+            entry_in_si(entry, quantity, evidence.atmosphere())
             continue
         try:
             value = to_si(entry.value, entry.unit, inverse_unit)
@@ -108,15 +109,6 @@ def check_dimensions(evidence: Evidence) -> Iterator[Finding]:
                 f"misreported; the other checks use the number as it stands."
             ),
         )
-
-
-def _fits(entry: Entry, quantity: Quantity, atmosphere: float) -> bool:
-    """Tell whether an entry has the dimension of its declaration."""
-    try:
-        entry_in_si(entry, quantity, atmosphere)
-    except UnitError:
-        return False
-    return True
 
 
 # Is every value within the limits of its declaration, which any device keeps?

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from ppafo.control.kind import OPEN_LOOP
 from ppafo.engine.lane_samples import TRACED
-from ppafo.engine.lanes import Floats, load_programs
+from ppafo.engine.lanes import Floats
 from ppafo.engine.run import TOO_MANY_PARTS
 from ppafo.errors import ScenarioError, nearest_name
 from ppafo.metrics import METRICS
@@ -21,6 +21,9 @@ from ppafo.simulation.simulate import REMEDY
 
 COMPLETED, DIVERGED, REFUSED = 0, 1, 2
 """How a run of an ensemble ended; refused is a combination of values that no run can have."""
+
+_ROUNDING = 1.0e-9
+"""Fraction by which rounding may put the end of a run before the last time of its traces."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,34 +83,29 @@ def run_ensemble(
         raise ScenarioError(f"{base.name}: traces need a time above 0 between two samples, not {interval:g} s")
     checked = check_columns(base, columns, gauge)
     plan = plan_ensemble(checked)
-    times = _times(plan, interval if bands else 0.0)
+    times: Floats = np.empty(0)
+    if bands and plan.batches:
+        longest = max(float((intervals(batch) * (batch.clock.samples - 1)).max()) for _, batch in plan.batches)
+        times = np.arange(int(longest / interval * (1.0 + _ROUNDING)) + 1, dtype=np.float64) * interval
     request = Request(metrics, tuple(dict.fromkeys(bands)), interval, times, base.controller.custom)
-    outcome = _run(plan, Outcome(checked.runs, request), threads)
-    if not errors:
-        return _result(plan, outcome, {})
-    alone = Request(metrics, (), interval, np.empty(0), base.controller.custom)
-    fine = _run(plan_ensemble(checked, finer), Outcome(checked.runs, alone), threads)
-    return _result(plan, outcome, _errors(outcome, fine))
-
-
-def _run(plan: EnsemblePlan, outcome: Outcome, threads: int | None) -> Outcome:
-    load_programs(outcome.programs([batch for _, batch in plan.batches]))
-    for members, batch in plan.batches:
-        outcome.run(batch, members, threads)
-    return outcome
-
-
-def _errors(outcome: Outcome, fine: Outcome) -> dict[str, Floats]:
-    """The estimated errors of metrics, from the same runs with finer steps."""
-    found = {}
-    for name, values in outcome.metrics.items():
-        changes = np.where(np.isfinite(fine.metrics[name]), np.abs(fine.metrics[name] - values), np.inf)
-        found[name] = np.where(np.isfinite(values), MARGIN * changes, np.nan)
-    return found
+    outcome = Outcome(checked.runs, request)
+    outcome.run_all(plan.batches, threads)
+    estimated = {}
+    if errors:
+        # For the metrics alone: nobody asks for the error of a trace.
+        alone = Request(metrics, (), interval, np.empty(0), base.controller.custom)
+        fine = Outcome(checked.runs, alone)
+        fine.run_all(plan_ensemble(checked, finer).batches, threads)
+        for name, values in outcome.metrics.items():
+            # Where the finer run has no value this one may be wrong by anything; without a value it has no error.
+            changes = np.where(np.isfinite(fine.metrics[name]), np.abs(fine.metrics[name] - values), np.inf)
+            estimated[name] = np.where(np.isfinite(values), MARGIN * changes, np.nan)
+    return _result(plan, outcome, estimated)
 
 
 def _result(plan: EnsemblePlan, outcome: Outcome, errors: dict[str, Floats]) -> EnsembleResult:
     status = np.where(outcome.is_completed, COMPLETED, DIVERGED).astype(np.int8)
+    # Runs that were refused are in no batch, so that until here they count as diverged.
     status[list(plan.reasons)] = REFUSED
     reasons = dict(plan.reasons)
     for run in np.flatnonzero(status == DIVERGED).tolist():
@@ -117,14 +115,6 @@ def _result(plan: EnsemblePlan, outcome: Outcome, errors: dict[str, Floats]) -> 
     return EnsembleResult(
         status, outcome.failure_time, dict(sorted(reasons.items())), outcome.metrics, times, outcome.traces, errors
     )
-
-
-def _times(plan: EnsemblePlan, every: float) -> Floats:
-    """Times of the traces [s], to the end of the longest run; none where nothing is traced."""
-    if every == 0.0 or not plan.batches:
-        return np.empty(0)
-    longest = max(float((intervals(batch) * (batch.clock.samples - 1)).max()) for _, batch in plan.batches)
-    return np.arange(int(longest / every * (1.0 + 1.0e-9)) + 1, dtype=np.float64) * every
 
 
 def _check_channel(base: Scenario, name: str) -> None:

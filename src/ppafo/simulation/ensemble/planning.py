@@ -3,13 +3,13 @@
 import operator
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.engine.lanes import Batch, Floats
+from ppafo.engine.lanes import Batch
 from ppafo.engine.run import Members, Run, batches_of
 from ppafo.errors import ScenarioError
 from ppafo.model.columns import Problem, at
@@ -17,43 +17,52 @@ from ppafo.model.declaration import range_rule
 from ppafo.parameters.building import actuator_problem, beyond_pressures, consistency, growth_and_problem
 from ppafo.parameters.device import VANE
 from ppafo.parameters.plant import switches_of
-from ppafo.simulation.check import unchanged
 from ppafo.simulation.clock import Clock
 from ppafo.simulation.declaration import limits, quantity_text
 from ppafo.simulation.motion_kind import MotionKind
-from ppafo.simulation.numbers import TIMES, Columns, clock_of, varied_scenario
+from ppafo.simulation.numbers import TIMES, Columns, clock_of, with_numbers
 from ppafo.simulation.plan import plan_runs
 from ppafo.simulation.scenario import Scenario
 
+# Numbers that name one of many: there is nothing between two of them.
 _WHOLE = ("sensors.seed", "wearer.person")
 
 Rule = Callable[[Scenario], tuple[Problem, ...]]
 """What may be wrong with a scenario that represents many runs."""
 
 
-@final
+@dataclass(slots=True)
 class Screen:
     """The runs that are left: their places in the ensemble, their columns and clocks; and why others are not."""
 
-    def __init__(self, columns: Columns) -> None:
-        self.columns = columns
-        self.members = np.arange(columns.runs)
-        self.clock: Clock | None = None
-        self.reasons: dict[int, str] = {}
+    columns: Columns
+    members: Members
+    reasons: dict[int, str]
+    clock: Clock | None = None
 
     @property
     def scenario(self) -> Scenario:
         """The scenario that represents the runs that are left. ScenarioError before the times are read."""
-        if self.clock is None:
+        clock = self.clock
+        if clock is None:
             raise ScenarioError("the times of an ensemble are not read yet")
-        return varied_scenario(self.columns, self.clock)
+        # What the clock came to stands in the place of the times that were given.
+        numbers = {path: column for path, column in self.columns.values.items() if path not in TIMES}
+        scenario = with_numbers(self.columns.base, numbers)
+        return replace(
+            scenario,
+            run=replace(scenario.run, duration=clock.duration, step=clock.step, output_interval=clock.output_interval),
+            controller=replace(scenario.controller, period=clock.period),
+        )
 
     def at(self, places: Members) -> "Screen":
         """The screen of some of these runs, which writes its reasons to the same place."""
-        part = Screen(self.columns.only(places))
-        part.members, part.reasons = self.members[places], self.reasons
-        part.clock = None if self.clock is None else _clock_of(self.clock, places)
-        return part
+        clock = self.clock
+        if clock is not None:
+            times = clock.duration, clock.step, clock.output_interval, clock.period
+            kept: list[Any] = [time[places] if isinstance(time, np.ndarray) else time for time in times]
+            clock = Clock(*kept)
+        return Screen(self.columns.only(places), self.members[places], self.reasons, clock)
 
     def refuse(self, is_bad: Any, line: Callable[[int], str]) -> None:
         """Drop runs, by a mask over those left or one truth value for all; ``line(place)`` says why."""
@@ -62,22 +71,29 @@ class Screen:
             return
         for place in np.flatnonzero(bad):
             self.reasons[int(self.members[place])] = line(int(place))
-        self.members = self.members[~bad]
-        self.columns = self.columns.only(~bad)
-        self.clock = None if self.clock is None else _clock_of(self.clock, ~bad)
+        left = self.at(np.flatnonzero(~bad))
+        self.members, self.columns, self.clock = left.members, left.columns, left.clock
 
 
 def screen_columns(columns: Columns) -> Screen:
     """The runs whose values are in range and fit together."""
-    screen = Screen(columns)
+    screen = Screen(columns, np.arange(columns.runs), {})
     for path in columns.values:
         # A default that follows others goes where they lead it, as it does in a single run.
         if path in columns.given or not columns.declared[path].follows:
             screen.refuse(*_out_of_range(screen.columns, path))
     if screen.members.size:
-        _read_clocks(screen)
+        base, times = columns.base, {path: column for path, column in screen.columns.values.items() if path in TIMES}
+        screen.clock, problems = base.motion.motion_kind.clock(base, times) if times else (clock_of(base), ())
+        for is_bad, line in problems:
+            screen.refuse(is_bad, line)
     for rule in rules_of(columns.base.motion.motion_kind):
-        _keep(screen, rule)
+        # After each problem that some runs have, the others are checked again: their numbers may have fewer.
+        while screen.members.size:
+            found = [problem for problem in rule(screen.scenario) if np.any(problem[0])]
+            if not found:
+                break
+            screen.refuse(*found[0])
     return screen
 
 
@@ -98,32 +114,6 @@ def _out_of_range(columns: Columns, path: str) -> Problem:
     return ~(is_good & (values == np.floor(values)) if path in _WHOLE else is_good), line
 
 
-def _read_clocks(screen: Screen) -> None:
-    """Read the clocks, and drop the runs whose times do not fit together."""
-    times = {path: column for path, column in screen.columns.values.items() if path in TIMES}
-    if not times:
-        screen.clock = clock_of(screen.columns.base)
-        return
-    base = screen.columns.base
-    screen.clock, problems = base.motion.motion_kind.clock(base, times)
-    for is_bad, line in problems:
-        screen.refuse(is_bad, line)
-
-
-def _clock_of(clock: Clock, kept: Any) -> Clock:
-    numbers: list[Any] = [clock.duration, clock.step, clock.output_interval, clock.period]
-    return Clock(*(number[kept] if isinstance(number, np.ndarray) else number for number in numbers))
-
-
-def _keep(screen: Screen, rule: Rule) -> None:
-    """Drop the runs that break a rule; after each problem that some have, the others are checked again."""
-    while screen.members.size:
-        found = [problem for problem in rule(screen.scenario) if np.any(problem[0])]
-        if not found:
-            return
-        screen.refuse(*found[0])
-
-
 @dataclass(frozen=True, slots=True)
 class EnsemblePlan:
     """Batches with the places of their runs in the ensemble, and a line for each run that cannot be."""
@@ -132,7 +122,7 @@ class EnsemblePlan:
     reasons: dict[int, str]
 
 
-def plan_ensemble(columns: Columns, change: Callable[[Run], Run] = unchanged) -> EnsemblePlan:
+def plan_ensemble(columns: Columns, change: Callable[[Run], Run] | None = None) -> EnsemblePlan:
     """Batches of all runs that can be; each has the rows, bit for bit, that ``plan_run`` gives it alone and changed."""
     screen = screen_columns(columns)
     batches: list[tuple[Members, Batch]] = []
@@ -142,14 +132,15 @@ def plan_ensemble(columns: Columns, change: Callable[[Run], Run] = unchanged) ->
     return EnsemblePlan(tuple(batches), screen.reasons)
 
 
-def _plan_batches(screen: Screen, places: Members, change: Callable[[Run], Run]) -> list[tuple[Members, Batch]]:
+def _plan_batches(screen: Screen, places: Members, change: Callable[[Run], Run] | None) -> list[tuple[Members, Batch]]:
     """Batches of some runs that ask for one program; what cannot be planned is refused."""
     part = screen.at(places)
     while part.members.size:
         run, problems = plan_runs(part.scenario)
         bad = [problem for problem in problems if np.any(problem[0])]
         if not bad:
-            return [(part.members[members], batch) for members, batch in batches_of(change(run), part.members.size)]
+            run = run if change is None else change(run)
+            return [(part.members[members], batch) for members, batch in batches_of(run, part.members.size)]
         part.refuse(*bad[0])
     return []
 
@@ -173,7 +164,7 @@ def _inconsistent(scenario: Scenario) -> tuple[Problem, ...]:
     """Two numbers of a device that contradict each other."""
 
     def problem(path: str, relation: str, other: str, holds: Any) -> Problem:
-        first, second = _number(scenario, path), _number(scenario, other)
+        first, second = operator.attrgetter(path, other)(scenario.device)
         return np.logical_not(
             holds
         ), lambda run: f"{path} = {at(first, run):.9g} must be {relation} {other} = {at(second, run):.9g} (SI units)"
@@ -216,11 +207,6 @@ def _beyond_the_table(scenario: Scenario) -> tuple[Problem, ...]:
 def _without_growth(scenario: Scenario) -> tuple[Problem, ...]:
     """An actuator that is no vane, whose chamber 1 does not grow with the angle."""
     return () if scenario.device.actuator.kind == VANE else (growth_and_problem(scenario.device)[1],)
-
-
-def _number(scenario: Scenario, path: str) -> Floats | float:
-    number: Floats | float = operator.attrgetter(path)(scenario.device)
-    return number
 
 
 def _second_regulator_above_the_first(scenario: Scenario) -> tuple[Problem, ...]:

@@ -1,6 +1,6 @@
 """Runs the batches of an ensemble and reads their meters."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, final
 
@@ -11,7 +11,7 @@ from ppafo.control.kind import PythonController
 from ppafo.engine.lane_samples import FELL
 from ppafo.engine.lane_samples import REQUEST as REQUEST_ROW
 from ppafo.engine.lane_source import SAME_MOMENT
-from ppafo.engine.lanes import Batch, BatchResult, Floats, add_meters, group_of, meters_of, run_blocks
+from ppafo.engine.lanes import Batch, BatchResult, Floats, add_meters, group_of, load_programs, meters_of, run_blocks
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, row_numbers
 from ppafo.engine.run import NEVER_FAILED, Members
@@ -125,12 +125,15 @@ class Outcome:
         self.metrics = {name: np.full(runs, np.nan) for name in request.metrics}
         self.traces = {name: np.full((request.times.size, runs), np.nan) for name in request.bands}
 
-    def programs(self, batches: Iterable[Batch]) -> list[Program]:
-        """Return the programs that batches need, with their meters."""
-        first = {batch.program: batch for batch in batches}
+    def run_all(self, batches: Sequence[tuple[Members, Batch]], threads: int | None) -> None:
+        """Run batches one after the other, whose runs have these places in the ensemble."""
+        first = {batch.program: batch for _, batch in batches}
         alone = [Batch(item.program, item.clock, item.parameters[:, :1], item.states[:, :1]) for item in first.values()]
-        # Several are compiled side by side before the first batch runs; a single one as it is met.
-        return [_meter_batch(batch, self.request).batch.program for batch in alone] if len(alone) > 1 else []
+        # Several programs are compiled side by side before the first batch runs; a single one as it is met.
+        if len(alone) > 1:
+            load_programs([_meter_batch(batch, self.request).batch.program for batch in alone])
+        for members, batch in batches:
+            self.run(batch, members, threads)
 
     def run(self, plain: Batch, members: Members, threads: int | None) -> None:
         """Run a batch whose runs have these places in the ensemble."""
@@ -165,8 +168,10 @@ class Outcome:
         result = group_of("result", task.batch.program.state_rows(), states)
         failed = result.failure_time
         self.too_many_parts[members] = result.too_many_parts != 0.0
+        # Meters stand below the rows of a plain batch, and what they come to says nothing about the run.
         completed = (failed >= NEVER_FAILED) & np.isfinite(states[:physical]).all(axis=0)
         self.is_completed[members] = completed
+        # Without a time of failure the last sample is the best that is known.
         end = task.interval * (task.samples - 1)
         time = np.where(failed < NEVER_FAILED, failed, end)
         self.failure_time[members] = np.where(completed, np.nan, time)
@@ -288,7 +293,13 @@ def _meter_batch(plain: Batch, request: Request) -> _MeteredBatch:
     meters = sorted({meter.name: meter for kind in available.values() for meter in kind.meters}.items())
     read_from_traces = dict.fromkeys(channel for kind in available.values() for channel in kind.traced)
     interval = intervals(plain)
-    stride = _stride(interval, request) if request.bands else 1
+    stride = max(1, round(request.every / float(interval[0]))) if request.bands else 1
+    # Runs of one batch may have other steps, but traces are rows of one array.
+    if request.bands and np.abs(stride * interval - request.every).max() > _SAME * request.every:
+        raise ScenarioError(
+            f"traces every {request.every:.6g} s need an output interval that divides it in every run, not "
+            f"{interval.max():.6g} s; give run.output_interval a value that does"
+        )
     late = _late_totals(plain, available)
     falls = {FELL} if program.reacts and (late or request.bands) else set[str]()
     traced = sorted({*read_from_traces, *request.bands, *late, *falls})
@@ -317,18 +328,6 @@ def intervals(batch: Batch) -> Floats:
     """Time between two samples [s] of each run of a batch that is not metered yet."""
     timing = group_of("timing", batch.program.parameter_rows(), batch.parameters)
     return np.asarray(timing.step * batch.clock.record_every)
-
-
-def _stride(interval: Floats, request: Request) -> int:
-    """Samples between two that are kept."""
-    stride = max(1, round(request.every / float(interval[0])))
-    # Runs of one batch may have other steps, but traces are rows of one array.
-    if np.abs(stride * interval - request.every).max() > _SAME * request.every:
-        raise ScenarioError(
-            f"traces every {request.every:.6g} s need an output interval that divides it in every run, not "
-            f"{interval.max():.6g} s; give run.output_interval a value that does"
-        )
-    return stride
 
 
 def _read(task: _MeteredBatch, name: str, readings: Readings) -> Floats:

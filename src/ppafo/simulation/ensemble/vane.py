@@ -19,10 +19,23 @@ from ppafo.simulation.scenario import ProfileChoice, Scenario, vane_motion
 
 def rules(scenario: Scenario) -> tuple[Problem, ...]:
     """Return what may be wrong with a scenario that represents many runs: the vane beyond a stop, a delay too long."""
-    return *_beyond_the_stops(scenario), *_too_late(scenario)
+    delay, step = scenario.sensors.delay, scenario.run.step
+
+    def long_line(run: int) -> str:
+        longest = quantity_text(MAXIMUM_STEPS_OF_DELAY * at(step, run), "s")
+        return f"sensors.delay = {at(delay, run):.9g} s: must be at most {longest}, {MAXIMUM_STEPS_OF_DELAY:.0e} steps"
+
+    return (
+        _beyond_the_stops(scenario),
+        (
+            delay > scenario.run.duration,
+            lambda run: f"sensors.delay = {at(delay, run):.9g} s: must not be longer than run.duration",
+        ),
+        (delay / step > MAXIMUM_STEPS_OF_DELAY, long_line),
+    )
 
 
-def _beyond_the_stops(scenario: Scenario) -> tuple[Problem, ...]:
+def _beyond_the_stops(scenario: Scenario) -> Problem:
     """A vane that begins, is held or is to move beyond the stops."""
     actuator, motion = scenario.device.actuator, vane_motion(scenario)
     profile = ProfileChoice("constant", {"level": motion.angle}) if motion.profile is None else motion.profile
@@ -37,37 +50,16 @@ def _beyond_the_stops(scenario: Scenario) -> tuple[Problem, ...]:
             path = path_of_locked_angle(scenario) or LOCKED_ANGLE
             return f"{path} = {quantity_text(at(level, run), 'rad')}: must be between the stops, {low} to {high}"
 
-        return ((outside, angle_line),)
+        return outside, angle_line
     # The bounds hold for all time; a run that may leave them is checked at its own times.
-    found = {int(run): _stop_violation(scenario, profile, int(run)) for run in np.flatnonzero(outside)}
-    for run, problem in found.items():
-        outside[run] = bool(problem)
-    return ((outside, lambda run: found[run]),)
-
-
-def _stop_violation(scenario: Scenario, profile: ProfileChoice, run: int) -> str:
-    actuator = scenario.device.actuator
-    settings = {name: at(value, run) for name, value in profile.settings.items()}
-    stops = (at(actuator.angle_min, run), at(actuator.angle_max, run))
-    one = ProfileChoice(profile.kind, settings)
-    return profile_problem(scenario.device.name, stops, one, at(scenario.run.duration, run), at(scenario.run.step, run))
-
-
-def _too_late(scenario: Scenario) -> tuple[Problem, ...]:
-    """Sensors whose delay is longer than the run, or than can be stored."""
-    delay, step = scenario.sensors.delay, scenario.run.step
-
-    def long_line(run: int) -> str:
-        longest = quantity_text(MAXIMUM_STEPS_OF_DELAY * at(step, run), "s")
-        return f"sensors.delay = {at(delay, run):.9g} s: must be at most {longest}, {MAXIMUM_STEPS_OF_DELAY:.0e} steps"
-
-    return (
-        (
-            delay > scenario.run.duration,
-            lambda run: f"sensors.delay = {at(delay, run):.9g} s: must not be longer than run.duration",
-        ),
-        (delay / step > MAXIMUM_STEPS_OF_DELAY, long_line),
-    )
+    found: dict[int, str] = {}
+    for run in np.flatnonzero(outside).tolist():
+        stops = at(actuator.angle_min, run), at(actuator.angle_max, run)
+        own = ProfileChoice(profile.kind, {name: at(value, run) for name, value in profile.settings.items()})
+        duration, step = at(scenario.run.duration, run), at(scenario.run.step, run)
+        found[run] = profile_problem(scenario.device.name, stops, own, duration, step)
+        outside[run] = bool(found[run])
+    return outside, lambda run: found[run]
 
 
 def clock(base: Scenario, times: Mapping[str, Any]) -> tuple[Clock, tuple[Problem, ...]]:

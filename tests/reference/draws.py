@@ -1,7 +1,7 @@
 """Random devices and experiments as scenario documents, by family; the same number gives the same document.
 
 A family is written for one thing that is hard; ``mixed`` draws everything at once. The documents are in the package's
-public form, so that the package and the judge are given the same thing.
+public form, so that the package and the reference are given the same thing.
 """
 
 import math

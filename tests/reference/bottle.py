@@ -2,7 +2,7 @@
 
 It is given the angle of the ankle and the command to the valves as a walk recorded them, and CoolProp's properties at
 nodes of its own; it knows no table, no step and no coupling of the package. Runge and Kutta of order four, 0.1 ms. The
-long comparison of docs/decisions/0018 is ``python -m tests.judge.bottle``.
+long comparison of docs/decisions/0018 is ``python -m tests.reference.bottle``.
 """
 
 import math
@@ -261,7 +261,7 @@ def moved(y: Column, slope: Column, step: float) -> Column:
     return [value + step * rate for value, rate in zip(y, slope, strict=True)]
 
 
-def judge(walk: Any, seconds: float) -> Floats:
+def independent_run(walk: Any, seconds: float) -> Floats:
     """What the equations give for the first seconds of a walk of the solenoid pair: (samples, 12) as ``follow``."""
     n = numbers_of(walk)
     gas, interval = fluid(n.set_1), float(walk.recording.time[1])
@@ -299,7 +299,7 @@ def main(words: list[str]) -> None:
     for coupling in words or ["1 ms", "10 ms", "100 ms", "500 ms"]:
         changes = [f"bottle.coupling={coupling}", "bottle.fill=0.3", "bottle.temperature=280 K"]
         found = walk("solenoid-regulators", 1.0, changes, bottle="paper-co2-9oz")
-        gaps = differences(found, judge(found, float(found.recording.time[-1])))
+        gaps = differences(found, independent_run(found, float(found.recording.time[-1])))
         line = f"{coupling}: {found.supply.ending.time:.6g} s, "
         sys.stdout.write(line + ", ".join(f"{name} {gap:.3g}" for name, gap in gaps.items()) + "\n")
         sys.stdout.flush()

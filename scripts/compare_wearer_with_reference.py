@@ -1,11 +1,12 @@
 """Compares wearers who react with the independent simulator of the tests: the first step, and ten strides.
 
-    python scripts/judge_wearer.py healthy-128 geyer-herr
-    python scripts/judge_wearer.py geyer-herr --steps 0.00625 0.003125
+    python scripts/compare_wearer_with_reference.py healthy-128 geyer-herr
+    python scripts/compare_wearer_with_reference.py geyer-herr --steps 0.00625 0.003125
 
-Prints two tables for each: how far the package is from the judge in the first 0.1 s, until the right foot strikes and
-until the left foot strikes, at some steps, with the judge's own difference where its step is half as long again; then
-strikes, lengths and means of ten strides, and when paths part. The device is vented, and its gas cannot turn the ankle.
+Prints two tables for each: how far the package is from the reference in the first 0.1 s, until the right foot strikes
+and until the left foot strikes, at some steps, with the reference's own difference where its step is half as long
+again; then strikes, lengths and means of ten strides, and when paths part. The device is vented, and its gas cannot
+turn the ankle.
 """
 
 import argparse
@@ -17,22 +18,22 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from tests.judge.wearer_comparison import (
+from tests.reference.wearer_comparison import (
     SETTLED,
     STEPS,
     STRIDES,
     Columns,
     Floats,
     Strides,
-    by_judge,
     by_package,
+    by_reference,
     gap,
     parted,
     strides_of,
 )
 
 FINE, COARSE = 100, 67
-"""Steps of the judge in a millisecond, and what it is compared with."""
+"""Steps of the reference in a millisecond, and what it is compared with."""
 UNTIL = (0.1, 0.3, 0.9)
 """Times [s]: the first leg stands; the right foot has struck; so has the left one."""
 
@@ -44,10 +45,10 @@ def cells_of(series: list[Floats], number: int) -> str:
 
 def compare(name: str, steps: Sequence[float]) -> None:
     """Print both tables of a wearer, with the package at these steps [ms]."""
-    judged = by_judge(name, FINE)
+    judged = by_reference(name, FINE)
     others: dict[str, Columns] = {f"package, {step:g} ms": by_package(name, step) for step in steps}
-    others["judge, 15 us"] = by_judge(name, COARSE)
-    print(f"\n{name}: largest difference from the judge\n")
+    others["reference, 15 us"] = by_reference(name, COARSE)
+    print(f"\n{name}: largest difference from the reference\n")
     print("| | until (s) | hip (mm) | a joint (deg) | load (body weights) | activation |")
     print("|---|---|---|---|---|---|")
     for until in UNTIL:
@@ -55,7 +56,7 @@ def compare(name: str, steps: Sequence[float]) -> None:
             cells = " | ".join(f"{value:.2g}" for value in gap(seen, judged, until))
             print(f"| {title} | {until:g} | {cells} |")
     every: dict[str, Strides] = {title: strides_of(seen) for title, seen in others.items()}
-    every = {"judge, 10 us": strides_of(judged), **every}
+    every = {"reference, 10 us": strides_of(judged), **every}
     parting = {title: (parted(seen, judged, 1.0), parted(seen, judged, 5.0)) for title, seen in others.items()}
     print(f"\n{name}: {STRIDES} strides of the left leg\n")
     print(f"| | {' | '.join(every)} |")
@@ -75,7 +76,7 @@ def compare(name: str, steps: Sequence[float]) -> None:
         print(f"| mean from stride {SETTLED + 1} on, {words} | {cells} |")
     for place, limit in enumerate((1, 5)):
         cells = " | ".join("-" if not np.isfinite(at[place]) else f"{at[place]:.2f}" for at in parting.values())
-        print(f"| a joint is {limit} deg from the judge's at (s) | - | {cells} |")
+        print(f"| a joint is {limit} deg from the reference's at (s) | - | {cells} |")
 
 
 def main() -> int:

@@ -1,14 +1,14 @@
 """Holds the package against the independent simulator of the tests on random devices and experiments.
 
-    python scripts/judge.py --draws 3000 --seed 1 --out out/judge
+    python scripts/compare_with_reference.py --draws 3000 --seed 1 --out out/reference
 
 Prints a table: draws of each family, how many are determined, how many of these are above the limits or failed, worst
 and median error over the limit; then those in which a decision of the controller hangs by a hair (they change where a
 sensor is moved by 1e-5 of the pressure range), and those that change where the start is moved by 1e-7. Every determined
 case above the limits is written as a scenario file into the folder, to be run again by
 
-    ppafo simulate out/judge/slow-valves-1-17.toml
-    python scripts/judge.py --again out/judge/slow-valves-1-17.toml
+    ppafo simulate out/reference/slow-valves-1-17.toml
+    python scripts/compare_with_reference.py --again out/reference/slow-valves-1-17.toml
 """
 
 import argparse
@@ -21,8 +21,8 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from ppafo import load_scenario, scenario_from_dict
-from tests.judge.comparison import Verdict, verdict
-from tests.judge.draws import FAMILIES, Document, draw
+from tests.reference.comparison import Verdict, verdict
+from tests.reference.draws import FAMILIES, Document, draw
 
 COLUMNS = (
     "draws",
@@ -72,14 +72,14 @@ def row(cases: list[Verdict], above: int, seconds: float) -> str:
 
 
 def main() -> int:
-    """Judge the requested draws; 1 where one is above the limits."""
+    """Compare the requested draws; 1 where one is above the limits."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--draws", type=int, default=330, help="how many in all, over all families (default 330)")
     parser.add_argument("--seed", type=int, default=1, help="another seed, other draws (default 1)")
     parser.add_argument("--duration", type=float, default=0.3, help="length of each run [s] (default 0.3)")
     parser.add_argument("--family", choices=list(FAMILIES), action="append", help="only this family; may be repeated")
-    parser.add_argument("--out", type=Path, default=Path("out/judge"), help="folder for cases above the limits")
-    parser.add_argument("--again", type=Path, help="judge one file instead")
+    parser.add_argument("--out", type=Path, default=Path("out/reference"), help="folder for cases above the limits")
+    parser.add_argument("--again", type=Path, help="compare one file instead")
     asked = parser.parse_args()
     if asked.again is not None:
         case = verdict(load_scenario(asked.again))

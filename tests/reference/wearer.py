@@ -580,7 +580,7 @@ def start(wearer: Any, numbers: Numbers, speed: float) -> Floats:
     return y
 
 
-def walk_of_judge(name: str, seconds: float, steps: int, device: Device = NONE) -> Walked:
+def walk_of_reference(name: str, seconds: float, steps: int, device: Device = NONE) -> Walked:
     """Walk a wearer by name for some seconds with ``steps`` steps a millisecond; 100 are 10 us each."""
     file = find_wearer(name)
     wearer = wearer_of(file)

@@ -30,7 +30,7 @@ from ppafo.errors import SimulationError
 from ppafo.model.plant import gravity_torque, net_driving_torque
 from ppafo.model.ports import at_valve, friction_at_rest, shown_signals
 from ppafo.model.sensors import Measurement, measure
-from tests.judge.reference_slopes import (
+from tests.reference.reference_slopes import (
     PLANT_UNKNOWNS,
     gas_unknowns,
     right_hand_side_source,
@@ -437,8 +437,8 @@ class Agreement:
 
 def compare_with_reference(run: Run, reference: ReferenceResult | None = None) -> Agreement:
     """Run the lanes and, unless it is given, the reference solver, and compare them at the record times."""
-    judge = reference or solve_reference(run)
-    return measure_agreement(run, run_batch(batch_of(run)), judge)
+    reference = reference or solve_reference(run)
+    return measure_agreement(run, run_batch(batch_of(run)), reference)
 
 
 def measure_agreement(run: Run, outcome: BatchResult, reference: ReferenceResult) -> Agreement:

@@ -684,7 +684,7 @@ def law_of(scenario: Scenario, bias: float) -> Law:
     """Controller and sensors as numbers; their noise must be off."""
     s, sensors = scenario.controller.settings, scenario.sensors
     if sensors.angle_noise or sensors.pressure_noise:
-        raise ValueError("the judge knows no noise")
+        raise ValueError("the reference knows no noise")
     names = ("proportional_gain", "integral_gain", "derivative_gain", "derivative_filter", "anti_windup")
     gains = (s.get(name, 0.0) for name in names)
     seen = (sensors.delay, sensors.pressure_resolution, bias)
@@ -751,7 +751,7 @@ def start_of(scenario: Scenario, rig: Rig, moved: float) -> Any:
     return y
 
 
-def judge(
+def independent_run(
     scenario: Scenario,
     tolerance: float = 1.0e-9,
     moved: float = 0.0,

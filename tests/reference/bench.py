@@ -13,7 +13,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from ppafo.simulation.scenario import FreeMotion, Scenario
-from tests.judge.simulator import Rig, flow, rig_of
+from tests.reference.simulator import Rig, flow, rig_of
 
 TOLERANCE = 1.0e-8
 

@@ -22,8 +22,8 @@ from ppafo.wearer.model.segments import Damping, Limb, Pose, accelerations, circ
 from ppafo.wearer.model.walker import Assist, Fibres, Joints, Walker, Wearer, next_walker, pull
 from ppafo.wearer.model.way import LEVEL, Piece, Way, footing
 from ppafo.wearer.published import first_answer, start_of
-from tests.judge import wearer as judge
-from tests.judge.wearer_comparison import STEPS, Columns, by_judge, by_package, gap, strides_of
+from tests.reference import wearer as reference
+from tests.reference.wearer_comparison import STEPS, Columns, by_package, by_reference, gap, strides_of
 
 pytestmark = pytest.mark.long
 
@@ -47,7 +47,7 @@ FEELINGS = (
     "flexor_length",
     "load",
 )
-"""Feelings in the judge's order."""
+"""Feelings in the reference's order."""
 
 
 def to_joints(pose: Pose, offset: float) -> np.ndarray:
@@ -65,14 +65,14 @@ def drawn_pose(draw: np.random.Generator, size: float) -> Pose:
     return Pose(*numbers[:3], Limb(*numbers[3:6]), Limb(*numbers[6:9]))
 
 
-def body_of_judge(wearer: Wearer, device: judge.Device = judge.NONE) -> tuple[Any, Any]:
-    model = mujoco.MjModel.from_xml_string(judge.body_file(wearer.body, device))
+def body_of_reference(wearer: Wearer, device: reference.Device = reference.NONE) -> tuple[Any, Any]:
+    model = mujoco.MjModel.from_xml_string(reference.body_file(wearer.body, device))
     return model, mujoco.MjData(model)
 
 
 def test_mujoco_accelerates_the_body_as_the_package_does() -> None:
-    wearer, device = WEARER, judge.Device(inertia=0.0084)
-    model, data = body_of_judge(wearer, device)
+    wearer, device = WEARER, reference.Device(inertia=0.0084)
+    model, data = body_of_reference(wearer, device)
     draw = np.random.default_rng(1)
     for _ in range(100):
         pose, rates = drawn_pose(draw, 1.2), drawn_pose(draw, 6.0)
@@ -109,16 +109,16 @@ def drawn_leg(draw: np.random.Generator) -> tuple[Joints, Joints, Fibres]:
     """Angles, rates and fibres of a leg, from slack to far above the largest forces."""
     angles = Joints(*np.radians(draw.uniform([60.0, 90.0, 120.0], [140.0, 185.0, 240.0])).tolist())
     own: list[Fibre] = []
-    for name in judge.MUSCLES:
+    for name in reference.MUSCLES:
         muscle = getattr(WEARER.left, name)
         own.append(Fibre(float(draw.uniform(0.01, 1.0)), muscle.optimum * float(draw.uniform(0.35, 1.5)), 0.0))
     rates = Joints(*draw.uniform(-8.0, 8.0, 3).tolist())
     return angles, rates, Fibres._make(own)
 
 
-def test_muscles_pull_and_move_as_those_of_the_judge() -> None:
+def test_muscles_pull_and_move_as_those_of_the_reference() -> None:
     free = WEARER._replace(stop=WEARER.stop._replace(stiffness=0.0))
-    numbers, draw = judge.numbers_of(free), np.random.default_rng(2)
+    numbers, draw = reference.numbers_of(free), np.random.default_rng(2)
     for _ in range(200):
         angles, rates, fibres = drawn_leg(draw)
         pulled = pull(WEARER.left, fibres, angles, rates, 0.0)
@@ -129,34 +129,34 @@ def test_muscles_pull_and_move_as_those_of_the_judge() -> None:
             np.array([[getattr(item, name) for item in fibres]] * 2) for name in ("activation", "length")
         )
         torque, speeds, felt = np.zeros(6), np.zeros((2, 7)), np.zeros(28)
-        judge.forces_on_legs(numbers, q, v, activation, length, torque, speeds, felt)
+        reference.forces_on_legs(numbers, q, v, activation, length, torque, speeds, felt)
         assert torque == pytest.approx([pulled.hip, pulled.knee, pulled.ankle] * 2, abs=ROUNDING)
         moved = [
             next_fibre(getattr(WEARER.left, name), getattr(fibres, name), 0.5, getattr(pulled, name), 0.0).velocity
-            for name in judge.MUSCLES
+            for name in reference.MUSCLES
         ]
         assert speeds == pytest.approx(np.array([moved, moved]), rel=1e-8, abs=1e-12)
         known = [getattr(pulled.felt, name) for name in FEELINGS]
-        assert np.delete(felt[:13], [judge.V_SOL, judge.V_GAS, judge.LOAD]) == pytest.approx(
-            np.delete(known, [judge.V_SOL, judge.V_GAS, judge.LOAD]), rel=1e-10, abs=1e-12
+        assert np.delete(felt[:13], [reference.V_SOL, reference.V_GAS, reference.LOAD]) == pytest.approx(
+            np.delete(known, [reference.V_SOL, reference.V_GAS, reference.LOAD]), rel=1e-10, abs=1e-12
         )
 
 
-def test_reflexes_answer_as_those_of_the_judge() -> None:
+def test_reflexes_answer_as_those_of_the_reference() -> None:
     draw, drawn = np.random.default_rng(3), set()
     for _ in range(500):
         gains = WEARER.left_gains._make(draw.uniform(0.0, 3.0, 27).tolist())
-        numbers = judge.numbers_of(WEARER._replace(left_gains=gains, right_gains=gains))
+        numbers = reference.numbers_of(WEARER._replace(left_gains=gains, right_gains=gains))
         felt = draw.uniform(-0.5, 1.5, 26)
-        felt[judge.PHI_K], felt[13 + judge.PHI_K] = draw.uniform(0.0, 3.2, 2)
+        felt[reference.PHI_K], felt[13 + reference.PHI_K] = draw.uniform(0.0, 3.2, 2)
         stands, rear = float(draw.integers(2)), float(draw.integers(2))
         lean, rate, left_at = draw.uniform(-1.0, 1.0, 3).tolist()
         own, other = (Felt(**dict(zip(FEELINGS, felt[a : a + 13].tolist(), strict=True))) for a in (0, 13))
         order = stimulation(gains, own, Balance(lean, rate), Gait(stands, 0.1, left_at), other.load, rear)
         given = np.zeros(7)
         stance = np.array([[stands, 0.1, left_at], [1.0, 0.0, 0.0]])
-        judge.stimulate(numbers, felt, lean, rate, stance, 0, rear > 0.5, given)
-        assert given == pytest.approx([getattr(order, name) for name in judge.MUSCLES], rel=1e-12)
+        reference.stimulate(numbers, felt, lean, rate, stance, 0, rear > 0.5, given)
+        assert given == pytest.approx([getattr(order, name) for name in reference.MUSCLES], rel=1e-12)
         drawn |= {(stands, muscle) for muscle in np.flatnonzero((given > 0.01) & (given < 1.0)).tolist()}
     assert len(drawn) == 14, "every muscle is answered between its limits, in stance and in swing"
 
@@ -167,12 +167,12 @@ def way_with_slope(slope: float) -> Way:
     return LEVEL._replace(pieces=(first, *LEVEL.pieces[1:]))
 
 
-def test_the_ground_pushes_as_that_of_the_judge() -> None:
-    draw, ground = np.random.default_rng(4), judge.numbers_of(WEARER).ground
+def test_the_ground_pushes_as_that_of_the_reference() -> None:
+    draw, ground = np.random.default_rng(4), reference.numbers_of(WEARER).ground
     seen = set()
     for _ in range(300):
         state, point = np.zeros(2), Point(0.0, 0.0, 0.0, 0.0)
-        # The judge has level ground; a slope is its coordinates turned.
+        # The reference has level ground; a slope is its coordinates turned.
         angle = float(draw.uniform(-0.2, 0.2))
         sine, cosine = math.sin(angle), math.cos(angle)
         x, speed = 0.0, float(draw.normal() * 10.0 ** draw.uniform(-3.0, 0.0))
@@ -191,8 +191,8 @@ def test_the_ground_pushes_as_that_of_the_judge() -> None:
                 sine * speed + cosine * rise,
                 0.0,
             )
-            along, up = judge.ground_force(ground, state, x, z, speed, rise, True)
-            # A point that comes to rest sticks at once before the judge, and from the next step on in the package.
+            along, up = reference.ground_force(ground, state, x, z, speed, rise, True)
+            # A point that comes to rest sticks at once in the reference, and from the next step on in the package.
             rests = point.touches > 0.5 and point.sticks < 0.5 and abs(speed) < WEARER.ground.rest_speed
             pressed = cosine * on_foot.force_y - sine * on_foot.force_x
             assert pressed == pytest.approx(on_foot.normal, rel=1e-9, abs=1e-9)
@@ -201,12 +201,12 @@ def test_the_ground_pushes_as_that_of_the_judge() -> None:
             assert rests or along == pytest.approx(held, rel=1e-9, abs=1e-6)
             seen.add(float(state[0]))
             point = on_foot.after
-    assert seen == {judge.AIR, judge.STICKS, judge.SLIDES}
+    assert seen == {reference.AIR, reference.STICKS, reference.SLIDES}
 
 
 def flying(height: float) -> tuple[Wearer, Walker]:
     """A wearer without muscles and ends of joints, high above the ground, who tumbles."""
-    names = dict.fromkeys(judge.MUSCLES, 0.0)
+    names = dict.fromkeys(reference.MUSCLES, 0.0)
     wearer = WEARER._replace(
         left=with_strengths(WEARER.left, names),
         right=with_strengths(WEARER.right, names),
@@ -220,7 +220,7 @@ def flying(height: float) -> tuple[Wearer, Walker]:
 def drift(step: float, seconds: float) -> tuple[float, np.ndarray]:
     """Change of energy [J], and of momentum but for gravity [kg m/s, kg m/s, kg m^2/s], in the air by MuJoCo."""
     wearer, walker = flying(100.0)
-    model, data = body_of_judge(wearer)
+    model, data = body_of_reference(wearer)
     weight = float(model.body_subtreemass[1]) * wearer.body.gravity
     ordered, free = first_answer(), Assist(0.0, 0.0, 0.0)
     energies, momenta = [], []
@@ -247,11 +247,11 @@ def test_in_the_air_energy_stays_and_gravity_alone_changes_momentum_to_second_or
 
 @pytest.fixture(scope="module")
 def judged() -> Columns:
-    """The first step before the judge."""
-    return by_judge("healthy-128", seconds=0.32)
+    """The first step of the reference."""
+    return by_reference("healthy-128", seconds=0.32)
 
 
-def test_the_first_step_comes_to_that_of_the_judge_as_the_step_shortens(judged: Columns) -> None:
+def test_the_first_step_comes_to_that_of_the_reference_as_the_step_shortens(judged: Columns) -> None:
     """A quarter of the step leaves less than a tenth of the error; the load is that at the begin of a step."""
     far, _, near = (by_package("healthy-128", step, seconds=5.5) for step in STEPS)
     coarse, fine = gap(far, judged, 0.3), gap(near, judged, 0.3)
@@ -266,7 +266,7 @@ def test_the_first_step_comes_to_that_of_the_judge_as_the_step_shortens(judged: 
     assert first.activation < 2e-4
 
 
-def test_the_judge_would_see_a_muscle_or_a_gain_that_is_wrong_by_two_in_a_thousand(judged: Columns) -> None:
+def test_the_reference_would_see_a_muscle_or_a_gain_that_is_wrong_by_two_in_a_thousand(judged: Columns) -> None:
     flaws = ("wearer.soleus_strength=0.998", "wearer.vastus_strength=0.998", "wearer.left_soleus_force=1.1611")
     sound, *wrong = (
         gap(by_package("healthy-128", 0.0125, 5.5, changes), judged, 0.3).hip
@@ -275,17 +275,17 @@ def test_the_judge_would_see_a_muscle_or_a_gain_that_is_wrong_by_two_in_a_thousa
     assert min(wrong) > 1.7 * sound
 
 
-def test_the_judge_has_nothing_of_the_package_but_the_numbers_of_wearers() -> None:
-    tree = ast.parse(Path(judge.__file__).read_text(encoding="utf-8"))
+def test_the_reference_has_nothing_of_the_package_but_the_numbers_of_wearers() -> None:
+    tree = ast.parse(Path(reference.__file__).read_text(encoding="utf-8"))
     taken = [item.module for item in ast.walk(tree) if isinstance(item, ast.ImportFrom)]
     taken += [name.name for item in ast.walk(tree) if isinstance(item, ast.Import) for name in item.names]
     assert {name for name in taken if name and name.startswith("ppafo")} == {"ppafo.wearer.loading"}
 
 
 @pytest.mark.thorough
-def test_ten_strides_are_as_long_and_as_quick_as_those_of_the_judge() -> None:
+def test_ten_strides_are_as_long_and_as_quick_as_those_of_the_reference() -> None:
     """At the package's own step, means are within half a percent."""
-    expected = strides_of(by_judge("healthy-128", 80, 11.6))
+    expected = strides_of(by_reference("healthy-128", 80, 11.6))
     walked = strides_of(by_package("healthy-128", STEPS[0], 11.6))
     assert walked.strikes[:2] == pytest.approx(expected.strikes[:2], abs=0.01)
     assert walked.lengths == pytest.approx(expected.lengths, rel=0.03)

@@ -1,4 +1,4 @@
-"""A drawn scenario before the judge: is its result determined, and how far off is the package?"""
+"""A drawn scenario against the reference: is its result determined, and how far off is the package?"""
 
 from typing import Any, NamedTuple
 
@@ -7,14 +7,14 @@ import numpy as np
 from ppafo.errors import PpafoError
 from ppafo.running import simulate
 from ppafo.simulation.scenario import Scenario
-from tests.judge.simulator import Answer, judge
+from tests.reference.simulator import Answer, independent_run
 
 LARGEST_ANGLE = 2.0e-4
 LARGEST_PRESSURE = 1.0e-3
 AROUND_IMPACTS = 5.0e-3
 """Time [s] before and after an impact that is left out: a shift of it by 1 us turns velocities over."""
 FRACTION = 0.1
-"""Share of a limit by which the judge may disagree with itself on a determined run."""
+"""Share of a limit by which the reference may disagree with itself on a determined run."""
 MOVED = 1.0e-7
 BIAS = 1.0e-5
 """Share of the pressure range by which what the controller measures is moved, one chamber up and the other down.
@@ -24,7 +24,7 @@ A hundredth of the limit: a loop that makes more than the whole limit of it hang
 
 
 class Verdict(NamedTuple):
-    """Largest errors over their limits, and what the judge says of itself over the same limits."""
+    """Largest errors over their limits, and what the reference says of itself over the same limits."""
 
     angle: float
     pressure: float
@@ -36,7 +36,7 @@ class Verdict(NamedTuple):
 
     @property
     def is_repeatable(self) -> bool:
-        """True where neither the start nor the judge's own step changes the result."""
+        """True where neither the start nor the reference's own step changes the result."""
         return self.compared > 0 and max(self.moved, self.own) <= FRACTION
 
     @property
@@ -100,12 +100,12 @@ def package_columns(scenario: Scenario, count: int) -> tuple[Any, str]:
 
 
 def verdict(scenario: Scenario) -> Verdict:
-    """How far the package is from the judge on a scenario, and whether the judge can say."""
-    answer = judge(scenario)
+    """How far the package is from the reference on a scenario, and whether the reference can say."""
+    answer = independent_run(scenario)
     span = pressure_range(scenario, answer)
-    others = [judge(scenario, moved=MOVED), judge(scenario, tolerance=1.0e-11)]
+    others = [independent_run(scenario, moved=MOVED), independent_run(scenario, tolerance=1.0e-11)]
     if scenario.controller.kind != "constant":
-        others += [judge(scenario, bias=BIAS * span), judge(scenario, bias=-BIAS * span)]
+        others += [independent_run(scenario, bias=BIAS * span), independent_run(scenario, bias=-BIAS * span)]
     keep = away_from_impacts(answer.time, answer.impacts, *(other.impacts for other in others))
     gaps = [max(differences(scenario, answer, columns(other), keep)) for other in others]
     doubts = (gaps[0], max(gaps[2:], default=0.0), gaps[1], int(keep.sum()))

@@ -1,4 +1,4 @@
-"""A shipped neuromuscular gait model in the package and before the judge: the first step, and ten strides."""
+"""A shipped neuromuscular gait model in the package and against the reference: the first step, and ten strides."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -12,7 +12,7 @@ from ppafo.walking import load_walk, walk
 from ppafo.walking.planning import plan_walk
 from ppafo.wearer.published import WEIGHT
 from ppafo.wearer.scheme import ReactingWalk
-from tests.judge.wearer import COLUMNS, SAMPLE, Device, walk_of_judge
+from tests.reference.wearer import COLUMNS, SAMPLE, Device, walk_of_reference
 
 Floats = NDArray[np.float64]
 
@@ -73,16 +73,16 @@ def by_package(name: str, step: float, seconds: float = SECONDS, changes: Sequen
 
 
 def device_of(name: str) -> Device:
-    """What the device of these walks is for the judge."""
+    """What the device of these walks is for the reference."""
     run = plan_walk(light_walk(name, STEPS[0]))
     assert isinstance(run.walk, ReactingWalk)
     share = run.walk.share
     return Device(inertia=share.inertia, damping=share.viscous_damping, friction=run.plant.dynamic_torque)
 
 
-def by_judge(name: str, steps: int = 100, seconds: float = SECONDS) -> Columns:
-    """The walk of the judge with ``steps`` steps a millisecond."""
-    return walk_of_judge(name, seconds, steps, device_of(name)).columns
+def by_reference(name: str, steps: int = 100, seconds: float = SECONDS) -> Columns:
+    """The walk of the reference with ``steps`` steps a millisecond."""
+    return walk_of_reference(name, seconds, steps, device_of(name)).columns
 
 
 def strides_of(columns: Columns) -> Strides:

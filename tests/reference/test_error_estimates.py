@@ -9,9 +9,9 @@ from ppafo.simulation.check import FINER, LARGEST_OF_PRESSURE
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
 from ppafo.simulation.scenario import Scenario
-from tests.judge.comparison import pressure_range
-from tests.judge.draws import draw
-from tests.judge.simulator import judge
+from tests.reference.comparison import pressure_range
+from tests.reference.draws import draw
+from tests.reference.simulator import independent_run
 
 SMALL_CHAMBERS = (
     "actuator.displacement_per_radian=51 cm^3/rad",
@@ -42,7 +42,7 @@ FEWEST, MOST = 1.0, 3.0
 
 def true_error(scenario: Scenario) -> float:
     """Largest error of a pressure [Pa] at any sample."""
-    answer, recording = judge(scenario), simulate(scenario).recording
+    answer, recording = independent_run(scenario), simulate(scenario).recording
     return max(
         float(np.abs(recording[name] - values).max())
         for name, values in (("pressure_1", answer.pressure_1), ("pressure_2", answer.pressure_2))
@@ -52,7 +52,7 @@ def true_error(scenario: Scenario) -> float:
 @pytest.mark.parametrize("case", SENSITIVE)
 def test_an_error_above_the_promised_one_is_estimated_and_makes_the_run_sensitive(case: str) -> None:
     scenario = load_scenario("step-response", SENSITIVE[case])
-    wrong, allowed = true_error(scenario), LARGEST_OF_PRESSURE * pressure_range(scenario, judge(scenario))
+    wrong, allowed = true_error(scenario), LARGEST_OF_PRESSURE * pressure_range(scenario, independent_run(scenario))
     result = simulate(scenario)
     check = result.check()
     row = next(row for row in check.courses if row.name == "pressures over time")
@@ -68,7 +68,7 @@ def test_the_estimated_error_of_a_draw_is_above_the_true_one_and_not_far(family:
     for number in range(4):
         scenario = scenario_from_dict(draw(family, 8, number))
         wrong = true_error(scenario)
-        if wrong > 1.0e-5 * pressure_range(scenario, judge(scenario)):
+        if wrong > 1.0e-5 * pressure_range(scenario, independent_run(scenario)):
             assert FEWEST <= simulate(scenario).error().pressure / wrong <= MOST, number
 
 

@@ -1,4 +1,6 @@
-"""The package held against the independent simulator on a hundred random devices; thousands by scripts/judge.py.
+"""The package held against the independent simulator on a hundred random devices.
+
+Thousands are compared by scripts/compare_with_reference.py.
 
 Every family must hold: what is determined is within 2e-4 of the angle range and 1e-3 of the pressure range away from
 impacts. ``mixed`` needs a program for nearly every draw, so only the command runs it.
@@ -11,10 +13,10 @@ import pytest
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
-from tests.judge.comparison import away_from_impacts, columns, differences, verdict
-from tests.judge.draws import FAMILIES, draw
-from tests.judge.reference_solver import chamber_pressures_of, solve_reference
-from tests.judge.simulator import judge
+from tests.reference.comparison import away_from_impacts, columns, differences, verdict
+from tests.reference.draws import FAMILIES, draw
+from tests.reference.reference_solver import chamber_pressures_of, solve_reference
+from tests.reference.simulator import independent_run
 
 SEED = 1
 DRAWS = 9
@@ -36,17 +38,19 @@ def test_the_same_number_draws_the_same_document_and_another_one_another() -> No
 @pytest.mark.parametrize(
     "flaw", ["valve.area=31.63 mm^2", "foot_plate.inertia=8.43 g m^2", "actuator.displacement_per_radian=51.1 cm^3/rad"]
 )
-def test_the_judge_would_see_a_device_that_is_wrong_by_two_in_a_thousand(flaw: str, step_response: Scenario) -> None:
-    answer, other = judge(step_response), judge(load_scenario("step-response", (flaw,)))
+def test_the_reference_would_see_a_device_that_is_wrong_by_two_in_a_thousand(
+    flaw: str, step_response: Scenario
+) -> None:
+    answer, other = independent_run(step_response), independent_run(load_scenario("step-response", (flaw,)))
     keep = away_from_impacts(answer.time, answer.impacts, other.impacts)
     assert max(differences(step_response, answer, columns(other), keep)) > 1.0
-    assert max(differences(step_response, answer, columns(judge(step_response, 1e-11)), keep)) < 1e-3
+    assert max(differences(step_response, answer, columns(independent_run(step_response, 1e-11)), keep)) < 1e-3
 
 
 def reference_gap(scenario: Scenario) -> float:
-    """Largest difference between reference solver and judge away from impacts, over the limits."""
+    """Largest difference between reference solver and independent run away from impacts, over the limits."""
     run = plan_run(scenario)
-    answer, reference = judge(scenario), solve_reference(run)
+    answer, reference = independent_run(scenario), solve_reference(run)
     keep = away_from_impacts(answer.time, answer.impacts, reference.impacts)
     seen = (reference.states[:, 0], *chamber_pressures_of(run, reference.states))
     return max(differences(scenario, answer, seen, keep))
@@ -65,7 +69,7 @@ def reference_gap(scenario: Scenario) -> float:
         "legs in a gait",
     ],
 )
-def test_judge_and_reference_solver_agree(family: str) -> None:
+def test_independent_run_and_reference_solver_agree(family: str) -> None:
     assert {n: gap for n in range(3) if (gap := reference_gap(scenario_from_dict(draw(family, SEED, n)))) > 1e-2} == {}
 
 
@@ -80,5 +84,5 @@ def test_a_vane_thrown_at_the_stop_it_starts_on_rebounds_at_once(angle: str, spe
 
 def test_a_supply_that_does_not_relieve_lets_gas_in_only(step_response: Scenario) -> None:
     high = dataclasses.replace(step_response, initial=dataclasses.replace(step_response.initial, pressure_1=900_000.0))
-    assert judge(high, relieving=False).drawn[5] == 0.0
-    assert judge(high, relieving=True).drawn[5] < 0.0
+    assert independent_run(high, relieving=False).drawn[5] == 0.0
+    assert independent_run(high, relieving=True).drawn[5] < 0.0
