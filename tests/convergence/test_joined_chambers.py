@@ -59,7 +59,7 @@ def stepped(*overrides: str) -> Course:
     """Push-off and then lifting with a vane held at 75 deg, by the functions of the lanes in plain Python."""
     device = load_device("ppafo2011", "solenoid_recycling", (f"valve.joining_time={JOINED} s", *overrides))
     plant = plant_parameters(device)
-    valve, coils = solenoid_recycling.prepare(valve_settings(device.valve)), solenoid_recycling.parted_long_ago()
+    valve, coils = solenoid_recycling.prepare(valve_settings(device.valve)), solenoid_recycling.RecyclingState()
     state = vented_state(plant, math.radians(75.0), 0.0)
     held = held_chambers(plant, state.angle)
     rows = []

@@ -1,35 +1,34 @@
 """Gas and work: what a task costs, and what it gives."""
 
 import math
+from collections.abc import Callable
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ppafo.metrics.metric import Floats, MetricKind, ReadAt, Readings
-from ppafo.model.columns import choose
+from ppafo.metrics.metric import Floats, MetricKind, ReadAt
+from ppafo.model.columns import Number, choose
 from ppafo.signals import Recording
 from ppafo.signals.meter import Course, MeterKind, Sample
 
 
-def gain(recording: Recording, channel: str) -> float:
-    """What a total of a recording, one of its channels, grows by from the first sample to the last, in its unit."""
+def gained(recording: Recording, channels: tuple[str, ...], function: Callable[..., Any] | None = None) -> float:
+    """What a total, a channel, grows by from the first sample to the last, in its unit, or a function of several."""
     # A total counts from the start of the run, and a recording may be a part of one.
-    values = recording[channel]
-    return float(values[-1] - values[0])
+    gains = [float(recording[channel][-1] - recording[channel][0]) for channel in channels]
+    return gains[0] if function is None else float(function(*gains))
 
 
-def gas_imbalance(recording: Recording) -> float:
+def gas_imbalance(supplied: Number, vented: Number, mass_1: Number, mass_2: Number) -> Number:
     """Supplied less vented less stored gas [kg]; what a simulation loses or invents, near 0 for a sound one."""
     # What leaks goes from one chamber to the other: it leaves neither sum.
-    stored = gain(recording, "mass_1") + gain(recording, "mass_2")
-    return gain(recording, "supplied_mass") - gain(recording, "vented_mass") - stored
+    return supplied - vented - (mass_1 + mass_2)
 
 
-def energy_imbalance(recording: Recording) -> float:
+def energy_imbalance(supplied: Number, vented: Number, heat: Number, work: Number, stored: Number) -> Number:
     """Enthalpy supplied less vented, and heat, less work and stored energy [J]; what a simulation loses or invents."""
-    taken = gain(recording, "supplied_enthalpy") - gain(recording, "vented_enthalpy") + gain(recording, "wall_heat")
-    return taken - gain(recording, "gas_work") - gain(recording, "gas_energy")
+    return supplied - vented + heat - work - stored
 
 
 def largest_pressure(recording: Recording) -> float:
@@ -52,7 +51,7 @@ def mechanical_work(recording: Recording) -> float:
 
 def work_per_gas(recording: Recording) -> float | None:
     """Mechanical work per gas taken from the supply [J/kg]; None where none was taken."""
-    gas = gain(recording, "supplied_mass")
+    gas = gained(recording, ("supplied_mass",))
     return mechanical_work(recording) / gas if gas > 0.0 else None
 
 
@@ -60,7 +59,7 @@ def gas_per_work(recording: Recording) -> float | None:
     """Gas taken from the supply per mechanical work [kg/J]; None where the actuator gave no work."""
     # A task that takes work from the leg would have a ratio below 0, which would rank as the best.
     work = mechanical_work(recording)
-    return gain(recording, "supplied_mass") / work if work > 0.0 else None
+    return gained(recording, ("supplied_mass",)) / work if work > 0.0 else None
 
 
 class LargestPressure(NamedTuple):
@@ -126,19 +125,6 @@ def update_work(state: Work, course: Course, sample: Sample) -> Work:
 WORK = MeterKind("work", Work, start_work, update_work, of_motion=True)
 
 
-def read_gas_imbalance(readings: Readings) -> Floats:
-    """``gas_imbalance`` [kg]."""
-    stored = readings.gains["mass_1"] + readings.gains["mass_2"]
-    return readings.gains["supplied_mass"] - readings.gains["vented_mass"] - stored
-
-
-def read_energy_imbalance(readings: Readings) -> Floats:
-    """``energy_imbalance`` [J]."""
-    gains = readings.gains
-    taken = gains["supplied_enthalpy"] - gains["vented_enthalpy"] + gains["wall_heat"]
-    return taken - gains["gas_work"] - gains["gas_energy"]
-
-
 def ratio(above: Floats, below: Floats) -> Floats:
     """One over the other; nan where the other is not above 0."""
     # nan where a recording has None: a column has no other word for it.
@@ -151,30 +137,27 @@ ENERGIES = ("supplied_enthalpy", "vented_enthalpy", "wall_heat", "gas_work", "ga
 _EFFORT = ("torque", "angle", "supplied_mass")
 
 
-def _gas(name: str, channel: str, summary: str) -> MetricKind:
-    """What a total of gas has grown by."""
-    return MetricKind(name, "kg", summary, (channel,), partial(gain, channel=channel), ReadAt((f"gains.{channel}",)))
+def _of_gains(
+    name: str, unit: str, summary: str, channels: tuple[str, ...], function: Callable[..., Any] | None = None
+) -> MetricKind:
+    """What a total has grown by, or a function of what several have."""
+    compute = partial(gained, channels=channels, function=function)
+    return MetricKind(
+        name, unit, summary, channels, compute, ReadAt(tuple(f"gains.{channel}" for channel in channels), function)
+    )
 
 
 METRICS = (
-    _gas("gas_supplied", "supplied_mass", "gas taken from the supply"),
-    _gas("gas_vented", "vented_mass", "gas let out to the atmosphere"),
-    _gas("gas_leaked", "leaked_mass", "gas leaked from chamber to chamber, in either direction"),
-    MetricKind(
-        "gas_imbalance",
-        "kg",
-        "supplied less vented less stored gas",
-        _BALANCE,
-        gas_imbalance,
-        read_gas_imbalance,
-    ),
-    MetricKind(
+    _of_gains("gas_supplied", "kg", "gas taken from the supply", ("supplied_mass",)),
+    _of_gains("gas_vented", "kg", "gas let out to the atmosphere", ("vented_mass",)),
+    _of_gains("gas_leaked", "kg", "gas leaked from chamber to chamber, in either direction", ("leaked_mass",)),
+    _of_gains("gas_imbalance", "kg", "supplied less vented less stored gas", _BALANCE, gas_imbalance),
+    _of_gains(
         "energy_imbalance",
         "J",
         "enthalpy supplied less vented, and heat, less work and stored energy of the gas",
         ENERGIES,
         energy_imbalance,
-        read_energy_imbalance,
     ),
     MetricKind(
         "largest_pressure",

@@ -81,6 +81,18 @@ def _entry(row: Any, name: str) -> Any:
     return row[name] if isinstance(row, Mapping) else getattr(row, name)
 
 
+def less(number: Floats, other: Floats) -> Floats:
+    """One number less another one of its unit (runs,)."""
+    return number - other
+
+
+def time_if_any(time: Floats) -> Floats:
+    """A time [s] of something; nan below 0, which stands for what has not happened."""
+    # The state of a run is floats alone, and a column has no other word for None.
+    found: Floats = choose(time >= 0.0, time, math.nan)
+    return found
+
+
 @dataclass(frozen=True, slots=True)
 class MetricKind:
     """A metric in the catalogue: the channels it needs, and a pure function that gives the value.

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ppafo.metrics.metric import LED_SHANK, Floats, MetricKind, ReadAt, Readings
+from ppafo.metrics.metric import LED_SHANK, Floats, MetricKind, ReadAt, Readings, less
 from ppafo.model.columns import root
 from ppafo.signals import Recording
 from ppafo.signals.meter import Course, MeterKind, Sample
@@ -61,13 +61,6 @@ def update_extremes(state: Extremes, course: Course, sample: Sample) -> Extremes
 
 
 EXTREMES = MeterKind("extremes", Extremes, start_extremes, update_extremes, of_motion=True)
-
-
-def read_angle_range(readings: Readings) -> Floats:
-    """``angle_range`` [rad]."""
-    state = readings.meters[EXTREMES.name]
-    span: Floats = state.largest - state.smallest
-    return span
 
 
 def read_time_of_fraction(readings: Readings, fraction: float) -> Floats:
@@ -160,7 +153,7 @@ METRICS = (
         "largest angle less smallest angle",
         ("angle",),
         angle_range,
-        read_angle_range,
+        ReadAt(("meters.extremes.largest", "meters.extremes.smallest"), less),
         (EXTREMES,),
     ),
     MetricKind(

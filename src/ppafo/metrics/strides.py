@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from ppafo.metrics.metric import LED, REQUEST, STEADY, WALK, Floats, MetricKind, ReadAt, Readings
+from ppafo.metrics.metric import LED, REQUEST, STEADY, WALK, Floats, MetricKind, ReadAt, Readings, less, time_if_any
 from ppafo.model.columns import choose, larger, root
 from ppafo.model.helping import HELPS, PUSH_OFF
 from ppafo.signals.meter import Course, MeterKind, Sample, StrideSample
@@ -188,27 +188,9 @@ def mean_of(total: Floats, count: Floats) -> Floats:
     return found
 
 
-def _vented(readings: Readings) -> Floats:
-    counted = readings.meters["strides"].counted
-    found: Floats = counted.whole - counted.helped
-    return found
-
-
-def _total_gas(readings: Readings) -> Floats:
-    strides = readings.meters["strides"]
-    found: Floats = strides.gas - strides.first_gas
-    return found
-
-
 def _push_off_error(readings: Readings) -> Floats:
     counted = readings.meters["strides"].counted
     found: Floats = root(mean_of(counted.squares, counted.samples))
-    return found
-
-
-def _safe_time(readings: Readings) -> Floats:
-    time = readings.meters["strides"].safe_time
-    found: Floats = choose(time >= 0.0, time, math.nan)
     return found
 
 
@@ -255,9 +237,19 @@ METRICS = (
         "vented_strides",
         "-",
         "whole strides with less help (lifted only, paused or stopped) in at least a part of them",
-        _vented,
+        ReadAt(("meters.strides.counted.whole", "meters.strides.counted.helped"), less),
     ),
-    _kind("total_gas", "kg", "gas taken from the supply in the whole walk", _total_gas),
-    _kind("safe_state_time", "s", "time at which the controller first lifted only, paused or stopped", _safe_time),
+    _kind(
+        "total_gas",
+        "kg",
+        "gas taken from the supply in the whole walk",
+        ReadAt(("meters.strides.gas", "meters.strides.first_gas"), less),
+    ),
+    _kind(
+        "safe_state_time",
+        "s",
+        "time at which the controller first lifted only, paused or stopped",
+        ReadAt(("meters.strides.safe_time",), time_if_any),
+    ),
 )
 """Those of ``walk_metrics`` that need neither a mean curve nor the healthy gait."""

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
-from ppafo.metrics.metric import REACTS, WALK, Floats, MetricKind, ReadAt, Readings
+from ppafo.metrics.metric import REACTS, WALK, Floats, MetricKind, ReadAt, Readings, time_if_any
 from ppafo.metrics.strides import NOT_YET, SETTLING, mean_of
 from ppafo.model.columns import choose, larger
 from ppafo.signals.meter import Course, MeterKind, WearerSample
@@ -63,13 +63,6 @@ def _stays_up(readings: Readings) -> Floats:
     return found
 
 
-def _fall_time(readings: Readings) -> Floats:
-    # A time below 0 stands for what has not happened: the state of a run is floats alone.
-    time = readings.meters["wearer"].now.fall_time
-    found: Floats = choose(time >= 0.0, time, math.nan)
-    return found
-
-
 def _walked_time(readings: Readings) -> Floats:
     now = readings.meters["wearer"].now
     found: Floats = choose(now.fall_time >= 0.0, now.fall_time, now.time)
@@ -107,7 +100,7 @@ def _mean(name: str, unit: str, summary: str, total: str, over: Callable[..., Fl
 
 METRICS = (
     _kind("stays_up", "-", "1 of a wearer who walks on to the end, 0 of one who falls", _stays_up),
-    _kind("fall_time", "s", "time at which the wearer falls", _fall_time),
+    _kind("fall_time", "s", "time at which the wearer falls", ReadAt(("meters.wearer.now.fall_time",), time_if_any)),
     _kind("walked_time", "s", "time until the wearer falls, or until the end", _walked_time),
     _mean("walking_speed", "m/s", "speed, mean over whole strides without the first ones", "way", per_second),
     _mean("stride_time", "s", "time of a stride, mean over whole strides without the first ones", "time", per_stride),

@@ -128,7 +128,8 @@ def draw_stored_result(stored: StoredResult) -> "Figure":
     name = _under(file, document, "scenario").get("name", "")
     if not isinstance(name, str):
         raise _other_form(file, "scenario.name", name, "a text")
-    atmosphere, valve = stated_atmosphere(file, document, "scenario", "device"), _valve(file, document, "scenario")
+    atmosphere = stated_atmosphere(file, document, "scenario", "device")
+    valve = str(_under(file, document, "scenario", "device", "valve").get("kind", ""))
     return recording_figure(stored.recording, one_line(name), _ending(file, document), atmosphere, valve)
 
 
@@ -145,7 +146,8 @@ def draw_stored_walk(file: Path, document: Mapping[str, Any], recording: Recordi
     remark = "; ".join(text for text in (_ending(file, document), fallen, part) if text)
     atmosphere = stated_atmosphere(file, document, "configuration", "device")
     shown = recording.between(end - _END_OF_WALK, end)
-    return recording_figure(shown, recording.label, remark, atmosphere, _valve(file, document, "configuration"))
+    valve = str(_under(file, document, "configuration", "device", "valve").get("kind", ""))
+    return recording_figure(shown, recording.label, remark, atmosphere, valve)
 
 
 def stated_atmosphere(file: Path, document: Mapping[str, Any], *device: str) -> float:
@@ -155,11 +157,6 @@ def stated_atmosphere(file: Path, document: Mapping[str, Any], *device: str) -> 
     """
     given = _positive(file, document, "a pressure in Pa", *device, "supply", "atmospheric_pressure")
     return STANDARD_ATMOSPHERE if given is None else given
-
-
-def _valve(file: Path, document: Mapping[str, Any], scenario: str) -> str:
-    """Return the kind of the valve at a key of a file's document, empty where it says none."""
-    return str(_under(file, document, scenario, "device", "valve").get("kind", ""))
 
 
 def _ending(file: Path, document: Mapping[str, Any]) -> str:

@@ -75,7 +75,7 @@ def test_spool_step_is_the_closed_form_for_any_frequency_damping_and_length(deca
 def test_spool_answers_a_step_as_a_second_order_system() -> None:
     settings = SPOOL._replace(spool_damping_ratio=0.2)
     valve = proportional.prepare_moving(settings)
-    state, highest = proportional.spool_at_rest(), 0.0
+    state, highest = proportional.SpoolState(), 0.0
     for _ in range(1000):
         _, state = proportional.advance_moving(valve, state, 0.5, 0.0, 1e-4)
         highest = max(highest, state.opening)
@@ -85,7 +85,7 @@ def test_spool_answers_a_step_as_a_second_order_system() -> None:
 
 def test_slew_limit_bounds_the_rate_of_the_opening() -> None:
     valve = proportional.prepare_moving(SPOOL._replace(spool_frequency=0.0, slew_limit=20.0))
-    state = proportional.spool_at_rest()
+    state = proportional.SpoolState()
     for _ in range(25):
         _, state = proportional.advance_moving(valve, state, 0.6, 0.0, 1e-3)
     assert state.opening == pytest.approx(0.5)
@@ -96,7 +96,7 @@ def run_pair(
 ) -> list[tuple[float, str, float]]:
     """Switchings (time, valve, position) of a pair whose command changes at given times."""
     valve = solenoid.prepare_timed(settings)
-    state, command, time, seen = solenoid.both_off_long_ago(), 0.0, 0.0, []
+    state, command, time, seen = solenoid.PairState(), 0.0, 0.0, []
     while time < until:
         command = command_at.get(round(time, 6), command)
         before = state
@@ -126,19 +126,19 @@ def test_pulse_shorter_than_the_opening_delay_never_reaches_the_flow() -> None:
 
 
 def test_no_command_vents_both_chambers() -> None:
-    openings = solenoid.instant_ideal(solenoid.prepare_ideal(PAIR), solenoid.both_off(), 0.0)
+    openings = solenoid.instant_ideal(solenoid.prepare_ideal(PAIR), solenoid.PairPositions(), 0.0)
     assert openings == (0.0, 1.0, 0.0, 1.0)
 
 
 def test_command_above_zero_feeds_chamber_1_and_vents_chamber_2() -> None:
-    openings = solenoid.instant_ideal(solenoid.prepare_ideal(PAIR), solenoid.both_off(), 1.0)
+    openings = solenoid.instant_ideal(solenoid.prepare_ideal(PAIR), solenoid.PairPositions(), 1.0)
     assert openings == (1.0, 0.0, 0.0, 1.0)
 
 
 def parts_of_a_step(settings: solenoid.TimedSolenoid, command: float, step: float) -> list[float]:
     """Lengths of the parts of a step that begins with a pair energised for chamber 1 long ago."""
     valve = solenoid.prepare_timed(settings)
-    state = solenoid.settle_timed(valve, solenoid.both_off_long_ago(), 1.0, 0.0)
+    state = solenoid.settle_timed(valve, solenoid.PairState(), 1.0, 0.0)
     state = solenoid.settle_timed(valve, state, 1.0, 0.5)
     time, remaining, lengths = 1.0, step, []
     while remaining > 0.0:
@@ -162,7 +162,7 @@ def test_step_without_a_switching_is_whole() -> None:
 def recycled(joining: float, holding: float, command_at: dict[float, float]) -> list[tuple[float, tuple[float, ...]]]:
     """Times and openings (source 1, vent 1, source 2, vent 2, joint) of a recycling pair, where they change."""
     valve = solenoid_recycling.prepare(solenoid_recycling.RecyclingSettings(*PAIR, joining, holding))
-    state, command, time, seen = solenoid_recycling.parted_long_ago(), 0.0, 0.0, []
+    state, command, time, seen = solenoid_recycling.RecyclingState(), 0.0, 0.0, []
     while time < 1.0:
         command = command_at.get(round(time, 6), command)
         state = solenoid_recycling.settle(valve, state, command, time)

@@ -278,7 +278,7 @@ class Writing:
         yield f"pace = {add(Pace)}(step)"
         if program.gas.start is not None:
             yield f"masses = {add(program.gas.start)}(plant, state)"
-        yield f"valve_state = {add(program.valve.initial)}()"
+        yield f"valve_state = {self.constant(program.valve.initial(), 'valve_state')}"
         if program.controller is not None:
             yield f"controller_state = {self.constant(program.controller.initial, 'controller_state')}"
         if program.has_lines:

@@ -28,10 +28,10 @@ class ValveModel:
     """Compiled side of a valve.
 
     ``parameters`` and ``state`` are NamedTuple classes of floats; ``prepare(settings)`` makes the first from
-    the declared settings; ``initial()`` the second. ``advance(parameters, state, command, time,
-    step)`` returns what the valve shows the plant during the step, and the next state. ``connect(plant, shown)``
-    turns that into ports (the engine reads its annotation of ``shown``, a float or a NamedTuple); ``port_flow`` and
-    ``port_flow_slopes`` are the functions of that kind of port.
+    the declared settings; ``initial()`` the second, as the class itself does whose fields have defaults.
+    ``advance(parameters, state, command, time, step)`` returns what the valve shows the plant during the step, and the
+    next state. ``connect(plant, shown)`` turns that into ports (the engine reads its annotation of ``shown``, a float
+    or a NamedTuple); ``port_flow`` and ``port_flow_slopes`` are the functions of that kind of port.
     ``jumps`` is True for a valve that changes abruptly by itself inside a step, as ``next_event`` and ``settle`` say:
     the step is then done in parts between those changes. ``shift(state, next_state)`` is the relative
     change of the opening of a valve that moves inside a step, None for one that stands still between two changes.

@@ -37,9 +37,9 @@ class IdealProportional(NamedTuple):
 
 
 class NoValveState(NamedTuple):
-    """An ideal valve remembers only what it shows: its opening from -1 to 1."""
+    """An ideal valve remembers only what it shows: its opening from -1 to 1. It starts closed."""
 
-    opening: float
+    opening: float = 0.0
 
 
 class MovingProportional(NamedTuple):
@@ -63,11 +63,14 @@ class SpoolStep(NamedTuple):
 
 
 class SpoolState(NamedTuple):
-    """Requested opening behind the slew limit, opening of the spool, both from -1 to 1, and its rate [1/s]."""
+    """Requested opening behind the slew limit, opening of the spool, both from -1 to 1, and its rate [1/s].
 
-    requested: float
-    opening: float
-    rate: float
+    It starts at rest in the middle.
+    """
+
+    requested: float = 0.0
+    opening: float = 0.0
+    rate: float = 0.0
 
 
 def opening_of_command(command: float, dead_band: float) -> float:
@@ -268,16 +271,6 @@ def prepare_moving(settings: ProportionalSettings) -> MovingProportional:
     )
 
 
-def spool_at_rest() -> SpoolState:
-    """A spool at rest in the middle."""
-    return SpoolState(0.0, 0.0, 0.0)
-
-
-def closed_valve() -> NoValveState:
-    """An ideal valve that is closed."""
-    return NoValveState(0.0)
-
-
 def dead_time(settings: ProportionalSettings) -> float:
     """Dead time of the command [s]."""
     return settings.delay
@@ -296,7 +289,7 @@ IDEAL = ValveModel(
     parameters=IdealProportional,
     state=NoValveState,
     prepare=prepare_ideal,
-    initial=closed_valve,
+    initial=NoValveState,
     advance=advance_ideal,
     connect=single_ports,
     port_flow=single_port_flow,
@@ -314,7 +307,7 @@ MOVING = ValveModel(
     parameters=MovingProportional,
     state=SpoolState,
     prepare=prepare_moving,
-    initial=spool_at_rest,
+    initial=SpoolState,
     advance=advance_moving,
     connect=blended_ports,
     port_flow=blended_port_flow,

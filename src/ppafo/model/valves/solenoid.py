@@ -28,10 +28,10 @@ class IdealSolenoid(NamedTuple):
 
 
 class PairPositions(NamedTuple):
-    """1 where a valve joins its chamber to the source, 0 where to the atmosphere."""
+    """1 where a valve joins its chamber to the source, 0 where to the atmosphere. Both start off."""
 
-    position_a: float
-    position_b: float
+    position_a: float = 0.0
+    position_b: float = 0.0
 
 
 class TimedSolenoid(NamedTuple):
@@ -43,19 +43,22 @@ class TimedSolenoid(NamedTuple):
 
 
 class Coil(NamedTuple):
-    """Where the flow is (0 or 1), where the coil was commanded to go, when, and when the flow follows [s]."""
+    """Where the flow is (0 or 1), where the coil was commanded to go, when, and when the flow follows [s].
 
-    position: float
-    target: float
-    accepted_time: float
-    change_time: float
+    It starts as one that was switched off long ago: the first order is taken at once, whatever the interval.
+    """
+
+    position: float = 0.0
+    target: float = 0.0
+    accepted_time: float = NEVER
+    change_time: float = NEVER
 
 
 class PairState(NamedTuple):
     """Both coils."""
 
-    coil_a: Coil
-    coil_b: Coil
+    coil_a: Coil = Coil()
+    coil_b: Coil = Coil()
 
 
 def coil_commands(command: float) -> tuple[float, float]:
@@ -189,18 +192,6 @@ def prepare_timed(settings: Any) -> TimedSolenoid:
     return TimedSolenoid(settings.opening_delay, settings.closing_delay, settings.switching_interval)
 
 
-def both_off() -> PairPositions:
-    """An ideal pair with both valves off."""
-    return PairPositions(0.0, 0.0)
-
-
-def both_off_long_ago() -> PairState:
-    """Two coils that were switched off long ago."""
-    # Long ago: the first order is taken at once, whatever the switching interval.
-    coil = Coil(position=0.0, target=0.0, accepted_time=NEVER, change_time=NEVER)
-    return PairState(coil, coil)
-
-
 def no_dead_time(settings: Any) -> float:
     """Dead time of the command [s]: none, the delays belong to the coils."""
     return 0.0
@@ -215,7 +206,7 @@ IDEAL = ValveModel(
     parameters=IdealSolenoid,
     state=PairPositions,
     prepare=prepare_ideal,
-    initial=both_off,
+    initial=PairPositions,
     advance=advance_ideal,
     connect=connect_positions,
     port_flow=single_port_flow,
@@ -233,7 +224,7 @@ TIMED = ValveModel(
     parameters=TimedSolenoid,
     state=PairState,
     prepare=prepare_timed,
-    initial=both_off_long_ago,
+    initial=PairState,
     advance=advance_timed,
     connect=connect_positions,
     port_flow=single_port_flow,

@@ -25,13 +25,16 @@ class RecyclingSolenoid(NamedTuple):
 
 
 class RecyclingState(NamedTuple):
-    """Both coils, 1 while the chambers are joined, 1 while chamber 2 keeps its gas, and when either ends [s]."""
+    """Both coils, 1 while the chambers are joined, 1 while chamber 2 keeps its gas, and when either ends [s].
 
-    pair: PairState
-    joined: float
-    keeps_gas: float
-    parting_time: float
-    release_time: float
+    It starts with coils that were switched off long ago and chambers that are not joined.
+    """
+
+    pair: PairState = PairState()
+    joined: float = 0.0
+    keeps_gas: float = 0.0
+    parting_time: float = NEVER
+    release_time: float = NEVER
 
 
 class RecyclingPositions(NamedTuple):
@@ -155,18 +158,11 @@ def prepare(settings: RecyclingSettings) -> RecyclingSolenoid:
     return RecyclingSolenoid(solenoid.prepare_timed(settings), settings.joining_time, settings.holding_time)
 
 
-def parted_long_ago() -> RecyclingState:
-    """Two coils that were switched off long ago, and chambers that are not joined."""
-    return RecyclingState(
-        solenoid.both_off_long_ago(), joined=0.0, keeps_gas=0.0, parting_time=NEVER, release_time=NEVER
-    )
-
-
 MODEL = ValveModel(
     parameters=RecyclingSolenoid,
     state=RecyclingState,
     prepare=prepare,
-    initial=parted_long_ago,
+    initial=RecyclingState,
     advance=advance,
     connect=connect,
     port_flow=single_port_flow,
