@@ -9,6 +9,7 @@ import linecache
 import re
 import threading
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
@@ -125,12 +126,12 @@ def check_flow(tree: ast.FunctionDef, file: str, local: Iterable[str]) -> None:
         raise refusal(file, tree, f"'{tree.name}' can end without 'return'; every path through it must return a value")
 
 
+@dataclass(frozen=True, slots=True)
 class _Flow:
     """Follows which names have a value; those after a return are of no interest (None)."""
 
-    def __init__(self, file: str, local: set[str]) -> None:
-        self.file = file
-        self.local = local
+    file: str
+    local: set[str]
 
     def end_of(self, body: list[ast.stmt], bound: set[str]) -> set[str] | None:
         """Names that have a value after some statements, None where they do not end."""
