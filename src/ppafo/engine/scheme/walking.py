@@ -73,29 +73,16 @@ def foot_direction(shank: float, angle: float) -> Direction:
     return Direction(sine, cosine)
 
 
-def leg_torque(
-    leg: LegParameters,
-    share: DeviceShare,
-    contact: float,
-    now: GaitNow,
-    ground_angle: float,
-    angle: float,
-    foot: Direction,
+def torque_with_carried(
+    leg: LegParameters, contact: float, now: GaitNow, ground_angle: float, angle: float, carried: CarriedFoot
 ) -> float:
     """Torque on the ankle [N m] beside actuator, friction, damping and inertia, positive in plantarflexion.
 
     The ankle's row of equation (11) with the prescribed shank, the wearer, tissue, the foot plate, and the ground
     under the heel. Muscles are what a healthy ankle adds to tissue and ground along the measured angles, on the heel
     the measured moment less tissue, so that a wearer who has all of them and no device walks the measured gait.
-    ``ground_angle`` [rad] of a flat foot.
+    ``ground_angle`` [rad] of a flat foot, ``carried`` the torques of foot and foot plate.
     """
-    return torque_with_carried(leg, contact, now, ground_angle, angle, carried_foot(leg, share, now, foot))
-
-
-def torque_with_carried(
-    leg: LegParameters, contact: float, now: GaitNow, ground_angle: float, angle: float, carried: CarriedFoot
-) -> float:
-    """Torque of ``leg_torque`` [N m], where the torques of foot and foot plate are known."""
     heel = ground.heel_torque(contact, now, leg, ground_angle, angle)
     active = now.moment if contact == ground.HEEL else now.healthy_torque
     muscles = active - passive_torque(leg, now.ankle)
