@@ -296,7 +296,7 @@ def _is_whole(kept: Path) -> bool:
         # What else lies there is no part of it: Numba tries, for an instant, whether it could write a file of its own.
         files = stated.items() if isinstance(stated, dict) else ()
         return _is_own(kept, [name for name, _ in files]) and all(
-            _checksum(kept / name) == given for name, given in files
+            hashlib.sha256(read_regular_file(kept / name)).hexdigest() == given for name, given in files
         )
     except (OSError, ValueError, RecursionError):
         return False
@@ -324,11 +324,7 @@ def _is_own(kept: Path, files: Collection[str]) -> bool:
 def _checksums(folder: Path) -> dict[str, str]:
     """Return the hash of every file of a program but the list of them itself."""
     files = sorted(path for path in folder.rglob("*") if not path.is_dir() and path.name != _CHECKSUMS)
-    return {path.relative_to(folder).as_posix(): _checksum(path) for path in files}
-
-
-def _checksum(path: Path) -> str:
-    return hashlib.sha256(read_regular_file(path)).hexdigest()
+    return {path.relative_to(folder).as_posix(): hashlib.sha256(read_regular_file(path)).hexdigest() for path in files}
 
 
 def _entries_named(folder: Path, pattern: re.Pattern[str]) -> list[Path]:

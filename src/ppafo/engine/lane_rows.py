@@ -8,6 +8,7 @@ nothing and a store an assignment. Lines that change a group for themselves alon
 import ast
 import re
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, TypeAlias, final
 
@@ -179,13 +180,13 @@ _STORED = re.compile(rf"{KEPT}\.(\w+) = \1")
 """A group that gets what lines made under its own name."""
 
 
+@dataclass
 class _Renaming(ast.NodeTransformer):
     """Gives groups that lines change for themselves other names; ``names`` has these as far as it came."""
 
-    def __init__(self, groups: set[str], names: dict[str, str], used: set[str]) -> None:
-        self.groups = groups
-        self.names = names
-        self.used = used
+    groups: set[str]
+    names: dict[str, str]
+    used: set[str]
 
     def visit_Assign(self, node: ast.Assign) -> ast.stmt | None:
         target, value = node.targets[0], node.value

@@ -256,12 +256,12 @@ def measure_sample(rows: Rows, moment: str) -> list[str]:
         begin, update = _meter_updates(rows)
         # One run makes its sample once for meters and traces, lanes in each of their loops.
         sample = [] if isinstance(rows, RunRows) else sample_lines(rows, moment)
-        sample += follow_lines(rows)
+        first, follow = course_lines(rows)
         lines += [
             "if next_record == 0:",
-            *indent([*course_lines(rows), *rows.over_lanes([*sample, *begin])]),
+            *indent([*first, *rows.over_lanes([*sample, *follow, *begin])]),
             "else:",
-            *indent(rows.over_lanes([*sample, *update])),
+            *indent(rows.over_lanes([*sample, *follow, *update])),
         ]
     # Where a sample has channels that are no number of the state itself.
     paths = TRACED | walk_traces(program) | (TRUE_MASSES if program.has_true_masses else {})
@@ -395,17 +395,23 @@ def walk_traces(program: Program) -> dict[str, str]:
     return {name: path for name, path in found.items() if path}
 
 
-def course_lines(rows: Rows) -> list[str]:
-    """Lines that look at the whole reference before the first sample: its last value, its largest, and where it holds.
+def course_lines(rows: Rows) -> tuple[list[str], list[str]]:
+    """Lines that look at the whole reference before the first sample, and those that load ``course`` at each sample.
 
-    A monotone reference is largest at one of its ends, and where its hold starts shows on the way. Any other one is
-    looked at sample by sample, over all lanes at once; its hold is looked for from the end.
+    The course is the last value of the reference, its largest, and where it holds. A monotone reference is largest at
+    one of its ends, and where its hold starts shows on the way. Any other one is looked at sample by sample, over all
+    lanes at once; its hold is looked for from the end.
     """
     if not rows.program.follows_reference:
-        return []
+        return [], ["course = ()"]
+    is_monotone = rows.program.reference.is_monotone
     cell = {name: rows.cells[f"course.{name}"] for name in ("last", "largest", "tolerance", "hold_start")}
-    value = f"{rows.add(rows.program.reference.value)}(reference, {{}} * interval * timing.step)[0]"
+    follow = [rows.load("course")]
+    if is_monotone:
+        follow.append(f"course = {rows.add(advance_course)}(course, sample)")
+        follow.append(f"{cell['hold_start']} = course.hold_start")
     given = [rows.load("timing"), rows.load("reference")]
+    value = f"{rows.add(rows.program.reference.value)}(reference, {{}} * interval * timing.step)[0]"
     ends = [
         *given,
         f"{cell['last']} = {value.format('last_record')}",
@@ -413,14 +419,16 @@ def course_lines(rows: Rows) -> list[str]:
         f"{cell['hold_start']} = 0.0",
     ]
     tolerance = rows.over_lanes([f"{cell['tolerance']} = {SAME_LEVEL!r} * {cell['largest']}"])
-    if rows.program.reference.is_monotone:
-        return [*rows.over_lanes(ends), *tolerance]
-    away = f"{rows.add(is_away)}({value.format('index')}, {cell['last']}, {cell['tolerance']})"
+    if is_monotone:
+        return [*rows.over_lanes(ends), *tolerance], follow
+    at_index = value.format("index")
+    largest = f"{cell['largest']} = max({cell['largest']}, abs({at_index}))"
+    away = f"{rows.add(is_away)}({at_index}, {cell['last']}, {cell['tolerance']})"
     found = f"index + 1.0 if {cell['hold_start']} == 0.0 and {away} else {cell['hold_start']}"
-    return [
+    first = [
         *rows.over_lanes(ends),
         "for index in range(last_record):",
-        *indent(rows.over_lanes([*given, f"{cell['largest']} = max({cell['largest']}, abs({value.format('index')}))"])),
+        *indent(rows.over_lanes([*given, largest])),
         *tolerance,
         "for index in range(last_record - 1, -1, -1):",
         *indent(rows.over_lanes([*given, f"{cell['hold_start']} = {found}"])),
@@ -430,16 +438,4 @@ def course_lines(rows: Rows) -> list[str]:
         "    if earliest > 0.0:",
         "        break",
     ]
-
-
-def follow_lines(rows: Rows) -> list[str]:
-    """Lines that load the course, and follow it where its hold is not known ahead."""
-    if not rows.program.follows_reference:
-        return ["course = ()"]
-    if not rows.program.reference.is_monotone:
-        return [rows.load("course")]
-    return [
-        rows.load("course"),
-        f"course = {rows.add(advance_course)}(course, sample)",
-        f"{rows.cells['course.hold_start']} = course.hold_start",
-    ]
+    return first, follow

@@ -47,7 +47,7 @@ def plant_loop(rows: Rows) -> list[str]:
     """
     program = rows.program
     if not program.is_parted:
-        return rows.over_phases([*opening(rows), *command_at_valve(rows), "length = timing.step"], phases(rows))
+        return rows.over_phases([*opening(rows), "length = timing.step"], phases(rows))
     # Places of late commands are the same for all lanes.
     places = []
     if program.late_commands:
@@ -57,8 +57,8 @@ def plant_loop(rows: Rows) -> list[str]:
         places.append("place_after = (step_index - command_delay) % command_history.shape[0]")
     if program.late_signals:
         places.append("next_place = (step_index + 1) % signal_history.shape[1]")
-    part = rows.over_phases([*part_opening(rows), f"length = {rows.length}"], phases(rows))
-    measured = rows.over_lanes([*part_opening(rows), *measure(rows)])
+    part = rows.over_phases([*opening(rows), f"length = {rows.length}"], phases(rows))
+    measured = rows.over_lanes([*opening(rows), *measure(rows)])
     # Lanes that waited get their state again before it is asked whether any has something left of its step.
     left = f"{rows.remaining} > 0.0"
     aside, back = ([], []) if isinstance(rows, RunRows) else waiting_lanes(rows)
@@ -75,25 +75,33 @@ def plant_loop(rows: Rows) -> list[str]:
 
 
 def opening(rows: Rows) -> list[str]:
-    """Lines that load what a step needs."""
+    """Lines that load what a step or part needs, and the command that the valve has in it."""
+    program = rows.program
     names = ["timing", "plant", "valve", "result", "state", "valve_state"]
-    for component in (rows.program.gas, rows.program.leg, rows.program.feed):
+    for component in (program.gas, program.leg, program.feed):
         names += () if component is None else component.loads
-    names += ["load", "shank"] if rows.program.shank is not None else []
-    names += ["held"] if rows.program.hands_chambers_on else []
-    names += ["start"] if rows.program.starts_apart else []
-    leaks = []
-    if rows.program.fails:
+    names += ["load", "shank"] if program.shank is not None else []
+    names += ["held"] if program.hands_chambers_on else []
+    names += ["start"] if program.starts_apart else []
+    lines = [*[rows.load(name) for name in names], time_of_step(rows)]
+    if program.fails:
         from ppafo.model.plant_faults import failed_plant
 
-        leaks = [f"plant = {rows.add(failed_plant)}(plant, plant_faults, time)"]
-    return [*[rows.load(name) for name in names], time_of_step(rows), *leaks, "command = result.command"]
-
-
-def command_at_valve(rows: Rows) -> list[str]:
-    """Line that makes the command that the valve follows, where an effect stands between."""
-    is_other = any(at_valve in effect.laws for effect in rows.program.effects)
-    return [f"command = {rows.add(at_valve)}(command)"] if is_other else []
+        lines.append(f"plant = {rows.add(failed_plant)}(plant, plant_faults, time)")
+    lines.append("command = result.command")
+    if program.is_parted:
+        lines += [rows.load("pace"), f"before = {rows.before}", "time += before"]
+    if program.late_commands:
+        lines += [
+            f"until_command = timing.command_lag * timing.step - before - {motion.SAME_INSTANT!r}",
+            "early = command_history[place_before, lane]",
+            "command = early if until_command > 0.0 else command_history[place_after, lane]",
+        ]
+    if program.late_signals:
+        lines.append("look_at = (1.0 - timing.signal_lag) * timing.step")
+    if any(at_valve in effect.laws for effect in program.effects):
+        lines.append(f"command = {rows.add(at_valve)}(command)")
+    return lines
 
 
 def time_of_step(rows: Rows) -> str:
@@ -416,20 +424,6 @@ def _with_slopes(name: str, kind: State) -> list[tuple[str, str]]:
     """Each number of a state, and its rate."""
     paths = leaf_paths(kind.row, f"{name}_state")
     return [(path, path.replace(f"{name}_state", f"{name}_state_slopes", 1)) for path in paths]
-
-
-def part_opening(rows: Rows) -> list[str]:
-    """Lines that load what a part needs, and the command that the valve has in it."""
-    lines = [*opening(rows), rows.load("pace"), f"before = {rows.before}", "time += before"]
-    if rows.program.late_commands:
-        lines += [
-            f"until_command = timing.command_lag * timing.step - before - {motion.SAME_INSTANT!r}",
-            "early = command_history[place_before, lane]",
-            "command = early if until_command > 0.0 else command_history[place_after, lane]",
-        ]
-    if rows.program.late_signals:
-        lines.append("look_at = (1.0 - timing.signal_lag) * timing.step")
-    return [*lines, *command_at_valve(rows)]
 
 
 def measure(rows: Rows) -> list[str]:

@@ -35,11 +35,24 @@ def over_samples(function: Callable[..., Any], *given: Any) -> Any:
 
 def called_over_samples(function: Callable[..., Any], of_columns: Callable[..., Any] | None, *given: Any) -> Any:
     """As ``over_samples``, of a function whose form for columns is known; None where it has none."""
-    if of_columns is None:
-        return _one_by_one(function, given)
-    # A choice works out what no sample takes, too.
-    with np.errstate(all="ignore"):
-        return of_columns(*given)
+    if of_columns is not None:
+        # A choice works out what no sample takes, too.
+        with np.errstate(all="ignore"):
+            return of_columns(*given)
+    # Sample by sample.
+    flat = [leaves(item) if isinstance(item, tuple) else [item] for item in given]
+    columns = [value for row in flat for value in row if isinstance(value, np.ndarray)]
+    if not columns:
+        return function(*given)
+    results = []
+    for sample in range(columns[0].size):
+        numbers = [[value[sample] if isinstance(value, np.ndarray) else value for value in row] for row in flat]
+        parts = (
+            rebuilt(type(item), map(float, row)) if isinstance(item, tuple) else float(row[0])
+            for item, row in zip(given, numbers, strict=True)
+        )
+        results.append(function(*parts))
+    return _gathered(results)
 
 
 @lru_cache(maxsize=64)
@@ -62,23 +75,6 @@ def in_columns(text: str, name: str) -> Callable[..., Any] | None:
     exec(compile(ast.fix_missing_locations(tree), "<columns>", "exec"), scope)
     found: Callable[..., Any] = scope[name]
     return found
-
-
-def _one_by_one(function: Callable[..., Any], given: tuple[Any, ...]) -> Any:
-    flat = [leaves(item) if isinstance(item, tuple) else [item] for item in given]
-    columns = [value for row in flat for value in row if isinstance(value, np.ndarray)]
-    if not columns:
-        return function(*given)
-
-    results = []
-    for sample in range(columns[0].size):
-        numbers = [[value[sample] if isinstance(value, np.ndarray) else value for value in row] for row in flat]
-        parts = (
-            rebuilt(type(item), map(float, row)) if isinstance(item, tuple) else float(row[0])
-            for item, row in zip(given, numbers, strict=True)
-        )
-        results.append(function(*parts))
-    return _gathered(results)
 
 
 def _gathered(results: list[Any]) -> Any:

@@ -9,6 +9,7 @@ import linecache
 import re
 import threading
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
@@ -125,12 +126,12 @@ def check_flow(tree: ast.FunctionDef, file: str, local: Iterable[str]) -> None:
         raise refusal(file, tree, f"'{tree.name}' can end without 'return'; every path through it must return a value")
 
 
+@dataclass(frozen=True, slots=True)
 class _Flow:
     """Follows which names have a value; those after a return are of no interest (None)."""
 
-    def __init__(self, file: str, local: set[str]) -> None:
-        self.file = file
-        self.local = local
+    file: str
+    local: set[str]
 
     def end_of(self, body: list[ast.stmt], bound: set[str]) -> set[str] | None:
         """Names that have a value after some statements, None where they do not end."""
@@ -227,7 +228,13 @@ def mistake(said: str, source: str) -> ProgramError:
     # The first is the innermost; several are the ways through one function, in an order that changes.
     number = min(numbers, default=0)
     text = lines[number - 1].strip() if 0 < number <= len(lines) else ""
-    found = place_in(lines, number) or _find_called(lines, text)
+    found = place_in(lines, number)
+    if found is None:
+        # A line of the loop: where the last function of a file that it calls was defined.
+        names = reversed(re.findall(r"\w+", text))
+        defined = (at for name in names for at, line in enumerate(lines, 1) if line.startswith(f"def {name}("))
+        called = next(defined, None)
+        found = None if called is None else place_in(lines, called)
     written = linecache.getline(found.file, found.line).strip() if found else ""
     problem = _told_problem(Report(said=said, source=source, text=text, written=written or text))
     if found is None:
@@ -249,15 +256,6 @@ def place_in(lines: list[str], number: int) -> Place | None:
         if not 0 <= index < len(at) - 1:
             return None
         return Place(origin["file"], at[index], min(line for line in at if line > at[index]))
-    return None
-
-
-def _find_called(lines: list[str], text: str) -> Place | None:
-    """Where the last function of a file that is called in a line of the loop was defined."""
-    for name in reversed(re.findall(r"\w+", text)):
-        for number, line in enumerate(lines, 1):
-            if line.startswith(f"def {name}("):
-                return place_in(lines, number)
     return None
 
 

@@ -186,11 +186,6 @@ class Program:
         return self.leg is not None and self.leg.fails
 
     @property
-    def has_lines(self) -> bool:
-        """True where lines behind regulators feed the chambers."""
-        return self.feed is not None
-
-    @property
     def chambers(self) -> str:
         """What the first stage of the chambers is called in a step."""
         return "gas" if self.feed is None else self.feed.chambers
@@ -234,7 +229,7 @@ class Program:
     @property
     def keeps_volumes(self) -> bool:
         """True where the chamber volumes of a locked vane are computed once; all others are treated as moving."""
-        return self.is_locked and not (self.has_true_masses or self.has_lines or self.has_shape)
+        return self.is_locked and not (self.has_true_masses or self.feed is not None or self.has_shape)
 
     @property
     def hands_chambers_on(self) -> bool:

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,20 +43,19 @@ TOO_MANY_PARTS = (
 WHOLE = 1.0e-9
 
 
+class LegGroups(NamedTuple):
+    """How a leg goes through a step, its groups of parameters, and its groups of states at the start."""
+
+    scheme: LegScheme
+    parameters: list[Any]
+    states: list[Any]
+
+
 class WornLeg(Protocol):
-    """A leg that walks with the device: its scheme, and its rows in the order of ``Program``."""
+    """A leg that walks with the device."""
 
-    @property
-    def scheme(self) -> LegScheme:
-        """How it goes through a step."""
-
-    @property
-    def parameters(self) -> list[Any]:
-        """Its groups of parameters."""
-
-    @property
-    def states(self) -> list[Any]:
-        """Its groups of states at the start."""
+    def groups(self) -> LegGroups:
+        """Its scheme, and its groups of rows in the order of ``Program``."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,27 +74,19 @@ class Walk:
     course: "Course | None" = None
     failing: "tuple[PlantFaults, ShutOff] | None" = None
 
-    @property
-    def scheme(self) -> LegScheme:
-        """How it goes through a step."""
+    def groups(self) -> LegGroups:
+        """Its scheme, and its groups of rows in the order of ``Program``."""
         fails, which = "" if self.failing is None else "FAILING_", "STRIDES" if self.course is None else "COURSE"
-        found: LegScheme = kind_at(f"ppafo.engine.scheme.walking:{fails}{which}")
-        return found
+        scheme: LegScheme = kind_at(f"ppafo.engine.scheme.walking:{fails}{which}")
+        parameters = [self.leg, self.share, self.gait, self.timing, self.sensors]
+        parameters += [] if self.course is None else [self.course]
+        states = [self.initial, NOTHING_SEEN]
+        if self.failing is not None:
+            from ppafo.model.plant_faults import POWERED  # most runs have no fault
 
-    @property
-    def parameters(self) -> list[Any]:
-        """Its groups of parameters."""
-        course, failing = [] if self.course is None else [self.course], self.failing or ()
-        return [self.leg, self.share, self.gait, self.timing, self.sensors, *course, *failing]
-
-    @property
-    def states(self) -> list[Any]:
-        """Its groups of states at the start."""
-        if self.failing is None:
-            return [self.initial, NOTHING_SEEN]
-        from ppafo.model.plant_faults import POWERED  # most runs have no fault
-
-        return [self.initial, NOTHING_SEEN, POWERED]
+            parameters += self.failing
+            states.append(POWERED)
+        return LegGroups(scheme, parameters, states)
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,7 +168,7 @@ def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:
         step=run.step, period=run.period, command_lag=command_lag, signal_lag=signal_lag, tolerance=run.tolerance
     )
     plant, valve = [run.plant, run.thermal], [run.valve]
-    walk, walk_states = ([], []) if run.walk is None else (run.walk.parameters, run.walk.states)
+    _, walk, walk_states = (None, [], []) if run.walk is None else run.walk.groups()
     lines, line_states = ([], []) if run.lines is None else ([run.lines.parameters], [run.lines.initial])
     leg = [] if run.leg is None else [run.leg.load, run.leg.shank]
     rest = [run.controller, run.reference, run.path, run.sensors, *walk, *lines, *leg, *run.effects]

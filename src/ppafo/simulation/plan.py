@@ -239,7 +239,7 @@ def _program(components: Components, steps: Steps, walk: WornLeg | None, has_del
         late_signals=walk is None and is_late,
         late_readings=walk is not None and is_late,
         gas=_gas_scheme(components, effects),
-        leg=None if walk is None else walk.scheme,
+        leg=None if walk is None else walk.groups().scheme,
         feed=None if components.supply_lines is None else kind_at(_LINES),
         is_adaptive=bool(first(steps.needs_parts)),
         # A broken number of steps to a sample puts samples inside steps.

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from ppafo.engine.components import LegScheme, Phases, RarePhase
+from ppafo.engine.run import LegGroups
 from ppafo.engine.scheme.motion import clamp_angle, with_motion
 from ppafo.engine.scheme.pneumatics import HeldChambers, held_chambers, held_pressures
 from ppafo.engine.scheme.walking import NO_CLEARANCE, DeviceShare
@@ -447,18 +448,10 @@ class ReactingWalk:
     nerves: Nerves
     failing: tuple[PlantFaults, ShutOff] | None = None
 
-    @property
-    def scheme(self) -> LegScheme:
-        """How it goes through a step."""
-        return REACTING if self.failing is None else FAILING_REACTING
-
-    @property
-    def parameters(self) -> list[Any]:
-        """Its groups of parameters."""
-        return [self.share, self.body, self.sensors, *(self.failing or ())]
-
-    @property
-    def states(self) -> list[Any]:
-        """Its groups of states at the start."""
-        own = [self.initial, NOTHING_SEEN, self.walker, self.reflexes, self.nerves]
-        return [*own, *([] if self.failing is None else [POWERED])]
+    def groups(self) -> LegGroups:
+        """Its scheme, and its groups of rows in the order of ``Program``."""
+        parameters = [self.share, self.body, self.sensors]
+        states = [self.initial, NOTHING_SEEN, self.walker, self.reflexes, self.nerves]
+        if self.failing is None:
+            return LegGroups(REACTING, parameters, states)
+        return LegGroups(FAILING_REACTING, [*parameters, *self.failing], [*states, POWERED])

@@ -10,7 +10,7 @@ import pytest
 
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.run import Run, batch_of, state_row_numbers
-from ppafo.engine.scheme.walking import DeviceShare, foot_direction, leg_torque
+from ppafo.engine.scheme.walking import DeviceShare, carried_foot, foot_direction, torque_with_carried
 from ppafo.gait import Gait, load_gait
 from ppafo.gait.gait import Curve
 from ppafo.model import contact as ground
@@ -148,8 +148,11 @@ def test_the_ground_under_the_heel_turns_the_toes_down(walk_plan: Callable[[str]
     for phase in (0.03, 0.06, 0.2):
         now = gait_at(walk.gait, walk.timing._replace(start=phase), walk.leg, 0.0)
         foot = foot_direction(now.shank, now.ankle)
-        on_heel = leg_torque(walk.leg, walk.share, ground.HEEL, now, walk.timing.ground_angle, now.ankle, foot)
-        in_air = leg_torque(walk.leg, walk.share, ground.SWING, now, walk.timing.ground_angle, now.ankle, foot)
+        carried = carried_foot(walk.leg, walk.share, now, foot)
+        on_heel, in_air = (
+            torque_with_carried(walk.leg, contact, now, walk.timing.ground_angle, now.ankle, carried)
+            for contact in (ground.HEEL, ground.SWING)
+        )
         # No more than the whole force at the heel.
         assert 0.0 < on_heel - in_air < 0.05 * now.force
 
@@ -200,7 +203,15 @@ def test_the_weight_of_the_foot_plate_pulls_the_toes_down(walk_plan: Callable[[s
     now = gait_at(walk.gait, walk.timing._replace(start=0.3), walk.leg, 0.0)
     level = foot_direction(0.0, 0.5 * math.pi)
     heavy, light = (
-        leg_torque(walk.leg, DeviceShare(0.0, 0.0, moment), ground.SWING, now, 0.0, 1.5, level) for moment in (0.2, 0.0)
+        torque_with_carried(
+            walk.leg,
+            ground.SWING,
+            now,
+            0.0,
+            1.5,
+            carried_foot(walk.leg, DeviceShare(0.0, 0.0, moment), now, level),
+        )
+        for moment in (0.2, 0.0)
     )
     assert heavy - light == pytest.approx(0.2 * walk.leg.gravity, rel=0.1)
 
@@ -213,8 +224,9 @@ def test_a_foot_plate_is_carried_along_like_a_foot_of_its_mass_and_inertia(walk_
     for phase in (0.66, 0.8, 0.95):
         now = gait_at(walk.gait, walk.timing._replace(start=phase), leg, 0.0)
         foot = foot_direction(now.shank, now.ankle + 0.2)
-        bare = leg_torque(leg, DeviceShare(0.0, 0.0, 0.0), ground.SWING, now, 0.0, now.ankle + 0.2, foot)
-        twice = leg_torque(
-            leg, DeviceShare(foot_inertia_about_ankle(leg), 0.0, moment), ground.SWING, now, 0.0, now.ankle + 0.2, foot
+        shares = DeviceShare(0.0, 0.0, 0.0), DeviceShare(foot_inertia_about_ankle(leg), 0.0, moment)
+        bare, twice = (
+            torque_with_carried(leg, ground.SWING, now, 0.0, now.ankle + 0.2, carried_foot(leg, share, now, foot))
+            for share in shares
         )
         assert twice - bare == pytest.approx(bare - passive_torque(leg, now.ankle + 0.2))

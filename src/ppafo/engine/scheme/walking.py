@@ -73,29 +73,16 @@ def foot_direction(shank: float, angle: float) -> Direction:
     return Direction(sine, cosine)
 
 
-def leg_torque(
-    leg: LegParameters,
-    share: DeviceShare,
-    contact: float,
-    now: GaitNow,
-    ground_angle: float,
-    angle: float,
-    foot: Direction,
+def torque_with_carried(
+    leg: LegParameters, contact: float, now: GaitNow, ground_angle: float, angle: float, carried: CarriedFoot
 ) -> float:
     """Torque on the ankle [N m] beside actuator, friction, damping and inertia, positive in plantarflexion.
 
     The ankle's row of equation (11) with the prescribed shank, the wearer, tissue, the foot plate, and the ground
     under the heel. Muscles are what a healthy ankle adds to tissue and ground along the measured angles, on the heel
     the measured moment less tissue, so that a wearer who has all of them and no device walks the measured gait.
-    ``ground_angle`` [rad] of a flat foot.
+    ``ground_angle`` [rad] of a flat foot, ``carried`` the torques of foot and foot plate.
     """
-    return torque_with_carried(leg, contact, now, ground_angle, angle, carried_foot(leg, share, now, foot))
-
-
-def torque_with_carried(
-    leg: LegParameters, contact: float, now: GaitNow, ground_angle: float, angle: float, carried: CarriedFoot
-) -> float:
-    """Torque of ``leg_torque`` [N m], where the torques of foot and foot plate are known."""
     heel = ground.heel_torque(contact, now, leg, ground_angle, angle)
     active = now.moment if contact == ground.HEEL else now.healthy_torque
     muscles = active - passive_torque(leg, now.ankle)
@@ -383,37 +370,34 @@ def find(rows: Any) -> list[str]:
 
 
 def lead(rows: Any) -> Phases:
-    """Phases before the gas: the gait at the end of the step, and where the foot would be."""
-    foot = f"{rows.add(begin_walk)}(plant, leg, gait_timing, state, held, walk, carried, next_gait, length)"
-    return [
-        *next_gait(rows),
-        [rows.load("next_gait"), rows.load("carried"), f"begun = {foot}", *rows.keep("begun")],
-    ]
+    """Phases before the gas: the gait at the end of the step, with the marks of a stride, and where the foot would be.
 
-
-def next_gait(rows: Any) -> Phases:
-    """Phases that make the gait at the end of the step: stride after stride, or in a task sequence, with its marks."""
+    The gait goes stride after stride, or in a task sequence.
+    """
     add = rows.add
+    given = "plant, leg, gait_timing, state, held, walk, carried, next_gait, length"
+    begun = f"begun = {add(begin_walk)}({given})"
     if rows.program.leg.takes_course:
-        given = "gait, walk_course, gait_timing, leg, time + length"
-        made = f"next_gait, marks = {add(gait_on_course)}({given})"
-        return [[rows.load("gait"), rows.load("walk_course"), made, *rows.keep("next_gait", "marks")]]
-    cells = {name: rows.cells[f"next_gait.{name}"] for name in GaitNow._fields}
-    measured = [cells[name] for name in GaitMeasured._fields]
-    rest = [name for name in GaitNow._fields if name not in GaitMeasured._fields]
-    return [
-        [f"place = {add(place_at)}(gait_timing, time + length)", *rows.keep("place")],
-        [
-            rows.load("gait"),
-            rows.load("place"),
-            f"measured = {add(measured_at)}(gait, gait_timing, leg, place)",
-            *[f"{cells[name]} = measured.{name}" for name in GaitMeasured._fields],
-        ],
-        [
-            f"next_gait = {add(gait_of)}(leg, {add(GaitMeasured)}({', '.join(measured)}))",
-            *[f"{cells[name]} = next_gait.{name}" for name in rest],
-        ],
-    ]
+        made = f"next_gait, marks = {add(gait_on_course)}(gait, walk_course, gait_timing, leg, time + length)"
+        phases: Phases = [[rows.load("gait"), rows.load("walk_course"), made, *rows.keep("next_gait", "marks")]]
+    else:
+        cells = {name: rows.cells[f"next_gait.{name}"] for name in GaitNow._fields}
+        measured = [cells[name] for name in GaitMeasured._fields]
+        rest = [name for name in GaitNow._fields if name not in GaitMeasured._fields]
+        phases = [
+            [f"place = {add(place_at)}(gait_timing, time + length)", *rows.keep("place")],
+            [
+                rows.load("gait"),
+                rows.load("place"),
+                f"measured = {add(measured_at)}(gait, gait_timing, leg, place)",
+                *[f"{cells[name]} = measured.{name}" for name in GaitMeasured._fields],
+            ],
+            [
+                f"next_gait = {add(gait_of)}(leg, {add(GaitMeasured)}({', '.join(measured)}))",
+                *[f"{cells[name]} = next_gait.{name}" for name in rest],
+            ],
+        ]
+    return [*phases, [rows.load("next_gait"), rows.load("carried"), begun, *rows.keep("begun")]]
 
 
 def assume(rows: Any) -> list[str]:

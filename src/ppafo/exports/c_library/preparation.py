@@ -281,7 +281,7 @@ class Writing:
         yield f"valve_state = {self.constant(program.valve.initial(), 'valve_state')}"
         if program.controller is not None:
             yield f"controller_state = {self.constant(program.controller.initial, 'controller_state')}"
-        if program.has_lines:
+        if program.feed is not None:
             yield f"line_state = {add(lines_at_start)}(plant, lines)"
         if program.stated:
             yield f"at_start = {add(moment_at_start)}(plant, state)"

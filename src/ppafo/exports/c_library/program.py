@@ -130,7 +130,7 @@ class ExportedProgram:
     @property
     def chooses_parts(self) -> bool:
         """True where the settings decide whether the error decides about the parts of a step."""
-        return self.program.is_locked and not (self.program.has_lines or self.program.has_shape)
+        return self.program.is_locked and self.program.feed is None and not self.program.has_shape
 
     @property
     def outputs(self) -> tuple[str, ...]:
