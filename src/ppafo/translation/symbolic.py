@@ -246,8 +246,8 @@ class _Call:
         """A number or truth value that is worked out from others."""
         if term.kind in _COMPARISONS:
             return self.compared(term.kind, parts[0], parts[1], _text(term))
-        if term.kind in ("and", "or"):
-            return _linked(term.kind, *parts)
+        if term.kind in ("and", "or", "not"):
+            return _logical(term.kind, *parts)
         writer: Callable[..., Any] | None = getattr(self, f"_of_{term.kind}", None)
         if writer is not None:
             return writer(term, *parts)
@@ -256,11 +256,6 @@ class _Call:
         if term.kind in _WHOLE_ONLY and not all(isinstance(part, int) for part in parts):
             raise self.refused(f"'{_text(term)}' of whole numbers")
         return _ARITHMETIC[term.kind](*parts)
-
-    def _of_not(self, _term: Term, given: Any) -> Any:
-        import casadi
-
-        return not given if isinstance(given, bool) else casadi.logic_not(given)
 
     def _of_sqrt(self, _term: Term, given: Any) -> Any:
         import casadi
@@ -355,10 +350,12 @@ def _returns(item: Statement) -> bool:
     return isinstance(item, typed.Count | typed.While) and any(map(_returns, item.body))
 
 
-def _linked(word: str, left: Any, right: Any) -> Any:
-    """Two truth values, known or not, with ``and`` or ``or`` between them."""
+def _logical(word: str, left: Any, right: Any = None) -> Any:
+    """What ``and``, ``or`` or ``not`` makes of truth values that are known or not."""
     import casadi
 
+    if word == "not":
+        return not left if isinstance(left, bool) else casadi.logic_not(left)
     for one, other in ((left, right), (right, left)):
         if isinstance(one, bool):
             return (other if one else False) if word == "and" else (True if one else other)
