@@ -213,11 +213,15 @@ def unit_by_pint(unit: str) -> ParsedUnit:
     bare, _ = split_pressure_kind(unit)
     try:
         parsed = _registry().parse_units(bare.replace("^", "**").replace(" ", "*"))
-    except pint.UndefinedUnitError as error:
-        unknown = error.unit_names
-        raise _unknown_unit(unknown if isinstance(unknown, str) else next(iter(unknown))) from error
-    except ValueError as error:  # pint takes 'nan' and 'inf' for numbers
-        raise _unknown_unit(bare) from error
+    except (pint.UndefinedUnitError, ValueError) as error:
+        # pint takes 'nan' and 'inf' for numbers.
+        unknown = error.unit_names if isinstance(error, pint.UndefinedUnitError) else bare
+        name = unknown if isinstance(unknown, str) else next(iter(unknown))
+        if name[-2:] in ("_g", "_a", "_d"):
+            raise UnitError(f"'{name}': {_KIND_BELONGS}") from error
+        hint = nearest_name(name, [prefix + known for known in _UNITS for prefix in ("", *_PREFIXES)])
+        available = f"{', '.join(_UNITS)}, with the prefixes {', '.join(_PREFIXES)}"
+        raise UnitError(f"'{name}' is not a known unit{hint}; available: {available}") from error
     except pint.OffsetUnitCalculusError as error:  # milli of a temperature that has another zero
         raise UnitError(f"'{unit}': degC takes no prefix; give degC or K") from error
     # Units are affine: their values at 0 and 1 give scale and offset.
@@ -235,14 +239,6 @@ def split_pressure_kind(unit: str) -> tuple[str, str]:
         raise UnitError(f"{_quote(unit)} is not a unit; write it like 'mm^2', 'N m s/rad' or 'm^3/(s Pa)'")
     pressure = _PRESSURE_KIND.fullmatch(normal)
     return (pressure[1], pressure[2]) if pressure else (normal, "")
-
-
-def _unknown_unit(name: str) -> UnitError:
-    if name[-2:] in ("_g", "_a", "_d"):
-        return UnitError(f"'{name}': {_KIND_BELONGS}")
-    hint = nearest_name(name, [prefix + unit for unit in _UNITS for prefix in ("", *_PREFIXES)])
-    known = f"{', '.join(_UNITS)}, with the prefixes {', '.join(_PREFIXES)}"
-    return UnitError(f"'{name}' is not a known unit{hint}; available: {known}")
 
 
 @functools.cache

@@ -100,27 +100,23 @@ def _is_model(node: Any) -> bool:
 
 
 def _unknown_key(spot: _Spot, model: type[BaseModel]) -> str:
+    """Say where a key belongs that is not known at its spot: in few other tables of the file, or a near name."""
     allowed, key = list(spot.holder.model_fields), spot.path.rpartition(".")[2]
-    homes = _homes(model, key)
-    homes = homes if len(homes) <= _MAXIMUM_HOMES else []
-    hint = f", which is a key of {' and '.join(homes)}" if homes else nearest_name(key, allowed)
-    return f"unknown key '{spot.path}'{hint}; allowed here: {', '.join(allowed)}"
-
-
-def _homes(model: Any, key: str) -> list[str]:
-    """Return the tables of a file that have this key, as the file writes them."""
-    found, left, seen = [], [("", model)], set()
+    homes: list[str] = []
+    left: list[tuple[str, Any]] = [("", model)]
+    seen = set()
     while left:
         path, node = left.pop(0)
-        members = [node] if _is_model(node) else _models_in(node)
-        for member in members:
+        for member in [node] if _is_model(node) else _models_in(node):
             if (path, member) in seen or len(path) > _LONGEST_VALUE:
                 continue
             seen.add((path, member))
-            if key in member.model_fields and (table := f"[{path}]" if path else "the top of the file") not in found:
-                found.append(table)
+            if key in member.model_fields and (table := f"[{path}]" if path else "the top of the file") not in homes:
+                homes.append(table)
             left += [(f"{path}.{name}".strip("."), field.annotation) for name, field in member.model_fields.items()]
-    return found
+    is_elsewhere = 0 < len(homes) <= _MAXIMUM_HOMES
+    hint = f", which is a key of {' and '.join(homes)}" if is_elsewhere else nearest_name(key, allowed)
+    return f"unknown key '{spot.path}'{hint}; allowed here: {', '.join(allowed)}"
 
 
 def _models_in(node: Any) -> list[Any]:

@@ -268,24 +268,20 @@ def parameter_set_toml(parameter_set: ParameterSet) -> str:
     # Section by section, in the order in which the sections first occur.
     entries = parameter_set.entries()
     sections = list(dict.fromkeys(path.rpartition(".")[0] for path in entries))
-    begun = set()
+    heads = {
+        valve: ("", f"[valves.{valve}]", *_assignments({"kind": kind}))
+        for valve, kind in parameter_set.valve_kinds.items()
+    }
     for path in sorted(entries, key=lambda path: sections.index(path.rpartition(".")[0])):
-        valve = path.split(".")[1] if path.startswith("valves.") else ""
-        if valve and valve not in begun:
-            begun.add(valve)
-            lines += _valve(parameter_set, valve)
+        if path.startswith("valves."):
+            lines += heads.pop(path.split(".")[1], ())
         lines += ("", f"[{path}]", *_assignments(entries[path].model_dump(exclude_defaults=True)))
     # A valve of which nothing but its kind is known has a table all the same.
-    for valve in parameter_set.valve_kinds:
-        if valve not in begun:
-            lines += _valve(parameter_set, valve)
+    for lines_of_valve in heads.values():
+        lines += lines_of_valve
     for finding, reason in parameter_set.accepted.items():
         lines += ("", "[[accepted]]", *_assignments({"finding": finding, "reason": reason}))
     return "\n".join(lines) + "\n"
-
-
-def _valve(parameter_set: ParameterSet, valve: str) -> Iterator[str]:
-    yield from ("", f"[valves.{valve}]", *_assignments({"kind": parameter_set.valve_kinds[valve]}))
 
 
 def _assignments(values: Mapping[str, Any]) -> Iterator[str]:

@@ -174,7 +174,13 @@ def effect_row(effect: Effect, device: Device, others: Sections = _NO_SECTIONS) 
     # Most effects compute with their settings as they are.
     if prepare is None:
         return effect.parameters(*settings.values())
-    given = [_number(device, section, name) for section, inner in names.items() for name in inner]
+    # A setting of the actuator comes before a number of the same name.
+    own_numbers = {"actuator": device.actuator.settings}
+    given = [
+        own_numbers[section][name] if name in own_numbers.get(section, ()) else getattr(getattr(device, section), name)
+        for section, inner in names.items()
+        for name in inner
+    ]
 
     def prepared(*numbers: float) -> Any:
         own, rest = numbers[: len(settings)], iter(numbers[len(settings) :])
@@ -182,11 +188,6 @@ def effect_row(effect: Effect, device: Device, others: Sections = _NO_SECTIONS) 
         return prepare(effect.settings(*own), _part("device", tuple(names))(*parts))
 
     return over_runs(prepared, *settings.values(), *given)
-
-
-def _number(device: Device, section: str, name: str) -> Any:
-    own = device.actuator.settings if section == "actuator" else {}
-    return own[name] if name in own else getattr(getattr(device, section), name)
 
 
 @cache

@@ -527,11 +527,23 @@ class _Body:
         """A statement with its blocks, line by line."""
         match item:
             case typed.Assign():
-                yield from self.assignment(item, level)
+                # What nobody reads is not written: a compiler would warn of it.
+                if item.name in self.scopes.read and not is_empty(item.value.type):
+                    starts = self.scopes.first.get(id(item), "")
+                    declared = f"{starts}{self.writer.type_name(item.value.type)} " if starts else ""
+                    is_listed = starts and self.writer.reading is not None
+                    value = self.terms.listed(item.value) if is_listed else self.terms.term(item.value)
+                    yield from self.line(f"{declared.replace('let ', '')}{self.name(item.name)} = {value};", level)
             case typed.Store():
                 yield from self.store(item, level)
             case typed.Return():
-                yield from self.end(item, level)
+                value = ""
+                # Where people read, a struct that is returned has a name.
+                if item.value.kind == "build" and self.writer.reading is not None:
+                    value = c_name("made", self.kinds, {*self.writer.outer, *map(self.name, self.kinds)})
+                    kind = self.writer.type_name(item.value.type)
+                    yield from self.line(f"const {kind} {value} = {self.terms.listed(item.value)};", level)
+                yield from self.line(f"return {value or self.terms.term(item.value)};", level)
             case typed.Count():
                 yield from self.counted_loop(item, level)
             case typed.If() | typed.While():
@@ -562,16 +574,6 @@ class _Body:
     def line(self, text: str, level: int) -> Iterator[str]:
         yield from _wrapped("    " * level + text, "    " * (level + 1))
 
-    def assignment(self, item: typed.Assign, level: int) -> Iterator[str]:
-        """A name gets a value; a name that lives from here on is declared with it."""
-        # What nobody reads is not written: a compiler would warn of it.
-        if item.name in self.scopes.read and not is_empty(item.value.type):
-            starts = self.scopes.first.get(id(item), "")
-            declared = f"{starts}{self.writer.type_name(item.value.type)} " if starts else ""
-            is_listed = starts and self.writer.reading is not None
-            value = self.terms.listed(item.value) if is_listed else self.terms.term(item.value)
-            yield from self.line(f"{declared.replace('let ', '')}{self.name(item.name)} = {value};", level)
-
     def store(self, item: typed.Store, level: int) -> Iterator[str]:
         """An element of an array or a field of a row gets a value."""
         value = item.value
@@ -583,16 +585,6 @@ class _Body:
                     yield from self.store(typed.Store(Term("field", kind, (item.element,), name), part), level)
             return
         yield from self.line(f"{self.terms.term(item.element)} = {self.terms.term(item.value)};", level)
-
-    def end(self, item: typed.Return, level: int) -> Iterator[str]:
-        """The end of a function; where people read, a struct that is returned has a name."""
-        if item.value.kind == "build" and self.writer.reading is not None:
-            made = c_name("made", self.kinds, {*self.writer.outer, *map(self.name, self.kinds)})
-            kind = self.writer.type_name(item.value.type)
-            yield from self.line(f"const {kind} {made} = {self.terms.listed(item.value)};", level)
-            yield from self.line(f"return {made};", level)
-            return
-        yield from self.line(f"return {self.terms.term(item.value)};", level)
 
     def counted_loop(self, item: typed.Count, level: int) -> Iterator[str]:
         """A loop that counts; a name that lives beyond it gets the number from a counter of its own."""

@@ -67,7 +67,7 @@ class Scopes:
             # A name that changes once is const: a reader of exported C need not look for more.
             self.first[id(mentions[0])] = "const " if self.changes[id(body)][name] == 1 else "let "
         # As far in as it goes: each block with a value of its own declares it for itself.
-        elif not self.is_divided(name, mentions):
+        elif not self.is_own(name, body):
             self.before.setdefault(id(body), []).append(name)
         else:
             loops = {id(statement) for statement in mentions if self.counts(name, statement)}
@@ -75,21 +75,17 @@ class Scopes:
             for inner in self.blocks(name, tuple(item for item in mentions if id(item) not in loops)):
                 self.place(name, inner)
 
-    def is_divided(self, name: str, mentions: Block) -> bool:
-        """True where each statement that mentions a name gives it its value in its own blocks before it reads it."""
-        return all(
+    def is_own(self, name: str, body: Block) -> bool:
+        """True where a block, or each block in it that mentions a name, gives it its value before it reads it."""
+        mentions = self.mentions(name, body)
+        return _begins(mentions[0], name) or all(
             self.counts(name, statement)
             or (
                 name not in self.direct[id(statement)]
-                and all(self.is_defined_first(name, inner) for inner in self.blocks(name, (statement,)))
+                and all(self.is_own(name, inner) for inner in self.blocks(name, (statement,)))
             )
             for statement in mentions
         )
-
-    def is_defined_first(self, name: str, body: Block) -> bool:
-        """True where a block gives a name its value before it reads it, so that it can be the block's own."""
-        mentions = self.mentions(name, body)
-        return _begins(mentions[0], name) or self.is_divided(name, mentions)
 
     def counts(self, name: str, statement: Statement) -> bool:
         """True for a loop of that name, which does not change it otherwise."""

@@ -244,47 +244,31 @@ class _Call:
 
     def calculated(self, term: Term, parts: list[Any]) -> Any:
         """A number or truth value that is worked out from others."""
+        import casadi
+
+        given, is_symbol = parts[0], isinstance(parts[0], casadi.SX)
         if term.kind in _COMPARISONS:
-            return self.compared(term.kind, parts[0], parts[1], _text(term))
-        if term.kind in ("and", "or"):
-            return _linked(term.kind, *parts)
-        writer: Callable[..., Any] | None = getattr(self, f"_of_{term.kind}", None)
-        if writer is not None:
-            return writer(term, *parts)
-        if term.kind not in _ARITHMETIC:
+            found = self.compared(term.kind, parts[0], parts[1], _text(term))
+        elif term.kind in ("and", "or", "not"):
+            found = _logical(term.kind, *parts)
+        elif term.kind == "abs":
+            is_negative = self.compared("<", given, 0.0, f"{_text(term.parts[0])} < 0.0")
+            found = (-given if is_negative else given) if isinstance(is_negative, bool) else casadi.fabs(given)
+        elif term.kind == "sqrt" and is_symbol:
+            found = casadi.sqrt(given)
+        elif term.kind == "sqrt":
+            found = math.sqrt(given) if given >= 0.0 else math.nan
+        elif term.kind == "convert":
+            if is_symbol and term.type == INT:
+                raise self.refused("the whole part of a number")
+            found = given if is_symbol else int(given) if term.type == INT else float(given)
+        elif term.kind not in _ARITHMETIC:
             raise self.refused(f"'{term.kind}' of the lane loop")
-        if term.kind in _WHOLE_ONLY and not all(isinstance(part, int) for part in parts):
+        elif term.kind in _WHOLE_ONLY and not all(isinstance(part, int) for part in parts):
             raise self.refused(f"'{_text(term)}' of whole numbers")
-        return _ARITHMETIC[term.kind](*parts)
-
-    def _of_not(self, _term: Term, given: Any) -> Any:
-        import casadi
-
-        return not given if isinstance(given, bool) else casadi.logic_not(given)
-
-    def _of_sqrt(self, _term: Term, given: Any) -> Any:
-        import casadi
-
-        if isinstance(given, casadi.SX):
-            return casadi.sqrt(given)
-        return math.sqrt(given) if given >= 0.0 else math.nan
-
-    def _of_abs(self, term: Term, given: Any) -> Any:
-        import casadi
-
-        is_negative = self.compared("<", given, 0.0, f"{_text(term.parts[0])} < 0.0")
-        if isinstance(is_negative, bool):
-            return -given if is_negative else given
-        return casadi.fabs(given)
-
-    def _of_convert(self, term: Term, given: Any) -> Any:
-        import casadi
-
-        if term.type == INT and isinstance(given, casadi.SX):
-            raise self.refused("the whole part of a number")
-        if isinstance(given, casadi.SX):
-            return given
-        return int(given) if term.type == INT else float(given)
+        else:
+            found = _ARITHMETIC[term.kind](*parts)
+        return found
 
     def compared(self, sign: str, left: Any, right: Any, words: str) -> Any:
         """A comparison: a truth value where both numbers are known or it is decided, else an expression."""
@@ -355,10 +339,12 @@ def _returns(item: Statement) -> bool:
     return isinstance(item, typed.Count | typed.While) and any(map(_returns, item.body))
 
 
-def _linked(word: str, left: Any, right: Any) -> Any:
-    """Two truth values, known or not, with ``and`` or ``or`` between them."""
+def _logical(word: str, left: Any, right: Any = None) -> Any:
+    """What ``and``, ``or`` or ``not`` makes of truth values that are known or not."""
     import casadi
 
+    if word == "not":
+        return not left if isinstance(left, bool) else casadi.logic_not(left)
     for one, other in ((left, right), (right, left)):
         if isinstance(one, bool):
             return (other if one else False) if word == "and" else (True if one else other)

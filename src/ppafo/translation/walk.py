@@ -175,7 +175,7 @@ class Expressions:
             if begin is None or end is None or node.slice.step is not None or kind.shape:
                 problem = f"'{ast.unparse(node.slice)}' is not from one place of an array up to another"
                 raise self.refused(node.slice, problem)
-            # These are in it: what is beyond is not looked for.
+            # Both bounds lie in it: what is beyond is not looked for.
             count = Term("extent", INT, (owner,), 0)
             bounds = (self.from_start(self.whole(item), count) for item in (begin, end))
             return Term("part", Array(kind.dimensions), (owner, *bounds))
@@ -523,8 +523,8 @@ class _FunctionWalk:
                 test = self.values.condition(node.test)
                 return [typed.If(test, self.block(node.body), self.block(node.orelse))]
             case ast.While():
-                lasting = self.values.condition(node.test)
-                return self.loop(node, lambda: typed.While(lasting, self.block(node.body)))
+                test = self.values.condition(node.test)
+                return self.loop(node, lambda: typed.While(test, self.block(node.body)))
         handler: Callable[[Any], list[Statement]] | None = getattr(self, f"do_{type(node).__name__.lower()}", None)
         if handler is None:
             raise self.refused(node, f"'{ast.unparse(node).splitlines()[0]}' is no statement of the subset")
