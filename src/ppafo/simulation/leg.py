@@ -41,9 +41,25 @@ def plan_leg(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
 
 
 def measured_leg(scenario: Scenario, run: Run, times: Floats, rows: Mapping[str, Floats]) -> Measured:
-    """Return recording and metrics of a vane that moves the foot of a leg."""
+    """Return recording and metrics of a vane that moves the foot of a leg; also of the leg where its shank moves.
+
+    Where a gait leads the shank, the foot stands beside the one that was measured.
+    """
+    kind, leg, angle = run.program.shank, run.leg, rows["state.angle"]
+    channels: dict[str, tuple[Floats, str]] = {}
+    # A shank at rest has one angle, which the scenario says.
+    if kind is not None and leg is not None and kind is not CONSTANT:
+        shank = np.broadcast_to(shank_over_samples(kind, leg.shank, times).angle, times.shape)
+        channels["shank_angle"] = (shank, "rad")
+        if kind is GAIT_SHANK:
+            foot = over_samples(foot_in_gait, leg.shank, times, angle)
+            channels["foot_angle"] = (foot.angle, "rad")
+            channels["measured_foot_angle"] = (foot.measured_angle, "rad")
+            channels["toe_difference"] = (foot.toe_difference, "m")
+        else:
+            channels["foot_angle"] = (shank - angle + 0.5 * np.pi, "rad")
     external_torque = partial(_torque_on_leg, _leg_of(scenario), run, times, rows)
-    return measured(scenario, run, times, rows, external_torque, _leg_channels(run, times, rows["state.angle"]))
+    return measured(scenario, run, times, rows, external_torque, channels)
 
 
 def _leg_of(scenario: Scenario) -> Leg:
@@ -81,24 +97,6 @@ def foot_load(
 def with_load(plant: PlantParameters, load: FootLoad) -> PlantParameters:
     """The plant with the inertia of all that turns; the weight of the foot plate is accounted for in the leg."""
     return plant._replace(inertia=load.inertia, gravity_torque=0.0)
-
-
-def _leg_channels(run: Run, times: Floats, angle: Floats) -> dict[str, tuple[Floats, str]]:
-    """Shank and foot of a leg whose shank moves; where a gait leads it, beside the foot that was measured."""
-    kind, leg = run.program.shank, run.leg
-    # A shank at rest has one angle, which the scenario says.
-    if kind is None or leg is None or kind is CONSTANT:
-        return {}
-    shank = np.broadcast_to(shank_over_samples(kind, leg.shank, times).angle, times.shape)
-    if kind is not GAIT_SHANK:
-        return {"shank_angle": (shank, "rad"), "foot_angle": (shank - angle + 0.5 * np.pi, "rad")}
-    foot = over_samples(foot_in_gait, leg.shank, times, angle)
-    return {
-        "shank_angle": (shank, "rad"),
-        "foot_angle": (foot.angle, "rad"),
-        "measured_foot_angle": (foot.measured_angle, "rad"),
-        "toe_difference": (foot.toe_difference, "m"),
-    }
 
 
 def _torque_on_leg(leg: Leg, run: Run, times: Floats, rows: Mapping[str, Floats], torque: Floats) -> Floats:

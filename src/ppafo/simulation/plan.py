@@ -298,13 +298,22 @@ def scenario_steps(scenario: Scenario, plant: PlantParameters) -> Steps:
         scenario.run.duration, scenario.run.step, scenario.run.output_interval, scenario.controller.period
     )
     tolerance = relative_tolerance(scenario.run.tolerance)
+    # The error decides about the parts of a step, but for a held vane whose chambers are slow enough for plain steps.
+    needs_parts: Any = True
+    is_bare_vane = scenario.supply_lines is None and scenario.device.actuator.kind == VANE.name
+    angle = vane_motion(scenario).locked_angle if is_bare_vane else None
+    if angle is not None:
+        # The pressure of gas with an energy balance follows faster, by its heat capacity ratio.
+        stiffness = 1.0 if scenario.gas_model is None else scenario.device.gas.heat_capacity_ratio
+        # A stricter tolerance counts as a longer step; a looser one as the default.
+        step = counts.step / smaller(1.0, tolerance)
+        needs_parts = np.logical_not(is_slow_locked(plant, step, angle, stiffness))
     return Steps(
         step=counts.step,
         step_count=whole(counts.step_count),
         steps_per_sample=whole(counts.steps_per_sample),
         record_every=counts.record_every,
-        # A stricter tolerance counts as a longer step; a looser one as the default.
-        needs_parts=is_adaptive(scenario, plant, counts.step / smaller(1.0, tolerance)),
+        needs_parts=needs_parts,
         tolerance=tolerance,
     )
 
@@ -337,21 +346,6 @@ def sensor_parameters(scenario: Scenario) -> SensorParameters:
         pressure_resolution=sensors.pressure_resolution,
         seed=sensors.seed,
     )
-
-
-def is_adaptive(scenario: Scenario, plant: PlantParameters, step: float) -> Any:
-    """True where the error decides about the parts of a step [s]; not where a held vane's chambers are slow enough.
-
-    For arrays (runs,) in the scenario an array of truth values.
-    """
-    if scenario.supply_lines is not None or scenario.device.actuator.kind != VANE.name:
-        return True
-    angle = vane_motion(scenario).locked_angle
-    if angle is None:
-        return True
-    # The pressure of gas with an energy balance follows faster, by its heat capacity ratio.
-    stiffness = 1.0 if scenario.gas_model is None else scenario.device.gas.heat_capacity_ratio
-    return np.logical_not(is_slow_locked(plant, step, angle, stiffness))
 
 
 def initial_state(scenario: Scenario, plant: PlantParameters) -> PlantState:

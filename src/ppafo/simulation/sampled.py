@@ -94,17 +94,6 @@ def run_sampled(batch: Batch, controller: PythonController) -> BatchResult:
     return run.result()
 
 
-def run_in_turn(batch: Batch, controller: PythonController, take: Callable[[slice, BatchResult], None]) -> None:
-    """Run the runs of a batch one after the other, and give each result away as ``run_blocks`` does: some 30 ms each.
-
-    An object has one state, so that it cannot be in charge of two runs at a time.
-    """
-    for run in range(batch.states.shape[1]):
-        one = slice(run, run + 1)
-        alone = Batch(batch.program, batch.clock, batch.parameters[:, one], batch.states[:, one])
-        take(one, run_sampled(alone, controller))
-
-
 def _group(batch: Batch, name: str) -> Any:
     """The NamedTuple of a group of parameters of the one run, with floats."""
     values: Any = batch.parameters[:, 0].tolist()

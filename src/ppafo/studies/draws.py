@@ -89,6 +89,15 @@ def replicate_seed(seed: int, replicate: int) -> int:
     return int(np.random.SeedSequence([seed, replicate]).generate_state(1, np.uint64)[0])
 
 
+def seeds_of_noise(scenarios: Iterable[Scenario], paths: Sequence[str], first: int, count: int, seed: int) -> Floats:
+    """Return what names streams of noise (streams,), from number ``first`` on of the stream that ``seed`` names.
+
+    None where no controller of the scenarios receives noise, or where the noise is among the ``paths`` that vary.
+    """
+    noise = Uncertainty(with_noise((), None, scenarios, paths)[0])
+    return noise.random_columns(first, count, seed)[NOISE] if noise.has_noise else np.zeros(0)
+
+
 NOISE_DRAWS = 512
 """Draws that are run again with other noise, at most: its fraction of the variance is then known to some percent."""
 

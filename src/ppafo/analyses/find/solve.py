@@ -17,8 +17,8 @@ from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import BLACK, GREEN, VERMILION
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import Floats
-from ppafo.studies.draws import Limit, Uncertainty, atmosphere_of, check_metrics, level_of
-from ppafo.studies.sampling import NOISE, with_noise
+from ppafo.studies.draws import Limit, atmosphere_of, check_metrics, level_of, seeds_of_noise
+from ppafo.studies.sampling import NOISE
 from ppafo.studies.study import with_overrides
 from ppafo.studies.varying import VariedPath, varied_path
 from ppafo.study.runs import Runs, Tally, settled, with_companions
@@ -104,8 +104,7 @@ def find(
     if not FEWEST <= grid <= MOST:
         raise StudyError(f"grid = {grid}: must be at least {FEWEST} and at most {MOST:,}")
     # The same streams for all values, so that neighbours differ by the value alone.
-    noise = Uncertainty(with_noise((), None, [base], [path.path])[0])
-    seeds = noise.random_columns(0, STREAMS, _SEED)[NOISE] if noise.has_noise else np.zeros(0)
+    seeds = seeds_of_noise([base], [path.path], 0, STREAMS, _SEED)
     tally = Tally(grid * max(1, seeds.size), progress)
     search = _Search(
         path.path, condition, Runs(base, with_companions([condition.metric], base), tally, (), threads), seeds

@@ -21,7 +21,7 @@ from ppafo.metrics.gas import ENERGIES
 from ppafo.metrics.metric import LED, LED_SHANK, REACTS, REQUEST, STEADY, WALK, MetricKind, Readings
 from ppafo.model.gas import energy_per_content
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState, TrueMasses
-from ppafo.simulation.sampled import run_in_turn
+from ppafo.simulation.sampled import run_sampled
 from ppafo.simulation.scenario import Scenario
 
 REFERENCE = "reference"
@@ -156,7 +156,11 @@ class Outcome:
         if self.request.custom is None:
             run_blocks(batch, take, threads)
         else:
-            run_in_turn(batch, self.request.custom, take)
+            # An object has one state, so that it cannot be in charge of two runs at a time.
+            for run in range(members.size):
+                one = slice(run, run + 1)
+                alone = Batch(batch.program, batch.clock, batch.parameters[:, one], batch.states[:, one])
+                take(one, run_sampled(alone, self.request.custom))
         self._judge(task, members, states, plain.states.shape[0])
         readings = task.readings(ends, slice(None), None)
         for name in task.metrics:

@@ -38,8 +38,7 @@ from ppafo.signals.recording import Floats
 from ppafo.simulation.declaration import PLAIN
 from ppafo.simulation.numbers import TIMES, declared_numbers, moving_together, number_at
 from ppafo.simulation.scenario import Scenario
-from ppafo.studies.draws import Uncertainty
-from ppafo.studies.sampling import NOISE, with_noise
+from ppafo.studies.draws import seeds_of_noise
 
 Members = NDArray[np.intp]
 SUPPLIES = (PRESSURE_PATH, SECOND_PRESSURE_PATH, ATMOSPHERE_PATH)
@@ -164,8 +163,7 @@ def _excess(values: Floats, limit: float | None, sign: float) -> Floats:
 def noise_streams(problem: DesignProblem, first: int, count: int) -> Floats:
     """Return the seeds of streams of noise, from number ``first`` on; none where no controller receives noise."""
     scenarios = [scenario for task in problem.tasks for scenario in task.scenarios.values()]
-    noise = Uncertainty(with_noise((), None, scenarios, [item.path for item in problem.variables])[0])
-    return noise.random_columns(first, count, problem.search.seed)[NOISE] if noise.has_noise else np.zeros(0)
+    return seeds_of_noise(scenarios, [item.path for item in problem.variables], first, count, problem.search.seed)
 
 
 def values_of(problem: DesignProblem, candidates: Candidates) -> dict[str, Floats]:

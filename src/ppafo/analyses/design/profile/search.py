@@ -17,8 +17,7 @@ from ppafo.constants import PASCALS_PER_PSI
 from ppafo.errors import StudyError
 from ppafo.parameters.parts import Part
 from ppafo.signals.recording import Floats
-from ppafo.studies.draws import Uncertainty
-from ppafo.studies.sampling import NOISE
+from ppafo.studies.draws import seeds_of_noise
 
 Limit = Literal["torque", "flow", "control", "pressure"]
 LIMITS: dict[Limit, str] = {
@@ -105,9 +104,8 @@ class Trials:
         self.gain_sets: Floats = np.array(list(product(problem.gain_factors, repeat=len(problem.gains))))
         self.runs = 0
         self.failures: dict[str, int] = {}
-        noise = Uncertainty(()).with_noise_of([problem.scenario])
         # The scenario's own seed plays no part, so that two scenarios are judged in the same noise.
-        self.seeds = noise.random_columns(0, STREAMS, _SEED)[NOISE] if noise.has_noise else np.zeros(0)
+        self.seeds = seeds_of_noise([problem.scenario], (), 0, STREAMS, _SEED)
         self._threads = threads
 
     def run(self, valve: Part, pressure: Floats, gains: NDArray[np.intp], opening: Floats) -> Trial:
