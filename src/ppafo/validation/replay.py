@@ -146,7 +146,8 @@ def _plan(one: Replay) -> Run:
     if run.step_count > MAXIMUM_STEPS:
         raise DataError(
             f"{one.measured.file}: {scenario.run.duration:.4g} s would take {run.step_count} steps of {run.step:.2g} "
-            f"s, at most {MAXIMUM_STEPS} are allowed; split the recording into parts"
+            f"s, at most {MAXIMUM_STEPS} are allowed; split the recording into parts, or give the unit of its times "
+            "where they are not seconds"
         )
     supply = one.device.supply
     plant = run.plant._replace(supply_pressure=supply.pressure, dorsiflexion_pressure=supply.dorsiflexion_pressure)
