@@ -191,12 +191,11 @@ def causes_of(
             if not is_fitted or not search.needs_another(first, sized):
                 return Causes(_cause_of(named, search.penalty), None, len(tried))
             return Causes(None, _cause_of([first], search.penalty), len(tried))
-    if settings.motion == "measured":
-        # Only samples were searched: that no change explains the recordings would say too much.
-        return Causes()
     # What is wrong with samples is seen in them, whatever else is wrong.
     nearest = max(tried, key=lambda one: (one.candidate.name.startswith(_SAMPLES), one.gain), default=None)
-    return Causes(None, None if nearest is None else _cause_of([nearest], search.penalty), len(tried))
+    # Of a measured angle only samples were searched: that no change explains the recordings would say too much.
+    is_silent = settings.motion == "measured"
+    return Causes() if nearest is None or is_silent else Causes(None, _cause_of([nearest], search.penalty), len(tried))
 
 
 def _in_milliseconds(
