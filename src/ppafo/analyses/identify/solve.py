@@ -30,12 +30,7 @@ from ppafo.storage.result_folder import read_recording
 
 
 def identify(problem: str | Path, progress: Report = report_nothing) -> Finding[Identification]:
-    """Return what the procedures of a problem file make of its recordings, in the recommended order.
-
-    The trajectory fit comes last and starts from what they found. ``progress`` hears what is being done. Estimates are
-    in SI units. IdentificationError for a problem that makes no sense, ParameterError for a set that does not, and
-    DataError for a recording that cannot be read; each in one line that begins with the file.
-    """
+    """Return what the procedures of a problem file make of its recordings; see ``ppafo.cli.verbs.bench.identify``."""
     path = Path(problem)
     return finding_of(solve_problem(load_problem(path), path.parent, path.name, progress))
 

@@ -105,22 +105,7 @@ def validate(
 ) -> Finding[Validation]:
     """Return the errors (model less measured) of the model with a parameter set against each recording.
 
-    ``recordings`` are CSV or NetCDF files or result folders. The model is run on the recorded command, supply pressure
-    and external torque; ``motion`` is ``free``, ``measured`` (the recorded angle is prescribed) or ``locked``. With a
-    ``volume`` [m^3] there is no vane and chamber 1 is a fixed volume. ``initial`` are texts such as
-    ``pressure_2=0 psi_g`` for channels that were not recorded, ``thresholds`` texts such as ``5%`` or ``angle=2 deg``:
-    the largest RMS errors that pass, of the full range or in a unit. Without any it is 10 % of full range, at
-    least half of the variance of a signal beside its noise is explained, and no single cause in record, set or model
-    is found (``causes``) that is larger than on any bench. ``longest_delay`` [s], at
-    most 1 s, limits the delay of the measurement that is taken out. ``columns`` is a column map or
-    ``FILE.toml[:NAME]``.
-
-    What is found has ``passes`` and, in ``recordings``, one ``RecordingAgreement`` each: ``measured`` and ``model`` are
-    recordings, their channels of shape (samples,) in SI; ``channels`` has RMS error, bias, largest error and delay [s]
-    of each channel in its SI unit (rad, Pa, N m). ``to_dict``, ``plot`` and ``save`` give JSON, figure and page.
-
-    DataError for a recording or an argument that cannot be used, ParameterError for a parameter set, a valve or an
-    override, SimulationError where the model diverges.
+    Arguments, result and errors are those of the command, ``ppafo.cli.verbs.bench.validate``.
     """
     report = progress or report_nothing
     device = load_device(parameter_set, valve, overrides)
@@ -184,15 +169,11 @@ _SHORT = 3.0
 def agreement_panels(agreement: RecordingAgreement, atmosphere: float) -> list[Panel]:
     """Return two panels for each channel of a recording; gauge pressures count from ``atmosphere`` [Pa absolute]."""
     pairs = [_channel_panels(agreement, channel, atmosphere) for channel in agreement.channels]
-    across = _across(agreement)
+    across = 1 if len(pairs) == 1 else 2
     rows = [pairs[first : first + across] for first in range(0, len(pairs), across)]
     empty = (Panel(TIME, TIME, ()), Panel(TIME, TIME, (), tall=0.5))
     filled = [[*row, *[empty] * (across - len(row))] for row in rows]
     return [panel for row in filled for line in zip(*row, strict=True) for panel in line]
-
-
-def _across(agreement: RecordingAgreement) -> int:
-    return 1 if len(agreement.channels) == 1 else 2
 
 
 def _channel_panels(agreement: RecordingAgreement, channel: ChannelAgreement, atmosphere: float) -> tuple[Panel, Panel]:
@@ -363,6 +344,7 @@ def _part(validation: Validation, name: str, agreement: RecordingAgreement) -> P
         f"{len(measured)} samples over {measured.duration:.4g} s; inputs from the recording: "
         f"{', '.join(agreement.inputs)}; delay of the measurement: {late}"
     )
+    across = 1 if len(agreement.channels) == 1 else 2
     return Part(
         f"{agreement.file} ({kind})",
         columns_of(_HEAD, map(channel_cells, agreement.channels)),
@@ -372,8 +354,8 @@ def _part(validation: Validation, name: str, agreement: RecordingAgreement) -> P
         name=f"{name}-agreement",
         caption=f"Dots: {kind}. Lines: the model on the recorded inputs. Below each: model less measured, the limit of "
         "its RMS value dashed where it is in range.",
-        across=_across(agreement),
-        size=(7.6 / _across(agreement), 2.1),
+        across=across,
+        size=(7.6 / across, 2.1),
     )
 
 
