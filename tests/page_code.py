@@ -21,6 +21,19 @@ def block_with(page: str, words: str) -> str:
     return block
 
 
+def assert_shows(block: str, printed: str) -> None:
+    """The lines of a block of a page stand in what was printed, in this order; ``...`` is for what is left out."""
+    lines = iter(printed.splitlines())
+    left_out = True
+    for line in block.strip().splitlines():
+        if line == "...":
+            left_out = True
+            continue
+        found = next((other for other in lines if not left_out or other == line), None)
+        assert found == line, f"{line!r} is not printed there, but {found!r}"
+        left_out = False
+
+
 def write_package(folder: Path, module: str, text: str, entry_points: str) -> None:
     """Write the one module of a package and what an installer leaves beside it; entry points as in pyproject.toml."""
     package, name = module.split(".")

@@ -10,6 +10,7 @@ import pytest
 from ppafo.analyses.identify.answer import Identification
 from ppafo.analyses.identify.solve import identify
 from ppafo.cli.main import main
+from tests.page_code import assert_shows
 
 PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "identify.md"
 EXAMPLE = Path(str(resources.files("ppafo"))) / "examples" / "measured-cylinder"
@@ -92,7 +93,7 @@ def test_a_chamber_whose_gas_comes_to_rest_gets_no_area(raw_files: Path, name: s
 def test_the_page_shows_what_the_command_prints(raw_files: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (raw_files / "problem.toml").write_text(blocks("toml")[0], encoding="utf-8")
     assert main(["identify", str(raw_files / "problem.toml")]) == 1
-    assert capsys.readouterr().out.strip() == blocks("text")[0].strip()
+    assert_shows(blocks("text")[0], capsys.readouterr().out)
 
 
 def test_the_command_of_the_page_leaves_what_the_page_says(raw_files: Path, monkeypatch: pytest.MonkeyPatch) -> None:

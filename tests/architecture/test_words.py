@@ -50,7 +50,6 @@ ALLOWED_IN_PAGES: Mapping[str, tuple[str, str]] = {
     "docs/decisions/0001-batched-runs.md": ("lanes", "lanes of a processor, in the engine"),
     "docs/evidence.md": ("Free vanes|answered", "a group of benchmarks, by its name"),
     "docs/measured.md": ("printed", "by a 3D printer"),
-    "docs/how-to/identify.md": ("printed", "by a 3D printer"),
 }
 """By page: words that stand there for something else, and for what."""
 

@@ -1,8 +1,5 @@
 """Recordings of the rig and of the model, whose truth is known: the fit finds it, or says that it does not hold."""
 
-import re
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -42,14 +39,3 @@ def test_the_bench_of_the_paper_with_all_its_effects_is_no_device_of_the_model()
 
 def test_recordings_and_what_is_made_of_them_say_that_they_are_synthetic() -> None:
     assert {recording.kind for recording in fitted("ideal").measurements} == {"synthetic"}
-
-
-def test_the_example_of_the_how_to_page_runs_and_calls_its_numbers_identified(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    page = Path(__file__).parents[2] / "docs" / "how-to" / "identify.md"
-    (code,) = re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
-    exec(compile(code, str(page), "exec"), {"__name__": "example"})
-    lines = capsys.readouterr().out.splitlines()
-    assert len(lines) == 2
-    assert all(line.endswith(", identified") for line in lines)

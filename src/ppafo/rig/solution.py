@@ -1,4 +1,4 @@
-"""Integrates one run on the rig from event to event: samples, arriving commands, valve, stick-slip, stops.
+"""Integrates one run on the rig from event to event, by LSODA: samples, arriving commands, valve, stick-slip, stops.
 
 Friction is Coulomb's with a static limit and Stribeck's curve, both growing with pressure, and sticking is a mode that
 root functions begin and end, as in the reference solver. A bristle model would need no modes, but to agree with
@@ -11,8 +11,9 @@ a new computer compiles once.
 """
 
 import functools
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,9 +32,10 @@ from ppafo.model.sensors import Measurement
 from ppafo.parameters.device import Device
 from ppafo.rig.dynamics import RigNumbers, RigPhysics, RigState, observables, rig_rates
 from ppafo.rig.preset import Sensor
-from ppafo.rig.stiff import Stretch, solve_stretch
 
 Floats = NDArray[np.float64]
+Slopes = Callable[[float, Floats], Floats]
+Distances = Callable[[float, Floats], tuple[float, float]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,6 +125,65 @@ def absolute_tolerances(valve_unknowns: int) -> Floats:
         by_kind = next((size for kind, size in _BY_KIND.items() if kind in name), _ENERGY_TOLERANCE)
         found.append(_TOLERANCES.get(name, by_kind))
     return np.array(found + [_VALVE_TOLERANCE] * valve_unknowns)
+
+
+TOLERANCE = 1.0e-8
+MAXIMUM_STEPS = 100_000
+_WITHIN = 4.0 * float(np.finfo(np.float64).eps)
+
+
+class Stretch(NamedTuple):
+    """Unknowns (times, unknowns) at the times [s] that were wanted and at the last one, where it ended."""
+
+    t: Floats
+    y: Floats
+
+
+def solve_stretch(
+    slopes: Slopes, tolerances: Floats, roots: Distances | None, y: Floats, time: float, end: float, wanted: Floats
+) -> Stretch:
+    """Unknowns from ``time`` to ``end`` [s], or to where one of two roots falls to 0, also at the ``wanted`` times.
+
+    A root that is 0 at the start ends nothing. SimulationError where the solver gives up.
+    """
+    from scipy.integrate import LSODA
+
+    solver = LSODA(slopes, time, y, end, rtol=TOLERANCE, atol=tolerances)
+    times, states = [time], [np.array(y)]
+    before = None if roots is None else roots(time, y)
+    # The ends are states of the solver itself, not of its interpolant.
+    waiting = list(wanted[(wanted > time) & (wanted < end)])
+    for _ in range(MAXIMUM_STEPS):
+        said = solver.step()
+        if solver.status == "failed":
+            raise SimulationError(f"the rig's solver stopped at t = {solver.t:.6g} s: {said}")
+        after, found = float(solver.t), None
+        # The interpolant is valid in the last step only, so it is asked for in each.
+        inside = solver.dense_output()
+        if roots is not None and before is not None:
+            now = roots(after, solver.y)
+            # Strictly above 0 before: a vane that just came to rest has not done so again.
+            crossed = [place for place in (0, 1) if before[place] > 0.0 >= now[place]]
+            found = min((_root(roots, place, inside, float(solver.t_old), after) for place in crossed), default=None)
+            before = now
+        last = after if found is None else found
+        while waiting and waiting[0] < last:
+            moment = waiting.pop(0)
+            times.append(moment)
+            states.append(inside(moment))
+        if found is not None or solver.status == "finished":
+            times.append(last)
+            states.append(inside(last) if found is not None else np.array(solver.y))
+            return Stretch(np.array(times), np.array(states))
+    raise SimulationError(f"the rig's solver took {MAXIMUM_STEPS} steps up to t = {solver.t:.6g} s")
+
+
+def _root(roots: Distances, place: int, inside: Callable[[float], Floats], start: float, end: float) -> float:
+    """Where a root falls to 0 within a step [s]."""
+    from scipy.optimize import brentq
+
+    found: float = brentq(lambda t: roots(t, inside(t))[place], start, end, xtol=1.0e-15, rtol=_WITHIN)
+    return found
 
 
 def solve_rig(rig_run: RigRun) -> RigSolution:

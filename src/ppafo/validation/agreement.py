@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from ppafo.errors import DataError
 from ppafo.parameters.device import Device
@@ -51,20 +52,25 @@ _SMALLEST_GAIN = 1.0e-12
 """Gain below which two curves are the same to the accuracy of the engine."""
 _RESOLUTION = 0.02
 """Fraction of a sample below which a delay counts as none."""
-_GOLDEN = 0.6180339887498949
-_REFINEMENTS = 30
+_ACCURACY = 1.0e-7
 _AT_LIMIT = 0.99
 
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """One channel of both: measured values at their times, the model's at its own, and the full range."""
+    """A channel of both: measured values at their times, the model's at its own, full range, unit of an error, limit.
 
+    ``limit`` is the one that was given for it, if any.
+    """
+
+    channel: str
+    unit: str
     times: Floats
     values: Floats
     model_times: Floats
     model_values: Floats
     full_range: float
+    limit: Limit | None = None
 
     def shift(self, delay: float, times: Floats) -> Floats:
         """The model, ``delay`` [s] later, at some times; before its first and after its last value it stands still."""
@@ -84,7 +90,7 @@ class Delay:
         return 0.0 if self.is_at_limit else self.value
 
 
-def estimate_delay(curves: "list[Curve]", limit: float) -> Delay:
+def estimate_delay(curves: list[Curve], limit: float) -> Delay:
     """The delay, at most ``limit`` [s] either way, that brings the channels together best, each in its full range."""
     if limit <= 0.0 or not curves:
         return Delay(0.0, is_at_limit=False)
@@ -94,40 +100,22 @@ def estimate_delay(curves: "list[Curve]", limit: float) -> Delay:
         replace(curve, times=curve.times[::step], values=curve.values[::step])
         for curve, step in zip(curves, steps, strict=True)
     ]
+
+    def cost(delay: float) -> float:
+        """Return the mean squared error over all samples and channels, in full ranges [-]."""
+        errors = [(one.shift(delay, one.times) - one.values) / one.full_range for one in thinned]
+        return sum(float(np.square(error).mean()) for error in errors) / len(errors)
+
     shifts = np.linspace(-limit, limit, _SHIFTS).tolist()
-    best = int(np.argmin([_cost(thinned, shift) for shift in shifts]))
-    value = _minimum(thinned, shifts[max(0, best - 1)], shifts[min(_SHIFTS - 1, best + 1)])
+    best = int(np.argmin([cost(shift) for shift in shifts]))
+    between = shifts[max(0, best - 1)], shifts[min(_SHIFTS - 1, best + 1)]
+    value = float(minimize_scalar(cost, bounds=between, method="bounded", options={"xatol": _ACCURACY * limit}).x)
     # A delay counts where it explains more than noise and the accuracy of the engine could.
-    shifted = _cost(thinned, value)
-    gain, samples = _cost(thinned, 0.0) - shifted, sum(curve.times.size for curve in thinned)
-    is_significant = gain > _SMALLEST_GAIN and gain * samples > _MINIMUM_GAIN * shifted
+    gain, samples = cost(0.0) - cost(value), sum(curve.times.size for curve in thinned)
+    is_significant = gain > _SMALLEST_GAIN and gain * samples > _MINIMUM_GAIN * cost(value)
     if abs(value) < _RESOLUTION * float(np.median(np.diff(curves[0].times))) or not is_significant:
         return Delay(0.0, is_at_limit=False)
     return Delay(value, abs(value) > _AT_LIMIT * limit)
-
-
-def _cost(curves: "list[Curve]", delay: float) -> float:
-    """Mean squared error over all samples and channels, in full ranges [-]."""
-    means = [
-        float((((curve.shift(delay, curve.times) - curve.values) / curve.full_range) ** 2).mean()) for curve in curves
-    ]
-    return sum(means) / len(means)
-
-
-def _minimum(curves: "list[Curve]", low: float, high: float) -> float:
-    """The delay [s] of the smallest cost between two delays, by golden section."""
-    inner = [high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)]
-    costs = [_cost(curves, delay) for delay in inner]
-    for _ in range(_REFINEMENTS):
-        if costs[0] <= costs[1]:
-            high, inner[1], costs[1] = inner[1], inner[0], costs[0]
-            inner[0] = high - _GOLDEN * (high - low)
-            costs[0] = _cost(curves, inner[0])
-        else:
-            low, inner[0], costs[0] = inner[0], inner[1], costs[1]
-            inner[1] = low + _GOLDEN * (high - low)
-            costs[1] = _cost(curves, inner[1])
-    return 0.5 * (low + high)
 
 
 _LONGEST_WEIGHT = 3.0
@@ -212,22 +200,11 @@ class RecordingAgreement:
         return all(channel.passes for channel in self.channels)
 
 
-@dataclass(frozen=True, slots=True)
-class Comparison:
-    """One channel to compare: its curves, the unit of an error, and the limit that was given for it, if any."""
-
-    channel: str
-    unit: str
-    curve: Curve
-    limit: Limit | None
-
-
-def channel_agreement(item: Comparison, delay: float) -> ChannelAgreement:
+def channel_agreement(curve: Curve, delay: float) -> ChannelAgreement:
     """The errors in one channel with the model shifted by ``delay`` [s].
 
     Without a limit of its own an RMS error passes up to 10 % of full range or half of the variance, and noise.
     """
-    curve = item.curve
     # Each sample speaks for its time by the trapezoidal rule, but not for a gap.
     intervals = np.diff(curve.times)
     intervals = np.minimum(intervals, _LONGEST_WEIGHT * np.median(intervals))
@@ -242,8 +219,8 @@ def channel_agreement(item: Comparison, delay: float) -> ChannelAgreement:
     explained = min(ACCEPTABLE_FRACTION * curve.full_range, math.sqrt(1.0 - EXPLAINED_FRACTION) * variation)
     usual = math.hypot(max(explained, _UNMOVED * curve.full_range), _WITHIN_NOISE * noise) / curve.full_range
     return ChannelAgreement(
-        channel=item.channel,
-        unit=item.unit,
+        channel=curve.channel,
+        unit=curve.unit,
         full_range=curve.full_range,
         variation=variation,
         noise=noise,
@@ -252,7 +229,7 @@ def channel_agreement(item: Comparison, delay: float) -> ChannelAgreement:
         bias=float(weights @ error),
         largest=float(error[worst]),
         largest_time=float(curve.times[worst]),
-        limit=usual if item.limit is None else item.limit.fraction_of(curve.full_range),
+        limit=usual if curve.limit is None else curve.limit.fraction_of(curve.full_range),
     )
 
 
@@ -280,11 +257,10 @@ def compare_recording(measured: Measured, device: Device, settings: ReplaySettin
     """Return how far the model of a device is from one recording, on the inputs of that recording."""
     wanted = replay_of(measured, device, settings)
     replayed = replay_recording(wanted)
-    items = _comparisons(measured, replayed, wanted.device, settings)
+    curves = _curves(measured, replayed, wanted.device, settings)
     # Sums and multiples of two others do not count twice.
-    chosen = [item for item in items if item.channel in (ANGLE, PRESSURE_1, PRESSURE_2)] or items[:1]
-    delay = estimate_delay([item.curve for item in chosen], settings.longest_delay)
-    channels = tuple(channel_agreement(item, delay.correction) for item in items)
+    chosen = [one for one in curves if one.channel in (ANGLE, PRESSURE_1, PRESSURE_2)] or curves[:1]
+    delay = estimate_delay(chosen, settings.longest_delay)
     longest = f"model and measurement are more than {settings.longest_delay:g} s apart in time; no delay was removed"
     late = [longest] if delay.is_at_limit else []
     return RecordingAgreement(
@@ -296,7 +272,7 @@ def compare_recording(measured: Measured, device: Device, settings: ReplaySettin
         inputs=replayed.inputs,
         step=replayed.step,
         delay=delay,
-        channels=channels,
+        channels=tuple(channel_agreement(one, delay.correction) for one in curves),
         remarks=(*measured.remarks, *_remarks(measured, device, settings), *late),
     )
 
@@ -310,26 +286,27 @@ def measured_values(recording: Recording, name: str) -> Floats | None:
     return recording[name]
 
 
-def _comparisons(measured: Measured, replayed: Replayed, device: Device, settings: ReplaySettings) -> list[Comparison]:
+def _curves(measured: Measured, replayed: Replayed, device: Device, settings: ReplaySettings) -> list[Curve]:
     """The channels that the recording has and that the model was not given."""
     gauge = supply_gauge(measured.recording, device)
     # Channels that say nothing where the vane is locked, or where there is none.
     silent: tuple[str, ...] = (ANGLE,) if settings.motion == "locked" else ()
     if settings.volume is not None:
         silent = tuple(name for name in COMPARED if name != PRESSURE_1)
-    items = []
+    curves, model = [], replayed.recording
     for name, kind in COMPARED.items():
         values = measured_values(measured.recording, name)
-        if values is None or name in replayed.inputs or name in silent:
-            continue
-        full_range = kind.full_range(device, gauge)
-        model = replayed.recording
-        curve = Curve(measured.recording.time, values, model.time, model[name], full_range)
-        items.append(Comparison(name, kind.unit, curve, settings.thresholds.limit(name)))
-    if not items:
+        if values is not None and name not in replayed.inputs and name not in silent:
+            times, full_range, limit = (
+                measured.recording.time,
+                kind.full_range(device, gauge),
+                settings.thresholds.limit(name),
+            )
+            curves.append(Curve(name, kind.unit, times, values, model.time, model[name], full_range, limit))
+    if not curves:
         word = "pressure_1" if settings.volume is not None else "anything beside the prescribed angle"
         raise DataError(f"{measured.file}: has nothing to compare; it needs {word}")
-    return items
+    return curves
 
 
 def _remarks(measured: Measured, device: Device, settings: ReplaySettings) -> tuple[str, ...]:

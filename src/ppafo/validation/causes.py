@@ -20,7 +20,7 @@ from ppafo.errors import PpafoError
 from ppafo.parameters.device import Device
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.signals.faults import isolated_samples
-from ppafo.signals.recording import Floats
+from ppafo.signals.recording import Floats, Recording
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.recorded import COMMAND, samples_at_rest
 from ppafo.validation.agreement import (
@@ -28,18 +28,22 @@ from ppafo.validation.agreement import (
     ChannelAgreement,
     RecordingAgreement,
     ReplaySettings,
+    compare_recording,
     measured_values,
     noise_in,
     replay_of,
 )
 from ppafo.validation.candidates import SENSORS, Candidate, Change, Sensor, effects, exchanges, joined, numbers, sizes
-from ppafo.validation.measured import ANGLE, PRESSURE_1, PRESSURE_2, Measured
+from ppafo.validation.measured import ANGLE, EXPLAINED_FRACTION, PRESSURE_1, PRESSURE_2, Measured
 from ppafo.validation.replay import Replay, Replayed, replay_together, replayed_scenario
 
 Flags = NDArray[np.bool_]
 
 ONLY_NOISE = 2.0
 """Mean square left over the noise's up to which nothing but noise is left: noise that is not white has more."""
+
+_MILLISECONDS, _LESS = 1.0e3, 0.5
+"""Rate of a clock whose milliseconds were read as seconds, and what is left of an error beyond its limit at most."""
 
 _TOGETHER = 32
 _STEPS = 2
@@ -153,6 +157,9 @@ def causes_of(
     report: Report = report_nothing,
 ) -> Causes:
     """Return what single cause explains all recordings together; none where nothing but noise is left of them."""
+    slowed = _in_milliseconds(read, agreements, device, settings)
+    if slowed is not None:
+        return Causes(slowed, None, 1)
     records = [_record_of(*pair, device, settings) for pair in zip(read, agreements, strict=True)]
     search = _Search(device, settings, records, report)
     none = search.evaluated([Change()])[0]
@@ -184,12 +191,45 @@ def causes_of(
             if not is_fitted or not search.needs_another(first, sized):
                 return Causes(_cause_of(named, search.penalty), None, len(tried))
             return Causes(None, _cause_of([first], search.penalty), len(tried))
-    if settings.motion == "measured":
-        # Only samples were searched: that no change explains the recordings would say too much.
-        return Causes()
     # What is wrong with samples is seen in them, whatever else is wrong.
     nearest = max(tried, key=lambda one: (one.candidate.name.startswith(_SAMPLES), one.gain), default=None)
-    return Causes(None, None if nearest is None else _cause_of([nearest], search.penalty), len(tried))
+    # Of a measured angle only samples were searched: that no change explains the recordings would say too much.
+    is_silent = settings.motion == "measured"
+    return Causes() if nearest is None or is_silent else Causes(None, _cause_of([nearest], search.penalty), len(tried))
+
+
+def _in_milliseconds(
+    read: Sequence[Measured], agreements: Sequence[RecordingAgreement], device: Device, settings: ReplaySettings
+) -> Cause | None:
+    """Return that times are milliseconds read as seconds, where the model agrees with a thousandth of them only.
+
+    It must then explain half of the variance of every signal, which one that stands still does not, with less than half
+    of each error that was beyond its limit. It comes first, for other causes would be sought in runs of a thousand
+    times the length of the recording.
+    """
+    if all(one.passes for one in agreements):
+        return None
+    slowed = [replace(one, recording=_at_rate(one.recording, _MILLISECONDS)) for one in read]
+    try:
+        others = [compare_recording(one, device, settings) for one in slowed]
+    except PpafoError:
+        return None
+    gain, left = 0.0, 0.0
+    for one, other in zip(agreements, others, strict=True):
+        for was, now in zip(one.channels, other.channels, strict=True):
+            explains = now.rms**2 < (1.0 - EXPLAINED_FRACTION) * now.variation**2
+            if not (was.passes or now.rms < _LESS * was.rms) or not (now.passes or explains):
+                return None
+            if was.channel in SENSORS:
+                gain += 2.0 * len(one.measured) * math.log(max(was.in_noise, 1.0) / max(now.in_noise, 1.0))
+            left = max(left, now.in_noise)
+    return Cause("milliseconds read as seconds", "times seem to be milliseconds read as seconds", gain, left)
+
+
+def _at_rate(recording: Recording, rate: float) -> Recording:
+    """Return a recording whose clock ran so many times as fast as its times say, in true time."""
+    first = recording.time[0]
+    return replace(recording, time=first + (recording.time - first) / rate)
 
 
 def _cause_of(named: Sequence[_Tried], penalty: float) -> Cause:
@@ -258,8 +298,7 @@ class _Search:
             for name, values in own.items():
                 recording = recording.with_channel(name, values, recording.unit(name))
         if change.clock != 1.0:
-            first = recording.time[0]
-            recording = replace(recording, time=first + (recording.time - first) / change.clock)
+            recording = _at_rate(recording, change.clock)
         if change.start is not None:
             settings = replace(settings, initial={**_starts(record, self.device, change.start), **settings.initial})
         try:

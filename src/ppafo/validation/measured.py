@@ -179,13 +179,17 @@ def check_recording(recording: Recording, device: Device, file: str, sha256: str
     if count < MINIMUM_SAMPLES:
         noun = "sample" if count == 1 else "samples"
         raise DataError(f"{file}: has {count} {noun}; at least {MINIMUM_SAMPLES} are needed")
-    unknown = _check_names(recording, file)
+    remarks = _check_names(recording, file)
     check_gaps(recording, file)
     check_command(recording, file)
     _check_size(recording, device, file)
     _check_pressures(recording, device, file)
     _check_change(recording, device, file)
-    return Measured(file, sha256, recording, (*unknown, *_gap_remarks(recording)))
+    wide = np.flatnonzero(np.diff(recording.time) > _REMARKED_GAP * usual_interval(recording.time))
+    if wide.size:
+        noun, first = "gap" if wide.size == 1 else "gaps", float(recording.time[wide[0]])
+        remarks += (f"{wide.size} {noun} in time, the first after {first:.6g} s; inputs were kept across",)
+    return Measured(file, sha256, recording, remarks)
 
 
 def _check_names(recording: Recording, file: str) -> tuple[str, ...]:
@@ -264,14 +268,3 @@ def _check_change(recording: Recording, device: Device, file: str) -> None:
             f"{file}: nothing happens in it: {', '.join(compared)} change by less than {_MINIMUM_CHANGE:.0%} of full "
             "range, so it cannot tell a good model from a bad one"
         )
-
-
-def _gap_remarks(recording: Recording) -> tuple[str, ...]:
-    gaps = np.diff(recording.time)
-    usual = usual_interval(recording.time)
-    count = int((gaps > _REMARKED_GAP * usual).sum())
-    if count == 0:
-        return ()
-    first = float(recording.time[int(np.argmax(gaps > _REMARKED_GAP * usual))])
-    noun = "gap" if count == 1 else "gaps"
-    return (f"{count} {noun} in time, the first after {first:.6g} s; inputs were kept across",)

@@ -135,7 +135,10 @@ def replayed_scenario(one: Replay) -> Scenario:
     highest = with_highest_supply(one.device, recording, recording.names)
     given: FreeMotion | PrescribedMotion | None = locked_vane(start.angle) if one.motion == "locked" else None
     if one.motion == "leg":
-        given = FreeMotion(start.angle, start.angular_velocity, leg=one.leg or leg_of_fixture())
+        # The leg on the test fixture is the scenario's of figure 7.
+        fixture = load_scenario("step-response").motion
+        leg = one.leg or (fixture.leg if isinstance(fixture, FreeMotion) else None)
+        given = FreeMotion(start.angle, start.angular_velocity, leg=leg)
     return replay_scenario(recording, highest, start, duration, one.measured.file, given)
 
 
@@ -146,7 +149,8 @@ def _plan(one: Replay) -> Run:
     if run.step_count > MAXIMUM_STEPS:
         raise DataError(
             f"{one.measured.file}: {scenario.run.duration:.4g} s would take {run.step_count} steps of {run.step:.2g} "
-            f"s, at most {MAXIMUM_STEPS} are allowed; split the recording into parts"
+            f"s, at most {MAXIMUM_STEPS} are allowed; split the recording into parts, or give the unit of its times "
+            "where they are not seconds"
         )
     supply = one.device.supply
     plant = run.plant._replace(supply_pressure=supply.pressure, dorsiflexion_pressure=supply.dorsiflexion_pressure)
@@ -156,12 +160,6 @@ def _plan(one: Replay) -> Run:
     every = max(count for count in range(1, most + 1) if run.steps_per_sample % count == 0)
     run = replace(run, plant=plant, record_every=every, step_count=samples * run.steps_per_sample)
     return with_prescribed_angle(run, one.start.angle) if one.motion == "measured" else run
-
-
-def leg_of_fixture() -> Leg | None:
-    """The leg on the test fixture, as the scenario of figure 7 has it."""
-    motion = load_scenario("step-response").motion
-    return motion.leg if isinstance(motion, FreeMotion) else None
 
 
 def _recording(measured: Measured, run: Run, record: Floats) -> Recording:

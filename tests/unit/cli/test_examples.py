@@ -16,8 +16,8 @@ EXAMPLES = load_examples()
 PYPROJECT = PurePosixPath("pyproject.toml")
 SCRIPT = "first-steps"
 """The example that is no part of a page: tests/acceptance/test_examples.py runs it."""
-DATA = ("muscle-pair.toml", "step-response-muscles.toml", "lever.toml")
-"""A set, its scenario and a column map, which pages name."""
+DATA = ("muscle-pair.toml", "step-response-muscles.toml", "lever.toml", "chamber.toml")
+"""A set, its scenario, a column map and a second problem, which pages name."""
 SHOWN_IN_PART = ("muscle_pair.py",)
 """A module of which a page shows whole functions."""
 

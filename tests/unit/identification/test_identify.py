@@ -139,11 +139,14 @@ def test_two_parts_of_one_recording_are_not_the_same_samples_twice(solved: Solve
     assert len(outcome.results) == 2
 
 
-def test_a_set_from_a_simulated_bench_says_so_and_a_measured_one_does_not(solved: Solve, bench: Path) -> None:
-    assert "from the problem 'twin', whose recordings are synthetic, " in solved(STATIC).new_set.parameter_set.notes
+def test_a_set_says_from_which_recordings_and_on_which_set_it_was_made(solved: Solve, bench: Path) -> None:
+    made = solved(STATIC).new_set.parameter_set
+    before = load_parameter_set("ppafo2011").title
+    assert made.title == f"{before}, identified on ppafo2011 from static.csv"
+    assert "come from the problem 'twin', on the set 'ppafo2011' from synthetic recordings: static.csv; " in made.notes
     text = (bench / "static.csv").read_text()
     (bench / "static.csv").write_text("".join(line for line in text.splitlines(True) if line[0] != "#"))
-    assert "from the problem 'twin', the fitted " in solved(STATIC).new_set.parameter_set.notes
+    assert "from measured recordings: static.csv; " in solved(STATIC).new_set.parameter_set.notes
 
 
 def test_the_citation_of_a_problem_is_that_of_the_new_set(solved: Solve) -> None:

@@ -89,6 +89,10 @@ def fast_clock(one: Recording) -> Recording:
     return replace(one, time=1.05 * one.time)
 
 
+def in_milliseconds(one: Recording) -> Recording:
+    return replace(one, time=1000.0 * one.time)
+
+
 @pytest.mark.parametrize(
     ("mistake", "words"),
     [
@@ -101,6 +105,7 @@ def fast_clock(one: Recording) -> Recording:
         (reversed_command, "command seems to have the wrong sign"),
         (read_with_gain, "pressure_1 seems to be read 1.04 times too large"),
         (fast_clock, "the clock of the recording seems to run 1.05 times as fast"),
+        (in_milliseconds, "times seem to be milliseconds read as seconds"),
     ],
     ids=lambda one: getattr(one, "__name__", None),
 )

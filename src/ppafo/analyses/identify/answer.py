@@ -4,14 +4,14 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.json_text import plain
 from ppafo.errors import DataError
-from ppafo.identification.bench.result import BenchResult, count_of, figure_3, procedure_figure
+from ppafo.identification.bench.result import BenchResult, bench_figure, count_of, figure_3
 from ppafo.identification.estimate import Estimate
 from ppafo.identification.new_set import NewSet, in_set_unit
 from ppafo.identification.source import kind_of
@@ -22,13 +22,11 @@ from ppafo.parameters.loading import parameter_set_toml
 from ppafo.parameters.parameter_set import ParameterSet
 from ppafo.report.finding import Finding, Part, columns_of
 from ppafo.report.kind import TIME, Kind
-from ppafo.report.panels import Mark, Panel
-from ppafo.report.style import ACTUAL, BLACK, CHAMBER_1, CHAMBER_2, GREY
+from ppafo.report.panels import Panel
+from ppafo.report.residuals import Course, course_panels
+from ppafo.report.style import ACTUAL, CHAMBER_1, CHAMBER_2
 from ppafo.signals import Recording, RecordingKind
 from ppafo.units import percentage
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,8 +86,6 @@ class Identification:
         }
 
 
-_MAXIMUM_DOTS = 90
-"""Samples shown beside the line; what is left is shown of all."""
 _KIND_WORDS = {"measured": "measured", "simulated": "simulated samples", "synthetic": "synthetic measurement"}
 _CHANNELS = {
     "angle": (Kind("Vane angle", "rad", "angle"), ACTUAL),
@@ -106,36 +102,23 @@ def trajectory_panels(measurement: Recording, model: Recording, atmosphere: floa
     if not np.array_equal(measurement.time, model.time):
         raise DataError(f"{model.label}: is not at the times of {measurement.label}")
     panels: list[Panel] = []
-    times, some = measurement.time, slice(None, None, -(-measurement.time.size // _MAXIMUM_DOTS))
-    ends = times[[0, -1]]
-    circles = {"linestyle": "", "marker": "o", "markersize": 3.6, "markerfacecolor": "none", "markeredgewidth": 0.7}
     for name in (name for name in _CHANNELS if name in measurement):
         kind, look = _CHANNELS[name]
-        # A pressure is shown as gauge of the standard atmosphere.
-        above = 0.0 if name == "angle" else atmosphere - STANDARD_ATMOSPHERE
-        samples, fitted = (each[name] - above for each in (measurement, model))
-        marks = [
-            Mark("line", times[some], samples[some], (), _KIND_WORDS[measurement.kind], BLACK, circles),
-            Mark("line", times, fitted, (), "model", look.colour, {"linewidth": 1.2}),
-        ]
-        legend = "" if panels else "above"
-        panels.append(Panel(TIME, kind, marks, legend=legend, then=lambda axes: axes.set_xlim(*ends), shares_x=True))
-        left = [
-            Mark("line", times, fitted - samples, colour=look.colour, style=_DOTS),
-            Mark("level", (), 0.0, colour=GREY, style={"linewidth": 0.8}),
-        ]
-        unit = Kind("model minus sample", quantity="angle" if name == "angle" else "pressure change")
-        panels.append(Panel(TIME, unit, left, then=_centre, tall=0.5, shares_x=True))
+        is_angle = name == "angle"
+        course = Course(
+            time=TIME,
+            level=kind,
+            change=Kind("model minus sample", quantity="angle" if is_angle else "pressure change"),
+            times=measurement.time,
+            samples=measurement[name],
+            model=model[name],
+            names=(_KIND_WORDS[measurement.kind], "model"),
+            colour=look.colour,
+            # A pressure is shown as gauge of the standard atmosphere.
+            above=0.0 if is_angle else atmosphere - STANDARD_ATMOSPHERE,
+        )
+        panels += course_panels(course, "circles", "" if panels else "above")
     return panels
-
-
-_DOTS = {"linestyle": "", "marker": ".", "markersize": 1.6}
-
-
-def _centre(axes: "Axes") -> None:
-    largest = max(map(abs, axes.dataLim.intervaly)) * 1.1 or 1.0
-    axes.set_ylim(-largest, largest)
-    axes.locator_params(axis="y", nbins=3)
 
 
 _FAR, _SHOWN = 2.0, 0.05
@@ -279,7 +262,7 @@ def _figures(identification: Identification) -> list[Part]:
         counts[result.procedure] = counts.get(result.procedure, 0) + 1
         number = counts[result.procedure]
         name = result.procedure if number == 1 else f"{result.procedure}-{number}"
-        draw = partial(procedure_figure, result)
+        draw = partial(bench_figure, result.panels, result.kind)
         found.append(Part(name=name, caption=result.summary, is_detail=True, draw=draw))
     fit = None if identification.trajectory is None else identification.trajectory.fit
     for measurement, model, scenario in zip(fit.measurements, fit.models, fit.scenarios, strict=True) if fit else ():

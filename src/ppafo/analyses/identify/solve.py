@@ -30,12 +30,7 @@ from ppafo.storage.result_folder import read_recording
 
 
 def identify(problem: str | Path, progress: Report = report_nothing) -> Finding[Identification]:
-    """Return what the procedures of a problem file make of its recordings, in the recommended order.
-
-    The trajectory fit comes last and starts from what they found. ``progress`` hears what is being done. Estimates are
-    in SI units. IdentificationError for a problem that makes no sense, ParameterError for a set that does not, and
-    DataError for a recording that cannot be read; each in one line that begins with the file.
-    """
+    """Return what the procedures of a problem file make of its recordings; see ``ppafo.cli.verbs.bench.identify``."""
     path = Path(problem)
     return finding_of(solve_problem(load_problem(path), path.parent, path.name, progress))
 
@@ -126,20 +121,37 @@ def _source(folder: Path, name: str, columns: str | None, problem: ProblemFile, 
     return source_of(path, recording)
 
 
+_FILES_IN_TITLE = 4
+
+
 def _name_set(found: Identification, problem: ProblemFile) -> ParameterSet:
-    old = found.new_set.parameter_set
-    recordings = "" if found.kind == "measured" else f", whose recordings are {found.kind}"
+    old, new = found.new_set.parameter_set, found.new_set
+    files = recording_files(problem)
+    left_out = len(files) - _FILES_IN_TITLE
+    shown = ", ".join([*files[:_FILES_IN_TITLE], *([f"{left_out} more"] if left_out > 0 else [])])
+    is_changed = "identified" if new.written or new.fitted else "no value identified"
+    changes = f" with {', '.join(problem.device.overrides)}" if problem.device.overrides else ""
     origins = (
-        f"Values with origin 'identified' or 'fitted' come from the problem '{problem.name}'{recordings}, the fitted "
-        f"ones being true for this model only; the others are from '{old.name}'."
+        f"Values with origin 'identified' or 'fitted' come from the problem '{problem.name}', on the set '{old.name}'"
+        f"{changes} from {found.kind} recordings: {', '.join(files)}; the fitted are true for this model only, the "
+        f"others from '{old.name}'."
     )
     return replace(
         old,
         file=f"{problem.name}.toml",
         name=problem.name,
-        title=problem.title or f"{old.title}, identified",
+        title=problem.title or f"{old.title}, {is_changed} on {old.name} from {shown}",
         citation=problem.citation or old.citation,
         # The new set may go anywhere, where the path of a file would not lead to its parent.
         parent=problem.device.set if problem.device.set in list_sets() else "",
         notes=f"{old.notes.rstrip()}\n{origins}".lstrip(),
     )
+
+
+def recording_files(problem: ProblemFile) -> list[str]:
+    """Return the names of the recordings of a problem, with the folder where two have one name."""
+    named = [name for item in problem.procedure for name in item.recordings]
+    named += [] if problem.trajectory is None else [item.recording for item in problem.trajectory.experiments]
+    paths = dict.fromkeys(map(Path, named))
+    names = [path.name for path in paths]
+    return ["/".join(path.parts[-2:]) if names.count(path.name) > 1 else path.name for path in paths]

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,8 +17,9 @@ from ppafo.progress import Progress, Report, report_nothing
 from ppafo.report.display_units import display_value, quantity_of_unit
 from ppafo.report.finding import Finding, Part, columns_of, facts
 from ppafo.report.kind import TIME, Kind
-from ppafo.report.panels import Mark, Panel
-from ppafo.report.style import ACTUAL, BLACK, CHAMBER_1, CHAMBER_2, GREY
+from ppafo.report.panels import Panel
+from ppafo.report.residuals import Course, course_panels
+from ppafo.report.style import ACTUAL, CHAMBER_1, CHAMBER_2
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.foreign import ColumnMap, load_column_map
 from ppafo.validation import ChannelAgreement
@@ -105,22 +106,7 @@ def validate(
 ) -> Finding[Validation]:
     """Return the errors (model less measured) of the model with a parameter set against each recording.
 
-    ``recordings`` are CSV or NetCDF files or result folders. The model is run on the recorded command, supply pressure
-    and external torque; ``motion`` is ``free``, ``measured`` (the recorded angle is prescribed) or ``locked``. With a
-    ``volume`` [m^3] there is no vane and chamber 1 is a fixed volume. ``initial`` are texts such as
-    ``pressure_2=0 psi_g`` for channels that were not recorded, ``thresholds`` texts such as ``5%`` or ``angle=2 deg``:
-    the largest RMS errors that pass, of the full range or in a unit. Without any it is 10 % of full range, at
-    least half of the variance of a signal beside its noise is explained, and no single cause in record, set or model
-    is found (``causes``) that is larger than on any bench. ``longest_delay`` [s], at
-    most 1 s, limits the delay of the measurement that is taken out. ``columns`` is a column map or
-    ``FILE.toml[:NAME]``.
-
-    What is found has ``passes`` and, in ``recordings``, one ``RecordingAgreement`` each: ``measured`` and ``model`` are
-    recordings, their channels of shape (samples,) in SI; ``channels`` has RMS error, bias, largest error and delay [s]
-    of each channel in its SI unit (rad, Pa, N m). ``to_dict``, ``plot`` and ``save`` give JSON, figure and page.
-
-    DataError for a recording or an argument that cannot be used, ParameterError for a parameter set, a valve or an
-    override, SimulationError where the model diverges.
+    Arguments, result and errors are those of the command, ``ppafo.cli.verbs.bench.validate``.
     """
     report = progress or report_nothing
     device = load_device(parameter_set, valve, overrides)
@@ -175,7 +161,6 @@ def _column_map(text: str) -> ColumnMap:
 KIND_WORDS = {"measured": "measured", "synthetic": "synthetic measurement", "simulated": "simulated, not measured"}
 """What the recording is called beside the model: nobody may take a model's output for a measurement."""
 _LOOKS = {PRESSURE_1: CHAMBER_1, PRESSURE_2: CHAMBER_2}
-_MAXIMUM_DOTS = 400
 _NEAR_LIMIT = 0.25
 _SHORT = 3.0
 """Recordings shorter than this [s] have an axis in milliseconds."""
@@ -184,61 +169,38 @@ _SHORT = 3.0
 def agreement_panels(agreement: RecordingAgreement, atmosphere: float) -> list[Panel]:
     """Return two panels for each channel of a recording; gauge pressures count from ``atmosphere`` [Pa absolute]."""
     pairs = [_channel_panels(agreement, channel, atmosphere) for channel in agreement.channels]
-    across = _across(agreement)
+    across = 1 if len(pairs) == 1 else 2
     rows = [pairs[first : first + across] for first in range(0, len(pairs), across)]
     empty = (Panel(TIME, TIME, ()), Panel(TIME, TIME, (), tall=0.5))
     filled = [[*row, *[empty] * (across - len(row))] for row in rows]
     return [panel for row in filled for line in zip(*row, strict=True) for panel in line]
 
 
-def _across(agreement: RecordingAgreement) -> int:
-    return 1 if len(agreement.channels) == 1 else 2
-
-
-def _channel_panels(agreement: RecordingAgreement, channel: ChannelAgreement, atmosphere: float) -> tuple[Panel, Panel]:
+def _channel_panels(agreement: RecordingAgreement, channel: ChannelAgreement, atmosphere: float) -> list[Panel]:
     """Return samples and model over time, and below them model less measured."""
     name, measured, model = channel.channel, agreement.measured, agreement.model
     given = measured_values(measured, name)
     assert given is not None, "a channel that is compared was measured"
-    # The measurement is late by the delay, so the model is read that much earlier.
-    line = np.interp(measured.time - agreement.delay.correction, model.time, model[name])
     is_short, is_chamber = measured.duration < _SHORT, name in (PRESSURE_1, PRESSURE_2)
     time, scale = (Kind("Time", "ms"), _MILLISECONDS) if is_short else (TIME, 1.0)
-    times, above = scale * measured.time, atmosphere - STANDARD_ATMOSPHERE if is_chamber else 0.0
-    change = Kind("", "", COMPARED[name].quantity)
-    level = Kind(quantity="pressure") if is_chamber else change
-    colour, every = _LOOKS.get(name, ACTUAL).colour, -(-times.size // _MAXIMUM_DOTS)
+    shown, limit = COMPARED[name], channel.limit * channel.full_range
     is_first = channel is agreement.channels[0]
-    dots, model_line = (KIND_WORDS[measured.kind], "model on the recorded inputs") if is_first else ("", "")
-    residual, limit = line - given, channel.limit * channel.full_range
-    marks = [
-        Mark("line", times, residual, colour=colour, style={"linewidth": 0.9}),
-        Mark("level", (), 0.0, colour=GREY, style={"linewidth": 0.8}),
-    ]
-    # Where the residual is far from the limit of its RMS value, that would only press it flat.
-    if float(np.abs(residual).max()) >= _NEAR_LIMIT * limit:
-        dashed = {"linewidth": 0.8, "linestyle": (0, (4, 3))}
-        marks += [Mark("level", (), level, colour=GREY, style=dashed) for level in (-limit, limit)]
-    upper = Panel(
-        time,
-        replace(level, words=COMPARED[name].title),
-        [
-            Mark(
-                "line",
-                times[::every],
-                (given - above)[::every],
-                (),
-                dots,
-                BLACK,
-                {"linestyle": "", "marker": ".", "markersize": 2.6},
-            ),
-            Mark("line", times, line - above, (), model_line, colour, {"linewidth": 1.3}),
-        ],
-        f"{COMPARED[name].title}: RMS {100 * channel.fraction:.2g} %",
-        legend="figure" if is_first else "",
-        shares_x=True,
+    course = Course(
+        time=time,
+        level=Kind(shown.title, "", "pressure" if is_chamber else shown.quantity),
+        change=Kind("Model less measured", "", shown.quantity),
+        times=scale * measured.time,
+        samples=given,
+        # The measurement is late by the delay, so the model is read that much earlier.
+        model=np.interp(measured.time - agreement.delay.correction, model.time, model[name]),
+        names=(KIND_WORDS[measured.kind], "model on the recorded inputs") if is_first else ("", ""),
+        colour=_LOOKS.get(name, ACTUAL).colour,
+        above=atmosphere - STANDARD_ATMOSPHERE if is_chamber else 0.0,
     )
-    return upper, Panel(time, replace(change, words="Model less measured"), marks, tall=0.5, shares_x=True)
+    # Where the residual is far from the limit of its RMS value, that would only press it flat.
+    is_near = float(np.abs(course.model - given).max()) >= _NEAR_LIMIT * limit
+    title = f"{shown.title}: RMS {100 * channel.fraction:.2g} %"
+    return course_panels(course, "dots", "figure" if is_first else "", title, (-limit, limit) if is_near else ())
 
 
 _MILLISECONDS = 1.0e3
@@ -363,6 +325,7 @@ def _part(validation: Validation, name: str, agreement: RecordingAgreement) -> P
         f"{len(measured)} samples over {measured.duration:.4g} s; inputs from the recording: "
         f"{', '.join(agreement.inputs)}; delay of the measurement: {late}"
     )
+    across = 1 if len(agreement.channels) == 1 else 2
     return Part(
         f"{agreement.file} ({kind})",
         columns_of(_HEAD, map(channel_cells, agreement.channels)),
@@ -372,8 +335,8 @@ def _part(validation: Validation, name: str, agreement: RecordingAgreement) -> P
         name=f"{name}-agreement",
         caption=f"Dots: {kind}. Lines: the model on the recorded inputs. Below each: model less measured, the limit of "
         "its RMS value dashed where it is in range.",
-        across=_across(agreement),
-        size=(7.6 / _across(agreement), 2.1),
+        across=across,
+        size=(7.6 / across, 2.1),
     )
 
 

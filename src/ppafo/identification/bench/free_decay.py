@@ -19,12 +19,13 @@ import numpy as np
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.law import Readings, Values, recordings_of, solve, sought, tolerance, within
-from ppafo.identification.bench.result import BenchResult, Reported, count_of, curve_mark, readings_mark, result_of
+from ppafo.identification.bench.result import BenchResult, Reported, count_of, result_of
 from ppafo.identification.fit import Free
 from ppafo.identification.source import Source, check_moves, check_no_gap, check_no_outlier, check_sources, window
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Mark, Panel
+from ppafo.report.residuals import curve_mark, readings_mark
 from ppafo.signals.faults import is_at_limit, noise_of, plateaus
 from ppafo.signals.recording import Floats
 

@@ -14,14 +14,7 @@ import numpy as np
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.flow import GasAt, Law, Opening, orifice_shape, solve_flow
 from ppafo.identification.bench.law import Readings, recordings_of
-from ppafo.identification.bench.result import (
-    BenchResult,
-    Reported,
-    curve_mark,
-    readings_mark,
-    result_of,
-    with_residuals,
-)
+from ppafo.identification.bench.result import BenchResult, Reported, result_of
 from ppafo.identification.source import (
     Source,
     check_moves,
@@ -33,6 +26,7 @@ from ppafo.identification.source import (
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.model.gas import critical_pressure_ratio
 from ppafo.report.kind import Kind
+from ppafo.report.residuals import curve_mark, readings_mark, with_residuals
 from ppafo.signals.recording import Floats
 
 PROCEDURE = "open-valve-flow"

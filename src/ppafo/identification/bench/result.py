@@ -7,52 +7,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from ppafo.identification.estimate import Estimate, Verdict
 from ppafo.identification.fit import Fit
 from ppafo.identification.source import Source, kind_of, told_of_readings
 from ppafo.identification.wording import conflict_in_words, widened_by
-from ppafo.report.kind import Kind
-from ppafo.report.panels import Mark, Panel, draw_panels
-from ppafo.report.style import BLACK, BLUE, VERMILION
+from ppafo.report.panels import Panel, draw_panels
 from ppafo.signals import RecordingKind
-from ppafo.signals.recording import Floats
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-_MAXIMUM_POINTS = 1200
-"""A page with every sample would be some megabytes, and look the same."""
-_READING = {"linestyle": "none", "markersize": 5, "markeredgewidth": 1.1}
-_LOOKS = {
-    "rising": (BLUE, {"marker": "x", **_READING}),
-    "falling": (VERMILION, {"marker": "o", "markerfacecolor": "none", **_READING}),
-    "measured": (BLUE, {"marker": ".", "linestyle": "none", "markersize": 4}),
-}
-
-
-def readings_mark(label: str, x: Floats, y: Floats, role: str = "measured") -> Mark:
-    """Return readings [SI] as dots, crosses where something was ``rising`` or circles where it was ``falling``."""
-    some = slice(None, None, max(1, x.size // _MAXIMUM_POINTS))
-    colour, style = _LOOKS[role]
-    return Mark("line", x[some], y[some], (), label, colour, style)
-
-
-def curve_mark(label: str, x: Floats, y: Floats) -> Mark:
-    """Return the curve of a law [SI] in the order of x; an empty label stays out of the legend."""
-    order = np.argsort(x, kind="stable")
-    return Mark("line", x[order], y[order], (), label, BLACK, {"linewidth": 1.4})
-
-
-def with_residuals(
-    title: str, x: Kind, y: Kind, marks: Sequence[Mark], at: Floats, residuals: Floats
-) -> tuple[Panel, Panel]:
-    """Return a panel and the one of the residuals [SI] at places along its horizontal axis."""
-    quantity = "pressure change" if y.quantity == "pressure" else y.quantity
-    left = [readings_mark("", at, residuals), Mark("level", (), 0.0, colour=BLACK, style={"linewidth": 1.4})]
-    below = Panel(x, Kind("Measured minus fitted", y.unit, quantity), left, "Residuals", legend="")
-    return Panel(x, y, marks, title, legend="inside"), below
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,9 +104,11 @@ def result_of(
 _SIZE = (4.1, 3.3)
 
 
-def procedure_figure(result: BenchResult) -> "Figure":
-    """Return the figure of a procedure: its two panels side by side."""
-    return _figure(result.panels, result.kind)
+def bench_figure(panels: Sequence[Panel], kind: RecordingKind) -> "Figure":
+    """Return the two panels of a procedure side by side, with letters."""
+    pairs = zip("AB", panels, strict=True)
+    lettered = [replace(panel, title=f"$\\bf{{{letter}}}$   {panel.title}") for letter, panel in pairs]
+    return draw_panels(lettered, 2, _SIZE, kind=kind)
 
 
 def figure_3(torque: BenchResult, decay: BenchResult) -> "Figure":
@@ -156,11 +121,4 @@ def figure_3(torque: BenchResult, decay: BenchResult) -> "Figure":
         # Of a page that shows two kinds of recordings, the mark of the figure would not say which panel is which.
         words = "" if result.kind == "measured" else f", {result.kind}"
         panels.append(replace(panel, title=f"{panel.title}{words}"))
-    return _figure(tuple(panels), kind_of((torque.kind, decay.kind)))
-
-
-def _figure(panels: tuple[Panel, ...], kind: RecordingKind) -> "Figure":
-    lettered = [
-        replace(panel, title=f"$\\bf{{{letter}}}$   {panel.title}") for letter, panel in zip("AB", panels, strict=True)
-    ]
-    return draw_panels(lettered, 2, _SIZE, kind=kind)
+    return bench_figure(panels, kind_of((torque.kind, decay.kind)))

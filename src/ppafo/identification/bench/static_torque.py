@@ -18,15 +18,7 @@ from numpy.typing import NDArray
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.law import Readings, Values, recordings_of, solve, sought, within
-from ppafo.identification.bench.result import (
-    BenchResult,
-    Reported,
-    count_of,
-    curve_mark,
-    readings_mark,
-    result_of,
-    with_residuals,
-)
+from ppafo.identification.bench.result import BenchResult, Reported, count_of, result_of
 from ppafo.identification.source import (
     Source,
     check_moves,
@@ -38,6 +30,7 @@ from ppafo.identification.source import (
 )
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.report.kind import Kind
+from ppafo.report.residuals import curve_mark, readings_mark, with_residuals
 from ppafo.signals.recording import Floats
 
 Labels = NDArray[np.int64]

@@ -16,18 +16,12 @@ import numpy as np
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.flow import GasAt, flow_tolerances, orifice_shape, read_flow, true_pressure
 from ppafo.identification.bench.law import Readings, Values, recordings_of, solve, sought
-from ppafo.identification.bench.result import (
-    BenchResult,
-    Reported,
-    curve_mark,
-    readings_mark,
-    result_of,
-    with_residuals,
-)
+from ppafo.identification.bench.result import BenchResult, Reported, result_of
 from ppafo.identification.source import Source, check_no_wrong_reading, check_sources, pool
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.model.effects.spool_play import spool_position
 from ppafo.report.kind import Kind
+from ppafo.report.residuals import curve_mark, readings_mark, with_residuals
 from ppafo.signals.recording import Floats
 
 PROCEDURE = "valve-map"

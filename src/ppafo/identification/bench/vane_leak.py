@@ -21,15 +21,7 @@ import numpy as np
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.flow import GAS_LAW, TEMPERATURE, GasAt, Law, Opening, gas_tolerances, solve_flow
 from ppafo.identification.bench.law import Readings, Values, recordings_of, solve, sought, tolerance, within
-from ppafo.identification.bench.result import (
-    BenchResult,
-    Reported,
-    count_of,
-    curve_mark,
-    readings_mark,
-    result_of,
-    with_residuals,
-)
+from ppafo.identification.bench.result import BenchResult, Reported, count_of, result_of
 from ppafo.identification.fit import Free
 from ppafo.identification.source import (
     Source,
@@ -43,6 +35,7 @@ from ppafo.identification.source import (
 )
 from ppafo.identification.tolerances import DEFAULTS, HELD, Tolerances, deviation_of_limit
 from ppafo.report.kind import TIME, Kind
+from ppafo.report.residuals import curve_mark, readings_mark, with_residuals
 from ppafo.signals.faults import plateaus, stands_out
 from ppafo.signals.recording import Floats
 

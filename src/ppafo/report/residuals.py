@@ -1,0 +1,95 @@
+"""What was measured, the law or the model beside it, and what is left: the panels of every fit and comparison."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ppafo.report.kind import Kind
+from ppafo.report.panels import Mark, Panel
+from ppafo.report.style import BLACK, BLUE, GREY, VERMILION
+from ppafo.signals.recording import Floats
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_HOLLOW = {"linestyle": "", "markerfacecolor": "none"}
+_READING = {"linestyle": "none", "markersize": 5, "markeredgewidth": 1.1}
+_LOOKS: dict[str, tuple[str, int, dict[str, Any]]] = {
+    "rising": (BLUE, 1200, {"marker": "x", **_READING}),
+    "falling": (VERMILION, 1200, {"marker": "o", "markerfacecolor": "none", **_READING}),
+    "measured": (BLUE, 1200, {"marker": ".", "linestyle": "none", "markersize": 4}),
+    "circles": (BLACK, 90, {"marker": "o", "markersize": 3.6, "markeredgewidth": 0.7, **_HOLLOW}),
+    "dots": (BLACK, 400, {"marker": ".", "markersize": 2.6, "linestyle": ""}),
+}
+"""Colour, largest number and style of what was measured: a page with every sample would have some megabytes."""
+
+
+def readings_mark(label: str, x: Floats, y: Floats, look: str = "measured") -> Mark:
+    """Return readings or samples [SI], some of them where there are very many, in one of the looks."""
+    colour, most, style = _LOOKS[look]
+    some = slice(None, None, -(-x.size // most))
+    return Mark("line", x[some], y[some], (), label, colour, style)
+
+
+def curve_mark(label: str, x: Floats, y: Floats) -> Mark:
+    """Return the curve of a law [SI] in the order of x; an empty label stays out of the legend."""
+    order = np.argsort(x, kind="stable")
+    return Mark("line", x[order], y[order], (), label, BLACK, {"linewidth": 1.4})
+
+
+def with_residuals(
+    title: str, x: Kind, y: Kind, marks: Sequence[Mark], at: Floats, residuals: Floats
+) -> tuple[Panel, Panel]:
+    """Return a panel and the one of the residuals [SI] at places along its horizontal axis."""
+    quantity = "pressure change" if y.quantity == "pressure" else y.quantity
+    left = [readings_mark("", at, residuals), Mark("level", (), 0.0, colour=BLACK, style={"linewidth": 1.4})]
+    below = Panel(x, Kind("Measured minus fitted", y.unit, quantity), left, "Residuals", legend="")
+    return Panel(x, y, marks, title, legend="inside"), below
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """Samples and a model of them at the same times, in units of ``time`` and ``level``; ``colour`` is the model's.
+
+    ``change`` is what a difference of both is, ``names`` are those of both in the legend, ``above`` is taken from both.
+    """
+
+    time: Kind
+    level: Kind
+    change: Kind
+    times: Floats
+    samples: Floats
+    model: Floats
+    names: tuple[str, str]
+    colour: str
+    above: float = 0.0
+
+
+def course_panels(one: Course, look: str, legend: str, title: str = "", limits: Sequence[float] = ()) -> list[Panel]:
+    """Return samples and model over time and, half as tall below them, model less sample, with ``limits`` dashed."""
+    upper = [
+        readings_mark(one.names[0], one.times, one.samples - one.above, look),
+        Mark("line", one.times, one.model - one.above, (), one.names[1], one.colour, {"linewidth": 1.3}),
+    ]
+    lower = [
+        Mark("line", one.times, one.model - one.samples, colour=one.colour, style={"linewidth": 0.9}),
+        Mark("level", (), 0.0, colour=GREY, style={"linewidth": 0.8}),
+    ]
+    dashed = {"linewidth": 0.8, "linestyle": (0, (4, 3))}
+    lower += [Mark("level", (), limit, colour=GREY, style=dashed) for limit in limits]
+
+    def set_time(axes: "Axes") -> None:
+        axes.set_xlim(one.times[0], one.times[-1])
+
+    return [
+        Panel(one.time, one.level, upper, title, legend=legend, then=set_time, shares_x=True),
+        Panel(one.time, one.change, lower, then=_centre, tall=0.5, shares_x=True),
+    ]
+
+
+def _centre(axes: "Axes") -> None:
+    largest = max(map(abs, axes.dataLim.intervaly)) * 1.1 or 1.0
+    axes.set_ylim(-largest, largest)
+    axes.locator_params(axis="y", nbins=3)
