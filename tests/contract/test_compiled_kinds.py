@@ -152,7 +152,8 @@ def effects(draw: random.Random) -> Iterator[Entry]:
             continue
         row, state = effect.parameters, effect.state.row
         moments = [(numbers(row), numbers(state), numbers(Moment), numbers(Moment), 1e-3) for _ in range(50)]
-        yield Entry(f"{effect.name}_start", effect.state.start, [(given[0], given[2]) for given in moments])
+        if effect.state.start is not None:
+            yield Entry(f"{effect.name}_start", effect.state.start, [(given[0], given[2]) for given in moments])
         yield Entry(f"{effect.name}_advance", effect.state.advance, moments)
         yield Entry(f"{effect.name}_slopes", effect.state.slopes, [given[:3] for given in moments])
 

@@ -251,10 +251,12 @@ def states_at_start(run: Run) -> list[Any]:
 
 
 def _started(state: State, parameters: type, row: Any, now: Moment) -> Any:
-    given = leaves(row)
+    start, given = state.start, leaves(row)
+    if start is None:
+        return state.row()
 
     def alone(*values: float) -> Any:
-        return state.start(rebuilt(parameters, values[: len(given)]), rebuilt(Moment, values[len(given) :]))
+        return start(rebuilt(parameters, values[: len(given)]), rebuilt(Moment, values[len(given) :]))
 
     return over_runs(alone, *given, *now)
 

@@ -283,10 +283,15 @@ class Writing:
             yield f"controller_state = {self.constant(program.controller.initial, 'controller_state')}"
         if program.feed is not None:
             yield f"line_state = {add(lines_at_start)}(plant, lines)"
-        if program.stated:
+        if any(kind.start is not None for kind in program.stated.values()):
             yield f"at_start = {add(moment_at_start)}(plant, state)"
         for name, kind in program.stated.items():
-            yield f"{name}_state = {add(kind.start)}({name}, at_start)"
+            started = (
+                self.constant(kind.row(), f"{name}_state")
+                if kind.start is None
+                else f"{add(kind.start)}({name}, at_start)"
+            )
+            yield f"{name}_state = {started}"
 
 
 SAID = {

@@ -26,10 +26,10 @@ class CoilHeating(NamedTuple):
 
 
 class CoilRises(NamedTuple):
-    """Rises of both coils over the room [K]."""
+    """Rises of both coils over the room [K], cold at the start."""
 
-    rise_a: float
-    rise_b: float
+    rise_a: float = 0.0
+    rise_b: float = 0.0
 
 
 def slower(rise: float, pull_in_share: float) -> float:
@@ -80,11 +80,6 @@ def opening_when_warm(time: float, is_coil_a: float, coil_heating: CoilHeating, 
     return opening_time(time, is_coil_a) * (1.0 + rise * (coil_heating.slowing + rise * coil_heating.slowing_squared))
 
 
-def start(_coil_heating: CoilHeating, _now: Moment) -> CoilRises:
-    """Cold coils."""
-    return CoilRises(0.0, 0.0)
-
-
 def advance(
     coil_heating: CoilHeating, coil_heating_state: CoilRises, _before: Moment, after: Moment, step: float
 ) -> CoilRises:
@@ -125,5 +120,5 @@ EFFECT = Effect(
         ("q", "pull_in_share", "-", "current that lifts a valve, over the last one of a cold coil"),
         ("-", "is_coil_a", "-", "1 for the coil of chamber 1, 0 for chamber 2's"),
     ),
-    state=State(row=CoilRises, start=start, advance=advance, slopes=slopes),
+    state=State(row=CoilRises, start=None, advance=advance, slopes=slopes),
 )

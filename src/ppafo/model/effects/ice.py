@@ -16,9 +16,9 @@ class Ice(NamedTuple):
 
 
 class IceState(NamedTuple):
-    """Blockage [-]: the exhaust conductance is divided by 1 + blockage."""
+    """Blockage [-]: the exhaust conductance is divided by 1 + blockage. It starts without ice."""
 
-    blockage: float
+    blockage: float = 0.0
 
 
 class IceSettings(NamedTuple):
@@ -37,11 +37,6 @@ def narrowed(conductance: float, ice_state: IceState) -> float:
     """Conductance [kg/(s Pa)] of the exhaust path with ice in it; ``C / (1 + s)``."""
     # A stage of a step extrapolates the state, below 0 too.
     return exhaust_path(conductance / (1.0 + max(ice_state.blockage, 0.0)))
-
-
-def start(_ice: Ice, _now: Moment) -> IceState:
-    """No ice."""
-    return IceState(0.0)
 
 
 def advance(ice: Ice, ice_state: IceState, _before: Moment, after: Moment, step: float) -> IceState:
@@ -72,5 +67,5 @@ EFFECT = Effect(
         ("1/tau", "melting", "1/s", "rate at which ice at the exhaust melts"),
         ("s", "blockage", "-", "blockage of the exhaust by ice"),
     ),
-    state=State(row=IceState, start=start, advance=advance, slopes=slopes, tolerances=(1.0e-4,)),
+    state=State(row=IceState, start=None, advance=advance, slopes=slopes, tolerances=(1.0e-4,)),
 )

@@ -37,17 +37,18 @@ class Moment(NamedTuple):
 class State:
     """State of an effect: ``row``, a NamedTuple of floats, and how it changes.
 
-    ``start(row, now)`` makes it from the effect's parameters and the plant at the beginning. ``advance(row, state,
-    before, after, step)`` brings it over a step [s] between two instants. ``slopes(row, state, now)`` are its rates in
-    continuous time: the reference solver integrates them, and the second stage of a step has ``state + step * slopes``
-    where a law acts on the gas. ``tolerances`` has for each number the error of one step that is allowed, for which
-    ``advance`` less ``state + step * slopes`` stands; without any, as where ``advance`` is exact, the state shortens no
-    step. ``settle(row, state, command)`` is the state after what changes at once where the valve gets a command: a step
-    does it in ``advance``, the reference solver between two stretches.
+    ``start(row, now)`` makes it from the effect's parameters and the plant at the beginning; None where the defaults of
+    ``row`` are the state then. ``advance(row, state, before, after, step)`` brings it over a step [s] between two
+    instants. ``slopes(row, state, now)`` are its rates in continuous time: the reference solver integrates them, and
+    the second stage of a step has ``state + step * slopes`` where a law acts on the gas. ``tolerances`` has for each
+    number the error of one step that is allowed, for which ``advance`` less ``state + step * slopes`` stands; without
+    any, as where ``advance`` is exact, the state shortens no step. ``settle(row, state, command)`` is the state after
+    what changes at once where the valve gets a command: a step does it in ``advance``, the reference solver between two
+    stretches.
     """
 
     row: type
-    start: Callable[..., Any]
+    start: Callable[..., Any] | None
     advance: Callable[..., Any]
     slopes: Callable[..., Any]
     tolerances: tuple[float, ...] = ()

@@ -15,9 +15,9 @@ class SpoolPlay(NamedTuple):
 
 
 class SpoolPlace(NamedTuple):
-    """Command [-] that the spool follows, -1 to 1."""
+    """Command [-] that the spool follows, -1 to 1, which starts in its middle."""
 
-    spool_command: float
+    spool_command: float = 0.0
 
 
 class PlaySettings(NamedTuple):
@@ -44,11 +44,6 @@ def behind_play(command: float, spool_play: SpoolPlay, spool_play_state: SpoolPl
     given = at_valve(command)
     drawn = spool_position(spool_play_state.spool_command, given, spool_play.play_width)
     return given if given > VENTS_ABOVE else drawn
-
-
-def start(_spool_play: SpoolPlay, _now: Moment) -> SpoolPlace:
-    """A spool in its middle."""
-    return SpoolPlace(0.0)
 
 
 def settle(_spool_play: SpoolPlay, spool_play_state: SpoolPlace, command: float) -> SpoolPlace:
@@ -82,5 +77,5 @@ EFFECT = Effect(
         ("b", "play_width", "-", "whole width of the play between command and spool"),
         ("c'", "spool_command", "-", "command that a spool with play follows"),
     ),
-    state=State(row=SpoolPlace, start=start, advance=advance, slopes=slopes, settle=settle),
+    state=State(row=SpoolPlace, start=None, advance=advance, slopes=slopes, settle=settle),
 )
