@@ -83,12 +83,12 @@ def opening(rows: Rows) -> list[str]:
     names += ["load", "shank"] if program.shank is not None else []
     names += ["held"] if program.hands_chambers_on else []
     names += ["start"] if program.starts_apart else []
-    lines = [*[rows.load(name) for name in names], time_of_step(rows)]
+    leaks = []
     if program.fails:
         from ppafo.model.plant_faults import failed_plant
 
-        lines.append(f"plant = {rows.add(failed_plant)}(plant, plant_faults, time)")
-    lines.append("command = result.command")
+        leaks = [f"plant = {rows.add(failed_plant)}(plant, plant_faults, time)"]
+    lines = [*[rows.load(name) for name in names], time_of_step(rows), *leaks, "command = result.command"]
     if program.is_parted:
         lines += [rows.load("pace"), f"before = {rows.before}", "time += before"]
     if program.late_commands:

@@ -36,9 +36,9 @@ def run_loop(program: Program, collector: Collector, outputs: str, in_parts: Pro
     rows = RunRows(program, collector, outputs)
     others = [] if in_parts is None else [RunRows(in_parts, collector, outputs)]
     body = [repr("What the run is made of, and where it stands.")]
-    for whole, groups in (("parameters", program.parameter_rows()), ("states", program.state_rows())):
+    for given, groups in (("parameters", program.parameter_rows()), ("states", program.state_rows())):
         # A group without numbers is not in the row of all.
-        body += [f"{name} = {f'{whole}.{name}' if leaf_paths(row, name) else '()'}" for name, row in groups.items()]
+        body += [f"{name} = {f'{given}.{name}' if leaf_paths(row, name) else '()'}" for name, row in groups.items()]
     body += [*find_begin(rows), *_all_steps(rows, others), repr("Where it stands now.")]
     body += [f"states.{name} = {name}" for name, row in program.state_rows().items() if leaf_paths(row, name)]
     text = "\n".join(body)
@@ -49,9 +49,9 @@ def run_loop(program: Program, collector: Collector, outputs: str, in_parts: Pro
             if re.search(rf"{KEPT}\.{group}\.[\w.]+(\[\d+\])? = ", text):
                 zeros = dict.fromkeys(leaf_paths(row, group), "0.0")
                 first.append(f"{group} = {row_expression(row, group, zeros, collector.add)}")
-    given = ["states", "parameters", "samples", *LOOP_ARRAYS, *LOOP_NUMBERS, *([NEEDS_PARTS] if others else [])]
+    arguments = ["states", "parameters", "samples", *LOOP_ARRAYS, *LOOP_NUMBERS, *([NEEDS_PARTS] if others else [])]
     sample = f"{outputs} = namedtuple({outputs!r}, {['time', *program.traced]!r})"
-    whole = "\n".join([sample, f"def advance({', '.join(given)}):", *indent([*dict.fromkeys(first), *body])])
+    whole = "\n".join([sample, f"def advance({', '.join(arguments)}):", *indent([*dict.fromkeys(first), *body])])
     # A single run is lane 0 of the histories, and its groups are local names.
     return re.sub(r"\blane\b", "0", re.sub(rf"\b{KEPT}\.", "", whole))
 
