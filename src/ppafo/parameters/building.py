@@ -45,6 +45,8 @@ _SAME = 1.0e-9
 """Angles [rad] this near are one, written in two ways."""
 _COVERED = 1.01
 """A supply this much above the pressures of a table is still covered by it."""
+Reader = Callable[[str, Iterable[Quantity]], dict[str, float]]
+"""From a section and what is declared for it: its numbers in SI, by name."""
 _FLAT_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow")
 
 
@@ -57,29 +59,29 @@ def build_device(parameter_set: ParameterSet, valve: str | None = None, links: G
     links = links_of_set(parameter_set) if links is None else links
     parameter_set = with_second_pressure(parameter_set)
     _check_complete(parameter_set, name)
-    reader, kind = _reader(parameter_set), parameter_set.valve_kinds[name]
+    read, kind = _reader(parameter_set), parameter_set.valve_kinds[name]
     relieving = parameter_set.flags.get(declaration.RELIEVING_PATH)
+    species = _species(parameter_set)
+    named_effects = {path.split(".")[1] for path in parameter_set.numbers if path.startswith(f"{SECTION}.")}
 
     device = Device(
         name=parameter_set.name,
-        gas=Gas(_species(parameter_set), **_section(reader, "gas", declaration.GAS)),
-        actuator=_actuator(parameter_set, reader),
-        friction=Friction(**_section(reader, "friction", declaration.FRICTION)),
-        foot_plate=FootPlate(**_section(reader, "foot_plate", declaration.FOOT_PLATE)),
-        supply=Supply(
-            **_section(reader, "supply", declaration.SUPPLY), relieving=relieving is not None and relieving.value
-        ),
+        gas=Gas(species, **read("gas", declaration.GAS)),
+        actuator=_actuator(parameter_set, read),
+        friction=Friction(**read("friction", declaration.FRICTION)),
+        foot_plate=FootPlate(**read("foot_plate", declaration.FOOT_PLATE)),
+        supply=Supply(**read("supply", declaration.SUPPLY), relieving=relieving is not None and relieving.value),
         valve=Valve(
             kind=kind,
-            settings={
-                item.name: _given_or_default(parameter_set, reader, f"valves.{name}", item)
-                for item in VALVES[kind].quantities
-            },
-            orifice=_orifice(parameter_set, reader, f"valves.{name}"),
+            settings=read(f"valves.{name}", VALVES[kind].quantities),
+            orifice=_orifice(parameter_set, read, f"valves.{name}"),
         ),
-        flow=Flow(**_section(reader, "flow", declaration.FLOW)),
+        flow=Flow(**read("flow", declaration.FLOW)),
         valve_name=name,
-        effects=_effects(parameter_set, reader),
+        effects={
+            effect: read(EFFECTS[effect].section, EFFECTS[effect].quantities_in(species))
+            for effect in sorted(named_effects)
+        },
         links=links,
     )
     is_beyond, line = beyond_pressures(device)
@@ -108,11 +110,11 @@ def growth_and_problem(device: Device) -> tuple[Any, Problem]:
     return growth, (np.logical_not(growth > 0.0), line)
 
 
-def _actuator(parameter_set: ParameterSet, read: Callable[[str], float]) -> Actuator:
+def _actuator(parameter_set: ParameterSet, read: Reader) -> Actuator:
     """Return the actuator: a vane, or one of another kind with its settings."""
     leak, kind = _orifice(parameter_set, read, "actuator.leak"), ACTUATORS[parameter_set.actuator_kind]
     quantities = declaration.actuator_quantities(parameter_set.actuator_kind)
-    given = {item.name: _given_or_default(parameter_set, read, "actuator", item) for item in quantities}
+    given = read("actuator", quantities)
     actuator = Actuator(
         torque_constant=given.get("torque_constant", 0.0),
         displacement_per_radian=given.get("displacement_per_radian", 0.0),
@@ -170,33 +172,30 @@ def beyond_pressures(device: Device) -> Problem:
     return gauge > _COVERED * highest, line
 
 
-def _given_or_default(
-    parameter_set: ParameterSet, read: Callable[[str], float], section: str, quantity: Quantity
-) -> float:
-    path = f"{section}.{quantity.name}"
-    given = path in parameter_set.numbers or quantity.default is None
-    return read(path) if given else float(quantity.default or 0.0)
+def _reader(parameter_set: ParameterSet) -> Reader:
+    """Return what reads a section in SI, checked against declared units and ranges; what it leaves out has its default.
 
-
-def _reader(parameter_set: ParameterSet) -> Callable[[str], float]:
-    """Return a function that gives the value at a path in SI, checked against its declared unit and range."""
+    A number without a default must be there.
+    """
     declared = parameter_set.declarations()
     atmosphere = atmospheric_pressure(parameter_set)
 
-    def read(path: str) -> float:
-        entry = parameter_set.numbers[path]
-        given = f"{parameter_set.file}: {path} = {number_text(entry)}"
-        with refused_as(ParameterError, given, UnitError):
-            value = entry_in_si(entry, declared[path], atmosphere)
-        if not declaration.is_within(value, declared[path]):
-            raise ParameterError(f"{given}: {range_rule(declared[path], declaration.limits_text(declared[path]))}")
-        return value
+    def read(section: str, members: Iterable[Quantity]) -> dict[str, float]:
+        found: dict[str, float] = {}
+        for member in members:
+            path = f"{section}.{member.name}"
+            if path not in parameter_set.numbers and member.default is not None:
+                found[member.name] = float(member.default)
+                continue
+            entry = parameter_set.numbers[path]
+            given = f"{parameter_set.file}: {path} = {number_text(entry)}"
+            with refused_as(ParameterError, given, UnitError):
+                found[member.name] = entry_in_si(entry, declared[path], atmosphere)
+            if not declaration.is_within(found[member.name], declared[path]):
+                raise ParameterError(f"{given}: {range_rule(declared[path], declaration.limits_text(declared[path]))}")
+        return found
 
     return read
-
-
-def _section(read: Callable[[str], float], section: str, members: Iterable[Quantity]) -> dict[str, float]:
-    return {member.name: read(f"{section}.{member.name}") for member in members}
 
 
 def _species(parameter_set: ParameterSet) -> str:
@@ -210,22 +209,10 @@ def _species(parameter_set: ParameterSet) -> str:
     return name
 
 
-def _orifice(parameter_set: ParameterSet, read: Callable[[str], float], section: str) -> Orifice | SonicOrifice:
+def _orifice(parameter_set: ParameterSet, read: Reader, section: str) -> Orifice | SonicOrifice:
     if _uses_sonic_form(parameter_set, section):
-        return SonicOrifice(**_section(read, section, declaration.SONIC_FORM))
-    return Orifice(**_section(read, section, declaration.AREA_FORM))
-
-
-def _effects(parameter_set: ParameterSet, read: Callable[[str], float]) -> dict[str, dict[str, float]]:
-    """Return the settings of all effects that the set says something of; what it leaves out has its default."""
-    given = {path.split(".")[1] for path in parameter_set.numbers if path.startswith(f"{SECTION}.")}
-    return {
-        name: {
-            item.name: _given_or_default(parameter_set, read, EFFECTS[name].section, item)
-            for item in EFFECTS[name].quantities_in(_species(parameter_set))
-        }
-        for name in sorted(given)
-    }
+        return SonicOrifice(**read(section, declaration.SONIC_FORM))
+    return Orifice(**read(section, declaration.AREA_FORM))
 
 
 def both_forms(parameter_set: ParameterSet, section: str) -> tuple[str, ...]:

@@ -145,11 +145,11 @@ class CTerms:
             case "choice":
                 test, yes, no = (self.term(part, _CHOICE + 1) for part in item.parts)
                 return f"{test} ? {yes} : {no}", _CHOICE
-        text = self.place(item) or self.call(item)
+        text = self.looked_up(item) or self.call(item)
         return (text, _ATOM) if text else self.operation(item)
 
-    def place(self, item: Term) -> str:
-        """A name, or what a place in a row, a tuple or an array holds; empty for any other term."""
+    def looked_up(self, item: Term) -> str:
+        """A name, or what lies at a place in a row, a tuple or an array; empty for any other term."""
         match item.kind:
             case "name":
                 text = self.name(item.detail)
@@ -516,7 +516,7 @@ class _Body:
             kind = self.kinds[name]
             if name in self.scopes.read and not is_empty(kind):
                 # A number begins as 0, so that no compiler fears for it.
-                begin = {typed.BOOL: " = false", FLOAT: " = 0.0"}
+                begin = {BOOL: " = false", FLOAT: " = 0.0"}
                 value = begin.get(kind, " = 0") if isinstance(kind, typed.Scalar) else ""
                 lines.append(f"{'    ' * level}{self.writer.type_name(kind)} {self.name(name)}{value};")
         for statement in body:
