@@ -57,7 +57,9 @@ PERSON = Quantity(
     0.0,
     float(LARGEST_SEED),
 )
-DURATION = Quantity("duration", "s", "length of the walk; its course's, else a minute unless given", None, 1.0, 3600.0)
+DURATION = Quantity(
+    "duration", "s", "length of the walk; its task sequence's, else a minute unless given", None, 1.0, 3600.0
+)
 
 WALK_SENSORS = (
     *(item for item in SENSORS if item.name != "delay"),
@@ -195,7 +197,7 @@ def _texts(document: Mapping[str, Any]) -> tuple[str, ...]:
         "gas_model.kind",
         *(f"faults.{part}.kind" for part in FAULTS),
     )
-    return (*TEXTS, "motion.kind", "gait", "course", *walk_kind_of(document).texts, BOTTLE_NAME, *kinds)
+    return (*TEXTS, "motion.kind", "gait", "task_sequence", *walk_kind_of(document).texts, BOTTLE_NAME, *kinds)
 
 
 def _quantities(document: Mapping[str, Any]) -> dict[str, Quantity]:
@@ -212,11 +214,11 @@ OF_A_WALK = Declared(
     find_kinds,
     _texts,
     _quantities,
-    same={"motion.gait": "gait", "motion.course": "course"},
+    same={"motion.gait": "gait", "motion.task_sequence": "task_sequence"},
     appended={path: (BOTTLE, own) for path, own in BOTTLE_OVERRIDES.items()},
     check_motion=_check_motion,
 )
-"""What the file of a walk can hold. Gait and course stand at the top of the file or, as its motion, in [motion]."""
+"""What the file of a walk can hold. Gait and task sequence stand at its top or, as its motion, in [motion]."""
 
 
 def _fault(part: str) -> Any:
@@ -260,8 +262,8 @@ def _walk_file(_controllers: Any, walks: tuple[tuple[str, WalkKind], ...]) -> ty
         "gait": optional(
             str, "name of a gait, or the path of a gait file; its subject walks; the built-in one unless given"
         ),
-        "course": optional(
-            str, "name of a course, or the path of its file; stride after equal stride unless one is given"
+        "task_sequence": optional(
+            str, "name of a task sequence, or the path of its file; stride after equal stride unless one is given"
         ),
     }
     motion = one_of(
@@ -273,7 +275,7 @@ def _walk_file(_controllers: Any, walks: tuple[tuple[str, WalkKind], ...]) -> ty
         wearer |= texts | quantity_fields(kind.numbers)
     own: dict[str, Any] = {
         "run": optional(table("WalkRun", run), "how long it is, and how it is computed"),
-        "motion": optional(motion, "that it is a walk; gait and course may stand here"),
+        "motion": optional(motion, "that it is a walk; gait and task sequence may stand here"),
         **which,
         "controller": (
             controller_table(walking_controllers(), "Walking"),

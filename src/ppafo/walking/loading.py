@@ -46,7 +46,6 @@ from ppafo.simulation.scenario import (
 )
 from ppafo.walking.bottle import BOTTLE, BOTTLE_NAME, BottleSupply, read_bottle
 from ppafo.walking.contradictions import check_walk
-from ppafo.walking.course import load_course
 from ppafo.walking.declaration import (
     DURATION,
     FAULTY,
@@ -69,6 +68,7 @@ from ppafo.walking.motion import (
 from ppafo.walking.nominal import nominal_terms
 from ppafo.walking.planning import NO_REFERENCE, walking_valve
 from ppafo.walking.preparation import FaultSettings
+from ppafo.walking.task_sequence import load_task_sequence
 
 FILE = TomlKind("walk", "walk", resources.files("ppafo.walking") / "configurations", ScenarioError)
 DEFAULT_PERIOD = 1.0e-3
@@ -93,19 +93,19 @@ def load_walk(
     name_or_path: str | Path,
     overrides: Iterable[str] = (),
     gait: str | Path | None = None,
-    course: str | Path | None = None,
+    task_sequence: str | Path | None = None,
     bottle: str | Path | None = None,
     parameter_set: ParameterSet | None = None,
 ) -> Scenario:
     """Return a scenario that is a walk by its name in the package or by the path of a TOML file, in SI units.
 
     ``overrides`` are texts such as ``controller.peak_torque=6 N m`` or ``valve.area=12.6mm^2``; ``gait``,
-    ``course`` and ``bottle`` replace the file's. A gait that is named, by the file or by ``gait``, brings its
+    ``task_sequence`` and ``bottle`` replace the file's. A gait that is named, by the file or by ``gait``, brings its
     subject as the default wearer; ``parameter_set`` takes the place of the set that is named. ScenarioError,
     ParameterError or DataError for anything that cannot be used.
     """
     file, given = label(str(name_or_path)), tuple(overrides)
-    named = {"gait": gait, "course": course, BOTTLE_NAME: bottle}
+    named = {"gait": gait, "task_sequence": task_sequence, BOTTLE_NAME: bottle}
     instead = {path: str(item) for path, item in named.items() if item is not None}
     # Refuse an override beside another word for the same value, by path in ``others``.
     for override in given:
@@ -169,11 +169,11 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     device = read_device(reading, hardware)
     with refused_as(ParameterError, f"{reading.file}: [device]", ParameterError):
         device.check_vane("a walk")
-    named_course = _named_file("course", request, document)
-    with _named_by("course", reading, request, ScenarioError):
-        course = None if named_course is None else load_course(named_course)
-        if course is not None:
-            who.check_course(course)
+    named_sequence = _named_file("task_sequence", request, document)
+    with _named_by("task_sequence", reading, request, ScenarioError):
+        sequence = None if named_sequence is None else load_task_sequence(named_sequence)
+        if sequence is not None:
+            who.check_task_sequence(sequence)
     with _named_by("gait", reading, request, DataError):
         walked = load_gait(_named_file("gait", request, document) or NORMATIVE)
     is_named = "gait" in instead or "gait" in document
@@ -194,7 +194,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
         bottle=bottle,
         broken=_broken(reading, line),
         shut_off=_shut_off(reading),
-        **who.read(reading, request, walked, is_named, course),
+        **who.read(reading, request, walked, is_named, sequence),
     )
     named = tuple(
         # The path of a file in full means the same from any folder.
@@ -231,7 +231,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
 
 
 def _named_file(path: str, request: ScenarioRequest, document: Mapping[str, Any]) -> str | None:
-    """Return the name or file of a gait or a course; a path in the document begins in the folder of the document."""
+    """Return the name or file of a gait or a task sequence; a path in the document begins in its folder."""
     if path in request.instead:
         return request.instead[path]
     name = document.get(path)
@@ -325,17 +325,17 @@ def _assumed(reading: Reading, bottle: BottleSupply | None) -> tuple[Assumption,
 
 
 def _duration(reading: Reading, scenario: Scenario) -> float:
-    """Return the length of a walk [s]: its file's, else its course's, else a minute, or ten on a bottle."""
+    """Return the length of a walk [s]: its file's, else its task sequence's, else a minute, or ten on a bottle."""
     motion = walk_of(scenario)
-    of_course = motion.who.duration(motion)
+    of_task_sequence = motion.who.duration(motion)
     if value_at(reading.document, "run.duration") is not None:
         duration = reading.number("run.duration", DURATION)
         for is_bad, line in duration_problems(scenario, duration):
             if is_bad:
                 raise ScenarioError(f"{reading.file}: {line(0)}")
         return duration
-    if of_course is not None:
-        return of_course
+    if of_task_sequence is not None:
+        return of_task_sequence
     return DEFAULT_DURATION if motion.bottle is None else BOTTLE_DURATION
 
 

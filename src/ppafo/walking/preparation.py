@@ -146,7 +146,7 @@ def walk_from(now: GaitNow, contact: float, shown_force: float) -> WalkState:
 def standing_on(
     leg: LegParameters, ground_angle: float, sine_foot: float, cosine_foot: float, phase: float, load: float
 ) -> GaitNow:
-    """Shank vertical, foot flat, both at rest: where a course begins, at a phase [turns] and a load [body weights].
+    """Shank vertical, foot flat, both at rest: how a task sequence begins, at a phase [turns] and load [body weights].
 
     Sine and cosine belong to the flat foot's angle [rad]. Numbers may be arrays (wearers,).
     """

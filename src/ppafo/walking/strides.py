@@ -1,4 +1,4 @@
-"""A walk stride by stride: numbers of each stride, mean curves, metrics of a walk, and of each segment of a course."""
+"""A walk stride by stride: numbers of strides, mean curves, metrics of a walk and of segments of a task sequence."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,9 +15,9 @@ from ppafo.model.helping import HELPS, PUSH_OFF
 from ppafo.signals import CHANNELS, Recording
 from ppafo.signals.recording import Floats
 from ppafo.simulation.scenario import Scenario
-from ppafo.walking.course import PlannedCourse, Span
 from ppafo.walking.gait_series import ankle_path, gait_timing
 from ppafo.walking.motion import walk_of
+from ppafo.walking.task_sequence import PlannedSequence, Span
 
 PHASES = np.linspace(0.0, 1.0, 101)
 """Phases from heel strike to heel strike at which curves are averaged."""
@@ -133,7 +133,7 @@ def stride_metrics(
 ) -> dict[str, Metric]:
     """Means over the chosen strides (strides,), and what they are of a healthy ankle; ``averages`` are theirs too."""
     found = {}
-    over = "" if walk_of(configuration).course is None else " over the strides at an even speed on level ground"
+    over = "" if walk_of(configuration).task_sequence is None else " over the strides at an even speed on level ground"
     for name, item in PER_STRIDE.items():
         values = strides[name][chosen]
         if values.size:
@@ -214,7 +214,7 @@ def healthy_toe_height(configuration: Scenario) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class SegmentResult:
-    """One segment of a course, from ``start`` to ``end`` [s], SI units.
+    """One segment of a task sequence, from ``start`` to ``end`` [s], SI units.
 
     ``strides`` begin in it with a strike, ``helped`` are the ones in which the controller was not in its safe
     state up to the next strike, or to the end. ``gas`` [kg], ``net_push_off_work`` [J] of the strides that begin in it,
@@ -236,7 +236,7 @@ class SegmentResult:
     safe_time: float | None
 
 
-def steady_strides(planned: PlannedCourse, strikes: Floats) -> NDArray[np.bool_]:
+def steady_strides(planned: PlannedSequence, strikes: Floats) -> NDArray[np.bool_]:
     """True for each whole stride, between strikes at times [s], at an even speed on level ground."""
     first, last = strikes[:-1], strikes[1:]
     steady = np.zeros(first.size, dtype=np.bool_)
@@ -247,7 +247,7 @@ def steady_strides(planned: PlannedCourse, strikes: Floats) -> NDArray[np.bool_]
 
 def segment_results(
     configuration: Scenario,
-    planned: PlannedCourse,
+    planned: PlannedSequence,
     recording: Recording,
     works: Floats,
     starts: NDArray[np.intp],
@@ -311,40 +311,44 @@ def _lowest_toes(configuration: Scenario, recording: Recording, own: NDArray[np.
 
 
 _SAME_TIME = 0.05
-"""Time [s] by which a recording may end before its course: its samples."""
+"""Time [s] by which a recording may end before its task sequence: its samples."""
 
 
-def is_whole_course(walked: float, planned: float) -> bool:
-    """True where a course of a planned time [s] was walked to its end, after a time [s] by its recording."""
+def is_whole_task_sequence(walked: float, planned: float) -> bool:
+    """True where a task sequence of a planned time [s] was walked to its end, after a time [s] by its recording."""
     return walked >= planned - _SAME_TIME
 
 
-def course_metrics(
-    planned: PlannedCourse, segments: Sequence[SegmentResult], recording: Recording, steady: int
+def task_sequence_metrics(
+    planned: PlannedSequence, segments: Sequence[SegmentResult], recording: Recording, steady: int
 ) -> dict[str, Metric]:
-    """Numbers of a whole course by name, SI units, or of what was walked of it."""
+    """Numbers of a whole task sequence by name, SI units, or of what was walked of it."""
     toes = [segment.lowest_toes for segment in segments if segment.lowest_toes is not None]
-    # A walk may go on after its course.
+    # A walk may go on after its task sequence.
     end = min(float(recording.time[-1]), float(planned.duration))
     gas = float(np.interp(end, recording.time, recording["supplied_mass"]))
     found = {
-        "course_time": Metric(end, "s", "length of the course, as far as it was walked"),
-        "course_planned_time": Metric(float(planned.duration), "s", "length of the whole course"),
+        "task_sequence_time": Metric(end, "s", "length of the task sequence, as far as it was walked"),
+        "task_sequence_planned_time": Metric(float(planned.duration), "s", "length of the whole task sequence"),
         "steady_strides": Metric(float(steady), "-", "whole strides at an even speed on level ground"),
-        "course_strides": Metric(float(sum(item.strides for item in segments)), "-", "strides of the course"),
-        "course_gas": Metric(gas, "kg", "gas taken from the supply on the course"),
-        "course_work": Metric(
+        "task_sequence_strides": Metric(
+            float(sum(item.strides for item in segments)), "-", "strides of the task sequence"
+        ),
+        "task_sequence_gas": Metric(gas, "kg", "gas taken from the supply over the task sequence"),
+        "task_sequence_work": Metric(
             sum(item.net_push_off_work for item in segments), "J", "net work of T_ex while the foot rolls over the toes"
         ),
-        "course_flat_push": Metric(
+        "task_sequence_flat_push": Metric(
             max((item.flat_push for item in segments), default=0.0),
             "N m",
             "largest torque in plantarflexion with a loaded heel",
         ),
     }
     if toes:
-        found["course_lowest_toes"] = Metric(min(toes), "m", "lowest toes over the ground in the middle of a swing")
+        found["task_sequence_lowest_toes"] = Metric(
+            min(toes), "m", "lowest toes over the ground in the middle of a swing"
+        )
     if "walking_speed" in recording:
         way = float(np.trapezoid(recording["walking_speed"], recording.time))
-        found["course_length"] = Metric(way, "m", "way on the course")
+        found["task_sequence_length"] = Metric(way, "m", "distance walked in the task sequence")
     return found

@@ -27,16 +27,16 @@ from ppafo.simulation.sampled import run_sampled
 from ppafo.simulation.scenario import Control, Scenario
 from ppafo.walking.bottle import WALKED, BottleLife, Schedule, life_on_bottle, run_on_bottle
 from ppafo.walking.contradictions import check_no_bottle
-from ppafo.walking.course import turns_walked
 from ppafo.walking.declaration import THRESHOLDS
 from ppafo.walking.events import FINDING_ROW, SAFE_ROW, VENTINGS_ROW
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import SHORTEST_STRIDES, check_led, duration_problems, walk_of, with_duration
 from ppafo.walking.person import crowd_of, draw_gaits
-from ppafo.walking.planning import course_of_walk, fed_device, plan_walk, plan_walks, unrecorded
+from ppafo.walking.planning import fed_device, plan_walk, plan_walks, task_sequence_of_walk, unrecorded
 from ppafo.walking.preparation import FaultSettings
 from ppafo.walking.result import REMEDY, WalkResult, result_of_walk
 from ppafo.walking.strides import PHASES, healthy_positive_work, healthy_toe_height, lowest_toes
+from ppafo.walking.task_sequence import turns_walked
 from ppafo.walking.wearer import draw_builds
 
 Progress = Callable[[float, float], None]
@@ -54,25 +54,26 @@ def walk(
     overrides: Iterable[str] = (),
     gait: str | Path | None = None,
     progress: Progress = silent,
-    course: str | Path | None = None,
+    task_sequence: str | Path | None = None,
     bottle: str | Path | None = None,
 ) -> WalkResult:
     """Walk for ``minutes`` [min]: a scenario that is a walk, the name of a shipped one, or a file.
 
-    Unless ``minutes`` are given it is as long as the file says, or the whole course, or one minute where there is none,
-    and up to ten on a bottle, which may end it before. With a name or a file go overrides as for the command, and a
-    ``gait``, ``course`` or ``bottle`` in place of its own. A walk that diverges is a result with that status, up to
-    the time of failure. ScenarioError or ParameterError for bad input. ``progress`` gets the minutes done and those in
-    all, part by part.
+    Unless ``minutes`` are given it is as long as the file says, or its task sequence, or one minute where there is
+    none, and up to ten on a bottle, which may end it before. With a name or a file go overrides as for the command,
+    and a ``gait``, ``task_sequence`` or ``bottle`` in place of its own. A walk that diverges is a result with that
+    status, up to the time of failure. ScenarioError or ParameterError for bad input. ``progress`` gets the minutes done
+    and those in all, part by part.
     """
     if isinstance(scenario, Scenario):
-        if any(item is not None for item in (gait, course, bottle)) or tuple(overrides):
+        if any(item is not None for item in (gait, task_sequence, bottle)) or tuple(overrides):
             raise ScenarioError(
-                "overrides, a gait, a course and a bottle go with a name or a file; a Scenario takes them in load_walk"
+                "overrides, a gait, a task sequence and a bottle go with a name or a file; a Scenario takes them in "
+                "load_walk"
             )
         chosen = scenario
     else:
-        chosen = load_walk(scenario, overrides, gait, course, bottle)
+        chosen = load_walk(scenario, overrides, gait, task_sequence, bottle)
     chosen = lasting(chosen, minutes)
     run, carried = plan_walk(chosen), walk_of(chosen).bottle
     custom = chosen.controller.custom
@@ -88,12 +89,12 @@ def walk(
 def bottle_life(scenario: Scenario, schedule: Schedule, progress: Progress = silent) -> BottleLife:
     """Walk on the bottle of a walk until that ends it: the one answer to how long a device lasts.
 
-    It is the run of ``walk`` on a bottle, for as long as ``schedule`` allows, with its rests; a course is repeated.
+    It is the run of ``walk`` on a bottle, as long as ``schedule`` allows, with its rests; a task sequence is repeated.
     Faults are left out: a device that has stopped empties no bottle. ScenarioError for a walk on no bottle.
     """
     sound = dict.fromkeys(walk_of(scenario).faults, FaultSettings())
     scenario = replace(scenario, motion=replace(walk_of(scenario), faults=sound, broken={}))
-    motion, planned = walk_of(scenario), course_of_walk(scenario)
+    motion, planned = walk_of(scenario), task_sequence_of_walk(scenario)
     if motion.bottle is None:
         raise ScenarioError(f"{scenario.name}: has no bottle")
     if scenario.controller.custom is not None:
@@ -101,7 +102,7 @@ def bottle_life(scenario: Scenario, schedule: Schedule, progress: Progress = sil
     strides = math.ceil(schedule.longest / motion.gait.stride_time)
     seconds = float(planned.duration) if planned is not None else strides * motion.gait.stride_time
     unrecorded = 60.0 if planned is None else 1.0
-    if planned is None:  # no more steps than a run may take: what lasts longer begins again, as a course does
+    if planned is None:  # no more steps than a run may take: what lasts longer begins again, as a task sequence does
         before = with_duration(scenario, unrecorded)
         step = plan_walk(replace(before, run=replace(before.run, output_interval=unrecorded))).step
         seconds = min(seconds, unrecorded * (MAXIMUM_STEPS * step // unrecorded))
@@ -151,7 +152,7 @@ class Comparison:
 
 
 def compare_walks(configuration: Scenario, minutes: float | None = None, progress: Progress = silent) -> Comparison:
-    """Walk ``minutes`` [min], or a whole course, with the device and without, as its kind of motion says.
+    """Walk ``minutes`` [min], or a whole task sequence, with the device and without, as its kind of motion says.
 
     ScenarioError for bad input, SimulationError where its bottle ends the walk before there is anything to compare.
     """
@@ -310,7 +311,7 @@ def walk_population(
     seed: int = 1,
     progress: Progress = silent,
 ) -> Population:
-    """Let many wearers walk for ``minutes`` [min], or all of a course; the first is the configuration's.
+    """Let many wearers walk for ``minutes`` [min], or all of a task sequence; the first is the configuration's.
 
     ``progress`` gets the number of wearers that have walked and the number of all. ScenarioError for bad input.
     """
@@ -326,7 +327,7 @@ def walk_population(
     build = draw_builds(wearers, generator)
     gaits = draw_gaits(walk_of(configuration).gait, build.stature, generator)
     crowd = crowd_of(configuration, build, gaits, generator)
-    planned = course_of_walk(crowd)
+    planned = task_sequence_of_walk(crowd)
     if minutes is None and planned is not None:
         minutes = float(np.max(planned.duration)) / 60.0
     seconds = lasting(configuration, minutes).run.duration
@@ -337,7 +338,7 @@ def walk_population(
     good = (rows["result.failure_time"] >= NEVER_FAILED) & np.isfinite(states).all(axis=0)
     walked = run.step * run.step_count
     # Numbers of each wearer from the totals; ``strides`` walked, parts of one included.
-    strides = walked * gaits.timing["frequency"] if planned is None else turns_walked(planned.course, walked)
+    strides = walked * gaits.timing["frequency"] if planned is None else turns_walked(planned.timed, walked)
     # Who never strikes must not divide by zero.
     strikes = np.maximum(rows["walk.strides"], 1.0)
     over = {"toe_clearance": strikes, "toe_landing": strikes}

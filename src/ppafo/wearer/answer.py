@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.analyses.walk.course import bottle_data, bottle_parts, bottle_remark
 from ppafo.analyses.walk.document import Row, metrics_table, walk_data
 from ppafo.analyses.walk.safety import over_time_parts, safety_remarks
+from ppafo.analyses.walk.task_sequence import bottle_data, bottle_parts, bottle_remark
 from ppafo.documents.json_text import plain
 from ppafo.gait.document import load_gait
 from ppafo.metrics.strides import SETTLING

@@ -20,12 +20,12 @@ from ppafo.simulation.loading import ScenarioRequest
 from ppafo.simulation.motion_kind import REACT
 from ppafo.simulation.plan import compose_run, too_many_steps
 from ppafo.simulation.scenario import Scenario
-from ppafo.walking.course import WalkingCourse
 from ppafo.walking.kind import WalkKind
 from ppafo.walking.led import WALK_KIND
 from ppafo.walking.motion import WalkMotion, walk_of
 from ppafo.walking.planning import components_of_walk, failing_of, fed_device, gait_sensors_of, walk_steps
 from ppafo.walking.preparation import device_share, vented_state, without_leg
+from ppafo.walking.task_sequence import TaskSequence
 from ppafo.walking.walk import with_device_off
 from ppafo.walking.wearer import paper_subject
 from ppafo.wearer.recording import reacting_result
@@ -41,10 +41,10 @@ from ppafo.wearer.settings import (
     start_of_body,
     wearer_of_walk,
 )
-from ppafo.wearer.way import check_reacting_course, length_of
+from ppafo.wearer.way import check_reacting_task_sequence, length_of
 
 SHORTEST_WAY = 6.0
-"""Shortest walk [s] on a course, unless given."""
+"""Shortest walk [s] in a task sequence, unless given."""
 
 
 def plan_reacting(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
@@ -82,14 +82,14 @@ def _too_long(scenario: Scenario) -> Problem:
 def _label(motion: WalkMotion) -> str:
     wearer = wearer_of_walk(motion)
     return f"a walk of a neuromuscular gait model, {wearer.name}" + (
-        "" if wearer.course is None else f", course {wearer.course.name}"
+        "" if wearer.task_sequence is None else f", task sequence {wearer.task_sequence.name}"
     )
 
 
 def _read(
-    reading: Reading, request: ScenarioRequest, _gait: Gait, _is_named: bool, course: WalkingCourse | None
+    reading: Reading, request: ScenarioRequest, _gait: Gait, _is_named: bool, sequence: TaskSequence | None
 ) -> Mapping[str, Any]:
-    return {"wearer": paper_subject(), "body": read_reacting(reading, request.folder, request.instead, course)}
+    return {"wearer": paper_subject(), "body": read_reacting(reading, request.folder, request.instead, sequence)}
 
 
 def _links(_document: Mapping[str, Any]) -> Graph:
@@ -103,10 +103,10 @@ def _interval(seconds: float) -> float:
 
 def _duration(motion: WalkMotion) -> float | None:
     wearer = wearer_of_walk(motion)
-    if wearer.course is None:
+    if wearer.task_sequence is None:
         return None
     # The reflexes set the pace: at the speed of the start, to the next whole second.
-    return max(SHORTEST_WAY, float(math.ceil(length_of(wearer.course) / wearer.settings[START_SPEED.name])))
+    return max(SHORTEST_WAY, float(math.ceil(length_of(wearer.task_sequence) / wearer.settings[START_SPEED.name])))
 
 
 def _remarks(motion: WalkMotion) -> list[str]:
@@ -116,7 +116,10 @@ def _remarks(motion: WalkMotion) -> list[str]:
 
 def _document(motion: WalkMotion) -> dict[str, Any]:
     wearer = wearer_of_walk(motion)
-    return {"wearer": {"name": wearer.name, "numbers": plain(dict(wearer.settings))}, "course": plain(wearer.course)}
+    return {
+        "wearer": {"name": wearer.name, "numbers": plain(dict(wearer.settings))},
+        "task_sequence": plain(wearer.task_sequence),
+    }
 
 
 def _nothing_healthy(_scenario: Scenario) -> dict[str, Any]:
@@ -139,7 +142,7 @@ REACT_KIND = replace(
         texts={NAME: NAME_SUMMARY},
         step=STEP_OF_BODY,
         interval=_interval,
-        check_course=check_reacting_course,
+        check_task_sequence=check_reacting_task_sequence,
         read=_read,
         links=_links,
         duration=_duration,
