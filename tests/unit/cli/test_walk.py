@@ -151,7 +151,7 @@ def test_the_list_names_every_walk_and_every_task_sequence(capsys: pytest.Captur
     assert names[8:] == ["corridor", "first-steps", "ramp-and-kerb", "six-minutes", "stairs"]
     assert main(["walk", "--list", "--json"]) == 0
     listed = json.loads(capsys.readouterr().out)["walks"]
-    assert [item["kind"] for item in listed] == ["walk"] * 8 + ["task_sequence"] * 5
+    assert [item["kind"] for item in listed] == ["walk"] * 8 + ["task sequence"] * 5
 
 
 def test_a_task_sequence_writes_its_segments_and_its_figure(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -143,10 +143,10 @@ def test_a_walk_takes_its_own_motion_and_names_the_kinds_that_exist(tmp_path: Pa
 def test_a_gait_or_task_sequence_that_is_not_there_names_the_file_and_the_key(
     key: str, kind: type[PpafoError], tmp_path: Path
 ) -> None:
-    file = written(tmp_path, f'{key} = "nobody"\n{text_of(NAME)}')
-    with pytest.raises(kind, match=rf"{file.name}: {key} = 'nobody': there is no {key} 'nobody'"):
+    file, noun = written(tmp_path, f'{key} = "nobody"\n{text_of(NAME)}'), key.replace("_", " ")
+    with pytest.raises(kind, match=rf"{file.name}: {key} = 'nobody': there is no {noun} 'nobody'"):
         load_walk(file)
-    with pytest.raises(kind, match=rf"^{NAME}: override {key}=nobody: there is no {key} 'nobody'"):
+    with pytest.raises(kind, match=rf"^{NAME}: override {key}=nobody: there is no {noun} 'nobody'"):
         load_walk(NAME, [f"{key}=nobody"])
     with pytest.raises(kind, match=rf"^there is no {key} 'nobody'"):
         load_walk(NAME, gait="nobody") if key == "gait" else load_walk(NAME, task_sequence="nobody")
