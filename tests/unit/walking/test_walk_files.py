@@ -148,7 +148,7 @@ def test_a_gait_or_task_sequence_that_is_not_there_names_the_file_and_the_key(
         load_walk(file)
     with pytest.raises(kind, match=rf"^{NAME}: override {key}=nobody: there is no {noun} 'nobody'"):
         load_walk(NAME, [f"{key}=nobody"])
-    with pytest.raises(kind, match=rf"^there is no {key} 'nobody'"):
+    with pytest.raises(kind, match=rf"^there is no {noun} 'nobody'"):
         load_walk(NAME, gait="nobody") if key == "gait" else load_walk(NAME, task_sequence="nobody")
 
 
