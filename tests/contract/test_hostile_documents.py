@@ -39,7 +39,7 @@ LOADERS: dict[str, Callable[[str], Any]] = {
     "parts": load_catalogue,
     "design": read_design_file,
     "walk": load_walk,
-    "task_sequence": load_task_sequence,
+    "task-sequence": load_task_sequence,
     "identification": load_problem,
     "columns": load_column_map,
     "rig": load_preset,

@@ -156,10 +156,6 @@ class BottleSupply:
         """Return what the supply offers the device at the start."""
         return self.offers(self.start(), self.temperature, 0.0)
 
-    def device_at_start(self, device: Device) -> Device:
-        """Return the device with gas of the temperature that the supply has at the start."""
-        return replace(device, gas=replace(device.gas, temperature=self.offers_first().gas_temperature))
-
     def fed(self, line: SupplyLine) -> SupplyLine:
         """Return the lines with the droop of the bottle's regulator, and with what it passes at the start."""
         droop, most = self.bottle.regulator.droop, self.offers_first().largest_flow
@@ -321,10 +317,6 @@ class SupplyCourse:
     last: SupplyState
     regulated: float
     ending: SupplyEnding
-
-    def at(self, name: str, times: Floats) -> Floats:
-        """Return a value at times [s], straight between those at which bottle and device met."""
-        return np.interp(times, self.times, self.values[name])
 
     @property
     def recording(self) -> Recording:

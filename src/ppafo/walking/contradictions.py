@@ -107,7 +107,16 @@ def _contradictions(scenario: Scenario) -> Iterator[Contradiction]:
     # An object in charge has no settings that could contradict.
     if scenario.controller.kind == PYTHON_CONTROLLER:
         return
-    yield _valve(scenario)
+    valve = scenario.device.valve.kind
+    fitting = " or ".join(sorted(kind.name for kind in WALKING_CONTROLLERS.values() if kind.only_switches))
+    yield Contradiction(
+        "controller.kind",
+        valve != "proportional" and not law_of(scenario).only_switches,
+        lambda _run: (
+            f"opens its valve gradually, which in a walk only a proportional valve does, not a {valve} one: "
+            f"take device.valve 'proportional', or controller.kind {fitting}"
+        ),
+    )
     if "load_threshold" in settings:
         yield from _times(scenario)
         yield from _angle_and_gait(scenario)
@@ -126,19 +135,6 @@ def _reason(pair: Pair, other: Any, run: int) -> str:
     if pair.words:
         return f"{pair.words}: {pair.other} is {value}"
     return f"must be {pair.relation} {pair.other}, which is {value}"
-
-
-def _valve(scenario: Scenario) -> Contradiction:
-    valve = scenario.device.valve.kind
-    fitting = " or ".join(sorted(kind.name for kind in WALKING_CONTROLLERS.values() if kind.only_switches))
-    remedy = f"take device.valve 'proportional', or controller.kind {fitting}"
-    return Contradiction(
-        "controller.kind",
-        valve != "proportional" and not law_of(scenario).only_switches,
-        lambda _run: (
-            f"opens its valve gradually, which in a walk only a proportional valve does, not a {valve} one: {remedy}"
-        ),
-    )
 
 
 def _times(scenario: Scenario) -> Iterator[Contradiction]:

@@ -1,7 +1,7 @@
 """From a name or a file to a scenario that is a walk; every mistake is one clear line."""
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from importlib import resources
@@ -13,7 +13,7 @@ from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import DataError, ParameterError, PpafoError, ScenarioError, one_line, refused_as
 from ppafo.gait import NORMATIVE, load_gait
 from ppafo.model.catalog import VALVES
-from ppafo.model.declaration import FORCE_LAG, PRESSURE_LAG, VALVE_DELAY, VALVE_LAG, Quantity
+from ppafo.model.declaration import FORCE_LAG, PRESSURE_LAG, VALVE_DELAY, VALVE_LAG
 from ppafo.model.plant_faults import PLANT_FAULTS, SHUT_OFF
 from ppafo.model.regulator import SupplyLines
 from ppafo.parameters import ParameterSet
@@ -261,8 +261,13 @@ def _control(
         # A timing of a controller that uses no gait phase is refused.
         with_timing(law, TIMINGS[timing_of(reading.document)])
     sections = {"controller": law.quantities, "timing": timing_settings(timing_of(reading.document))}
-    found = links_of_defaults(sections, device, lines)
-    links = {path: own for path, own in found.items() if value_at(reading.document, path) is None}
+    terms = _terms(device.valve) | nominal_terms(device, lines)
+    links: dict[str, tuple[Follows, ...]] = {
+        f"{section}.{item.name}": (Follows(tuple(terms[name] for name in item.follows), item.default or 0.0),)
+        for section, items in sections.items()
+        for item in items
+        if item.follows and value_at(reading.document, f"{section}.{item.name}") is None
+    }
     present: dict[str, Any] = {f"valve.{name}": number for name, number in device.valve.settings.items()}
     present |= {f"sensors.{name}": number for name, number in sensors.items()}
     if lines is not None:
@@ -274,7 +279,10 @@ def _control(
     present |= {path: device_number_at(device, path) for path in followed - set(present)}
     settings: dict[str, float] = {}
     for section, items in sections.items():
-        known = (with_default(item, f"{section}.{item.name}", links, present.__getitem__) for item in items)
+        known = []
+        for item in items:
+            link = links.get(f"{section}.{item.name}")
+            known.append(item if link is None else replace(item, default=float(link[0].number(present.__getitem__))))
         settings |= reading.section(section, tuple(known))
     rate, period = (value_at(reading.document, f"controller.{name}") for name in ("rate", "period"))
     seconds = DEFAULT_PERIOD if period is None else reading.number("controller.period", PERIOD)
@@ -346,22 +354,6 @@ WALKING = Layout(FILE, OF_A_WALK, walk_file, walk_file, build_walk)
 def lag_of_bandwidth(bandwidth: float) -> float:
     """Time constant [s] of a sensor of a bandwidth [Hz]; 0 for one that follows at once, whose bandwidth is 0."""
     return 1.0 / (_TURN * bandwidth) if bandwidth > 0.0 else 0.0
-
-
-def links_of_defaults(sections: Mapping[str, Iterable[Quantity]], device: Device, lines: SupplyLines | None) -> Graph:
-    """Return the links of the quantities of some sections whose defaults follow others, by path."""
-    terms = _terms(device.valve) | nominal_terms(device, lines)
-    return {
-        f"{section}.{item.name}": (Follows(tuple(terms[name] for name in item.follows), item.default or 0.0),)
-        for section, items in sections.items()
-        for item in items
-        if item.follows
-    }
-
-
-def with_default(item: Quantity, path: str, links: Graph, present: Callable[[str], Any]) -> Quantity:
-    """Return a quantity with the default that follows from what others are at ``present``."""
-    return replace(item, default=float(links[path][0].number(present))) if path in links else item
 
 
 def _terms(valve: Valve) -> dict[str, Term]:

@@ -248,8 +248,10 @@ def law_of(scenario: Scenario) -> ControllerKind:
 
 def fed_device(scenario: Scenario) -> Device:
     """The device with the gas that its supply has at the start: cold gas where it hangs on a bottle."""
-    bottle = walk_of(scenario).bottle
-    return scenario.device if bottle is None else bottle.device_at_start(scenario.device)
+    bottle, device = walk_of(scenario).bottle, scenario.device
+    if bottle is None:
+        return device
+    return replace(device, gas=replace(device.gas, temperature=bottle.offers_first().gas_temperature))
 
 
 def task_sequence_of_walk(scenario: Scenario) -> PlannedSequence | None:

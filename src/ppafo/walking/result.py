@@ -91,8 +91,8 @@ def recording_of_walk(
 
 
 def supply_channels(supply: SupplyCourse, time: Floats, record: Mapping[str, Floats]) -> dict[str, tuple[Floats, str]]:
-    """Channels of the bottle of a walk with their units."""
-    found = {name: (supply.at(name, time), UNITS[name]) for name in supply.values}
+    """Channels of the bottle of a walk with their units, straight between the times at which it met the device."""
+    found = {name: (np.interp(time, supply.times, values), UNITS[name]) for name, values in supply.values.items()}
     return found | {"bottle_mass": (supply.first.mass - record["line_state.regulated_mass"], "kg")}
 
 

@@ -17,7 +17,7 @@ from ppafo.signals.recording import Floats
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.gait_series import ankle_path, gait_timing
 from ppafo.walking.motion import walk_of
-from ppafo.walking.task_sequence import PlannedSequence, Span
+from ppafo.walking.task_sequence import PlannedSequence
 
 PHASES = np.linspace(0.0, 1.0, 101)
 """Phases from heel strike to heel strike at which curves are averaged."""
@@ -103,9 +103,17 @@ def walk_metrics(
     ``starts`` are the samples after each heel strike, ``helped`` tells which strides had help and ``counted`` which of
     all are for means. ``averages`` are over the counted strides with help.
     """
-    found = stride_metrics(configuration, strides, averages, helped & counted)
-    found |= counts_of_strides(recording, helped)
-    return found | _tracking(recording, starts, helped & counted) | first_less_help(recording)
+    chosen = helped & counted
+    found = stride_metrics(configuration, strides, averages, chosen) | counts_of_strides(recording, helped)
+    # A controller that requests a torque is judged by how well it gets it in push-off.
+    if "reference" in recording and chosen.any():
+        pushes = samples_of(chosen, starts, recording.time.size) & (recording["controller_phase"] == PUSH_OFF)
+        error = (recording["reference"] - recording["torque"])[pushes]
+        if error.size:
+            rms = float(np.sqrt(np.mean(error**2)))
+            summary = "RMS of requested torque less actuator torque in push-off"
+            found["push_off_error"] = Metric(rms, "N m", summary)
+    return found | first_less_help(recording)
 
 
 def counts_of_strides(recording: Recording, helped: NDArray[np.bool_]) -> dict[str, Metric]:
@@ -171,18 +179,6 @@ def lowest_toes(configuration: Scenario, height: Floats) -> Metric:
         "m",
         "lowest toe height above ground in mid-swing of the mean stride; below 0 they would drag",
     )
-
-
-def _tracking(recording: Recording, starts: NDArray[np.intp], chosen: NDArray[np.bool_]) -> dict[str, Metric]:
-    """How well a controller that wants a torque gets it in push-off; nothing for others or without strides."""
-    if "reference" not in recording or not chosen.any():
-        return {}
-    pushes = samples_of(chosen, starts, recording.time.size) & (recording["controller_phase"] == PUSH_OFF)
-    error = (recording["reference"] - recording["torque"])[pushes]
-    if not error.size:
-        return {}
-    rms = float(np.sqrt(np.mean(error**2)))
-    return {"push_off_error": Metric(rms, "N m", "RMS of requested torque less actuator torque in push-off")}
 
 
 def first_less_help(recording: Recording) -> dict[str, Metric]:
@@ -253,46 +249,43 @@ def segment_results(
     starts: NDArray[np.intp],
 ) -> tuple[SegmentResult, ...]:
     """The segments that a recording reached; ``works`` [J] of its whole strides, between strikes at ``starts``."""
-    end = float(recording.time[-1])
-    reached = [span for span in planned.spans if float(span.start) < end]
-    return tuple(_segment(configuration, span, recording, works, starts) for span in reached)
-
-
-def _segment(
-    configuration: Scenario, span: Span, recording: Recording, works: Floats, starts: NDArray[np.intp]
-) -> SegmentResult:
-    time = recording.time
-    last = min(float(span.end), float(time[-1]))
-    own = (time >= float(span.start)) & (time <= last)
-    strikes = time[starts]
-    # The last strike of a recording begins a stride that is not whole: it has no work of its own.
-    begun = np.flatnonzero((strikes >= float(span.start)) & (strikes < last))
-    gas = np.interp([float(span.start), last], time, recording["supplied_mass"])
+    time, contact = recording.time, recording["contact"]
+    strikes, end = time[starts], float(time[-1])
     heel = recording["heel_force"] > LOADED_HEEL * walk_of(configuration).wearer.body_mass * STANDARD_GRAVITY
-    loaded = own & heel & (recording["contact"] <= FLAT) & (recording["contact"] != SWING)
-    push = recording["torque"][loaded]
-    helped, safe_time = 0, None
-    # Where no controller works there is no help, and no safe state either.
-    if "safe_state" in recording:
-        safe = recording["safe_state"] > 0.5
-        edges = np.append(starts, time.size)
-        helped = sum(not safe[edges[stride] : edges[stride + 1]].any() for stride in begun)
-        # Where less help begins within the segment: one that was in its safe state before has no time of its own.
-        begins = np.flatnonzero(own & safe & ~np.append(False, safe[:-1]))
-        safe_time = float(time[begins[0]]) if begins.size else None
-    return SegmentResult(
-        kind=span.kind,
-        title=span.title,
-        start=float(span.start),
-        end=last,
-        strides=begun.size,
-        helped=helped,
-        gas=float(gas[1] - gas[0]),
-        net_push_off_work=float(works[begun[begun < works.size]].sum()),
-        lowest_toes=_lowest_toes(configuration, recording, own),
-        flat_push=max(float(push.max()), 0.0) if push.size else 0.0,
-        safe_time=safe_time,
-    )
+    found = []
+    for span in planned.spans:
+        start, last = float(span.start), min(float(span.end), end)
+        if start >= end:
+            continue
+        own = (time >= start) & (time <= last)
+        # The last strike of a recording begins a stride that is not whole: it has no work of its own.
+        begun = np.flatnonzero((strikes >= start) & (strikes < last))
+        gas = np.interp([start, last], time, recording["supplied_mass"])
+        push = recording["torque"][own & heel & (contact <= FLAT) & (contact != SWING)]
+        helped, safe_time = 0, None
+        # Where no controller works there is no help, and no safe state either.
+        if "safe_state" in recording:
+            safe = recording["safe_state"] > 0.5
+            edges = np.append(starts, time.size)
+            helped = sum(not safe[edges[stride] : edges[stride + 1]].any() for stride in begun)
+            # Where less help begins within the segment: one that was in its safe state before has no time of its own.
+            begins = np.flatnonzero(own & safe & ~np.append(False, safe[:-1]))
+            safe_time = float(time[begins[0]]) if begins.size else None
+        result = SegmentResult(
+            kind=span.kind,
+            title=span.title,
+            start=start,
+            end=last,
+            strides=begun.size,
+            helped=helped,
+            gas=float(gas[1] - gas[0]),
+            net_push_off_work=float(works[begun[begun < works.size]].sum()),
+            lowest_toes=_lowest_toes(configuration, recording, own),
+            flat_push=max(float(push.max()), 0.0) if push.size else 0.0,
+            safe_time=safe_time,
+        )
+        found.append(result)
+    return tuple(found)
 
 
 def _lowest_toes(configuration: Scenario, recording: Recording, own: NDArray[np.bool_]) -> float | None:
@@ -308,15 +301,6 @@ def _lowest_toes(configuration: Scenario, recording: Recording, own: NDArray[np.
         middle = [first + round((last - first) * (at - timing.toe_off) / span) for at in timing[4:6]]
         found.append(float(recording["toe_height"][middle[0] : middle[1] + 1].min()))
     return min(found, default=None)
-
-
-_SAME_TIME = 0.05
-"""Time [s] by which a recording may end before its task sequence: its samples."""
-
-
-def is_whole_task_sequence(walked: float, planned: float) -> bool:
-    """True where a task sequence of a planned time [s] was walked to its end, after a time [s] by its recording."""
-    return walked >= planned - _SAME_TIME
 
 
 def task_sequence_metrics(

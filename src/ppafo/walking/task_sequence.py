@@ -118,7 +118,8 @@ def load_task_sequence(name_or_path: str | Path) -> TaskSequence:
     """Return a task sequence by its name in the package or the path of its file; ScenarioError for a mistake in it."""
     file = label(str(name_or_path))
     document = FILE.parse(FILE.read(name_or_path), file)
-    validate(_outline(), document, file, ScenarioError)
+    # What is in the segments is checked segment by segment.
+    validate(_task_sequence_table(dict[str, Any], "TaskSequenceOutline"), document, file, ScenarioError)
     segments = []
     for number, given in enumerate(document["segment"], start=1):
         kind = given.get("kind")
@@ -194,6 +195,7 @@ def _segment_table(kind: str) -> type[BaseModel]:
     return table(f"{model_name(kind)}Segment", kind_field(kind, summary) | quantity_fields(given) | free)
 
 
+@functools.cache
 def _task_sequence_table(segment: Any, name: str) -> type[BaseModel]:
     fields: dict[str, Any] = {
         "schema_version": (Literal[1], Field(description="version of this layout")),
@@ -205,12 +207,6 @@ def _task_sequence_table(segment: Any, name: str) -> type[BaseModel]:
         ),
     }
     return table(name, fields)
-
-
-@functools.cache
-def _outline() -> type[BaseModel]:
-    """The layout of a task sequence without what is in its segments, which is checked segment by segment."""
-    return _task_sequence_table(dict[str, Any], "TaskSequenceOutline")
 
 
 def json_schema() -> dict[str, Any]:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ppafo.control.walking import event_on_off
 from ppafo.control.walking.fault_flags import FAULT_FLAGS
 from ppafo.engine.lane_rows import LANES
-from ppafo.engine.lanes import STEPS_PER_CALL, Batch, BatchResult, Floats, begin_block, run_batch
+from ppafo.engine.lanes import STEPS_PER_CALL, Batch, Floats, begin_block, run_batch
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import NEVER_FAILED, batch_of
 from ppafo.errors import ScenarioError, SimulationError
@@ -81,7 +81,12 @@ def walk(
         check_no_bottle(chosen)
         return result_of_walk(chosen, run, run_sampled(batch_of(run), custom), None)
     if carried is None:
-        return result_of_walk(chosen, run, _run_in_parts(batch_of(run), run.step, progress), None)
+        # In parts short enough for an interrupt to be seen and for progress to be reported.
+        block, count = begin_block(batch_of(run)), run.step_count
+        for done in range(0, count, STEPS_PER_CALL):
+            block.advance(min(STEPS_PER_CALL, count - done))
+            progress(min(done + STEPS_PER_CALL, count) * run.step / 60.0, count * run.step / 60.0)
+        return result_of_walk(chosen, run, block.result(), None)
     outcome, supply = run_on_bottle(run, fed_device(chosen), carried, walk_of(chosen).gait.stride_time, progress)
     return result_of_walk(chosen, run, outcome, supply)
 
@@ -122,16 +127,6 @@ def lasting(scenario: Scenario, minutes: float | None) -> Scenario:
         if is_bad:
             raise ScenarioError(line(0))
     return with_duration(scenario, 60.0 * minutes)
-
-
-def _run_in_parts(batch: Batch, step: float, progress: Progress) -> BatchResult:
-    """Run in parts short enough for an interrupt to be seen and for progress to be reported."""
-    block = begin_block(batch)
-    count = batch.clock.step_count
-    for done in range(0, count, STEPS_PER_CALL):
-        block.advance(min(STEPS_PER_CALL, count - done))
-        progress(min(done + STEPS_PER_CALL, count) * step / 60.0, count * step / 60.0)
-    return block.result()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -173,17 +173,14 @@ def draw_bounded_normal(generator: np.random.Generator, shape: tuple[int, ...]) 
     return np.clip(generator.standard_normal(shape), -MAXIMUM_DEVIATIONS, MAXIMUM_DEVIATIONS)
 
 
-def _shares() -> dict[str, float]:
-    """Return the numbers of the leg of the paper's subject over the powers of its body mass and its stature."""
-    paper = paper_subject()
-    return {
-        name: getattr(paper, name) / (paper.body_mass**of_mass * paper.stature**of_stature)
-        for name, (of_mass, of_stature) in SCALING.items()
-    }
-
+_PAPER = paper_subject()
+_SHARES: Mapping[str, float] = {
+    name: getattr(_PAPER, name) / (_PAPER.body_mass**of_mass * _PAPER.stature**of_stature)
+    for name, (of_mass, of_stature) in SCALING.items()
+}
+"""Numbers of the leg of the paper's subject over the powers of its body mass and its stature."""
 
 # Constants of their own, for the functions below are translated to C.
-_SHARES = _shares()
 _SHANK_CENTRE, _FOOT_CENTRE = _SHARES["shank_mass_centre"], _SHARES["foot_mass_centre"]
 _HEEL, _TOE = _SHARES["heel_lever"], _SHARES["toe_lever"]
 _SHANK_MASS, _FOOT_MASS = _SHARES["shank_mass"], _SHARES["foot_mass"]

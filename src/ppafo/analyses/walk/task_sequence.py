@@ -20,7 +20,7 @@ from ppafo.walking.figures.mean_stride import walk_figure
 from ppafo.walking.figures.over_time import bottle_figure, peak_torques, task_sequence_figure
 from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WalkResult
-from ppafo.walking.strides import SegmentResult, is_whole_task_sequence
+from ppafo.walking.strides import SegmentResult
 from ppafo.walking.walk import Comparison
 
 _BOTTLE_CAPTION = (
@@ -135,6 +135,8 @@ _EXPLAINED = (
     "do: a constant walk ratio. Standing is a vertical shank over a flat foot. The forces of a stride and the fraction "
     "of the stance stay the same at every speed.",
 )
+_SAME_TIME = 0.05
+"""Time [s] by which a recording may end before its task sequence: its samples."""
 _MEAN = (
     "Mean over the strides at an even speed on level ground, of all speeds together, with the standard deviation as a "
     "band."
@@ -150,7 +152,7 @@ def task_sequence_parts(comparison: Comparison) -> tuple[Part, ...]:
     rows = [asdict(segment) | {"without": without.get(segment.start)} for segment in worn.segments]
     numbers: dict[str, float] = {name: item.value for name, item in worn.metrics.items()}
     bare_toes = bare.metrics.get("task_sequence_lowest_toes")
-    is_whole = is_whole_task_sequence(numbers["task_sequence_time"], numbers["task_sequence_planned_time"])
+    is_whole = numbers["task_sequence_time"] >= numbers["task_sequence_planned_time"] - _SAME_TIME
     rows.append(
         {
             "title": "whole task sequence" if is_whole else "as far as walked",
