@@ -55,10 +55,6 @@ class SeriesOfMany:
     cosines: Floats
     sines: Floats
 
-    def at_heel_strike(self) -> Floats:
-        """Value at phase 0."""
-        return np.asarray(self.mean + self.cosines.sum(axis=1))
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VariedGaits:
@@ -171,7 +167,8 @@ def drawn_people(build: Build, gaits: VariedGaits, generator: np.random.Generato
     scale, shift = (draw_bounded_normal(generator, (count,)) for _ in range(2))
     scale[0], shift[0] = 0.0, 0.0
     timing: Any = {"start": np.zeros(count), **gaits.timing}
-    shank, ankle = (gaits.series[name].at_heel_strike() for name in ("shank", "ankle"))
+    # At phase 0 a curve is its mean and the sum of its cosines.
+    shank, ankle = (of.mean + of.cosines.sum(axis=1) for of in (gaits.series["shank"], gaits.series["ankle"]))
     strike: Any = shank - ankle + 0.5 * np.pi - gaits.timing["ground_angle"]
     thresholds: Any = 1.0 + THRESHOLD_VARIATION * scale
     mass: Any = build.mass

@@ -344,7 +344,14 @@ def _strides(
     """Plan a segment; where it walks on evenly and on level ground, that time [s] is given."""
     kind, values = segment.kind, segment.values
     if kind in ("stand", "rest"):
-        _stand(planner, values["duration"], RESTING_LOAD if kind == "rest" else STANDING_LOAD)
+        left, load = values["duration"], RESTING_LOAD if kind == "rest" else STANDING_LOAD
+        if planner.ratio > 0.0:
+            planner.go(1.0, 0.0, 0.0, load)
+        elif planner.load != load:
+            changing = min(LOADING_TIME, 0.5 * left)
+            planner.stay(changing + 0.0 * planner.frequency, load)
+            left -= changing
+        planner.stay(left + 0.0 * planner.frequency, load)
     elif kind == "stop":
         planner.go(values["strides"], 0.0, 0.0)
     elif kind == "start":
@@ -365,16 +372,6 @@ def _strides(
         slope = values.get("slope", 0.0)
         is_level = kind == "walk" and slope == 0.0
         yield from _walk(planner, values, ratio, ratio * shorter, tilt, slope, is_level)
-
-
-def _stand(planner: _Planner, duration: float, load: float) -> None:
-    if planner.ratio > 0.0:
-        planner.go(1.0, 0.0, 0.0, load)
-    elif planner.load != load:
-        changing = min(LOADING_TIME, 0.5 * duration)
-        planner.stay(changing + 0.0 * planner.frequency, load)
-        duration -= changing
-    planner.stay(duration + 0.0 * planner.frequency, load)
 
 
 def _walk(

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ppafo.control.walking import event_on_off
 from ppafo.control.walking.fault_flags import FAULT_FLAGS
@@ -345,17 +344,13 @@ def walk_population(
         "stance_share": gaits.timing["toe_off"],
     }
     kept = [{name: values[good] for name, values in table.items()} for table in (traits, outcomes)]
-    vented, paused, found = _less_help(rows, good)
-    return Population(configuration, seconds / 60.0, seed, kept[0], kept[1], int((~good).sum()), vented, paused, found)
-
-
-def _less_help(rows: Mapping[str, Floats], good: NDArray[np.bool_]) -> tuple[int, int, dict[str, int]]:
-    """Return how many of the good walks ended stopped, how many others had less help, and the last flags of both."""
-    if SAFE_ROW not in rows:
-        return 0, 0, {}
-    stopped, less = rows[SAFE_ROW][good] == STOPPED, rows[VENTINGS_ROW][good] > 0.0
-    last = Counter(FAULT_FLAGS[flag].name for flag in rows[f"{FINDING_ROW}.fault_flag"][good][less].tolist())
-    return int(stopped.sum()), int((~stopped & less).sum()), dict(last.most_common())
+    vented, paused, flags = 0, 0, Counter[str]()
+    if SAFE_ROW in rows:
+        stopped, less = rows[SAFE_ROW][good] == STOPPED, rows[VENTINGS_ROW][good] > 0.0
+        vented, paused = int(stopped.sum()), int((~stopped & less).sum())
+        flags.update(FAULT_FLAGS[flag].name for flag in rows[f"{FINDING_ROW}.fault_flag"][good][less].tolist())
+    lost, last = int((~good).sum()), dict(flags.most_common())
+    return Population(configuration, seconds / 60.0, seed, kept[0], kept[1], lost, vented, paused, last)
 
 
 def _run_in_groups(batch: Batch, progress: Progress) -> Floats:

@@ -115,11 +115,6 @@ class LegArtists:
         self.foot.set_xy([ankle, heel, toe])
         self.joint.set_data([knee[0], ankle[0]], [knee[1], ankle[1]])
 
-    def colour(self, shade: str) -> None:
-        """Paint the foot."""
-        self.foot.set_facecolor(shade)
-        self.foot.set_edgecolor(shade)
-
 
 def leg_artists(axes: "Axes", colour: str, width: float, is_ghost: bool = False) -> LegArtists:
     """Add the lines of one leg to an axes, of a line width [points]; ``place`` puts them somewhere."""
@@ -346,7 +341,7 @@ class _Scene:
         ghost, worn = self.artists
         ghost.place(self.legs.healthy, index, offset)
         worn.place(self.legs.worn, index, offset)
-        worn.colour(DRAGS if drags(self.legs, index) else self.colour)
+        worn.foot.set_color(DRAGS if drags(self.legs, index) else self.colour)
         parts = (ghost.shank, worn.shank, worn.foot, ghost.foot, worn.joint)
         return [self.ticks, *parts]
 
