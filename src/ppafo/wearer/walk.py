@@ -13,7 +13,6 @@ from ppafo.engine.run import Run
 from ppafo.gait import Gait
 from ppafo.metrics.metric import REACTS
 from ppafo.model.columns import Problem, at
-from ppafo.parameters.graph import Graph
 from ppafo.parameters.plant import plant_parameters
 from ppafo.simulation.declaration import Reading
 from ppafo.simulation.loading import ScenarioRequest
@@ -41,7 +40,7 @@ from ppafo.wearer.settings import (
     start_of_body,
     wearer_of_walk,
 )
-from ppafo.wearer.way import check_reacting_task_sequence, length_of
+from ppafo.wearer.way import check_reacting_task_sequence
 
 SHORTEST_WAY = 6.0
 """Shortest walk [s] in a task sequence, unless given."""
@@ -68,15 +67,12 @@ def plan_reacting(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         lambda plant: vented_state(plant, start.ankle, 0.0),
         walk,
     )
-    return run, (too_many_steps(scenario, run.step, run.step_count), _too_long(scenario))
-
-
-def _too_long(scenario: Scenario) -> Problem:
-    """A step that is too long for a body."""
     step = scenario.run.step
-    return np.asarray(
-        step > LONGEST_STEP
-    ), lambda run: f"run.step = {at(step, run):g} s: a neuromuscular gait model needs {LONGEST_STEP:g} s or less"
+    too_long: Problem = (
+        np.asarray(step > LONGEST_STEP),
+        lambda run: f"run.step = {at(step, run):g} s: a neuromuscular gait model needs {LONGEST_STEP:g} s or less",
+    )
+    return run, (too_many_steps(scenario, run.step, run.step_count), too_long)
 
 
 def _label(motion: WalkMotion) -> str:
@@ -92,10 +88,6 @@ def _read(
     return {"wearer": paper_subject(), "body": read_reacting(reading, request.folder, request.instead, sequence)}
 
 
-def _links(_document: Mapping[str, Any]) -> Graph:
-    return {}
-
-
 def _interval(seconds: float) -> float:
     # Each sample has some hundred numbers more than a leg along a gait has.
     return 5.0e-3 if seconds <= 61.0 else (1.0e-2 if seconds <= 601.0 else 5.0e-2)
@@ -105,8 +97,9 @@ def _duration(motion: WalkMotion) -> float | None:
     wearer = wearer_of_walk(motion)
     if wearer.task_sequence is None:
         return None
+    way = sum(segment.values.get("distance", 0.0) for segment in wearer.task_sequence.segments)
     # The reflexes set the pace: at the speed of the start, to the next whole second.
-    return max(SHORTEST_WAY, float(math.ceil(length_of(wearer.task_sequence) / wearer.settings[START_SPEED.name])))
+    return max(SHORTEST_WAY, float(math.ceil(way / wearer.settings[START_SPEED.name])))
 
 
 def _remarks(motion: WalkMotion) -> list[str]:
@@ -122,11 +115,10 @@ def _document(motion: WalkMotion) -> dict[str, Any]:
     }
 
 
-def _nothing_healthy(_scenario: Scenario) -> dict[str, Any]:
+def _nothing(_of: Any) -> dict[str, Any]:
+    """Return no links of the wearer's numbers, and no numbers of a healthy walk."""
     return {}
 
-
-_PLACES = {f"wearer.{item.name}": ("motion", "body", "settings", item.name) for item in REACTIONS}
 
 REACT_KIND = replace(
     WALK_KIND,
@@ -144,14 +136,14 @@ REACT_KIND = replace(
         interval=_interval,
         check_task_sequence=check_reacting_task_sequence,
         read=_read,
-        links=_links,
+        links=_nothing,
         duration=_duration,
         subject=REACTS,
         result=reacting_result,
         remarks=_remarks,
         document=_document,
         without=with_device_off,
-        healthy=_nothing_healthy,
+        healthy=_nothing,
         finding="ppafo.wearer.answer:reacting_finding",
         exported="ppafo.wearer.export:REACTING_WALK",
     ),

@@ -4,7 +4,7 @@ Any number may be an array (runs,), or one that an export writes down.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -107,22 +107,14 @@ def check_reacting_task_sequence(sequence: TaskSequence) -> None:
 
 def stretches_of_task_sequence(sequence: TaskSequence) -> tuple[Stretch, ...]:
     """The way of a task sequence, which was checked to be one of a neuromuscular gait model."""
-    return tuple(_laid(sequence))
-
-
-def _laid(sequence: TaskSequence) -> Iterator[Stretch]:
-    place = 0.0
+    place, found = 0.0, []
     for segment in sequence.segments:
         values = dict(segment.values)
         if segment.kind == "walk":
             values["slope"] = math.tan(values.get("slope", 0.0))
-        yield Stretch(segment.kind, place, values)
+        found.append(Stretch(segment.kind, place, values))
         place += EDGE if segment.kind == "step" else values.get("distance", 0.0)
-
-
-def length_of(sequence: TaskSequence) -> float:
-    """Length of the way [m]."""
-    return sum(segment.values.get("distance", 0.0) for segment in sequence.segments)
+    return tuple(found)
 
 
 def way_of(stretches: Sequence[Stretch]) -> Way:
