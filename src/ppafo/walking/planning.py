@@ -34,8 +34,9 @@ from ppafo.walking.person import VariedGaits, crowd_of, leg_of_person, person_of
 from ppafo.walking.preparation import (
     FaultSettings,
     device_share,
+    fault_of,
+    gait_sensors,
     longest_delay,
-    sensors_of,
     smallest_chamber,
     vented_state,
     walk_from_standing,
@@ -172,10 +173,10 @@ def gait_sensors_of(scenario: Scenario) -> GaitSensors:
         left = iter(values)
         own = {name: next(left) for name in numbers}
         failing = {
-            sensor: FaultSettings(fault.kind, {name: next(left) for name in fault.numbers})
+            f"{sensor}_fault": fault_of(FaultSettings(fault.kind, {name: next(left) for name in fault.numbers}), period)
             for sensor, fault in faults.items()
         }
-        return sensors_of(own, failing, period)
+        return gait_sensors(own, period, **failing)
 
     return over_runs(made, scenario.controller.period, *given)
 

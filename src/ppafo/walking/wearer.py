@@ -263,8 +263,13 @@ def read_wearer(reading: Reading, gait: Gait, is_named: bool) -> Wearer:
 
     Where it gives the stature, segments follow that and the body mass.
     """
+    paper = subject = paper_subject()
     # The built-in gait, where nobody names it, is walked by the paper's subject and not by its own.
-    subject = _subject(gait) if is_named else paper_subject()
+    if is_named:
+        # A subject of unknown stature has the lengths of the paper's.
+        stature = 1.0 if gait.stature is None else SHANK_SHARE * gait.stature / paper.shank_length
+        segments = scaled(paper, gait.body_mass / paper.body_mass, stature)
+        subject = replace(paper, stature=paper.stature if gait.stature is None else gait.stature, **segments)
     if value_at(reading.document, STATURE) is not None:
         known = {item.name: replace(item, default=getattr(subject, item.name)) for item in WEARER}
         given = {path: reading.number(path, known[path.partition(".")[2]]) for path in (STATURE, BODY_MASS)}
@@ -283,15 +288,6 @@ def read_wearer(reading: Reading, gait: Gait, is_named: bool) -> Wearer:
                 f"{item.unit}: give wearer.{item.name}"
             )
     return Wearer(**reading.section("wearer", quantities))
-
-
-def _subject(gait: Gait) -> Wearer:
-    """Return the wearer with body mass, and lengths where the stature is known, of the subject of a gait."""
-    paper = paper_subject()
-    # A subject of unknown stature has the lengths of the paper's.
-    stature = 1.0 if gait.stature is None else SHANK_SHARE * gait.stature / paper.shank_length
-    segments = scaled(paper, gait.body_mass / paper.body_mass, stature)
-    return replace(paper, stature=paper.stature if gait.stature is None else gait.stature, **segments)
 
 
 def _of_stature(wearer: Wearer, gait: Gait, origin: str) -> str:

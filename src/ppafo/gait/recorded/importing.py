@@ -142,7 +142,7 @@ def of_usual_time(strides: Sequence[Stride], least: int) -> Strides:
     # The median: one stop among ten strides would move a mean.
     median = float(np.median([item.time for item in strides]))
     kept = [item for item in strides if abs(item.time - median) <= LARGEST_STRIDE_CHANGE * median]
-    why = "{:.3g} s long, the others are about " + f"{_mean([item.time for item in kept]):.3g} s"
+    why = "{:.3g} s long, the others are about " + f"{np.mean([item.time for item in kept]):.3g} s"
     return Strides(tuple(kept), tuple((item, why.format(item.time)) for item in strides if item not in kept), least)
 
 
@@ -523,7 +523,7 @@ def _finish(
 ) -> ImportedGait:
     """Return the gait of mean curves that legs can have; DataError where any cannot, with everything in ``wrong``."""
     taken, walk, settings, signs_from = strides.taken, footfalls.walk, source.settings, source.signs_from
-    share, time = _mean([item.stance_share for item in taken]), _mean([item.time for item in taken])
+    share, time = float(np.mean([item.stance_share for item in taken])), float(np.mean([item.time for item in taken]))
     means = {name: item.mean for name, item in curves.items()}
     fitted = {name: fit_curve(item.mean, HARMONICS[name], item.spread) for name, item in curves.items()}
     errors = {name: error for name, (_, error) in fitted.items()}
@@ -584,10 +584,6 @@ def _check_enough(strides: Strides, found: list[Stride], walk: Mapping[str, Sign
     )
 
 
-def _mean(values: Sequence[float]) -> float:
-    return float(np.mean(values))
-
-
 def _spread(values: Sequence[float]) -> float:
     return float(np.std(values, ddof=1)) if len(values) > 1 else 0.0
 
@@ -609,8 +605,8 @@ def _gait(
         body_mass=settings.body_mass or 0.0,
         stature=settings.stature,
         walking_speed=settings.walking_speed,
-        stride_time=_mean([item.time for item in strides]),
-        stance_share=_mean([item.stance_share for item in strides]),
+        stride_time=float(np.mean([item.time for item in strides])),
+        stance_share=float(np.mean([item.stance_share for item in strides])),
         stride_time_deviation=_spread([item.time for item in strides]),
         stance_share_deviation=_spread([item.stance_share for item in strides]),
         strides=len(strides),
