@@ -1,5 +1,6 @@
 """A key of an earlier version is answered with what it is called now, wherever a user may write it."""
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -61,3 +62,12 @@ def test_a_walk_names_the_task_sequence(place: str, tmp_path: Path) -> None:
 def test_a_command_names_the_task_sequence(words: list[str], now: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(words) == 2
     assert now in capsys.readouterr().err
+
+
+def test_the_folder_of_a_walk_of_an_earlier_version_is_to_be_written_again(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    walked = {"format": "ppafo walk", "configuration": {"course": {"name": "stairs"}}}
+    (tmp_path / "walk.json").write_text(json.dumps(walked), encoding="utf-8")
+    assert main(["bottle", str(tmp_path)]) == 2
+    assert "'course', which is now called 'task_sequence'; write the walk again" in capsys.readouterr().err
