@@ -128,23 +128,13 @@ def fault_numbers(part: str, kind: str) -> tuple[Quantity, ...]:
     return FAULTS[part][kind].quantities if kind else ()
 
 
-def controller_settings(kind: str) -> tuple[Quantity, ...]:
-    """Return the settings of a walking controller, none where it is unknown."""
-    known = walking_controllers()
-    return known[kind].quantities if kind in known else ()
-
-
-def timing_settings(kind: str) -> tuple[Quantity, ...]:
-    """Return the settings of an estimator of the gait phase, none where it is unknown."""
-    return TIMINGS[kind].quantities if kind in TIMINGS else ()
-
-
 def sections(kind: WalkKind, controller: str, timing: str, gas: str) -> dict[str, tuple[Quantity, ...]]:
-    """Return the declarations of the numbers of any walk with these kinds, by section."""
+    """Return the declarations of the numbers of any walk with these kinds, by section; an unknown kind has none."""
+    laws = walking_controllers()
     return {
         "wearer": kind.numbers,
-        "controller": (RATE, PERIOD, *controller_settings(controller)),
-        "timing": timing_settings(timing),
+        "controller": (RATE, PERIOD, *(laws[controller].quantities if controller in laws else ())),
+        "timing": TIMINGS[timing].quantities if timing in TIMINGS else (),
         "sensors": (*WALK_SENSORS, SEED),
         "run": (DURATION, STEP),
         "gas_model": gas_settings(gas),

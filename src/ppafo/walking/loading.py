@@ -55,7 +55,6 @@ from ppafo.walking.declaration import (
     WALK_SENSORS,
     fault_numbers,
     timing_of,
-    timing_settings,
     walk_file,
 )
 from ppafo.walking.kind import WalkKind
@@ -257,10 +256,11 @@ def _control(
     """
     kind = kind_at(reading.document, "controller")
     law = walking_controllers()[kind]
+    timing = TIMINGS[timing_of(reading.document)]
     with refused_as(ScenarioError, f"{reading.file}", ScenarioError):
         # A timing of a controller that uses no gait phase is refused.
-        with_timing(law, TIMINGS[timing_of(reading.document)])
-    sections = {"controller": law.quantities, "timing": timing_settings(timing_of(reading.document))}
+        with_timing(law, timing)
+    sections = {"controller": law.quantities, "timing": timing.quantities}
     terms = _terms(device.valve) | nominal_terms(device, lines)
     links: dict[str, tuple[Follows, ...]] = {
         f"{section}.{item.name}": (Follows(tuple(terms[name] for name in item.follows), item.default or 0.0),)

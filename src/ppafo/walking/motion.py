@@ -28,7 +28,6 @@ from ppafo.walking.declaration import (
     by_path,
     fault_numbers,
     sections,
-    timing_settings,
 )
 from ppafo.walking.kind import WalkKind
 from ppafo.walking.preparation import FaultSettings
@@ -126,8 +125,8 @@ PLACES: Mapping[str, tuple[str, ...]] = {
     f"wearer.{PERSON.name}": ("motion", PERSON.name),
     **{
         f"timing.{item.name}": ("controller", "settings", item.name)
-        for kind in TIMINGS
-        for item in timing_settings(kind)
+        for kind in TIMINGS.values()
+        for item in kind.quantities
     },
     **{f"sensors.{name}": ("motion", "forces", name) for name in FORCES},
     **{
