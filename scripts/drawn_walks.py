@@ -1,6 +1,6 @@
-"""Walks by chance: courses, speeds, wearers and devices are drawn, and what must hold of all of them is counted.
+"""Walks by chance: task sequences, speeds, wearers and devices are drawn, and what must hold of all of them is counted.
 
-    python scripts/drawn_walks.py --courses 1000 --seed 32
+    python scripts/drawn_walks.py --task-sequences 1000 --seed 32
     python scripts/drawn_walks.py --faults 60 --seed 32
     python scripts/drawn_walks.py --residuals 12 --seed 32
 
@@ -102,8 +102,8 @@ class Outcome:
     unhelped: int
 
 
-def drawn_course(draws: np.random.Generator) -> str:
-    """The text of a course: walking on level ground and slopes, turns, stairs, stumbles, scuffs, stops, sitting."""
+def drawn_task_sequence(draws: np.random.Generator) -> str:
+    """The text of a task sequence: walking on level ground and slopes, turns, stairs, stumbles, scuffs, stops, rest."""
     parts, walks = ["stand"], False
     for _ in range(int(draws.integers(3, 7))):
         kinds = [
@@ -164,10 +164,10 @@ def drawn_device(base: Scenario, draws: np.random.Generator) -> dict[str, float]
 
 
 def drawn_walk(valve: str, draws: np.random.Generator, folder: Path, overrides: Iterable[str] = ()) -> Scenario:
-    """A walk with a drawn course, wearer and device; drawn again where no such gait can walk the course."""
+    """A walk with a drawn task sequence, wearer and device; drawn again where no such gait can walk that."""
     while True:
         file = folder / "drawn.toml"
-        file.write_text(drawn_course(draws))
+        file.write_text(drawn_task_sequence(draws))
         sensors = [
             f"faults.{sensor}.{name}={value}"
             for sensor, offset in (
@@ -179,7 +179,7 @@ def drawn_walk(valve: str, draws: np.random.Generator, folder: Path, overrides: 
         ]
         person = f"wearer.person={int(draws.integers(1, 100_000))}"
         try:
-            base = load_walk(valve, [person, *sensors, *overrides], course=file)
+            base = load_walk(valve, [person, *sensors, *overrides], task_sequence=file)
         except ScenarioError:
             continue
         return with_numbers(base, drawn_device(base, draws))
@@ -379,15 +379,15 @@ def row_with(valve: str, part: str, kind: str, found: list[Outcome]) -> str:
 def main() -> None:
     """Print what is asked for."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--courses", type=int, default=0, help="drawn walks without a fault, of each valve")
+    parser.add_argument("--task-sequences", type=int, default=0, help="drawn walks without a fault, of each valve")
     parser.add_argument("--faults", type=int, default=0, help="drawn walks of each fault and valve")
     parser.add_argument("--residuals", type=int, default=0, help="drawn walks of each row of the table of residuals")
     parser.add_argument("--seed", type=int, default=32)
     given = parser.parse_args()
-    if given.courses:
+    if given.task_sequences:
         print(f"{WITHOUT}\n|{'---|' * (WITHOUT.count('|') - 1)}")
         for valve in VALVES:
-            print(row_without(valve, without_faults(valve, given.courses, given.seed)), flush=True)
+            print(row_without(valve, without_faults(valve, given.task_sequences, given.seed)), flush=True)
     if given.faults:
         print(f"{WITH}\n|{'---|' * (WITH.count('|') - 1)}")
         for part, kinds in PLANT_FAULTS.items():

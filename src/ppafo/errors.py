@@ -102,7 +102,11 @@ def said_missing(names: Sequence[str]) -> str:
     return f"{listed} {'is' if len(quoted) == 1 else 'are'} missing"
 
 
-RENAMED_KEYS: Mapping[str, str] = {"quantum": "resolution", "volume_per_angle": "displacement_per_radian"}
+RENAMED_KEYS: Mapping[str, str] = {
+    "course": "task_sequence",
+    "quantum": "resolution",
+    "volume_per_angle": "displacement_per_radian",
+}
 """Keys of files of earlier versions and what they are called now."""
 
 
@@ -114,8 +118,12 @@ def nearest_name(name: str, allowed: Iterable[str]) -> str:
     """
     word, known = str(name), list(allowed)
     before, dot, last = word.rpartition(".")
-    if (now := f"{before}{dot}{RENAMED_KEYS.get(last, last)}") != word and now in known:
-        return f", which is now called '{now}'"
+    if last in RENAMED_KEYS:
+        renamed = f"{before}{dot}{RENAMED_KEYS[last]}"
+        # Commands have a hyphen where files have an underscore.
+        for now in (renamed, renamed.replace("_", "-")):
+            if now in known:
+                return f", which is now called '{now}'"
     # 0.6 finds a transposed or forgotten letter, and is difflib's own default.
     near = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
     if not near:

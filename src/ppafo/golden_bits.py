@@ -33,15 +33,15 @@ VARIED = {
     ),
 }
 """Scenarios with settings of their own, for what no shipped one has."""
-COURSES = {"first-steps": "proportional"}
-"""Courses, and the walk that takes each."""
+TASK_SEQUENCES = {"first-steps": "proportional"}
+"""Task sequences, and the walk that takes each."""
 WALKED = 4.0
 """Seconds of a walk."""
 
 
 def names() -> tuple[str, ...]:
     """Return the names of all runs."""
-    return (*list_scenarios(), *VARIED, *list_walks(), *COURSES)
+    return (*list_scenarios(), *VARIED, *list_walks(), *TASK_SEQUENCES)
 
 
 def plain_batch(name: str) -> Batch:
@@ -51,7 +51,7 @@ def plain_batch(name: str) -> Batch:
         return batch_of(plan_run(load_scenario(scenario, settings)))
     if name in list_scenarios():
         return batch_of(plan_run(load_scenario(name)))
-    walk = load_walk(COURSES[name], course=name) if name in COURSES else load_walk(name)
+    walk = load_walk(TASK_SEQUENCES[name], task_sequence=name) if name in TASK_SEQUENCES else load_walk(name)
     return batch_of(plan_walk(with_duration(walk, WALKED)))
 
 

@@ -21,7 +21,7 @@ from ppafo.simulation.scenario import Scenario
 
 _OF_A_VANE = ("motion", "initial", "reference")
 """Sections of which the file of a vane has one; a walk has none of them unless its motion says that it is a walk."""
-_OF_A_LEG = ("wearer", "timing", "faults", "bottle", "gait", "course")
+_OF_A_LEG = ("wearer", "timing", "faults", "bottle", "gait", "task_sequence")
 """Sections that only the file of a walk has."""
 
 

@@ -70,13 +70,13 @@ def test_the_task_sequence_and_the_bottle_of_the_page_load(tmp_path: Path) -> No
     walk_file.write_text(blocks("toml")[0] + blocks("toml")[2])
     assert walk_of(load_walk(walk_file)).bottle is not None
     walk_file.write_text(blocks("toml")[0])
-    assert walk_of(load_walk(walk_file, [f"course={tmp_path / 'door.toml'}"])).course is not None
+    assert walk_of(load_walk(walk_file, [f"task_sequence={tmp_path / 'door.toml'}"])).task_sequence is not None
 
 
 def test_the_segments_of_the_page_are_rows_of_what_the_command_prints(capsys: pytest.CaptureFixture[str]) -> None:
-    rows = re.findall(r"^    \*? +(rest|start, 0.4 m/s|ramp, 1 m/s|whole course) +(.*)$", PAGE, re.MULTILINE)
+    rows = re.findall(r"^    \*? +(rest|start, 0.4 m/s|ramp, 1 m/s|whole task sequence) +(.*)$", PAGE, re.MULTILINE)
     assert len(rows) == 4
-    assert main(["walk", "solenoid", "--course", "first-steps"]) == 0
+    assert main(["walk", "solenoid", "--task-sequence", "first-steps"]) == 0
     printed = capsys.readouterr().out
     for name, numbers in rows:
         (found,) = re.findall(rf"^\*? +{re.escape(name)} +(.*)$", printed, re.MULTILINE)

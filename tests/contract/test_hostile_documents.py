@@ -28,8 +28,8 @@ from ppafo.simulation.loading import load_scenario, scenario_from_dict
 from ppafo.storage.foreign import load_column_map
 from ppafo.storage.result_folder import read_document, read_recording
 from ppafo.studies.loading import load_study
-from ppafo.walking.course import load_course
 from ppafo.walking.loading import load_walk
+from ppafo.walking.task_sequence import load_task_sequence
 
 LOADERS: dict[str, Callable[[str], Any]] = {
     "parameters": load_parameter_set,
@@ -39,7 +39,7 @@ LOADERS: dict[str, Callable[[str], Any]] = {
     "parts": load_catalogue,
     "design": read_design_file,
     "walk": load_walk,
-    "course": load_course,
+    "task-sequence": load_task_sequence,
     "identification": load_problem,
     "columns": load_column_map,
     "rig": load_preset,

@@ -310,6 +310,7 @@ class CommandParser(argparse.ArgumentParser):
 
 
 RENAMED = {
+    "--course": "--task-sequence",
     "--first": "--first-draws",
     "--gas-per-step": "--gas-per-stride",
     "--least-strides": "--minimum-strides",

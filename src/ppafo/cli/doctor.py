@@ -18,7 +18,7 @@ FORMATS: dict[str, str] = {
     "parts": "ppafo.parameters.parts.catalogue",
     "design": "ppafo.analyses.design.loading",
     "walk": "ppafo.walking.declaration",
-    "course": "ppafo.walking.course",
+    "task-sequence": "ppafo.walking.task_sequence",
     "identification": "ppafo.identification.problem",
     "columns": "ppafo.storage.foreign",
     "rig": "ppafo.rig.preset",

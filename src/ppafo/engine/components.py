@@ -94,7 +94,7 @@ class LegScheme:
     ``reacts`` has a body of its own, which no gait leads.
     """
 
-    takes_course: bool
+    takes_task_sequence: bool
     parameters: Mapping[str, type]
     states: Mapping[str, type]
     loads: tuple[str, ...]

@@ -171,9 +171,9 @@ class Program:
         return self.leg is not None
 
     @property
-    def takes_course(self) -> bool:
+    def takes_task_sequence(self) -> bool:
         """True where that leg walks a task sequence: it stands, starts, changes its speed and stops."""
-        return self.leg is not None and self.leg.takes_course
+        return self.leg is not None and self.leg.takes_task_sequence
 
     @property
     def reacts(self) -> bool:

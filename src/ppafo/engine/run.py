@@ -24,7 +24,7 @@ from ppafo.model.sensors import NOTHING_SEEN, GaitSensors, SensorParameters
 if TYPE_CHECKING:  # for most runs know no leg, no line, no walk and no fault
     from ppafo.engine.led_leg import LedLeg
     from ppafo.engine.scheme.walking import DeviceShare, WalkState
-    from ppafo.model.gait import Course, GaitSeries, GaitTiming
+    from ppafo.model.gait import GaitSeries, GaitTiming, TimedSequence
     from ppafo.model.leg import LegParameters
     from ppafo.model.plant_faults import PlantFaults, ShutOff
     from ppafo.model.regulator import LineState, SupplyLines
@@ -60,7 +60,7 @@ class WornLeg(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Walk:
-    """A leg that a gait leads; ``course`` None where it walks stride after equal stride.
+    """A leg that a gait leads; ``task_sequence`` None where it walks stride after equal stride.
 
     ``failing`` are the faults of the plant and its shut-off valve, None where it has neither.
     """
@@ -71,15 +71,16 @@ class Walk:
     timing: "GaitTiming"
     sensors: GaitSensors
     initial: "WalkState"
-    course: "Course | None" = None
+    task_sequence: "TimedSequence | None" = None
     failing: "tuple[PlantFaults, ShutOff] | None" = None
 
     def groups(self) -> LegGroups:
         """Its scheme, and its groups of rows in the order of ``Program``."""
-        fails, which = "" if self.failing is None else "FAILING_", "STRIDES" if self.course is None else "COURSE"
+        fails = "" if self.failing is None else "FAILING_"
+        which = "STRIDES" if self.task_sequence is None else "TASK_SEQUENCE"
         scheme: LegScheme = kind_at(f"ppafo.engine.scheme.walking:{fails}{which}")
         parameters = [self.leg, self.share, self.gait, self.timing, self.sensors]
-        parameters += [] if self.course is None else [self.course]
+        parameters += [] if self.task_sequence is None else [self.task_sequence]
         states = [self.initial, NOTHING_SEEN]
         if self.failing is not None:
             from ppafo.model.plant_faults import POWERED  # most runs have no fault

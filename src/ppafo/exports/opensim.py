@@ -23,7 +23,7 @@ from ppafo.walking.walk import walk
 
 Side = Literal["right", "left"]
 FEW_STRIDES = 0.2
-"""Minutes of a walk without a course, unless given."""
+"""Minutes of a walk without a task sequence, unless given."""
 SHORTEST_STRIDE, LONGEST_STRIDE = 0.4, 5.0
 """Between two heel strikes of a foot [s]."""
 
@@ -46,13 +46,13 @@ def files_of_walk(
     side: Side,
     strikes: tuple[float, ...] | None,
 ) -> dict[str, bytes]:
-    """Return the files of a walk by its name, without a course of ``minutes`` [min], ``FEW_STRIDES`` unless given."""
+    """Return the files of a walk by its name, of ``minutes`` [min] or its task sequence, else ``FEW_STRIDES``."""
     if strikes is not None:
         check_strikes(strikes)
     check_duration_once(overrides, minutes)
     chosen = load_walk(name, overrides, gait)
     check_led(chosen, "a torque file for OpenSim")
-    few_strides = FEW_STRIDES if walk_of(chosen).course is None else None
+    few_strides = FEW_STRIDES if walk_of(chosen).task_sequence is None else None
     result = walk(chosen, few_strides if minutes is None else minutes)
     return opensim_files(result, side, strikes or ())
 

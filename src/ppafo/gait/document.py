@@ -2,7 +2,6 @@
 
 import functools
 import json
-from collections.abc import Iterator
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -221,21 +220,19 @@ def gait_toml(gait: Gait) -> str:
         lines.append(f'stance_share_deviation = "{gait.stance_share_deviation!r}"')
     lines.append(f"count = {gait.strides}")
     for name, curve in gait.curves.items():
-        lines += ["", f"[{name}]", *_series(curve, CURVES[name])]
+        si_unit = CURVES[name]
+        lines += ["", f"[{name}]", f"unit = {_text(WRITTEN_UNITS.get(si_unit, si_unit))}"]
+        lines.append(f"mean = {_number_text(curve.mean, si_unit)}")
+        for key, values in (("cosine", curve.cosines), ("sine", curve.sines)):
+            lines.append(f"{key} = [{', '.join(_number_text(value, si_unit) for value in values)}]")
+        lines.append(f"deviation = {_number_text(curve.deviation, si_unit)}")
     return "\n".join(lines) + "\n"
 
 
-def _series(curve: Curve, si_unit: str) -> Iterator[str]:
+def _number_text(value: float, si_unit: str) -> str:
+    """Return a coefficient in the unit in which its curve is written."""
     unit = WRITTEN_UNITS.get(si_unit, si_unit)
-
-    def number_text(value: float) -> str:
-        return repr(float(f"{from_si(value, plain_unit(unit), plain_unit(si_unit)):.{_DIGITS}g}"))
-
-    yield f"unit = {_text(unit)}"
-    yield f"mean = {number_text(curve.mean)}"
-    yield f"cosine = [{', '.join(map(number_text, curve.cosines))}]"
-    yield f"sine = [{', '.join(map(number_text, curve.sines))}]"
-    yield f"deviation = {number_text(curve.deviation)}"
+    return repr(float(f"{from_si(value, plain_unit(unit), plain_unit(si_unit)):.{_DIGITS}g}"))
 
 
 def _text(text: str) -> str:

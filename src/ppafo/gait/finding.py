@@ -11,7 +11,7 @@ import numpy as np
 from ppafo.gait.document import gait_toml
 from ppafo.gait.gait import CURVES, Gait, clinical_angle, plain_unit
 from ppafo.gait.recorded.footfalls import Stride
-from ppafo.gait.recorded.importing import ImportedGait, phases
+from ppafo.gait.recorded.importing import PHASES, ImportedGait
 from ppafo.report.display_units import display_unit, display_value, display_values, quantity_of_unit
 from ppafo.report.finding import Finding, Part, columns_of, facts
 from ppafo.report.kind import Kind
@@ -52,7 +52,39 @@ class GaitFound:
 
     def json_document(self) -> dict[str, Any]:
         """Return numbers and curves, and the strides of an import, as plain data in SI."""
-        return _data(self.gait, self.imported)
+        gait, imported = self.gait, self.imported
+        document: dict[str, Any] = {
+            **{name: getattr(gait, name) for name in _PLAIN},
+            "phases": PHASES.tolist(),
+            "curves": {
+                name: {
+                    "unit": CURVES[name],
+                    "harmonics": curve.harmonics,
+                    "deviation": curve.deviation,
+                    "series": curve.values_at(PHASES).tolist(),
+                }
+                for name, curve in gait.curves.items()
+            },
+        }
+        if imported is not None:
+            document["imported"] = {
+                "files": list(imported.files),
+                "events": imported.events,
+                "strides": [_stride(item) for item in imported.strides],
+                "left_out": [_stride(item) for item in imported.left_out],
+                "remarks": list(imported.remarks),
+                "curves": {
+                    name: {
+                        "strides": len(item.strides),
+                        "mean": item.mean.tolist(),
+                        "deviation": item.deviation.tolist(),
+                        "fit_root_mean_square": imported.fit_errors[name].root_mean_square,
+                        "fit_largest": imported.fit_errors[name].largest,
+                    }
+                    for name, item in imported.curves.items()
+                },
+            }
+        return document
 
 
 _HEAD = ("curve", "lowest", "highest", "unit", "between strides", "series error (RMS)")
@@ -107,7 +139,7 @@ def _row(gait: Gait, name: str, imported: ImportedGait | None) -> tuple[str | No
     quantity = quantity_of_unit(CURVES[name])
     curve = gait.curves[name]
     is_ankle = name == "ankle_angle"
-    series = curve.values_at(phases())
+    series = curve.values_at(PHASES)
     values = display_values(clinical_angle(series) if is_ankle else series, quantity)
     left = 0.0 if imported is None else display_value(imported.fit_errors[name].root_mean_square, quantity)
     return (
@@ -118,43 +150,6 @@ def _row(gait: Gait, name: str, imported: ImportedGait | None) -> tuple[str | No
         f"{display_value(curve.deviation, quantity):.2g}" if curve.deviation else None,
         f"{left:.2g}" if left > _NOISE else None,
     )
-
-
-def _data(gait: Gait, imported: ImportedGait | None) -> dict[str, Any]:
-    document: dict[str, Any] = {
-        **{name: getattr(gait, name) for name in _PLAIN},
-        "phases": phases().tolist(),
-        "curves": {
-            name: {
-                "unit": CURVES[name],
-                "harmonics": curve.harmonics,
-                "deviation": curve.deviation,
-                "series": curve.values_at(phases()).tolist(),
-            }
-            for name, curve in gait.curves.items()
-        },
-    }
-    if imported is None:
-        return document
-    return document | {
-        "imported": {
-            "files": list(imported.files),
-            "events": imported.events,
-            "strides": [_stride(item) for item in imported.strides],
-            "left_out": [_stride(item) for item in imported.left_out],
-            "remarks": list(imported.remarks),
-            "curves": {
-                name: {
-                    "strides": len(item.strides),
-                    "mean": item.mean.tolist(),
-                    "deviation": item.deviation.tolist(),
-                    "fit_root_mean_square": imported.fit_errors[name].root_mean_square,
-                    "fit_largest": imported.fit_errors[name].largest,
-                }
-                for name, item in imported.curves.items()
-            },
-        }
-    }
 
 
 def _stride(stride: Stride) -> dict[str, float]:
@@ -181,8 +176,8 @@ def gait_panels(gait: Gait, imported: ImportedGait | None = None) -> list[Panel]
 
 def _panel(gait: Gait, name: str, imported: ImportedGait | None, is_first: bool) -> Panel:
     sign = clinical_angle if name == "ankle_angle" else np.asarray
-    curve, percent, toe_off = gait.curves[name], 100.0 * phases(), 100.0 * gait.stance_share
-    series = sign(curve.values_at(phases()))
+    curve, percent, toe_off = gait.curves[name], 100.0 * PHASES, 100.0 * gait.stance_share
+    series = sign(curve.values_at(PHASES))
     marks = [
         Mark("span", (0.0, toe_off), colour=_STANCE, style={"alpha": 0.5}),
         Mark("level", (), 0.0, colour=GREY, style={"linewidth": 0.8}),

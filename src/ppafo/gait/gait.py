@@ -81,14 +81,6 @@ class Curve:
         """Return the value at a phase [strides]."""
         return float(self.values_at(phase))
 
-    def rate(self, phase: float, stride_time: float) -> float:
-        """Return the first derivative by time at a phase [strides], for a stride of this time [s]."""
-        return self.derivative(stride_time).value(phase)
-
-    def acceleration(self, phase: float, stride_time: float) -> float:
-        """Return the second derivative by time at a phase [strides], for a stride of this time [s]."""
-        return self.derivative(stride_time).rate(phase, stride_time)
-
     def derivative(self, stride_time: float) -> "Curve":
         """Return the derivative by time for a stride of this time [s]; how much strides differ in it is not known."""
         angular = 2.0 * np.pi / stride_time * (1.0 + np.arange(self.harmonics))

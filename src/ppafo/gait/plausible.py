@@ -30,10 +30,6 @@ class MeanStride:
     stride_time: float
     signs_from: SignSource
 
-    def other_sign(self, key: str, turned: str = "the other sign") -> str:
-        """Return how to reverse a curve, by its key in a gait map."""
-        return other_sign(self.signs_from, key, turned)
-
 
 def other_sign(signs_from: SignSource, key: str, turned: str = "the other sign") -> str:
     """Return how to reverse a curve: by its key in a gait map, or in the file."""
@@ -90,7 +86,8 @@ def check_stance(walk: MeanStride) -> None:
     elif "vertical_force" in walk.curves:
         hint = "is the force of this foot, its sign and unit right?"
     else:
-        hint = f"it comes from shank_angle: where its sign is reversed, {walk.other_sign('shank_angle.positive')}"
+        remedy = other_sign(walk.signs_from, "shank_angle.positive")
+        hint = f"it comes from shank_angle: where its sign is reversed, {remedy}"
     file = walk.file.get("vertical_force", walk.file["shank_angle"])
     raise DataError(
         f"{file}: the foot is on the ground for {100.0 * walk.stance_share:.0f} % of the stride, "
@@ -138,7 +135,7 @@ def check_shank(walk: MeanStride) -> None:
     if growth > _TURNED_BACK * travel:
         raise DataError(
             f"{place} grows by {growth:.2g} deg while the foot stands: the shank would rotate backwards over it; "
-            f"{walk.other_sign('shank_angle.positive')}{_other_foot(walk)}"
+            f"{other_sign(walk.signs_from, 'shank_angle.positive')}{_other_foot(walk)}"
         )
     if float(phi[0]) < -10.0 or float(np.mean(phi)) > 10.0 or float(np.mean(phi)) < -50.0:
         raise DataError(
@@ -168,7 +165,7 @@ def check_ankle(walk: MeanStride) -> None:
         raise DataError(
             f"{place} goes into plantarflexion while the shank rotates forward over the standing foot, which would "
             f"turn by {turned:.2g} deg (RMS), and by {reversed_turned:.2g} deg with the other sign: its sign is "
-            f"reversed; {walk.other_sign('ankle_angle.positive', 'the other sign about 90 deg')}"
+            f"reversed; {other_sign(walk.signs_from, 'ankle_angle.positive', 'the other sign about 90 deg')}"
         )
     foot = standing_tilt(walk.curves["shank_angle"], walk.curves["ankle_angle"])
     if abs(foot) > REFUSED_TILT or float(theta.min()) < ANKLE_LIMITS[0] or float(theta.max()) > ANKLE_LIMITS[1]:
@@ -299,7 +296,7 @@ def check_moment(walk: MeanStride) -> None:
     if float(np.mean(moment)) < 0.0 and float(-np.min(moment)) > _CLEARLY_BETTER * float(np.max(moment)):
         raise DataError(
             f"{place} is {np.min(moment):.3g} N m/kg at its largest, into dorsiflexion: its sign is reversed; "
-            f"{walk.other_sign('ankle_moment.positive')}"
+            f"{other_sign(walk.signs_from, 'ankle_moment.positive')}"
         )
     peak, (low, high) = float(np.max(moment)), MOMENT_PEAK
     if not low <= peak <= high:
@@ -540,5 +537,5 @@ def _check_knee_curve(walk: MeanStride, name: str) -> None:
         raise DataError(
             f"{place} is {driven:.3g} m/s^2 about toe-off and {held:.3g} m/s^2 in the middle of the swing, and it "
             "is the other way round in walking: its sign is reversed, or it is of the other knee; "
-            f"{walk.other_sign(f'the sign of knee.{name[5:]}')}"
+            f"{other_sign(walk.signs_from, f'the sign of knee.{name[5:]}')}"
         )

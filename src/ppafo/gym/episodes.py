@@ -494,10 +494,10 @@ class WalkEpisodes:
 def walk_episodes(configuration: Scenario, randomise: bool, seconds: float) -> WalkEpisodes:
     """Return the episodes of a walk of some length [s]; the profile of its controller is the requested torque.
 
-    ScenarioError for a walk with a course or a bottle, or whose controller has no profile.
+    ScenarioError for a walk with a task sequence or a bottle, or whose controller has no profile.
     """
     check_led(configuration, "an environment")
-    for name in ("course", "bottle"):
+    for name in ("task_sequence", "bottle"):
         if getattr(walk_of(configuration), name) is not None:
             raise ScenarioError(
                 f"{configuration.origin.file}: {name}: an environment does not support it; leave it out"

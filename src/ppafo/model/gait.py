@@ -318,7 +318,7 @@ WALKS_ABOVE = 0.5
 standing."""
 
 
-class CoursePart(NamedTuple):
+class SequencePart(NamedTuple):
     """One part: start and length [s], phase at its start [turns], and what changes over it: first value and gain.
 
     Strides per second [Hz], ``stride`` (angles over the recorded ones) [-] and ``load`` [body weights] that the foot
@@ -342,10 +342,10 @@ class CoursePart(NamedTuple):
     scuff: float
 
 
-class Course(NamedTuple):
+class TimedSequence(NamedTuple):
     """Parts in the order of their starts; unused ones start at ``NEVER``."""
 
-    parts: Annotated[tuple[CoursePart, ...], PARTS]
+    parts: Annotated[tuple[SequencePart, ...], PARTS]
 
 
 class Motion(NamedTuple):
@@ -400,13 +400,13 @@ def blend(fraction: float) -> Blend:
     )
 
 
-def part_at(course: Course, time: float) -> CoursePart:
+def part_at(sequence: TimedSequence, time: float) -> SequencePart:
     """The part in force at a time [s] from 0 on."""
-    found = course.parts[0]
-    for part in course.parts[1:]:
+    found = sequence.parts[0]
+    for part in sequence.parts[1:]:
         # A select for each field: choosing a whole struct would be a branch, which vector code cannot have.
         begun = time >= part.start
-        found = CoursePart(
+        found = SequencePart(
             start=part.start if begun else found.start,
             length=part.length if begun else found.length,
             turns=part.turns if begun else found.turns,
@@ -424,7 +424,7 @@ def part_at(course: Course, time: float) -> CoursePart:
     return found
 
 
-def pace_in(part: CoursePart, time: float) -> Pace:
+def pace_in(part: SequencePart, time: float) -> Pace:
     """Phase, strides per second and stride in a part at a time [s] within it."""
     passed = time - part.start
     fraction = min(passed / part.length, 1.0)
@@ -490,8 +490,8 @@ def marks_at(timing: GaitTiming, leg: LegParameters, phase: float, pace: Pace) -
     return Marks(scuff_force=weight if scuffs else 0.0, forefoot=1.0 if pace.tilt > 0.0 else 0.0)
 
 
-def gait_on_course(
-    gait: GaitSeries, course: Course, timing: GaitTiming, leg: LegParameters, time: float
+def gait_in_task_sequence(
+    gait: GaitSeries, sequence: TimedSequence, timing: GaitTiming, leg: LegParameters, time: float
 ) -> tuple[GaitNow, Marks]:
     """The gait of a person with this leg at a time [s] of a task sequence, and what marks the stride.
 
@@ -503,7 +503,7 @@ def gait_on_course(
     slope up, in stance and in the swing (the invariance of A. H. Hansen, D. S. Childress, S. C. Miff, Hum. Mov. Sci. 23
     (2004) 807). Moment, force and the direction of gravity on the unloaded foot are taken from level walking.
     """
-    pace = pace_in(part_at(course, time), time)
+    pace = pace_in(part_at(sequence, time), time)
     phase = pace.turns - float(int(pace.turns))
     at = harmonics(phase)
     tilt = tilt_of_shank(timing, phase, pace)

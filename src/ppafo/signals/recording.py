@@ -60,8 +60,8 @@ CHANNELS: dict[str, ChannelKind] = {
     "swing_knee_torque": ChannelKind(
         "N m", "T_1 of equation (11) in the swing, what moves shank and foot; 0 on the ground"
     ),
-    "walking_speed": ChannelKind("m/s", "speed on a course, from length and time of the strides"),
-    "stride_frequency": ChannelKind("Hz", "strides per second on a course, 0 in standing"),
+    "walking_speed": ChannelKind("m/s", "speed in a task sequence, from length and time of the strides"),
+    "stride_frequency": ChannelKind("Hz", "strides per second in a task sequence, 0 in standing"),
     "contact": ChannelKind(PLAIN_NUMBER, "foot and ground: 0 free, 1 on the heel, 2 flat, 3 on the toes", is_held=True),
     "controller_phase": ChannelKind(
         PLAIN_NUMBER, "phase that the controller sees: 0 swing, 1 landing, 2 mid-stance, 3 push-off", is_held=True

@@ -73,7 +73,7 @@ def apply_overrides(
                 raise ScenarioError(f"override '{own[path]}': {instead}")
             if path in RENAMED_KEYS:
                 raise ScenarioError(f"override '{own[path]}': {renamed_key(path, own[path].text)}")
-            raise _unused(path, own, known, file)
+            raise _unused(path, own, (*known, *declared.same), file)
     for path in waiting:
         if path in declared.appended:
             section, inner = declared.appended[path]

@@ -156,10 +156,6 @@ class BottleSupply:
         """Return what the supply offers the device at the start."""
         return self.offers(self.start(), self.temperature, 0.0)
 
-    def device_at_start(self, device: Device) -> Device:
-        """Return the device with gas of the temperature that the supply has at the start."""
-        return replace(device, gas=replace(device.gas, temperature=self.offers_first().gas_temperature))
-
     def fed(self, line: SupplyLine) -> SupplyLine:
         """Return the lines with the droop of the bottle's regulator, and with what it passes at the start."""
         droop, most = self.bottle.regulator.droop, self.offers_first().largest_flow
@@ -322,10 +318,6 @@ class SupplyCourse:
     regulated: float
     ending: SupplyEnding
 
-    def at(self, name: str, times: Floats) -> Floats:
-        """Return a value at times [s], straight between those at which bottle and device met."""
-        return np.interp(times, self.times, self.values[name])
-
     @property
     def recording(self) -> Recording:
         """Return the course of the supply as a recording."""
@@ -376,7 +368,7 @@ class _Use:
 class BottleLife:
     """A bottle walked to its end: its course over all of the time, time walked and in all [s].
 
-    ``repeats`` is how many strides, or courses, were walked.
+    ``repeats`` is how many strides, or task sequences, were walked.
     """
 
     course: SupplyCourse
@@ -396,7 +388,7 @@ def minutes_text(seconds: float) -> str:
 
 
 def strides_text(strides: float) -> str:
-    """Return a number of strides as it is shown: a decimal of few, such as of courses, whole ones of many."""
+    """Return a number of strides as it is shown: a decimal of few, such as of task sequences, whole ones of many."""
     return f"{strides:.1f}" if strides < 99.5 else f"{strides:.0f}"
 
 
@@ -427,14 +419,14 @@ def life_on_bottle(
     schedule: Schedule,
     progress: Callable[[float, float], None] = lambda _done, _total: None,
 ) -> BottleLife:
-    """Walk until the bottle ends it: the same run as ``run_on_bottle``, with rests, and repeated where it is a course.
+    """Walk until the bottle ends it: the run of ``run_on_bottle``, with rests, repeated where it is a task sequence.
 
     The run is planned for as long as may be walked at most.
     """
     use = _Use([(0.0, supply.start(), supply.offers_first())])
     while use.ending is None and use.walked + use.rested < schedule.longest:
         _use_bottle(run, device, supply, stride_time, use, progress, schedule)
-    length = batch_of(run).clock.step_count * run.step if run.program.takes_course else stride_time
+    length = batch_of(run).clock.step_count * run.step if run.program.takes_task_sequence else stride_time
     return BottleLife(_course_of_use(supply, use), use.walked, use.walked + use.rested, use.walked / length)
 
 

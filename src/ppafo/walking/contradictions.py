@@ -107,11 +107,18 @@ def _contradictions(scenario: Scenario) -> Iterator[Contradiction]:
     # An object in charge has no settings that could contradict.
     if scenario.controller.kind == PYTHON_CONTROLLER:
         return
-    yield _valve(scenario)
+    valve = scenario.device.valve.kind
+    fitting = " or ".join(sorted(kind.name for kind in WALKING_CONTROLLERS.values() if kind.only_switches))
+    yield Contradiction(
+        "controller.kind",
+        valve != "proportional" and not law_of(scenario).only_switches,
+        lambda _run: (
+            f"opens its valve gradually, which in a walk only a proportional valve does, not a {valve} one: "
+            f"take device.valve 'proportional', or controller.kind {fitting}"
+        ),
+    )
     if "load_threshold" in settings:
-        yield from _times(scenario)
-        yield from _angle_and_gait(scenario)
-        yield from _pressures(scenario)
+        yield from _of_events(scenario)
     if "peak_time" in settings:
         peak, fall = settings["peak_time"], settings["fall_time"]
         yield Contradiction(
@@ -128,22 +135,10 @@ def _reason(pair: Pair, other: Any, run: int) -> str:
     return f"must be {pair.relation} {pair.other}, which is {value}"
 
 
-def _valve(scenario: Scenario) -> Contradiction:
-    valve = scenario.device.valve.kind
-    fitting = " or ".join(sorted(kind.name for kind in WALKING_CONTROLLERS.values() if kind.only_switches))
-    remedy = f"take device.valve 'proportional', or controller.kind {fitting}"
-    return Contradiction(
-        "controller.kind",
-        valve != "proportional" and not law_of(scenario).only_switches,
-        lambda _run: (
-            f"opens its valve gradually, which in a walk only a proportional valve does, not a {valve} one: {remedy}"
-        ),
-    )
-
-
-def _times(scenario: Scenario) -> Iterator[Contradiction]:
-    settings, period = scenario.controller.settings, scenario.controller.period
-    stride, first = walk_of(scenario).gait.stride_time, settings["first_stride_time"]
+def _of_events(scenario: Scenario) -> Iterator[Contradiction]:
+    """Yield what contradicts the settings of a controller that sees events by force: times, angle, gait, pressures."""
+    settings, period, gait = scenario.controller.settings, scenario.controller.period, walk_of(scenario).gait
+    stride, first = gait.stride_time, settings["first_stride_time"]
     yield Contradiction(
         "controller.first_stride_time",
         np.logical_or(first <= 0.5 * stride, first >= 2.0 * stride),
@@ -165,9 +160,8 @@ def _times(scenario: Scenario) -> Iterator[Contradiction]:
         lambda run: f"must be longer than two sample periods of the controller, {_text(period, run, 's')} each",
     )
 
-
-def _angle_and_gait(scenario: Scenario) -> Iterator[Contradiction]:
-    settings, actuator, gait = scenario.controller.settings, scenario.device.actuator, walk_of(scenario).gait
+    # The swing must lie between what sensor and device reach, and the gait must have a force to see.
+    actuator = scenario.device.actuator
     least = larger(settings["lowest_angle"], actuator.angle_min)
     most = smaller(settings["highest_angle"], actuator.angle_max)
     swing = settings["swing_angle"]
@@ -187,9 +181,8 @@ def _angle_and_gait(scenario: Scenario) -> Iterator[Contradiction]:
         ),
     )
 
-
-def _pressures(scenario: Scenario) -> Iterator[Contradiction]:
-    settings, supply = scenario.controller.settings, scenario.device.supply
+    # The atmosphere, the supply and what a moving foot makes of it are the limits of the pressures.
+    supply = scenario.device.supply
     room = supply.atmospheric_pressure
     lowest = smaller(supply.pressure, supply.dorsiflexion_pressure)
     compressed = larger(supply.pressure, supply.dorsiflexion_pressure) * COMPRESSION

@@ -57,7 +57,9 @@ PERSON = Quantity(
     0.0,
     float(LARGEST_SEED),
 )
-DURATION = Quantity("duration", "s", "length of the walk; its course's, else a minute unless given", None, 1.0, 3600.0)
+DURATION = Quantity(
+    "duration", "s", "length of the walk; its task sequence's, else a minute unless given", None, 1.0, 3600.0
+)
 
 WALK_SENSORS = (
     *(item for item in SENSORS if item.name != "delay"),
@@ -126,23 +128,13 @@ def fault_numbers(part: str, kind: str) -> tuple[Quantity, ...]:
     return FAULTS[part][kind].quantities if kind else ()
 
 
-def controller_settings(kind: str) -> tuple[Quantity, ...]:
-    """Return the settings of a walking controller, none where it is unknown."""
-    known = walking_controllers()
-    return known[kind].quantities if kind in known else ()
-
-
-def timing_settings(kind: str) -> tuple[Quantity, ...]:
-    """Return the settings of an estimator of the gait phase, none where it is unknown."""
-    return TIMINGS[kind].quantities if kind in TIMINGS else ()
-
-
 def sections(kind: WalkKind, controller: str, timing: str, gas: str) -> dict[str, tuple[Quantity, ...]]:
-    """Return the declarations of the numbers of any walk with these kinds, by section."""
+    """Return the declarations of the numbers of any walk with these kinds, by section; an unknown kind has none."""
+    laws = walking_controllers()
     return {
         "wearer": kind.numbers,
-        "controller": (RATE, PERIOD, *controller_settings(controller)),
-        "timing": timing_settings(timing),
+        "controller": (RATE, PERIOD, *(laws[controller].quantities if controller in laws else ())),
+        "timing": TIMINGS[timing].quantities if timing in TIMINGS else (),
         "sensors": (*WALK_SENSORS, SEED),
         "run": (DURATION, STEP),
         "gas_model": gas_settings(gas),
@@ -195,7 +187,7 @@ def _texts(document: Mapping[str, Any]) -> tuple[str, ...]:
         "gas_model.kind",
         *(f"faults.{part}.kind" for part in FAULTS),
     )
-    return (*TEXTS, "motion.kind", "gait", "course", *walk_kind_of(document).texts, BOTTLE_NAME, *kinds)
+    return (*TEXTS, "motion.kind", "gait", "task_sequence", *walk_kind_of(document).texts, BOTTLE_NAME, *kinds)
 
 
 def _quantities(document: Mapping[str, Any]) -> dict[str, Quantity]:
@@ -212,11 +204,11 @@ OF_A_WALK = Declared(
     find_kinds,
     _texts,
     _quantities,
-    same={"motion.gait": "gait", "motion.course": "course"},
+    same={"motion.gait": "gait", "motion.task_sequence": "task_sequence"},
     appended={path: (BOTTLE, own) for path, own in BOTTLE_OVERRIDES.items()},
     check_motion=_check_motion,
 )
-"""What the file of a walk can hold. Gait and course stand at the top of the file or, as its motion, in [motion]."""
+"""What the file of a walk can hold. Gait and task sequence stand at its top or, as its motion, in [motion]."""
 
 
 def _fault(part: str) -> Any:
@@ -260,8 +252,8 @@ def _walk_file(_controllers: Any, walks: tuple[tuple[str, WalkKind], ...]) -> ty
         "gait": optional(
             str, "name of a gait, or the path of a gait file; its subject walks; the built-in one unless given"
         ),
-        "course": optional(
-            str, "name of a course, or the path of its file; stride after equal stride unless one is given"
+        "task_sequence": optional(
+            str, "name of a task sequence, or the path of its file; stride after equal stride unless one is given"
         ),
     }
     motion = one_of(
@@ -273,7 +265,7 @@ def _walk_file(_controllers: Any, walks: tuple[tuple[str, WalkKind], ...]) -> ty
         wearer |= texts | quantity_fields(kind.numbers)
     own: dict[str, Any] = {
         "run": optional(table("WalkRun", run), "how long it is, and how it is computed"),
-        "motion": optional(motion, "that it is a walk; gait and course may stand here"),
+        "motion": optional(motion, "that it is a walk; gait and task sequence may stand here"),
         **which,
         "controller": (
             controller_table(walking_controllers(), "Walking"),

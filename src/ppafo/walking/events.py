@@ -4,7 +4,7 @@ Less help, a pause, a stop or a return of help is listed with its fault flag, th
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -192,30 +192,23 @@ def safety_events(configuration: Scenario, time: Floats, record: Mapping[str, Fl
     vents = np.diff(ventings, prepend=0.0) > 0.0
     helps = np.diff(level, prepend=HELPS) < 0.0
     places = np.flatnonzero(vents | helps).tolist()
-    found = tuple(
-        _venting(configuration, float(time[place]), float(level[place]), record, place)
-        if vents[place] and level[place] > HELPS
-        else SafetyEvent(float(time[place]), float(level[place]))
-        for place in places
-    )
+    quantities = {item.name: item for item in law_of(configuration).quantities}
+    found = []
+    for place in places:
+        event = SafetyEvent(float(time[place]), float(level[place]))
+        if vents[place] and level[place] > HELPS:
+            flag = FAULT_FLAGS[float(record[f"{FINDING_ROW}.fault_flag"][place])]
+            event = replace(
+                event,
+                fault_flag=flag,
+                readings={name: float(record[f"{FINDING_ROW}.{name}"][place]) for name in flag.readings},
+                settings={name: configuration.controller.settings[name] for name in flag.settings},
+                units={name: quantities[name].unit for name in flag.settings},
+                atmosphere=configuration.device.supply.atmospheric_pressure,
+            )
+        found.append(event)
     # A watchdog that has acted stays, whatever the controller does when it comes back.
     return (*(event for event in found if not watchdog or event.time < watchdog[0].time), *watchdog)
-
-
-def _venting(
-    configuration: Scenario, time: float, level: float, record: Mapping[str, Floats], place: int
-) -> SafetyEvent:
-    flag = FAULT_FLAGS[float(record[f"{FINDING_ROW}.fault_flag"][place])]
-    quantities = {item.name: item for item in law_of(configuration).quantities}
-    return SafetyEvent(
-        time=time,
-        level=level,
-        fault_flag=flag,
-        readings={name: float(record[f"{FINDING_ROW}.{name}"][place]) for name in flag.readings},
-        settings={name: configuration.controller.settings[name] for name in flag.settings},
-        units={name: quantities[name].unit for name in flag.settings},
-        atmosphere=configuration.device.supply.atmospheric_pressure,
-    )
 
 
 def _text(value: float, si_unit: str, atmosphere: float) -> str:

@@ -7,7 +7,7 @@ path carries the foot with and without the device; toes that come out below the 
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -165,11 +165,7 @@ class AnklePath:
     def toes_over_ankle(self, shank: Floats, ankle: Floats) -> Floats:
         """Height of the toes over the ankle [m], below 0 with a flat foot."""
         tilt = shank - ankle + 0.5 * np.pi - self.ground_angle
-        return np.asarray(self.toes_at(np.sin(tilt), np.cos(tilt)))
-
-    def toes_at(self, sine: Any, cosine: Any) -> Any:
-        """Height of the toes over the ankle [m], for sine and cosine of the sole's tilt: numbers or expressions."""
-        return self.toe_lever * sine - self.height * cosine
+        return np.asarray(self.toe_lever * np.sin(tilt) - self.height * np.cos(tilt))
 
     def _sole(self, tilt: Floats, lever: float) -> Floats:
         along, up = np.cos(tilt), np.sin(tilt)
@@ -230,22 +226,22 @@ def fit_rocker(gait: Gait) -> RockerFit:
     that is still up when the toes of the measured foot take over keeps the last lever. The lever of the heel itself
     bounds it, and stands in where nothing was measured.
     """
+    not_measured = RockerFit(LONGER_THAN_A_FOOT, 0.0, ROLL_ANGLES[0])
+    if gait.vertical_force is None:
+        return not_measured
     phases = np.linspace(0.0, landing_phase(gait), 151)
-    levers = _measured_levers(gait, phases)
-    if levers is None or gait.vertical_force is None:
-        return RockerFit(LONGER_THAN_A_FOOT, 0.0, ROLL_ANGLES[0])
+    force = truncate(gait.vertical_force).values_at(phases)
+    if gait.ankle_moment is not None:
+        levers = -truncate(gait.ankle_moment).values_at(phases) / np.maximum(force * STANDARD_GRAVITY, 1.0)
+    elif gait.centre_of_pressure is not None:
+        levers = -truncate(gait.centre_of_pressure).values_at(phases)
+    else:
+        return not_measured
     tilt = np.maximum(foot_angles(gait, phases) - gait_timing(gait).ground_angle, 0.0)
-    force = np.maximum(truncate(gait.vertical_force).values_at(phases), 0.0)
+    force = np.maximum(force, 0.0)
     flat = max(float(levers[-1]), 0.0)
     _, rise, half = min(_rise(half, tilt, levers - flat, force) for half in ROLL_ANGLES)
     return RockerFit(flat, rise, half)
-
-
-def _measured_levers(gait: Gait, phases: Floats) -> Floats | None:
-    if gait.ankle_moment is not None and gait.vertical_force is not None:
-        force = np.maximum(truncate(gait.vertical_force).values_at(phases) * STANDARD_GRAVITY, 1.0)
-        return np.asarray(-truncate(gait.ankle_moment).values_at(phases) / force)
-    return None if gait.centre_of_pressure is None else -truncate(gait.centre_of_pressure).values_at(phases)
 
 
 def _rise(half: float, tilt: Floats, levers: Floats, force: Floats) -> tuple[float, float, float]:

@@ -16,9 +16,10 @@ class WalkKind:
 
     ``summary`` is for the layout of its files, ``label(motion)`` for messages. ``numbers`` and ``texts`` of
     ``[wearer]`` have their meaning, ``step`` is the largest step, ``interval(seconds)`` the time [s] between two
-    samples of the record of a walk of this length [s]. ``read(reading, folder, instead, course)`` gives the attributes
-    of ``WalkMotion`` that say who walks, after ``check_course``; ``links`` how the wearer's numbers follow others,
-    ``duration(motion)`` how long a course takes unless given [s], None where the motion does not say.
+    samples of the record of a walk of this length [s]. ``read(reading, folder, instead, task_sequence)`` gives the
+    attributes of ``WalkMotion`` that say who walks, after ``check_task_sequence``; ``links`` how the wearer's numbers
+    follow others, ``duration(motion)`` how long a task sequence takes unless given [s], None where the motion does not
+    say.
 
     ``subject`` is the word of metrics for what walks. ``result(scenario, run, time, record, status, supply)`` is that
     of the rows up to where a run failed, ``remarks(motion)`` say who walks, ``document(motion)`` has that as data.
@@ -33,7 +34,7 @@ class WalkKind:
     texts: Mapping[str, str]
     step: Quantity
     interval: Callable[[float], float]
-    check_course: Callable[[Any], None]
+    check_task_sequence: Callable[[Any], None]
     read: Callable[..., Mapping[str, Any]]
     links: Callable[[Mapping[str, Any]], Any]
     duration: Callable[[Any], float | None]

@@ -11,22 +11,24 @@ from ppafo.simulation.declaration import Reading
 from ppafo.simulation.loading import ScenarioRequest
 from ppafo.simulation.motion_kind import WALK, MotionKind
 from ppafo.walking.contradictions import rules
-from ppafo.walking.course import WalkingCourse, check_led_course
 from ppafo.walking.declaration import PERSON, STEP
 from ppafo.walking.kind import WalkKind
 from ppafo.walking.motion import PLACES, WalkMotion, clock_with, numbers_of_scenario, record_interval
-from ppafo.walking.planning import noise, plan_walks, planned_course, switches
+from ppafo.walking.planning import noise, plan_walks, planned_task_sequence, switches
 from ppafo.walking.result import lacks, led_result, measured
+from ppafo.walking.task_sequence import TaskSequence, check_led_task_sequence
 from ppafo.walking.walk import healthy_metrics, without_device
 from ppafo.walking.wearer import WEARER, links_of_stature, read_wearer, wearer_origin, who_walks
 
 
 def _label(motion: WalkMotion) -> str:
-    return f"a walk, gait {motion.gait.name}" + ("" if motion.course is None else f", course {motion.course.name}")
+    return f"a walk, gait {motion.gait.name}" + (
+        "" if motion.task_sequence is None else f", task sequence {motion.task_sequence.name}"
+    )
 
 
 def _read(
-    reading: Reading, _request: ScenarioRequest, gait: Gait, is_named: bool, course: WalkingCourse | None
+    reading: Reading, _request: ScenarioRequest, gait: Gait, is_named: bool, sequence: TaskSequence | None
 ) -> Mapping[str, Any]:
     person = reading.number(f"wearer.{PERSON.name}", PERSON)
     if person != int(person):
@@ -35,7 +37,7 @@ def _read(
         "wearer": read_wearer(reading, gait, is_named),
         "wearer_origin": wearer_origin(reading, gait, is_named),
         "person": person,
-        "course": course,
+        "task_sequence": sequence,
     }
 
 
@@ -46,8 +48,9 @@ def _remarks(motion: WalkMotion) -> list[str]:
 
 
 def _duration(motion: WalkMotion) -> float | None:
+    sequence = motion.task_sequence
     # As long as the wearer with the gait as it is takes for it, whoever walks.
-    return None if motion.course is None else float(planned_course(motion.course, motion.gait).duration)
+    return None if sequence is None else float(planned_task_sequence(sequence, motion.gait).duration)
 
 
 def _document(motion: WalkMotion) -> dict[str, Any]:
@@ -55,7 +58,7 @@ def _document(motion: WalkMotion) -> dict[str, Any]:
         "gait": plain(motion.gait),
         "wearer": plain(motion.wearer),
         "wearer_origin": motion.wearer_origin,
-        "course": plain(motion.course),
+        "task_sequence": plain(motion.task_sequence),
     }
 
 
@@ -78,7 +81,7 @@ WALK_KIND = MotionKind(
         texts={},
         step=STEP,
         interval=record_interval,
-        check_course=check_led_course,
+        check_task_sequence=check_led_task_sequence,
         read=_read,
         links=links_of_stature,
         duration=_duration,

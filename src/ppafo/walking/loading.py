@@ -1,7 +1,7 @@
 """From a name or a file to a scenario that is a walk; every mistake is one clear line."""
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from importlib import resources
@@ -13,7 +13,7 @@ from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import DataError, ParameterError, PpafoError, ScenarioError, one_line, refused_as
 from ppafo.gait import NORMATIVE, load_gait
 from ppafo.model.catalog import VALVES
-from ppafo.model.declaration import FORCE_LAG, PRESSURE_LAG, VALVE_DELAY, VALVE_LAG, Quantity
+from ppafo.model.declaration import FORCE_LAG, PRESSURE_LAG, VALVE_DELAY, VALVE_LAG
 from ppafo.model.plant_faults import PLANT_FAULTS, SHUT_OFF
 from ppafo.model.regulator import SupplyLines
 from ppafo.parameters import ParameterSet
@@ -46,7 +46,6 @@ from ppafo.simulation.scenario import (
 )
 from ppafo.walking.bottle import BOTTLE, BOTTLE_NAME, BottleSupply, read_bottle
 from ppafo.walking.contradictions import check_walk
-from ppafo.walking.course import load_course
 from ppafo.walking.declaration import (
     DURATION,
     FAULTY,
@@ -56,7 +55,6 @@ from ppafo.walking.declaration import (
     WALK_SENSORS,
     fault_numbers,
     timing_of,
-    timing_settings,
     walk_file,
 )
 from ppafo.walking.kind import WalkKind
@@ -69,6 +67,7 @@ from ppafo.walking.motion import (
 from ppafo.walking.nominal import nominal_terms
 from ppafo.walking.planning import NO_REFERENCE, walking_valve
 from ppafo.walking.preparation import FaultSettings
+from ppafo.walking.task_sequence import load_task_sequence
 
 FILE = TomlKind("walk", "walk", resources.files("ppafo.walking") / "configurations", ScenarioError)
 DEFAULT_PERIOD = 1.0e-3
@@ -93,19 +92,19 @@ def load_walk(
     name_or_path: str | Path,
     overrides: Iterable[str] = (),
     gait: str | Path | None = None,
-    course: str | Path | None = None,
+    task_sequence: str | Path | None = None,
     bottle: str | Path | None = None,
     parameter_set: ParameterSet | None = None,
 ) -> Scenario:
     """Return a scenario that is a walk by its name in the package or by the path of a TOML file, in SI units.
 
     ``overrides`` are texts such as ``controller.peak_torque=6 N m`` or ``valve.area=12.6mm^2``; ``gait``,
-    ``course`` and ``bottle`` replace the file's. A gait that is named, by the file or by ``gait``, brings its
+    ``task_sequence`` and ``bottle`` replace the file's. A gait that is named, by the file or by ``gait``, brings its
     subject as the default wearer; ``parameter_set`` takes the place of the set that is named. ScenarioError,
     ParameterError or DataError for anything that cannot be used.
     """
     file, given = label(str(name_or_path)), tuple(overrides)
-    named = {"gait": gait, "course": course, BOTTLE_NAME: bottle}
+    named = {"gait": gait, "task_sequence": task_sequence, BOTTLE_NAME: bottle}
     instead = {path: str(item) for path, item in named.items() if item is not None}
     # Refuse an override beside another word for the same value, by path in ``others``.
     for override in given:
@@ -169,11 +168,11 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     device = read_device(reading, hardware)
     with refused_as(ParameterError, f"{reading.file}: [device]", ParameterError):
         device.check_vane("a walk")
-    named_course = _named_file("course", request, document)
-    with _named_by("course", reading, request, ScenarioError):
-        course = None if named_course is None else load_course(named_course)
-        if course is not None:
-            who.check_course(course)
+    named_sequence = _named_file("task_sequence", request, document)
+    with _named_by("task_sequence", reading, request, ScenarioError):
+        sequence = None if named_sequence is None else load_task_sequence(named_sequence)
+        if sequence is not None:
+            who.check_task_sequence(sequence)
     with _named_by("gait", reading, request, DataError):
         walked = load_gait(_named_file("gait", request, document) or NORMATIVE)
     is_named = "gait" in instead or "gait" in document
@@ -194,7 +193,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
         bottle=bottle,
         broken=_broken(reading, line),
         shut_off=_shut_off(reading),
-        **who.read(reading, request, walked, is_named, course),
+        **who.read(reading, request, walked, is_named, sequence),
     )
     named = tuple(
         # The path of a file in full means the same from any folder.
@@ -231,7 +230,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
 
 
 def _named_file(path: str, request: ScenarioRequest, document: Mapping[str, Any]) -> str | None:
-    """Return the name or file of a gait or a course; a path in the document begins in the folder of the document."""
+    """Return the name or file of a gait or a task sequence; a path in the document begins in its folder."""
     if path in request.instead:
         return request.instead[path]
     name = document.get(path)
@@ -257,12 +256,18 @@ def _control(
     """
     kind = kind_at(reading.document, "controller")
     law = walking_controllers()[kind]
+    timing = TIMINGS[timing_of(reading.document)]
     with refused_as(ScenarioError, f"{reading.file}", ScenarioError):
         # A timing of a controller that uses no gait phase is refused.
-        with_timing(law, TIMINGS[timing_of(reading.document)])
-    sections = {"controller": law.quantities, "timing": timing_settings(timing_of(reading.document))}
-    found = links_of_defaults(sections, device, lines)
-    links = {path: own for path, own in found.items() if value_at(reading.document, path) is None}
+        with_timing(law, timing)
+    sections = {"controller": law.quantities, "timing": timing.quantities}
+    terms = _terms(device.valve) | nominal_terms(device, lines)
+    links: dict[str, tuple[Follows, ...]] = {
+        f"{section}.{item.name}": (Follows(tuple(terms[name] for name in item.follows), item.default or 0.0),)
+        for section, items in sections.items()
+        for item in items
+        if item.follows and value_at(reading.document, f"{section}.{item.name}") is None
+    }
     present: dict[str, Any] = {f"valve.{name}": number for name, number in device.valve.settings.items()}
     present |= {f"sensors.{name}": number for name, number in sensors.items()}
     if lines is not None:
@@ -274,7 +279,10 @@ def _control(
     present |= {path: device_number_at(device, path) for path in followed - set(present)}
     settings: dict[str, float] = {}
     for section, items in sections.items():
-        known = (with_default(item, f"{section}.{item.name}", links, present.__getitem__) for item in items)
+        known = []
+        for item in items:
+            link = links.get(f"{section}.{item.name}")
+            known.append(item if link is None else replace(item, default=float(link[0].number(present.__getitem__))))
         settings |= reading.section(section, tuple(known))
     rate, period = (value_at(reading.document, f"controller.{name}") for name in ("rate", "period"))
     seconds = DEFAULT_PERIOD if period is None else reading.number("controller.period", PERIOD)
@@ -325,17 +333,17 @@ def _assumed(reading: Reading, bottle: BottleSupply | None) -> tuple[Assumption,
 
 
 def _duration(reading: Reading, scenario: Scenario) -> float:
-    """Return the length of a walk [s]: its file's, else its course's, else a minute, or ten on a bottle."""
+    """Return the length of a walk [s]: its file's, else its task sequence's, else a minute, or ten on a bottle."""
     motion = walk_of(scenario)
-    of_course = motion.who.duration(motion)
+    of_task_sequence = motion.who.duration(motion)
     if value_at(reading.document, "run.duration") is not None:
         duration = reading.number("run.duration", DURATION)
         for is_bad, line in duration_problems(scenario, duration):
             if is_bad:
                 raise ScenarioError(f"{reading.file}: {line(0)}")
         return duration
-    if of_course is not None:
-        return of_course
+    if of_task_sequence is not None:
+        return of_task_sequence
     return DEFAULT_DURATION if motion.bottle is None else BOTTLE_DURATION
 
 
@@ -346,22 +354,6 @@ WALKING = Layout(FILE, OF_A_WALK, walk_file, walk_file, build_walk)
 def lag_of_bandwidth(bandwidth: float) -> float:
     """Time constant [s] of a sensor of a bandwidth [Hz]; 0 for one that follows at once, whose bandwidth is 0."""
     return 1.0 / (_TURN * bandwidth) if bandwidth > 0.0 else 0.0
-
-
-def links_of_defaults(sections: Mapping[str, Iterable[Quantity]], device: Device, lines: SupplyLines | None) -> Graph:
-    """Return the links of the quantities of some sections whose defaults follow others, by path."""
-    terms = _terms(device.valve) | nominal_terms(device, lines)
-    return {
-        f"{section}.{item.name}": (Follows(tuple(terms[name] for name in item.follows), item.default or 0.0),)
-        for section, items in sections.items()
-        for item in items
-        if item.follows
-    }
-
-
-def with_default(item: Quantity, path: str, links: Graph, present: Callable[[str], Any]) -> Quantity:
-    """Return a quantity with the default that follows from what others are at ``present``."""
-    return replace(item, default=float(links[path][0].number(present))) if path in links else item
 
 
 def _terms(valve: Valve) -> dict[str, Term]:

@@ -20,7 +20,6 @@ from ppafo.simulation.declaration import THERMAL, line_paths
 from ppafo.simulation.motion_kind import WALK, MotionKind
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.bottle import BottleSupply
-from ppafo.walking.course import WalkingCourse
 from ppafo.walking.declaration import (
     FAULTS,
     FAULTY,
@@ -29,23 +28,23 @@ from ppafo.walking.declaration import (
     by_path,
     fault_numbers,
     sections,
-    timing_settings,
 )
 from ppafo.walking.kind import WalkKind
 from ppafo.walking.preparation import FaultSettings
+from ppafo.walking.task_sequence import TaskSequence
 from ppafo.walking.wearer import WEARER, Wearer
 
 
 class WalkingBody(Protocol):
-    """What walks by itself: its numbers by name, any of which may be an array (runs,), and the course of its way."""
+    """What walks by itself: its numbers by name, any of which may be an array (runs,), and its task sequence."""
 
     @property
     def settings(self) -> Mapping[str, Any]:
         """Numbers of ``[wearer]`` by name."""
 
     @property
-    def course(self) -> WalkingCourse | None:
-        """The course, None without one."""
+    def task_sequence(self) -> TaskSequence | None:
+        """The task sequence, None without one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,9 +53,9 @@ class WalkMotion:
 
     ``timing`` is how the controller estimates the gait phase, ``forces`` are the settings [SI] of sensors that no
     vane has, by name, and ``faults`` those that fail, by sensor; ``broken`` are parts of the plant that fail, and
-    ``shut_off`` is the valve of the safe state, {} where none is fitted. ``course`` is what the wearer does one after
-    the other, None where stride follows equal stride; ``bottle`` the one that the device hangs on, None where its
-    supply does not end. ``body`` is what walks by itself in a kind of walk without a prescribed gait, else None.
+    ``shut_off`` is the valve of the safe state, {} where none is fitted. ``task_sequence`` is what the wearer does
+    one after the other, None where stride follows equal stride; ``bottle`` the one that the device hangs on, None where
+    its supply does not end. ``body`` is what walks by itself in a kind of walk without a prescribed gait, else None.
     ``wearer_origin`` says in words whose body mass it is. ``person`` is the number of the person
     of the population who walks, 0 for the wearer with the gait as it is, or a ``Person`` who is drawn already. It, and
     numbers of wearer, ``forces`` and ``faults``, may be arrays (runs,).
@@ -68,7 +67,7 @@ class WalkMotion:
     timing: str
     forces: Mapping[str, Any]
     faults: Mapping[str, FaultSettings]
-    course: WalkingCourse | None = None
+    task_sequence: TaskSequence | None = None
     bottle: BottleSupply | None = None
     wearer_origin: str = "the paper's subject"
     person: Any = 0.0
@@ -118,7 +117,7 @@ def person_remarks(scenario: Scenario) -> list[str]:
 
 
 SHORTEST_STRIDES = 5
-SHORTEST_COURSE = 1.0
+SHORTEST_TASK_SEQUENCE = 1.0
 LONGEST_MINUTES = 60.0
 
 PLACES: Mapping[str, tuple[str, ...]] = {
@@ -126,8 +125,8 @@ PLACES: Mapping[str, tuple[str, ...]] = {
     f"wearer.{PERSON.name}": ("motion", PERSON.name),
     **{
         f"timing.{item.name}": ("controller", "settings", item.name)
-        for kind in TIMINGS
-        for item in timing_settings(kind)
+        for kind in TIMINGS.values()
+        for item in kind.quantities
     },
     **{f"sensors.{name}": ("motion", "forces", name) for name in FORCES},
     **{
@@ -170,14 +169,14 @@ def with_duration(scenario: Scenario, seconds: float) -> Scenario:
 def duration_problems(scenario: Scenario, seconds: Any) -> tuple[Problem, ...]:
     """What is wrong with the length of a walk [s], which may be an array (runs,)."""
     # The controller learns over the first strides, and means leave them out: a walk needs more than these.
-    has_course = walk_of(scenario).course is not None
-    shortest = SHORTEST_COURSE if has_course else SHORTEST_STRIDES * walk_of(scenario).gait.stride_time
+    has_task_sequence = walk_of(scenario).task_sequence is not None
+    shortest = SHORTEST_TASK_SEQUENCE if has_task_sequence else SHORTEST_STRIDES * walk_of(scenario).gait.stride_time
     fits = np.logical_and(seconds >= shortest, seconds <= 60.0 * LONGEST_MINUTES)
 
     def line(run: int) -> str:
         return (
             f"a walk of {at(seconds, run) / 60.0:.6g} min: must be {shortest / 60.0:.2g} min "
-            f"({'a second of a course' if has_course else f'{SHORTEST_STRIDES} strides'}) or more, and "
+            f"({'a second of a task sequence' if has_task_sequence else f'{SHORTEST_STRIDES} strides'}) or more, and "
             f"at most {LONGEST_MINUTES:g} min"
         )
 

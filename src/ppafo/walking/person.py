@@ -55,14 +55,6 @@ class SeriesOfMany:
     cosines: Floats
     sines: Floats
 
-    def at_heel_strike(self) -> Floats:
-        """Value at phase 0."""
-        return np.asarray(self.mean + self.cosines.sum(axis=1))
-
-    def scale(self, factor: Floats) -> "SeriesOfMany":
-        """The curves, each times its factor [-] (people,)."""
-        return SeriesOfMany(self.mean * factor, self.cosines * factor[:, None], self.sines * factor[:, None])
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VariedGaits:
@@ -71,10 +63,6 @@ class VariedGaits:
     series: dict[str, SeriesOfMany]
     timing: dict[str, Floats]
     stride_time: Floats
-
-    def strike_angle(self) -> Floats:
-        """Angle [rad] of each foot over the horizontal at its heel strike."""
-        return self.series["shank"].at_heel_strike() - self.series["ankle"].at_heel_strike() + 0.5 * np.pi
 
 
 def draw_gaits(gait: Gait, stature: Floats, generator: np.random.Generator) -> VariedGaits:
@@ -90,7 +78,9 @@ def draw_gaits(gait: Gait, stature: Floats, generator: np.random.Generator) -> V
     time[0], fraction[0] = gait.stride_time, gait.stance_share
     # The knee goes through a way that is larger by the stature, in another time.
     hurry = stature * (gait.stride_time / time) ** 2
-    series |= {name: series[name].scale(hurry) for name in KNEE}
+    for name in KNEE:
+        knee, each = series[name], hurry[:, None]
+        series[name] = SeriesOfMany(knee.mean * hurry, knee.cosines * each, knee.sines * each)
     timing = {"frequency": 1.0 / time, **_events(series["shank"], series["ankle"], fraction)}
     return VariedGaits(series, timing, time)
 
@@ -177,7 +167,9 @@ def drawn_people(build: Build, gaits: VariedGaits, generator: np.random.Generato
     scale, shift = (draw_bounded_normal(generator, (count,)) for _ in range(2))
     scale[0], shift[0] = 0.0, 0.0
     timing: Any = {"start": np.zeros(count), **gaits.timing}
-    strike: Any = gaits.strike_angle() - gaits.timing["ground_angle"]
+    # At phase 0 a curve is its mean and the sum of its cosines.
+    shank, ankle = (of.mean + of.cosines.sum(axis=1) for of in (gaits.series["shank"], gaits.series["ankle"]))
+    strike: Any = shank - ankle + 0.5 * np.pi - gaits.timing["ground_angle"]
     thresholds: Any = 1.0 + THRESHOLD_VARIATION * scale
     mass: Any = build.mass
     stature: Any = build.stature

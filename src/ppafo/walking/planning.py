@@ -27,7 +27,6 @@ from ppafo.parameters.device import Device, Valve
 from ppafo.parameters.plant import first_settings, plant_parameters
 from ppafo.simulation.plan import Components, Steps, compose_run, sensor_parameters, too_many_steps
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, ProfileChoice, Scenario
-from ppafo.walking.course import PlannedCourse, WalkingCourse, plan_course, standing_gait
 from ppafo.walking.declaration import FORCES, WALK_SENSORS
 from ppafo.walking.gait_series import heel_rocker
 from ppafo.walking.motion import walk_of
@@ -35,8 +34,9 @@ from ppafo.walking.person import VariedGaits, crowd_of, leg_of_person, person_of
 from ppafo.walking.preparation import (
     FaultSettings,
     device_share,
+    fault_of,
+    gait_sensors,
     longest_delay,
-    sensors_of,
     smallest_chamber,
     vented_state,
     walk_from_standing,
@@ -44,6 +44,7 @@ from ppafo.walking.preparation import (
     walk_step_counts,
     with_leg,
 )
+from ppafo.walking.task_sequence import PlannedSequence, TaskSequence, plan_task_sequence, standing_gait
 from ppafo.walking.wearer import Build, leg_parameters
 
 NO_REFERENCE = ProfileChoice("constant", {"level": 0.0})
@@ -51,7 +52,7 @@ NO_REFERENCE = ProfileChoice("constant", {"level": 0.0})
 
 
 def plan_walk(scenario: Scenario) -> Run:
-    """The run of a walk with vented chambers, which begins at a heel strike, or on a course standing.
+    """The run of a walk with vented chambers, which begins at a heel strike, or in a task sequence standing.
 
     ScenarioError where it cannot be.
     """
@@ -73,13 +74,13 @@ def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
     leg = leg_of_person(leg_parameters(motion.wearer, heel_rocker(motion.gait, motion.wearer)), person)
     bare = plant_parameters(device)
     sensors = gait_sensors_of(scenario)
-    planned = course_of_walk(scenario)
+    planned = task_sequence_of_walk(scenario)
     if planned is None:
-        # A walk of equal strides begins at a heel strike, a course standing.
+        # A walk of equal strides begins at a heel strike, a task sequence standing.
         rows = leg, person.series, person.timing
         initial = of_each(lambda leg, gait, timing: walk_from_strike(gait_at(gait, timing, leg, 0.0)), *rows)
     else:
-        initial = of_each(lambda *rows: walk_from_standing(standing_gait(*rows)), leg, person.timing, planned.course)
+        initial = of_each(lambda *rows: walk_from_standing(standing_gait(*rows)), leg, person.timing, planned.timed)
     walk = Walk(
         leg=leg,
         share=device_share(bare, leg.gravity),
@@ -87,7 +88,7 @@ def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         timing=person.timing,
         sensors=sensors,
         initial=initial,
-        course=None if planned is None else planned.course,
+        task_sequence=None if planned is None else planned.timed,
         failing=failing_of(scenario),
     )
     # Whoever fits the controller to a person sets its thresholds and the start of its push-off anew.
@@ -172,10 +173,10 @@ def gait_sensors_of(scenario: Scenario) -> GaitSensors:
         left = iter(values)
         own = {name: next(left) for name in numbers}
         failing = {
-            sensor: FaultSettings(fault.kind, {name: next(left) for name in fault.numbers})
+            f"{sensor}_fault": fault_of(FaultSettings(fault.kind, {name: next(left) for name in fault.numbers}), period)
             for sensor, fault in faults.items()
         }
-        return sensors_of(own, failing, period)
+        return gait_sensors(own, period, **failing)
 
     return over_runs(made, scenario.controller.period, *given)
 
@@ -248,20 +249,23 @@ def law_of(scenario: Scenario) -> ControllerKind:
 
 def fed_device(scenario: Scenario) -> Device:
     """The device with the gas that its supply has at the start: cold gas where it hangs on a bottle."""
-    bottle = walk_of(scenario).bottle
-    return scenario.device if bottle is None else bottle.device_at_start(scenario.device)
+    bottle, device = walk_of(scenario).bottle, scenario.device
+    if bottle is None:
+        return device
+    return replace(device, gas=replace(device.gas, temperature=bottle.offers_first().gas_temperature))
 
 
-def course_of_walk(scenario: Scenario) -> PlannedCourse | None:
-    """The course of a walk in time, None where it has none; ScenarioError for what its gait does not allow."""
+def task_sequence_of_walk(scenario: Scenario) -> PlannedSequence | None:
+    """The task sequence of a walk in time, None where it has none; ScenarioError for what its gait does not allow."""
     motion = walk_of(scenario)
-    return None if motion.course is None else planned_course(motion.course, motion.gait, motion.person)
+    sequence = motion.task_sequence
+    return None if sequence is None else planned_task_sequence(sequence, motion.gait, motion.person)
 
 
-def planned_course(course: WalkingCourse, gait: Gait, number: Any = 0.0) -> PlannedCourse:
-    """A course in time, walked by the person with a number; ScenarioError for what the gait does not allow."""
+def planned_task_sequence(sequence: TaskSequence, gait: Gait, number: Any = 0.0) -> PlannedSequence:
+    """A task sequence in time, walked by the person with a number; ScenarioError for what the gait does not allow."""
     person = person_of(gait, number)
-    return plan_course(course, gait, person.timing.frequency, person.timing, person.strike_angle)
+    return plan_task_sequence(sequence, gait, person.timing.frequency, person.timing, person.strike_angle)
 
 
 def walking_valve(valve: Valve) -> ValveModel:

@@ -146,7 +146,7 @@ def walk_from(now: GaitNow, contact: float, shown_force: float) -> WalkState:
 def standing_on(
     leg: LegParameters, ground_angle: float, sine_foot: float, cosine_foot: float, phase: float, load: float
 ) -> GaitNow:
-    """Shank vertical, foot flat, both at rest: where a course begins, at a phase [turns] and a load [body weights].
+    """Shank vertical, foot flat, both at rest: how a task sequence begins, at a phase [turns] and load [body weights].
 
     Sine and cosine belong to the flat foot's angle [rad]. Numbers may be arrays (wearers,).
     """
@@ -269,13 +269,8 @@ class FaultSettings:
     numbers: Mapping[str, float] = field(default_factory=dict)
 
 
-def sensors_of(numbers: Mapping[str, float], faults: Mapping[str, FaultSettings], period: float) -> GaitSensors:
-    """Return the sensors of some settings [SI], with faults by sensor, at a sample period [s] of the controller."""
-    failing = {f"{sensor}_fault": _fault_of(fault, period) for sensor, fault in faults.items()}
-    return gait_sensors(numbers, period, **failing)
-
-
-def _fault_of(fault: FaultSettings, period: float) -> Fault:
+def fault_of(fault: FaultSettings, period: float) -> Fault:
+    """Return the fault of a sensor with its numbers [SI], at a sample period [s] of the controller."""
     given = fault.numbers
     if not fault.kind:
         # A sound sensor has a fault that never begins, so that one program serves both.

@@ -24,16 +24,14 @@ from ppafo.storage.opensim import opensim_recording, write_opensim
 from ppafo.walking.bottle import UNITS, SupplyCourse
 from ppafo.walking.channels import Channels, actuator_channels, controller_channels, valve_and_ground_channels
 from ppafo.walking.contradictions import check_no_bottle
-from ppafo.walking.course import PlannedCourse, pace_in_time
 from ppafo.walking.events import SAFE_ROW, SafetyEvent, safety_events
 from ppafo.walking.gait_series import AnklePath, ankle_path, truncate
 from ppafo.walking.motion import walk_of
 from ppafo.walking.person import as_drawn
-from ppafo.walking.planning import course_of_walk, law_of
+from ppafo.walking.planning import law_of, task_sequence_of_walk
 from ppafo.walking.strides import (
     Curves,
     SegmentResult,
-    course_metrics,
     helped_strides,
     mean_curves,
     per_stride,
@@ -42,8 +40,10 @@ from ppafo.walking.strides import (
     steady_strides,
     stride_metrics,
     stride_starts,
+    task_sequence_metrics,
     walk_metrics,
 )
+from ppafo.walking.task_sequence import PlannedSequence, pace_in_time
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -84,15 +84,15 @@ def recording_of_walk(
     if supply is not None:
         channels |= supply_channels(supply, time, record)
     channels |= controller_channels(record)
-    if led.course is not None:
-        channels |= _course_channels(configuration, run, path, time, record)
+    if led.task_sequence is not None:
+        channels |= _task_sequence_channels(configuration, run, path, time, record)
     values = {name: Channel(np.asarray(series), unit) for name, (series, unit) in channels.items()}
     return Recording(f"walk, {configuration.name}", time, values, kind="simulated")
 
 
 def supply_channels(supply: SupplyCourse, time: Floats, record: Mapping[str, Floats]) -> dict[str, tuple[Floats, str]]:
-    """Channels of the bottle of a walk with their units."""
-    found = {name: (supply.at(name, time), UNITS[name]) for name in supply.values}
+    """Channels of the bottle of a walk with their units, straight between the times at which it met the device."""
+    found = {name: (np.interp(time, supply.times, values), UNITS[name]) for name, values in supply.values.items()}
     return found | {"bottle_mass": (supply.first.mass - record["line_state.regulated_mass"], "kg")}
 
 
@@ -106,16 +106,16 @@ def with_cold_gas(run: Run, supply: SupplyCourse | None, time: Floats) -> Run:
     return replace(run, plant=run.plant._replace(gas_product=product))
 
 
-def _course_channels(
+def _task_sequence_channels(
     configuration: Scenario, run: Run, path: AnklePath, time: Floats, record: Mapping[str, Any]
 ) -> dict[str, tuple[Any, str]]:
-    """What a course has beside a walk of equal strides, and the toes over ground that may rise: stairs lift the ankle.
+    """What a task sequence adds to equal strides, and the toes over ground that may rise: stairs lift the ankle.
 
     The healthy toes are as high as the gait's, times the stride over the recorded one.
     """
-    course = led_leg(run).course
-    assert course is not None, "of a course"
-    gait, pace = walk_of(configuration).gait, pace_in_time(course, time)
+    sequence = led_leg(run).task_sequence
+    assert sequence is not None, "of a task sequence"
+    gait, pace = walk_of(configuration).gait, pace_in_time(sequence, time)
     phase, shank = record["walk.now.phase"], record["walk.now.shank"]
     healthy = path.toe_height(
         phase, truncate(gait.shank_angle).values_at(phase), truncate(gait.ankle_angle).values_at(phase)
@@ -173,7 +173,7 @@ class WalkResult:
     learns; ``vented_metrics`` over the strides with less help (lifted only, paused or stopped), {} without such.
     ``starts`` are the samples of the recording right after each heel strike, ``helped`` is True for each stride with
     help throughout, and ``events`` are the pauses, the stop and the returns of help. ``segments`` are the segments of a
-    course, none without one; means are then over its strides at an even speed on level ground.
+    task sequence, none without one; means are then over its strides at an even speed on level ground.
     ``supply`` is the bottle over the walk, None where the device hangs on none.
     """
 
@@ -269,7 +269,7 @@ def lacks(scenario: Scenario, kind: MetricKind) -> str:
             "reference" in kind.channels,
             "a walk has no one reference that its torque follows: push_off_error is the error in push-off",
         ),
-        (bool(kind.traced), "it needs the course of the whole run, which is not kept of a walk"),
+        (bool(kind.traced), "it needs the whole run over time, which is not kept of a walk"),
         (LED_SHANK in needs, "it needs a leg without ground, whose shank follows a gait"),
         (REACTS in needs and subject != REACTS, f"it needs a neuromuscular gait model (motion.kind = '{REACT}')"),
         (
@@ -277,8 +277,8 @@ def lacks(scenario: Scenario, kind: MetricKind) -> str:
             "it is measured from the gait that leads a leg, and none does here: lowest_toes is over the ground",
         ),
         (
-            STEADY in needs and motion.course is not None,
-            "it is a mean over equal strides, and a course has others: leave the course out",
+            STEADY in needs and motion.task_sequence is not None,
+            "it is a mean over equal strides, and a task sequence has others: leave the task sequence out",
         ),
         (REQUEST in needs and not has_request, f"its controller '{control}' requests no torque"),
     )
@@ -289,7 +289,7 @@ def integral_of_a_stride(result: WalkResult, values: Floats) -> float:
     """Return the integral of a channel over the ankle angle, in its unit times rad, mean over the counted strides."""
     turned = np.diff(result.recording["angle"])
     done = np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * turned)])
-    planned = course_of_walk(result.scenario)
+    planned = task_sequence_of_walk(result.scenario)
     counted = result.helped & _counted(planned, result.recording, result.starts)
     return float(np.diff(done[result.starts])[counted].mean())
 
@@ -312,7 +312,7 @@ def led_result(
     strides = per_stride(record, starts)
     # A controller without a safe state helps in every stride.
     helped = helped_strides(record.get(SAFE_ROW, np.zeros(recording.time.size)), starts)
-    planned = course_of_walk(scenario)
+    planned = task_sequence_of_walk(scenario)
     steady = _counted(planned, recording, starts)
     averages, vented = (mean_curves(recording, starts, chosen & steady) for chosen in (helped, ~helped))
     metrics = walk_metrics(scenario, recording, strides, averages, starts, helped, steady)
@@ -322,7 +322,7 @@ def led_result(
     segments: tuple[SegmentResult, ...] = ()
     if planned is not None:
         segments = segment_results(scenario, planned, recording, strides["net_push_off_work"], starts)
-        metrics |= course_metrics(planned, segments, recording, int((helped & steady).sum()))
+        metrics |= task_sequence_metrics(planned, segments, recording, int((helped & steady).sum()))
     return WalkResult(
         scenario=walked,
         recording=recording,
@@ -339,8 +339,8 @@ def led_result(
     )
 
 
-def _counted(planned: PlannedCourse | None, recording: Recording, starts: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """True for each whole stride that counts for means: not the first ones, of a course those at an even speed."""
+def _counted(planned: PlannedSequence | None, recording: Recording, starts: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """True for each whole stride that counts for means: not the first ones; of a task sequence the even ones."""
     if planned is not None:
         return steady_strides(planned, recording.time[starts])
     return settled(np.ones(max(starts.size - 1, 0), dtype=np.bool_))

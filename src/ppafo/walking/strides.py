@@ -1,4 +1,4 @@
-"""A walk stride by stride: numbers of each stride, mean curves, metrics of a walk, and of each segment of a course."""
+"""A walk stride by stride: numbers of strides, mean curves, metrics of a walk and of segments of a task sequence."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,9 +15,9 @@ from ppafo.model.helping import HELPS, PUSH_OFF
 from ppafo.signals import CHANNELS, Recording
 from ppafo.signals.recording import Floats
 from ppafo.simulation.scenario import Scenario
-from ppafo.walking.course import PlannedCourse, Span
 from ppafo.walking.gait_series import ankle_path, gait_timing
 from ppafo.walking.motion import walk_of
+from ppafo.walking.task_sequence import PlannedSequence
 
 PHASES = np.linspace(0.0, 1.0, 101)
 """Phases from heel strike to heel strike at which curves are averaged."""
@@ -103,9 +103,17 @@ def walk_metrics(
     ``starts`` are the samples after each heel strike, ``helped`` tells which strides had help and ``counted`` which of
     all are for means. ``averages`` are over the counted strides with help.
     """
-    found = stride_metrics(configuration, strides, averages, helped & counted)
-    found |= counts_of_strides(recording, helped)
-    return found | _tracking(recording, starts, helped & counted) | first_less_help(recording)
+    chosen = helped & counted
+    found = stride_metrics(configuration, strides, averages, chosen) | counts_of_strides(recording, helped)
+    # A controller that requests a torque is judged by how well it gets it in push-off.
+    if "reference" in recording and chosen.any():
+        pushes = samples_of(chosen, starts, recording.time.size) & (recording["controller_phase"] == PUSH_OFF)
+        error = (recording["reference"] - recording["torque"])[pushes]
+        if error.size:
+            rms = float(np.sqrt(np.mean(error**2)))
+            summary = "RMS of requested torque less actuator torque in push-off"
+            found["push_off_error"] = Metric(rms, "N m", summary)
+    return found | first_less_help(recording)
 
 
 def counts_of_strides(recording: Recording, helped: NDArray[np.bool_]) -> dict[str, Metric]:
@@ -133,7 +141,7 @@ def stride_metrics(
 ) -> dict[str, Metric]:
     """Means over the chosen strides (strides,), and what they are of a healthy ankle; ``averages`` are theirs too."""
     found = {}
-    over = "" if walk_of(configuration).course is None else " over the strides at an even speed on level ground"
+    over = "" if walk_of(configuration).task_sequence is None else " over the strides at an even speed on level ground"
     for name, item in PER_STRIDE.items():
         values = strides[name][chosen]
         if values.size:
@@ -173,18 +181,6 @@ def lowest_toes(configuration: Scenario, height: Floats) -> Metric:
     )
 
 
-def _tracking(recording: Recording, starts: NDArray[np.intp], chosen: NDArray[np.bool_]) -> dict[str, Metric]:
-    """How well a controller that wants a torque gets it in push-off; nothing for others or without strides."""
-    if "reference" not in recording or not chosen.any():
-        return {}
-    pushes = samples_of(chosen, starts, recording.time.size) & (recording["controller_phase"] == PUSH_OFF)
-    error = (recording["reference"] - recording["torque"])[pushes]
-    if not error.size:
-        return {}
-    rms = float(np.sqrt(np.mean(error**2)))
-    return {"push_off_error": Metric(rms, "N m", "RMS of requested torque less actuator torque in push-off")}
-
-
 def first_less_help(recording: Recording) -> dict[str, Metric]:
     """When the controller first helped less; nothing where it never did."""
     if "safe_state" not in recording or not recording["safe_state"].any():
@@ -214,7 +210,7 @@ def healthy_toe_height(configuration: Scenario) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class SegmentResult:
-    """One segment of a course, from ``start`` to ``end`` [s], SI units.
+    """One segment of a task sequence, from ``start`` to ``end`` [s], SI units.
 
     ``strides`` begin in it with a strike, ``helped`` are the ones in which the controller was not in its safe
     state up to the next strike, or to the end. ``gas`` [kg], ``net_push_off_work`` [J] of the strides that begin in it,
@@ -236,7 +232,7 @@ class SegmentResult:
     safe_time: float | None
 
 
-def steady_strides(planned: PlannedCourse, strikes: Floats) -> NDArray[np.bool_]:
+def steady_strides(planned: PlannedSequence, strikes: Floats) -> NDArray[np.bool_]:
     """True for each whole stride, between strikes at times [s], at an even speed on level ground."""
     first, last = strikes[:-1], strikes[1:]
     steady = np.zeros(first.size, dtype=np.bool_)
@@ -247,52 +243,49 @@ def steady_strides(planned: PlannedCourse, strikes: Floats) -> NDArray[np.bool_]
 
 def segment_results(
     configuration: Scenario,
-    planned: PlannedCourse,
+    planned: PlannedSequence,
     recording: Recording,
     works: Floats,
     starts: NDArray[np.intp],
 ) -> tuple[SegmentResult, ...]:
     """The segments that a recording reached; ``works`` [J] of its whole strides, between strikes at ``starts``."""
-    end = float(recording.time[-1])
-    reached = [span for span in planned.spans if float(span.start) < end]
-    return tuple(_segment(configuration, span, recording, works, starts) for span in reached)
-
-
-def _segment(
-    configuration: Scenario, span: Span, recording: Recording, works: Floats, starts: NDArray[np.intp]
-) -> SegmentResult:
-    time = recording.time
-    last = min(float(span.end), float(time[-1]))
-    own = (time >= float(span.start)) & (time <= last)
-    strikes = time[starts]
-    # The last strike of a recording begins a stride that is not whole: it has no work of its own.
-    begun = np.flatnonzero((strikes >= float(span.start)) & (strikes < last))
-    gas = np.interp([float(span.start), last], time, recording["supplied_mass"])
+    time, contact = recording.time, recording["contact"]
+    strikes, end = time[starts], float(time[-1])
     heel = recording["heel_force"] > LOADED_HEEL * walk_of(configuration).wearer.body_mass * STANDARD_GRAVITY
-    loaded = own & heel & (recording["contact"] <= FLAT) & (recording["contact"] != SWING)
-    push = recording["torque"][loaded]
-    helped, safe_time = 0, None
-    # Where no controller works there is no help, and no safe state either.
-    if "safe_state" in recording:
-        safe = recording["safe_state"] > 0.5
-        edges = np.append(starts, time.size)
-        helped = sum(not safe[edges[stride] : edges[stride + 1]].any() for stride in begun)
-        # Where less help begins within the segment: one that was in its safe state before has no time of its own.
-        begins = np.flatnonzero(own & safe & ~np.append(False, safe[:-1]))
-        safe_time = float(time[begins[0]]) if begins.size else None
-    return SegmentResult(
-        kind=span.kind,
-        title=span.title,
-        start=float(span.start),
-        end=last,
-        strides=begun.size,
-        helped=helped,
-        gas=float(gas[1] - gas[0]),
-        net_push_off_work=float(works[begun[begun < works.size]].sum()),
-        lowest_toes=_lowest_toes(configuration, recording, own),
-        flat_push=max(float(push.max()), 0.0) if push.size else 0.0,
-        safe_time=safe_time,
-    )
+    found = []
+    for span in planned.spans:
+        start, last = float(span.start), min(float(span.end), end)
+        if start >= end:
+            continue
+        own = (time >= start) & (time <= last)
+        # The last strike of a recording begins a stride that is not whole: it has no work of its own.
+        begun = np.flatnonzero((strikes >= start) & (strikes < last))
+        gas = np.interp([start, last], time, recording["supplied_mass"])
+        push = recording["torque"][own & heel & (contact <= FLAT) & (contact != SWING)]
+        helped, safe_time = 0, None
+        # Where no controller works there is no help, and no safe state either.
+        if "safe_state" in recording:
+            safe = recording["safe_state"] > 0.5
+            edges = np.append(starts, time.size)
+            helped = sum(not safe[edges[stride] : edges[stride + 1]].any() for stride in begun)
+            # Where less help begins within the segment: one that was in its safe state before has no time of its own.
+            begins = np.flatnonzero(own & safe & ~np.append(False, safe[:-1]))
+            safe_time = float(time[begins[0]]) if begins.size else None
+        result = SegmentResult(
+            kind=span.kind,
+            title=span.title,
+            start=start,
+            end=last,
+            strides=begun.size,
+            helped=helped,
+            gas=float(gas[1] - gas[0]),
+            net_push_off_work=float(works[begun[begun < works.size]].sum()),
+            lowest_toes=_lowest_toes(configuration, recording, own),
+            flat_push=max(float(push.max()), 0.0) if push.size else 0.0,
+            safe_time=safe_time,
+        )
+        found.append(result)
+    return tuple(found)
 
 
 def _lowest_toes(configuration: Scenario, recording: Recording, own: NDArray[np.bool_]) -> float | None:
@@ -310,41 +303,36 @@ def _lowest_toes(configuration: Scenario, recording: Recording, own: NDArray[np.
     return min(found, default=None)
 
 
-_SAME_TIME = 0.05
-"""Time [s] by which a recording may end before its course: its samples."""
-
-
-def is_whole_course(walked: float, planned: float) -> bool:
-    """True where a course of a planned time [s] was walked to its end, after a time [s] by its recording."""
-    return walked >= planned - _SAME_TIME
-
-
-def course_metrics(
-    planned: PlannedCourse, segments: Sequence[SegmentResult], recording: Recording, steady: int
+def task_sequence_metrics(
+    planned: PlannedSequence, segments: Sequence[SegmentResult], recording: Recording, steady: int
 ) -> dict[str, Metric]:
-    """Numbers of a whole course by name, SI units, or of what was walked of it."""
+    """Numbers of a whole task sequence by name, SI units, or of what was walked of it."""
     toes = [segment.lowest_toes for segment in segments if segment.lowest_toes is not None]
-    # A walk may go on after its course.
+    # A walk may go on after its task sequence.
     end = min(float(recording.time[-1]), float(planned.duration))
     gas = float(np.interp(end, recording.time, recording["supplied_mass"]))
     found = {
-        "course_time": Metric(end, "s", "length of the course, as far as it was walked"),
-        "course_planned_time": Metric(float(planned.duration), "s", "length of the whole course"),
+        "task_sequence_time": Metric(end, "s", "length of the task sequence, as far as it was walked"),
+        "task_sequence_planned_time": Metric(float(planned.duration), "s", "length of the whole task sequence"),
         "steady_strides": Metric(float(steady), "-", "whole strides at an even speed on level ground"),
-        "course_strides": Metric(float(sum(item.strides for item in segments)), "-", "strides of the course"),
-        "course_gas": Metric(gas, "kg", "gas taken from the supply on the course"),
-        "course_work": Metric(
+        "task_sequence_strides": Metric(
+            float(sum(item.strides for item in segments)), "-", "strides of the task sequence"
+        ),
+        "task_sequence_gas": Metric(gas, "kg", "gas taken from the supply over the task sequence"),
+        "task_sequence_work": Metric(
             sum(item.net_push_off_work for item in segments), "J", "net work of T_ex while the foot rolls over the toes"
         ),
-        "course_flat_push": Metric(
+        "task_sequence_flat_push": Metric(
             max((item.flat_push for item in segments), default=0.0),
             "N m",
             "largest torque in plantarflexion with a loaded heel",
         ),
     }
     if toes:
-        found["course_lowest_toes"] = Metric(min(toes), "m", "lowest toes over the ground in the middle of a swing")
+        found["task_sequence_lowest_toes"] = Metric(
+            min(toes), "m", "lowest toes over the ground in the middle of a swing"
+        )
     if "walking_speed" in recording:
         way = float(np.trapezoid(recording["walking_speed"], recording.time))
-        found["course_length"] = Metric(way, "m", "way on the course")
+        found["task_sequence_length"] = Metric(way, "m", "distance walked in the task sequence")
     return found

@@ -8,12 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ppafo.control.walking import event_on_off
 from ppafo.control.walking.fault_flags import FAULT_FLAGS
 from ppafo.engine.lane_rows import LANES
-from ppafo.engine.lanes import STEPS_PER_CALL, Batch, BatchResult, Floats, begin_block, run_batch
+from ppafo.engine.lanes import STEPS_PER_CALL, Batch, Floats, begin_block, run_batch
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import NEVER_FAILED, batch_of
 from ppafo.errors import ScenarioError, SimulationError
@@ -27,16 +26,16 @@ from ppafo.simulation.sampled import run_sampled
 from ppafo.simulation.scenario import Control, Scenario
 from ppafo.walking.bottle import WALKED, BottleLife, Schedule, life_on_bottle, run_on_bottle
 from ppafo.walking.contradictions import check_no_bottle
-from ppafo.walking.course import turns_walked
 from ppafo.walking.declaration import THRESHOLDS
 from ppafo.walking.events import FINDING_ROW, SAFE_ROW, VENTINGS_ROW
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import SHORTEST_STRIDES, check_led, duration_problems, walk_of, with_duration
 from ppafo.walking.person import crowd_of, draw_gaits
-from ppafo.walking.planning import course_of_walk, fed_device, plan_walk, plan_walks, unrecorded
+from ppafo.walking.planning import fed_device, plan_walk, plan_walks, task_sequence_of_walk, unrecorded
 from ppafo.walking.preparation import FaultSettings
 from ppafo.walking.result import REMEDY, WalkResult, result_of_walk
 from ppafo.walking.strides import PHASES, healthy_positive_work, healthy_toe_height, lowest_toes
+from ppafo.walking.task_sequence import turns_walked
 from ppafo.walking.wearer import draw_builds
 
 Progress = Callable[[float, float], None]
@@ -54,25 +53,26 @@ def walk(
     overrides: Iterable[str] = (),
     gait: str | Path | None = None,
     progress: Progress = silent,
-    course: str | Path | None = None,
+    task_sequence: str | Path | None = None,
     bottle: str | Path | None = None,
 ) -> WalkResult:
     """Walk for ``minutes`` [min]: a scenario that is a walk, the name of a shipped one, or a file.
 
-    Unless ``minutes`` are given it is as long as the file says, or the whole course, or one minute where there is none,
-    and up to ten on a bottle, which may end it before. With a name or a file go overrides as for the command, and a
-    ``gait``, ``course`` or ``bottle`` in place of its own. A walk that diverges is a result with that status, up to
-    the time of failure. ScenarioError or ParameterError for bad input. ``progress`` gets the minutes done and those in
-    all, part by part.
+    Unless ``minutes`` are given it is as long as the file says, or its task sequence, or one minute where there is
+    none, and up to ten on a bottle, which may end it before. With a name or a file go overrides as for the command,
+    and a ``gait``, ``task_sequence`` or ``bottle`` in place of its own. A walk that diverges is a result with that
+    status, up to the time of failure. ScenarioError or ParameterError for bad input. ``progress`` gets the minutes done
+    and those in all, part by part.
     """
     if isinstance(scenario, Scenario):
-        if any(item is not None for item in (gait, course, bottle)) or tuple(overrides):
+        if any(item is not None for item in (gait, task_sequence, bottle)) or tuple(overrides):
             raise ScenarioError(
-                "overrides, a gait, a course and a bottle go with a name or a file; a Scenario takes them in load_walk"
+                "overrides, a gait, a task sequence and a bottle go with a name or a file; a Scenario takes them in "
+                "load_walk"
             )
         chosen = scenario
     else:
-        chosen = load_walk(scenario, overrides, gait, course, bottle)
+        chosen = load_walk(scenario, overrides, gait, task_sequence, bottle)
     chosen = lasting(chosen, minutes)
     run, carried = plan_walk(chosen), walk_of(chosen).bottle
     custom = chosen.controller.custom
@@ -80,7 +80,12 @@ def walk(
         check_no_bottle(chosen)
         return result_of_walk(chosen, run, run_sampled(batch_of(run), custom), None)
     if carried is None:
-        return result_of_walk(chosen, run, _run_in_parts(batch_of(run), run.step, progress), None)
+        # In parts short enough for an interrupt to be seen and for progress to be reported.
+        block, count = begin_block(batch_of(run)), run.step_count
+        for done in range(0, count, STEPS_PER_CALL):
+            block.advance(min(STEPS_PER_CALL, count - done))
+            progress(min(done + STEPS_PER_CALL, count) * run.step / 60.0, count * run.step / 60.0)
+        return result_of_walk(chosen, run, block.result(), None)
     outcome, supply = run_on_bottle(run, fed_device(chosen), carried, walk_of(chosen).gait.stride_time, progress)
     return result_of_walk(chosen, run, outcome, supply)
 
@@ -88,12 +93,12 @@ def walk(
 def bottle_life(scenario: Scenario, schedule: Schedule, progress: Progress = silent) -> BottleLife:
     """Walk on the bottle of a walk until that ends it: the one answer to how long a device lasts.
 
-    It is the run of ``walk`` on a bottle, for as long as ``schedule`` allows, with its rests; a course is repeated.
+    It is the run of ``walk`` on a bottle, as long as ``schedule`` allows, with its rests; a task sequence is repeated.
     Faults are left out: a device that has stopped empties no bottle. ScenarioError for a walk on no bottle.
     """
     sound = dict.fromkeys(walk_of(scenario).faults, FaultSettings())
     scenario = replace(scenario, motion=replace(walk_of(scenario), faults=sound, broken={}))
-    motion, planned = walk_of(scenario), course_of_walk(scenario)
+    motion, planned = walk_of(scenario), task_sequence_of_walk(scenario)
     if motion.bottle is None:
         raise ScenarioError(f"{scenario.name}: has no bottle")
     if scenario.controller.custom is not None:
@@ -101,7 +106,7 @@ def bottle_life(scenario: Scenario, schedule: Schedule, progress: Progress = sil
     strides = math.ceil(schedule.longest / motion.gait.stride_time)
     seconds = float(planned.duration) if planned is not None else strides * motion.gait.stride_time
     unrecorded = 60.0 if planned is None else 1.0
-    if planned is None:  # no more steps than a run may take: what lasts longer begins again, as a course does
+    if planned is None:  # no more steps than a run may take: what lasts longer begins again, as a task sequence does
         before = with_duration(scenario, unrecorded)
         step = plan_walk(replace(before, run=replace(before.run, output_interval=unrecorded))).step
         seconds = min(seconds, unrecorded * (MAXIMUM_STEPS * step // unrecorded))
@@ -123,16 +128,6 @@ def lasting(scenario: Scenario, minutes: float | None) -> Scenario:
     return with_duration(scenario, 60.0 * minutes)
 
 
-def _run_in_parts(batch: Batch, step: float, progress: Progress) -> BatchResult:
-    """Run in parts short enough for an interrupt to be seen and for progress to be reported."""
-    block = begin_block(batch)
-    count = batch.clock.step_count
-    for done in range(0, count, STEPS_PER_CALL):
-        block.advance(min(STEPS_PER_CALL, count - done))
-        progress(min(done + STEPS_PER_CALL, count) * step / 60.0, count * step / 60.0)
-    return block.result()
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Comparison:
     """A walk with the device, the same without it, and numbers of the healthy gait by name.
@@ -151,7 +146,7 @@ class Comparison:
 
 
 def compare_walks(configuration: Scenario, minutes: float | None = None, progress: Progress = silent) -> Comparison:
-    """Walk ``minutes`` [min], or a whole course, with the device and without, as its kind of motion says.
+    """Walk ``minutes`` [min], or a whole task sequence, with the device and without, as its kind of motion says.
 
     ScenarioError for bad input, SimulationError where its bottle ends the walk before there is anything to compare.
     """
@@ -310,7 +305,7 @@ def walk_population(
     seed: int = 1,
     progress: Progress = silent,
 ) -> Population:
-    """Let many wearers walk for ``minutes`` [min], or all of a course; the first is the configuration's.
+    """Let many wearers walk for ``minutes`` [min], or all of a task sequence; the first is the configuration's.
 
     ``progress`` gets the number of wearers that have walked and the number of all. ScenarioError for bad input.
     """
@@ -326,7 +321,7 @@ def walk_population(
     build = draw_builds(wearers, generator)
     gaits = draw_gaits(walk_of(configuration).gait, build.stature, generator)
     crowd = crowd_of(configuration, build, gaits, generator)
-    planned = course_of_walk(crowd)
+    planned = task_sequence_of_walk(crowd)
     if minutes is None and planned is not None:
         minutes = float(np.max(planned.duration)) / 60.0
     seconds = lasting(configuration, minutes).run.duration
@@ -337,7 +332,7 @@ def walk_population(
     good = (rows["result.failure_time"] >= NEVER_FAILED) & np.isfinite(states).all(axis=0)
     walked = run.step * run.step_count
     # Numbers of each wearer from the totals; ``strides`` walked, parts of one included.
-    strides = walked * gaits.timing["frequency"] if planned is None else turns_walked(planned.course, walked)
+    strides = walked * gaits.timing["frequency"] if planned is None else turns_walked(planned.timed, walked)
     # Who never strikes must not divide by zero.
     strikes = np.maximum(rows["walk.strides"], 1.0)
     over = {"toe_clearance": strikes, "toe_landing": strikes}
@@ -349,17 +344,13 @@ def walk_population(
         "stance_share": gaits.timing["toe_off"],
     }
     kept = [{name: values[good] for name, values in table.items()} for table in (traits, outcomes)]
-    vented, paused, found = _less_help(rows, good)
-    return Population(configuration, seconds / 60.0, seed, kept[0], kept[1], int((~good).sum()), vented, paused, found)
-
-
-def _less_help(rows: Mapping[str, Floats], good: NDArray[np.bool_]) -> tuple[int, int, dict[str, int]]:
-    """Return how many of the good walks ended stopped, how many others had less help, and the last flags of both."""
-    if SAFE_ROW not in rows:
-        return 0, 0, {}
-    stopped, less = rows[SAFE_ROW][good] == STOPPED, rows[VENTINGS_ROW][good] > 0.0
-    last = Counter(FAULT_FLAGS[flag].name for flag in rows[f"{FINDING_ROW}.fault_flag"][good][less].tolist())
-    return int(stopped.sum()), int((~stopped & less).sum()), dict(last.most_common())
+    vented, paused, flags = 0, 0, Counter[str]()
+    if SAFE_ROW in rows:
+        stopped, less = rows[SAFE_ROW][good] == STOPPED, rows[VENTINGS_ROW][good] > 0.0
+        vented, paused = int(stopped.sum()), int((~stopped & less).sum())
+        flags.update(FAULT_FLAGS[flag].name for flag in rows[f"{FINDING_ROW}.fault_flag"][good][less].tolist())
+    lost, last = int((~good).sum()), dict(flags.most_common())
+    return Population(configuration, seconds / 60.0, seed, kept[0], kept[1], lost, vented, paused, last)
 
 
 def _run_in_groups(batch: Batch, progress: Progress) -> Floats:

@@ -173,17 +173,14 @@ def draw_bounded_normal(generator: np.random.Generator, shape: tuple[int, ...]) 
     return np.clip(generator.standard_normal(shape), -MAXIMUM_DEVIATIONS, MAXIMUM_DEVIATIONS)
 
 
-def _shares() -> dict[str, float]:
-    """Return the numbers of the leg of the paper's subject over the powers of its body mass and its stature."""
-    paper = paper_subject()
-    return {
-        name: getattr(paper, name) / (paper.body_mass**of_mass * paper.stature**of_stature)
-        for name, (of_mass, of_stature) in SCALING.items()
-    }
-
+_PAPER = paper_subject()
+_SHARES: Mapping[str, float] = {
+    name: getattr(_PAPER, name) / (_PAPER.body_mass**of_mass * _PAPER.stature**of_stature)
+    for name, (of_mass, of_stature) in SCALING.items()
+}
+"""Numbers of the leg of the paper's subject over the powers of its body mass and its stature."""
 
 # Constants of their own, for the functions below are translated to C.
-_SHARES = _shares()
 _SHANK_CENTRE, _FOOT_CENTRE = _SHARES["shank_mass_centre"], _SHARES["foot_mass_centre"]
 _HEEL, _TOE = _SHARES["heel_lever"], _SHARES["toe_lever"]
 _SHANK_MASS, _FOOT_MASS = _SHARES["shank_mass"], _SHARES["foot_mass"]
@@ -266,8 +263,13 @@ def read_wearer(reading: Reading, gait: Gait, is_named: bool) -> Wearer:
 
     Where it gives the stature, segments follow that and the body mass.
     """
+    paper = subject = paper_subject()
     # The built-in gait, where nobody names it, is walked by the paper's subject and not by its own.
-    subject = _subject(gait) if is_named else paper_subject()
+    if is_named:
+        # A subject of unknown stature has the lengths of the paper's.
+        stature = 1.0 if gait.stature is None else SHANK_SHARE * gait.stature / paper.shank_length
+        segments = scaled(paper, gait.body_mass / paper.body_mass, stature)
+        subject = replace(paper, stature=paper.stature if gait.stature is None else gait.stature, **segments)
     if value_at(reading.document, STATURE) is not None:
         known = {item.name: replace(item, default=getattr(subject, item.name)) for item in WEARER}
         given = {path: reading.number(path, known[path.partition(".")[2]]) for path in (STATURE, BODY_MASS)}
@@ -286,15 +288,6 @@ def read_wearer(reading: Reading, gait: Gait, is_named: bool) -> Wearer:
                 f"{item.unit}: give wearer.{item.name}"
             )
     return Wearer(**reading.section("wearer", quantities))
-
-
-def _subject(gait: Gait) -> Wearer:
-    """Return the wearer with body mass, and lengths where the stature is known, of the subject of a gait."""
-    paper = paper_subject()
-    # A subject of unknown stature has the lengths of the paper's.
-    stature = 1.0 if gait.stature is None else SHANK_SHARE * gait.stature / paper.shank_length
-    segments = scaled(paper, gait.body_mass / paper.body_mass, stature)
-    return replace(paper, stature=paper.stature if gait.stature is None else gait.stature, **segments)
 
 
 def _of_stature(wearer: Wearer, gait: Gait, origin: str) -> str:

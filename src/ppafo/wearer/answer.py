@@ -5,13 +5,13 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.analyses.walk.course import bottle_data, bottle_parts, bottle_remark
 from ppafo.analyses.walk.document import Row, metrics_table, walk_data
 from ppafo.analyses.walk.safety import over_time_parts, safety_remarks
+from ppafo.analyses.walk.task_sequence import bottle_data, bottle_parts, bottle_remark
 from ppafo.documents.json_text import plain
 from ppafo.gait.document import load_gait
 from ppafo.metrics.strides import SETTLING
-from ppafo.report.finding import Column, Finding, Part, columns_of
+from ppafo.report.finding import Finding, Part, columns_of
 from ppafo.report.kind import Kind
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import BLUE, GREY, VERMILION
@@ -127,6 +127,10 @@ def reacting_finding(comparison: Comparison) -> Finding[ReactingPair]:
     remarks += fall_remarks(comparison)
     remarks += [] if worn.supply is None else [bottle_remark(worn)]
     remarks += safety_remarks(worn)
+    numbers = [
+        (head, {name: one.value for name, one in walked.metrics.items()})
+        for head, walked in (("with", worn), ("device off", bare))
+    ]
     stays = worn.metrics["stays_up"].value > 0.5
     strides = f"{worn.metrics['strides'].value:.0f} strides"
     ended = "walks to the end" if stays else f"falls after {worn.metrics['fall_time'].value:.1f} s"
@@ -136,7 +140,7 @@ def reacting_finding(comparison: Comparison) -> Finding[ReactingPair]:
         title=f"Walking with {scenario.name}",
         said=(f"{scenario.name}: {wearer.name} {ended}, {strides}",),
         parts=(
-            Part(columns=reacting_table(comparison), remarks=remarks),
+            Part(columns=metrics_table(ROWS, numbers), remarks=remarks),
             *_way_part(comparison),
             *bottle_parts(worn),
             *_likeness_part(comparison),
@@ -244,14 +248,6 @@ def fall_remarks(comparison: Comparison) -> list[str]:
             )
             found.append(f"{words}: the wearer falls {place}{' ' if place else ''}at {fall.value:.1f} s{means}")
     return found
-
-
-def reacting_table(comparison: Comparison) -> list[Column]:
-    """Return a row for each number, with the device and with it off."""
-    walks = (("with", comparison.with_device), ("device off", comparison.without_device))
-    return metrics_table(
-        ROWS, [(head, {name: one.value for name, one in walked.metrics.items()}) for head, walked in walks]
-    )
 
 
 def _way_part(comparison: Comparison) -> tuple[Part, ...]:

@@ -405,7 +405,7 @@ def end(rows: Any) -> list[str]:
 def _scheme(fails: bool) -> LegScheme:
     faults = {"plant_faults": PlantFaults, "shut_off": ShutOff} if fails else {}
     return LegScheme(
-        takes_course=False,
+        takes_task_sequence=False,
         parameters={"share": DeviceShare, "wearer": Wearer, "gait_sensors": GaitSensors, **faults},
         states={
             "walk": ReactingState,

@@ -15,8 +15,8 @@ from ppafo.model.contact import FLAT
 from ppafo.model.declaration import Quantity
 from ppafo.simulation.declaration import Reading, value_at
 from ppafo.simulation.motion_kind import REACT
-from ppafo.walking.course import WalkingCourse
 from ppafo.walking.motion import WalkMotion
+from ppafo.walking.task_sequence import TaskSequence
 from ppafo.wearer.loading import (
     FASTEST_START,
     IN_RADIANS,
@@ -34,7 +34,7 @@ from ppafo.wearer.model.walker import Fibres, Walker, Wearer, joints
 from ppafo.wearer.model.way import NOT_PUSHED
 from ppafo.wearer.published import felt_at, first_answer, start_of, start_with_size, with_size
 from ppafo.wearer.scheme import STANDING, ReactingState, Reflexes, WalkNow
-from ppafo.wearer.way import OF_THE_WAY, Stretch, stretches_of_course, stretches_of_settings, way_of
+from ppafo.wearer.way import OF_THE_WAY, Stretch, stretches_of_settings, stretches_of_task_sequence, way_of
 
 NAME = "wearer.name"
 """Where the file of a walk names the wearer."""
@@ -88,14 +88,14 @@ FIRST_STRIDE = 1.0
 class ReactingWearer:
     """A neuromuscular gait model: its file, the body with muscles and gains that this gives, and its numbers by name.
 
-    ``settings`` has the numbers of ``REACTIONS``, without the way's where there is a ``course``; each may be an
+    ``settings`` has the numbers of ``REACTIONS``, without the way's where there is a ``task_sequence``; each may be an
     array (runs,).
     """
 
     file: WearerFile
     body: Wearer
     settings: Mapping[str, Any]
-    course: WalkingCourse | None = None
+    task_sequence: TaskSequence | None = None
 
     @property
     def name(self) -> str:
@@ -105,7 +105,9 @@ class ReactingWearer:
     @property
     def stretches(self) -> tuple[Stretch, ...]:
         """What the wearer meets on the way, one after the other."""
-        return stretches_of_settings(self.settings) if self.course is None else stretches_of_course(self.course)
+        if self.task_sequence is None:
+            return stretches_of_settings(self.settings)
+        return stretches_of_task_sequence(self.task_sequence)
 
     @property
     def weight(self) -> Any:
@@ -190,17 +192,19 @@ def _standing(limb: Limb, force: Any) -> ReactingState:
     )
 
 
-def _check_way(reading: Reading, given: Mapping[str, Any], course: WalkingCourse) -> None:
-    """Raise ScenarioError for a course with more pieces than there are, or beside a way that the wearer has."""
-    with refused_as(ScenarioError, course.file, ScenarioError):
-        way_of(stretches_of_course(course))
+def _check_way(reading: Reading, given: Mapping[str, Any], sequence: TaskSequence) -> None:
+    """Raise ScenarioError for a task sequence with more pieces than there are, or beside a way that the wearer has."""
+    with refused_as(ScenarioError, sequence.file, ScenarioError):
+        way_of(stretches_of_task_sequence(sequence))
     for item in OF_THE_WAY:
         if item.name in given:
-            raise reading.refusal(f"wearer.{item.name}", f"does not go with course '{course.name}', which has the way")
+            raise reading.refusal(
+                f"wearer.{item.name}", f"does not go with task sequence '{sequence.name}', which has the way"
+            )
 
 
 def read_reacting(
-    reading: Reading, folder: Path, instead: Mapping[str, str], course: WalkingCourse | None
+    reading: Reading, folder: Path, instead: Mapping[str, str], sequence: TaskSequence | None
 ) -> ReactingWearer:
     """Return the neuromuscular gait model of the file of a walk.
 
@@ -216,14 +220,14 @@ def read_reacting(
         )
     if "gait" in reading.document:
         raise reading.refusal("gait", f"does not go with motion.kind = '{REACT}' yet: leave it out")
-    if course is not None:
-        _check_way(reading, given, course)
+    if sequence is not None:
+        _check_way(reading, given, sequence)
     with refused_as(DataError, reading.quote(NAME), DataError):
         file = find_wearer(folder / name if Path(name).suffix == ".toml" else name)
     own = {f"left_{name}": value for name, value in file.left_gains._asdict().items()}
     own |= {f"right_{name}": value for name, value in file.right_gains._asdict().items()}
     own |= {START_SPEED.name: file.speed}
-    read = REACTIONS if course is None else tuple(item for item in REACTIONS if item not in OF_THE_WAY)
+    read = REACTIONS if sequence is None else tuple(item for item in REACTIONS if item not in OF_THE_WAY)
     # The file's numbers are the defaults of the settings, so that a walk file or an override changes any of them.
     numbers = tuple(replace(item, default=own.get(item.name, item.default)) for item in read)
-    return ReactingWearer(file, wearer_of(file), reading.section("wearer", numbers), course)
+    return ReactingWearer(file, wearer_of(file), reading.section("wearer", numbers), sequence)

@@ -13,19 +13,18 @@ from ppafo.engine.run import Run
 from ppafo.gait import Gait
 from ppafo.metrics.metric import REACTS
 from ppafo.model.columns import Problem, at
-from ppafo.parameters.graph import Graph
 from ppafo.parameters.plant import plant_parameters
 from ppafo.simulation.declaration import Reading
 from ppafo.simulation.loading import ScenarioRequest
 from ppafo.simulation.motion_kind import REACT
 from ppafo.simulation.plan import compose_run, too_many_steps
 from ppafo.simulation.scenario import Scenario
-from ppafo.walking.course import WalkingCourse
 from ppafo.walking.kind import WalkKind
 from ppafo.walking.led import WALK_KIND
 from ppafo.walking.motion import WalkMotion, walk_of
 from ppafo.walking.planning import components_of_walk, failing_of, fed_device, gait_sensors_of, walk_steps
 from ppafo.walking.preparation import device_share, vented_state, without_leg
+from ppafo.walking.task_sequence import TaskSequence
 from ppafo.walking.walk import with_device_off
 from ppafo.walking.wearer import paper_subject
 from ppafo.wearer.recording import reacting_result
@@ -41,10 +40,10 @@ from ppafo.wearer.settings import (
     start_of_body,
     wearer_of_walk,
 )
-from ppafo.wearer.way import check_reacting_course, length_of
+from ppafo.wearer.way import check_reacting_task_sequence
 
 SHORTEST_WAY = 6.0
-"""Shortest walk [s] on a course, unless given."""
+"""Shortest walk [s] in a task sequence, unless given."""
 
 
 def plan_reacting(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
@@ -68,32 +67,25 @@ def plan_reacting(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         lambda plant: vented_state(plant, start.ankle, 0.0),
         walk,
     )
-    return run, (too_many_steps(scenario, run.step, run.step_count), _too_long(scenario))
-
-
-def _too_long(scenario: Scenario) -> Problem:
-    """A step that is too long for a body."""
     step = scenario.run.step
-    return np.asarray(
-        step > LONGEST_STEP
-    ), lambda run: f"run.step = {at(step, run):g} s: a neuromuscular gait model needs {LONGEST_STEP:g} s or less"
+    too_long: Problem = (
+        np.asarray(step > LONGEST_STEP),
+        lambda run: f"run.step = {at(step, run):g} s: a neuromuscular gait model needs {LONGEST_STEP:g} s or less",
+    )
+    return run, (too_many_steps(scenario, run.step, run.step_count), too_long)
 
 
 def _label(motion: WalkMotion) -> str:
     wearer = wearer_of_walk(motion)
     return f"a walk of a neuromuscular gait model, {wearer.name}" + (
-        "" if wearer.course is None else f", course {wearer.course.name}"
+        "" if wearer.task_sequence is None else f", task sequence {wearer.task_sequence.name}"
     )
 
 
 def _read(
-    reading: Reading, request: ScenarioRequest, _gait: Gait, _is_named: bool, course: WalkingCourse | None
+    reading: Reading, request: ScenarioRequest, _gait: Gait, _is_named: bool, sequence: TaskSequence | None
 ) -> Mapping[str, Any]:
-    return {"wearer": paper_subject(), "body": read_reacting(reading, request.folder, request.instead, course)}
-
-
-def _links(_document: Mapping[str, Any]) -> Graph:
-    return {}
+    return {"wearer": paper_subject(), "body": read_reacting(reading, request.folder, request.instead, sequence)}
 
 
 def _interval(seconds: float) -> float:
@@ -103,10 +95,11 @@ def _interval(seconds: float) -> float:
 
 def _duration(motion: WalkMotion) -> float | None:
     wearer = wearer_of_walk(motion)
-    if wearer.course is None:
+    if wearer.task_sequence is None:
         return None
+    way = sum(segment.values.get("distance", 0.0) for segment in wearer.task_sequence.segments)
     # The reflexes set the pace: at the speed of the start, to the next whole second.
-    return max(SHORTEST_WAY, float(math.ceil(length_of(wearer.course) / wearer.settings[START_SPEED.name])))
+    return max(SHORTEST_WAY, float(math.ceil(way / wearer.settings[START_SPEED.name])))
 
 
 def _remarks(motion: WalkMotion) -> list[str]:
@@ -116,14 +109,16 @@ def _remarks(motion: WalkMotion) -> list[str]:
 
 def _document(motion: WalkMotion) -> dict[str, Any]:
     wearer = wearer_of_walk(motion)
-    return {"wearer": {"name": wearer.name, "numbers": plain(dict(wearer.settings))}, "course": plain(wearer.course)}
+    return {
+        "wearer": {"name": wearer.name, "numbers": plain(dict(wearer.settings))},
+        "task_sequence": plain(wearer.task_sequence),
+    }
 
 
-def _nothing_healthy(_scenario: Scenario) -> dict[str, Any]:
+def _nothing(_of: Any) -> dict[str, Any]:
+    """Return no links of the wearer's numbers, and no numbers of a healthy walk."""
     return {}
 
-
-_PLACES = {f"wearer.{item.name}": ("motion", "body", "settings", item.name) for item in REACTIONS}
 
 REACT_KIND = replace(
     WALK_KIND,
@@ -139,16 +134,16 @@ REACT_KIND = replace(
         texts={NAME: NAME_SUMMARY},
         step=STEP_OF_BODY,
         interval=_interval,
-        check_course=check_reacting_course,
+        check_task_sequence=check_reacting_task_sequence,
         read=_read,
-        links=_links,
+        links=_nothing,
         duration=_duration,
         subject=REACTS,
         result=reacting_result,
         remarks=_remarks,
         document=_document,
         without=with_device_off,
-        healthy=_nothing_healthy,
+        healthy=_nothing,
         finding="ppafo.wearer.answer:reacting_finding",
         exported="ppafo.wearer.export:REACTING_WALK",
     ),

@@ -4,7 +4,7 @@ Any number may be an array (runs,), or one that an export writes down.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -12,13 +12,13 @@ import numpy as np
 
 from ppafo.errors import ScenarioError
 from ppafo.model.declaration import Quantity
-from ppafo.walking.course import FORCE, HEIGHT, PUSHED_FOR, WalkingCourse
+from ppafo.walking.task_sequence import FORCE, HEIGHT, PUSHED_FOR, TaskSequence
 from ppafo.wearer.model.way import LEVEL, PIECES, PUSHES, UNUSED, UNUSED_PUSH, Piece, Push, Way
 
 _REFLEXES = ("walk", "step", "push")
 """What reflexes can do, or what can be done to them."""
 _LEVEL_START = 1.0
-"""Way [m] on level ground with which a course begins."""
+"""Way [m] on level ground with which a task sequence begins."""
 
 EDGE = 0.01
 """Length [m] of the steep piece that a step is: its edges are not sharp."""
@@ -30,7 +30,7 @@ PUSH = replace(FORCE, name="push", default=0.0)
 PUSH_FROM = Quantity("push_from", "m", "way before the push", 5.0, 0.01, 1.0e4)
 PUSH_DURATION = replace(PUSHED_FOR, name="push_duration", summary="how long the push lasts")
 OF_THE_WAY = (SLOPE, STEP_HEIGHT, GROUND_FROM, PUSH, PUSH_FROM, PUSH_DURATION)
-"""Numbers of a way without a course."""
+"""Numbers of a way without a task sequence."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,43 +86,35 @@ def stretches_of_settings(settings: Mapping[str, Any]) -> tuple[Stretch, ...]:
     )
 
 
-def check_reacting_course(course: WalkingCourse) -> None:
+def check_reacting_task_sequence(sequence: TaskSequence) -> None:
     """Raise ScenarioError for what a neuromuscular gait model cannot do."""
-    for index, segment in enumerate(course.segments):
+    for index, segment in enumerate(sequence.segments):
         if segment.kind not in _REFLEXES:
-            raise course.refusal(
+            raise sequence.refusal(
                 index,
-                "a neuromuscular gait model walks on, for the reflexes know nothing else; such a course has walk (with "
-                "distance and slope), step and push",
+                "a neuromuscular gait model walks on, for the reflexes know nothing else; its task sequence has walk "
+                "(with distance and slope), step and push",
             )
         others = [name for name in segment.values if segment.kind == "walk" and name not in ("distance", "slope")]
         if others:
-            raise course.refusal(
+            raise sequence.refusal(
                 index, f"{others[0]}: the reflexes set the pace of a neuromuscular gait model: give distance, and slope"
             )
-    first = course.segments[0]
+    first = sequence.segments[0]
     if first.kind != "walk" or first.values["distance"] < _LEVEL_START or first.values.get("slope"):
-        raise course.refusal(0, f"a neuromuscular gait model begins with a level walk of {_LEVEL_START:g} m or more")
+        raise sequence.refusal(0, f"a neuromuscular gait model begins with a level walk of {_LEVEL_START:g} m or more")
 
 
-def stretches_of_course(course: WalkingCourse) -> tuple[Stretch, ...]:
-    """The way of a course, which was checked to be one of a neuromuscular gait model."""
-    return tuple(_laid(course))
-
-
-def _laid(course: WalkingCourse) -> Iterator[Stretch]:
-    place = 0.0
-    for segment in course.segments:
+def stretches_of_task_sequence(sequence: TaskSequence) -> tuple[Stretch, ...]:
+    """The way of a task sequence, which was checked to be one of a neuromuscular gait model."""
+    place, found = 0.0, []
+    for segment in sequence.segments:
         values = dict(segment.values)
         if segment.kind == "walk":
             values["slope"] = math.tan(values.get("slope", 0.0))
-        yield Stretch(segment.kind, place, values)
+        found.append(Stretch(segment.kind, place, values))
         place += EDGE if segment.kind == "step" else values.get("distance", 0.0)
-
-
-def length_of(course: WalkingCourse) -> float:
-    """Length of the way [m]."""
-    return sum(segment.values.get("distance", 0.0) for segment in course.segments)
+    return tuple(found)
 
 
 def way_of(stretches: Sequence[Stretch]) -> Way:

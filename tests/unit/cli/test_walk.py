@@ -143,7 +143,7 @@ def test_json_is_the_only_thing_printed(tmp_path: Path, capsys: pytest.CaptureFi
     assert document["folder"] == str(tmp_path / "walk")
 
 
-def test_the_list_names_every_walk_and_every_course(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_list_names_every_walk_and_every_task_sequence(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["walk", "--list"]) == 0
     names = [line.split()[0] for line in capsys.readouterr().out.splitlines()]
     proportional = ("proportional", "proportional-learning", "proportional-regulators")
@@ -151,32 +151,32 @@ def test_the_list_names_every_walk_and_every_course(capsys: pytest.CaptureFixtur
     assert names[8:] == ["corridor", "first-steps", "ramp-and-kerb", "six-minutes", "stairs"]
     assert main(["walk", "--list", "--json"]) == 0
     listed = json.loads(capsys.readouterr().out)["walks"]
-    assert [item["kind"] for item in listed] == ["walk"] * 8 + ["course"] * 5
+    assert [item["kind"] for item in listed] == ["walk"] * 8 + ["task sequence"] * 5
 
 
-def test_a_course_writes_its_segments_and_its_figure(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_task_sequence_writes_its_segments_and_its_figure(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = tmp_path / "along"
-    assert main(["walk", "solenoid", "--course", "stairs", "--minutes", "0.3", "--out", str(folder)]) == 0
+    assert main(["walk", "solenoid", "--task-sequence", "stairs", "--minutes", "0.3", "--out", str(folder)]) == 0
     out = capsys.readouterr().out
     assert "stairs, 0.6 m/s" in out
-    assert "as far as walked" in out, "0.3 min are a part of the course"
+    assert "as far as walked" in out, "0.3 min are a part of the task sequence"
     assert "is scaled to 0.6, 0.8 m/s: beyond 1.06 to 1.6 m/s" in out
-    assert {"course.png", "course.svg", "segments.csv", "segments-off.csv"} <= set(names(folder))
+    assert {"task_sequence.png", "task_sequence.svg", "segments.csv", "segments-off.csv"} <= set(names(folder))
     assert "legs.png" not in names(folder)
     document = json.loads((folder / "walk.json").read_text())
-    assert document["course"] == "stairs"
+    assert document["task_sequence"] == "stairs"
     assert [item["kind"] for item in document["segments"]] == ["stand", "walk", "stairs"]
     lines = (folder / "segments.csv").read_text().splitlines()
     assert lines[1].startswith("kind,start [s],end [s],strides [-],helped [-],gas [kg]")
     assert len(lines) == 5
 
 
-def test_a_bottle_repeats_a_course_as_a_whole(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_bottle_repeats_a_task_sequence_as_a_whole(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = tmp_path / "along"
-    assert main(["walk", "solenoid", "--course", "stairs", "--out", str(folder)]) == 0
+    assert main(["walk", "solenoid", "--task-sequence", "stairs", "--out", str(folder)]) == 0
     capsys.readouterr()
     assert main(["bottle", str(folder), "--longest", "5 s"]) == 0
-    assert "walk 'solenoid' on course 'stairs'" in capsys.readouterr().out
+    assert "walk 'solenoid' on task sequence 'stairs'" in capsys.readouterr().out
 
 
 def test_the_schema_of_a_walk_file_is_published(capsys: pytest.CaptureFixture[str]) -> None:

@@ -53,14 +53,14 @@ THERMAL = (
 )
 SLOW = ("valve.spool_frequency=30 Hz", "valve.slew_limit=20 1/s", "timing.kind=estimated")
 EVERYTHING = (*SEEN, *FAULTY, *THERMAL, *SLOW, "controller.rate=330 Hz", "run.step=0.4 ms")
-ON_RAMP = ("reacting", ("course=ramp-and-kerb", *SEEN, *THERMAL))
+ON_RAMP = ("reacting", ("task_sequence=ramp-and-kerb", *SEEN, *THERMAL))
 VARIED: tuple[tuple[str, tuple[str, ...]], ...] = (
     *((name, ()) for name in list_walks()),
     ("proportional-regulators", EVERYTHING),
-    ("proportional", ("course=first-steps",)),
+    ("proportional", ("task_sequence=first-steps",)),
     ON_RAMP,
 )
-"""Every shipped walk, one with every further feature (sensors with faults, thermal gas, slow valve), and courses."""
+"""Every shipped walk, one with all further features (sensors with faults, thermal gas, slow valve), task sequences."""
 
 BY_NUMBA = ("proportional-regulators", EVERYTHING)
 """The walk whose lanes Numba compiles, so that no translator stands on both sides; it takes a minute.
@@ -131,7 +131,7 @@ def numbers_in_c(library: ctypes.CDLL, values: Values, rows: tuple[int, int]) ->
 def batches(name: str, overrides: tuple[str, ...], settings: tuple[Setting, ...]) -> Iterator[tuple[Values, Batch]]:
     """Settings as they are, then drawn ones, each with what Python plans of them."""
     draw = np.random.default_rng(15)
-    kinds = [text for text in overrides if "kind=" in text or text.startswith("course")]
+    kinds = [text for text in overrides if "kind=" in text or text.startswith("task_sequence")]
     values = {item.path: item.value for item in settings}
     while True:
         try:
@@ -245,7 +245,7 @@ def test_every_sample_of_a_walk_has_the_bits_of_python(
     assert {"strides", "helped_strides", "total_gas"} <= set(known)
     assert known == pytest.approx({head: result.metrics[head].value for head in known}, rel=1e-12, abs=1e-15)
     has_strides = result.metrics["counted_strides"].value > 0.0
-    assert ("net_push_off_work" in known) == (walk_of(walked).course is None and has_strides)
+    assert ("net_push_off_work" in known) == (walk_of(walked).task_sequence is None and has_strides)
 
 
 def test_a_walk_of_every_feature_is_clean_under_the_sanitizers_and_the_same_in_c_plus_plus(tmp_path: Path) -> None:

@@ -91,7 +91,7 @@ def test_options_of_the_other_source_are_refused(
     assert not (tmp_path / "out").exists()
 
 
-COURSE = """schema_version = 1
+TASK_SEQUENCE = """schema_version = 1
 name = "short"
 description = "A few steps."
 
@@ -103,11 +103,11 @@ duration = "4 s"
 
 
 @pytest.mark.parametrize(("given", "end"), [([], 4.0), (["--minutes", "2 s"], 2.0)])
-def test_a_walk_is_as_long_as_its_course_unless_minutes_are_given(
+def test_a_walk_is_as_long_as_its_task_sequence_unless_minutes_are_given(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], given: list[str], end: float
 ) -> None:
-    (tmp_path / "short.toml").write_text(COURSE, encoding="utf-8")
-    words = ["export", "opensim", "solenoid", "--set", f"course={tmp_path / 'short.toml'}", *given]
+    (tmp_path / "short.toml").write_text(TASK_SEQUENCE, encoding="utf-8")
+    words = ["export", "opensim", "solenoid", "--set", f"task_sequence={tmp_path / 'short.toml'}", *given]
     assert main([*words, "--out", str(tmp_path / "out")]) == 0, capsys.readouterr().err
     times = read_opensim(tmp_path / "out" / "device_torque.sto").time
     # A segment is a whole number of strides.

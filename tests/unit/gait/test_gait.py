@@ -38,9 +38,10 @@ def test_a_curve_is_the_sum_of_its_series_and_has_its_derivatives(phase: float) 
     step = 1e-4
     before, now, after = (phase + k * step / STRIDE_TIME for k in (-1, 0, 1))
     slope = (CURVE.value(after) - CURVE.value(before)) / (2.0 * step)
-    assert CURVE.rate(now, STRIDE_TIME) == pytest.approx(slope, abs=1e-4)
-    bend = (CURVE.rate(after, STRIDE_TIME) - CURVE.rate(before, STRIDE_TIME)) / (2.0 * step)
-    assert CURVE.acceleration(now, STRIDE_TIME) == pytest.approx(bend, abs=1e-3)
+    rate = CURVE.derivative(STRIDE_TIME)
+    assert rate.value(now) == pytest.approx(slope, abs=1e-4)
+    bend = (rate.value(after) - rate.value(before)) / (2.0 * step)
+    assert rate.derivative(STRIDE_TIME).value(now) == pytest.approx(bend, abs=1e-3)
 
 
 def test_a_scaled_curve_differs_between_strides_as_much_more() -> None:
@@ -278,8 +279,8 @@ def test_the_rate_of_the_shank_is_the_recorded_one(normative: Gait, shared_data:
     table = np.genfromtxt(
         shared_data / "gait" / "falisse2019_derived" / "falisse2019_s1_1p33_stride.csv", delimiter=",", names=True
     )
-    rates = [np.degrees(normative.shank_angle.rate(p / 100.0, normative.stride_time)) for p in table["pct"]]
-    left = np.array(rates) - table["phidot_deg_s"]
+    rate = normative.shank_angle.derivative(normative.stride_time)
+    left = np.degrees(rate.values_at(table["pct"] / 100.0)) - table["phidot_deg_s"]
     assert np.max(np.abs(left)) < 0.015 * np.ptp(table["phidot_deg_s"])
     assert np.sqrt(np.mean(left**2)) < 0.25 * np.sqrt(np.mean(table["phidot_deg_s_sd"] ** 2))
 

@@ -1,4 +1,4 @@
-"""Walks by chance: what must hold of every course, wearer and device, and of every fault of the plant."""
+"""Walks by chance: what must hold of every task sequence, wearer and device, and of every fault of the plant."""
 
 import numpy as np
 import pytest

@@ -64,7 +64,7 @@ def test_a_nondisabled_wearer_keeps_the_gait_and_the_device_takes_over_part_of_l
 @pytest.mark.parametrize("valve", ["solenoid", "proportional"])
 def test_a_nondisabled_wearer_stops_without_a_pause(valve: str) -> None:
     """The last foot comes down slowly: its toes carried nothing until it was flat to the last degree, and it paused."""
-    result = walk(load_walk(valve, ["wearer.keeps_gait=1"], course="corridor"), 0.35)
+    result = walk(load_walk(valve, ["wearer.keeps_gait=1"], task_sequence="corridor"), 0.35)
     assert result.recording.time[-1] > 19.0
     assert not result.events
 
@@ -74,9 +74,9 @@ def test_nondisabled_wearers_whose_feet_roll_slowly_are_helped_without_a_pause()
     assert (people.vented, people.paused) == (0, 0)
 
 
-def test_coarse_sensors_take_no_help_away_on_a_course_with_stops() -> None:
+def test_coarse_sensors_take_no_help_away_in_a_task_sequence_with_stops() -> None:
     """Their steps hold a reading for long: half to seven tenths of the wearers paused by a sensor that seemed still."""
-    people = walk_population(load_walk("solenoid", SENSORS["coarse"], course="corridor"), None, 24)
+    people = walk_population(load_walk("solenoid", SENSORS["coarse"], task_sequence="corridor"), None, 24)
     assert people.vented == 0
     assert not [name for name in people.fault_flags if name.startswith(("still_", "frozen_"))]
 

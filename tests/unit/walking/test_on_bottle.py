@@ -219,7 +219,7 @@ def test_a_bottle_of_the_package_is_set_to_the_pressure_of_the_walk_and_says_so(
 
 
 @pytest.mark.parametrize(
-    ("path", "value"), [("gait", "falisse2019-subject1"), ("course", "stairs"), ("bottle", BOTTLE)]
+    ("path", "value"), [("gait", "falisse2019-subject1"), ("task_sequence", "stairs"), ("bottle", BOTTLE)]
 )
 def test_what_is_named_twice_is_refused(path: str, value: str) -> None:
     own = "bottle.name=other" if path == "bottle" else f"{path}=other"

@@ -282,13 +282,13 @@ def test_a_ratio_changes_a_gain_of_both_legs() -> None:
             {"wearer": {"reacts": "geyer-herr"}},
             'wearer.reacts = \'geyer-herr\': is now motion.kind = "react" and wearer.name = "geyer-herr"',
         ),
-        ({"course": "stairs"}, "segment 1 (stand): a neuromuscular gait model walks on"),
+        ({"task_sequence": "stairs"}, "segment 1 (stand): a neuromuscular gait model walks on"),
         (
-            {"course": "ramp-and-kerb", "wearer": {"name": "geyer-herr", "slope": 0.01}},
-            "wearer.slope = 0.01: does not go with course 'ramp-and-kerb'",
+            {"task_sequence": "ramp-and-kerb", "wearer": {"name": "geyer-herr", "slope": 0.01}},
+            "wearer.slope = 0.01: does not go with task sequence 'ramp-and-kerb'",
         ),
         (
-            {"course": "ramp-and-kerb", "motion": {"kind": "walk"}, "wearer": {}},
+            {"task_sequence": "ramp-and-kerb", "motion": {"kind": "walk"}, "wearer": {}},
             "segment 1 (walk): distance is for a neuromuscular gait model",
         ),
         ({"gait": "falisse2019-subject1"}, "does not go with motion.kind = 'react' yet"),

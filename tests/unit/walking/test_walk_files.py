@@ -62,29 +62,33 @@ def test_every_shipped_walk_says_in_its_motion_that_it_is_one() -> None:
     }
 
 
-def test_gait_and_course_may_stand_in_the_motion_or_above_and_not_in_both(tmp_path: Path) -> None:
-    course = 'course = "stairs"\n'
-    inside = load_scenario(written(tmp_path, text_of(NAME) + MOTION + course))
-    above = load_scenario(written(tmp_path, course + text_of(NAME)))
-    assert walk_of(inside).course == walk_of(above).course
-    assert walk_of(inside).course is not None
+def test_gait_and_task_sequence_may_stand_in_the_motion_or_above_and_not_in_both(tmp_path: Path) -> None:
+    sequence = 'task_sequence = "stairs"\n'
+    inside = load_scenario(written(tmp_path, text_of(NAME) + MOTION + sequence))
+    above = load_scenario(written(tmp_path, sequence + text_of(NAME)))
+    assert walk_of(inside).task_sequence == walk_of(above).task_sequence
+    assert walk_of(inside).task_sequence is not None
     assert inside.run.duration == above.run.duration
-    with pytest.raises(ScenarioError, match=r"mine\.toml: give either motion\.course or course, not both"):
-        load_scenario(written(tmp_path, course + text_of(NAME) + MOTION + course))
+    with pytest.raises(
+        ScenarioError, match=r"mine\.toml: give either motion\.task_sequence or task_sequence, not both"
+    ):
+        load_scenario(written(tmp_path, sequence + text_of(NAME) + MOTION + sequence))
 
 
 def test_an_override_means_the_same_under_either_path() -> None:
-    one, other = (load_scenario(NAME, [f"{path}=stairs"]) for path in ("course", "motion.course"))
-    assert walk_of(one).course == walk_of(other).course
-    with pytest.raises(ScenarioError, match=r"override 'motion\.course=stairs': the motion is given as 'rise' already"):
-        load_walk(NAME, ["motion.course=stairs"], course="rise")
+    one, other = (load_scenario(NAME, [f"{path}=stairs"]) for path in ("task_sequence", "motion.task_sequence"))
+    assert walk_of(one).task_sequence == walk_of(other).task_sequence
+    with pytest.raises(
+        ScenarioError, match=r"override 'motion\.task_sequence=stairs': the motion is given as 'rise' already"
+    ):
+        load_walk(NAME, ["motion.task_sequence=stairs"], task_sequence="rise")
 
 
-def test_a_course_beside_a_file_in_another_folder_is_found_by_its_relative_path(tmp_path: Path) -> None:
-    course = (resources.files("ppafo") / "walking" / "courses" / "stairs.toml").read_text(encoding="utf-8")
-    (tmp_path / "own.toml").write_text(course)
-    found = load_scenario(written(tmp_path, text_of(NAME) + MOTION + 'course = "own.toml"\n'))
-    own, shipped = (walk_of(item).course for item in (found, load_scenario(NAME, ["course=stairs"])))
+def test_a_task_sequence_beside_a_file_in_another_folder_is_found_by_its_relative_path(tmp_path: Path) -> None:
+    sequence = (resources.files("ppafo") / "walking" / "task_sequences" / "stairs.toml").read_text(encoding="utf-8")
+    (tmp_path / "own.toml").write_text(sequence)
+    found = load_scenario(written(tmp_path, text_of(NAME) + MOTION + 'task_sequence = "own.toml"\n'))
+    own, shipped = (walk_of(item).task_sequence for item in (found, load_scenario(NAME, ["task_sequence=stairs"])))
     assert own is not None
     assert shipped is not None
     assert (own.file, own.segments) == (str(tmp_path / "own.toml"), shipped.segments)
@@ -135,17 +139,17 @@ def test_a_walk_takes_its_own_motion_and_names_the_kinds_that_exist(tmp_path: Pa
         load_walk(misspelt)
 
 
-@pytest.mark.parametrize(("key", "kind"), [("gait", DataError), ("course", ScenarioError)])
-def test_a_gait_or_course_that_is_not_there_names_the_file_and_the_key(
+@pytest.mark.parametrize(("key", "kind"), [("gait", DataError), ("task_sequence", ScenarioError)])
+def test_a_gait_or_task_sequence_that_is_not_there_names_the_file_and_the_key(
     key: str, kind: type[PpafoError], tmp_path: Path
 ) -> None:
-    file = written(tmp_path, f'{key} = "nobody"\n{text_of(NAME)}')
-    with pytest.raises(kind, match=rf"{file.name}: {key} = 'nobody': there is no {key} 'nobody'"):
+    file, noun = written(tmp_path, f'{key} = "nobody"\n{text_of(NAME)}'), key.replace("_", " ")
+    with pytest.raises(kind, match=rf"{file.name}: {key} = 'nobody': there is no {noun} 'nobody'"):
         load_walk(file)
-    with pytest.raises(kind, match=rf"^{NAME}: override {key}=nobody: there is no {key} 'nobody'"):
+    with pytest.raises(kind, match=rf"^{NAME}: override {key}=nobody: there is no {noun} 'nobody'"):
         load_walk(NAME, [f"{key}=nobody"])
-    with pytest.raises(kind, match=rf"^there is no {key} 'nobody'"):
-        load_walk(NAME, gait="nobody") if key == "gait" else load_walk(NAME, course="nobody")
+    with pytest.raises(kind, match=rf"^there is no {noun} 'nobody'"):
+        load_walk(NAME, gait="nobody") if key == "gait" else load_walk(NAME, task_sequence="nobody")
 
 
 def test_where_only_a_vane_will_do_a_walk_is_refused_by_its_motion(tmp_path: Path) -> None:

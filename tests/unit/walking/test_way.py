@@ -73,8 +73,8 @@ def test_a_way_of_more_pieces_than_there_are_is_refused() -> None:
         way_of((START, *steps))
 
 
-def test_a_course_of_too_many_pieces_is_refused_by_the_name_of_its_file(tmp_path: Path) -> None:
+def test_a_task_sequence_of_too_many_pieces_is_refused_by_the_name_of_its_file(tmp_path: Path) -> None:
     step = '[[segment]]\nkind = "walk"\ndistance = "3 m"\n[[segment]]\nkind = "step"\nheight = "1 cm"\n'
     (tmp_path / "stairway.toml").write_text(f'schema_version = 1\nname = "stairway"\n{PIECES * step}')
     with pytest.raises(ScenarioError, match=r"stairway\.toml: the ground has \d+ pieces"):
-        load_walk("reacting", course=tmp_path / "stairway.toml")
+        load_walk("reacting", task_sequence=tmp_path / "stairway.toml")

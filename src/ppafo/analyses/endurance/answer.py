@@ -30,7 +30,7 @@ class Endurance:
     """The request and its result.
 
     ``discharge`` is the requested course. ``strides_when_warm`` is the number of strides that a bottle which stays at
-    room temperature gives: what cooling costs. ``is_of_course`` is true where a stride is a course.
+    room temperature gives: what cooling costs. ``is_of_task_sequence`` is true where a stride is a task sequence.
     """
 
     bottle: Bottle
@@ -38,7 +38,7 @@ class Endurance:
     schedule: Schedule
     discharge: Discharge
     strides_when_warm: float
-    is_of_course: bool = False
+    is_of_task_sequence: bool = False
 
     def json_document(self) -> dict[str, Any]:
         """Return the course, its ending and the bottle as plain data in SI."""

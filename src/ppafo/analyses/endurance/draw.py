@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ppafo.constants import GRAMS_PER_KILOGRAM
-from ppafo.errors import DataError, ParameterError, PpafoError, refused_as
+from ppafo.errors import DataError, ParameterError, PpafoError, nearest_name, refused_as
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 from ppafo.simulation.loading import ScenarioRequest, scenario_of
@@ -109,7 +109,7 @@ class WalkGas:
     """A walk as far as its gas goes: name, recording, gas [kg] and time [s] of a stride.
 
     ``gas_per_stride`` is the mean of the strides with help at the set pressure, 0 where the walk took none. A walk on a
-    ``course``, "" without one, is repeated as a whole: gas and time are then the whole's. ``scenario`` is what
+    ``task_sequence``, "" without one, is repeated as a whole: gas and time are then the whole's. ``scenario`` is what
     was walked.
     """
 
@@ -117,22 +117,22 @@ class WalkGas:
     recording: Recording
     gas_per_stride: float
     stride_time: float
-    course: str = ""
+    task_sequence: str = ""
     scenario: Scenario | None = None
 
 
 def walk_gas(result: WalkResult) -> WalkGas:
     """Return the gas of a walk."""
-    configuration, course = result.scenario, walk_of(result.scenario).course
-    gas = result.metrics.get("gas" if course is None else "course_gas")
+    configuration, sequence = result.scenario, walk_of(result.scenario).task_sequence
+    gas = result.metrics.get("gas" if sequence is None else "task_sequence_gas")
     # A neuromuscular gait model sets the pace, and one who took gas made strides.
-    time = result.metrics.get("stride_time" if course is None else "course_time")
+    time = result.metrics.get("stride_time" if sequence is None else "task_sequence_time")
     return WalkGas(
         configuration.name,
         result.recording,
         0.0 if gas is None else gas.value,
         walk_of(configuration).gait.stride_time if time is None else time.value,
-        course="" if course is None else course.name,
+        task_sequence="" if sequence is None else sequence.name,
         scenario=configuration,
     )
 
@@ -156,20 +156,22 @@ def read_walk_gas(folder: Path) -> WalkGas:
     status = _table(document, "status", path).get("kind", "completed")
     if status != "completed":
         raise DataError(f"{path}: the walk {status}, so it cannot be repeated")
-    course = _table(document, "configuration", path).get("course")
-    key = "gas" if course is None else "course_gas"
+    configuration = _table(document, "configuration", path)
+    if configuration.get("course") is not None:
+        raise DataError(f"{path}: 'course'{nearest_name('course', ('task_sequence',))}; write the walk again")
+    sequence = None if configuration.get("task_sequence") is None else _table(configuration, "task_sequence", path)
+    key = "gas" if sequence is None else "task_sequence_gas"
     has_gas = key in _table(document, "metrics", path)
     gas = _number(document, f"metrics.{key}.value", path, -_LEAST) if has_gas else 0.0
-    time = "configuration.gait.stride_time" if course is None else "metrics.course_time.value"
+    time = "configuration.gait.stride_time" if sequence is None else "metrics.task_sequence_time.value"
     stride_time = _number(document, time, path, 0.0)
-    name = document["configuration"].get("name", folder.name)
     return WalkGas(
-        str(name),
+        str(configuration.get("name", folder.name)),
         _recording(folder),
         gas,
         stride_time,
-        "" if course is None else str(_table({"course": course}, "course", path).get("name", "course")),
-        _walked(document["configuration"], path),
+        "" if sequence is None else str(sequence.get("name", "task sequence")),
+        _walked(configuration, path),
     )
 
 
@@ -218,5 +220,5 @@ def draw_of_walk(walk: WalkGas) -> Draw:
     # An open valve may let gas back into the supply for moments, so the largest flow is a mean over 0.1 s.
     peak = max(largest_flow(walk.recording), walk.gas_per_stride / walk.stride_time)
     draw = draw_of_numbers(walk.gas_per_stride, walk.stride_time, peak)
-    along = f" on course '{walk.course}'" if walk.course else ""
+    along = f" in task sequence '{walk.task_sequence}'" if walk.task_sequence else ""
     return replace(draw, origin=f"walk '{walk.name}'{along}, {walk.recording.kind}, repeated")

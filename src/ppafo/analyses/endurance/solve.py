@@ -84,7 +84,7 @@ def endurance(
             found[name] = follow_bottle(full, draw_of_recording(recording, stride_time), schedule)
             continue
         if stride_time is not None:
-            stride = f"its whole course '{gas.course}'" if gas.course else "one stride of its walk"
+            stride = f"its whole task sequence '{gas.task_sequence}'" if gas.task_sequence else "one stride of its walk"
             raise ParameterError(f"--stride-time: a stride of {name} is {stride}; omit --stride-time")
         found[name] = endurance_of_walk_gas(gas, bottle, schedule, changed)
     return finding_of(*found.values()) if len(found) == 1 else finding_of_several(Endurances(found))
@@ -95,7 +95,7 @@ def endurance_of_walk(result: WalkResult, bottle: str | Path | None = None) -> E
 
     The same device, without faults, walks on the bottle until that ends it, as ``ppafo walk --bottle`` does;
     ``bottle`` is its own, or the paper's, unless given. A stride is one of the leg with the device, or a whole
-    course.
+    task sequence.
     """
     gas = walk_gas(result)
     # A walk that takes no gas lasts for ever on any bottle.
@@ -131,7 +131,7 @@ def endurance_of_walk_gas(
         schedule=schedule,
         discharge=discharge_of_life(life, taken),
         strides_when_warm=usable / taken.mass_per_stride,
-        is_of_course=bool(gas.course),
+        is_of_task_sequence=bool(gas.task_sequence),
     )
 
 

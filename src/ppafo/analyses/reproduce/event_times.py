@@ -10,11 +10,11 @@ from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import NEVER_FAILED, batch_of
 from ppafo.errors import SimulationError
 from ppafo.simulation.scenario import Scenario
-from ppafo.walking.course import Segment, WalkingCourse
 from ppafo.walking.events import EVENTS, EventErrors, event_errors, known_events, true_events, within
 from ppafo.walking.motion import walk_of
-from ppafo.walking.planning import course_of_walk, plan_walk
+from ppafo.walking.planning import plan_walk, task_sequence_of_walk
 from ppafo.walking.result import REMEDY
+from ppafo.walking.task_sequence import Segment, TaskSequence
 from ppafo.walking.walk import lasting
 
 WEARERS = {"healthy": ("wearer.keeps_gait=1",), "impaired": ("wearer.keeps_gait=0",)}
@@ -34,20 +34,20 @@ def rms_of(parts: Sequence[Floats]) -> float:
     return float(np.sqrt(np.mean(every**2))) if every.size else float("nan")
 
 
-def uneven_course(cadence: float) -> WalkingCourse:
+def uneven_task_sequence(cadence: float) -> TaskSequence:
     """Strides whose times vary as people's do, about a cadence [1/s] of steps."""
     generator = np.random.default_rng(SEED)
     paces = cadence / (1.0 + VARIATION * np.clip(generator.standard_normal(UNEVEN_STRIDES), -2.0, 2.0))
     # Each stride is a segment of its own, since a segment has one pace.
     strides = (Segment("walk", {"cadence": pace, "strides": 1.0}) for pace in paces.tolist())
     begin = (Segment("start", {"strides": 1.0}), Segment("walk", {"strides": 6.0}))
-    return WalkingCourse("uneven", "Strides of uneven time.", (*begin, *strides), "uneven")
+    return TaskSequence("uneven", "Strides of uneven time.", (*begin, *strides), "uneven")
 
 
 def timed_events(configuration: Scenario, minutes: float) -> Mapping[str, EventErrors]:
     """Errors of the events of one walk of at most so many minutes; SimulationError where it diverges."""
-    course = course_of_walk(configuration)
-    longest = lasting(configuration, minutes).run.duration if course is None else float(course.duration)
+    sequence = task_sequence_of_walk(configuration)
+    longest = lasting(configuration, minutes).run.duration if sequence is None else float(sequence.duration)
     run = plan_walk(
         replace(
             configuration, run=replace(configuration.run, duration=min(longest, 60.0 * minutes), output_interval=1.0e-3)

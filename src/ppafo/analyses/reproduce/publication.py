@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ppafo.analyses.reproduce.claim import Verdict
-from ppafo.analyses.reproduce.event_times import WEARERS, rms_of, timed_events, uneven_course
+from ppafo.analyses.reproduce.event_times import WEARERS, rms_of, timed_events, uneven_task_sequence
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.toml_text import label
 from ppafo.errors import ScenarioError, SimulationError, UnitError, nearest_name, refused_as
@@ -109,11 +109,11 @@ def event_reduction(wearer: str, _values: Values) -> float:
     """Share [-] by which state estimation lowers the error of event times of one wearer, against thresholds."""
     configuration = load_walk(PAIR, WEARERS[wearer])
     # Two steps a stride.
-    course = uneven_course(2.0 / walk_of(configuration).gait.stride_time)
+    sequence = uneven_task_sequence(2.0 / walk_of(configuration).gait.stride_time)
     errors = []
     for timing in ("thresholds", "estimated"):
         walked = load_walk(PAIR, (*WEARERS[wearer], f"timing.kind={timing}"))
-        walked = replace(walked, motion=replace(walk_of(walked), course=course))
+        walked = replace(walked, motion=replace(walk_of(walked), task_sequence=sequence))
         errors.append(rms_of([event.errors for event in timed_events(walked, 1.0).values()]))
     return 1.0 - errors[1] / errors[0]
 

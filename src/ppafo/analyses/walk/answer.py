@@ -8,16 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.analyses.walk.course import (
-    bottle_data,
-    bottle_parts,
-    bottle_remark,
-    course_data,
-    course_files,
-    course_parts,
-    course_pictures,
-    trust_remark,
-)
 from ppafo.analyses.walk.document import (
     Row,
     csv_of,
@@ -29,6 +19,16 @@ from ppafo.analyses.walk.document import (
     walk_document,
 )
 from ppafo.analyses.walk.safety import over_time_parts, safety_remarks
+from ppafo.analyses.walk.task_sequence import (
+    bottle_data,
+    bottle_parts,
+    bottle_remark,
+    task_sequence_data,
+    task_sequence_files,
+    task_sequence_parts,
+    task_sequence_pictures,
+    trust_remark,
+)
 from ppafo.documents.json_text import plain
 from ppafo.kinds import kind_at
 from ppafo.metrics.strides import PER_STRIDE
@@ -40,7 +40,7 @@ from ppafo.signals.recording import Floats
 from ppafo.simulation.scenario import UNITS, Scenario
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
-from ppafo.walking import course as courses
+from ppafo.walking import task_sequence as task_sequences
 from ppafo.walking.figures.legs import animation, frames_figure, strip_figure
 from ppafo.walking.figures.mean_stride import walk_figure
 from ppafo.walking.figures.population import population_figure
@@ -177,7 +177,7 @@ class WalkPair:
         return {
             **walk_data(WALK_FORMAT, SCHEMA_VERSION, self.comparison),
             "minutes": float(worn.recording.time[-1]) / 60.0,
-            **course_data(self.comparison),
+            **task_sequence_data(self.comparison),
             **bottle_data(worn),
             "metrics_vented": plain(dict(worn.vented_metrics)),
             "healthy": plain(dict(self.comparison.healthy)),
@@ -227,7 +227,7 @@ def finding_of(comparison: Comparison) -> Finding[WalkPair]:
     worn, bare = comparison.with_device, comparison.without_device
     configuration, walked, gait = worn.scenario, walk_of(worn.scenario), walk_of(worn.scenario).gait
     strides = f"{worn.metrics['strides'].value:.0f} strides" if "strides" in worn.metrics else "no strides"
-    along = "" if walked.course is None else f", course {walked.course.name}"
+    along = "" if walked.task_sequence is None else f", task sequence {walked.task_sequence.name}"
     bottle = "" if worn.supply is None else bottle_remark(worn)
     if worn.supply is None and "gas" in worn.metrics and worn.metrics["gas"].value > 0.0:
         on_it = f"walk on it, --bottle {PAPER_BOTTLE}"
@@ -243,8 +243,8 @@ def finding_of(comparison: Comparison) -> Finding[WalkPair]:
         if configuration.origin.overrides
         else "",
     )
-    if walked.course is not None:
-        pictures = course_pictures(comparison)
+    if walked.task_sequence is not None:
+        pictures = task_sequence_pictures(comparison)
     else:
         walks = {"with the device": worn, "without": bare}
         shown = (
@@ -266,7 +266,7 @@ def finding_of(comparison: Comparison) -> Finding[WalkPair]:
         said=(f"{configuration.name}: {worn.status.kind}, {strides} of {gait.name}{along}",),
         parts=(
             Part(said=[text for text in set_up if text], is_detail=True),
-            *course_parts(comparison),
+            *task_sequence_parts(comparison),
             Part(columns=comparison_table(comparison), remarks=[text for text in remarks if text]),
             *bottle_parts(worn),
             Part("How to read it", said=(_EXPLAINED, _LIMITS), is_detail=True),
@@ -283,7 +283,7 @@ def finding_of(comparison: Comparison) -> Finding[WalkPair]:
             "strides-off.csv": lambda: strides_csv(bare),
             "mean-stride.csv": lambda: mean_stride_csv(worn),
             "mean-stride-off.csv": lambda: mean_stride_csv(bare),
-            **course_files(comparison),
+            **task_sequence_files(comparison),
         },
         live=lambda: live_part([configuration]),
     )
@@ -336,7 +336,7 @@ def walk_with_and_without(
     configuration: Scenario | str | Path,
     minutes: float | None = None,
     gait: str | Path | None = None,
-    course: str | Path | None = None,
+    task_sequence: str | Path | None = None,
     bottle: str | Path | None = None,
     wearers: int | None = None,
     seed: int = 1,
@@ -346,7 +346,7 @@ def walk_with_and_without(
     """Walk with the device, without it, and beside the healthy gait; or let many wearers walk with it.
 
     ``configuration`` is a walk file, its name or a loaded one; ``minutes`` the length of the walk [min], one or
-    its task sequence's unless given; ``gait``, ``course`` and ``bottle`` replace the configuration's;
+    its task sequence's unless given; ``gait``, ``task_sequence`` and ``bottle`` replace the configuration's;
     ``wearers`` the number of different wearers, drawn with ``seed``. ScenarioError
     for bad input; a walk that diverges is a finding that has not passed.
     """
@@ -354,7 +354,7 @@ def walk_with_and_without(
     # The options of the command line belong to a file: a scenario that was built has all of it already.
     if not isinstance(chosen, Scenario):
         check_duration_once(overrides, minutes)
-        chosen = load_walk(chosen, overrides, gait, course, bottle)
+        chosen = load_walk(chosen, overrides, gait, task_sequence, bottle)
     report = progress or report_nothing
     if wearers is not None:
         advance = _reporter(report, "walking", "wearers", 0.0)
@@ -365,9 +365,9 @@ def walk_with_and_without(
 
 
 def list_files() -> list[dict[str, Any]]:
-    """Return the walks and the courses that come with the package: name, what it is, description."""
+    """Return the walks and the task sequences that come with the package: name, what it is, description."""
     found = []
-    for library in (FILE, courses.FILE):
+    for library in (FILE, task_sequences.FILE):
         files = {name: library.parse(library.read(name), name) for name in library.names()}
         found += [
             {"name": name, "kind": library.noun, "description": str(file.get("description", ""))}
@@ -379,9 +379,9 @@ def list_files() -> list[dict[str, Any]]:
 def default_folder(values: Mapping[str, Any]) -> Path:
     """Return where the command writes by default: by the name of the configuration."""
     configuration = load_walk(
-        values["configuration"], values["overrides"], values["gait"], values["course"], values["bottle"]
+        values["configuration"], values["overrides"], values["gait"], values["task_sequence"], values["bottle"]
     )
-    walked, bottled = walk_of(configuration).course, walk_of(configuration).bottle
+    walked, bottled = walk_of(configuration).task_sequence, walk_of(configuration).bottle
     along = ("" if walked is None else f"-{walked.name}") + ("" if bottled is None else f"-{bottled.bottle.name}")
     return Path("out") / f"{'walk' if values['wearers'] is None else 'wearers'}-{configuration.name}{along}"
 

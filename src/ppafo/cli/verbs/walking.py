@@ -39,7 +39,7 @@ def walk(
     configuration: Walk = "solenoid",
     *,
     gait: Gait | None = None,
-    course: Annotated[str | Path, Word("COURSE")] | None = None,
+    task_sequence: Annotated[str | Path, Word("SEQUENCE")] | None = None,
     bottle: Annotated[str | Path, Word("BOTTLE")] | None = None,
     minutes: Minutes | None = None,
     wearers: Count | None = None,
@@ -51,15 +51,17 @@ def walk(
 
     configuration: name of a walk configuration, or a .toml file; default solenoid
     gait: name of a gait, or a gait file; default: the gait of the configuration
-    course: what the wearer does one after the other: a name or a .toml file; 'ppafo walk --list' has the names
+    task_sequence: what the wearer does one after the other: a name or a .toml file; 'ppafo walk --list' has the names
     bottle: supply the device from a bottle: a name ('ppafo bottle --list') or a .toml file; the walk ends with it
-    minutes: time to walk; default 1, up to 10 on a bottle, or a whole course
+    minutes: time to walk; default 1, up to 10 on a bottle, or a whole task sequence
     wearers: number of different wearers to simulate instead of one
     seed: random seed of the wearers; default 1
     """
     from ppafo.analyses.walk.answer import walk_with_and_without
 
-    return walk_with_and_without(configuration, minutes, gait, course, bottle, wearers, seed, overrides, progress)
+    return walk_with_and_without(
+        configuration, minutes, gait, task_sequence, bottle, wearers, seed, overrides, progress
+    )
 
 
 def gait_list() -> Said:

@@ -87,13 +87,6 @@ def next_phase(rules: PhaseRules, state: PhaseState, heel: float, toe: float, pa
     return after_push_off if phase == PUSH_OFF else found
 
 
-def next_phase_state(
-    rules: PhaseRules, state: PhaseState, heel_force: float, toe_force: float, period: float
-) -> PhaseState:
-    """State after a sample of both forces [N]; ``period`` [s]."""
-    return timed_phase_state(rules, state, heel_force, toe_force, state.since_strike + period, period)
-
-
 def timed_phase_state(
     rules: PhaseRules, state: PhaseState, heel_force: float, toe_force: float, passed: float, period: float
 ) -> PhaseState:

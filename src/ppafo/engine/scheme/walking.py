@@ -19,15 +19,15 @@ from ppafo.engine.scheme.pneumatics import HeldChambers, held_chambers, held_pre
 from ppafo.model import contact as ground
 from ppafo.model.elementary import TURNS_OF_RADIAN, sine_and_cosine_of_turns
 from ppafo.model.gait import (
-    Course,
     GaitMeasured,
     GaitNow,
     GaitPlace,
     GaitSeries,
     GaitTiming,
     Marks,
+    TimedSequence,
+    gait_in_task_sequence,
     gait_of,
-    gait_on_course,
     measured_at,
     place_at,
     shown_toe_force,
@@ -377,9 +377,10 @@ def lead(rows: Any) -> Phases:
     add = rows.add
     given = "plant, leg, gait_timing, state, held, walk, carried, next_gait, length"
     begun = f"begun = {add(begin_walk)}({given})"
-    if rows.program.leg.takes_course:
-        made = f"next_gait, marks = {add(gait_on_course)}(gait, walk_course, gait_timing, leg, time + length)"
-        phases: Phases = [[rows.load("gait"), rows.load("walk_course"), made, *rows.keep("next_gait", "marks")]]
+    if rows.program.leg.takes_task_sequence:
+        made = f"{add(gait_in_task_sequence)}(gait, task_sequence, gait_timing, leg, time + length)"
+        kept = rows.keep("next_gait", "marks")
+        phases: Phases = [[rows.load("gait"), rows.load("task_sequence"), f"next_gait, marks = {made}", *kept]]
     else:
         cells = {name: rows.cells[f"next_gait.{name}"] for name in GaitNow._fields}
         measured = [cells[name] for name in GaitMeasured._fields]
@@ -442,7 +443,7 @@ def end(rows: Any) -> list[str]:
 
 def mark_stride(rows: Any) -> list[str]:
     """Lines that add a stride's marks in a task sequence: a scuff on the toe sensor, a forefoot on a stair's edge."""
-    if not rows.program.leg.takes_course:
+    if not rows.program.leg.takes_task_sequence:
         return []
     add, follow = rows.add, rows.cells["gait_sensors.follow_rate"]
     marked = {
@@ -453,19 +454,19 @@ def mark_stride(rows: Any) -> list[str]:
     return [rows.load("marks"), f"walk_after = {add(WalkState)}({fields})"]
 
 
-def _scheme(takes_course: bool, fails: bool) -> LegScheme:
+def _scheme(takes_task_sequence: bool, fails: bool) -> LegScheme:
     gait = {"leg": LegParameters, "share": DeviceShare, "gait": GaitSeries}
     timing = {"gait_timing": GaitTiming, "gait_sensors": GaitSensors}
-    place = {} if takes_course else {"place": GaitPlace}
+    place = {} if takes_task_sequence else {"place": GaitPlace}
     faults = {"plant_faults": PlantFaults, "shut_off": ShutOff} if fails else {}
     return LegScheme(
-        takes_course=takes_course,
-        parameters={**gait, **timing, **({"walk_course": Course} if takes_course else {}), **faults},
+        takes_task_sequence=takes_task_sequence,
+        parameters={**gait, **timing, **({"task_sequence": TimedSequence} if takes_task_sequence else {}), **faults},
         states={"walk": WalkState, "gait_seen": GaitSeen, **({"unpowered": Unpowered} if fails else {})},
         loads=("leg", "share", "gait_timing", "walk", *faults, *(["unpowered"] if fails else [])),
         stored={"walk": "walk_after"},
         begun=WalkStep,
-        led={**place, "next_gait": GaitNow, **({"marks": Marks} if takes_course else {})},
+        led={**place, "next_gait": GaitNow, **({"marks": Marks} if takes_task_sequence else {})},
         handed={"carried": CarriedFoot},
         ended={"ahead": HeldChambers, "ended": WalkEnd},
         find=find,
@@ -477,7 +478,9 @@ def _scheme(takes_course: bool, fails: bool) -> LegScheme:
     )
 
 
-STRIDES, COURSE = _scheme(takes_course=False, fails=False), _scheme(takes_course=True, fails=False)
+STRIDES = _scheme(takes_task_sequence=False, fails=False)
+TASK_SEQUENCE = _scheme(takes_task_sequence=True, fails=False)
 """A leg that walks stride after equal stride, and one that stands, starts, changes its speed and stops."""
-FAILING_STRIDES, FAILING_COURSE = _scheme(takes_course=False, fails=True), _scheme(takes_course=True, fails=True)
+FAILING_STRIDES = _scheme(takes_task_sequence=False, fails=True)
+FAILING_TASK_SEQUENCE = _scheme(takes_task_sequence=True, fails=True)
 """The same with a plant that may fail, or whose line has a shut-off valve."""

@@ -345,10 +345,10 @@ They equal the metrics of a study (`ppafo sweep`) to the bit. In `ppafo simulate
 recording, whose sums are rounded in another order: they agree to about 15 digits. Not here, since they need all samples
 of a channel: {left_out}."""
 _METRICS_OF_WALK = """\
-They are means over the strides with help, from the third on, and counts; on a course counts alone. In `ppafo walk` the
-same are computed from the recording, whose sums are rounded in another order: they agree to about 15 digits. Not here,
-since they need the mean stride or the healthy one: `healthy_positive_work`, `push_off_share`, `lowest_toes`,
-`angle_difference`, `dorsiflexor_moment`; nor safety events and the segments of a course."""
+They are means over the strides with help, from the third on, and counts; of a task sequence counts alone. In
+`ppafo walk` the same are computed from the recording, whose sums are rounded in another order: they agree to about 15
+digits. Not here, since they need the mean stride or the healthy one: `healthy_positive_work`, `push_off_share`,
+`lowest_toes`, `angle_difference`, `dorsiflexor_moment`; nor safety events and the segments of a task sequence."""
 _FOLLOWS = """\
 - As in ppafo, these follow others as long as they have their default, also where that is given: {followers}."""
 _TRAPS_OF_WALK = """\

@@ -1,6 +1,6 @@
 """From the settings of a walk to the numbers of a run: one composed function that calls the planning.
 
-What a gait comes to (series, events, how its heel rolls) and a course in time are numbers written out.
+What a gait comes to (series, events, how its heel rolls) and a task sequence in time are numbers written out.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -25,11 +25,10 @@ from ppafo.simulation.numbers import device_numbers, number_at
 from ppafo.simulation.profiles import profile_parameters
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.contradictions import PAIRS
-from ppafo.walking.course import flat_foot
 from ppafo.walking.declaration import PERSON, fault_numbers
 from ppafo.walking.gait_series import fit_rocker, gait_series, gait_timing
 from ppafo.walking.motion import WalkMotion, walk_of
-from ppafo.walking.planning import NO_REFERENCE, course_of_walk, failing_of, law_of
+from ppafo.walking.planning import NO_REFERENCE, failing_of, law_of, task_sequence_of_walk
 from ppafo.walking.preparation import (
     DISTORTED,
     DISTORTING,
@@ -49,6 +48,7 @@ from ppafo.walking.preparation import (
     walk_step_counts,
     with_leg,
 )
+from ppafo.walking.task_sequence import flat_foot
 from ppafo.walking.wearer import WEARER, leg_parameters
 
 _FORCES = ("force_bandwidth", "force_noise", "force_resolution", "lost_share")
@@ -189,14 +189,14 @@ def _lines(configuration: Scenario, writing: Writing) -> Iterator[str]:
     yield "needs_parts = False"
     yield from writing.timing("signal_delay")
 
-    # Controller, gas and course.
+    # Controller, gas and task sequence.
     settings = {item.name: c_identifier(path) for path, item in _control(configuration).items()}
     yield f"controller = {writing.kind('controller', law_of(configuration), settings)}"
     yield f"reference = {writing.constant(profile_parameters(NO_REFERENCE), 'reference')}"
     yield from writing.gas()
-    planned = course_of_walk(configuration)
+    planned = task_sequence_of_walk(configuration)
     if planned is not None:
-        yield f"walk_course = {writing.constant(planned.course, 'walk_course')}"
+        yield f"task_sequence = {writing.constant(planned.timed, 'task_sequence')}"
 
     yield from form.start(configuration, writing)
     yield from writing.start()
@@ -231,12 +231,12 @@ def _fault(writing: Writing, kind: str, names: Mapping[str, str]) -> str:
 
 
 def _start(configuration: Scenario, writing: Writing) -> Iterator[str]:
-    """Lines that make the states at the start: at a heel strike, or standing where there is a course."""
-    add, planned = writing.add, course_of_walk(configuration)
+    """Lines that make the states at the start: at a heel strike, or standing where there is a task sequence."""
+    add, planned = writing.add, task_sequence_of_walk(configuration)
     if planned is None:
         yield f"walk = {add(walk_from_strike)}({add(gait_at)}(gait, gait_timing, leg, 0.0))"
     else:
-        first = planned.course.parts[0]
+        first = planned.timed.parts[0]
         sine, cosine = map(float, flat_foot(gait_timing(walk_of(configuration).gait)))
         given = f"leg, gait_timing.ground_angle, {sine!r}, {cosine!r}, {first.turns!r}, {first.load!r}"
         yield f"walk = {add(walk_from_standing)}({add(standing_on)}({given}))"
@@ -245,14 +245,16 @@ def _start(configuration: Scenario, writing: Writing) -> Iterator[str]:
 
 
 def _words(motion: WalkMotion) -> tuple[tuple[str, ...], str]:
-    gait, course = motion.gait, motion.course
-    way = "stride after equal stride" if course is None else f"the course `{course.name}`, which stays as it is"
+    gait, sequence = motion.gait, motion.task_sequence
+    way = "stride after equal stride"
+    if sequence is not None:
+        way = f"the task sequence `{sequence.name}`, which stays as it is"
     led = (
         f"the gait, `{gait.name}`: its series, its events and its stride of "
         f"{gait.stride_time:.4g} s are numbers in the source",
         f"how it is walked: {way}",
     )
-    return led, "the gait alone" if course is None else "the gait and its course alone"
+    return led, "the gait alone" if sequence is None else "the gait and its task sequence alone"
 
 
 LED_WALK = ExportedWalk(_leg, _start, _words)

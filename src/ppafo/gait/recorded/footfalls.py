@@ -15,7 +15,7 @@ from ppafo.constants import STANDARD_GRAVITY
 from ppafo.errors import DataError
 from ppafo.gait.gait import REQUIRED
 from ppafo.gait.recorded.mapping import Side
-from ppafo.gait.recorded.table import MotionTable
+from ppafo.gait.recorded.table import OFF, STRIKE, MotionTable
 from ppafo.gait.recorded.walk import LOADS, CurveColumns, Signal, low_pass, with_absence
 from ppafo.signals.recording import Floats
 
@@ -126,25 +126,19 @@ def strides_from_shank(shank: Signal) -> list[Stride]:
     apart = max(1, int(_SHORTEST_STRIDE * smooth.rate))
     peaks = find_peaks(smooth.values, height=high - _TOP * (high - low), distance=apart)[0].tolist()
     rate = np.gradient(smooth.values, smooth.time)
-    return [
-        Stride(
-            float(smooth.time[first]), float(smooth.time[_toe_off(smooth, rate, first, last)]), float(smooth.time[last])
-        )
-        for first, last in pairwise(peaks)
-    ]
-
-
-def _toe_off(shank: Signal, rate: Floats, first: int, last: int) -> int:
-    """Return the sample of the fastest lean backwards between mid-stride and the start of the swing."""
-    lowest = first + int(np.argmin(shank.values[first:last]))
-    # Toe-off lies in the second half of the lean: the shank turns as fast just after heel strike.
-    middle = first + (lowest - first) // 2
-    if lowest - middle < 2 or shank.values[lowest] > _DEEPEST:
-        raise DataError(
-            f"{shank.file}: the shank does not lean back before the swing after {shank.time[first]:g} s, so there is "
-            "no toe-off to be found in it; give a vertical force, or correct the sign of the shank angle"
-        )
-    return middle + int(np.argmin(rate[middle:lowest]))
+    strides = []
+    for first, last in pairwise(peaks):
+        lowest = first + int(np.argmin(smooth.values[first:last]))
+        # Toe-off lies in the second half of the lean: the shank turns as fast just after heel strike.
+        middle = first + (lowest - first) // 2
+        if lowest - middle < 2 or smooth.values[lowest] > _DEEPEST:
+            raise DataError(
+                f"{shank.file}: the shank does not lean back before the swing after {smooth.time[first]:g} s, so there "
+                "is no toe-off to be found in it; give a vertical force, or correct the sign of the shank angle"
+            )
+        off = middle + int(np.argmin(rate[middle:lowest]))
+        strides.append(Stride(*(float(smooth.time[place]) for place in (first, off, last))))
+    return strides
 
 
 _LEAST_LEAN = 0.5
@@ -367,7 +361,7 @@ def _strides_of_file(tables: Sequence[MotionTable], side: Side) -> list[Stride]:
     # Events of two trials have two clocks.
     if len(trials) != 1:
         return []
-    strikes, offs = trials[0].strikes(side), trials[0].offs(side)
+    strikes, offs = (trials[0].events.get((side, kind), []) for kind in (STRIKE, OFF))
     strides = []
     for start, end in pairwise(strikes):
         # Two toe-offs between two strikes are a missed strike: such a stride is none.

@@ -41,7 +41,7 @@ from ppafo.gait.recorded.footfalls import (
 )
 from ppafo.gait.recorded.form import Convention
 from ppafo.gait.recorded.mapping import GaitMap, ImportSettings, check_settings, column_names
-from ppafo.gait.recorded.reading import arranged, find_convention, read_table
+from ppafo.gait.recorded.reading import FORMS, find_convention, read_table
 from ppafo.gait.recorded.table import MotionTable, fill_gaps
 from ppafo.gait.recorded.walk import (
     LOADS,
@@ -57,7 +57,8 @@ from ppafo.signals.recording import Floats
 from ppafo.units import format_quantity
 
 SAMPLES = 101
-"""Phases from 0 to 1, in percent."""
+PHASES = np.linspace(0.0, 1.0, SAMPLES)
+"""Phases [strides] of every normalised curve, from 0 to 1."""
 
 _UNLOADED_FORCE = 0.02
 
@@ -80,11 +81,6 @@ class CurveStatistics:
         return float(np.sqrt(np.mean(self.deviation**2)))
 
 
-def phases() -> Floats:
-    """Return the phases [strides] of every normalised curve, from 0 to 1."""
-    return np.linspace(0.0, 1.0, SAMPLES)
-
-
 def statistics(name: str, signal: Signal, strides: Sequence[Stride]) -> CurveStatistics:
     """Return the curves of a signal over strides that it covers; between samples runs a cubic spline.
 
@@ -93,7 +89,7 @@ def statistics(name: str, signal: Signal, strides: Sequence[Stride]) -> CurveSta
     from scipy.interpolate import CubicSpline
 
     spline = CubicSpline(signal.time, signal.values)
-    at = [np.clip(item.start + item.time * phases(), signal.time[0], signal.time[-1]) for item in strides]
+    at = [np.clip(item.start + item.time * PHASES, signal.time[0], signal.time[-1]) for item in strides]
     curves = np.array([spline(times) for times in at]).reshape(-1, SAMPLES)
     if signal.is_position and strides:
         pairs = zip(curves, strides, strict=True)
@@ -111,13 +107,12 @@ def over_strides(name: str, curves: Floats, strides: Sequence[Stride]) -> CurveS
     mean = curves.mean(axis=0)
     deviation = curves.std(axis=0, ddof=1) if len(strides) > 1 else np.zeros(SAMPLES)
     if name == "centre_of_pressure":
-        percent = phases()
         fraction = float(np.mean([item.stance_share for item in strides]))
         # Without its ends: where hardly any force acts its place has no meaning.
-        inside = (percent > _UNLOADED_FORCE) & (percent < fraction - _UNLOADED_FORCE)
-        at, first = percent[inside], float(mean[inside][0])
+        inside = (PHASES > _UNLOADED_FORCE) & (fraction - _UNLOADED_FORCE > PHASES)
+        at, first = PHASES[inside], float(mean[inside][0])
         # The line over the swing goes on into the next stride, where the stance begins again.
-        mean = np.interp(percent, [*at, 1.0 + at[0]], [*mean[inside], first], period=None)
+        mean = np.interp(PHASES, [*at, 1.0 + at[0]], [*mean[inside], first], period=None)
         deviation = np.where(inside, deviation, 0.0)
     return CurveStatistics(curves, mean, deviation, tuple(strides))
 
@@ -147,7 +142,7 @@ def of_usual_time(strides: Sequence[Stride], least: int) -> Strides:
     # The median: one stop among ten strides would move a mean.
     median = float(np.median([item.time for item in strides]))
     kept = [item for item in strides if abs(item.time - median) <= LARGEST_STRIDE_CHANGE * median]
-    why = "{:.3g} s long, the others are about " + f"{_mean([item.time for item in kept]):.3g} s"
+    why = "{:.3g} s long, the others are about " + f"{np.mean([item.time for item in kept]):.3g} s"
     return Strides(tuple(kept), tuple((item, why.format(item.time)) for item in strides if item not in kept), least)
 
 
@@ -336,7 +331,7 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: li
         raise_noted(wrong)
     if settings.columns is None:
         # Only without a map: a user's map names the columns as the file has them.
-        tables = [arranged(table) for table in tables]
+        tables = [FORMS[table.form].arrange(table) for table in tables]
     settings, said = _with_subject(settings, tables, wrong)
     # Without a body mass loads are looked at per kg of 1 kg, and scaled to 1 below.
     person = Person(settings.body_mass or 1.0, settings.stature)
@@ -528,7 +523,7 @@ def _finish(
 ) -> ImportedGait:
     """Return the gait of mean curves that legs can have; DataError where any cannot, with everything in ``wrong``."""
     taken, walk, settings, signs_from = strides.taken, footfalls.walk, source.settings, source.signs_from
-    share, time = _mean([item.stance_share for item in taken]), _mean([item.time for item in taken])
+    share, time = float(np.mean([item.stance_share for item in taken])), float(np.mean([item.time for item in taken]))
     means = {name: item.mean for name, item in curves.items()}
     fitted = {name: fit_curve(item.mean, HARMONICS[name], item.spread) for name, item in curves.items()}
     errors = {name: error for name, (_, error) in fitted.items()}
@@ -589,10 +584,6 @@ def _check_enough(strides: Strides, found: list[Stride], walk: Mapping[str, Sign
     )
 
 
-def _mean(values: Sequence[float]) -> float:
-    return float(np.mean(values))
-
-
 def _spread(values: Sequence[float]) -> float:
     return float(np.std(values, ddof=1)) if len(values) > 1 else 0.0
 
@@ -614,8 +605,8 @@ def _gait(
         body_mass=settings.body_mass or 0.0,
         stature=settings.stature,
         walking_speed=settings.walking_speed,
-        stride_time=_mean([item.time for item in strides]),
-        stance_share=_mean([item.stance_share for item in strides]),
+        stride_time=float(np.mean([item.time for item in strides])),
+        stance_share=float(np.mean([item.stance_share for item in strides])),
         stride_time_deviation=_spread([item.time for item in strides]),
         stance_share_deviation=_spread([item.stance_share for item in strides]),
         strides=len(strides),

@@ -85,11 +85,6 @@ def find_convention(tables: Sequence[MotionTable], side: Side, body_mass: float)
     return Convention(GaitMap(**columns), () if has_force else plates, remarks)
 
 
-def arranged(table: MotionTable) -> MotionTable:
-    """Return a table as the convention of its form has it."""
-    return FORMS[table.form].arrange(table)
-
-
 def _is_there(mapped: object, table: MotionTable) -> bool:
     """Return whether a table has all columns of a curve that is mapped."""
     return mapped is not None and all(name.removeprefix("-") in table.columns for name in column_names(mapped))

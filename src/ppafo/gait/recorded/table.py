@@ -9,7 +9,8 @@ import numpy as np
 from ppafo.errors import DataError
 from ppafo.signals.recording import Floats
 
-_STRIKE, _OFF = "foot strike", "foot off"
+STRIKE, OFF = "foot strike", "foot off"
+"""Kinds of events."""
 
 Events = dict[tuple[str, str], list[float]]
 
@@ -25,14 +26,6 @@ class Trial:
     stature: float | None = None
     events: Events = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
-
-    def strikes(self, side: str) -> list[float]:
-        """Return the heel strikes of a foot."""
-        return self.events.get((side, _STRIKE), [])
-
-    def offs(self, side: str) -> list[float]:
-        """Return the toe-offs of a foot."""
-        return self.events.get((side, _OFF), [])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -382,26 +382,23 @@ def walk_signals(
     where an angle cannot be used, with everything in ``wrong``.
     """
     walk: dict[str, Signal] = {}
-
-    def read_curve(name: str) -> None:
-        mapped = getattr(columns, name)
-        optional = is_default and name not in REQUIRED
-        found = None if mapped is None else find_columns(name, column_names(mapped), tables, optional)
-        if found is None:
-            return
-        if isinstance(mapped, AngleMap) and mapped.terms is None:
-            if "shank_angle" not in walk:
-                return
-            signal = foot_markers_angle(found, mapped, walk["shank_angle"])
-        else:
-            signal = _curve_of(name, found, mapped, person.body_mass)
-        signal = replace(signal, columns=tuple(column for _, column in found.terms))
-        walk[name] = with_absence(signal) if name in LOADS else without_ends(signal)
-
     # The shank stands first: an ankle from markers of the foot turns against it.
     for name in _UNITS:
+        mapped = getattr(columns, name)
+        if mapped is None:
+            continue
         with noted_in(wrong):
-            read_curve(name)
+            found = find_columns(name, column_names(mapped), tables, is_default and name not in REQUIRED)
+            if found is None:
+                continue
+            if not isinstance(mapped, AngleMap) or mapped.terms is not None:
+                signal = _curve_of(name, found, mapped, person.body_mass)
+            elif "shank_angle" in walk:
+                signal = foot_markers_angle(found, mapped, walk["shank_angle"])
+            else:
+                continue
+            signal = replace(signal, columns=tuple(column for _, column in found.terms))
+            walk[name] = with_absence(signal) if name in LOADS else without_ends(signal)
     with noted_in(wrong):
         knee = {} if columns.knee is None else knee_signals(columns.knee, tables, person.stature, is_default)
         walk |= {name: without_ends(signal) for name, signal in knee.items()}

@@ -257,7 +257,7 @@ def has_channels(program: Program, kind: MetricKind) -> bool:
     has_reference = program.has_reference and not program.walks
     has = {
         WALK: program.walks,
-        STEADY: not program.takes_course,
+        STEADY: not program.takes_task_sequence,
         LED: not program.reacts,
         REACTS: program.reacts,
         LED_SHANK: program.is_on_gait,

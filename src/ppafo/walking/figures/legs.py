@@ -55,6 +55,9 @@ _VIEW = (-0.62, 0.62, -0.12, 0.78)
 _TICK = 0.35
 """Distance of the marks on the ground [m]."""
 
+_CHAMBERS = (("pressure_1", "plantarflexion", CHAMBER_1.colour), ("pressure_2", "dorsiflexion", CHAMBER_2.colour))
+"""Channel, name and colour of each chamber."""
+
 _VALVE = {0: ("closed", "#ffffff"), 1: ("plantarflexion", "#8fbfe0"), -1: ("dorsiflexion", "#f0b48a")}
 _VENTED = ("vented", "#e4e4e4")
 
@@ -111,11 +114,6 @@ class LegArtists:
         self.shank.set_data([knee[0], ankle[0]], [knee[1], ankle[1]])
         self.foot.set_xy([ankle, heel, toe])
         self.joint.set_data([knee[0], ankle[0]], [knee[1], ankle[1]])
-
-    def colour(self, shade: str) -> None:
-        """Paint the foot."""
-        self.foot.set_facecolor(shade)
-        self.foot.set_edgecolor(shade)
 
 
 def leg_artists(axes: "Axes", colour: str, width: float, is_ghost: bool = False) -> LegArtists:
@@ -313,10 +311,7 @@ def _legs(axes: "Axes", result: WalkResult) -> None:
 
 def _pressures(axes: "Axes", result: WalkResult) -> None:
     atmosphere = result.scenario.device.supply.atmospheric_pressure
-    for channel, name, colour in (
-        ("pressure_1", "plantarflexion", CHAMBER_1.colour),
-        ("pressure_2", "dorsiflexion", CHAMBER_2.colour),
-    ):
+    for channel, name, colour in _CHAMBERS:
         if channel in result.averages:
             curve = (result.averages[channel].mean - atmosphere) / PASCALS_PER_PSI
             axes.plot(_PERCENT, curve, color=colour, label=name)
@@ -346,7 +341,7 @@ class _Scene:
         ghost, worn = self.artists
         ghost.place(self.legs.healthy, index, offset)
         worn.place(self.legs.worn, index, offset)
-        worn.colour(DRAGS if drags(self.legs, index) else self.colour)
+        worn.foot.set_color(DRAGS if drags(self.legs, index) else self.colour)
         parts = (ghost.shank, worn.shank, worn.foot, ghost.foot, worn.joint)
         return [self.ticks, *parts]
 
@@ -394,17 +389,31 @@ def _stage(comparison: Comparison, turns: np.ndarray) -> "tuple[Figure, list[_Sc
         axes = figure.add_axes((0.01 + 0.5 * place, 0.34, 0.48, 0.6))
         scenes.append(_scene(axes, result, turns, f"{word} the device", colour))
     traces = figure.add_axes((0.09, 0.115, 0.89, 0.18))
-    _traces(traces, comparison.with_device, turns)
+    worn, configuration = comparison.with_device, comparison.with_device.scenario
+    fine = np.linspace(turns[0], turns[-1], 400)
+    atmosphere = configuration.device.supply.atmospheric_pressure
+    for channel, name, colour in _CHAMBERS:
+        times = fine * walk_of(configuration).gait.stride_time
+        gauge = np.interp(times, worn.recording.time, worn.recording[channel]) - atmosphere
+        traces.plot(fine - turns[0], gauge / PASCALS_PER_PSI, color=colour, linewidth=1.3, label=name)
+    traces.set_xlim(0.0, turns[-1] - turns[0])
+    traces.set_ylim(top=max(10.0, traces.get_ylim()[1]))
+    traces.set_xlabel("strides", fontsize=8.5, labelpad=1.0)
+    traces.set_ylabel("psig", fontsize=8.5)
+    traces.tick_params(labelsize=8)
+    traces.locator_params(axis="y", nbins=3)
+    traces.legend(
+        loc="lower left", bbox_to_anchor=(0.0, 1.02), ncols=2, borderaxespad=0.0, handlelength=1.4, fontsize=8.5
+    )
     cursor = traces.axvline(0.0, color=BLACK, linewidth=1.2, animated=True)
     box = {"boxstyle": "round,pad=0.3", "facecolor": "#ffffff", "edgecolor": GREY, "linewidth": 0.8}
     lamp = traces.text(
         0.995, 1.24, "", transform=traces.transAxes, ha="right", va="center", fontsize=9, bbox=box, animated=True
     )
-    name = comparison.with_device.scenario.name
     figure.text(
         0.012,
         0.985,
-        f"{name}, half speed, simulated; dark red: toes more than 1 cm below ground",
+        f"{configuration.name}, half speed, simulated; dark red: toes more than 1 cm below ground",
         ha="left",
         va="top",
         fontsize=9,
@@ -428,25 +437,6 @@ def _scene(axes: "Axes", result: WalkResult, turns: np.ndarray, label: str, colo
         artist.set_animated(True)
     start = float(np.mean(legs.healthy.ankle[:_PER_STRIDE, 0] - stride * (turns[:_PER_STRIDE] - turns[0])))
     return _Scene(axes, legs, artists, ticks, colour, start + stride * (turns - turns[0]))
-
-
-def _traces(axes: "Axes", result: WalkResult, turns: np.ndarray) -> None:
-    recording, configuration = result.recording, result.scenario
-    fine = np.linspace(turns[0], turns[-1], 400)
-    atmosphere = configuration.device.supply.atmospheric_pressure
-    names = (("pressure_1", "plantarflexion", CHAMBER_1.colour), ("pressure_2", "dorsiflexion", CHAMBER_2.colour))
-    for channel, name, colour in names:
-        values = np.interp(fine * walk_of(configuration).gait.stride_time, recording.time, recording[channel])
-        axes.plot(fine - turns[0], (values - atmosphere) / PASCALS_PER_PSI, color=colour, linewidth=1.3, label=name)
-    axes.set_xlim(0.0, turns[-1] - turns[0])
-    axes.set_ylim(top=max(10.0, axes.get_ylim()[1]))
-    axes.set_xlabel("strides", fontsize=8.5, labelpad=1.0)
-    axes.set_ylabel("psig", fontsize=8.5)
-    axes.tick_params(labelsize=8)
-    axes.locator_params(axis="y", nbins=3)
-    axes.legend(
-        loc="lower left", bbox_to_anchor=(0.0, 1.02), ncols=2, borderaxespad=0.0, handlelength=1.4, fontsize=8.5
-    )
 
 
 def _gif(images: "list[Image]", stride_time: float) -> bytes:

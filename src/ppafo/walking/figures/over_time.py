@@ -1,4 +1,4 @@
-"""A whole walk over time: gas, toes and phases with the safe state; a course with its segments; the bottle."""
+"""A whole walk over time: gas, toes and phases with the safe state; a task sequence with its segments; the bottle."""
 
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
@@ -37,7 +37,7 @@ _FAULT_SUFFIX = "_fault"
 _APART = 0.2
 """Fraction of a walk within which failures have one label; others are in two rows in turn."""
 
-_COURSE_PHASES = {
+_TASK_SEQUENCE_PHASES = {
     1.0: ("landing", "#f6d5bd"),
     2.0: ("mid-stance", "#e4e4e4"),
     3.0: ("push-off", "#8fbfe0"),
@@ -45,7 +45,7 @@ _COURSE_PHASES = {
 }
 _SHADED, _SAFE = "#f3f3f3", "#cc3311"
 _NARROWEST = 0.045
-"""Fraction of the course below which the name of a segment stands upright."""
+"""Fraction of the task sequence below which the name of a segment stands upright."""
 
 _GAS = Kind("Gas taken", "kg", "gas mass")
 _TOES = Kind("Toe height above ground", "m", "body length")
@@ -153,8 +153,8 @@ def _levels(recording: Recording, x: Kind) -> Panel:
     return Panel(x, Kind("Level of help"), marks, then=name_levels, tall=0.55, shares_x=True)
 
 
-def course_figure(worn: WalkResult, bare: WalkResult) -> "Figure":
-    """Return a course over time with the device (and without it); needs a recording of at least two samples."""
+def task_sequence_figure(worn: WalkResult, bare: WalkResult) -> "Figure":
+    """Return a task sequence over time with the device (and without it); needs a recording of at least two samples."""
     recording, time = worn.recording, worn.recording.time
     # Every other segment on grey, and a line where the controller helps less.
     shaded: dict[str, Any] = {"alpha": 1.0, "zorder": 0}
@@ -204,11 +204,11 @@ def course_figure(worn: WalkResult, bare: WalkResult) -> "Figure":
     ]
     panels = [Panel(TIME, pace, [*common, Mark("line", time, speed, colour=BLACK)], then=name_segments, shares_x=True)]
     panels += [Panel(TIME, kind, [*common, *marks], then=set_limits, shares_x=True) for kind, marks in drawn]
-    course = walk_of(worn.scenario).course
+    sequence = walk_of(worn.scenario).task_sequence
     return draw_panels(
         panels,
         size=(9.1, 1.45),
-        title=f"{worn.scenario.name}, course {'' if course is None else course.name}",
+        title=f"{worn.scenario.name}, task sequence {'' if sequence is None else sequence.name}",
         note="blue: with the device; orange: without it; red line: the controller helps less",
         kind=recording.kind,
     )
@@ -231,7 +231,7 @@ def _phase_strip(recording: Recording) -> list[Mark]:
             colour=colour,
             style={"alpha": 1.0, "where": seen == phase, "step": "post"},
         )
-        for phase, (name, colour) in _COURSE_PHASES.items()
+        for phase, (name, colour) in _TASK_SEQUENCE_PHASES.items()
     ]
 
 

@@ -42,7 +42,7 @@ def watched(
         time = sample * PERIOD
         heel, toe = forces(max(time - late[sample // 1000], 0.0), toes)
         seen = GaitMeasurement(float(np.interp(time % 1.0, shares, ankle)), 1.02e5, 1.02e5, 0.0, heel, toe)
-        after = phases.next_phase_state(PHASES, phase, heel, toe, PERIOD)
+        after = phases.timed_phase_state(PHASES, phase, heel, toe, phase.since_strike + PERIOD, PERIOD)
         state = safety.monitor(RULES, state, phase, after, seen, PERIOD)
         phase = after
         found.append(state)

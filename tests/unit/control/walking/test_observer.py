@@ -158,7 +158,7 @@ strides = 4
 def test_who_climbs_stairs_at_the_speed_of_the_gait_is_not_stopped(name: str, tmp_path) -> None:  # type: ignore[no-untyped-def]
     file = tmp_path / "four-stairs.toml"
     file.write_text(FOUR_STAIRS)
-    climbed = walk(load_walk(name, course=file))
+    climbed = walk(load_walk(name, task_sequence=file))
     assert climbed.status.is_completed
     assert climbed.events == (), [event.message for event in climbed.events]
 

@@ -51,7 +51,7 @@ def followed(kind: TimingKind, phase: Floats, stride_time: float = 1.0, **change
     rules, clock, seen, found = settings(kind, **changed), kind.initial, phases.START, []
     heel, toe = forces(phase % 1.0, stride_time)
     for angle, on_heel, on_toe in zip(angles(phase % 1.0).tolist(), heel.tolist(), toe.tolist(), strict=True):
-        after = phases.next_phase_state(RULES, seen, on_heel, on_toe, PERIOD)
+        after = phases.timed_phase_state(RULES, seen, on_heel, on_toe, seen.since_strike + PERIOD, PERIOD)
         measurement = GaitMeasurement(angle, 1.0e5, 1.0e5, 0.0, on_heel, on_toe)
         clock = kind.follow(rules, RULES, clock, seen, after, measurement, PERIOD)
         seen = after
@@ -70,7 +70,7 @@ def test_a_force_that_rises_evenly_is_detected_as_late_as_the_known_delays_say()
     heel, toe = forces(np.arange(0.0, 1.0, PERIOD), 1.0)
     seen, times = phases.START, {}
     for sample, (on_heel, on_toe) in enumerate(zip(heel.tolist(), toe.tolist(), strict=True)):
-        after = phases.next_phase_state(RULES, seen, on_heel, on_toe, PERIOD)
+        after = phases.timed_phase_state(RULES, seen, on_heel, on_toe, seen.since_strike + PERIOD, PERIOD)
         marks = gait_clock.seen_events(seen, after)
         times |= {name: sample * PERIOD for name, mark in marks._asdict().items() if mark > 0.5}
         seen = after

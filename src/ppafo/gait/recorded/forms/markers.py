@@ -140,7 +140,13 @@ def _axes(
     # How far a point went, (3,), from where it is first seen to where it is last seen.
     seen = np.flatnonzero(np.isfinite(at_ankle).all(axis=0))
     way = at_ankle[:, seen[-1]] - at_ankle[:, seen[0]] if seen.size else np.zeros(3)
-    pointing = _pointing(table, foot, labels)
+    # The mean way from heel to toes, (3,), of the samples at which both are seen.
+    pointing = None
+    at_heel, at_toe = (_point(table, _first(labels, foot, names) or "") for names in (_HEELS, _TOES))
+    if at_heel is not None and at_toe is not None:
+        shoe = at_toe - at_heel
+        both = np.isfinite(shoe).all(axis=0)
+        pointing = shoe[:, both].mean(axis=1) if both.any() else None
     # Most laboratories write millimetres, also where the file does not say so.
     if np.hypot(*np.delete(way, up)) < _LEAST_WAY * {"m": 1.0, "cm": 100.0}.get(
         table.units.get(f"{ankle}.x", ""), 1000.0
@@ -169,16 +175,6 @@ def _axes(
 def _point(table: MotionTable, label: str) -> Floats | None:
     rows = [table.columns.get(f"{label}.{axis}") for axis in "xyz"]
     return None if any(row is None for row in rows) else np.array(rows)
-
-
-def _pointing(table: MotionTable, foot: str, labels: Sequence[str]) -> Floats | None:
-    """Return the mean way from heel to toes, (3,); None where the markers are not there or never seen together."""
-    at_heel, at_toe = (_point(table, _first(labels, foot, names) or "") for names in (_HEELS, _TOES))
-    if at_heel is None or at_toe is None:
-        return None
-    apart = at_toe - at_heel
-    seen = np.isfinite(apart).all(axis=0)
-    return np.asarray(apart[:, seen].mean(axis=1)) if seen.any() else None
 
 
 _FACTORS = {

@@ -1,4 +1,4 @@
-"""Courses: files and their mistakes, segments in time, and what the foot, the gas and many wearers do on them."""
+"""Task sequences: files and their mistakes, segments in time, and what foot, gas and many wearers do in them."""
 
 import itertools
 from dataclasses import replace
@@ -8,18 +8,18 @@ import numpy as np
 import pytest
 
 from ppafo.analyses.endurance.draw import walk_gas
-from ppafo.analyses.walk.course import course_parts
+from ppafo.analyses.walk.task_sequence import task_sequence_parts
 from ppafo.engine.lane_source import lane_source
 from ppafo.errors import ScenarioError
 from ppafo.gait import load_gait
 from ppafo.model.contact import FLAT
 from ppafo.model.plant import chamber_mass, chamber_volumes
 from ppafo.walking import load_walk, walk, walk_population
-from ppafo.walking.course import WalkingCourse, led_courses, load_course
 from ppafo.walking.motion import walk_of, with_duration
-from ppafo.walking.planning import plan_walk, planned_course
+from ppafo.walking.planning import plan_walk, planned_task_sequence
 from ppafo.walking.result import WalkResult, integral_of_a_stride
-from ppafo.walking.strides import course_metrics, steady_strides
+from ppafo.walking.strides import steady_strides, task_sequence_metrics
+from ppafo.walking.task_sequence import TaskSequence, led_task_sequences, load_task_sequence
 from ppafo.walking.walk import Comparison
 
 HEAD = 'schema_version = 1\nname = "tried"\n'
@@ -34,8 +34,8 @@ def written(folder: Path, *segments: str) -> Path:
     return path
 
 
-def course_of(folder: Path, *segments: str) -> WalkingCourse:
-    return load_course(written(folder, *segments))
+def sequence_of(folder: Path, *segments: str) -> TaskSequence:
+    return load_task_sequence(written(folder, *segments))
 
 
 MISTAKES = {
@@ -68,7 +68,7 @@ MISTAKES = {
 def test_a_mistake_is_one_line_that_names_the_segment(mistake: str, tmp_path: Path) -> None:
     text, said = MISTAKES[mistake]
     with pytest.raises(ScenarioError) as raised:
-        load_course(written(tmp_path, text))
+        load_task_sequence(written(tmp_path, text))
     message = str(raised.value)
     assert "\n" not in message
     assert message.startswith(f"{tmp_path / 'tried.toml'}: ")
@@ -76,62 +76,65 @@ def test_a_mistake_is_one_line_that_names_the_segment(mistake: str, tmp_path: Pa
         assert words in message
 
 
-def test_a_cadence_beyond_the_speeds_of_a_course_is_refused(tmp_path: Path) -> None:
-    course = course_of(tmp_path, WALK.replace('speed = "1.2 m/s"', 'cadence = "150 1/min"'))
+def test_a_cadence_beyond_the_speeds_of_a_task_sequence_is_refused(tmp_path: Path) -> None:
+    sequence = sequence_of(tmp_path, WALK.replace('speed = "1.2 m/s"', 'cadence = "150 1/min"'))
     with pytest.raises(ScenarioError, match=r"segment 1 \(walk\): cadence: .* 0\.4 to 1\.6 m/s"):
-        planned_course(course, GAIT)
+        planned_task_sequence(sequence, GAIT)
 
 
-def test_more_segments_than_a_course_has_room_for_are_refused(tmp_path: Path) -> None:
-    course = course_of(tmp_path, *([STAND, WALK] * 20))
+def test_more_segments_than_a_task_sequence_has_room_for_are_refused(tmp_path: Path) -> None:
+    sequence = sequence_of(tmp_path, *([STAND, WALK] * 20))
     with pytest.raises(ScenarioError, match="32 is the most"):
-        planned_course(course, GAIT)
+        planned_task_sequence(sequence, GAIT)
 
 
-def test_an_unknown_course_is_refused_with_the_nearest_name() -> None:
-    with pytest.raises(ScenarioError, match="there is no course 'corider', did you mean 'corridor'"):
-        load_walk("solenoid", course="corider")
+def test_an_unknown_task_sequence_is_refused_with_the_nearest_name() -> None:
+    with pytest.raises(ScenarioError, match="there is no task sequence 'corider', did you mean 'corridor'"):
+        load_walk("solenoid", task_sequence="corider")
 
 
-def test_a_walk_file_names_its_course_by_a_path_beside_it(tmp_path: Path) -> None:
+def test_a_walk_file_names_its_task_sequence_by_a_path_beside_it(tmp_path: Path) -> None:
     written(tmp_path, STAND, WALK)
     (tmp_path / "own.toml").write_text(
-        'schema_version = 1\nname = "own"\ncourse = "tried.toml"\n[device]\nset = "ppafo2011"\nvalve = "solenoid"\n'
+        'schema_version = 1\nname = "own"\ntask_sequence = "tried.toml"\n'
+        '[device]\nset = "ppafo2011"\nvalve = "solenoid"\n'
         '[controller]\nkind = "event_on_off"\n'
     )
-    course = walk_of(load_walk(tmp_path / "own.toml")).course
-    assert course is not None
-    assert [segment.kind for segment in course.segments] == ["stand", "walk"]
-    replaced = walk_of(load_walk(tmp_path / "own.toml", course="stairs")).course
+    sequence = walk_of(load_walk(tmp_path / "own.toml")).task_sequence
+    assert sequence is not None
+    assert [segment.kind for segment in sequence.segments] == ["stand", "walk"]
+    replaced = walk_of(load_walk(tmp_path / "own.toml", task_sequence="stairs")).task_sequence
     assert replaced is not None
     assert replaced.name == "stairs"
 
 
-@pytest.mark.parametrize("name", led_courses())
-def test_the_segments_of_a_course_follow_each_other_and_walk_whole_strides(name: str) -> None:
-    planned = planned_course(load_course(name), GAIT)
+@pytest.mark.parametrize("name", led_task_sequences())
+def test_the_segments_of_a_task_sequence_follow_each_other_and_walk_whole_strides(name: str) -> None:
+    planned = planned_task_sequence(load_task_sequence(name), GAIT)
     ends = [float(span.end) for span in planned.spans]
     assert [float(span.start) for span in planned.spans] == [0.0, *ends[:-1]]
     assert ends[-1] == planned.duration
-    turns = [float(part.turns) for part in planned.course.parts if part.start < 1.0e5]
+    turns = [float(part.turns) for part in planned.timed.parts if part.start < 1.0e5]
     whole = np.array(turns) - turns[0]
     assert np.abs(2.0 * whole - np.round(2.0 * whole)).max() < 1.0e-9
 
 
 def test_a_walk_takes_the_nearest_whole_number_of_strides(tmp_path: Path) -> None:
     given = '[[segment]]\nkind = "walk"\nspeed = "1.2 m/s"\nduration = "20 s"\n'
-    span = planned_course(course_of(tmp_path, STAND, given), GAIT).spans[1]
+    span = planned_task_sequence(sequence_of(tmp_path, STAND, given), GAIT).spans[1]
     assert abs(span.end - span.start - 20.0) <= 0.5 * GAIT.stride_time * (1.33 / 1.2) ** 0.5
 
 
-def test_a_walk_without_a_course_is_composed_without_one() -> None:
+def test_a_walk_without_a_task_sequence_is_composed_without_one() -> None:
     text = lane_source(plan_walk(with_duration(load_walk("solenoid"), 60.0)).program)
-    assert "gait_on_course(" not in text
+    assert "gait_in_task_sequence(" not in text
     assert "scuff" not in text
-    with_course = lane_source(plan_walk(with_duration(load_walk("solenoid", course="stairs"), 60.0)).program)
-    assert "gait_on_course(" in with_course
+    with_task_sequence = lane_source(
+        plan_walk(with_duration(load_walk("solenoid", task_sequence="stairs"), 60.0)).program
+    )
+    assert "gait_in_task_sequence(" in with_task_sequence
     assert "model_gait_measured_at" in text
-    assert "model_gait_measured_at" not in with_course
+    assert "model_gait_measured_at" not in with_task_sequence
 
 
 LENIENT = (
@@ -141,12 +144,12 @@ LENIENT = (
     "controller.flat_from=0.2",
     "controller.flat_to=0.201",
 )
-"""Signs of faults that standing and stairs give too are put off, so that there is help on the whole course."""
+"""Signs of faults that standing and stairs give too are put off, so that there is help on the whole task sequence."""
 
 
 @pytest.fixture(scope="module")
 def corridor() -> WalkResult:
-    return walk("solenoid", overrides=LENIENT, course="corridor")
+    return walk("solenoid", overrides=LENIENT, task_sequence="corridor")
 
 
 def within(result: WalkResult, kind: str, margin: float = 0.0) -> list[np.ndarray]:
@@ -166,8 +169,8 @@ def test_in_standing_the_foot_is_flat_and_both_sensors_are_loaded(corridor: Walk
             assert recording[sensor][standing] == pytest.approx(0.25 * weight, rel=0.05)
 
 
-def test_gas_is_kept_on_a_course(corridor: WalkResult) -> None:
-    run = plan_walk(with_duration(load_walk("solenoid", LENIENT, course="corridor"), 1.0))
+def test_gas_is_kept_in_a_task_sequence(corridor: WalkResult) -> None:
+    run = plan_walk(with_duration(load_walk("solenoid", LENIENT, task_sequence="corridor"), 1.0))
     recording, plant = corridor.recording, run.plant
     volumes = chamber_volumes(plant, recording["angle"])  # type: ignore[arg-type]
     masses = [
@@ -179,15 +182,15 @@ def test_gas_is_kept_on_a_course(corridor: WalkResult) -> None:
     assert np.ptp(balance) < 1.0e-10
 
 
-def test_the_segments_add_up_to_the_course(corridor: WalkResult) -> None:
+def test_the_segments_add_up_to_the_task_sequence(corridor: WalkResult) -> None:
     metrics, segments = corridor.metrics, corridor.segments
-    assert sum(item.gas for item in segments) == pytest.approx(metrics["course_gas"].value, rel=1.0e-9)
-    assert metrics["course_gas"].value == corridor.recording["supplied_mass"][-1]
+    assert sum(item.gas for item in segments) == pytest.approx(metrics["task_sequence_gas"].value, rel=1.0e-9)
+    assert metrics["task_sequence_gas"].value == corridor.recording["supplied_mass"][-1]
     assert sum(item.strides for item in segments) == corridor.starts.size
-    assert metrics["course_strides"].value == corridor.starts.size
+    assert metrics["task_sequence_strides"].value == corridor.starts.size
     lowest = [item.lowest_toes for item in segments if item.lowest_toes is not None]
-    assert metrics["course_lowest_toes"].value == min(lowest)
-    assert 0 < metrics["helped_strides"].value <= metrics["course_strides"].value
+    assert metrics["task_sequence_lowest_toes"].value == min(lowest)
+    assert 0 < metrics["helped_strides"].value <= metrics["task_sequence_strides"].value
     assert metrics["steady_strides"].value < metrics["strides"].value
 
 
@@ -203,24 +206,26 @@ def test_means_are_over_the_strides_at_an_even_speed_on_level_ground(corridor: W
 
 
 def test_an_integral_of_a_stride_is_over_the_strides_of_the_means(corridor: WalkResult) -> None:
-    steady = steady_strides(planned_course(load_course("corridor"), GAIT), corridor.recording.time[corridor.starts])
+    steady = steady_strides(
+        planned_task_sequence(load_task_sequence("corridor"), GAIT), corridor.recording.time[corridor.starts]
+    )
     angle = corridor.recording["angle"]
     # Of the angle itself it is half of what its square gained from strike to strike.
     gains = np.diff(0.5 * angle[corridor.starts] ** 2)[steady & corridor.helped]
     assert integral_of_a_stride(corridor, angle) == pytest.approx(gains.mean(), abs=1.0e-12)
 
 
-def test_a_walk_longer_than_its_course_has_the_gas_and_the_time_of_the_course(corridor: WalkResult) -> None:
-    planned = planned_course(load_course("corridor"), GAIT)
-    longer = course_metrics(replace(planned, duration=40.0), corridor.segments, corridor.recording, 0)
-    assert longer["course_time"].value == longer["course_planned_time"].value == 40.0
-    assert longer["course_gas"].value == corridor.recording["supplied_mass"][corridor.recording.time <= 40.0][-1]
+def test_a_walk_longer_than_its_task_sequence_has_the_gas_and_the_time_of_the_sequence(corridor: WalkResult) -> None:
+    planned = planned_task_sequence(load_task_sequence("corridor"), GAIT)
+    longer = task_sequence_metrics(replace(planned, duration=40.0), corridor.segments, corridor.recording, 0)
+    assert longer["task_sequence_time"].value == longer["task_sequence_planned_time"].value == 40.0
+    assert longer["task_sequence_gas"].value == corridor.recording["supplied_mass"][corridor.recording.time <= 40.0][-1]
     gas = walk_gas(replace(corridor, metrics={**corridor.metrics, **longer}))
-    assert (gas.stride_time, gas.gas_per_stride) == (40.0, longer["course_gas"].value)
+    assert (gas.stride_time, gas.gas_per_stride) == (40.0, longer["task_sequence_gas"].value)
 
 
-def test_the_table_of_a_course_counts_helped_strides_as_it_counts_strides(corridor: WalkResult) -> None:
-    table = course_parts(Comparison(corridor, corridor, {}))[0]
+def test_the_table_of_a_task_sequence_counts_helped_strides_as_it_counts_strides(corridor: WalkResult) -> None:
+    table = task_sequence_parts(Comparison(corridor, corridor, {}))[0]
     for column in (3, 4):
         *parts, whole = (int(str(row[column])) for row in table.rows)
         assert whole == sum(parts)
@@ -246,7 +251,7 @@ def test_the_recording_has_the_speed_of_each_segment(corridor: WalkResult) -> No
         assert recording["walking_speed"][late] == pytest.approx(speed, rel=1.0e-6)
     assert recording["walking_speed"][within(corridor, "stand")[0]].max() == 0.0
     way = np.diff(recording["walking_speed"][within(corridor, "walk", 2.5)[0]]).size * recording.time[1] * 1.2
-    assert way < corridor.metrics["course_length"].value < 1.4 * recording.time[-1]
+    assert way < corridor.metrics["task_sequence_length"].value < 1.4 * recording.time[-1]
 
 
 def first_loaded(result: WalkResult, start: float, end: float) -> list[str]:
@@ -261,7 +266,7 @@ def first_loaded(result: WalkResult, start: float, end: float) -> list[str]:
 
 
 def test_on_stairs_the_toes_are_loaded_first_also_with_a_device_that_lifts_them() -> None:
-    result = walk("solenoid", overrides=LENIENT, course="stairs")
+    result = walk("solenoid", overrides=LENIENT, task_sequence="stairs")
     before, first, _, second, after, *_ = result.segments[1:]
     for item in (first, second):
         assert first_loaded(result, item.start, item.end) == ["toe"] * 6
@@ -269,8 +274,8 @@ def test_on_stairs_the_toes_are_loaded_first_also_with_a_device_that_lifts_them(
         assert set(first_loaded(result, item.start + 2.0, item.end)) == {"heel"}
 
 
-def test_a_course_has_the_same_bits_alone_and_in_a_population() -> None:
-    configuration = load_walk("solenoid", LENIENT, course="stairs")
+def test_a_task_sequence_has_the_same_bits_alone_and_in_a_population() -> None:
+    configuration = load_walk("solenoid", LENIENT, task_sequence="stairs")
     people = walk_population(configuration, 0.3, 20, seed=2)
     alone = walk_population(configuration, 0.3, 1, seed=2)
     single = walk(configuration, 0.3)
@@ -283,7 +288,7 @@ def test_a_course_has_the_same_bits_alone_and_in_a_population() -> None:
 
 
 def test_a_population_walks_until_the_slowest_is_through() -> None:
-    configuration = load_walk("solenoid", course="first-steps")
+    configuration = load_walk("solenoid", task_sequence="first-steps")
     people = walk_population(configuration, None, 12, seed=2)
     assert people.diverged == 0
-    assert 60.0 * people.minutes > planned_course(load_course("first-steps"), GAIT).duration
+    assert 60.0 * people.minutes > planned_task_sequence(load_task_sequence("first-steps"), GAIT).duration

@@ -1,4 +1,4 @@
-"""A course of walking: from a name or a file to its segments, and from these to its parts in time, in SI units."""
+"""A task sequence: from a name or a file to its segments, and from these to its parts in time, in SI units."""
 
 import functools
 import math
@@ -18,7 +18,7 @@ from ppafo.errors import ScenarioError, nearest_name
 from ppafo.gait import Gait
 from ppafo.model.declaration import Quantity
 from ppafo.model.elementary import sine_and_cosine
-from ppafo.model.gait import NEVER, PARTS, STANDS_AT, Course, CoursePart, GaitNow, GaitTiming
+from ppafo.model.gait import NEVER, PARTS, STANDS_AT, GaitNow, GaitTiming, SequencePart, TimedSequence
 from ppafo.model.leg import LegParameters
 from ppafo.signals.recording import Floats
 from ppafo.simulation.declaration import Reading
@@ -26,10 +26,10 @@ from ppafo.simulation.motion_kind import REACT
 from ppafo.simulation.schema import kind_field, model_name, number_type, quantity_fields
 from ppafo.walking.preparation import standing_on
 
-FILE = TomlKind("course", "course", resources.files("ppafo.walking") / "courses", ScenarioError)
+FILE = TomlKind("task sequence", "task-sequence", resources.files("ppafo.walking") / "task_sequences", ScenarioError)
 
 SLOWEST, FASTEST = 0.4, 1.6
-"""Walking speeds of a course [m/s]."""
+"""Walking speeds of a task sequence [m/s]."""
 
 SPEED = Quantity("speed", "m/s", "walking speed; the gait's unless given", None, SLOWEST, FASTEST)
 CADENCE = Quantity("cadence", "1/s", "steps of both legs in a time, in place of a speed", None, 0.5, 4.0)
@@ -89,14 +89,14 @@ the forefoot is on the stair all the same."""
 
 @dataclass(frozen=True, slots=True)
 class Segment:
-    """One segment of a course; ``values`` in SI units by name, without those that were not given."""
+    """One segment of a task sequence; ``values`` in SI units by name, without those that were not given."""
 
     kind: str
     values: dict[str, float]
 
 
 @dataclass(frozen=True, slots=True)
-class WalkingCourse:
+class TaskSequence:
     """What the wearer does one after the other, who stands at the beginning; ``file`` is what messages call it."""
 
     name: str
@@ -109,16 +109,17 @@ class WalkingCourse:
         return ScenarioError(f"{self.file}: segment {number + 1} ({self.segments[number].kind}): {reason}")
 
 
-def led_courses() -> tuple[str, ...]:
-    """Return the names of the courses of the package that a wearer with a prescribed gait can walk."""
-    return tuple(name for name in FILE.names() if _without_gait(load_course(name)) is None)
+def led_task_sequences() -> tuple[str, ...]:
+    """Return the names of the task sequences of the package that a wearer with a prescribed gait can walk."""
+    return tuple(name for name in FILE.names() if _without_gait(load_task_sequence(name)) is None)
 
 
-def load_course(name_or_path: str | Path) -> WalkingCourse:
-    """Return a course by its name in the package or by the path of a TOML file; ScenarioError for a mistake in it."""
+def load_task_sequence(name_or_path: str | Path) -> TaskSequence:
+    """Return a task sequence by its name in the package or the path of its file; ScenarioError for a mistake in it."""
     file = label(str(name_or_path))
     document = FILE.parse(FILE.read(name_or_path), file)
-    validate(_outline(), document, file, ScenarioError)
+    # What is in the segments is checked segment by segment.
+    validate(_task_sequence_table(dict[str, Any], "TaskSequenceOutline"), document, file, ScenarioError)
     segments = []
     for number, given in enumerate(document["segment"], start=1):
         kind = given.get("kind")
@@ -137,10 +138,10 @@ def load_course(name_or_path: str | Path) -> WalkingCourse:
         if strides is not None and strides != int(strides):
             raise reading.refusal("strides", "must be a whole number")
         segments.append(Segment(kind, values))
-    course = WalkingCourse(document["name"], document.get("description", ""), tuple(segments), file)
-    for index, reason in _contradictions(course.segments):
-        raise course.refusal(index, reason)
-    return course
+    sequence = TaskSequence(document["name"], document.get("description", ""), tuple(segments), file)
+    for index, reason in _contradictions(sequence.segments):
+        raise sequence.refusal(index, reason)
+    return sequence
 
 
 def _contradictions(segments: Iterable[Segment]) -> Iterator[tuple[int, str]]:
@@ -169,20 +170,20 @@ _WITHOUT_GAIT = ("step", "push")
 """What is for a body that walks by itself."""
 
 
-def check_led_course(course: WalkingCourse) -> None:
+def check_led_task_sequence(sequence: TaskSequence) -> None:
     """Raise ScenarioError for what a wearer with a prescribed gait cannot do."""
-    index = _without_gait(course)
+    index = _without_gait(sequence)
     if index is not None:
-        kind = course.segments[index].kind
+        kind = sequence.segments[index].kind
         what = "distance" if kind == "walk" else f"a {kind}"
-        raise course.refusal(
+        raise sequence.refusal(
             index, f"{what} is for a neuromuscular gait model, and this gait is prescribed: set motion.kind = '{REACT}'"
         )
 
 
-def _without_gait(course: WalkingCourse) -> int | None:
+def _without_gait(sequence: TaskSequence) -> int | None:
     """The first segment, from 0, that a gait does not take, None where there is none."""
-    only = (segment.kind in _WITHOUT_GAIT or DISTANCE.name in segment.values for segment in course.segments)
+    only = (segment.kind in _WITHOUT_GAIT or DISTANCE.name in segment.values for segment in sequence.segments)
     return next((index for index, is_so in enumerate(only) if is_so), None)
 
 
@@ -194,7 +195,8 @@ def _segment_table(kind: str) -> type[BaseModel]:
     return table(f"{model_name(kind)}Segment", kind_field(kind, summary) | quantity_fields(given) | free)
 
 
-def _course_table(segment: Any, name: str) -> type[BaseModel]:
+@functools.cache
+def _task_sequence_table(segment: Any, name: str) -> type[BaseModel]:
     fields: dict[str, Any] = {
         "schema_version": (Literal[1], Field(description="version of this layout")),
         "name": (str, Field(pattern=NAME, max_length=100)),
@@ -207,16 +209,10 @@ def _course_table(segment: Any, name: str) -> type[BaseModel]:
     return table(name, fields)
 
 
-@functools.cache
-def _outline() -> type[BaseModel]:
-    """The layout of a course without what is in its segments, which is checked segment by segment."""
-    return _course_table(dict[str, Any], "CourseOutline")
-
-
 def json_schema() -> dict[str, Any]:
-    """Return the JSON Schema of a file of a course."""
-    model = _course_table(one_of([_segment_table(kind) for kind in KINDS]), "CourseFile")
-    return make_schema(model, "ppafo walk --course")
+    """Return the JSON Schema of a file of a task sequence."""
+    model = _task_sequence_table(one_of([_segment_table(kind) for kind in KINDS]), "TaskSequenceFile")
+    return make_schema(model, "ppafo walk --task-sequence")
 
 
 @dataclass(frozen=True, slots=True)
@@ -230,10 +226,10 @@ class Span:
 
 
 @dataclass(frozen=True, slots=True)
-class PlannedCourse:
-    """The parts of a course for the engine, its segments in time, and parts [s] of equal strides on level ground."""
+class PlannedSequence:
+    """Parts of a task sequence for the engine, its segments in time, and times [s] of equal strides on level ground."""
 
-    course: Course
+    timed: TimedSequence
     spans: tuple[Span, ...]
     steady: tuple[tuple[Numbers, Numbers], ...]
     duration: Numbers
@@ -251,7 +247,7 @@ class _Planner:
         self.load = load
         self.stride = 0.0
         self.slope = 0.0
-        self.parts: list[CoursePart] = []
+        self.parts: list[SequencePart] = []
 
     def stay(self, length: Numbers, load: float) -> None:
         """Stand for a time [s]; the load changes over it."""
@@ -288,7 +284,7 @@ class _Planner:
     ) -> None:
         frequency = self.ratio * self.frequency
         self.parts.append(
-            CoursePart(
+            SequencePart(
                 start=self.time,
                 length=length,
                 turns=self.turns,
@@ -308,21 +304,21 @@ class _Planner:
         self.ratio, self.stride, self.load, self.slope = ratio, stride, load, slope
 
 
-def plan_course(
-    course: WalkingCourse, gait: Gait, frequency: Numbers, timing: GaitTiming, strike_angle: Numbers
-) -> PlannedCourse:
-    """The course of a wearer with these strides per second [Hz], or of many; ``strike_angle`` [rad] over flat.
+def plan_task_sequence(
+    sequence: TaskSequence, gait: Gait, frequency: Numbers, timing: GaitTiming, strike_angle: Numbers
+) -> PlannedSequence:
+    """The task sequence of a wearer with these strides per second [Hz], or of many; ``strike_angle`` [rad] over flat.
 
     A speed or cadence is relative to the gait's: people of a population walk each at their own. ScenarioError for
     a segment that the gait does not allow, or more parts than there are.
     """
-    resting = course.segments[0].kind == "rest"
+    resting = sequence.segments[0].kind == "rest"
     planner = _Planner(frequency, STANDS_AT * timing.heel_off, RESTING_LOAD if resting else STANDING_LOAD)
     spans: list[Span] = []
     steady: list[tuple[Numbers, Numbers]] = []
-    for index, segment in enumerate(course.segments):
+    for index, segment in enumerate(sequence.segments):
         start = planner.time
-        ratio = _ratio(course, index, gait)
+        ratio = _ratio(sequence, index, gait)
         steady += _strides(planner, segment, ratio, strike_angle)
         spans.append(Span(segment.kind, _title(segment), start, planner.time))
     duration = planner.time
@@ -333,13 +329,13 @@ def plan_course(
         planner.go(NEVER, planner.ratio, planner.stride, slope=planner.slope)
     if len(planner.parts) > PARTS:
         raise ScenarioError(
-            f"{course.file}: takes {len(planner.parts)} parts, a change of speed counted apart, and {PARTS} is the "
-            "most: leave segments out, or make it two courses"
+            f"{sequence.file}: takes {len(planner.parts)} parts, a change of speed counted apart, and {PARTS} is the "
+            "most: leave segments out, or make it two task sequences"
         )
     # The engine has a fixed number of parts, and a part that never begins changes nothing.
     unused = planner.parts[0]._replace(start=NEVER)
     parts = (*planner.parts, *(unused,) * (PARTS - len(planner.parts)))
-    return PlannedCourse(Course(parts), tuple(spans), tuple(steady), duration)
+    return PlannedSequence(TimedSequence(parts), tuple(spans), tuple(steady), duration)
 
 
 def _strides(
@@ -348,7 +344,14 @@ def _strides(
     """Plan a segment; where it walks on evenly and on level ground, that time [s] is given."""
     kind, values = segment.kind, segment.values
     if kind in ("stand", "rest"):
-        _stand(planner, values["duration"], RESTING_LOAD if kind == "rest" else STANDING_LOAD)
+        left, load = values["duration"], RESTING_LOAD if kind == "rest" else STANDING_LOAD
+        if planner.ratio > 0.0:
+            planner.go(1.0, 0.0, 0.0, load)
+        elif planner.load != load:
+            changing = min(LOADING_TIME, 0.5 * left)
+            planner.stay(changing + 0.0 * planner.frequency, load)
+            left -= changing
+        planner.stay(left + 0.0 * planner.frequency, load)
     elif kind == "stop":
         planner.go(values["strides"], 0.0, 0.0)
     elif kind == "start":
@@ -369,16 +372,6 @@ def _strides(
         slope = values.get("slope", 0.0)
         is_level = kind == "walk" and slope == 0.0
         yield from _walk(planner, values, ratio, ratio * shorter, tilt, slope, is_level)
-
-
-def _stand(planner: _Planner, duration: float, load: float) -> None:
-    if planner.ratio > 0.0:
-        planner.go(1.0, 0.0, 0.0, load)
-    elif planner.load != load:
-        changing = min(LOADING_TIME, 0.5 * duration)
-        planner.stay(changing + 0.0 * planner.frequency, load)
-        duration -= changing
-    planner.stay(duration + 0.0 * planner.frequency, load)
 
 
 def _walk(
@@ -411,12 +404,12 @@ def _count(planner: _Planner, values: dict[str, float], ratio: float, used: Numb
     return np.maximum(np.rint((values["duration"] - used) * ratio * planner.frequency), 1.0)
 
 
-def _ratio(course: WalkingCourse, index: int, gait: Gait) -> float:
+def _ratio(sequence: TaskSequence, index: int, gait: Gait) -> float:
     """Strides per second over the recorded ones: the square root of the speed over the recorded one."""
-    values, recorded = course.segments[index].values, gait.walking_speed
+    values, recorded = sequence.segments[index].values, gait.walking_speed
     if "speed" in values:
         if recorded is None:
-            raise course.refusal(
+            raise sequence.refusal(
                 index, f"speed: gait '{gait.name}' has no walking speed, so it cannot be scaled to one; give a cadence"
             )
         # Step length over cadence stays as it is over the speeds of walking, so both go with the root.
@@ -425,10 +418,10 @@ def _ratio(course: WalkingCourse, index: int, gait: Gait) -> float:
     ratio = 0.5 * values["cadence"] * gait.stride_time if "cadence" in values else 1.0
     speed = (recorded or 1.0) * ratio * ratio
     if "cadence" in values and recorded is not None and not SLOWEST <= speed <= FASTEST:
-        raise course.refusal(
+        raise sequence.refusal(
             index,
-            f"cadence: with the walk ratio of gait '{gait.name}' that is {speed:.3g} m/s; a course goes at {SLOWEST:g} "
-            f"to {FASTEST:g} m/s",
+            f"cadence: with the walk ratio of gait '{gait.name}' that is {speed:.3g} m/s; a task sequence goes at "
+            f"{SLOWEST:g} to {FASTEST:g} m/s",
         )
     return ratio
 
@@ -452,9 +445,9 @@ class PaceInTime:
     stride: Floats
 
 
-def pace_in_time(course: Course, time: Floats) -> PaceInTime:
-    """Where one wearer is on a course at times [s]; the same polynomials as ``model.course``, for arrays."""
-    table = np.array([leaves(part) for part in course.parts], dtype=np.float64)
+def pace_in_time(sequence: TimedSequence, time: Floats) -> PaceInTime:
+    """Where one wearer is in a task sequence at times [s]; the same polynomials as ``model.gait``, for arrays."""
+    table = np.array([leaves(part) for part in sequence.parts], dtype=np.float64)
     row = table[np.searchsorted(table[:, 0], time, side="right") - 1].T
     start, length, turns, frequency, frequency_gain, stride, stride_gain = row[:7]
     fraction = np.minimum((time - start) / length, 1.0)
@@ -467,10 +460,10 @@ def pace_in_time(course: Course, time: Floats) -> PaceInTime:
     )
 
 
-def turns_walked(course: Course, time: float) -> Numbers:
-    """Strides, parts of one included, from the start of a course to a time [s]; floats or arrays (wearers,)."""
+def turns_walked(sequence: TimedSequence, time: float) -> Numbers:
+    """Strides, parts of one included, from the start of a task sequence to a time [s]; floats or arrays (wearers,)."""
     turns: Numbers = 0.0
-    for part in course.parts:
+    for part in sequence.parts:
         passed = np.clip(time - part.start, 0.0, part.length)
         fraction = passed / part.length
         integral = fraction**4 * (2.5 + fraction * (fraction - 3.0))
@@ -478,9 +471,9 @@ def turns_walked(course: Course, time: float) -> Numbers:
     return turns
 
 
-def standing_gait(leg: LegParameters, timing: GaitTiming, course: Course) -> GaitNow:
-    """Where a course begins: shank vertical, foot flat, both at rest; numbers may be arrays (wearers,)."""
-    first = course.parts[0]
+def standing_gait(leg: LegParameters, timing: GaitTiming, sequence: TimedSequence) -> GaitNow:
+    """Where a task sequence begins: shank vertical, foot flat, both at rest; numbers may be arrays (wearers,)."""
+    first = sequence.parts[0]
     sine, cosine = flat_foot(timing)
     return standing_on(leg, timing.ground_angle, sine, cosine, first.turns, first.load)
 

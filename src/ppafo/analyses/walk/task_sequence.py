@@ -1,4 +1,4 @@
-"""What a walk on a course or on its bottle adds: tables, remarks, data, files, pictures."""
+"""What a task sequence or a bottle adds to a walk: tables, remarks, data, files, pictures."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, fields
@@ -17,10 +17,10 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.walking.bottle import SupplyCourse, lasted, minutes_text, strides_text
 from ppafo.walking.figures.mean_stride import walk_figure
-from ppafo.walking.figures.over_time import bottle_figure, course_figure, peak_torques
+from ppafo.walking.figures.over_time import bottle_figure, peak_torques, task_sequence_figure
 from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WalkResult
-from ppafo.walking.strides import SegmentResult, is_whole_course
+from ppafo.walking.strides import SegmentResult
 from ppafo.walking.walk import Comparison
 
 _BOTTLE_CAPTION = (
@@ -67,7 +67,7 @@ def _facts(worn: WalkResult, supply: SupplyCourse) -> list[tuple[str, str]]:
     full = _GAS.text(supply.supply.mass)
     walked = f"after {worn.helped.size} whole strides"
     # Strides of a gait that is prescribed are counted by time, as ``ppafo bottle`` counts them.
-    if motion.course is None and motion.is_led:
+    if motion.task_sequence is None and motion.is_led:
         strides = strides_text(supply.ending.time / motion.gait.stride_time)
         walked = f"{strides} strides, {worn.helped.size} of them whole between strikes"
     rows = [
@@ -117,7 +117,9 @@ _NUMBERS: tuple[Row, ...] = (
     ("flat_push", "push, heel loaded", "torque", 1),
     ("safe_time", "less help at", "time", 2),
 )
-_COURSE = "The course over time. Grey: every other segment. 'Without' is the same course without a device."
+_TASK_SEQUENCE = (
+    "The task sequence over time. Grey: every other segment. 'Without' is the same task sequence without a device."
+)
 _EXPLAINED = (
     "A stride counts for the segment in which its foot strikes; it is helped where the controller neither lifts only "
     "nor pauses nor has stopped before the next strike. Work is net work on the wearer while the foot rolls over the "
@@ -127,34 +129,36 @@ _EXPLAINED = (
     "do: a constant walk ratio. Standing is a vertical shank over a flat foot. The forces of a stride and the fraction "
     "of the stance stay the same at every speed.",
 )
+_SAME_TIME = 0.05
+"""Time [s] by which a recording may end before its task sequence: its samples."""
 _MEAN = (
     "Mean over the strides at an even speed on level ground, of all speeds together, with the standard deviation as a "
     "band."
 )
 
 
-def course_parts(comparison: Comparison) -> tuple[Part, ...]:
-    """Return the table of the segments, and how to read it; nothing for a walk without a course."""
+def task_sequence_parts(comparison: Comparison) -> tuple[Part, ...]:
+    """Return the table of the segments, and how to read it; nothing for a walk without a task sequence."""
     worn, bare = comparison.with_device, comparison.without_device
-    if walk_of(worn.scenario).course is None:
+    if walk_of(worn.scenario).task_sequence is None:
         return ()
     without = {segment.start: segment.lowest_toes for segment in bare.segments}
     rows = [asdict(segment) | {"without": without.get(segment.start)} for segment in worn.segments]
     numbers: dict[str, float] = {name: item.value for name, item in worn.metrics.items()}
-    bare_toes = bare.metrics.get("course_lowest_toes")
-    is_whole = is_whole_course(numbers["course_time"], numbers["course_planned_time"])
+    bare_toes = bare.metrics.get("task_sequence_lowest_toes")
+    is_whole = numbers["task_sequence_time"] >= numbers["task_sequence_planned_time"] - _SAME_TIME
     rows.append(
         {
-            "title": "whole course" if is_whole else "as far as walked",
+            "title": "whole task sequence" if is_whole else "as far as walked",
             "start": 0.0,
-            "end": numbers["course_time"],
-            "strides": numbers["course_strides"],
+            "end": numbers["task_sequence_time"],
+            "strides": numbers["task_sequence_strides"],
             "helped": sum(segment.helped for segment in worn.segments),
-            "gas": numbers["course_gas"],
-            "net_push_off_work": numbers["course_work"],
-            "lowest_toes": numbers.get("course_lowest_toes"),
+            "gas": numbers["task_sequence_gas"],
+            "net_push_off_work": numbers["task_sequence_work"],
+            "lowest_toes": numbers.get("task_sequence_lowest_toes"),
             "without": None if bare_toes is None else bare_toes.value,
-            "flat_push": numbers["course_flat_push"],
+            "flat_push": numbers["task_sequence_flat_push"],
             "safe_time": numbers.get("safe_state_time"),
         }
     )
@@ -164,31 +168,37 @@ def course_parts(comparison: Comparison) -> tuple[Part, ...]:
         head, *cells = number_texts(number, (row[number[0]] for row in rows))
         table.append(Column(str(head), cells))
     means = (
-        f"The numbers below are means over the {numbers['steady_strides']:.0f} of {numbers['course_strides']:.0f} "
-        "strides that are at an even speed on level ground."
+        f"The numbers below are means over the {numbers['steady_strides']:.0f} of "
+        f"{numbers['task_sequence_strides']:.0f} strides that are at an even speed on level ground."
     )
     return (
         Part(columns=table, marked=(len(rows) - 1,)),
-        Part("How to read the course", said=_EXPLAINED, is_detail=True),
+        Part("How to read the task sequence", said=_EXPLAINED, is_detail=True),
         Part(said=(means,)),
     )
 
 
-def course_pictures(comparison: Comparison) -> tuple[Part, ...]:
-    """Return the course over time, and the mean of its even strides where there are any."""
+def task_sequence_pictures(comparison: Comparison) -> tuple[Part, ...]:
+    """Return the task sequence over time, and the mean of its even strides where there are any."""
     worn, bare = comparison.with_device, comparison.without_device
     mean = partial(walk_figure, {"with the device": worn, "without": bare})
     pictures = (
-        Part("The course", name="course", caption=_COURSE, draw=partial(course_figure, worn, bare), is_detail=True),
+        Part(
+            "The task sequence",
+            name="task-sequence",
+            caption=_TASK_SEQUENCE,
+            draw=partial(task_sequence_figure, worn, bare),
+            is_detail=True,
+        ),
         Part("The mean stride", name="mean-stride", caption=_MEAN, draw=mean, is_detail=True),
     )
     return pictures if worn.averages and bare.averages else pictures[:1]
 
 
-def course_files(comparison: Comparison) -> dict[str, Callable[[], bytes]]:
-    """Return the files of a course, its segments with and without the device, and of a bottle over the walk."""
+def task_sequence_files(comparison: Comparison) -> dict[str, Callable[[], bytes]]:
+    """Return the files of a task sequence, its segments with and without the device, and of a bottle over the walk."""
     found: dict[str, Callable[[], bytes]] = {}
-    if walk_of(comparison.with_device.scenario).course is not None:
+    if walk_of(comparison.with_device.scenario).task_sequence is not None:
         found["segments.csv"] = lambda: segments_csv(comparison.with_device.segments)
         found["segments-off.csv"] = lambda: segments_csv(comparison.without_device.segments)
     supply = comparison.with_device.supply
@@ -205,14 +215,14 @@ def segments_csv(segments: Sequence[SegmentResult]) -> bytes:
     return csv_of({head: [getattr(one, name) for one in segments] for head, name in zip(heads, names, strict=True)})
 
 
-def course_data(comparison: Comparison) -> dict[str, Any]:
-    """Return the segments as data, in SI units; nothing for a walk without a course."""
+def task_sequence_data(comparison: Comparison) -> dict[str, Any]:
+    """Return the segments as data, in SI units; nothing for a walk without a task sequence."""
     worn, bare = comparison.with_device, comparison.without_device
-    course = walk_of(worn.scenario).course
-    if course is None:
+    sequence = walk_of(worn.scenario).task_sequence
+    if sequence is None:
         return {}
     return {
-        "course": course.name,
+        "task_sequence": sequence.name,
         "segments": [asdict(segment) for segment in worn.segments],
         "segments_off": [asdict(segment) for segment in bare.segments],
     }
@@ -220,17 +230,17 @@ def course_data(comparison: Comparison) -> dict[str, Any]:
 
 def trust_remark(configuration: Scenario) -> str:
     """Return which segments go beyond the speeds for which scaling the gait can be trusted; empty where none does."""
-    course, gait = walk_of(configuration).course, walk_of(configuration).gait
-    if course is None:
+    sequence, gait = walk_of(configuration).task_sequence, walk_of(configuration).gait
+    if sequence is None:
         return ""
     try:
         low, high = speed_range(gait)
     except DataError:
         return f"gait '{gait.name}' has no walking speed: how far its strides can be scaled is not known"
-    given = [item.values["speed"] for item in course.segments if "speed" in item.values]
+    given = [item.values["speed"] for item in sequence.segments if "speed" in item.values]
     recorded = gait.walking_speed or 0.0
     # A cadence counts steps of both feet; the speed goes with its square, as the walk ratio is constant.
-    ratios = [0.5 * item.values["cadence"] * gait.stride_time for item in course.segments if "cadence" in item.values]
+    ratios = [0.5 * item.values["cadence"] * gait.stride_time for item in sequence.segments if "cadence" in item.values]
     speeds = [*given, *(recorded * ratio * ratio for ratio in ratios)]
     # A speed at the edge, written in another unit, is not beyond it.
     far = sorted({f"{speed:.2g}" for speed in speeds if not low - 1.0e-9 <= speed <= high + 1.0e-9})
