@@ -7,7 +7,7 @@ for a cause with a size. A common delay, and a start that was read from noisy sa
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import reduce
 from typing import NamedTuple
@@ -189,7 +189,9 @@ def causes_of(
             # What has no size of its own to fit, a swap or a sign, cannot pass for two other changes.
             is_fitted = len(first.candidate.sizes) > 1 and not first.candidate.name.startswith(_SAMPLES)
             if not is_fitted or not search.needs_another(first, sized):
-                return Causes(_cause_of(named, search.penalty), None, len(tried))
+                # With errors of sensors that any bench has, other small changes may explain as much as one alone.
+                others = search.beside_usual(sized, none, {one.candidate.name for one in named}) if is_fitted else []
+                return Causes(_cause_of(named, search.penalty, others), None, len(tried))
             return Causes(None, _cause_of([first], search.penalty), len(tried))
     # What is wrong with samples is seen in them, whatever else is wrong.
     nearest = max(tried, key=lambda one: (one.candidate.name.startswith(_SAMPLES), one.gain), default=None)
@@ -232,11 +234,18 @@ def _at_rate(recording: Recording, rate: float) -> Recording:
     return replace(recording, time=first + (recording.time - first) / rate)
 
 
-def _cause_of(named: Sequence[_Tried], penalty: float) -> Cause:
-    """Return the best of those that explain recordings, with all that the recordings cannot tell from it."""
-    best = max(one.gain for one in named)
+def _cause_of(named: Sequence[_Tried], penalty: float, others: Sequence[_Tried] = ()) -> Cause:
+    """Return the best of those that explain recordings, with all that the recordings cannot tell from it.
+
+    ``others`` explain them beside what any bench has, and come after those that do alone.
+    """
+    best, alone = max(one.gain for one in named), {one.candidate.name for one in named}
     # Of those that the recordings cannot tell apart, numbers of the set come first.
-    alike = [
+    alike = sorted(
+        (one for one in [*named, *others] if one.gain > best - penalty),
+        key=lambda one: (one.candidate.name not in alone, not one.candidate.at(one.size).numbers, -one.gain),
+    )
+    first, *rest = (
         Cause(
             name=one.name,
             in_words=one.in_words(at.size),
@@ -245,11 +254,9 @@ def _cause_of(named: Sequence[_Tried], penalty: float) -> Cause:
             numbers={path: (value, one.unit) for path, value in one.at(at.size).numbers.items() if one.unit},
             is_usual=at.is_usual,
         )
-        for at, one in ((at, at.candidate) for at in sorted(named, key=lambda one: -one.gain))
-        if at.gain > best - penalty
-    ]
-    first, *others = sorted(alike, key=lambda one: not one.numbers)
-    return replace(first, same=tuple(others))
+        for at, one in ((at, at.candidate) for at in alike)
+    )
+    return replace(first, same=tuple(rest))
 
 
 @dataclass(frozen=True, slots=True)
@@ -317,14 +324,12 @@ class _Search:
 
         ``none`` are the mean squares without any. A size at an end of its grid is refused.
         """
-        counts = np.concatenate([np.full(len(one.channels), one.values.shape[1]) for one in self.records])
         best: dict[str, _Tried] = {}
         runs = [(one, size) for one in candidates for size in one.grid]
         for step in range(_STEPS + 1):
             for (one, size), left in zip(runs, self.evaluated([one.at(size) for one, size in runs]), strict=True):
                 if left is not None:
-                    parts = np.log(np.maximum(none, 1.0)) - np.log(np.maximum(left.squares, 1.0))
-                    gain = float(counts @ parts) - self.penalty * (len(one.sizes) > 1)
+                    gain = self._gain(left, none) - self.penalty * (len(one.sizes) > 1)
                     now, before = _Tried(candidate=one, size=size, left=left, gain=gain), best.get(one.name)
                     # Sizes that leave nothing but noise are equal: one inside the grid is known better than its ends.
                     if before is None or (gain, now.is_inside) > (before.gain, before.is_inside):
@@ -332,6 +337,11 @@ class _Search:
             if step < _STEPS:
                 runs = self._improved([one for one in best.values() if len(one.candidate.sizes) > 1])
         return [one for one in best.values() if len(one.candidate.sizes) == 1 or one.is_inside]
+
+    def _gain(self, left: _Left, none: Floats) -> float:
+        """Return by how much more than none a change explains, before its size is paid for."""
+        counts = np.concatenate([np.full(len(one.channels), one.values.shape[1]) for one in self.records])
+        return float(counts @ (np.log(np.maximum(none, 1.0)) - np.log(np.maximum(left.squares, 1.0))))
 
     def _improved(self, moved: Sequence[_Tried]) -> list[tuple[Candidate, float]]:
         """Return the size of each candidate after a Gauss-Newton step, no further than its neighbours in the grid."""
@@ -365,13 +375,34 @@ class _Search:
         slopes = self._slopes(Change(), none, usual)
         if not slopes:
             return []
-        # In units of its limit each has the same bounds, whatever its own unit is.
-        limits = np.array([one.usual for one, _ in slopes])
-        columns = np.stack([column for _, column in slopes], axis=1)
-        found = lsq_linear(columns * limits, -none.errors, (-1.0, 1.0)).x * limits
-        change = reduce(joined, [one.at(float(size)) for (one, _), size in zip(slopes, found, strict=True)])
+        change = reduce(joined, [one.at(size) for one, size, _ in _bounded(slopes, none.errors)])
         words = "zeros, gains and delays of several sensors seem to be off"
         return [Candidate("several sensors", words, lambda _: change, (1.0,), usual=1.0)]
+
+    def beside_usual(self, sized: Sequence[Candidate], none: _Left, named: Collection[str]) -> list[_Tried]:
+        """Return the changes larger than on any bench that explain recordings beside what any bench has, at no cost.
+
+        Their sizes are those of a straight line from none; a run says whether they explain. Those ``named`` are known.
+        """
+        slopes = self._slopes(Change(), none, sized)
+        usual, found = [pair for pair in slopes if pair[0].usual], list[tuple[Candidate, float, Change]]()
+        for one, column in slopes:
+            if one.name in named:
+                continue
+            beside = [pair for pair in usual if pair[0] is not one]
+            (_, size, _), *others = fitted = _bounded([(replace(one, usual=math.inf), column), *beside], none.errors)
+            left = none.errors + sum(step * slope for _, step, slope in fitted)
+            # A straight line leaves some more; what leaves far more is no small change.
+            if float(left @ left) < 2.0 * ONLY_NOISE * len(left) and abs(size) > one.usual:
+                change = reduce(joined, [other.at(step) for other, step, _ in others], one.at(size))
+                found.append((one, size, change))
+        runs = self.evaluated([change for _, _, change in found])
+        tried = [
+            _Tried(candidate=one, size=size, left=left, gain=self._gain(left, none.squares) - self.penalty)
+            for (one, size, _), left in zip(found, runs, strict=True)
+            if left is not None
+        ]
+        return [one for one in tried if one.explains and one.is_inside]
 
     def needs_another(self, first: _Tried, candidates: Sequence[Candidate]) -> bool:
         """Return whether a second change, larger than on any bench, explains what a first leaves.
@@ -402,6 +433,21 @@ class _Search:
                 if abs(along / size) > one.usual and explained > engine + threshold * noise * noise:
                     return True
         return False
+
+
+def _bounded(slopes: Sequence[tuple[Candidate, Floats]], errors: Floats) -> list[tuple[Candidate, float, Floats]]:
+    """Return candidates with the sizes, no larger than usual, that leave least of errors on straight lines, and slopes.
+
+    One whose usual size is infinite has no bound.
+    """
+    # In units of its limit, or of its slope, each has one size, whatever its own unit is.
+    scales = np.array(
+        [one.usual if math.isfinite(one.usual) else 1.0 / max(float(np.linalg.norm(at)), 1e-300) for one, at in slopes]
+    )
+    most = np.array([1.0 if math.isfinite(one.usual) else math.inf for one, _ in slopes])
+    columns = np.stack([column for _, column in slopes], axis=1)
+    sizes = lsq_linear(columns * scales, -errors, (-most, most)).x * scales
+    return [(one, float(size), column) for (one, column), size in zip(slopes, sizes, strict=True)]
 
 
 def _record_of(measured: Measured, agreement: RecordingAgreement, device: Device, settings: ReplaySettings) -> _Record:

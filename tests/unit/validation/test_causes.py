@@ -187,6 +187,17 @@ def test_two_mistakes_that_look_like_a_third_are_not_named_as_that(bench: Record
     assert found.nearest is not None
 
 
+def test_a_small_number_of_the_set_is_not_named_alone_for_a_clock_beside_a_usual_gain(bench: Recording) -> None:
+    run = simulate(load_scenario("step-response", ["motion.kind=free", "run.duration=0.2 s"])).recording
+    random, seen = np.random.default_rng(32), bench
+    for name, size in (("angle", 4e-4), ("pressure_1", 100.0), ("pressure_2", 100.0)):
+        seen = with_channel(seen, name, run[name] + size * random.standard_normal(len(run)))
+    wrong = with_channel(seen, "pressure_2", ROOM + 1.0035 * (seen["pressure_2"] - ROOM))
+    found = causes(replace(wrong, time=1.0025 * wrong.time)).found
+    assert found is not None
+    assert "rate of the clock" in {one.name for one in (found, *found.same)}
+
+
 def test_two_mistakes_at_once_have_no_single_cause_and_the_nearest_is_said(bench: Recording) -> None:
     wrong = with_channel(read_with_gain(bench), "angle", 1.06 * bench["angle"])
     found = causes(wrong)

@@ -128,7 +128,7 @@ def _name_set(found: Identification, problem: ProblemFile) -> ParameterSet:
     old, new = found.new_set.parameter_set, found.new_set
     files = recording_files(problem)
     left_out = len(files) - _FILES_IN_TITLE
-    shown = ", ".join([*files[:_FILES_IN_TITLE], *([f"{left_out} more"] if left_out > 0 else [])])
+    shown = ", ".join(files[:_FILES_IN_TITLE]) + (f" and {left_out} more" if left_out > 0 else "")
     is_changed = "identified" if new.written or new.fitted else "no value identified"
     changes = f" with {', '.join(problem.device.overrides)}" if problem.device.overrides else ""
     origins = (
