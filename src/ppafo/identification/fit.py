@@ -8,12 +8,13 @@ estimated from them. Each difference of the Jacobian is as long as changes the r
 import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares, lsq_linear
+from scipy.signal import lfilter
 from scipy.stats import f as fisher
 from scipy.stats import qmc
 from scipy.stats import t as student
@@ -60,10 +61,17 @@ class Block:
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """Noise of a channel: standard deviation [SI] and reflection coefficients [-] of its autoregression (Burg)."""
+    """Noise of a channel: standard deviation [SI], and what makes it white: an autoregression or a level that drifts.
+
+    ``reflection`` are coefficients [-] of the autoregression (Burg). ``gain`` [-] is the part of each innovation by
+    which a level moves that drifts as a random walk beside white noise, 0 for none. ``innovation`` is the size of what
+    nothing foretells over the deviation [-].
+    """
 
     deviation: float
     reflection: tuple[float, ...] = ()
+    gain: float = 0.0
+    innovation: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,6 +122,9 @@ class Fit:
         return dict(zip((one.name for one in self.numbers), self.values.tolist(), strict=True))
 
 
+SMOOTH = "noise"
+"""Number of a conflict whose channel leaves more than noise: nearly all of it is foretold by the samples before."""
+
 STATED = "stated limit"
 """Group of a conflict that is not among recordings: they want a tolerance beyond its limit."""
 
@@ -129,10 +140,26 @@ SAMPLES_PER_COEFFICIENT = 100
 _LARGEST_REFLECTION = 1.0 - 1.0e-9
 """Of residuals that follow a law exactly, such as a constant's: no innovation would be left."""
 
+_GAINS = tuple(2.0**-power for power in range(1, 9))
+"""Gains of a level that are tried; with less it would not move within some hundred samples."""
+
+_SMOOTHEST = 0.2
+"""Innovation [-] below which residuals are no noise: that of a sensor with a first order lag of 50 samples."""
+
+_LEFT_OUT = 0.01
+"""Largest fraction of the samples that are left out because an event, such as an impact, passes them."""
+
+_BENT = 0.3
+"""Bend in units of noise, over a standard error to both sides, from which an event passes a sample."""
+
 _PASSES = 6
 _ROUNDS = 20
 _SETTLED = 0.03
 _EVALUATIONS = 40
+_LAST_STEPS = 12
+_SHARES = (1.0, 0.3, 0.1)
+_GAIN = 0.02
+"""Steps after whitening, the fractions of one that are tried, and the sum of squares [-] below which one is no gain."""
 _SIGNIFICANCE = 0.01
 _PARTING = 0.05
 """Fraction of the covariance of all by which a group's alone must be larger for its direction to be tested."""
@@ -158,7 +185,7 @@ def fit(
     """Return the numbers that explain recordings best, their covariance and whether the recordings agree on them.
 
     Squares are minimised within bounds, at first with a loss that is robust (soft L1); weights follow from what is left
-    in each channel. Then residuals are whitened by one autoregression per channel and the numbers take one more step.
+    in each channel. Then residuals are whitened by the noise of each channel and the numbers step on until none gains.
     Other starts are tried only where the recordings disagree. ``memory`` is the highest order of the autoregression, 0
     for readings that were taken one by one. IdentificationError where no run succeeds, and where samples are no more
     than the numbers that are sought, and for bounds that leave a number no room about its start.
@@ -209,6 +236,7 @@ class _Work:
         self.evaluations = 0
         self.least: dict[str, float] = {}
         self.step = np.full(len(numbers), _STEPS[1])
+        self.left_out = np.zeros(0, dtype=np.intp)
         self._last: tuple[bytes, Floats] | None = None
 
     def at(self, points: Floats) -> Floats:
@@ -250,6 +278,17 @@ class _Work:
         sizes = np.linalg.norm(slopes * weight[:, None], axis=0)
         self.step = np.clip(_UNITS_OF_NOISE / np.maximum(sizes, 1.0e-300), *_STEPS)
         return slopes
+
+    def leave_out(self, point: Floats, root: Floats, noise: Floats) -> None:
+        """Leave out the samples that an event, such as an impact, passes within a standard error of the numbers.
+
+        What such a sample seems to say is narrow and false, for its slope holds on one side of the event only.
+        """
+        ends = np.clip(point[:, None] + np.concatenate([root, -root], axis=1), self.low[:, None], self.high[:, None])
+        above, below = np.split(self.at(ends) - self.one(point)[:, None], 2, axis=1)
+        bends = np.nan_to_num(np.abs(above + below)).max(axis=1) / noise
+        self.left_out = np.argsort(-bends)[: int(_LEFT_OUT * len(bends))]
+        self.left_out = self.left_out[bends[self.left_out] > _BENT]
 
     def rows_of(self, channel: str) -> list[slice]:
         """Return the rows of a channel in each recording."""
@@ -332,9 +371,36 @@ def burg(series: Sequence[Floats], highest: int = _HIGHEST_ORDER) -> tuple[float
     return tuple(found[: best[1]])
 
 
+def noise_of(series: Sequence[Floats], deviation: float = 1.0, highest: int = _HIGHEST_ORDER) -> Noise:
+    """Return the noise of several series in units of its ``deviation`` [SI], as AIC wants it.
+
+    It is an autoregression, or white noise beside a random walk: a slow drift, for which an autoregression needs many
+    coefficients. Columns add up, as for ``burg``.
+    """
+    reflection = burg(series, highest)
+    count, power = sum(len(one) for one in series), math.prod(1.0 - one * one for one in reflection)
+    best = count * math.log(max(power, 1.0e-300)) + 2.0 * len(reflection)
+    found = Noise(deviation, reflection, 0.0, math.sqrt(power))
+    size = sum(float(np.square(one).sum()) for one in series)
+    if highest and count >= SAMPLES_PER_COEFFICIENT and size > 0.0:
+        for gain in _GAINS:
+            power = sum(float(np.square(_without_level(one, gain)).sum()) for one in series) / size
+            if count * math.log(max(power, 1.0e-300)) + 2.0 < best:
+                best = count * math.log(max(power, 1.0e-300)) + 2.0
+                found = Noise(deviation, (), gain, math.sqrt(power))
+    return found
+
+
+def _without_level(values: Floats, gain: float) -> Floats:
+    """Return the innovations of white noise beside a random walk: the Kalman filter of a local level, settled."""
+    return np.asarray(lfilter([1.0, -1.0], [1.0, gain - 1.0], values, axis=0))
+
+
 def whiten(values: Floats, noise: Noise) -> Floats:
     """Return columns (samples, columns) [SI] of one recording as innovations [-] of the noise of their channel."""
     forward = values / noise.deviation
+    if noise.gain > 0.0:
+        return _without_level(forward, noise.gain) / noise.innovation
     backward, power = forward.copy(), 1.0
     done = forward.copy()
     for order, one in enumerate(noise.reflection, start=1):
@@ -345,9 +411,13 @@ def whiten(values: Floats, noise: Noise) -> Floats:
 
 
 class _Linear(NamedTuple):
-    """Residuals and Jacobian whitened [-] side by side, root and covariance of scaled numbers, noise by channel."""
+    """Residuals and Jacobian whitened [-] side by side, root of the covariance of scaled numbers, noise by channel.
+
+    ``without`` are orthonormal columns [-] of the samples that are left out.
+    """
 
     rows: Floats
+    without: Floats
     root: Floats
     noise: Floats
     sensors: dict[str, Noise]
@@ -361,16 +431,24 @@ def _linear(work: _Work, point: Floats, left: Floats, slopes: Floats) -> tuple[_
     """
     step, hidden = np.zeros(len(point)), np.zeros((len(left), 0))
     limits = work.low - point - 1.0e-300, work.high - point + 1.0e-300
+    # A sample with a number of its own says nothing: so it is left out of any noise.
+    own_numbers = np.zeros((len(left), len(work.left_out)))
+    own_numbers[work.left_out, np.arange(len(work.left_out))] = 1.0
     for _ in range(_ROUNDS):
         series = np.column_stack([left + slopes @ step, hidden])
+        series[work.left_out] = 0.0
         noise = work.deviations(series)
-        known, rows = {}, np.column_stack([left, slopes]) / noise[:, None]
+        known, rows = {}, np.column_stack([left, slopes, own_numbers * noise[:, None]]) / noise[:, None]
         for channel in work.channels:
             own = work.rows_of(channel)
-            reflection = burg([series[one] / noise[one, None] for one in own], work.memory)
-            known[channel] = Noise(float(noise[own[0]][0]), reflection)
+            known[channel] = noise_of(
+                [series[one] / noise[one, None] for one in own], float(noise[own[0]][0]), work.memory
+            )
             for one in own:
-                rows[one] = whiten(rows[one], Noise(1.0, reflection))
+                rows[one] = whiten(rows[one], replace(known[channel], deviation=1.0))
+        without = np.linalg.qr(rows[:, 1 + len(point) :])[0]
+        rows = rows[:, : 1 + len(point)]
+        rows = rows - without @ (without.T @ rows)
         root, _ = _root_of_inverse(rows[:, 1:].T @ rows[:, 1:] + np.diag(np.square(work.prior)))
         hidden = slopes @ root
         before = step
@@ -383,7 +461,7 @@ def _linear(work: _Work, point: Floats, left: Floats, slopes: Floats) -> tuple[_
         step = np.asarray(solved.x)
         if np.abs((step - before) @ np.linalg.pinv(root)).max() < 0.01 and series.shape[1] > 1:
             break
-    return _Linear(rows=rows, root=root, noise=noise, sensors=known), step
+    return _Linear(rows=rows, without=without, root=root, noise=noise, sensors=known), step
 
 
 def _root_of_inverse(curvature: Floats) -> tuple[Floats, Mask]:
@@ -400,15 +478,25 @@ def _root_of_inverse(curvature: Floats) -> tuple[Floats, Mask]:
 def _whitened(work: _Work, point: Floats, settled: bool, confidence: float) -> Fit:
     """Return the fit after whitening and one more Gauss-Newton step from the least squares."""
     left = work.one(point)
-    slopes = work.jacobian(point, 1.0 / work.deviations(left[:, None]))
-    linear, step = _linear(work, point, left, slopes)
-    reached = np.clip(point + step, work.low, work.high)
-    # A Gauss-Newton step may leave where runs succeed, or overshoot: it is taken only where it lowers the squares.
-    after = work.one(reached)
-    if np.isfinite(after).all() and _cost(work, after, reached, linear) <= _cost(work, left, point, linear):
+    noise, is_checked = work.deviations(left[:, None]), False
+    work.left_out = work.left_out[:0]
+    for _ in range(_LAST_STEPS):
+        linear, step = _linear(work, point, left, work.jacobian(point, 1.0 / noise))
+        noise, cost = linear.noise, _cost(work, left, point, linear)
+        # A step may leave where runs succeed, or overshoot: a shorter one is taken then, one that gains or none.
+        for share in _SHARES:
+            reached = np.clip(point + share * step, work.low, work.high)
+            after = work.one(reached)
+            gain = cost - _cost(work, after, reached, linear) if np.isfinite(after).all() else -math.inf
+            if gain > 0.0:
+                break
+        settled = gain < _GAIN
+        if settled and is_checked:
+            break
+        if settled:
+            is_checked = True
+            work.leave_out(point, linear.root, noise)
         point, left = reached, after
-        slopes = work.jacobian(point, 1.0 / linear.noise)
-        linear, _ = _linear(work, point, left, slopes)
     known, rows = linear.sensors, linear.rows
     whitened, errors = rows[:, 1:], rows[:, 0]
     covariance = linear.root @ linear.root.T
@@ -428,9 +516,9 @@ def _whitened(work: _Work, point: Floats, settled: bool, confidence: float) -> F
         low=np.maximum(point - wide, work.low) * work.scale,
         high=np.minimum(point + wide, work.high) * work.scale,
         noise={channel: one.deviation for channel, one in known.items()},
-        correlation={channel: len(one.reflection) for channel, one in known.items()},
+        correlation={channel: len(one.reflection) + (one.gain > 0.0) for channel, one in known.items()},
         residuals=left,
-        conflict=_conflict(work, rows, point, ~touching, freedom),
+        conflict=_too_smooth(known) or _conflict(work, rows, point, ~touching, freedom),
         unidentified=tuple(_unidentified(covariance, names)),
         shares={
             names[place]: tuple(
@@ -451,8 +539,11 @@ def _whitened(work: _Work, point: Floats, settled: bool, confidence: float) -> F
 def _cost(work: _Work, left: Floats, point: Floats, linear: _Linear) -> float:
     """Return the sum of squares [-] of whitened residuals and priors."""
     scaled = (left / linear.noise)[:, None]
-    parts = [whiten(scaled[one.rows], Noise(1.0, linear.sensors[one.channel].reflection)) for one in work.blocks]
-    return sum(float(np.square(one).sum()) for one in parts) + float(np.square((point - work.mean) * work.prior).sum())
+    errors = np.concatenate(
+        [whiten(scaled[one.rows], replace(linear.sensors[one.channel], deviation=1.0)) for one in work.blocks]
+    )
+    errors = errors - linear.without @ (linear.without.T @ errors)
+    return float(np.square(errors).sum()) + float(np.square((point - work.mean) * work.prior).sum())
 
 
 def _groups(work: _Work) -> Iterator[tuple[str, list[slice]]]:
@@ -466,6 +557,12 @@ def _groups(work: _Work) -> Iterator[tuple[str, list[slice]]]:
             if key not in seen:
                 seen.add(key)
                 yield name, rows
+
+
+def _too_smooth(sensors: Mapping[str, Noise]) -> Conflict | None:
+    """Return the channel whose residuals are least like noise, None where all are like noise."""
+    channel, noise = min(sensors.items(), key=lambda item: item[1].innovation)
+    return Conflict(channel, SMOOTH, 1.0 / noise.innovation, 0.0) if noise.innovation < _SMOOTHEST else None
 
 
 def _conflict(work: _Work, rows: Floats, point: Floats, free: Mask, freedom: float) -> Conflict | None:
@@ -526,7 +623,7 @@ def _likelihood(work: _Work, found: Fit) -> float:
     size = 0.0
     for one in work.blocks:
         noise, count = found.sensors[one.channel], one.rows.stop - one.rows.start
-        size += count * (math.log(noise.deviation) + 0.5 * sum(math.log(1.0 - k * k) for k in noise.reflection))
+        size += count * (math.log(noise.deviation) + math.log(noise.innovation))
     return -size - 0.5 * float(np.square((found.values / work.scale - work.mean) * work.prior).sum())
 
 
