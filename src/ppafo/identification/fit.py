@@ -158,7 +158,7 @@ _SETTLED = 0.03
 _EVALUATIONS = 40
 _LAST_STEPS = 12
 _SHARES = (1.0, 0.3, 0.1)
-_GAIN = 0.02
+_GAIN = 0.05
 """Steps after whitening, the fractions of one that are tried, and the sum of squares [-] below which one is no gain."""
 _SIGNIFICANCE = 0.01
 _PARTING = 0.05
@@ -371,23 +371,23 @@ def burg(series: Sequence[Floats], highest: int = _HIGHEST_ORDER) -> tuple[float
     return tuple(found[: best[1]])
 
 
-def noise_of(series: Sequence[Floats], deviation: float = 1.0, highest: int = _HIGHEST_ORDER) -> Noise:
-    """Return the noise of several series in units of its ``deviation`` [SI], as AIC wants it.
+def noise_of(series: Sequence[Floats], highest: int = _HIGHEST_ORDER) -> Noise:
+    """Return the noise of several series [-] as AIC wants it: an autoregression, or a random walk beside white noise.
 
-    It is an autoregression, or white noise beside a random walk: a slow drift, for which an autoregression needs many
-    coefficients. Columns add up, as for ``burg``.
+    That is a slow drift, for which an autoregression needs many coefficients. Columns add up, as for ``burg``.
     """
+    count, size = sum(len(one) for one in series), sum(float(np.square(one).sum()) for one in series)
+    # What is less than the floor is the engine's, and no noise.
+    if size < 0.5 * count:
+        return Noise(1.0)
     reflection = burg(series, highest)
-    count, power = sum(len(one) for one in series), math.prod(1.0 - one * one for one in reflection)
-    best = count * math.log(max(power, 1.0e-300)) + 2.0 * len(reflection)
-    found = Noise(deviation, reflection, 0.0, math.sqrt(power))
-    size = sum(float(np.square(one).sum()) for one in series)
-    if highest and count >= SAMPLES_PER_COEFFICIENT and size > 0.0:
-        for gain in _GAINS:
-            power = sum(float(np.square(_without_level(one, gain)).sum()) for one in series) / size
-            if count * math.log(max(power, 1.0e-300)) + 2.0 < best:
-                best = count * math.log(max(power, 1.0e-300)) + 2.0
-                found = Noise(deviation, (), gain, math.sqrt(power))
+    found = Noise(1.0, reflection, 0.0, math.sqrt(math.prod(1.0 - one * one for one in reflection)))
+    best = 2.0 * count * math.log(found.innovation) + 2.0 * len(reflection)
+    for gain in _GAINS if highest and count >= SAMPLES_PER_COEFFICIENT else ():
+        innovation = math.sqrt(sum(float(np.square(_without_level(one, gain)).sum()) for one in series) / size)
+        criterion = 2.0 * count * math.log(innovation) + 2.0
+        if criterion < best:
+            best, found = criterion, Noise(1.0, (), gain, innovation)
     return found
 
 
@@ -441,11 +441,9 @@ def _linear(work: _Work, point: Floats, left: Floats, slopes: Floats) -> tuple[_
         known, rows = {}, np.column_stack([left, slopes, own_numbers * noise[:, None]]) / noise[:, None]
         for channel in work.channels:
             own = work.rows_of(channel)
-            known[channel] = noise_of(
-                [series[one] / noise[one, None] for one in own], float(noise[own[0]][0]), work.memory
-            )
+            known[channel] = noise_of([series[one] / noise[one, None] for one in own], work.memory)
             for one in own:
-                rows[one] = whiten(rows[one], replace(known[channel], deviation=1.0))
+                rows[one] = whiten(rows[one], known[channel])
         without = np.linalg.qr(rows[:, 1 + len(point) :])[0]
         rows = rows[:, : 1 + len(point)]
         rows = rows - without @ (without.T @ rows)
@@ -476,11 +474,11 @@ def _root_of_inverse(curvature: Floats) -> tuple[Floats, Mask]:
 
 
 def _whitened(work: _Work, point: Floats, settled: bool, confidence: float) -> Fit:
-    """Return the fit after whitening and one more Gauss-Newton step from the least squares."""
+    """Return the fit after whitening and Gauss-Newton steps from the least squares."""
     left = work.one(point)
     noise, is_checked = work.deviations(left[:, None]), False
     work.left_out = work.left_out[:0]
-    for _ in range(_LAST_STEPS):
+    for number in range(_LAST_STEPS):
         linear, step = _linear(work, point, left, work.jacobian(point, 1.0 / noise))
         noise, cost = linear.noise, _cost(work, left, point, linear)
         # A step may leave where runs succeed, or overshoot: a shorter one is taken then, one that gains or none.
@@ -491,13 +489,15 @@ def _whitened(work: _Work, point: Floats, settled: bool, confidence: float) -> F
             if gain > 0.0:
                 break
         settled = gain < _GAIN
-        if settled and is_checked:
+        if (settled and is_checked) or number == _LAST_STEPS - 1:
             break
         if settled:
             is_checked = True
             work.leave_out(point, linear.root, noise)
         point, left = reached, after
-    known, rows = linear.sensors, linear.rows
+    rows = linear.rows
+    sizes = {one.channel: float(noise[one.rows][0]) for one in reversed(work.blocks)}
+    known = {channel: replace(one, deviation=sizes[channel]) for channel, one in linear.sensors.items()}
     whitened, errors = rows[:, 1:], rows[:, 0]
     covariance = linear.root @ linear.root.T
     # Samples less what the numbers took: a tolerance that the readings do not move takes none.
@@ -539,9 +539,7 @@ def _whitened(work: _Work, point: Floats, settled: bool, confidence: float) -> F
 def _cost(work: _Work, left: Floats, point: Floats, linear: _Linear) -> float:
     """Return the sum of squares [-] of whitened residuals and priors."""
     scaled = (left / linear.noise)[:, None]
-    errors = np.concatenate(
-        [whiten(scaled[one.rows], replace(linear.sensors[one.channel], deviation=1.0)) for one in work.blocks]
-    )
+    errors = np.concatenate([whiten(scaled[one.rows], linear.sensors[one.channel]) for one in work.blocks])
     errors = errors - linear.without @ (linear.without.T @ errors)
     return float(np.square(errors).sum()) + float(np.square((point - work.mean) * work.prior).sum())
 
