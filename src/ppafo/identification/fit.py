@@ -149,8 +149,9 @@ _SMOOTHEST = 0.2
 _LEFT_OUT = 0.01
 """Largest fraction of the samples that are left out because an event, such as an impact, passes them."""
 
-_BENT = 0.3
-"""Bend in units of noise, over a standard error to both sides, from which an event passes a sample."""
+_LEVERAGE = 0.1
+"""Share of a combination of numbers that one sample decides alone from which it is left out."""
+
 
 _PASSES = 6
 _ROUNDS = 20
@@ -278,17 +279,6 @@ class _Work:
         sizes = np.linalg.norm(slopes * weight[:, None], axis=0)
         self.step = np.clip(_UNITS_OF_NOISE / np.maximum(sizes, 1.0e-300), *_STEPS)
         return slopes
-
-    def leave_out(self, point: Floats, root: Floats, noise: Floats) -> None:
-        """Leave out the samples that an event, such as an impact, passes within a standard error of the numbers.
-
-        What such a sample seems to say is narrow and false, for its slope holds on one side of the event only.
-        """
-        ends = np.clip(point[:, None] + np.concatenate([root, -root], axis=1), self.low[:, None], self.high[:, None])
-        above, below = np.split(self.at(ends) - self.one(point)[:, None], 2, axis=1)
-        bends = np.nan_to_num(np.abs(above + below)).max(axis=1) / noise
-        self.left_out = np.argsort(-bends)[: int(_LEFT_OUT * len(bends))]
-        self.left_out = self.left_out[bends[self.left_out] > _BENT]
 
     def rows_of(self, channel: str) -> list[slice]:
         """Return the rows of a channel in each recording."""
@@ -463,14 +453,15 @@ def _linear(work: _Work, point: Floats, left: Floats, slopes: Floats) -> tuple[_
 
 
 def _root_of_inverse(curvature: Floats) -> tuple[Floats, Mask]:
-    """Return a matrix whose product with its transpose is the inverse, and which of its columns are seen at all.
+    """Return a matrix whose product with its transpose is the inverse, and which of its columns are fixed at all.
 
-    The others are large, of numbers or combinations that nothing fixes.
+    The others are large, of numbers or combinations that are not identifiable.
     """
     sizes = np.sqrt(np.maximum(np.diag(curvature), 0.0))
     size = np.where(sizes > 1.0e-9 * sizes.max(initial=0.0), sizes, sizes.max(initial=1.0e-9) or 1.0)
     values, vectors = np.linalg.eigh(curvature / size / size[:, None])
-    return np.asarray(vectors / np.sqrt(np.maximum(values, _RANK)) / size[:, None]), np.asarray(values > _RANK)
+    root = np.asarray(vectors / np.sqrt(np.maximum(values, _RANK)) / size[:, None])
+    return root, np.asarray((values > _RANK) & (np.abs(root).max(axis=0) < _UNKNOWN))
 
 
 def _whitened(work: _Work, point: Floats, settled: bool, confidence: float) -> Fit:
@@ -493,7 +484,10 @@ def _whitened(work: _Work, point: Floats, settled: bool, confidence: float) -> F
             break
         if settled:
             is_checked = True
-            work.leave_out(point, linear.root, noise)
+            # What a sample near an impact seems to say alone is narrow and false: its slope holds on one side only.
+            leverage = np.square(linear.rows[:, 1:] @ linear.root).sum(axis=1)
+            highest = np.argsort(-leverage)[: int(_LEFT_OUT * len(leverage))]
+            work.left_out = highest[leverage[highest] > _LEVERAGE]
         point, left = reached, after
     rows = linear.rows
     sizes = {one.channel: float(noise[one.rows][0]) for one in reversed(work.blocks)}
@@ -518,7 +512,7 @@ def _whitened(work: _Work, point: Floats, settled: bool, confidence: float) -> F
         noise={channel: one.deviation for channel, one in known.items()},
         correlation={channel: len(one.reflection) + (one.gain > 0.0) for channel, one in known.items()},
         residuals=left,
-        conflict=_too_smooth(known) or _conflict(work, rows, point, ~touching, freedom),
+        conflict=_conflict(work, rows, point, ~touching, freedom) or _too_smooth(known),
         unidentified=tuple(_unidentified(covariance, names)),
         shares={
             names[place]: tuple(
@@ -571,8 +565,8 @@ def _conflict(work: _Work, rows: Floats, point: Floats, free: Mask, freedom: flo
     """
     errors, slopes = rows[:, 0], rows[:, 1:][:, free]
     prior, shift = np.square(work.prior[free]), (point - work.mean)[free]
-    root, seen = _root_of_inverse(slopes.T @ slopes + np.diag(prior))
-    root = root[:, seen]
+    root, fixed = _root_of_inverse(slopes.T @ slopes + np.diag(prior))
+    root = root[:, fixed]
     groups, found = list(_groups(work)), None
     names = np.array([one.name for one in work.numbers])[free]
     count_of_tests = len(groups) + int((prior > 0.0).sum())
