@@ -488,7 +488,8 @@ def _whitened(work: _Work, point: Floats, settled: bool, confidence: float) -> F
             leverage = np.square(linear.rows[:, 1:] @ linear.root).sum(axis=1)
             highest = np.argsort(-leverage)[: int(_LEFT_OUT * len(leverage))]
             work.left_out = highest[leverage[highest] > _LEVERAGE]
-        point, left = reached, after
+        if gain > 0.0:
+            point, left = reached, after
     rows = linear.rows
     sizes = {one.channel: float(noise[one.rows][0]) for one in reversed(work.blocks)}
     known = {channel: replace(one, deviation=sizes[channel]) for channel, one in linear.sensors.items()}
