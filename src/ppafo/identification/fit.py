@@ -123,7 +123,7 @@ class Fit:
 
 
 SMOOTH = "noise"
-"""Number of a conflict whose channel leaves more than noise: nearly all of it is foretold by the samples before."""
+"""Number of a conflict whose channel leaves what is too smooth for noise: ``standard_errors`` times its innovation."""
 
 STATED = "stated limit"
 """Group of a conflict that is not among recordings: they want a tolerance beyond its limit."""

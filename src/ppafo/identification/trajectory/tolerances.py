@@ -28,8 +28,12 @@ _WIDEST = 12.0
 _EXACT = ("area", "angle_min", "angle_max", "linear_ratio", "critical_ratio", "atmospheric_pressure")
 """Names of numbers that only go with another one, or that the zero of a sensor moves as well."""
 
-_STRIBECK, _FACTOR, _ONE_SIDED = "effects.stribeck.velocity", 1.5, 1.645
-"""Path of a velocity that may be near 0, the standard deviation of its logarithm, and how many its limit is above."""
+_STRIBECK = "effects.stribeck.velocity"
+_FACTOR, _ONE_SIDED, _LEAST = 1.5, 1.645, 0.01
+"""Standard deviation of the logarithm of that velocity, how many of them its limit is above, and its least over that.
+
+The fall is as good as abrupt below; the effect would be off at 0.
+"""
 
 _START_OF_ANGLE = math.radians(0.05)
 """Standard deviation of an angle that is read at the start [rad]."""
@@ -91,16 +95,12 @@ def _stribeck(tolerances: Tolerances, experiments: Sequence[Experiment], given: 
     With an abrupt fall static friction is traded for damping. What a step response says of static friction goes with
     the logarithm of this velocity, so that is moved.
     """
-    limit, moves = (
-        tolerances.stribeck_velocity,
-        any(isinstance(scenario_of(one).motion, FreeMotion) for one in experiments),
-    )
-    friction = experiments[0].scenario.device.friction
-    if not limit > 0.0 or not moves or _STRIBECK in given or number_at(experiments[0].scenario, _STRIBECK) > 0.0:
-        return
-    if friction.static_torque > friction.dynamic_torque:
+    limit, scenario = tolerances.stribeck_velocity, experiments[0].scenario
+    moves = any(isinstance(one.scenario.motion, FreeMotion) and ANGLE not in one.inputs for one in experiments)
+    friction, has_own = scenario.device.friction, _STRIBECK in given or number_at(scenario, _STRIBECK) > 0.0
+    if limit > 0.0 and moves and not has_own and friction.static_torque > friction.dynamic_torque:
         yield FreeParameter(
-            _STRIBECK, limit * math.exp(-_ONE_SIDED * _FACTOR), 0.02 * limit, 4.0 * limit, _FACTOR,
+            _STRIBECK, limit * math.exp(-_ONE_SIDED * _FACTOR), _LEAST * limit, 4.0 * limit, _FACTOR,
             is_tolerance=True, is_logarithm=True,
         )  # fmt: skip
 
