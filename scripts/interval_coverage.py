@@ -86,7 +86,8 @@ def walk(random: np.random.Generator, count: int) -> Floats:
 
 def drift(random: np.random.Generator, count: int) -> Floats:
     """White noise and a straight drift that ends three sizes away."""
-    return random.standard_normal(count) + random.choice([-3.0, 3.0]) * np.linspace(0.0, 1.0, count)
+    end = float(random.choice([-3.0, 3.0]))
+    return random.standard_normal(count) + end * np.linspace(0.0, 1.0, count)
 
 
 def heavy(random: np.random.Generator, count: int) -> Floats:

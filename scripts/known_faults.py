@@ -193,7 +193,7 @@ def main() -> None:
     words = parser.parse_args()
     first, random = words.seeds[0], np.random.default_rng(words.seeds[0])
     drawn = [tuple(random.choice(len(FAULTS), 2, replace=False).tolist()) for _ in range(words.pairs)]
-    work = [((place,), seed) for place in range(len(FAULTS)) for seed in words.seeds]
+    work: list[tuple[tuple[int, ...], int]] = [((place,), seed) for place in range(len(FAULTS)) for seed in words.seeds]
     work += [(pair, first + number) for number, pair in enumerate(drawn)]
     work += [((), first + number) for number in range(words.right)]
     results = results_of(verdict_of, work, words.processes)
