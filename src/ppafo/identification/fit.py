@@ -182,14 +182,17 @@ def fit(
     confidence: float = 0.95,
     report: Report = report_nothing,
     memory: int = _HIGHEST_ORDER,
+    is_motion: bool = False,
 ) -> Fit:
     """Return the numbers that explain recordings best, their covariance and whether the recordings agree on them.
 
     Squares are minimised within bounds, at first with a loss that is robust (soft L1); weights follow from what is left
     in each channel. Then residuals are whitened by the noise of each channel and the numbers step on until none gains.
     Other starts are tried only where the recordings disagree. ``memory`` is the highest order of the autoregression, 0
-    for readings that were taken one by one. IdentificationError where no run succeeds, and where samples are no more
-    than the numbers that are sought, and for bounds that leave a number no room about its start.
+    for readings that were taken one by one. In recordings of motion (``is_motion``) sensors may drift, and samples
+    that an impact passes are left out; what a bench reads moves as slowly as its sensors drift. IdentificationError
+    where no run succeeds, and where samples are no more than the numbers that are sought, and for bounds that leave a
+    number no room about its start.
     """
     if not numbers or not blocks:
         raise IdentificationError(f"a fit of {len(numbers)} numbers to {len(blocks)} blocks: each needs at least one")
@@ -199,7 +202,7 @@ def fit(
                 f"{one.name}: bounds {one.low:g} to {one.high:g} with the start {one.start:g}: the lower must be below "
                 "the upper and the start between them"
             )
-    work = _Work(residuals, tuple(numbers), tuple(blocks), report, memory)
+    work = _Work(residuals, tuple(numbers), tuple(blocks), report, memory, is_motion)
     samples, sought = (
         sum(one.rows.stop - one.rows.start for one in blocks),
         sum(math.isinf(one.deviation) for one in numbers),
@@ -223,10 +226,16 @@ class _Work:
     """Runs of a fit in scaled numbers, with the last one kept."""
 
     def __init__(
-        self, residuals: Residuals, numbers: tuple[Free, ...], blocks: tuple[Block, ...], report: Report, memory: int
+        self,
+        residuals: Residuals,
+        numbers: tuple[Free, ...],
+        blocks: tuple[Block, ...],
+        report: Report,
+        memory: int,
+        is_motion: bool,
     ) -> None:
         self.residuals, self.numbers, self.blocks, self.report = residuals, numbers, blocks, report
-        self.memory = memory
+        self.memory, self.is_motion = memory, is_motion
         self.scale = np.array([one.scale for one in numbers])
         self.start, self.low, self.high, deviation = (
             np.array([getattr(one, name) for one in numbers]) / self.scale
@@ -361,10 +370,11 @@ def burg(series: Sequence[Floats], highest: int = _HIGHEST_ORDER) -> tuple[float
     return tuple(found[: best[1]])
 
 
-def noise_of(series: Sequence[Floats], highest: int = _HIGHEST_ORDER) -> Noise:
+def noise_of(series: Sequence[Floats], highest: int = _HIGHEST_ORDER, may_drift: bool = True) -> Noise:
     """Return the noise of several series [-] as AIC wants it: an autoregression, or a random walk beside white noise.
 
-    That is a slow drift, for which an autoregression needs many coefficients. Columns add up, as for ``burg``.
+    That is a slow drift, where it ``may_drift``, for which an autoregression needs many coefficients. Columns add up,
+    as for ``burg``.
     """
     count, size = sum(len(one) for one in series), sum(float(np.square(one).sum()) for one in series)
     # What is less than the floor is the engine's, and no noise.
@@ -373,7 +383,7 @@ def noise_of(series: Sequence[Floats], highest: int = _HIGHEST_ORDER) -> Noise:
     reflection = burg(series, highest)
     found = Noise(1.0, reflection, 0.0, math.sqrt(math.prod(1.0 - one * one for one in reflection)))
     best = 2.0 * count * math.log(found.innovation) + 2.0 * len(reflection)
-    for gain in _GAINS if highest and count >= SAMPLES_PER_COEFFICIENT else ():
+    for gain in _GAINS if may_drift and count >= SAMPLES_PER_COEFFICIENT else ():
         innovation = math.sqrt(sum(float(np.square(_without_level(one, gain)).sum()) for one in series) / size)
         criterion = 2.0 * count * math.log(innovation) + 2.0
         if criterion < best:
@@ -431,7 +441,7 @@ def _linear(work: _Work, point: Floats, left: Floats, slopes: Floats) -> tuple[_
         known, rows = {}, np.column_stack([left, slopes, own_numbers * noise[:, None]]) / noise[:, None]
         for channel in work.channels:
             own = work.rows_of(channel)
-            known[channel] = noise_of([series[one] / noise[one, None] for one in own], work.memory)
+            known[channel] = noise_of([series[one] / noise[one, None] for one in own], work.memory, work.is_motion)
             for one in own:
                 rows[one] = whiten(rows[one], known[channel])
         without = np.linalg.qr(rows[:, 1 + len(point) :])[0]
@@ -453,15 +463,14 @@ def _linear(work: _Work, point: Floats, left: Floats, slopes: Floats) -> tuple[_
 
 
 def _root_of_inverse(curvature: Floats) -> tuple[Floats, Mask]:
-    """Return a matrix whose product with its transpose is the inverse, and which of its columns are fixed at all.
+    """Return a matrix whose product with its transpose is the inverse, and which of its columns are seen at all.
 
-    The others are large, of numbers or combinations that are not identifiable.
+    The others are large, of numbers or combinations that nothing fixes.
     """
     sizes = np.sqrt(np.maximum(np.diag(curvature), 0.0))
     size = np.where(sizes > 1.0e-9 * sizes.max(initial=0.0), sizes, sizes.max(initial=1.0e-9) or 1.0)
     values, vectors = np.linalg.eigh(curvature / size / size[:, None])
-    root = np.asarray(vectors / np.sqrt(np.maximum(values, _RANK)) / size[:, None])
-    return root, np.asarray((values > _RANK) & (np.abs(root).max(axis=0) < _UNKNOWN))
+    return np.asarray(vectors / np.sqrt(np.maximum(values, _RANK)) / size[:, None]), np.asarray(values > _RANK)
 
 
 def _whitened(work: _Work, point: Floats, settled: bool, confidence: float) -> Fit:
@@ -480,7 +489,7 @@ def _whitened(work: _Work, point: Floats, settled: bool, confidence: float) -> F
             if gain > 0.0:
                 break
         settled = gain < _GAIN
-        if (settled and is_checked) or number == _LAST_STEPS - 1:
+        if (settled and (is_checked or not work.is_motion)) or number == _LAST_STEPS - 1:
             break
         if settled:
             is_checked = True
@@ -566,8 +575,8 @@ def _conflict(work: _Work, rows: Floats, point: Floats, free: Mask, freedom: flo
     """
     errors, slopes = rows[:, 0], rows[:, 1:][:, free]
     prior, shift = np.square(work.prior[free]), (point - work.mean)[free]
-    root, fixed = _root_of_inverse(slopes.T @ slopes + np.diag(prior))
-    root = root[:, fixed]
+    root, seen = _root_of_inverse(slopes.T @ slopes + np.diag(prior))
+    root = root[:, seen]
     groups, found = list(_groups(work)), None
     names = np.array([one.name for one in work.numbers])[free]
     count_of_tests = len(groups) + int((prior > 0.0).sum())

@@ -61,7 +61,7 @@ def _fit(kind: str, generator: np.random.Generator, size: float = 0.02, slower: 
             truth[one.name] = one.start + one.deviation * generator.normal()
     clean = _law(*(np.array([one]) for one in truth.values()), slower=slower)[:, 0]
     measured = clean + size * np.concatenate([_noise(kind, generator) for _ in _BLOCKS])
-    return fit(lambda points: measured[:, None] - _law(*points), _NUMBERS, _BLOCKS)
+    return fit(lambda points: measured[:, None] - _law(*points), _NUMBERS, _BLOCKS, is_motion=True)
 
 
 def _coverage(kind: str, fits: int, seed: int) -> tuple[float, int]:
@@ -163,6 +163,7 @@ def test_a_sample_that_alone_decides_a_number_is_left_out() -> None:
         (Free("value", 1.0, -10.0, 10.0, 1.0),),
         [Block("only", "first", slice(0, _COUNT))],
         memory=0,
+        is_motion=True,
     )
 
     assert found.low[0] <= 2.0 <= found.high[0]

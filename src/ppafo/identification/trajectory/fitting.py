@@ -139,6 +139,7 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
         blocks_of(prepared, numbers, start),
         problem.confidence,
         report,
+        is_motion=True,
     )
     conflict = conflict_in_words(found, "the model lacks something")
     sought = [place for place, item in enumerate(numbers) if not item.is_tolerance]
