@@ -1,6 +1,6 @@
 """Counts how often the intervals of the bench procedures hold the truth, on recordings of the simulated test bench.
 
-    python scripts/bench_coverage.py --first 5101 --count 40 --preset paper-bench
+    python scripts/bench_coverage.py --first 5101 --count 40 --preset paper-bench --processes 4
 
 Each seed is one recording for each procedure, with sensors of its own; all are synthetic. The problem is that of the
 how-to page: no tolerance is stated, so the defaults count. For each number: how many intervals hold the truth of
@@ -9,17 +9,24 @@ rig.json, how many of the others are flagged ("holds for this model only"), and 
 
 import argparse
 import statistics
+import sys
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
+if not __package__:
+    # The first place is this folder, in which this file would pass for the package of the same name.
+    sys.path[0] = str(Path(__file__).parents[1])
+
 from ppafo.errors import PpafoError
-from ppafo.identification.bench import BenchResult
+from ppafo.identification.estimate import Estimate
 from ppafo.identification.problem import PROCEDURES, Setting, parse_problem, run_procedure
 from ppafo.identification.source import Source
 from ppafo.parameters import load_parameter_set
 from ppafo.rig import record
+from scripts.processes import add_processes, results_of
 
 DEVICE = "ppafo2011"
 EXPERIMENTS = {**{kind: kind for kind in PROCEDURES}, "vane-leak-steady": "vane-leak"}
@@ -57,14 +64,29 @@ class Count:
     widths: list[float] = field(default_factory=list)
 
 
-def identified(experiment: str, preset: str, seed: int) -> tuple[BenchResult, dict[str, float]]:
+@dataclass
+class Identified:
+    """What a procedure makes of a recording: its estimates, the truth, CPU seconds, and why it was refused."""
+
+    estimates: tuple[Estimate, ...]
+    truth: dict[str, float]
+    seconds: float
+    refused: str = ""
+
+
+def identified(experiment: str, preset: str, seed: int) -> Identified:
     """Return what the procedure makes of a recording, and the truth."""
+    begun = time.process_time()
     kind = EXPERIMENTS[experiment]
     made = record(experiment, preset, seed, DEVICE)
     text = f'{HEAD}[[procedure]]\nkind = "{kind}"\nrecordings = ["made.csv"]\n{EXTRA.get(experiment, "")}'
     problem = parse_problem(text.encode(), "bench").procedure[0]
     setting = Setting(load_parameter_set(DEVICE), "proportional", experiment)
-    return run_procedure((Source(made.recording),), problem, setting), truths(made.truth)
+    try:
+        found, refused = run_procedure((Source(made.recording),), problem, setting).estimates, ""
+    except PpafoError as error:
+        found, refused = (), str(error)
+    return Identified(found, truths(made.truth), time.process_time() - begun, refused)
 
 
 def main() -> None:
@@ -74,26 +96,28 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=40, help="seeds in a row")
     parser.add_argument("--preset", default="paper-bench")
     parser.add_argument("--only", choices=tuple(EXPERIMENTS), nargs="*", default=tuple(EXPERIMENTS))
+    add_processes(parser)
     words = parser.parse_args()
+    seeds = range(words.first, words.first + words.count)
     print(f"{words.preset}, seeds {words.first} to {words.first + words.count - 1}, synthetic\n")
     print("| experiment | number | hold | miss, flagged | miss, not flagged | flagged | half width | CPU ms a fit |")
     print("|---|---|---|---|---|---|---|---|")
+    results = results_of(
+        identified, [(one, words.preset, seed) for one in words.only for seed in seeds], words.processes
+    )
     for experiment in words.only:
         counts: dict[str, Count] = {}
         refused, spent = 0, 0.0
-        for seed in range(words.first, words.first + words.count):
-            begun = time.process_time()
-            try:
-                result, true = identified(experiment, words.preset, seed)
-            except PpafoError as error:
+        for _ in seeds:
+            found = next(results)
+            spent += found.seconds
+            if found.refused:
                 refused += 1
-                print(f"refused: {error}")
-                continue
-            spent += time.process_time() - begun
-            for estimate in result.estimates:
-                if estimate.path not in true:
+                print(f"refused: {found.refused}")
+            for estimate in found.estimates:
+                if estimate.path not in found.truth:
                     continue
-                count, value = counts.setdefault(estimate.path, Count()), true[estimate.path]
+                count, value = counts.setdefault(estimate.path, Count()), found.truth[estimate.path]
                 holds, is_flagged = estimate.low <= value <= estimate.high, estimate.verdict != "identified"
                 count.total += 1
                 count.held += holds

@@ -1,6 +1,6 @@
 """Counts how often intervals of the trajectory fit hold, on recordings that are synthetic and whose truth is known.
 
-    python scripts/interval_coverage.py --seed 5 --fits 40 --cell ideal --cell white
+    python scripts/interval_coverage.py --seed 5 --fits 40 --cell ideal --cell white --processes 4
 
 Two step responses of 501 samples, there and back; four numbers of the device are sought beside all tolerances.
 ``ideal`` and ``default`` are recorded by the simulated bench (ideal-laboratory and paper-bench), which has a solver
@@ -13,7 +13,7 @@ import json
 import math
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -41,6 +41,7 @@ from ppafo.running import simulate
 from ppafo.signals.recording import Channel, Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
+from scripts.processes import add_processes, results_of
 
 COMMON = ("motion.kind=free", "run.duration=0.5 s")
 BACK = (
@@ -83,6 +84,12 @@ def walk(random: np.random.Generator, count: int) -> Floats:
     return random.standard_normal(count) + np.cumsum(random.standard_normal(count)) / math.sqrt(count)
 
 
+def drift(random: np.random.Generator, count: int) -> Floats:
+    """White noise and a straight drift that ends three sizes away."""
+    end = float(random.choice([-3.0, 3.0]))
+    return random.standard_normal(count) + end * np.linspace(0.0, 1.0, count)
+
+
 def heavy(random: np.random.Generator, count: int) -> Floats:
     """Student t of 3 degrees of freedom."""
     return np.asarray(random.standard_t(3.0, count) / math.sqrt(3.0))
@@ -95,7 +102,7 @@ def hum(random: np.random.Generator, count: int) -> Floats:
 
 
 KINDS: dict[str, Callable[[np.random.Generator, int], Floats]] = {
-    "white": white, "AR(1)": autoregression, "random walk": walk, "Student t": heavy, "hum": hum,
+    "white": white, "AR(1)": autoregression, "random walk": walk, "Student t": heavy, "hum": hum, "drift": drift,
 }  # fmt: skip
 CELLS = (*PRESETS, *KINDS, *DEPARTURES)
 
@@ -174,6 +181,30 @@ def recordings_of(cell: str, random: np.random.Generator) -> tuple[Recording, ..
     )
 
 
+class One(NamedTuple):
+    """What one fit of a cell comes to: intervals that hold, by number, and their half widths over the truth."""
+
+    holds: list[bool]
+    is_flagged: bool
+    wrong_and_identified: int
+    half_widths: list[float]
+    seconds: float
+
+
+def one_of(cell: str, seed: int, number: int) -> One:
+    """Return what a fit of a cell comes to; its recordings are drawn with the seed and the number."""
+    random = np.random.default_rng([seed, CELLS.index(cell), number])
+    truth = [number_at(scenarios(truth_in_words())[0], path) for path in SOUGHT]
+    recordings = recordings_of(cell, random)
+    begun = time.process_time()
+    found: TrajectoryFit = fit(problem_of(recordings, random, cell not in DEPARTURES))
+    seconds = time.process_time() - begun
+    holds = [one.low <= true <= one.high for one, true in zip(found.estimates, truth, strict=True)]
+    wrong = sum(not hold and one.is_identified for hold, one in zip(holds, found.estimates, strict=True))
+    half = [one.half_width / true for one, true in zip(found.estimates, truth, strict=True)]
+    return One(holds, bool(found.conflict), wrong, half, seconds)
+
+
 class Row(NamedTuple):
     """A line of the table: intervals that hold, by number, fits that are flagged, and what a fit costs."""
 
@@ -192,23 +223,18 @@ class Row(NamedTuple):
         return f"| {self.cell} | {self.fits} | {counts} | {others} |"
 
 
-def row_of(cell: str, fits: int, seed: int) -> Row:
-    """Return what some fits of a cell come to."""
-    random = np.random.default_rng([seed, CELLS.index(cell)])
-    truth = [number_at(scenarios(truth_in_words())[0], path) for path in SOUGHT]
-    held, wrong, flagged, seconds, half = np.zeros(len(SOUGHT), dtype=int), 0, 0, [], []
-    for _ in range(fits):
-        recordings = recordings_of(cell, random)
-        begun = time.process_time()
-        found: TrajectoryFit = fit(problem_of(recordings, random, cell not in DEPARTURES))
-        seconds.append(time.process_time() - begun)
-        holds = [one.low <= true <= one.high for one, true in zip(found.estimates, truth, strict=True)]
-        held += holds
-        flagged += bool(found.conflict)
-        wrong += sum(not hold and one.is_identified for hold, one in zip(holds, found.estimates, strict=True))
-        half.append([one.half_width / true for one, true in zip(found.estimates, truth, strict=True)])
-    widths = np.median(half, axis=0).tolist()
-    return Row(cell, fits, held.tolist(), flagged, wrong, widths, float(np.median(seconds)))
+def row_of(cell: str, ones: Iterable[One]) -> Row:
+    """Return what the fits of a cell come to together."""
+    ones = list(ones)
+    return Row(
+        cell=cell,
+        fits=len(ones),
+        held=np.sum([one.holds for one in ones], axis=0).tolist(),
+        flagged=sum(one.is_flagged for one in ones),
+        wrong_and_identified=sum(one.wrong_and_identified for one in ones),
+        half_widths=np.median([one.half_widths for one in ones], axis=0).tolist(),
+        seconds=float(np.median([one.seconds for one in ones])),
+    )
 
 
 def main(words: Sequence[str] | None = None) -> int:
@@ -218,13 +244,17 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument("--fits", type=int, default=40, help="fits for each cell; default 40")
     parser.add_argument("--cell", action="append", choices=CELLS, help="a line of the table; default: all")
     parser.add_argument("--out", type=Path, help="write the table as JSON into this file, too")
+    add_processes(parser)
     parsed = parser.parse_args(words)
     print(f"synthetic recordings; held and half width are those of {', '.join(SOUGHT)}")
     print("| cell | fits | held | flagged | wrong, yet identified | half width, % | CPU s a fit |")
     print("|---|---|---|---|---|---|---|")
-    rows = []
-    for cell in parsed.cell or CELLS:
-        rows.append(row_of(cell, parsed.fits, parsed.seed))
+    cells, rows = parsed.cell or CELLS, []
+    ones = results_of(
+        one_of, [(cell, parsed.seed, number) for cell in cells for number in range(parsed.fits)], parsed.processes
+    )
+    for cell in cells:
+        rows.append(row_of(cell, [next(ones) for _ in range(parsed.fits)]))
         print(rows[-1].text(), flush=True)
     if parsed.out is not None:
         parsed.out.write_text(json.dumps([row._asdict() for row in rows], indent=1), encoding="utf-8")

@@ -1,6 +1,6 @@
 """Prints what `ppafo validate` names of 14 known faults, of two at once, and how often right recordings disagree.
 
-    python scripts/known_faults.py --seeds 4711 4712 --pairs 40 --right 100
+    python scripts/known_faults.py --seeds 4711 4712 --pairs 40 --right 100 --processes 4
 
 Recordings are step responses of the simulated bench (ideal-laboratory), which shares no equation of motion and
 no integrator with the model: 1 kHz, free vane, its own noise. Each fault is one of the record or one number of the
@@ -10,14 +10,20 @@ change explains them. ``--right`` has no fault, with seeds from the first on.
 """
 
 import argparse
+import sys
 import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
+
+if not __package__:
+    # The first place is this folder, in which this file would pass for the package of the same name.
+    sys.path[0] = str(Path(__file__).parents[1])
 
 import ppafo
 from ppafo.analyses.validate.solve import Validation, in_words
@@ -26,6 +32,7 @@ from ppafo.errors import PpafoError
 from ppafo.rig.experiments import record
 from ppafo.signals.recording import Recording
 from ppafo.storage import write_csv
+from scripts.processes import add_processes, results_of
 
 ROOM = 101325.0
 SUPPLY = ("supply.pressure=55 psi_g", "supply.dorsiflexion_pressure=55 psi_g")
@@ -115,8 +122,8 @@ FAULTS = (
     Fault("Cd of the valve 10 % low", ("valve.discharge_coefficient",), device=("valve.discharge_coefficient=0.1017",)),
     Fault("inertia 30 % high", ("foot_plate.inertia",), device=("foot_plate.inertia=0.01092 kg m^2",)),
 )
-NOTHING = Fault("nothing", ())
-VERDICTS = ("right", "wrong", "none")
+NOTHING = Fault("", ())
+VERDICTS = ("right", "wrong", "none", "refused")
 
 
 def recorded(fault: Fault, seed: int) -> Recording:
@@ -152,21 +159,28 @@ def together(first: Fault, second: Fault) -> Fault:
     )
 
 
-def pairs_judged(count: int, seed: int) -> str:
-    """How often two faults at once have a single cause that is neither, one of them that explains both, or none."""
-    random, found = np.random.default_rng(seed), Counter[str]()
-    for number in range(count):
-        first, second = (FAULTS[place] for place in random.choice(len(FAULTS), 2, replace=False).tolist())
-        both = together(first, second)
-        try:
-            verdict = judged(both, validated(both, seed + number))
-        except PpafoError:
-            verdict = "refused"
-        found[verdict] += 1
-        if verdict in ("right", "wrong"):
-            print(f"  {both.title}: {verdict}", flush=True)
-    words = {"wrong": "another named", "right": "one named that explains both", "none": "none named"}
-    return ", ".join(f"{found[name]} {text}" for name, text in (*words.items(), ("refused", "refused when read")))
+class Verdict(NamedTuple):
+    """What is said of a fault, by which names, whether the recordings agree with the model, and CPU seconds."""
+
+    word: str
+    named: tuple[str, ...]
+    passes: bool
+    seconds: float
+
+
+def verdict_of(places: tuple[int, ...], seed: int) -> Verdict:
+    """What is said of the faults at places of ``FAULTS`` at once; of none, a right recording."""
+    fault = NOTHING
+    for place in places:
+        fault = together(fault, FAULTS[place]) if fault.title else FAULTS[place]
+    begun = time.process_time()
+    try:
+        found = validated(fault, seed)
+    except PpafoError:
+        return Verdict("refused", (), False, time.process_time() - begun)
+    best = found.causes.found
+    same = () if best is None else tuple(one.name for one in (best, *best.same))
+    return Verdict(judged(fault, found), same, found.passes, time.process_time() - begun)
 
 
 def main() -> None:
@@ -175,24 +189,37 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, nargs="+", required=True)
     parser.add_argument("--right", type=int, default=0, metavar="COUNT", help="COUNT right recordings")
     parser.add_argument("--pairs", type=int, default=0, metavar="COUNT", help="COUNT recordings with two faults")
+    add_processes(parser)
     words = parser.parse_args()
+    first, random = words.seeds[0], np.random.default_rng(words.seeds[0])
+    drawn = [tuple(random.choice(len(FAULTS), 2, replace=False).tolist()) for _ in range(words.pairs)]
+    work: list[tuple[tuple[int, ...], int]] = [((place,), seed) for place in range(len(FAULTS)) for seed in words.seeds]
+    work += [(pair, first + number) for number, pair in enumerate(drawn)]
+    work += [((), first + number) for number in range(words.right)]
+    results = results_of(verdict_of, work, words.processes)
     total: Counter[str] = Counter()
-    begun = time.process_time()
+    spent = 0.0
     for fault in FAULTS:
-        found = [validated(fault, seed) for seed in words.seeds]
-        counts = Counter(judged(fault, one) for one in found)
+        found = [next(results) for _ in words.seeds]
+        counts = Counter(one.word for one in found)
         total += counts
-        best = found[0].causes.found
-        same = [] if best is None else [one.name for one in (best, *best.same)]
+        spent += sum(one.seconds for one in found)
         said = ", ".join(f"{counts[verdict]} {verdict}" for verdict in VERDICTS if counts[verdict])
-        print(f"{fault.title}: {said} ({' or '.join(same)})", flush=True)
-    spent = (time.process_time() - begun) / total.total()
-    print(f"\n{', '.join(f'{total[verdict]} {verdict}' for verdict in VERDICTS)}; {spent:.1f} CPU s each", flush=True)
-    if words.pairs:
-        print(f"two faults at once: {pairs_judged(words.pairs, words.seeds[0])}", flush=True)
+        print(f"{fault.title}: {said} ({' or '.join(found[0].named)})", flush=True)
+    each = spent / total.total()
+    print(f"\n{', '.join(f'{total[verdict]} {verdict}' for verdict in VERDICTS)}; {each:.1f} CPU s each", flush=True)
+    if drawn:
+        said_of: Counter[str] = Counter()
+        for pair in drawn:
+            word = next(results).word
+            said_of[word] += 1
+            if word in ("right", "wrong"):
+                print(f"  {', '.join(FAULTS[place].title for place in pair)}: {word}", flush=True)
+        words_for = {"wrong": "another named", "right": "one named that explains both", "none": "none named"}
+        words_for["refused"] = "refused when read"
+        print(f"two faults at once: {', '.join(f'{said_of[name]} {text}' for name, text in words_for.items())}")
     if words.right:
-        right = [validated(NOTHING, words.seeds[0] + number) for number in range(words.right)]
-        alarms = sum(not one.passes for one in right)
+        alarms = sum(not next(results).passes for _ in range(words.right))
         print(f"{alarms} of {words.right} right recordings do not agree")
 
 

@@ -34,7 +34,7 @@ AGREES, DIFFERS, NOT_RUN, OPEN = "agrees", "differs", "not run", "stated"
 LEAST = 0.90
 """Least share of 95 % intervals that may hold."""
 
-RIGHT_MODELS = ("ideal", "white", "AR(1)", "random walk", "Student t", "hum")
+RIGHT_MODELS = ("ideal", "white", "AR(1)", "random walk", "Student t", "hum", "drift")
 """Cells of ``scripts/interval_coverage.py`` whose device is the fitted model."""
 
 MISSING = 2
@@ -142,7 +142,7 @@ def claims(_long: Path) -> list[Line]:
 def intervals(long: Path) -> list[Line]:
     """How often 95 % intervals of trajectory fits hold."""
     command = "python scripts/interval_coverage.py --seed 20611 --fits 40 --out out/coverage.json"
-    what = "95 % intervals of trajectory fits: rig, five kinds of noise"
+    what = "95 % intervals of trajectory fits: rig, six kinds of noise"
     file = long / "coverage.json"
     if not file.is_file():
         return [Line(what, "known truth", "", "", NOT_RUN, command)]

@@ -28,8 +28,8 @@ from ppafo.simulation.plan import plan_run
 solve_reference(plan_run(load_scenario("torque-task-proportional", ["run.duration=20 ms"])))
 print("reference solution", "numba" in sys.modules)
 
-from scripts.interval_coverage import row_of
-row_of("white", 1, 5)
+from scripts.interval_coverage import one_of
+one_of("white", 5, 0)
 print("fit", "numba" in sys.modules)
 """
 

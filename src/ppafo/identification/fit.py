@@ -8,12 +8,13 @@ estimated from them. Each difference of the Jacobian is as long as changes the r
 import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares, lsq_linear
+from scipy.signal import lfilter
 from scipy.stats import f as fisher
 from scipy.stats import qmc
 from scipy.stats import t as student
@@ -60,10 +61,17 @@ class Block:
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """Noise of a channel: standard deviation [SI] and reflection coefficients [-] of its autoregression (Burg)."""
+    """Noise of a channel: standard deviation [SI], and what makes it white: an autoregression or a level that drifts.
+
+    ``reflection`` are coefficients [-] of the autoregression (Burg). ``gain`` [-] is the part of each innovation by
+    which a level moves that drifts as a random walk beside white noise, 0 for none. ``innovation`` is the size of what
+    nothing foretells over the deviation [-].
+    """
 
     deviation: float
     reflection: tuple[float, ...] = ()
+    gain: float = 0.0
+    innovation: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,6 +122,9 @@ class Fit:
         return dict(zip((one.name for one in self.numbers), self.values.tolist(), strict=True))
 
 
+SMOOTH = "noise"
+"""Number of a conflict whose channel leaves what is too smooth for noise: ``standard_errors`` times its innovation."""
+
 STATED = "stated limit"
 """Group of a conflict that is not among recordings: they want a tolerance beyond its limit."""
 
@@ -129,10 +140,27 @@ SAMPLES_PER_COEFFICIENT = 100
 _LARGEST_REFLECTION = 1.0 - 1.0e-9
 """Of residuals that follow a law exactly, such as a constant's: no innovation would be left."""
 
+_GAINS = tuple(2.0**-power for power in range(1, 9))
+"""Gains of a level that are tried; with less it would not move within some hundred samples."""
+
+_SMOOTHEST = 0.2
+"""Innovation [-] below which residuals are no noise: that of a sensor with a first order lag of 50 samples."""
+
+_LEFT_OUT = 0.01
+"""Largest fraction of the samples that are left out because an event, such as an impact, passes them."""
+
+_LEVERAGE = 0.1
+"""Share of a combination of numbers that one sample decides alone from which it is left out."""
+
+
 _PASSES = 6
 _ROUNDS = 20
 _SETTLED = 0.03
 _EVALUATIONS = 40
+_LAST_STEPS = 12
+_SHARES = (1.0, 0.3, 0.1)
+_GAIN = 0.05
+"""Steps after whitening, the fractions of one that are tried, and the sum of squares [-] below which one is no gain."""
 _SIGNIFICANCE = 0.01
 _PARTING = 0.05
 """Fraction of the covariance of all by which a group's alone must be larger for its direction to be tested."""
@@ -154,14 +182,17 @@ def fit(
     confidence: float = 0.95,
     report: Report = report_nothing,
     memory: int = _HIGHEST_ORDER,
+    is_motion: bool = False,
 ) -> Fit:
     """Return the numbers that explain recordings best, their covariance and whether the recordings agree on them.
 
     Squares are minimised within bounds, at first with a loss that is robust (soft L1); weights follow from what is left
-    in each channel. Then residuals are whitened by one autoregression per channel and the numbers take one more step.
+    in each channel. Then residuals are whitened by the noise of each channel and the numbers step on until none gains.
     Other starts are tried only where the recordings disagree. ``memory`` is the highest order of the autoregression, 0
-    for readings that were taken one by one. IdentificationError where no run succeeds, and where samples are no more
-    than the numbers that are sought, and for bounds that leave a number no room about its start.
+    for readings that were taken one by one. In recordings of motion (``is_motion``) sensors may drift, and samples
+    that an impact passes are left out; what a bench reads moves as slowly as its sensors drift. IdentificationError
+    where no run succeeds, and where samples are no more than the numbers that are sought, and for bounds that leave a
+    number no room about its start.
     """
     if not numbers or not blocks:
         raise IdentificationError(f"a fit of {len(numbers)} numbers to {len(blocks)} blocks: each needs at least one")
@@ -171,7 +202,7 @@ def fit(
                 f"{one.name}: bounds {one.low:g} to {one.high:g} with the start {one.start:g}: the lower must be below "
                 "the upper and the start between them"
             )
-    work = _Work(residuals, tuple(numbers), tuple(blocks), report, memory)
+    work = _Work(residuals, tuple(numbers), tuple(blocks), report, memory, is_motion)
     samples, sought = (
         sum(one.rows.stop - one.rows.start for one in blocks),
         sum(math.isinf(one.deviation) for one in numbers),
@@ -195,10 +226,16 @@ class _Work:
     """Runs of a fit in scaled numbers, with the last one kept."""
 
     def __init__(
-        self, residuals: Residuals, numbers: tuple[Free, ...], blocks: tuple[Block, ...], report: Report, memory: int
+        self,
+        residuals: Residuals,
+        numbers: tuple[Free, ...],
+        blocks: tuple[Block, ...],
+        report: Report,
+        memory: int,
+        is_motion: bool,
     ) -> None:
         self.residuals, self.numbers, self.blocks, self.report = residuals, numbers, blocks, report
-        self.memory = memory
+        self.memory, self.is_motion = memory, is_motion
         self.scale = np.array([one.scale for one in numbers])
         self.start, self.low, self.high, deviation = (
             np.array([getattr(one, name) for one in numbers]) / self.scale
@@ -209,6 +246,7 @@ class _Work:
         self.evaluations = 0
         self.least: dict[str, float] = {}
         self.step = np.full(len(numbers), _STEPS[1])
+        self.left_out = np.zeros(0, dtype=np.intp)
         self._last: tuple[bytes, Floats] | None = None
 
     def at(self, points: Floats) -> Floats:
@@ -332,9 +370,37 @@ def burg(series: Sequence[Floats], highest: int = _HIGHEST_ORDER) -> tuple[float
     return tuple(found[: best[1]])
 
 
+def noise_of(series: Sequence[Floats], highest: int = _HIGHEST_ORDER, may_drift: bool = True) -> Noise:
+    """Return the noise of several series [-] as AIC wants it: an autoregression, or a random walk beside white noise.
+
+    That is a slow drift, where it ``may_drift``, for which an autoregression needs many coefficients. Columns add up,
+    as for ``burg``.
+    """
+    count, size = sum(len(one) for one in series), sum(float(np.square(one).sum()) for one in series)
+    # What is less than the floor is the engine's, and no noise.
+    if size < 0.5 * count:
+        return Noise(1.0)
+    reflection = burg(series, highest)
+    found = Noise(1.0, reflection, 0.0, math.sqrt(math.prod(1.0 - one * one for one in reflection)))
+    best = 2.0 * count * math.log(found.innovation) + 2.0 * len(reflection)
+    for gain in _GAINS if may_drift and count >= SAMPLES_PER_COEFFICIENT else ():
+        innovation = math.sqrt(sum(float(np.square(_without_level(one, gain)).sum()) for one in series) / size)
+        criterion = 2.0 * count * math.log(innovation) + 2.0
+        if criterion < best:
+            best, found = criterion, Noise(1.0, (), gain, innovation)
+    return found
+
+
+def _without_level(values: Floats, gain: float) -> Floats:
+    """Return the innovations of white noise beside a random walk: the Kalman filter of a local level, settled."""
+    return np.asarray(lfilter([1.0, -1.0], [1.0, gain - 1.0], values, axis=0))
+
+
 def whiten(values: Floats, noise: Noise) -> Floats:
     """Return columns (samples, columns) [SI] of one recording as innovations [-] of the noise of their channel."""
     forward = values / noise.deviation
+    if noise.gain > 0.0:
+        return _without_level(forward, noise.gain) / noise.innovation
     backward, power = forward.copy(), 1.0
     done = forward.copy()
     for order, one in enumerate(noise.reflection, start=1):
@@ -345,9 +411,13 @@ def whiten(values: Floats, noise: Noise) -> Floats:
 
 
 class _Linear(NamedTuple):
-    """Residuals and Jacobian whitened [-] side by side, root and covariance of scaled numbers, noise by channel."""
+    """Residuals and Jacobian whitened [-] side by side, root of the covariance of scaled numbers, noise by channel.
+
+    ``without`` are orthonormal columns [-] of the samples that are left out.
+    """
 
     rows: Floats
+    without: Floats
     root: Floats
     noise: Floats
     sensors: dict[str, Noise]
@@ -361,16 +431,22 @@ def _linear(work: _Work, point: Floats, left: Floats, slopes: Floats) -> tuple[_
     """
     step, hidden = np.zeros(len(point)), np.zeros((len(left), 0))
     limits = work.low - point - 1.0e-300, work.high - point + 1.0e-300
+    # A sample with a number of its own says nothing: so it is left out of any noise.
+    own_numbers = np.zeros((len(left), len(work.left_out)))
+    own_numbers[work.left_out, np.arange(len(work.left_out))] = 1.0
     for _ in range(_ROUNDS):
         series = np.column_stack([left + slopes @ step, hidden])
+        series[work.left_out] = 0.0
         noise = work.deviations(series)
-        known, rows = {}, np.column_stack([left, slopes]) / noise[:, None]
+        known, rows = {}, np.column_stack([left, slopes, own_numbers * noise[:, None]]) / noise[:, None]
         for channel in work.channels:
             own = work.rows_of(channel)
-            reflection = burg([series[one] / noise[one, None] for one in own], work.memory)
-            known[channel] = Noise(float(noise[own[0]][0]), reflection)
+            known[channel] = noise_of([series[one] / noise[one, None] for one in own], work.memory, work.is_motion)
             for one in own:
-                rows[one] = whiten(rows[one], Noise(1.0, reflection))
+                rows[one] = whiten(rows[one], known[channel])
+        without = np.linalg.qr(rows[:, 1 + len(point) :])[0]
+        rows = rows[:, : 1 + len(point)]
+        rows = rows - without @ (without.T @ rows)
         root, _ = _root_of_inverse(rows[:, 1:].T @ rows[:, 1:] + np.diag(np.square(work.prior)))
         hidden = slopes @ root
         before = step
@@ -383,7 +459,7 @@ def _linear(work: _Work, point: Floats, left: Floats, slopes: Floats) -> tuple[_
         step = np.asarray(solved.x)
         if np.abs((step - before) @ np.linalg.pinv(root)).max() < 0.01 and series.shape[1] > 1:
             break
-    return _Linear(rows=rows, root=root, noise=noise, sensors=known), step
+    return _Linear(rows=rows, without=without, root=root, noise=noise, sensors=known), step
 
 
 def _root_of_inverse(curvature: Floats) -> tuple[Floats, Mask]:
@@ -398,18 +474,34 @@ def _root_of_inverse(curvature: Floats) -> tuple[Floats, Mask]:
 
 
 def _whitened(work: _Work, point: Floats, settled: bool, confidence: float) -> Fit:
-    """Return the fit after whitening and one more Gauss-Newton step from the least squares."""
+    """Return the fit after whitening and Gauss-Newton steps from the least squares."""
     left = work.one(point)
-    slopes = work.jacobian(point, 1.0 / work.deviations(left[:, None]))
-    linear, step = _linear(work, point, left, slopes)
-    reached = np.clip(point + step, work.low, work.high)
-    # A Gauss-Newton step may leave where runs succeed, or overshoot: it is taken only where it lowers the squares.
-    after = work.one(reached)
-    if np.isfinite(after).all() and _cost(work, after, reached, linear) <= _cost(work, left, point, linear):
-        point, left = reached, after
-        slopes = work.jacobian(point, 1.0 / linear.noise)
-        linear, _ = _linear(work, point, left, slopes)
-    known, rows = linear.sensors, linear.rows
+    noise, is_checked = work.deviations(left[:, None]), False
+    work.left_out = work.left_out[:0]
+    for number in range(_LAST_STEPS):
+        linear, step = _linear(work, point, left, work.jacobian(point, 1.0 / noise))
+        noise, cost = linear.noise, _cost(work, left, point, linear)
+        # A step may leave where runs succeed, or overshoot: a shorter one is taken then, one that gains or none.
+        for share in _SHARES:
+            reached = np.clip(point + share * step, work.low, work.high)
+            after = work.one(reached)
+            gain = cost - _cost(work, after, reached, linear) if np.isfinite(after).all() else -math.inf
+            if gain > 0.0:
+                break
+        settled = gain < _GAIN
+        if (settled and (is_checked or not work.is_motion)) or number == _LAST_STEPS - 1:
+            break
+        if settled:
+            is_checked = True
+            # What a sample near an impact seems to say alone is narrow and false: its slope holds on one side only.
+            leverage = np.square(linear.rows[:, 1:] @ linear.root).sum(axis=1)
+            highest = np.argsort(-leverage)[: int(_LEFT_OUT * len(leverage))]
+            work.left_out = highest[leverage[highest] > _LEVERAGE]
+        if gain > 0.0:
+            point, left = reached, after
+    rows = linear.rows
+    sizes = {one.channel: float(noise[one.rows][0]) for one in reversed(work.blocks)}
+    known = {channel: replace(one, deviation=sizes[channel]) for channel, one in linear.sensors.items()}
     whitened, errors = rows[:, 1:], rows[:, 0]
     covariance = linear.root @ linear.root.T
     # Samples less what the numbers took: a tolerance that the readings do not move takes none.
@@ -428,9 +520,9 @@ def _whitened(work: _Work, point: Floats, settled: bool, confidence: float) -> F
         low=np.maximum(point - wide, work.low) * work.scale,
         high=np.minimum(point + wide, work.high) * work.scale,
         noise={channel: one.deviation for channel, one in known.items()},
-        correlation={channel: len(one.reflection) for channel, one in known.items()},
+        correlation={channel: len(one.reflection) + (one.gain > 0.0) for channel, one in known.items()},
         residuals=left,
-        conflict=_conflict(work, rows, point, ~touching, freedom),
+        conflict=_conflict(work, rows, point, ~touching, freedom) or _too_smooth(known),
         unidentified=tuple(_unidentified(covariance, names)),
         shares={
             names[place]: tuple(
@@ -451,8 +543,9 @@ def _whitened(work: _Work, point: Floats, settled: bool, confidence: float) -> F
 def _cost(work: _Work, left: Floats, point: Floats, linear: _Linear) -> float:
     """Return the sum of squares [-] of whitened residuals and priors."""
     scaled = (left / linear.noise)[:, None]
-    parts = [whiten(scaled[one.rows], Noise(1.0, linear.sensors[one.channel].reflection)) for one in work.blocks]
-    return sum(float(np.square(one).sum()) for one in parts) + float(np.square((point - work.mean) * work.prior).sum())
+    errors = np.concatenate([whiten(scaled[one.rows], linear.sensors[one.channel]) for one in work.blocks])
+    errors = errors - linear.without @ (linear.without.T @ errors)
+    return float(np.square(errors).sum()) + float(np.square((point - work.mean) * work.prior).sum())
 
 
 def _groups(work: _Work) -> Iterator[tuple[str, list[slice]]]:
@@ -466,6 +559,12 @@ def _groups(work: _Work) -> Iterator[tuple[str, list[slice]]]:
             if key not in seen:
                 seen.add(key)
                 yield name, rows
+
+
+def _too_smooth(sensors: Mapping[str, Noise]) -> Conflict | None:
+    """Return the channel whose residuals are least like noise, None where all are like noise."""
+    channel, noise = min(sensors.items(), key=lambda item: item[1].innovation)
+    return Conflict(channel, SMOOTH, 1.0 / noise.innovation, 0.0) if noise.innovation < _SMOOTHEST else None
 
 
 def _conflict(work: _Work, rows: Floats, point: Floats, free: Mask, freedom: float) -> Conflict | None:
@@ -526,7 +625,7 @@ def _likelihood(work: _Work, found: Fit) -> float:
     size = 0.0
     for one in work.blocks:
         noise, count = found.sensors[one.channel], one.rows.stop - one.rows.start
-        size += count * (math.log(noise.deviation) + 0.5 * sum(math.log(1.0 - k * k) for k in noise.reflection))
+        size += count * (math.log(noise.deviation) + math.log(noise.innovation))
     return -size - 0.5 * float(np.square((found.values / work.scale - work.mean) * work.prior).sum())
 
 

@@ -78,6 +78,10 @@ class BenchSection(StrictTable):
         Text | None, Field(description="of the gas temperature; default: what the set states, else 15 K")
     ] = None
     gas_law: Annotated[Text | None, Field(description="departure of the gas from the ideal gas law; 1 %")] = None
+    stribeck_velocity: Annotated[
+        Text | None,
+        Field(description="up to which friction at rest lasts in a motion, where no effect says it; 0.5 rad/s"),
+    ] = None
     zero_of_flow: Annotated[Text | None, Field(description="zero of the flow meter, of its largest reading; 5 %")] = (
         None
     )
@@ -102,6 +106,7 @@ class Tolerances:
     start_of_pressure: float | None = None
     gas_temperature: float | None = None
     gas_law: float | None = None
+    stribeck_velocity: float = 0.5
     zero_of_flow: float = 0.05
     held: float | None = None
     each_recording: tuple[Sensed, ...] = ()
@@ -151,6 +156,7 @@ _UNITS = {
     "start_of_pressure": "Pa_d",
     "gas_temperature": "K",
     "gas_law": "1",
+    "stribeck_velocity": "rad/s",
     "zero_of_flow": "1",
     "held": "1",
 }

@@ -2,7 +2,7 @@
 
 import math
 
-from ppafo.identification.fit import STATED, Fit
+from ppafo.identification.fit import SMOOTH, STATED, Fit
 from ppafo.units import percentage
 
 _SHOWN_IN = {"Pa": ("kPa", 1.0e-3), "rad": ("deg", 180.0 / math.pi)}
@@ -46,6 +46,10 @@ def conflict_in_words(found: Fit, remedy: str) -> str:
         return ""
     if one.group == STATED:
         return f"{one.number} is {one.standard_errors:.1f} standard errors beyond its stated limit; {remedy}"
+    if one.number == SMOOTH:
+        return (
+            f"what is left of {one.group} is {one.standard_errors:.0f} times its noise, too smooth for noise; {remedy}"
+        )
     return (
         f"{one.group} alone wants other numbers than all readings together, {one.number} by {one.standard_errors:.1f} "
         f"standard errors; {remedy}"

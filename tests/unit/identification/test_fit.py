@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.fit import Block, Fit, Free, Noise, burg, fit, whiten
+from ppafo.identification.fit import SMOOTH, Block, Fit, Free, Noise, burg, fit, noise_of, whiten
 from ppafo.signals.recording import Floats
 
 _COUNT = 300
@@ -46,7 +46,7 @@ def _noise(kind: str, generator: np.random.Generator) -> Floats:
             found[place] = 0.9 * found[place - 1] + math.sqrt(1.0 - 0.81) * white[place]
         return found
     if kind == "random walk":
-        return 0.1 * np.cumsum(generator.normal(size=_COUNT))
+        return white + np.cumsum(generator.normal(size=_COUNT)) / math.sqrt(_COUNT)
     if kind == "Student t":
         return generator.standard_t(3.0, _COUNT) / math.sqrt(3.0)
     if kind == "hum":
@@ -61,7 +61,7 @@ def _fit(kind: str, generator: np.random.Generator, size: float = 0.02, slower: 
             truth[one.name] = one.start + one.deviation * generator.normal()
     clean = _law(*(np.array([one]) for one in truth.values()), slower=slower)[:, 0]
     measured = clean + size * np.concatenate([_noise(kind, generator) for _ in _BLOCKS])
-    return fit(lambda points: measured[:, None] - _law(*points), _NUMBERS, _BLOCKS)
+    return fit(lambda points: measured[:, None] - _law(*points), _NUMBERS, _BLOCKS, is_motion=True)
 
 
 def _coverage(kind: str, fits: int, seed: int) -> tuple[float, int]:
@@ -75,15 +75,17 @@ def _coverage(kind: str, fits: int, seed: int) -> tuple[float, int]:
 
 
 @pytest.mark.parametrize(
-    ("kind", "least"), [("white", 0.9), ("AR(1)", 0.9), ("random walk", 0.75), ("Student t", 0.9), ("hum", 0.85)]
+    ("kind", "least", "most_flagged"),
+    # Of a drift, the zero and the start of a recording absorb a part that the noise then does not show.
+    [("white", 0.9, 1), ("AR(1)", 0.9, 1), ("random walk", 0.85, 2), ("Student t", 0.9, 1), ("hum", 0.85, 1)],
 )
 def test_intervals_hold_in_five_kinds_of_noise_and_a_model_that_is_right_is_not_called_wrong(
-    kind: str, least: float
+    kind: str, least: float, most_flagged: int
 ) -> None:
     held, flagged = _coverage(kind, 20, seed=7)
 
     assert held >= least
-    assert flagged <= 1
+    assert flagged <= most_flagged
 
 
 def test_a_model_whose_two_recordings_want_two_rates_holds_for_itself_only() -> None:
@@ -133,6 +135,53 @@ def test_whitening_by_the_autoregression_that_was_found_leaves_white_noise() -> 
 
     assert reflection[0] == pytest.approx(0.9, abs=0.06)
     assert abs(np.corrcoef(white[1:], white[:-1])[0, 1]) < 0.12
+
+
+def test_a_slow_drift_beside_white_noise_is_whitened_as_a_level_and_white_noise_is_left_alone() -> None:
+    generator = np.random.default_rng(5)
+    white = generator.normal(size=1000)
+    drifting = white + 0.1 * np.cumsum(generator.normal(size=1000))
+    size = math.sqrt(np.mean(drifting**2))
+
+    assert noise_of([white]).gain == 0.0
+    found = noise_of([drifting / size])
+
+    assert found.gain == pytest.approx(0.1, abs=0.05)
+    assert found.innovation * size == pytest.approx(1.05, rel=0.05)
+    assert np.std(whiten(drifting / size, found)) == pytest.approx(1.0, rel=0.01)
+
+
+def test_a_sample_that_alone_decides_a_number_is_left_out() -> None:
+    slope = np.zeros((_COUNT, 1))
+    slope[150] = 100.0
+    slope[:150] = 1.0
+    measured = 2.0 * slope + 0.1 * np.random.default_rng(1).normal(size=(_COUNT, 1))
+    measured[150] -= 5.0
+
+    found = fit(
+        lambda points: measured - slope * points[:1],
+        (Free("value", 1.0, -10.0, 10.0, 1.0),),
+        [Block("only", "first", slice(0, _COUNT))],
+        memory=0,
+        is_motion=True,
+    )
+
+    assert found.low[0] <= 2.0 <= found.high[0]
+    assert found.high[0] - found.low[0] == pytest.approx(2.0 * 1.96 * 0.1 / math.sqrt(150.0), rel=0.3)
+
+
+def test_residuals_that_are_too_smooth_for_noise_are_a_conflict() -> None:
+    measured = np.sin(9.0 * _TIME) + 0.01 * np.random.default_rng(1).normal(size=_COUNT)
+
+    found = fit(
+        lambda points: measured[:, None] - points[:1],
+        (Free("level", 1.0, -10.0, 10.0, 1.0),),
+        [Block("only", "first", slice(0, _COUNT))],
+    )
+
+    assert found.conflict is not None
+    assert (found.conflict.group, found.conflict.number) == ("first", SMOOTH)
+    assert found.conflict.standard_errors > 5.0
 
 
 def test_a_law_that_fits_exactly_leaves_numbers_and_a_channel_of_small_units_keeps_its_weight() -> None:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -85,7 +85,7 @@ def _expect(fit: TrajectoryFit, candidate: Candidate) -> Expected:
     rows = []
     for name, deviation in noise.items():
         known = fit.fit.sensors.get(name)
-        rows.append(whiten(slopes[name], Noise(deviation, known.reflection if known else ())))
+        rows.append(whiten(slopes[name], replace(known, deviation=deviation) if known else Noise(deviation)))
     whole = fit.fit.covariance
     sizes = np.sqrt(np.diag(whole))
     jacobian = np.concatenate(rows) * sizes[place]

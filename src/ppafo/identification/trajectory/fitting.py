@@ -1,5 +1,6 @@
 """The trajectory fit: runs as residuals of the one estimator, and what comes of it as values of the device."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -138,6 +139,7 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
         blocks_of(prepared, numbers, start),
         problem.confidence,
         report,
+        is_motion=True,
     )
     conflict = conflict_in_words(found, "the model lacks something")
     sought = [place for place, item in enumerate(numbers) if not item.is_tolerance]
@@ -147,14 +149,20 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
         name, item = free[place].name, numbers[place]
         shares = {one.path: dict(found.shares[one.path]).get(name, 0.0) for one in estimates}
         widens = max(shares, key=lambda path: shares[path], default="")
+        (before, first), (after, last) = (
+            (math.exp(value), math.exp(value) * error) if item.is_logarithm else (value, error)
+            for value, error in (
+                (item.free.start, item.free.deviation), (float(found.values[place]), float(errors[place]))
+            )
+        )  # fmt: skip
         known.append(
             Known(
                 name=name,
                 unit=item.unit,
-                before=item.free.start,
-                before_error=item.free.deviation,
-                after=float(found.values[place]),
-                after_error=float(errors[place]),
+                before=before,
+                before_error=first,
+                after=after,
+                after_error=last,
                 widens=widens,
                 share=shares.get(widens, 0.0),
             )

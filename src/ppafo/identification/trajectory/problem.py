@@ -262,6 +262,7 @@ class FreeParameter:
     ``mean``, which is the start where it is None; infinite for none. Bounds left out are the declared ones, at most a
     factor of 100 from the start. ``recordings`` limits the number to some experiments, by label: an initial pressure
     belongs to one. One that ``is_tolerance`` is known within a tolerance, and no value of the device that is sought.
+    One that ``is_logarithm`` is moved as its natural logarithm; ``deviation`` is of that.
     """
 
     path: str
@@ -271,6 +272,7 @@ class FreeParameter:
     deviation: float = math.inf
     recordings: tuple[str, ...] = ()
     is_tolerance: bool = False
+    is_logarithm: bool = False
 
     @property
     def name(self) -> str:
@@ -287,6 +289,7 @@ class Number:
     free: Free
     recordings: tuple[str, ...]
     is_tolerance: bool
+    is_logarithm: bool
 
     def acts_in(self, label: str) -> bool:
         """Return whether the number acts in the experiment with this label."""
@@ -342,15 +345,16 @@ def number_of(parameter: FreeParameter, experiments: Sequence[Experiment]) -> Nu
         (not parameter.deviation > 0.0, "the standard deviation of a prior must be above 0"),
         (not is_allowed, f"the bounds {bounds} exceed what is allowed, {allowed}"),
     )
+    if parameter.is_logarithm:
+        start, low, high = math.log(start), math.log(low), math.log(high)
     # Differences are a thousandth of the scale at most, which for a prior is a tenth of its deviation.
     scale = abs(start) or 0.5 * (high - low)
     if math.isfinite(parameter.deviation):
         scale = _SCALE * parameter.deviation
     name = full_path(parameter.name, scenarios[0])
     free = Free(name, start, low, high, scale, parameter.deviation)
-    return Number(
-        path, unit.removesuffix("_a").removesuffix("_d") or "-", free, parameter.recordings, parameter.is_tolerance
-    )
+    shown, recordings = unit.removesuffix("_a").removesuffix("_d") or "-", parameter.recordings
+    return Number(path, shown, free, recordings, parameter.is_tolerance, parameter.is_logarithm)
 
 
 def reach_of(chosen: Sequence[Number]) -> float:

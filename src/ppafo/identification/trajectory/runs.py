@@ -177,7 +177,8 @@ def _steps_between_samples(time: Floats, reach: float, step: float) -> float:
 
 def columns_in(label: str, numbers: Sequence[Number], points: Floats) -> dict[str, Floats]:
     """Return the numbers [SI] by path that act in the experiment with a label, at points [SI] (numbers, points)."""
-    return {item.path: row for item, row in zip(numbers, points, strict=True) if item.acts_in(label)}
+    acting = ((item, row) for item, row in zip(numbers, points, strict=True) if item.acts_in(label))
+    return {item.path: np.exp(row) if item.is_logarithm else row for item, row in acting}
 
 
 def numbers_in(label: str, numbers: Sequence[Number], point: Floats) -> dict[str, float]:

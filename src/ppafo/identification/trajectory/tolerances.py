@@ -17,6 +17,7 @@ from ppafo.identification.trajectory.problem import (
     scenario_of,
 )
 from ppafo.parameters.parameter_set import ParameterSet
+from ppafo.parameters.plant import switches_of
 from ppafo.signals.faults import noise_of
 from ppafo.simulation.recorded import ANGLE, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, FreeMotion, Scenario
@@ -26,6 +27,13 @@ _WIDEST = 12.0
 
 _EXACT = ("area", "angle_min", "angle_max", "linear_ratio", "critical_ratio", "atmospheric_pressure")
 """Names of numbers that only go with another one, or that the zero of a sensor moves as well."""
+
+_STRIBECK = "effects.stribeck.velocity"
+_FACTOR, _ONE_SIDED, _LEAST = 1.5, 1.645, 0.01
+"""Standard deviation of the logarithm of that velocity, how many of them its limit is above, and its least over that.
+
+The fall is as good as abrupt below; the effect would be off at 0.
+"""
 
 _START_OF_ANGLE = math.radians(0.05)
 """Standard deviation of an angle that is read at the start [rad]."""
@@ -78,7 +86,23 @@ def tolerance_parameters(
             for group in groups:
                 whole = len(group) == len(experiments) and kind not in tolerances.each_recording
                 found.append(_parameter(path, 0.0, deviation_of_limit(limit), () if whole else group))
-    return (*found, *_of_set(tolerances, experiments, given, stated or {}))
+    return (*found, *_of_set(tolerances, experiments, given, stated or {}), *_stribeck(tolerances, experiments, given))
+
+
+def _stribeck(tolerances: Tolerances, experiments: Sequence[Experiment], given: set[str]) -> Iterator[FreeParameter]:
+    """Yield the velocity up to which friction at rest lasts, of which 95 % are below the limit, where the set has none.
+
+    With an abrupt fall static friction is traded for damping. What a step response says of static friction goes with
+    the logarithm of this velocity, so that is moved.
+    """
+    limit, scenario = tolerances.stribeck_velocity, experiments[0].scenario
+    moves = any(isinstance(one.scenario.motion, FreeMotion) and ANGLE not in one.inputs for one in experiments)
+    friction, has_own = scenario.device.friction, _STRIBECK in given or number_at(scenario, _STRIBECK) > 0.0
+    if limit > 0.0 and moves and not has_own and friction.static_torque > friction.dynamic_torque:
+        yield FreeParameter(
+            _STRIBECK, limit * math.exp(-_ONE_SIDED * _FACTOR), _LEAST * limit, 4.0 * limit, _FACTOR,
+            is_tolerance=True, is_logarithm=True,
+        )  # fmt: skip
 
 
 def _of_run(tolerances: Tolerances, experiment: Experiment) -> dict[str, tuple[float, float]]:
@@ -112,12 +136,14 @@ def _of_set(
 ) -> Iterator[FreeParameter]:
     """Return the numbers of the device that are held, each with its own uncertainty, as the fit moves them."""
     scenario = experiments[0].scenario
+    off = {effect.section for effect, is_on in switches_of(scenario.device).items() if not is_on}
     for path, quantity in declared_numbers(scenario).items():
         section, _, name = path.rpartition(".")
         if path in given or section in ("motion", "initial", "recording", "motion.shank") or path.startswith("supply."):
             continue
         value, half_width = number_at(scenario, path), stated.get(path, 0.0)
-        if value == 0.0 or (half_width == 0.0 and name in _EXACT):
+        # An effect that is off has no numbers that act.
+        if section in off or value == 0.0 or (half_width == 0.0 and name in _EXACT):
             continue
         kind = path.replace(f"valves.{scenario.device.valve_name}.", "valve.")
         deviation = tolerances.deviation_of(kind, value, half_width)

@@ -75,6 +75,21 @@ def test_a_number_of_the_set_is_held_with_what_the_set_states_or_else_a_default(
     assert not any(item.path.startswith(("gas.", "friction.", "actuator.")) for item in exact)
 
 
+def test_friction_at_rest_may_last_in_a_motion_up_to_a_velocity_where_the_set_says_nothing_of_it(
+    experiment: Experiment,
+) -> None:
+    (found,) = (one for one in tolerance_parameters(Tolerances(), (experiment,), ()) if "stribeck" in one.path)
+    assert found.is_logarithm
+    assert math.log(0.5 / found.start) == pytest.approx(1.645 * found.deviation)
+    own = replace(experiment, scenario=with_numbers(experiment.scenario, {"effects.stribeck.velocity": 0.2}))
+    (stated,) = (
+        one for one in tolerance_parameters(Tolerances(), (own,), ()) if one.path.endswith("stribeck.velocity")
+    )
+    assert not stated.is_logarithm
+    exact = tolerance_parameters(Tolerances(stribeck_velocity=0.0), (experiment,), ())
+    assert not any("stribeck" in one.path for one in exact)
+
+
 def test_a_start_read_from_noisy_samples_is_known_to_their_noise(experiment: Experiment) -> None:
     inside = replace(experiment, start=0.05, initial_state="recording")
     deviations = {item.path: item.deviation for item in tolerance_parameters(Tolerances(), (inside,), ())}
