@@ -147,7 +147,7 @@ def wearers_csv(population: Population) -> bytes:
     """Return one line for each wearer, in SI units."""
     columns = {f"{name} [{item.unit}]": population.traits[name] for name, item in TRAITS.items()}
     columns |= {f"{name} [{item.unit}]": population.outcomes[name] for name, item in OUTCOMES.items()}
-    return csv_of({head: values.tolist() for head, values in columns.items()})
+    return csv_of(columns)
 
 
 def quantiles(table: Mapping[str, Floats], numbers: Mapping[str, Number]) -> dict[str, dict[str, object]]:
@@ -315,7 +315,7 @@ def strides_csv(result: WalkResult) -> bytes:
     columns = {"stride [-]": np.arange(1.0, count + 1.0), "start [s]": result.recording.time[result.starts[:count]]}
     columns |= {f"{name} [{item.unit}]": result.strides[name] for name, item in PER_STRIDE.items()}
     columns["helped [-]"] = result.helped.astype(np.float64)
-    return csv_of({head: values.tolist() for head, values in columns.items()})
+    return csv_of(columns)
 
 
 def mean_stride_csv(result: WalkResult) -> bytes:
@@ -325,7 +325,7 @@ def mean_stride_csv(result: WalkResult) -> bytes:
     for name, curves in result.averages.items():
         columns[f"{name} [{curves.unit}]"] = curves.mean
         columns[f"{name}_deviation [{curves.unit}]"] = curves.deviation
-    return csv_of({head: values.tolist() for head, values in columns.items()})
+    return csv_of(columns)
 
 
 _LONG = 12.0

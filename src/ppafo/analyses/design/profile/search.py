@@ -80,11 +80,6 @@ class Pressures:
         return int(self.works.argmax()) if self.works.any() else None
 
     @property
-    def below(self) -> float | None:
-        """The highest pressure below the lowest that works; None where none works or none below was tried."""
-        return float(self.pressure[self.first - 1]) if self.first else None
-
-    @property
     def fails_above(self) -> float | None:
         """A pressure above the lowest that works at which the limit is missed again; None where there is none."""
         failing = np.flatnonzero(~self.works[self.first :]) if self.first is not None else np.empty(0, dtype=int)
@@ -199,7 +194,8 @@ def limit_of(trials: Trials, valve: Part, tried: Pressures) -> Limit:
     half way between the two (between that one and the highest where none works): where one works, the flow limits.
     """
     problem = trials.problem
-    if tried.first is not None and tried.below is None:
+    # The lowest of all that were tried.
+    if tried.first == 0:
         return "pressure"
     atmosphere, alone = problem.scenario.device.supply.atmospheric_pressure, ceiling_pressure(problem)
     reached = float(tried.pressure[-1 if tried.first is None else tried.first])
