@@ -125,8 +125,7 @@ def synthetic_evidence(
             torque=torque,
             decay=decay,
             step=record("step-response", BENCH_PRESET, RIG_SEED, PLANTED_SET, step_overrides).recording,
-            solenoid=recorded["solenoid"],
-            proportional=recorded["proportional"],
+            **recorded,
         )
     # No claim rests on a recording: without them the figures show less, and the report says why.
     except (SimulationError, DataError) as error:

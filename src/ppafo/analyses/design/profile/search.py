@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ppafo.analyses.design.profile.problem import SizingProblem
 from ppafo.analyses.design.trials import STREAMS, run_trials
+from ppafo.analyses.parts.solve import rated_pressure
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.errors import StudyError
 from ppafo.parameters.parts import Part
@@ -152,8 +153,7 @@ class Trials:
 
 def highest_pressure(problem: SizingProblem, valve: Part) -> float:
     """Return the highest pressure [Pa absolute] to try: the file's, or what the parts are made for."""
-    parts = (valve, *problem.carried)
-    return min([problem.highest_pressure, *(part.values.get("largest_pressure", np.inf) for part in parts)])
+    return min(problem.highest_pressure, rated_pressure(valve, *problem.carried))
 
 
 def try_pressures(trials: Trials, valve: Part) -> Pressures:
