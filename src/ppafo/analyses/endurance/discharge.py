@@ -45,13 +45,13 @@ class Ending:
     usable_when_warm: float
 
 
-def reserve(bottle: Bottle, draw: Draw, pressure: float, temperature: float) -> float:
-    """Return the margin of a bottle at its largest flow, as a fraction: below 0 the supply pressure is lost.
+def reserves(bottle: Bottle, draw: Draw, pressure: float, temperature: float) -> tuple[float, float]:
+    """Return the margins of a bottle at its largest flow, as fractions: below 0 the supply pressure is lost.
 
-    The smaller of two: pressure above what the regulator needs, and flow above the largest one.
+    First the pressure above what the regulator needs, then the flow that it would pass above the largest one.
     """
     to_spare = pressure_reserve(bottle.regulator, pressure, draw.peak_flow) / bottle.regulator.set_pressure
-    return min(to_spare, flow_limit(bottle, pressure, temperature) / draw.peak_flow - 1.0)
+    return to_spare, flow_limit(bottle, pressure, temperature) / draw.peak_flow - 1.0
 
 
 def flow_limit(bottle: Bottle, pressure: float, temperature: float) -> float:
@@ -68,7 +68,7 @@ def smallest_mass_when_warm(bottle: Bottle, draw: Draw) -> float:
     for _ in range(60):
         middle = 0.5 * (low + high)
         pressure = bottle_content(table, middle, bottle.volume, room).pressure
-        if reserve(bottle, draw, pressure, room) < 0.0:
+        if min(reserves(bottle, draw, pressure, room)) < 0.0:
             low = middle
         else:
             high = middle
@@ -90,9 +90,9 @@ def ending(bottle: Bottle, draw: Draw, mass: float, content: BottleContent, stop
     if stopped_by == "frozen":
         cold = "the liquid begins to freeze (dry ice)" if has_liquid(bottle.fluid.table) else "the gas is too cold"
         return Ending("frozen", f"{cold}, and the property table ends here; {left}, {warm}", mass, usable)
-    to_spare = pressure_reserve(bottle.regulator, content.pressure, draw.peak_flow) / bottle.regulator.set_pressure
-    # Both reserves are fractions, so that the smaller one says what went short first.
-    is_pressure = to_spare <= flow_limit(bottle, content.pressure, content.temperature) / draw.peak_flow - 1.0
+    of_pressure, of_flow = reserves(bottle, draw, content.pressure, content.temperature)
+    # Both are fractions, so that the smaller one says what went short first.
+    is_pressure = of_pressure <= of_flow
     short = "maintain the supply pressure" if is_pressure else "drive the largest flow through the regulator"
     why = f"its pressure is too low to {short}"
     # What a warm bottle would still give decides between the two: cold is mended by waiting, empty is not.
@@ -177,7 +177,7 @@ def discharge(bottle: Bottle, draw: Draw, schedule: Schedule) -> Discharge:
     """
     check_schedule(schedule)
     content = bottle_content(bottle.fluid.table, bottle.mass, bottle.volume, bottle.room_temperature)
-    if reserve(bottle, draw, content.pressure, content.temperature) <= 0.0:
+    if min(reserves(bottle, draw, content.pressure, content.temperature)) <= 0.0:
         most = flow_limit(bottle, content.pressure, content.temperature) * GRAMS_PER_KILOGRAM
         raise ParameterError(
             f"even the full bottle cannot maintain the supply pressure at the largest flow, "
@@ -285,7 +285,7 @@ def solve_stretch(bottle: Bottle, draw: Draw, start: float, end: float, values: 
 
     def to_spare(_time: float, y: Floats) -> float:
         content = content_of(bottle, float(y[0]), float(y[1]))
-        return reserve(bottle, draw, content.pressure, content.temperature)
+        return min(reserves(bottle, draw, content.pressure, content.temperature))
 
     # A stretch may begin without a reserve, and the solver finds crossings only.
     if walking and to_spare(start, values) <= 0.0:

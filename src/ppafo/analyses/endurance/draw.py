@@ -99,8 +99,7 @@ def largest_flow(recording: Recording) -> float:
     starts = recording.time[recording.time <= recording.time[-1] - window]
     # The last window need not begin at a sample.
     starts = np.append(starts, recording.time[-1] - window)
-    ends = np.interp(starts + window, recording.time, _gas_use(recording))
-    begins = np.interp(starts, recording.time, _gas_use(recording))
+    begins, ends = (np.interp(times, recording.time, _gas_use(recording)) for times in (starts, starts + window))
     return float(np.max(ends - begins) / window)
 
 
@@ -137,11 +136,6 @@ def walk_gas(result: WalkResult) -> WalkGas:
     )
 
 
-def is_walk_folder(path: Path) -> bool:
-    """Return True for a folder that ``ppafo walk`` wrote for one wearer."""
-    return path.is_dir() and (path / WALK_FILE).is_file()
-
-
 def read_walk_gas(folder: Path) -> WalkGas:
     """Return the gas of a walk from the folder that ``ppafo walk`` wrote; DataError where it says too little."""
     path = folder / WALK_FILE
@@ -165,9 +159,12 @@ def read_walk_gas(folder: Path) -> WalkGas:
     gas = _number(document, f"metrics.{key}.value", path, -_LEAST) if has_gas else 0.0
     time = "configuration.gait.stride_time" if sequence is None else "metrics.task_sequence_time.value"
     stride_time = _number(document, time, path, 0.0)
+    recording = read_recording(folder)
+    if "supplied_mass" not in recording:
+        raise DataError(f"{recording.label}: has no channel 'supplied_mass'; write the walk again")
     return WalkGas(
         str(configuration.get("name", folder.name)),
-        _recording(folder),
+        recording,
         gas,
         stride_time,
         "" if sequence is None else str(sequence.get("name", "task sequence")),
@@ -186,13 +183,6 @@ def _walked(configuration: Mapping[str, Any], file: Path) -> Scenario | None:
             raise DataError("'configuration' says no walk")
         folder = Path() if given is None else Path(given).parent
         return scenario_of(ScenarioRequest(name, given, folder, content, tuple(map(str, overrides))), WALKING)
-
-
-def _recording(folder: Path) -> Recording:
-    recording = read_recording(folder)
-    if "supplied_mass" not in recording:
-        raise DataError(f"{recording.label}: has no channel 'supplied_mass'; write the walk again")
-    return recording
 
 
 def _table(document: Mapping[str, Any], name: str, file: Path) -> Mapping[str, Any]:

@@ -7,12 +7,12 @@ from pathlib import Path
 from ppafo.analyses.endurance.answer import Endurance, Endurances, finding_of, finding_of_several
 from ppafo.analyses.endurance.discharge import check_schedule, discharge, discharge_of_life, smallest_mass_when_warm
 from ppafo.analyses.endurance.draw import (
+    WALK_FILE,
     Draw,
     WalkGas,
     draw_of_numbers,
     draw_of_recording,
     draw_of_walk,
-    is_walk_folder,
     read_walk_gas,
     walk_gas,
 )
@@ -76,7 +76,8 @@ def endurance(
     found = {}
     for name, use in uses.items():
         gas = walk_gas(use) if isinstance(use, WalkResult) else None
-        if isinstance(use, str | Path) and is_walk_folder(Path(use)):
+        # The folder that a walk of one wearer was written into.
+        if isinstance(use, str | Path) and (Path(use) / WALK_FILE).is_file():
             gas = read_walk_gas(Path(use))
         if gas is None:
             full = load_bottle(named, changed)

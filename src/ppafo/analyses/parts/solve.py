@@ -1,5 +1,6 @@
-"""Real parts of a catalogue, listed with the origin of every figure; what other analyses say of doubtful figures."""
+"""Real parts of a catalogue, listed with the origin of every figure; what other analyses say of parts."""
 
+import math
 import textwrap
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -120,6 +121,11 @@ def doubts_data(doubtful: Iterable[tuple[Part, str]]) -> list[dict[str, Any]]:
     return [
         {"part": part.name, "figure": name, **part.figures[name].model_dump(mode="json")} for part, name in doubtful
     ]
+
+
+def rated_pressure(*parts: Part) -> float:
+    """Return the highest pressure [Pa absolute] that all of some parts are made for; infinite where none states one."""
+    return min(part.values.get("largest_pressure", math.inf) for part in parts)
 
 
 def part_titles(parts: Iterable[Part]) -> finding.Part:

@@ -10,8 +10,8 @@ from functools import cache
 from ppafo.errors import DataError, SimulationError
 from ppafo.identification.bench import BenchResult, FreeDecaySettings, free_decay, static_torque
 from ppafo.identification.source import Source
-from ppafo.parameters import ParameterSet, load_device, load_parameter_set
 from ppafo.parameters import apply_overrides as apply_to_set
+from ppafo.parameters import load_device, load_parameter_set
 from ppafo.parameters.parameter_set import SOURCE as OVERRIDE
 from ppafo.parameters.parameter_set import number_text
 from ppafo.rig import record
@@ -48,18 +48,24 @@ def assumed_values(scenarios: Mapping[str, Scenario]) -> tuple[AssumedValue, ...
     """Return what the scenarios rest on, by the name that a reader knows them by; the same value is listed once."""
     merged: dict[tuple[str, str, str], AssumedValue] = {}
     for name, scenario in scenarios.items():
-        changed = apply_overrides(scenario.origin.content, scenario.origin.overrides, scenario.name)
         origin = scenario.origin
+        changed = apply_overrides(origin.content, origin.overrides, scenario.name)
         written = origin.content["device"].get("overrides", ())
         of_file = apply_to_set(load_parameter_set(origin.parameter_set), written, origin.valve)
-        in_force = apply_to_set(of_file, changed.device, scenario.origin.valve)
+        in_force = apply_to_set(of_file, changed.device, origin.valve)
         summaries = {path: quantity.summary for path, quantity in quantities(changed.document).items()}
         summaries |= {path: quantity.summary for path, quantity in in_force.declarations().items()}
         own = [
             AssumedValue(item.path, summaries.get(item.path, ""), item.value, "assumed", item.note, "", (name,))
             for item in scenario.assumptions
         ]
-        settled = {item.path for item in own} | _without_effect(scenario, in_force)
+        settled = {item.path for item in own}
+        # Reported results are what a run is compared with; of two valves one is in the device.
+        settled |= {path for path in in_force.numbers if path.startswith("reported.")}
+        valve = f"valves.{origin.valve}."
+        settled |= {path for path in in_force.numbers if path.startswith("valves.") and not path.startswith(valve)}
+        if isinstance(scenario.motion, PrescribedMotion):
+            settled |= _ONLY_FOR_A_FREE_VANE
         for path, entry in in_force.numbers.items():
             is_set_here = entry.source == OVERRIDE
             of_the_file = is_set_here and of_file.numbers.get(path) == entry
@@ -73,15 +79,6 @@ def assumed_values(scenarios: Mapping[str, Scenario]) -> tuple[AssumedValue, ...
             earlier = merged.get(key)
             merged[key] = value if earlier is None else replace(earlier, used_by=(*earlier.used_by, name))
     return tuple(merged.values())
-
-
-def _without_effect(scenario: Scenario, parameter_set: ParameterSet) -> set[str]:
-    """Return the paths of the set that the run does not use."""
-    # Reported results are what a run is compared with; of two valves one is in the device.
-    reported = {path for path in parameter_set.numbers if path.startswith("reported.")}
-    valve = f"valves.{scenario.origin.valve}."
-    others = {path for path in parameter_set.numbers if path.startswith("valves.") and not path.startswith(valve)}
-    return reported | others | (_ONLY_FOR_A_FREE_VANE if isinstance(scenario.motion, PrescribedMotion) else frozenset())
 
 
 PLANTED_SET = "ppafo2011"
@@ -128,8 +125,7 @@ def synthetic_evidence(
             torque=torque,
             decay=decay,
             step=record("step-response", BENCH_PRESET, RIG_SEED, PLANTED_SET, step_overrides).recording,
-            solenoid=recorded["solenoid"],
-            proportional=recorded["proportional"],
+            **recorded,
         )
     # No claim rests on a recording: without them the figures show less, and the report says why.
     except (SimulationError, DataError) as error:

@@ -38,11 +38,6 @@ class PhasedRuns:
     errors: Floats
     gas: Floats
 
-    @property
-    def count(self) -> int:
-        """How many runs."""
-        return self.errors.size
-
 
 def phased_runs(solenoid: Result) -> PhasedRuns:
     """Return the pair's task with its decisions at each phase; its own run alone where the task has no such phase.
@@ -117,7 +112,7 @@ def torque_task_claims(runs: PhasedRuns, proportional: Result, rests_on: tuple[s
     """
     error = proportional.metrics["rms_error"].value
     gas = GRAMS_PER_KILOGRAM * proportional.metrics["gas_supplied"].value
-    over = f"Median and range of {runs.count} runs over the unknown phase of the decisions, either valve first."
+    over = f"Median and range of {runs.errors.size} runs over the unknown phase of the decisions, either valve first."
 
     def claim(identifier: str, values: Floats, decimals: int, note: str) -> Claim:
         entry = paper_entries()[identifier]

@@ -31,7 +31,7 @@ def audited(
         with refused_as(ParameterError, "--parent" if parent else f"{one.file}: parent", ParameterError):
             parents.append(load_parameter_set(parent or one.parent) if parent or one.parent else None)
     found = [(one, audit(one, other)) for one, other in zip(sets, parents, strict=True)]
-    documents = [
+    documents: list[dict[str, Any]] = [
         {
             "set": one.name,
             "overrides": list(overrides),
@@ -46,7 +46,13 @@ def audited(
     is_one = len(found) == 1
     if is_one:
         changed = changed_paths(sets[0], parents[0]) if compares and not is_whole else None
-        parts = [*_changes(documents[0]), *_parts(*found[0], changed)]
+        parts = _parts(*found[0], changed)
+        if parents[0] is not None:
+            name, parent, values = sets[0].name, parents[0].name, documents[0]["changes"]
+            count = f"{len(values)} value{'' if len(values) == 1 else 's'}" if values else "nothing"
+            rows = [(one["path"], one["before"] or None, one["after"] or None, one["origin"]) for one in values]
+            said = f"{name} changes {count} of its parent {parent}"
+            parts.insert(0, Part(said=[said], columns=columns_of(("value", parent, name, "origin"), rows), left=4))
     else:
         # A row for each finding and a column for each set, with how serious it is there.
         verdicts = [{one.id: "accepted" if one.accepted else one.severity for one in findings} for _, findings in found]
@@ -64,17 +70,6 @@ def audited(
         kind="measured",
         command="sets audit",
     )
-
-
-def _changes(document: dict[str, Any]) -> list[Part]:
-    """Return what a set changes of its parent, nothing without one."""
-    name, parent, changed = document["set"], document["parent"], document["changes"]
-    if parent is None:
-        return []
-    count = f"{len(changed)} value{'' if len(changed) == 1 else 's'}" if changed else "nothing"
-    rows = [(one["path"], one["before"] or None, one["after"] or None, one["origin"]) for one in changed]
-    heads = ("value", parent, name, "origin")
-    return [Part(said=[f"{name} changes {count} of its parent {parent}"], columns=columns_of(heads, rows), left=4)]
 
 
 def _counts(findings: list[Finding]) -> dict[str, int]:

@@ -11,6 +11,7 @@ from ppafo.errors import StudyError, nearest_name
 from ppafo.signals.recording import CHANNELS
 from ppafo.storage.parquet import as_numpy, column_names, matrix_of, read_parquet
 from ppafo.storage.places import Place
+from ppafo.study.runs import joined
 from ppafo.study.store import chunk_file, stored_rows, trace_column
 
 if TYPE_CHECKING:
@@ -73,8 +74,7 @@ class StudyResults:
             first = chunk_file(0)
             traces = {trace_column(name) for name in CHANNELS}
             columns = [name for name in column_names(self.place.open(first), first) if name not in traces]
-        parts = [as_numpy(part) for part in self.chunks(columns)]
-        return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+        return joined([as_numpy(part) for part in self.chunks(columns)])
 
     def by_configuration(self, column: str) -> dict[str, np.ndarray[Any, Any]]:
         """Return a column of all runs, by name of the configuration; runs of the same place got the same draw."""

@@ -40,7 +40,7 @@ from ppafo.studies.loading import list_studies, load_study
 from ppafo.studies.study import Study
 from ppafo.study.blocks import chunk_count, samples_of
 from ppafo.study.manifest import read_manifest
-from ppafo.study.runs import Tally
+from ppafo.study.runs import Tally, joined
 from ppafo.study.store import (
     STATUSES,
     Finished,
@@ -113,18 +113,16 @@ def bands_file(study: Study, results: StudyResults) -> bytes:
                     **{f"q{fraction:g}": level for fraction, level in zip(fractions, levels, strict=True)},
                 }
             )
-    joined = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    rows = joined(parts)
     units = {stored_unit(CHANNELS[name].unit) for name in study.outputs.bands}
     unit = units.pop() if len(units) == 1 else "SI unit of the channel"
     names = [item.name for item in study.configurations]
     columns = {
-        "configuration": TableColumn(
-            encode_texts(joined.pop("configuration"), names), "-", "name of the base scenario"
-        ),
-        "channel": TableColumn(encode_texts(joined.pop("channel"), study.outputs.bands), "-", "name of the channel"),
-        "time": TableColumn(joined.pop("time"), "s", "time since the start"),
-        "runs": TableColumn(joined.pop("runs"), "-", "completed runs, without a fall so far"),
-        **{name: TableColumn(values, unit, "quantile over runs") for name, values in joined.items()},
+        "configuration": TableColumn(encode_texts(rows.pop("configuration"), names), "-", "name of the base scenario"),
+        "channel": TableColumn(encode_texts(rows.pop("channel"), study.outputs.bands), "-", "name of the channel"),
+        "time": TableColumn(rows.pop("time"), "s", "time since the start"),
+        "runs": TableColumn(rows.pop("runs"), "-", "completed runs, without a fall so far"),
+        **{name: TableColumn(values, unit, "quantile over runs") for name, values in rows.items()},
     }
     return parquet_bytes(table_of(columns, {"study": study.name}))
 

@@ -254,33 +254,29 @@ def load_tuning(tuning: str | Path | Mapping[str, Any], overrides: Sequence[str]
     document, source = read_source(TUNING, tuning)
     parsed = validate(TuningFile, document, source.file, StudyError)
     with refused_as(StudyError, source.file, ScenarioError, ParameterError, StudyError):
-        return _problem(parsed, source.folder, overrides)
-
-
-def _problem(parsed: TuningFile, folder: Path, overrides: Sequence[str]) -> Problem:
-    scenario = load_scenario(placed(parsed.scenario, folder), parsed.overrides)
-    scenario = reloaded(scenario, overrides) if overrides else scenario
-    metrics = [*(item.metric for item in parsed.objective), *(item.metric for item in parsed.constraints)]
-    check_metrics(list(dict.fromkeys(metrics)), scenario)
-    paths = [item.path for item in parsed.search]
-    spread = _spread(parsed, folder, paths, scenario)
-    drawn = () if spread is None else (*spread.uncertainty.paths, *spread.uncertainty.same)
-    repeated = first_twice(paths)
-    if repeated is not None:
-        raise StudyError(f"'{repeated}' is searched twice; give it only one [[search]]")
-    varies = ATMOSPHERE_PATH in (*paths, *drawn)
-    atmosphere = atmosphere_of(scenario, (*drawn, *paths))
-    return Problem(
-        name=parsed.name,
-        description=" ".join(parsed.description.split()),
-        scenario=scenario,
-        overrides=scenario.origin.overrides,
-        searched=tuple(_searched(item, scenario, varies) for item in parsed.search),
-        goals=tuple(_goal(item) for item in parsed.objective),
-        constraints=tuple(_constraint(item, atmosphere) for item in parsed.constraints),
-        spread=spread,
-        effort=parsed.effort,
-    )
+        scenario = load_scenario(placed(parsed.scenario, source.folder), parsed.overrides)
+        scenario = reloaded(scenario, overrides) if overrides else scenario
+        metrics = [*(item.metric for item in parsed.objective), *(item.metric for item in parsed.constraints)]
+        check_metrics(list(dict.fromkeys(metrics)), scenario)
+        paths = [item.path for item in parsed.search]
+        spread = _spread(parsed, source.folder, paths, scenario)
+        drawn = () if spread is None else (*spread.uncertainty.paths, *spread.uncertainty.same)
+        repeated = first_twice(paths)
+        if repeated is not None:
+            raise StudyError(f"'{repeated}' is searched twice; give it only one [[search]]")
+        varies = ATMOSPHERE_PATH in (*paths, *drawn)
+        atmosphere = atmosphere_of(scenario, (*drawn, *paths))
+        return Problem(
+            name=parsed.name,
+            description=" ".join(parsed.description.split()),
+            scenario=scenario,
+            overrides=scenario.origin.overrides,
+            searched=tuple(_searched(item, scenario, varies) for item in parsed.search),
+            goals=tuple(_goal(item) for item in parsed.objective),
+            constraints=tuple(_constraint(item, atmosphere) for item in parsed.constraints),
+            spread=spread,
+            effort=parsed.effort,
+        )
 
 
 def _searched(item: SearchRange, scenario: Scenario, atmosphere_varies: bool) -> Searched:

@@ -1,6 +1,6 @@
 """A walk of one wearer with and without the device, or of many wearers, in words, tables and figures."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -147,7 +147,7 @@ def wearers_csv(population: Population) -> bytes:
     """Return one line for each wearer, in SI units."""
     columns = {f"{name} [{item.unit}]": population.traits[name] for name, item in TRAITS.items()}
     columns |= {f"{name} [{item.unit}]": population.outcomes[name] for name, item in OUTCOMES.items()}
-    return csv_of({head: values.tolist() for head, values in columns.items()})
+    return csv_of(columns)
 
 
 def quantiles(table: Mapping[str, Floats], numbers: Mapping[str, Number]) -> dict[str, dict[str, object]]:
@@ -315,7 +315,7 @@ def strides_csv(result: WalkResult) -> bytes:
     columns = {"stride [-]": np.arange(1.0, count + 1.0), "start [s]": result.recording.time[result.starts[:count]]}
     columns |= {f"{name} [{item.unit}]": result.strides[name] for name, item in PER_STRIDE.items()}
     columns["helped [-]"] = result.helped.astype(np.float64)
-    return csv_of({head: values.tolist() for head, values in columns.items()})
+    return csv_of(columns)
 
 
 def mean_stride_csv(result: WalkResult) -> bytes:
@@ -325,7 +325,7 @@ def mean_stride_csv(result: WalkResult) -> bytes:
     for name, curves in result.averages.items():
         columns[f"{name} [{curves.unit}]"] = curves.mean
         columns[f"{name}_deviation [{curves.unit}]"] = curves.deviation
-    return csv_of({head: values.tolist() for head, values in columns.items()})
+    return csv_of(columns)
 
 
 _LONG = 12.0
@@ -357,9 +357,9 @@ def walk_with_and_without(
         chosen = load_walk(chosen, overrides, gait, task_sequence, bottle)
     report = progress or report_nothing
     if wearers is not None:
-        advance = _reporter(report, "walking", "wearers", 0.0)
+        advance = _reporter(report, "wearers", 0.0)
         return wearers_finding(walk_population(chosen, minutes, wearers, seed, advance))
-    comparison = compare_walks(chosen, minutes, _reporter(report, "walking", "min", _LONG))
+    comparison = compare_walks(chosen, minutes, _reporter(report, "min", _LONG))
     found: Finding[Any] = kind_at(walk_of(comparison.with_device.scenario).who.finding)(comparison)
     return found
 
@@ -386,9 +386,9 @@ def default_folder(values: Mapping[str, Any]) -> Path:
     return Path("out") / f"{'walk' if values['wearers'] is None else 'wearers'}-{configuration.name}{along}"
 
 
-def _reporter(report: Report, activity: str, noun: str, above: float) -> "Any":
+def _reporter(report: Report, noun: str, above: float) -> Callable[[float, float], None]:
     def forward(done: float, total: float) -> None:
         if total > above:
-            report(Progress(activity, round(done), round(total), noun=noun))
+            report(Progress("walking", round(done), round(total), noun=noun))
 
     return forward

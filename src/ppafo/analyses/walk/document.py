@@ -103,8 +103,9 @@ def metrics_table(rows: Sequence[Row], columns: Sequence[tuple[str, Mapping[str,
 def csv_of(columns: Mapping[str, Iterable[Any]]) -> bytes:
     """Return simulated columns as comma-separated text; a cell is empty where there is nothing to say."""
     lines = ["# simulated: a model's own output, not measured", ",".join(columns)]
+    cells = (values.tolist() if isinstance(values, np.ndarray) else values for values in columns.values())
     lines += [
         ",".join("" if cell is None else cell if isinstance(cell, str) else repr(cell) for cell in row)
-        for row in zip(*columns.values(), strict=True)
+        for row in zip(*cells, strict=True)
     ]
     return ("\n".join(lines) + "\n").encode()

@@ -29,6 +29,7 @@ from ppafo.analyses.design.front.search import (
     search_front,
 )
 from ppafo.analyses.design.trials import STREAMS, run_trials
+from ppafo.analyses.parts.solve import rated_pressure
 from ppafo.errors import ScenarioError, StudyError
 from ppafo.parameters.graph import ATMOSPHERE_PATH, PRESSURE_PATH, SECOND_PRESSURE_PATH
 from ppafo.parameters.overrides import over
@@ -133,13 +134,7 @@ class Evaluation:
         # By what fraction (candidates,) the highest supply pressure is above what the parts are made for.
         problem = self.problem
         ratings = np.array(
-            [
-                min(
-                    part.values.get("largest_pressure", np.inf)
-                    for part in (item.valve, item.actuator, *problem.carried)
-                )
-                for item in problem.combinations
-            ]
+            [rated_pressure(item.valve, item.actuator, *problem.carried) for item in problem.combinations]
         )[candidates.choice]
         chosen = values_of(problem, candidates)
         highest = np.zeros(len(candidates))

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ppafo.analyses.design.profile.problem import SizingProblem
 from ppafo.analyses.design.trials import STREAMS, run_trials
+from ppafo.analyses.parts.solve import rated_pressure
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.errors import StudyError
 from ppafo.parameters.parts import Part
@@ -78,11 +79,6 @@ class Pressures:
     def first(self) -> int | None:
         """Place of the lowest pressure that works, None where none does."""
         return int(self.works.argmax()) if self.works.any() else None
-
-    @property
-    def below(self) -> float | None:
-        """The highest pressure below the lowest that works; None where none works or none below was tried."""
-        return float(self.pressure[self.first - 1]) if self.first else None
 
     @property
     def fails_above(self) -> float | None:
@@ -157,8 +153,7 @@ class Trials:
 
 def highest_pressure(problem: SizingProblem, valve: Part) -> float:
     """Return the highest pressure [Pa absolute] to try: the file's, or what the parts are made for."""
-    parts = (valve, *problem.carried)
-    return min([problem.highest_pressure, *(part.values.get("largest_pressure", np.inf) for part in parts)])
+    return min(problem.highest_pressure, rated_pressure(valve, *problem.carried))
 
 
 def try_pressures(trials: Trials, valve: Part) -> Pressures:
@@ -199,7 +194,8 @@ def limit_of(trials: Trials, valve: Part, tried: Pressures) -> Limit:
     half way between the two (between that one and the highest where none works): where one works, the flow limits.
     """
     problem = trials.problem
-    if tried.first is not None and tried.below is None:
+    # The lowest of all that were tried.
+    if tried.first == 0:
         return "pressure"
     atmosphere, alone = problem.scenario.device.supply.atmospheric_pressure, ceiling_pressure(problem)
     reached = float(tried.pressure[-1 if tried.first is None else tried.first])

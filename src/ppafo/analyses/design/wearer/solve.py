@@ -16,7 +16,7 @@ import numpy as np
 from ppafo.analyses.design.wearer.electrical import Electrical, electrical_of, electrical_sentences
 from ppafo.analyses.endurance.answer import Endurance
 from ppafo.analyses.endurance.solve import endurance_of_walk
-from ppafo.analyses.parts.solve import doubts_data, part_titles, parts_to_check
+from ppafo.analyses.parts.solve import doubts_data, part_titles, parts_to_check, rated_pressure
 from ppafo.constants import PASCALS_PER_PSI, STANDARD_ATMOSPHERE
 from ppafo.control.walking.assistance import ASSISTANCE_QUANTITIES
 from ppafo.errors import ScenarioError, StudyError
@@ -203,7 +203,7 @@ def size_for_wearer(wish: Wish, report: Report) -> WearerSizing:
         for valve in catalogue.groups["valves"].values()
         for actuator in catalogue.groups["actuators"].values()
         # A part without a largest pressure in the catalogue is not left out.
-        if all(part.values.get("largest_pressure", np.inf) >= wish.pressure for part in (valve, actuator))
+        if rated_pressure(valve, actuator) >= wish.pressure
     ]
     tried: list[Tried] = []
     for place, (valve, actuator) in enumerate(pairs):
@@ -426,7 +426,7 @@ def _at_more_pressure(wish: Wish, tried: list[Tried]) -> Iterator[tuple[Wish, Tr
     for more in _MORE_PRESSURE:
         asked = wish.at_gauge(more)
         for one in strongest:
-            if min(part.values.get("largest_pressure", np.inf) for part in (one.valve, one.actuator)) < asked.pressure:
+            if rated_pressure(one.valve, one.actuator) < asked.pressure:
                 continue
             for again in _few_strides(asked, one.valve, one.actuator):
                 if again.torque >= wish.torque:
