@@ -1,23 +1,24 @@
 """The mean stride of walks beside the healthy gait: ankle, torques, pressures and toes, mean with band."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from ppafo.gait.gait import clinical_angle
+from ppafo.metrics import Metric
 from ppafo.report.kind import Kind
 from ppafo.report.panels import Mark, Panel, draw_panels
 from ppafo.report.style import BLACK, BLUE, GREY, VERMILION
+from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
+from ppafo.simulation.scenario import Scenario
 from ppafo.walking.motion import walk_of
-from ppafo.walking.strides import PHASES, healthy_toe_height
+from ppafo.walking.strides import PHASES, Curves, healthy_toe_height
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-    from ppafo.walking.result import WalkResult
 
 WITH, WITHOUT, HEALTHY = BLUE, VERMILION, BLACK
 STANCE = "#f1f1f1"
@@ -35,7 +36,27 @@ _CHANNELS = {
 """Panels from top to bottom, and the channels in each of them that are drawn for every walk."""
 
 
-def walk_figure(walks: "Mapping[str, WalkResult]") -> "Figure":
+class Strides(Protocol):
+    """What is drawn of a walk."""
+
+    @property
+    def scenario(self) -> Scenario:
+        """Who walks with what."""
+
+    @property
+    def recording(self) -> Recording:
+        """Every sample."""
+
+    @property
+    def averages(self) -> Mapping[str, Curves]:
+        """Mean and deviation of each channel over the stride."""
+
+    @property
+    def metrics(self) -> Mapping[str, Metric]:
+        """Numbers of the whole walk."""
+
+
+def walk_figure(walks: Mapping[str, Strides]) -> "Figure":
     """Return the mean stride of one or two walks of the same wearer by name, and the healthy gait beside them."""
     first = next(iter(walks.values()))
     gait = walk_of(first.scenario).gait
