@@ -577,6 +577,7 @@ def _conflict(work: _Work, rows: Floats, point: Floats, free: Mask, freedom: flo
     prior, shift = np.square(work.prior[free]), (point - work.mean)[free]
     root, seen = _root_of_inverse(slopes.T @ slopes + np.diag(prior))
     root = root[:, seen]
+    variance = np.square(root).sum(axis=1)
     groups, found = list(_groups(work)), None
     names = np.array([one.name for one in work.numbers])[free]
     count_of_tests = len(groups) + int((prior > 0.0).sum())
@@ -596,11 +597,11 @@ def _conflict(work: _Work, rows: Floats, point: Floats, free: Mask, freedom: flo
         if p < _SIGNIFICANCE and (found is None or p < found.p):
             moved = np.abs(axes @ (along / alone))
             spread = np.sqrt(np.square(axes) @ (1.0 / alone - 1.0))
-            ratio = moved / np.maximum(spread, 1.0e-300)
-            most = int(np.argmax(ratio))
-            found = Conflict(group=name, number=str(names[most]), standard_errors=float(ratio[most]), p=p)
+            # A number of which the group says nothing moves by rounding alone. Along one direction all part as far.
+            ratios = np.where(spread > 1.0e-6 * np.sqrt(variance), moved / np.maximum(spread, 1.0e-300), 0.0)
+            most = int(np.argmax(ratios > (1.0 - 1.0e-6) * ratios.max()))
+            found = Conflict(group=name, number=str(names[most]), standard_errors=float(ratios[most]), p=p)
     # What is stated of a tolerance is a group of its own: its mean parts from the fit by deviation^2 - C.
-    variance = np.square(root).sum(axis=1)
     own_variance = 1.0 / np.maximum(prior, 1.0e-300) - variance
     for place in np.flatnonzero((prior > 0.0) & (own_variance >= _PARTING * variance)).tolist():
         ratio = abs(float(shift[place])) / math.sqrt(float(own_variance[place]))

@@ -161,7 +161,7 @@ def test_a_task_sequence_writes_its_segments_and_its_figure(tmp_path: Path, caps
     assert "stairs, 0.6 m/s" in out
     assert "as far as walked" in out, "0.3 min are a part of the task sequence"
     assert "is scaled to 0.6, 0.8 m/s: beyond 1.06 to 1.6 m/s" in out
-    assert {"task_sequence.png", "task_sequence.svg", "segments.csv", "segments-off.csv"} <= set(names(folder))
+    assert {"task-sequence.png", "task-sequence.svg", "segments.csv", "segments-off.csv"} <= set(names(folder))
     assert "legs.png" not in names(folder)
     document = json.loads((folder / "walk.json").read_text())
     assert document["task_sequence"] == "stairs"
@@ -176,7 +176,7 @@ def test_a_bottle_repeats_a_task_sequence_as_a_whole(tmp_path: Path, capsys: pyt
     assert main(["walk", "solenoid", "--task-sequence", "stairs", "--out", str(folder)]) == 0
     capsys.readouterr()
     assert main(["bottle", str(folder), "--longest", "5 s"]) == 0
-    assert "walk 'solenoid' on task sequence 'stairs'" in capsys.readouterr().out
+    assert "walk 'solenoid' in task sequence 'stairs'" in capsys.readouterr().out
 
 
 def test_the_schema_of_a_walk_file_is_published(capsys: pytest.CaptureFixture[str]) -> None:
