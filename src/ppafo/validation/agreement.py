@@ -320,7 +320,7 @@ def _remarks(measured: Measured, device: Device, settings: ReplaySettings) -> tu
     if not measured.has(SUPPLY):
         # Said as values, for they may be the set's or given in its place.
         used = {"supply.pressure": device.supply.pressure}
-        if not (measured.has(DORSIFLEXION_SUPPLY) or device.supply.has_one_pressure):
+        if settings.volume is None and not (measured.has(DORSIFLEXION_SUPPLY) or device.supply.has_one_pressure):
             used["supply.dorsiflexion_pressure"] = device.supply.dorsiflexion_pressure
         room = device.supply.atmospheric_pressure
         shown = [f"{path} = {from_si(value, 'psi_g', 'Pa_a', room):.4g} psi_g" for path, value in used.items()]
