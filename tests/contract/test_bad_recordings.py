@@ -3,6 +3,7 @@
 A refusal is one line with the file, the column and the line or sample, exit code 2. A flag is a note or a failed check.
 """
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -171,12 +172,14 @@ def run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Run:
 
 
 BOTH = [False, True]
+UNIT = re.compile(r"UNIT (\w+) (.+)")
+UNIT_IN_MAP, UNIT_IN_HEADER = r"channel '\1', unit = '\2'", r"column '\1 [\2]'"
 REFUSED = {
     "missing column": ("identify", without("angle"), ["angle"]),
     "missing command": ("validate", without("pressure_2"), ["pressure_2"]),
-    "unit": ("identify", in_unit("angle", "N m"), ["angle [N m]", "an angle is needed"]),
-    "unit of a pressure": ("validate", in_unit("pressure_1", "psi"), ["pressure_1 [psi]", "psi_g"]),
-    "unit of an angle": ("validate", in_unit("angle", "kg"), ["angle [kg]", "an angle is needed"]),
+    "unit": ("identify", in_unit("angle", "N m"), ["UNIT angle N m", "an angle is needed"]),
+    "unit of a pressure": ("validate", in_unit("pressure_1", "psi"), ["UNIT pressure_1 psi", "psi_g"]),
+    "unit of an angle": ("validate", in_unit("angle", "kg"), ["UNIT angle kg", "an angle is needed"]),
     "gap": ("identify", gap, ["gap of 90.01 s", f"sample {AT}"]),
     "gap in a step": ("validate", gap, ["gap of 90 s", f"sample {AT}"]),
     "NaN": ("identify", with_value("angle", np.nan), ["LINE", "column", "'nan'"]),
@@ -211,7 +214,9 @@ def test_a_fault_is_refused_in_one_line_that_names_its_place(run: Run, fault: st
     assert len(lines) == 1
     assert "bench.csv: " in lines[0]
     wanted = [word.replace("LINE", f"line {AT + ran.first_line}") for word in words]
+    wanted = [UNIT.sub(UNIT_IN_MAP if through_map else UNIT_IN_HEADER, word) for word in wanted]
     assert all(word in lines[0] for word in wanted), lines[0]
+    assert not (through_map and "UNIT" in words[0]) or ".toml" in lines[0]
 
 
 @pytest.mark.parametrize("through_map", BOTH, ids=["header", "column map"])

@@ -100,16 +100,15 @@ def check_clock(time: Floats, lines: Sequence[int]) -> None:
 def in_si(column: Column, values: Floats, atmosphere: float) -> Floats:
     """Return the values in the unit in which a recording keeps them; gauge counts from ``atmosphere`` [Pa absolute].
 
-    DataError for a unit that does not fit.
+    UnitError for a unit that does not fit.
     """
     from ppafo.units import check_unit, to_si
 
-    with refused_as(DataError, f"column '{column.name} [{column.unit}]'", UnitError):
-        if column.unit != column.si_unit:
-            given, wanted = (_SPELT.get(unit, unit) for unit in (column.unit, column.si_unit))
-            return np.array([to_si(value, given, wanted, atmosphere) for value in values.tolist()])
-        if column.name not in CHANNELS:
-            check_unit(_SPELT.get(column.unit, column.unit))
+    if column.unit != column.si_unit:
+        given, wanted = (_SPELT.get(unit, unit) for unit in (column.unit, column.si_unit))
+        return np.array([to_si(value, given, wanted, atmosphere) for value in values.tolist()])
+    if column.name not in CHANNELS:
+        check_unit(_SPELT.get(column.unit, column.unit))
     return values
 
 
@@ -188,7 +187,10 @@ def read_csv(path: str | Path, label: str | None = None, atmosphere: float = STA
         if not len(values):
             raise DataError("has a header but no samples")
         check_clock(values[:, 0], range(first + 2, first + 2 + len(values)))
-        series = [in_si(column, values[:, index], atmosphere) for index, column in enumerate(columns)]
+        series = []
+        for index, column in enumerate(columns):
+            with refused_as(DataError, f"column '{column.name} [{column.unit}]'", UnitError):
+                series.append(in_si(column, values[:, index], atmosphere))
         named = {
             column.name: Channel(one, column.si_unit, column.between)
             for column, one in zip(columns[1:], series[1:], strict=True)

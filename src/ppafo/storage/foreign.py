@@ -8,6 +8,7 @@ import math
 import re
 from array import array
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, nullcontext
 from importlib import resources
 from itertools import chain, islice
 from pathlib import Path
@@ -118,11 +119,15 @@ _COMMENT = "#"
 
 
 def read_foreign(
-    path: str | Path, columns: ColumnMap, label: str | None = None, atmosphere: float = STANDARD_ATMOSPHERE
+    path: str | Path,
+    columns: ColumnMap,
+    label: str | None = None,
+    atmosphere: float = STANDARD_ATMOSPHERE,
+    map_name: str = "",
 ) -> Recording:
     """Return the recording in a table through a column map, in SI units; gauge counts from ``atmosphere`` [Pa abs].
 
-    DataError names the file and the column.
+    DataError names the file and the column; of a fault in the map its key, and the map where ``map_name`` says which.
     """
     content = read_bytes(path)
     with refused_as(DataError, path, DataError):
@@ -147,16 +152,22 @@ def read_foreign(
             for name, place in places.items():
                 thousands = columns.channels[name].thousands
                 numbers[name].append(_number(row[place], thousands, columns.decimal, titles[name], line))
-        channels = {
-            name: _channel(name, item, np.array(numbers.get(name, ())), len(found), atmosphere)
-            for name, item in columns.channels.items()
-        }
+        channels = {}
+        for name, item in columns.channels.items():
+            with _in_map(map_name):
+                channels[name] = _channel(name, item, np.array(numbers.get(name, ())), len(found), atmosphere)
         time = channels.pop(TIME).values
         check_clock(time, found)
         # A synthetic recording stays one through a column map.
         kind = kind_of_comments(line for line in lines if line.startswith(_COMMENT))
         recording = Recording(label or one_line(Path(path).stem), time, channels, kind)
-        return recording if columns.direction is None else _with_direction(recording, columns.direction)
+        with _in_map(map_name):
+            return recording if columns.direction is None else _with_direction(recording, columns.direction)
+
+
+def _in_map(map_name: str) -> AbstractContextManager[None]:
+    """Name the map in what is refused within a ``with`` block, if it has a name."""
+    return refused_as(DataError, f"column map {one_line(map_name)}", DataError) if map_name else nullcontext()
 
 
 def _rows(lines: list[str], columns: ColumnMap) -> tuple[list[str], list[str], Rows]:
@@ -254,15 +265,17 @@ def _channel(name: str, item: MappedChannel, numbers: Floats, count: int, atmosp
     if item.constant is not None:
         with refused_as(DataError, f"channel '{name}', constant = {item.constant!r}", UnitError):
             value, unit = split_quantity(item.constant)
-        column = Column(name, unit or PLAIN_NUMBER)
-        return Channel(in_si(column, np.full(count, value), atmosphere), column.si_unit, item.between)
-    values, unit = item.sign * (item.factor * numbers + item.offset), item.unit
+            column = Column(name, unit or PLAIN_NUMBER)
+            return Channel(in_si(column, np.full(count, value), atmosphere), column.si_unit, item.between)
+    values, unit, key = item.sign * (item.factor * numbers + item.offset), item.unit, f"unit = {item.unit!r}"
     if item.times is not None:
         with refused_as(DataError, f"channel '{name}', times = {item.times!r}", UnitError):
             multiple, times_unit = split_quantity(item.times)
         values, unit = values * multiple, f"{unit} {times_unit}".removeprefix(f"{PLAIN_NUMBER} ").strip()
+        key += f" with times = {item.times!r}"
     column = Column(name, unit)
-    return Channel(in_si(column, values, atmosphere), TIME_UNIT if name == TIME else column.si_unit, item.between)
+    with refused_as(DataError, f"channel '{name}', {key}", UnitError):
+        return Channel(in_si(column, values, atmosphere), column.si_unit, item.between)
 
 
 def _with_direction(recording: Recording, wanted: MappedDirection) -> Recording:

@@ -15,8 +15,9 @@ from ppafo.parameters.device import Device
 from ppafo.signals import Recording
 from ppafo.signals.faults import noise_of
 from ppafo.signals.recording import Floats
-from ppafo.simulation.recorded import SUPPLY, regular_interval, start_of, with_fixed_volume
+from ppafo.simulation.recorded import DORSIFLEXION_SUPPLY, SUPPLY, regular_interval, start_of, with_fixed_volume
 from ppafo.simulation.scenario import Leg
+from ppafo.units import from_si
 from ppafo.validation.measured import (
     ACCEPTABLE_FRACTION,
     ANGLE,
@@ -121,7 +122,7 @@ def estimate_delay(curves: list[Curve], limit: float) -> Delay:
 _LONGEST_WEIGHT = 3.0
 """Usual intervals for which one sample may speak at most, so that a gap does not count for what nobody measured."""
 _OTHER_SUPPLY = 0.05
-"""Fraction of the set's gauge pressure by which a recorded supply may differ before it is remarked on."""
+"""Fraction of the model's gauge pressure by which a recorded supply may differ before it is remarked on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -314,10 +315,17 @@ def _remarks(measured: Measured, device: Device, settings: ReplaySettings) -> tu
     own = device.supply.pressure - device.supply.atmospheric_pressure
     followed = supply_gauge(measured.recording, device)
     if measured.has(SUPPLY) and abs(followed - own) > _OTHER_SUPPLY * own:
-        other = f"{followed / own:.3g} times the gauge pressure of the set" if own > 0.0 else "pressure, the set's none"
-        remarks.append(f"the recorded supply has {other}; the recorded supply was used")
+        times = f"{followed / own:.3g} times the gauge pressure of" if own > 0.0 else "pressure, other than"
+        remarks.append(f"the recorded supply has {times} supply.pressure; the recorded supply was used")
     if not measured.has(SUPPLY):
-        remarks.append("the supply pressure was not recorded; the parameter set's was used")
+        # Said as values, for they may be the set's or given in its place.
+        used = {"supply.pressure": device.supply.pressure}
+        if settings.volume is None and not (measured.has(DORSIFLEXION_SUPPLY) or device.supply.has_one_pressure):
+            used["supply.dorsiflexion_pressure"] = device.supply.dorsiflexion_pressure
+        room = device.supply.atmospheric_pressure
+        shown = [f"{path} = {from_si(value, 'psi_g', 'Pa_a', room):.4g} psi_g" for path, value in used.items()]
+        verb = "was" if len(shown) == 1 else "were"
+        remarks.append(f"the supply pressure was not recorded; {' and '.join(shown)} {verb} used")
     if regular_interval(measured.recording.time) is None:
         remarks.append("samples are not regular in time; changes of the command were moved to the nearest step")
     if settings.volume is not None:

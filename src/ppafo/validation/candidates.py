@@ -231,7 +231,7 @@ def numbers(measured: Measured, device: Device, settings: ReplaySettings) -> Ite
         own = number_at(scenario, path)
         factors = tuple(one for one in _FACTORS if quantity.minimum <= one * own <= quantity.maximum)
         if own > 0.0 and len(factors) > 2:
-            words = f"{path} seems to be {{:.3g}} times the set's value"
+            words = f"{path} seems to be {{:.3g}} times the model's value"
             change = partial(_numbered, path, own)
             yield Candidate(path, words, change, factors, is_ratio=True, unit=quantity.unit or "-")
     room = device.supply.atmospheric_pressure

@@ -22,7 +22,7 @@ from ppafo.progress import Progress, Report, report_nothing
 from ppafo.signals.faults import isolated_samples
 from ppafo.signals.recording import Floats, Recording
 from ppafo.simulation.numbers import with_numbers
-from ppafo.simulation.recorded import COMMAND, samples_at_rest
+from ppafo.simulation.recorded import COMMAND, samples_at_rest, usual_interval
 from ppafo.validation.agreement import (
     ENGINE_ERROR,
     ChannelAgreement,
@@ -42,8 +42,17 @@ Flags = NDArray[np.bool_]
 ONLY_NOISE = 2.0
 """Mean square left over the noise's up to which nothing but noise is left: noise that is not white has more."""
 
-_MILLISECONDS, _LESS = 1.0e3, 0.5
-"""Rate of a clock whose milliseconds were read as seconds, and what is left of an error beyond its limit at most."""
+_TIMES = {
+    "milliseconds read as seconds": (1.0e3, "ms"),
+    "seconds read as milliseconds": (1.0e-3, "s"),
+}
+"""Rate of a clock whose times were read in a wrong unit, and the right one."""
+
+_LESS = 0.5
+"""What is left of an error beyond its limit at most, where times in another unit explain it."""
+
+_SHORT_INTERVAL = 2.0e-5
+"""Interval of samples [s] up to which times may be seconds read as milliseconds: from fifty samples a second on."""
 
 _TOGETHER = 32
 _STEPS = 2
@@ -157,9 +166,9 @@ def causes_of(
     report: Report = report_nothing,
 ) -> Causes:
     """Return what single cause explains all recordings together; none where nothing but noise is left of them."""
-    slowed = _in_milliseconds(read, agreements, device, settings)
-    if slowed is not None:
-        return Causes(slowed, None, 1)
+    other_unit = _in_other_unit(read, agreements, device, settings)
+    if other_unit is not None:
+        return Causes(other_unit, None, 1)
     records = [_record_of(*pair, device, settings) for pair in zip(read, agreements, strict=True)]
     search = _Search(device, settings, records, report)
     none = search.evaluated([Change()])[0]
@@ -200,20 +209,25 @@ def causes_of(
     return Causes() if nearest is None or is_silent else Causes(None, _cause_of([nearest], search.penalty), len(tried))
 
 
-def _in_milliseconds(
+def _in_other_unit(
     read: Sequence[Measured], agreements: Sequence[RecordingAgreement], device: Device, settings: ReplaySettings
 ) -> Cause | None:
-    """Return that times are milliseconds read as seconds, where the model agrees with a thousandth of them only.
+    """Return that times are milliseconds read as seconds or the reverse, where the model agrees with these only.
 
     It must then explain half of the variance of every signal, which one that stands still does not, with less than half
     of each error that was beyond its limit. It comes first, for other causes would be sought in runs of a thousand
-    times the length of the recording.
+    times the length of the recording, or a thousandth.
     """
     if all(one.passes for one in agreements):
         return None
-    slowed = [replace(one, recording=_at_rate(one.recording, _MILLISECONDS)) for one in read]
+    # Hardly any bench samples so often, and a run a thousand times as long is not made for others.
+    is_short = max(usual_interval(one.recording.time) for one in read) <= _SHORT_INTERVAL
+    name = "seconds read as milliseconds" if is_short else "milliseconds read as seconds"
+    rate, unit = _TIMES[name]
     try:
-        others = [compare_recording(one, device, settings) for one in slowed]
+        others = [
+            compare_recording(replace(one, recording=_at_rate(one.recording, rate)), device, settings) for one in read
+        ]
     except PpafoError:
         return None
     gain, left = 0.0, 0.0
@@ -225,7 +239,8 @@ def _in_milliseconds(
             if was.channel in SENSORS:
                 gain += 2.0 * len(one.measured) * math.log(max(was.in_noise, 1.0) / max(now.in_noise, 1.0))
             left = max(left, now.in_noise)
-    return Cause("milliseconds read as seconds", "times seem to be milliseconds read as seconds", gain, left)
+    remedy = f'write time [{unit}] in the header, or unit = "{unit}" for time in a column map'
+    return Cause(name, f"times seem to be {name} ({remedy})", gain, left)
 
 
 def _at_rate(recording: Recording, rate: float) -> Recording:

@@ -158,17 +158,17 @@ class Measured:
         return name in self.recording
 
 
-def read_measured(path: str | Path, device: Device, columns: ColumnMap | None = None) -> Measured:
+def read_measured(path: str | Path, device: Device, columns: ColumnMap | None = None, map_name: str = "") -> Measured:
     """Return the recording of a file or result folder; DataError where it cannot be compared with a model.
 
-    A file with columns of its own is read through a column map.
+    A file with columns of its own is read through a column map; ``map_name`` is what messages call this one.
     """
     place = Path(path)
     atmosphere = device.supply.atmospheric_pressure
     if columns is None or place.is_dir():
         recording = read_recording(place, atmosphere)
     else:
-        recording = read_foreign(place, columns, atmosphere=atmosphere)
+        recording = read_foreign(place, columns, atmosphere=atmosphere, map_name=map_name)
     content = read_bytes(place / NETCDF_FILE if place.is_dir() else place)
     return check_recording(recording, device, str(path), hashlib.sha256(content).hexdigest())
 
@@ -203,7 +203,10 @@ def _check_names(recording: Recording, file: str) -> tuple[str, ...]:
             raise DataError(f"{file}: channel '{name}' is not known{hint}")
     if COMMAND not in recording:
         names = ", ".join(recording.names)
-        raise DataError(f"{file}: there is no channel '{COMMAND}', which the replay needs; available: {names}")
+        remedy = f'a column map can give a constant one, {COMMAND} = {{ constant = "1" }}'
+        raise DataError(
+            f"{file}: there is no channel '{COMMAND}', which the replay needs; available: {names}; {remedy}"
+        )
     if not any(name in recording for name in COMPARED):
         raise DataError(f"{file}: has none of the channels to compare: {', '.join(COMPARED)}")
     return tuple(f"channel '{name}' is not known and was ignored" for name in unknown)

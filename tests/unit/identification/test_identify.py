@@ -90,6 +90,13 @@ def test_every_planted_value_gets_into_the_new_set_with_interval_and_origin(solv
     assert "Before, the set had 0.3 mm^2 (published" in entry.note
 
 
+def test_values_are_counted_as_those_of_the_set_beside_others_that_are_identified(solved: Solve) -> None:
+    outcome = solved(STATIC)
+    count = len(outcome.new_set.written)
+    assert sum(item.is_identified for item in outcome.estimates) > count > 0
+    assert f"new set 'twin': {count} values of the set identified: " in text_of(finding_of(outcome))
+
+
 def test_the_new_set_reads_back_and_makes_a_device(solved: Solve, bench: Path) -> None:
     outcome = solved(ALL)
     text = parameter_set_toml(outcome.new_set.parameter_set)

@@ -193,6 +193,15 @@ def test_a_map_that_does_not_fit_is_explained(tmp_path: Path, channel: dict[str,
     assert message in str(caught.value)
 
 
+def test_a_unit_that_does_not_fit_is_said_of_the_map_and_its_key(tmp_path: Path) -> None:
+    columns = mapped(channels={"pressure_1": {"column": 2, "unit": "bar"}})
+    wanted = r"raw.csv: column map rig.toml:a: channel 'pressure_1', unit = 'bar': 'bar' does not say which pressure"
+    with pytest.raises(DataError, match=wanted):
+        read_foreign(written(tmp_path, "0,1\n10,2\n"), columns, map_name="rig.toml:a")
+    with pytest.raises(DataError, match=r"raw.csv: channel 'pressure_1', unit = 'bar': 'bar' does not say"):
+        read_foreign(written(tmp_path, "0,1\n10,2\n"), columns)
+
+
 def test_a_misspelt_column_gets_the_nearest_name(tmp_path: Path) -> None:
     columns = mapped(header=True, channels={"time": {"column": "tme", "unit": "s"}})
     with pytest.raises(DataError, match="no column 'tme', did you mean 'time'"):

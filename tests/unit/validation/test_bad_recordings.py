@@ -49,7 +49,10 @@ def written(folder: Path, *lines: str) -> Path:
         ([HEADER.replace("pressure_1 [psi_g]", "pressure_1 [psi]"), *ROWS], ["pressure_1 [psi]", "psi_g"]),
         ([HEADER.replace("angle [deg]", "angle [s]"), *ROWS], ["angle [s]", "an angle is needed"]),
         ([HEADER.replace("angle [deg]", "angel [deg]"), *ROWS], ["'angel' is not known", "did you mean 'angle'"]),
-        ([HEADER.replace("command [-]", "valve [-]"), *ROWS], ["no channel 'command'", "available: valve, angle"]),
+        (
+            [HEADER.replace("command [-]", "valve [-]"), *ROWS],
+            ["no channel 'command'", "available: valve, angle", 'command = { constant = "1" }'],
+        ),
         (
             [HEADER, *ROWS[:5], ROWS[5].replace(",1,", ",nan,"), *ROWS[6:]],
             ["line 7, column 'command [-]': 'nan' is not a number"],

@@ -93,6 +93,11 @@ def in_milliseconds(one: Recording) -> Recording:
     return replace(one, time=1000.0 * one.time)
 
 
+def in_seconds(one: Recording) -> Recording:
+    """Times in seconds under a header that says milliseconds."""
+    return replace(one, time=0.001 * one.time)
+
+
 @pytest.mark.parametrize(
     ("mistake", "words"),
     [
@@ -105,7 +110,8 @@ def in_milliseconds(one: Recording) -> Recording:
         (reversed_command, "command seems to have the wrong sign"),
         (read_with_gain, "pressure_1 seems to be read 1.04 times too large"),
         (fast_clock, "the clock of the recording seems to run 1.05 times as fast"),
-        (in_milliseconds, "times seem to be milliseconds read as seconds"),
+        (in_milliseconds, "times seem to be milliseconds read as seconds (write time [ms] in the header, or unit = "),
+        (in_seconds, "times seem to be seconds read as milliseconds (write time [s] in the header, or unit = "),
     ],
     ids=lambda one: getattr(one, "__name__", None),
 )

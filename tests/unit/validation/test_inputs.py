@@ -141,7 +141,7 @@ def test_a_supply_unlike_that_of_the_set_is_followed_and_said(agree: Agree) -> N
     device = load_device("ppafo2011")
     pressures = independent(device, lambda _time: 6.0e5, lambda _time: 1.3)
     agreement = agree(recording_of(pressures, np.full(TIMES.size, 6.0e5), np.full(TIMES.size, 1.3)), device)
-    assert any("1.45 times the gauge pressure of the set" in remark for remark in agreement.remarks)
+    assert any("1.45 times the gauge pressure of supply.pressure" in remark for remark in agreement.remarks)
     gauge = 6.0e5 - device.supply.atmospheric_pressure
     assert next(item for item in agreement.channels if item.channel == "pressure_1").full_range == gauge
 

@@ -143,7 +143,9 @@ def finding_of(identification: Identification) -> Finding[Identification]:
         parts.append(_trajectory_part(identification.trajectory, before))
     written, fitted = new_set.written, new_set.fitted
     # What holds for this model only is in the set as well, and is never counted with what is identified.
-    count = f"{count_of(len(written), 'value')} identified: {', '.join(written)}" if written else "no value identified"
+    # Other numbers may be identified too, such as the zero of a scale, for which a set has no place.
+    number = count_of(len(written), "value") if written else "no value"
+    count = f"{number} of the set identified{': ' if written else ''}{', '.join(written)}"
     rest = f"; for this model only: {', '.join(fitted)}" if fitted else ""
     problem = (f"it makes no device yet: {new_set.problem}",) if new_set.problem else ()
     return Finding(
@@ -178,8 +180,7 @@ def _far_from(before: ParameterSet, estimates: Iterable[Estimate]) -> Iterator[s
         ratio = value / entry.value
         if not 1.0 / _FAR_FROM_SET < ratio < _FAR_FROM_SET:
             yield (
-                f"remark: {item.path} is {ratio:.3g} times the value of set '{before.name}', "
-                f"{entry.value:.4g} {unit}".rstrip()
+                f"remark: {item.path} is {ratio:.3g} times the value before, {entry.value:.4g} {unit}".rstrip()
                 + ": check the units of the recording"
             )
 

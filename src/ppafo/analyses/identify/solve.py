@@ -46,7 +46,7 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
     tasks = [
         _Task(
             item,
-            tuple(_source(folder, name, item.columns, problem, before) for name in item.recordings),
+            tuple(_source(folder, name, item.columns, problem, before, file) for name in item.recordings),
             f"{file}: procedure {number}, {item.kind}",
         )
         for number, item in sorted(
@@ -76,7 +76,7 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
         current = with_estimates(current, result.estimates).parameter_set
     of_bench = [estimate for result in results for estimate in result.estimates]
     setting = FitSetting(
-        lambda item: _source(folder, item.recording, item.columns, problem, current),
+        lambda item: _source(folder, item.recording, item.columns, problem, current, file),
         folder,
         f"{file}: trajectory",
         current,
@@ -109,13 +109,15 @@ def _base_set(problem: ProblemFile, folder: Path) -> ParameterSet:
     return apply_overrides(base, problem.device.overrides, problem.device.valve)
 
 
-def _source(folder: Path, name: str, columns: str | None, problem: ProblemFile, parameter_set: ParameterSet) -> Source:
+def _source(
+    folder: Path, name: str, columns: str | None, problem: ProblemFile, parameter_set: ParameterSet, file: str
+) -> Source:
     path = folder / name
     atmosphere = atmospheric_pressure(parameter_set)
     if path.is_dir():
         raise IdentificationError(f"{path}: is a folder, which has no hash; name the recording in it")
     if columns is not None:
-        recording = read_foreign(path, problem.columns[columns], atmosphere=atmosphere)
+        recording = read_foreign(path, problem.columns[columns], None, atmosphere, f"{file}:{columns}")
     else:
         recording = read_recording(path, atmosphere)
     return source_of(path, recording)

@@ -128,9 +128,10 @@ def validate(
     if not recordings:
         raise DataError("no recording was given; name at least one .csv or .nc file or result folder")
     column_map = columns if columns is None or isinstance(columns, ColumnMap) else _column_map(str(columns))
+    map_name = "" if columns is column_map else str(columns)
     read: list[Measured] = []
     for path in recordings:
-        measured = read_measured(path, device, column_map)
+        measured = read_measured(path, device, column_map, map_name)
         # Given twice, under two names too, a recording would count twice as evidence.
         same = next((one.file for one in read if one.sha256 == measured.sha256), None)
         if same is not None:

@@ -66,6 +66,23 @@ def test_agreement_is_printed_and_written(bench: Path, tmp_path: Path, capsys: p
     assert "http" not in page
 
 
+def test_the_supply_that_was_used_is_said_where_none_was_recorded(
+    bench: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    main([*SET, str(bench / "step.csv")])
+    printed = capsys.readouterr().out
+    assert "note: the supply pressure was not recorded; supply.pressure = 55 psi_g was used\n" in printed
+
+
+def test_a_fault_of_a_column_map_names_the_file_of_the_map(
+    bench: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    columns = 'time = { column = 1, unit = "s" }\npressure_1 = { column = 3, unit = "bar" }\n'
+    (tmp_path / "rig.toml").write_text(f"[columns.a.channels]\n{columns}")
+    assert main([*SET, str(bench / "step.csv"), "--columns", f"{tmp_path / 'rig.toml'}:a"]) == 2
+    assert "rig.toml:a: channel 'pressure_1', unit = 'bar': 'bar'" in capsys.readouterr().err
+
+
 def test_several_recordings_of_any_format_are_compared_at_once(
     bench: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
