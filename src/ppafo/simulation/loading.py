@@ -402,7 +402,14 @@ def scenario_of(request: ScenarioRequest, layout: Layout) -> Scenario:
     # What is wrong in the file itself is said as such; what it lacks an override may give.
     if request.overrides:
         _check_layout(request.content, request.file, layout, may_have_gaps=True)
-    changed = apply_overrides(request.content, request.overrides, request.file, declared)
+    try:
+        changed = apply_overrides(request.content, request.overrides, request.file, declared)
+    except ScenarioError:
+        # A kind that is not known has no values: where one is given, it is the mistake.
+        kinds = [text for text in request.overrides if split_override(text, ScenarioError).typed.endswith(".kind")]
+        chosen = apply_overrides(request.content, kinds, request.file, declared)
+        _check_layout(chosen.document, request.file, layout, may_have_gaps=True)
+        raise
     # Overrides may name kinds that the file does not.
     declared.find_kinds(changed.document, request.file)
     _check_layout(changed.document, request.file, layout)

@@ -253,7 +253,9 @@ def _check(reading: Reading, device: Device, supply: BottleSupply) -> None:
     fluid, regulator = supply.bottle.fluid, supply.bottle.regulator
     if abs(device.gas.specific_gas_constant / fluid.table.gas_constant - 1.0) > _SAME_GAS:
         raise reading.refusal(
-            BOTTLE_NAME, f"holds {fluid.name}, and the device is fed with {device.gas.species}: gas.species"
+            BOTTLE_NAME,
+            f"holds {fluid.name}, and the device is fed with {device.gas.species}: set gas.species={fluid.name}, or "
+            f"take a bottle of {device.gas.species}",
         )
     if device.supply.relieving:
         raise ScenarioError(f"{reading.file}: supply.relieving: no gas goes back into a bottle; set it to false")
