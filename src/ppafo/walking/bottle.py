@@ -243,7 +243,7 @@ def _numbers(reading: Reading, section: Mapping[str, Any], bottle: Bottle) -> di
         fits = f"{GRAMS_PER_KILOGRAM * most:.4g} g fit into it at {found['temperature']:g} K"
         raise ScenarioError(
             f"{reading.file}: [{BOTTLE}]: {GRAMS_PER_KILOGRAM * mass:.4g} g of {bottle.fluid.name}, and {fits}: set "
-            f"{BOTTLE}.fill or {BOTTLE}.temperature lower"
+            f"{BOTTLE}.fill or {BOTTLE}.temperature lower, or {BOTTLE}.volume higher"
         )
     return found
 
