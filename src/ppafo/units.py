@@ -16,6 +16,7 @@ import functools
 import json
 import math
 import re
+from collections.abc import Iterable
 from decimal import Decimal
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -59,10 +60,12 @@ _UNITS = {
     "lbf": "pound_force = 4.4482216152605 * newton = lbf",
     "percent": "percent = 0.01",
 }
+_PRESSURES = ("Pa", "bar", "psi")
 _LEVEL, _DIFFERENCE = "Pa_a", "Pa_d"
 _KINDS = {"g": "gauge pressure", "a": "absolute pressure", "d": "pressure difference"}
 _KIND_BELONGS = "_g, _a and _d belong to a unit of pressure that stands alone, such as psi_g"
 _LONGEST_UNIT = 60
+_MOST_FACTORS = 4
 
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _NOT_ZERO = re.compile(r"[^eE]*[1-9]", re.ASCII)
@@ -219,15 +222,68 @@ def unit_by_pint(unit: str) -> ParsedUnit:
         name = unknown if isinstance(unknown, str) else next(iter(unknown))
         if name[-2:] in ("_g", "_a", "_d"):
             raise UnitError(f"'{name}': {_KIND_BELONGS}") from error
-        hint = nearest_name(name, [prefix + known for known in _UNITS for prefix in ("", *_PREFIXES)])
-        available = f"{', '.join(_UNITS)}, with the prefixes {', '.join(_PREFIXES)}"
-        raise UnitError(f"'{name}' is not a known unit{hint}; available: {available}") from error
+        others = ", ".join(other for other in _UNITS if other not in _PRESSURES)
+        pressures = ", ".join(f"{pressure}_{kind}" for pressure in _PRESSURES for kind in _KINDS)
+        raise UnitError(
+            f"'{name}' is not a known unit{_unit_hint(name, unit)}; available: {others}, pressures as {pressures} "
+            f"(in a compound {', '.join(_PRESSURES)}), with the prefixes {', '.join(_PREFIXES)}"
+        ) from error
     except pint.OffsetUnitCalculusError as error:  # milli of a temperature that has another zero
         raise UnitError(f"'{unit}': degC takes no prefix; give degC or K") from error
     # Units are affine: their values at 0 and 1 give scale and offset.
     zero, one = (_registry().Quantity(Decimal(number), parsed).to_base_units().magnitude for number in (0, 1))
     powers = {name: round(float(str(power))) for name, power in parsed.dimensionality.items()}
     return ParsedUnit(one - zero, zero, powers)
+
+
+def _unit_hint(name: str, unit: str) -> str:
+    """Return what may be meant by an unknown name in a unit: ``, did you mean 'N m'?``; an empty text if nothing is."""
+    bare, kind = split_pressure_kind(unit)
+    known, pressures = _spellings(_UNITS), _spellings(_PRESSURES)
+    if name == bare and not kind and name[-1] in _KINDS and name[:-1] in pressures:
+        return f", did you mean '{name[:-1]}_{name[-1]}'?"
+
+    product = _as_product(name)
+    if product:
+        # Names that are products too get their spaces with this one, and parentheses below a stroke.
+        spaced = re.sub(r"[A-Za-zµ]+", lambda found: _as_product(found[0]) or found[0], bare)
+        spaced = re.sub(rf"/({_FACTOR}(?: {_FACTOR})+)", r"/(\1)", spaced)
+        return f", did you mean '{spaced}'?"
+
+    hint = nearest_name(name, known)
+    if name == bare:
+        # Alone, a pressure must say which it is.
+        for near in pressures:
+            *others, last = (f"'{near}_{which}'" for which in kind or _KINDS)
+            hint = hint.replace(f"'{near}'", " or ".join(filter(None, (", ".join(others), last))))
+    return hint
+
+
+def _as_product(name: str) -> str:
+    """Return a name as known units with spaces, ``N m`` for ``Nm``; an empty text where it is known or no product.
+
+    No unit is there twice, so that ``Nmm`` is ``N mm``; short ones come first, so that ``Nms`` is ``N m s``.
+    """
+    known = _spellings(_UNITS)
+    # A letter typed twice, as in degg, is no product.
+    if name in known or re.sub(r"(.)\1", r"\1", name) in known:
+        return ""
+
+    def split(rest: str, before: tuple[str, ...]) -> str:
+        if not rest:
+            return " ".join(before)
+        # Products of more are not written, and would take long to find in a long name.
+        if len(before) == _MOST_FACTORS:
+            return ""
+        parts = (rest[:end] for end in range(1, len(rest) + 1))
+        found = (split(rest[len(part) :], (*before, part)) for part in parts if part in known and part not in before)
+        return next(filter(None, found), "")
+
+    return split(name, ())
+
+
+def _spellings(units: Iterable[str]) -> tuple[str, ...]:
+    return tuple(prefix + unit for unit in units for prefix in ("", "µ", *_PREFIXES))
 
 
 def split_pressure_kind(unit: str) -> tuple[str, str]:

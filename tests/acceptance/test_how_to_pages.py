@@ -258,15 +258,15 @@ def test_the_controller_of_the_page_is_compiled_and_named_in_a_scenario(hysteres
 def test_the_controller_of_the_page_walks() -> None:
     words = shlex.split(extension("ppafo walk"))
     overrides = [after for word, after in itertools.pairwise(words) if word == "--set"]
-    assert overrides[0] == "controller.kind=hysteresis"
+    assert overrides[0] == "controller.kind=my_laws.hysteresis:KIND"
     walked = ppafo.walk(words[2], 0.1, overrides)
     assert walked.status.is_completed
     assert "safe_state_time" not in walked.metrics
     assert walked.metrics["net_push_off_work"].value > 0.5
     command = walked.recording["command"]
     assert set(command.round(12)) <= {-1.0, 0.0, 1.0, VENT}
-    # Named by its module, as step 2 of the page has it, it is the same controller.
-    named = ppafo.walk(words[2], 0.1, ["controller.kind=my_laws.hysteresis:KIND", *overrides[1:]])
+    # By its short name, as step 3 of the page has it, it is the same controller.
+    named = ppafo.walk(words[2], 0.1, ["controller.kind=hysteresis", *overrides[1:]])
     assert (named.recording["command"] == command).all()
 
 

@@ -133,9 +133,34 @@ def test_what_is_not_written_like_a_unit_is_refused(unit: str) -> None:
         check_unit(unit)
 
 
-def test_an_unknown_unit_names_the_nearest_one() -> None:
-    with pytest.raises(UnitError, match="'kPq' is not a known unit, did you mean 'kPa'"):
-        check_unit("kPq")
+@pytest.mark.parametrize(
+    ("unit", "meant"),
+    [
+        ("kPq/s", "'kPa'"),
+        ("kPq", "'kPa_g', 'kPa_a' or 'kPa_d'"),
+        ("psii_g", "'psi_g'"),
+        ("psig", "'psi_g'"),
+        ("Nm", "'N m'"),
+        ("Nms/rad", "'N m s/rad'"),
+        ("Nmm", "'N mm'"),
+        ("kgm^2", "'kg m^2'"),
+        ("J/kgK", "'J/(kg K)'"),
+        ("J/(kgK)", "'J/(kg K)'"),
+        ("degg", "'deg'"),
+    ],
+)
+def test_an_unknown_unit_names_the_nearest_one_or_the_product_that_it_is(unit: str, meant: str) -> None:
+    with pytest.raises(UnitError, match=re.escape(f"is not a known unit, did you mean {meant}?")):
+        check_unit(unit)
+
+
+def test_pressures_that_are_listed_as_available_are_read_alone() -> None:
+    with pytest.raises(UnitError) as caught:
+        check_unit("qqq")
+    listed = str(caught.value).partition("pressures as ")[2].partition(" (")[0].split(", ")
+    assert len(listed) == 9
+    for unit in listed:
+        to_si(1.0, unit, "Pa_d" if unit.endswith("_d") else "Pa_a")
 
 
 @pytest.mark.parametrize("unit", ["nan", "inf", "NaN", "m nan", "nan_g", "m/nan"])

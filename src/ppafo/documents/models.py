@@ -25,6 +25,11 @@ def is_gap(detail: ErrorDetails) -> bool:
     return detail["type"] in _GAPS
 
 
+def is_unknown_kind(detail: ErrorDetails) -> bool:
+    """Tell whether a problem is a kind that is not known; a table that has one kind only has it as a plain word."""
+    return detail["type"] == "union_tag_invalid" or (detail["type"] == "literal_error" and detail["loc"][-1] == "kind")
+
+
 def all_problems(details: list[ErrorDetails], model: type[BaseModel]) -> str:
     """Return what is wrong as one line: unknown keys first, which make others missing, then values, then all gaps.
 

@@ -28,7 +28,7 @@ from ppafo.parameters.device import (
     Supply,
     Valve,
 )
-from ppafo.parameters.graph import ATMOSPHERE_PATH, Graph
+from ppafo.parameters.graph import ATMOSPHERE_PATH, SECOND_PRESSURE_PATH, Graph
 from ppafo.parameters.overrides import FORMS, either, in_two_forms
 from ppafo.parameters.parameter_set import (
     ParameterSet,
@@ -231,7 +231,8 @@ def _uses_sonic_form(parameter_set: ParameterSet, section: str) -> bool:
     return any(f"{section}.{item.name}" in parameter_set.numbers for item in declaration.SONIC_FORM)
 
 
-def _check_complete(parameter_set: ParameterSet, valve: str) -> None:
+def missing_values(parameter_set: ParameterSet, valve: str) -> list[str]:
+    """Return the paths that a device with a valve of the set needs, and that the set has no value at."""
     needed = [
         f"{name}.{member.name}"
         for name in _FLAT_SECTIONS
@@ -244,8 +245,13 @@ def _check_complete(parameter_set: ParameterSet, valve: str) -> None:
         needed += [f"{section}.{member.name}" for member in form]
     kind = parameter_set.valve_kinds[valve]
     needed += [f"valves.{valve}.{member.name}" for member in VALVES[kind].quantities if member.default is None]
-    missing = [path for path in needed if path not in parameter_set.numbers]
-    missing += [path for path in (declaration.SPECIES_PATH,) if path not in parameter_set.texts]
+    # Without a pressure of its own, chamber 2 has the one of chamber 1.
+    missing = [path for path in needed if path not in (*parameter_set.numbers, SECOND_PRESSURE_PATH)]
+    return missing + [path for path in (declaration.SPECIES_PATH,) if path not in parameter_set.texts]
+
+
+def _check_complete(parameter_set: ParameterSet, valve: str) -> None:
+    missing = missing_values(parameter_set, valve)
     if missing:
         completed = parameter_set.completed_by
         remedy = f"use '{completed}', which completes it" if completed else "add them to the file or as overrides"

@@ -13,7 +13,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from ppafo.control.catalog import CONTROLLERS
-from ppafo.documents.models import all_problems, is_gap
+from ppafo.documents.models import all_problems, is_gap, is_unknown_kind
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, ScenarioError, nearest_name, one_line
 from ppafo.parameters import ParameterSet, build_device, list_sets, load_parameter_set
@@ -402,7 +402,14 @@ def scenario_of(request: ScenarioRequest, layout: Layout) -> Scenario:
     # What is wrong in the file itself is said as such; what it lacks an override may give.
     if request.overrides:
         _check_layout(request.content, request.file, layout, may_have_gaps=True)
-    changed = apply_overrides(request.content, request.overrides, request.file, declared)
+    try:
+        changed = apply_overrides(request.content, request.overrides, request.file, declared)
+    except ScenarioError:
+        # A kind that is not known has no values: where one is given, it is the mistake.
+        kinds = [text for text in request.overrides if split_override(text, ScenarioError).typed.endswith(".kind")]
+        chosen = apply_overrides(request.content, kinds, request.file, declared)
+        _check_layout(chosen.document, request.file, layout, of_kinds_alone=True)
+        raise
     # Overrides may name kinds that the file does not.
     declared.find_kinds(changed.document, request.file)
     _check_layout(changed.document, request.file, layout)
@@ -413,8 +420,10 @@ def scenario_of(request: ScenarioRequest, layout: Layout) -> Scenario:
     return layout.build(request, changed)
 
 
-def _check_layout(document: dict[str, Any], file: str, layout: Layout, may_have_gaps: bool = False) -> None:
-    """Raise ScenarioError for unknown keys and kinds, and for gaps unless there may be some."""
+def _check_layout(
+    document: dict[str, Any], file: str, layout: Layout, may_have_gaps: bool = False, of_kinds_alone: bool = False
+) -> None:
+    """Raise ScenarioError for unknown keys and kinds, or kinds alone, and for gaps unless there may be some."""
     # The whole layout has every kind of everything: it is made for a message alone.
     for model in (layout.model, layout.whole):
         try:
@@ -423,6 +432,9 @@ def _check_layout(document: dict[str, Any], file: str, layout: Layout, may_have_
             found = error.errors(include_url=False)
         else:
             return
-    problems = [item for item in found if not (may_have_gaps and is_gap(item))]
+    if of_kinds_alone:
+        problems = [item for item in found if is_unknown_kind(item)]
+    else:
+        problems = [item for item in found if not (may_have_gaps and is_gap(item))]
     if problems:
         raise ScenarioError(f"{file}: {all_problems(problems, layout.whole(document))}")

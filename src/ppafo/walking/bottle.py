@@ -243,7 +243,7 @@ def _numbers(reading: Reading, section: Mapping[str, Any], bottle: Bottle) -> di
         fits = f"{GRAMS_PER_KILOGRAM * most:.4g} g fit into it at {found['temperature']:g} K"
         raise ScenarioError(
             f"{reading.file}: [{BOTTLE}]: {GRAMS_PER_KILOGRAM * mass:.4g} g of {bottle.fluid.name}, and {fits}: set "
-            f"{BOTTLE}.fill or {BOTTLE}.temperature lower"
+            f"{BOTTLE}.fill or {BOTTLE}.temperature lower, or {BOTTLE}.volume higher"
         )
     return found
 
@@ -253,7 +253,9 @@ def _check(reading: Reading, device: Device, supply: BottleSupply) -> None:
     fluid, regulator = supply.bottle.fluid, supply.bottle.regulator
     if abs(device.gas.specific_gas_constant / fluid.table.gas_constant - 1.0) > _SAME_GAS:
         raise reading.refusal(
-            BOTTLE_NAME, f"holds {fluid.name}, and the device is fed with {device.gas.species}: gas.species"
+            BOTTLE_NAME,
+            f"holds {fluid.name}, and the device is fed with {device.gas.species}: set gas.species={fluid.name}, or "
+            f"take a bottle of {device.gas.species}",
         )
     if device.supply.relieving:
         raise ScenarioError(f"{reading.file}: supply.relieving: no gas goes back into a bottle; set it to false")

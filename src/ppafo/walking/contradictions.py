@@ -17,6 +17,7 @@ from ppafo.model.columns import Problem, at, larger, smaller
 from ppafo.parameters.plant import valve_settings
 from ppafo.simulation.declaration import Reading, short_quantity_text, value_at
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario
+from ppafo.walking.declaration import OF_A_WALK
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import law_of, walking_valve
 from ppafo.walking.wearer import Wearer
@@ -72,9 +73,17 @@ def check_walk(scenario: Scenario, reading: Reading) -> None:
     """Raise ScenarioError with the first contradiction; ``reading`` says how a value was given."""
     for path, is_bad, reason in _contradictions(scenario):
         if is_bad:
-            if value_at(reading.document, path) is not None:
+            quantity = OF_A_WALK.quantities(reading.document).get(path)
+            if quantity is None or value_at(reading.document, path) is not None:
                 raise reading.refusal(path, reason(0))
-            raise ScenarioError(f"{reading.file}: {path}, which is not given and takes its default: {reason(0)}")
+            section, _, name = path.partition(".")
+            number = getattr(walk_of(scenario).wearer if section == "wearer" else scenario.controller, name)
+            # In six digits, as the number that it contradicts.
+            default = short_quantity_text(number, quantity.unit, scenario.device.supply.atmospheric_pressure)
+            raise ScenarioError(
+                f"{reading.file}: {path}, which is not given and takes its default, {default}: {reason(0)}; "
+                f"give it in the file or with --set {path}=..."
+            )
 
 
 def rules(scenario: Scenario) -> tuple[Problem, ...]:

@@ -159,6 +159,12 @@ def test_any_override_text_is_taken_or_refused_cleanly(path: str, text: str) -> 
     assert len(message.splitlines()) <= 1
 
 
+@pytest.mark.parametrize("section", ["controller", "reference", "gas_model"])
+def test_beside_a_setting_a_kind_that_is_not_known_is_the_mistake(section: str) -> None:
+    with pytest.raises(ScenarioError, match=rf"{section}\.kind = 'nothing' is not known"):
+        load_scenario(TASK, [f"{section}.band=1", f"{section}.kind=nothing"])
+
+
 @pytest.mark.parametrize(
     "words",
     [

@@ -25,14 +25,17 @@ MISTAKES = {
     "controller.frozen_time=10 ms; controller.rate=100 Hz": "than two sample periods of the controller, 0.01 s each",
     "controller.lowest_angle=100 deg; controller.highest_angle=90 deg": "must be below controller.highest_angle",
     "controller.push_off_end=0.39": "must be above controller.push_off_start, which is 0.4",
+    "actuator.angle_max=90 deg": r"its default, 96.2569 deg: .* 90 deg; give it .* --set controller.swing_angle=\.\.\.",
     "controller.swing_angle=135 deg": "lies outside the range of sensor and device, 20 deg to 130 deg",
     "wearer.shank_mass_centre=0.5 m": "lies beyond the ankle: wearer.shank_length is 0.46 m",
-    "wearer.toe_lever=0.08 m": "wearer.foot_mass_centre, which is not given and takes its default",
+    "wearer.toe_lever=0.08 m": "which is not given and takes its default, 0.09 m: lies beyond the toes",
     "controller.unload_treshold=20 N": "has no value 'controller.unload_treshold', did you mean 'controller.unload_th",
     "controller.load_threshold=60": "a number without a unit does not fit: a unit like 'N' is needed",
     "controller.load_threshold=60 kg": "unit 'kg' does not fit: a unit like 'N' is needed",
     "wearer.body_mass=5 kg": "must be at least 10 kg and at most 300 kg",
     "controller.kind=event_of": "'event_of' is not known",
+    "controller.kind=hysteresis; controller.band=0.5 N m": "controller.kind = 'hysteresis' is not known",
+    "faults.heel.kind=stuk; faults.heel.foo=3 N": "'stuk' is not known, did you mean 'stuck'",
     "faults.heel.time=3 s": "'faults.heel.kind' is missing",
     "faults.pressure_1.kind=stuck; faults.pressure_1.time=3 s; faults.pressure_1.reading=3 N": "a pressure level is",
     "controller.kind=event_proportional": "not a solenoid one: take device.valve 'proportional', or cont",
@@ -44,7 +47,7 @@ MISTAKES = {
     "sensors.pressure_lost_share=2": "must be at least 0 and at most 1",
 }
 ON_A_PROPORTIONAL_VALVE = {
-    "valve.delay=60 ms": "controller.fill_time, which is not given and takes its default: must be longer than the dead",
+    "valve.delay=60 ms": "fill_time, which is not given and takes its default, 0.05 s: must be longer than the dead",
 }
 PROFILE = {
     "controller.peak_time=0.9; controller.fall_time=0.2": "the torque would end after the stride",

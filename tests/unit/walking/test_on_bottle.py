@@ -176,7 +176,7 @@ def test_ice_narrows_the_seat_until_the_gas_lacks_no_more_than_it_is_given() -> 
 
 MISTAKES = {
     "bottle.name=paper-co2-9": "did you mean 'paper-co2-9oz'",
-    "bottle.name=air-48ci-3000psi": "holds air, and the device is fed with CO2",
+    "bottle.name=air-48ci-3000psi": "is fed with CO2: set gas.species=air, or take a bottle of CO2",
     "bottle.fill=0": "must be more than 0",
     "bottle.temperature=200 K": "must be above 216.592 K",
     "bottle.temperature=303 K": "and 224.9 g fit into it at 303 K",

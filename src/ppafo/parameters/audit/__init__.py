@@ -16,6 +16,7 @@ from ppafo.parameters.audit.values import (
     check_dimensions,
     check_gas_data,
     check_ideal_gas,
+    check_missing,
     check_ranges,
     check_statements,
 )
@@ -25,6 +26,7 @@ from ppafo.parameters.parameter_set import ParameterSet, overridden_paths
 __all__ = ["Finding", "NamedValue", "Severity", "Side", "audit", "changed_paths"]
 
 CHECKS: dict[str, Callable[[Evidence], Iterator[Finding]]] = {
+    "missing": check_missing,
     "statements": check_statements,
     "dimensions": check_dimensions,
     "ranges": check_ranges,

@@ -5,10 +5,11 @@ import math
 from collections.abc import Iterator
 
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
-from ppafo.errors import UnitError
+from ppafo.errors import ParameterError, UnitError
 from ppafo.model.effects.second_virial import SECOND_VIRIAL
 from ppafo.model.gas import SPECIES
 from ppafo.parameters.audit.evidence import Evidence, Finding, Side
+from ppafo.parameters.building import missing_values
 from ppafo.parameters.declaration import is_within
 from ppafo.parameters.parameter_set import entry_in_si, number_in_si, number_text
 from ppafo.parameters.publications.publication import FILE, read_publication
@@ -54,6 +55,34 @@ def _stated_numbers(name: str) -> dict[str, tuple[float, str]]:
             except ValueError:
                 continue  # The name of chambers.
     return found
+
+
+# Does a device lack a value?
+
+
+def check_missing(evidence: Evidence) -> Iterator[Finding]:
+    """Yield a warning with the values that a device still lacks, unless the set names one that completes it."""
+    parameter_set = evidence.parameter_set
+    if parameter_set.completed_by:
+        return
+    missing: list[str] = []
+    for valve in parameter_set.valve_kinds:
+        # An orifice in two forms has a finding of its own.
+        with contextlib.suppress(ParameterError):
+            missing += missing_values(parameter_set, valve)
+    if missing:
+        paths = tuple(dict.fromkeys(missing))
+        yield Finding(
+            id="missing-values",
+            severity="warning",
+            title=f"no device yet: {len(paths)} value{' is' if len(paths) == 1 else 's are'} missing",
+            values=(),
+            sides=(),
+            paragraph=(
+                f"A device needs more: {', '.join(paths)}. Add {'it' if len(paths) == 1 else 'them'} to the file or as "
+                "overrides. What rests on missing values is not audited."
+            ),
+        )
 
 
 # Does every value have the dimension that its equation needs?

@@ -16,6 +16,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, Field
 
+from ppafo.constants import GRAMS_PER_KILOGRAM
 from ppafo.documents.models import NAME, make_schema, optional, read_model, table
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, UnitError, nearest_name, refused_as, said_missing
@@ -38,7 +39,7 @@ from ppafo.parameters.declaration import is_within, limits_text
 from ppafo.parameters.overrides import Forms, other_forms, override_set
 from ppafo.parameters.parameter_set import Entry, TextEntry
 from ppafo.parameters.parts import Part, load_catalogue
-from ppafo.units import format_quantity, split_quantity, to_si
+from ppafo.units import format_quantity, from_si, split_quantity, to_si
 
 _FOLDER = resources.files("ppafo.parameters.bottles") / "fluid_tables"
 _SUFFIX = ".json"
@@ -367,11 +368,11 @@ def _mass_of_fill(values: Mapping[str, float], fluid: Fluid, file: str) -> float
     # Above the saturated vapour the rest is liquid: pressure and temperature then leave the mass open.
     if fluid_pressure(fluid.table, temperature, math.inf) < pressure:
         most = fluid_pressure(fluid.table, temperature, math.inf)
+        place, end = f"{file}: bottle.fill_pressure", f"{_pressure_text(most)} at {temperature:g} K"
         raise ParameterError(
-            f"{file}: bottle.fill_pressure: {fluid.name} is gas up to {most:.4g} Pa at {temperature:g} K; "
-            "give bottle.gas_mass instead"
+            f"{place}: {fluid.name} is gas up to {end}; give bottle.gas_mass instead"
             if has_liquid(fluid.table)
-            else f"{file}: bottle.fill_pressure: the table of {fluid.name} ends at {most:.4g} Pa at {temperature:g} K"
+            else f"{place}: the table of {fluid.name} ends at {end}"
         )
     return values["bottle.volume"] * gas_density(fluid.table, temperature, pressure)
 
@@ -393,15 +394,22 @@ def _check_content(bottle: Bottle, file: str) -> None:
     wet = has_liquid(fluid.table)
     most = bottle.volume * (liquid_density if wet else densest_gas)(fluid.table, temperature)
     if bottle.mass >= most:
+        volume = bottle.entries["bottle.volume"]
+        fill = "bottle.gas_mass" if "bottle.gas_mass" in bottle.entries else "bottle.fill_pressure"
         raise ParameterError(
-            f"{file}: {bottle.mass:.4g} kg of {fluid.name} do not fit into {bottle.volume:.4g} m^3 at "
-            f"{temperature:g} K: {'liquid would fill it at' if wet else 'the property table ends at'} {most:.4g} kg; "
-            "set bottle.gas_mass or room.temperature lower"
+            f"{file}: {GRAMS_PER_KILOGRAM * bottle.mass:.4g} g of {fluid.name} do not fit into "
+            f"{format_quantity(volume.value, volume.unit)} at {temperature:g} K: "
+            f"{'liquid would fill it at' if wet else 'the property table ends at'} "
+            f"{GRAMS_PER_KILOGRAM * most:.4g} g; set {fill} or room.temperature lower, or bottle.volume higher"
         )
     content = bottle_content(fluid.table, bottle.mass, bottle.volume, temperature)
     if pressure_reserve(bottle.regulator, content.pressure, 0.0) <= 0.0:
         needed = bottle.regulator.set_pressure + bottle.regulator.pressure_margin
         raise ParameterError(
-            f"{file}: the full bottle has {content.pressure:.4g} Pa at {temperature:g} K, but its regulator needs "
-            f"{needed:.4g} Pa: regulator.set_pressure and regulator.pressure_margin"
+            f"{file}: the full bottle has {_pressure_text(content.pressure)} at {temperature:g} K, but its regulator "
+            f"needs {_pressure_text(needed)}: regulator.set_pressure and regulator.pressure_margin"
         )
+
+
+def _pressure_text(pressure: float) -> str:
+    return f"{from_si(pressure, 'bar_a', 'Pa_a'):.4g} bar_a"

@@ -49,9 +49,10 @@ def test_a_value_is_replaced_and_a_pressure_replaces_a_mass() -> None:
         ("bottle.volume=1 kg", "does not fit"),
         ("bottle.volume", "PATH=VALUE"),
         ("bottle.volume=0 L", "must be at least"),
-        ("bottle.volume=300 cm^3", "liquid would fill it"),
+        ("bottle.volume=300 cm^3", "255 g of CO2 do not fit into 300 cm^3 at 298 K: liquid would fill it at 213.8 g"),
+        ("bottle.volume=0.3 L", "g; set bottle.gas_mass or room.temperature lower, or bottle.volume higher"),
         ("room.temperature=40 degC", "known above 216.592 K and up to 303.9 K"),
-        ("regulator.set_pressure=70 bar_g", "its regulator needs"),
+        ("regulator.set_pressure=70 bar_g", "its regulator needs 7"),
         ("regulator.set_pressure=50 psi", "does not say which pressure"),
     ],
 )

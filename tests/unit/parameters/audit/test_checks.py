@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from ppafo.parameters import apply_overrides, list_sets, load_parameter_set
+from ppafo.errors import ParameterError
+from ppafo.parameters import apply_overrides, build_device, list_sets, load_parameter_set
 from ppafo.parameters.audit import Finding, audit
 
 BASE = load_parameter_set("ppafo2011")
@@ -148,8 +149,19 @@ def test_a_value_that_no_device_can_have_is_an_error() -> None:
     assert "must lie between 0 and 1" in finding.paragraph
 
 
-def test_a_set_with_almost_nothing_in_it_has_almost_nothing_to_say() -> None:
-    assert audit(replace(BASE, numbers={}, texts={}, accepted={})) == []
+def test_a_set_with_almost_nothing_in_it_has_nothing_to_say_but_what_is_missing() -> None:
+    [finding] = audit(replace(BASE, numbers={}, texts={}, accepted={}))
+    assert (finding.id, finding.severity) == ("missing-values", "warning")
+    with pytest.raises(ParameterError) as caught:
+        build_device(replace(BASE, numbers={}, texts={}))
+    refused = str(caught.value).partition("a device needs ")[2].partition(": missing here")[0].split(", ")
+    assert all(path in finding.paragraph for path in refused)
+    assert "valves.solenoid.area" in finding.paragraph
+
+
+def test_nothing_is_said_to_be_missing_in_a_complete_set_or_in_one_that_names_what_completes_it() -> None:
+    sets = [audit(load_parameter_set(name)) for name in list_sets()]
+    assert not [finding for found in sets for finding in found if finding.id == "missing-values"]
 
 
 def test_a_stated_efficiency_that_explains_the_volume_is_a_note_and_another_is_a_warning() -> None:
