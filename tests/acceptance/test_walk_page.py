@@ -64,6 +64,18 @@ def test_the_walk_file_of_the_page_loads(tmp_path: Path) -> None:
     assert not has_ideal_sensors(configuration)
 
 
+def test_the_walk_file_of_the_page_loses_its_help_as_the_page_says(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "stiff-ankle.toml"
+    path.write_text(blocks("toml")[0])
+    (said,) = re.findall(r"^With `--minutes 0.2` this file has (help in 2 of 10 strides)", PAGE, re.MULTILINE)
+    assert main(["walk", str(path), "--minutes", "0.2", "--out", str(tmp_path / "out")]) == 1
+    printed = capsys.readouterr().out
+    assert said in printed
+    assert "less help" in printed.splitlines()[2]
+
+
 def test_the_task_sequence_and_the_bottle_of_the_page_load(tmp_path: Path) -> None:
     (tmp_path / "door.toml").write_text(blocks("toml")[1])
     walk_file = tmp_path / "own.toml"

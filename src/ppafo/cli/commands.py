@@ -186,6 +186,8 @@ def check_words(words: list[str]) -> None:
     # A group alone is a mistake, unless its help is asked for, which the parser prints.
     if isinstance(command, Group) and "-h" not in words and "--help" not in words:
         actions, action = list(command.actions), given[1] if len(given) > 1 else None
+        if action is None and "--list" in words and "list" in actions:
+            raise UsageError(f"{word}: there is no option '--list'; 'ppafo {word} list' shows what there is")
         if action is None:
             raise UsageError(f"{word}: give one of {', '.join(actions)}; see 'ppafo {word} --help'")
         if action not in actions:

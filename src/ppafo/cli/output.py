@@ -90,6 +90,7 @@ def deliver(found: Any, as_json: bool, out: Path | None, command: str, *, has_wr
 
     text, document = text_of(found), found.to_dict()
     folder = str(document["folder"]) if has_written else None
+    made: list[str] = []
     if out is not None:
         from ppafo.report.drawing import load_drawing
 
@@ -99,8 +100,10 @@ def deliver(found: Any, as_json: bool, out: Path | None, command: str, *, has_wr
 
         write_files(out, files_of(found), command)
         folder = str(out)
+        # What other commands take, such as the gait of 'ppafo walk --gait'.
+        made = [f"file to use: {out / name}" for name in found.files if name.endswith(".toml")]
     if folder is not None:
-        text += f"\n\nreport: {folder}/{REPORT}"
+        text += "\n".join(["\n", f"report: {folder}/{REPORT}", *made])
     print_result(text, document if folder is None else {**document, "folder": folder}, as_json)
     return EXIT_GOOD if found.passed else EXIT_CHECK_FAILED
 

@@ -16,6 +16,8 @@ from ppafo.documents.regular_file import MAXIMUM_BYTES_TYPED, decoded, read_regu
 from ppafo.errors import PpafoError, nearest_name, one_line, reason
 
 _SUFFIX = ".toml"
+_MAXIMUM_NAMED = 3
+"""Files of a folder that a message names."""
 _LONGEST_LABEL, _KEPT_AT_EACH_END = 200, 60
 _PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+"""
 _DEEP_KEY = re.compile(
@@ -33,12 +35,16 @@ def beside(name: str, folder: Path, known: Collection[str] = ()) -> str:
 
 @dataclass(frozen=True, slots=True)
 class TomlKind:
-    """A kind of file: what messages call it, its name for ``--schema``, the files of the package, the error raised."""
+    """A kind of file: what messages call it, its name for ``--schema``, the files of the package, the error raised.
+
+    ``made`` says behind "give a .toml file" where one comes from, where a command makes it.
+    """
 
     noun: str
     schema: str
     shipped: Traversable
     error: type[PpafoError]
+    made: str = ""
 
     def names(self) -> tuple[str, ...]:
         """Return the names of the files that come with the package."""
@@ -54,18 +60,26 @@ class TomlKind:
         if path.suffix != _SUFFIX and not is_there:
             hint = nearest_name(name, self.names())
             known = f"available: {', '.join(self.names())}, or " if self.names() else ""
-            raise self.error(f"there is no {self.noun} '{label(name)}'{hint}; {known}give a .toml file")
+            raise self.error(f"there is no {self.noun} '{label(name)}'{hint}; {known}give a .toml file{self.made}")
         try:
             return read_regular_file(path, MAXIMUM_BYTES_TYPED)
+        except IsADirectoryError as error:
+            inside = [label(str(file)) for file in sorted(path.glob(f"*{_SUFFIX}"))[:_MAXIMUM_NAMED]]
+            remedy = f"; give {' or '.join(inside)}" if inside else f"; give a .toml file{self.made}"
+            raise self.error(f"{label(name)}: cannot be read: {reason(error)}{remedy}") from error
         except (OSError, ValueError) as error:
-            raise self.error(f"{label(name)}: cannot be read: {reason(error)}") from error
+            raise self.error(f"{label(name)}: cannot be read: {reason(error)}{self._remedy(name)}") from error
+
+    def _remedy(self, file: str) -> str:
+        """Return what to give in place of a file of another kind, such as a recording; empty for a .toml file."""
+        return "" if Path(file).suffix in ("", _SUFFIX) else f"; give a .toml file{self.made}"
 
     def parse(self, content: bytes, file: str) -> dict[str, Any]:
         """Return the document in the bytes of a file; ``file`` is what messages call it."""
         try:
             text = decoded(content)
         except UnicodeDecodeError as error:
-            raise self.error(f"{file}: is not a text file in UTF-8 (byte {error.start})") from error
+            raise self.error(f"{file}: is not a text file in UTF-8 (byte {error.start}){self._remedy(file)}") from error
         if not text.strip():
             raise self.error(f"{file}: is empty; 'ppafo doctor --schema {self.schema}' prints its format")
         # Before the parser, whose time grows with the square of the dots.
@@ -75,7 +89,7 @@ class TomlKind:
             # A copy, since overrides are written into a document and the parsed one is kept.
             document = copy.deepcopy(_document(text))
         except tomllib.TOMLDecodeError as error:
-            raise self.error(f"{file}: is not valid TOML: {one_line(error)}") from error
+            raise self.error(f"{file}: is not valid TOML: {one_line(error)}{self._remedy(file)}") from error
         except (RecursionError, ValueError) as error:
             raise self.error(f"{file}: is not usable TOML: nested too deeply or a number too long") from error
         self.check_depth(document, file)

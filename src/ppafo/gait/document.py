@@ -174,7 +174,13 @@ def json_schema() -> dict[str, Any]:
 NORMATIVE = "falisse2019-subject1"
 """The gait that is taken where none is named."""
 
-_FILE = TomlKind("gait", "gait", resources.files("ppafo") / "gait" / "normative", DataError)
+_FILE = TomlKind(
+    "gait",
+    "gait",
+    resources.files("ppafo") / "gait" / "normative",
+    DataError,
+    made=", which 'ppafo gait import' makes of a recording",
+)
 
 
 def list_gaits() -> tuple[str, ...]:

@@ -202,12 +202,20 @@ def _text_lines(path: str | Path) -> list[str]:
     return text_of(read_bytes(path)).replace("\r\n", "\n").replace("\r", "\n").split("\n")
 
 
-_SIGNS = (
-    "signs=ankle_angle is 0 with the foot square to the shank and above 0 in dorsiflexion, moments along it too; "
-    "ankle_angle_moment is what the wearer gives, ankle_angle_device what the device gives the wearer; "
-    "ground_force_vy is above 0 upward; other columns have the signs of ppafo"
-)
-"""A line of the header; sides are left out of the names."""
+_SIGNS = {
+    r"(healthy_)?ankle_angle_[rl]": "is 0 with the foot square to the shank and above 0 in dorsiflexion",
+    r"ankle_angle_[rl]_speed": "is above 0 towards dorsiflexion",
+    r"ankle_angle_[rl]_moment": "is what the wearer gives, above 0 in dorsiflexion",
+    r"ankle_angle_[rl]_device(_moment)?": "is what the device gives the wearer, above 0 in dorsiflexion",
+    r"ground_force_[rl]_vy": "is above 0 upward",
+}
+"""What the header says of the signs of the columns in OpenSim's names."""
+
+
+def _signs(names: Sequence[str]) -> str:
+    said = [f"{name} {sign}" for name in names for form, sign in _SIGNS.items() if re.fullmatch(form, name)]
+    others = "other columns" if said else "columns"
+    return f"signs={'; '.join([*said, f'{others} have the signs of ppafo'])}"
 
 
 def opensim_bytes(recording: Recording) -> bytes:
@@ -225,7 +233,7 @@ def opensim_bytes(recording: Recording) -> bytes:
         "inDegrees=no",
         f"kind={recording.kind}",
         f"units={units}",
-        _SIGNS,
+        _signs(recording.names),
         _END,
         "\t".join((TIME, *recording.names)),
     ]

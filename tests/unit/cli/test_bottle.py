@@ -80,6 +80,23 @@ def test_a_recording_is_repeated(walk: Path, capsys: pytest.CaptureFixture[str])
     assert repeated["result"]["strides"] == pytest.approx(given["result"]["strides"], rel=1e-6)
 
 
+def test_only_who_walks_makes_strides(walk: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["bottle", str(walk)]) == 0
+    alone = capsys.readouterr().out
+    assert " min of use, " in alone
+    assert "\nrepetitions of the recording  " in alone
+    twin = tmp_path / "twin.csv"
+    twin.write_bytes(walk.read_bytes())
+    assert main(["bottle", str(walk), str(twin)]) == 0
+    both = capsys.readouterr().out
+    assert "gas per repetition (g)  run time (min)  repetitions" in both
+    assert [word for word in ("stride", "walking") if word in alone + both] == []
+    assert main(["bottle", str(walk), "--stride-time", "2 s"]) == 0
+    strides = capsys.readouterr().out
+    assert " min of walking, " in strides
+    assert "\nstrides  " in strides
+
+
 def test_the_folder_has_all_files_and_is_made_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "out"
     assert main([*QUICK, "--out", str(out)]) == 0

@@ -3,6 +3,7 @@
 import os
 import time
 import tracemalloc
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 
@@ -95,6 +96,23 @@ def test_room_is_taken_for_what_is_there_and_not_for_the_most_that_may_be(tmp_pa
     tracemalloc.stop()
     assert content == b"x" * 1000
     assert most < 10_000_000
+
+
+def test_a_file_of_another_kind_and_a_folder_are_answered_with_what_to_give(tmp_path: Path) -> None:
+    kind = replace(KIND, made=", which a command makes")
+    (tmp_path / "walk.csv").write_text("time [s],angle [deg]\n", encoding="utf-8")
+    with pytest.raises(ScenarioError, match=r"walk\.csv: is not valid TOML: .*; give a \.toml file, which a command"):
+        kind.parse(kind.read(tmp_path / "walk.csv"), "walk.csv")
+    (tmp_path / "walk.csv").write_bytes(b"0" * (MAXIMUM_BYTES_TYPED + 1))
+    with pytest.raises(ScenarioError, match=r"it is larger than 1 MB, .*; give a \.toml file, which a command makes$"):
+        kind.read(tmp_path / "walk.csv")
+    with pytest.raises(
+        ScenarioError, match=r"it is a directory, not a file; give a \.toml file, which a command makes$"
+    ):
+        kind.read(tmp_path)
+    (tmp_path / "mine.toml").touch()
+    with pytest.raises(ScenarioError, match=r"it is a directory, not a file; give \S*/mine\.toml$"):
+        kind.read(tmp_path)
 
 
 def test_a_number_that_would_become_0_is_refused() -> None:

@@ -35,6 +35,11 @@ def test_the_whole_walk_is_in_opensims_sign(walked: WalkResult, tmp_path: Path) 
     for name in ("device_torque.sto", "walk.sto"):
         head = (tmp_path / name).read_text(encoding="utf-8").partition("endheader")[0]
         assert "above 0 in dorsiflexion" in head
+        (signs,) = [line.removeprefix("signs=") for line in head.splitlines() if line.startswith("signs=")]
+        *named, others = signs.split("; ")
+        assert {sentence.split()[0] for sentence in named} <= set(read_opensim(tmp_path / name).columns)
+        assert others == "other columns have the signs of ppafo"
+        assert "ankle_angle_l_device" in signs
 
 
 def test_the_mean_stride_lies_on_heel_strikes(walked: WalkResult) -> None:

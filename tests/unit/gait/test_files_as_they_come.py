@@ -337,6 +337,7 @@ def test_a_plain_table_with_opensims_names_is_read(
     ("text", "message"),
     [
         ("frame,shank\n1,2\n", "the first column must be 'time', it is 'frame'"),
+        ("percent [%],a [deg]\n0,1\n", "it is 'percent'; a mean stride over 0 to 100 % is written out as time, at le"),
         ("time,a,a\n0,1,2\n", "there are two columns 'a'; every column needs a name of its own"),
         ("time,a,\n0,1,2\n", "a column has no name"),
         ("time,a\n0,1,2\n", "line 2 has 3 values for 2 columns"),
@@ -352,6 +353,18 @@ def test_a_damaged_plain_table_is_refused_in_one_line(tmp_path: Path, text: str,
     assert message in str(refused.value)
     assert str(refused.value).startswith(str(path))
     assert "\n" not in str(refused.value)
+
+
+def test_a_column_without_unit_is_one_that_a_gait_map_may_name(tmp_path: Path) -> None:
+    path = tmp_path / "walk.csv"
+    columns = {f"{name} [deg]": values for name, values in angles(TIME).items()} | {"Kraft": force(TIME)}
+    rows = "".join(",".join(map(repr, row)) + "\n" for row in np.column_stack([TIME, *columns.values()]).tolist())
+    path.write_text(f"{','.join(['time [s]', *columns])}\n{rows}")
+    table = read_table(path)
+    assert (table.units["Kraft"], np.array_equal(table.columns["Kraft"], force(TIME))) == ("", True)
+    path.write_text(f"time [s],Kraft\n{''.join(f'{0.01 * k},1{chr(10)}' for k in range(30))}")
+    with pytest.raises(DataError, match=r"Kraft\); name the columns in a gait map \(--map\)"):
+        import_gait([path], PERSON)
 
 
 def test_a_plain_table_without_units_asks_for_them(tmp_path: Path) -> None:

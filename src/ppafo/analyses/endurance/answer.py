@@ -30,7 +30,8 @@ class Endurance:
     """The request and its result.
 
     ``discharge`` is the requested course. ``strides_when_warm`` is the number of strides that a bottle which stays at
-    room temperature gives: what cooling costs. ``is_of_task_sequence`` is true where a stride is a task sequence.
+    room temperature gives: what cooling costs. ``is_of_task_sequence`` is true where a stride is a task sequence,
+    ``is_of_recording`` where it is a whole recording, in which nobody need have walked.
     """
 
     bottle: Bottle
@@ -39,6 +40,7 @@ class Endurance:
     discharge: Discharge
     strides_when_warm: float
     is_of_task_sequence: bool = False
+    is_of_recording: bool = False
 
     def json_document(self) -> dict[str, Any]:
         """Return the course, its ending and the bottle as plain data in SI."""
@@ -90,7 +92,6 @@ _LEFT_OUT = (
     "with the vapour, a bottle upside down, leaking connections, and ice on the outside of the bottle."
 )
 _CAPTION = "Temperature, pressure and gas in the bottle from full to the end."
-_USES = ("gas use", ("gas per stride", _MASS), ("walking", _DURATION), "strides", "ended")
 
 
 def finding_of(found: Endurance) -> Finding[Endurance]:
@@ -112,7 +113,7 @@ def finding_of(found: Endurance) -> Finding[Endurance]:
                 name="endurance",
                 caption=_CAPTION,
                 size=(7.0, 1.9),
-                title=f"{found.bottle.name}: {_MASS.text(found.draw.mass_per_stride)} per stride of "
+                title=f"{found.bottle.name}: {_MASS.text(found.draw.mass_per_stride)} per {_counted(found)} of "
                 f"{TIME.text(found.draw.stride_time, '.3g')}",
                 note=f"End: {found.discharge.ending.message}.",
                 remarks=(_LEFT_OUT,),
@@ -133,6 +134,9 @@ def finding_of(found: Endurance) -> Finding[Endurance]:
 
 def finding_of_several(several: Endurances) -> Finding[Endurances]:
     """Return how long the bottle lasts for several gas uses, side by side."""
+    are_strides = all(_counted(one) == "stride" for one in several.uses.values())
+    counted, time = ("stride", "walking") if are_strides else ("repetition", "run time")
+    titles = ("gas use", (f"gas per {counted}", _MASS), (time, _DURATION), f"{counted}s", "ended")
     rows = [
         (
             name,
@@ -149,11 +153,15 @@ def finding_of_several(several: Endurances) -> Finding[Endurances]:
         title=_TITLE,
         said=(next(iter(several.uses.values())).bottle.title,),
         parts=(
-            Part(columns=columns_of(_USES, rows)),
+            Part(columns=columns_of(titles, rows)),
             Part("What is not in the model", said=(_LEFT_OUT,), is_detail=True),
         ),
         found=several,
     )
+
+
+def _counted(found: Endurance) -> str:
+    return "repetition" if found.is_of_task_sequence or found.is_of_recording else "stride"
 
 
 _TITLE = "How long the bottle lasts"
@@ -193,17 +201,22 @@ def _facts(found: Endurance) -> list[tuple[str, str]]:
     # What warms the gas of the full bottle to the room's temperature behind the regulator.
     content = bottle_content(bottle.fluid.table, bottle.mass, bottle.volume, room)
     heat = heat_to_warm(bottle.fluid.table, content, room, bottle.regulator.set_pressure)
+    counted, repeated = _counted(found), "recording" if found.is_of_recording else "task sequence"
+    use = "of use" if found.is_of_recording else "of walking"
     rows = [
-        ("run time", f"{minutes_text(course.walking_time)} of walking, {minutes_text(course.total_time)} in total"),
-        ("strides", strides_text(course.strides)),
+        ("run time", f"{minutes_text(course.walking_time)} {use}, {minutes_text(course.total_time)} in total"),
         (
-            "strides without cooling",
+            "strides" if counted == "stride" else f"repetitions of the {repeated}",
+            strides_text(course.strides),
+        ),
+        (
+            f"{counted}s without cooling",
             f"{strides_text(found.strides_when_warm)} (a bottle that stays at room temperature)",
         ),
         ("ended", course.ending.message),
         (
             "gas",
-            f"{_MASS.text(draw.mass_per_stride)} a stride, {_FLOW.text(draw.mean_flow)}, largest "
+            f"{_MASS.text(draw.mass_per_stride)} a {counted}, {_FLOW.text(draw.mean_flow)}, largest "
             f"{_FLOW.text(draw.peak_flow)}",
         ),
         ("heat that it lacks", f"{heat * draw.mean_flow:.3g} W, {heat / 1000.0:.3g} kJ/kg, at the start"),

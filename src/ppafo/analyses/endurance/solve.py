@@ -82,7 +82,9 @@ def endurance(
         if gas is None:
             full = load_bottle(named, changed)
             recording = use if isinstance(use, Recording) else read_recording(Path(str(use)))
-            found[name] = follow_bottle(full, draw_of_recording(recording, stride_time), schedule)
+            life = follow_bottle(full, draw_of_recording(recording, stride_time), schedule)
+            # Whoever says how long a stride takes recorded strides; else the recording is what repeats.
+            found[name] = replace(life, is_of_recording=stride_time is None)
             continue
         if stride_time is not None:
             stride = f"its whole task sequence '{gas.task_sequence}'" if gas.task_sequence else "one stride of its walk"

@@ -176,6 +176,7 @@ def describe(parts: Parts, fractions: Sequence[float]) -> dict[str, Any]:
 LOG = "log.jsonl"
 """The only file that says when, where and how fast; all others are the same wherever they are made."""
 _INTERRUPTED = "interrupted; finished chunks are kept, and the same command resumes the study"
+_INTERRUPTED_AT_ONCE = "interrupted; nothing was kept yet, and the same command begins anew"
 
 
 def sweep(
@@ -257,7 +258,7 @@ def sweep_into_folder(
             swept = sweep(chosen, folder, (), None, None, threads, scheduler, agreed, progress)
             write_report(swept.found)
         except KeyboardInterrupt:
-            raise KeyboardInterrupt(_INTERRUPTED) from None
+            raise KeyboardInterrupt(_INTERRUPTED if _is_begun(chosen, folder) else _INTERRUPTED_AT_ONCE) from None
         return swept
     if metric is None:
         raise StudyError(f"statistic '{statistic}': needs the metric that it is of, for example --metric rms_error")
@@ -270,6 +271,12 @@ def sweep_into_folder(
     found = estimate(chosen, metric, statistic, seed=seed, draws=most, threads=threads, progress=progress, **given)
     found.save(place)
     return replace(found, found=replace(found.found, folder=str(place)))
+
+
+def _is_begun(study: Study, folder: str | Path) -> bool:
+    """Return whether a folder has a finished chunk of a study."""
+    names = place_at(str(folder)).names()
+    return any(note_file(number) in names for number in range(chunk_count(study)))
 
 
 def studies_of_the_package() -> list[dict[str, Any]]:

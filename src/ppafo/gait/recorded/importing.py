@@ -664,4 +664,4 @@ def _remarks(curves: Mapping[str, CurveStatistics], strides: Strides, events: st
     if "vertical_force" in curves:
         return remarks + force_remarks(curves["vertical_force"].mean)
     less = ": heel strikes and toe-offs come from the shank and are less exact" if events == SHANK else ""
-    return [*remarks, f"no vertical force{less}"]
+    return [*remarks, f"no vertical force{less}; a column of another name needs a gait map (--map)"]

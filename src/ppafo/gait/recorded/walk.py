@@ -134,7 +134,7 @@ class CurveColumns:
         unit = stated or self.table.units[name]
         values = self.table.columns[name]
         if not unit:
-            raise DataError(f"{place}: the file does not state its unit; give {self.unit_key} in a gait map")
+            raise DataError(f"{place}: the file does not state its unit; give {self.unit_key} in a gait map (--map)")
         given = "" if unit == "-" else unit
         problem = ""
         for si_unit in si_units:
@@ -194,7 +194,8 @@ def find_columns(
     why = f"there is no column {missing!r}{hint}" if missing not in known else "no file has all of its columns"
     said = "".join(f"; {remark}" for table in tables for remark in table.remarks)
     raise DataError(
-        f"{curve}: {why} ({files}: {shown}{said}); name the columns in a gait map, 'ppafo doctor --schema gait-map'"
+        f"{curve}: {why} ({files}: {shown}{said}); name the columns in a gait map (--map), "
+        "'ppafo doctor --schema gait-map'"
     )
 
 

@@ -29,6 +29,7 @@ def _read(path: str | Path) -> MotionTable:
     """Return a table of this package, or a plain one."""
     if is_plain(path):
         return read_plain_csv(path)
+    _check_first_name(path, _named_columns(_header(path))[0][0])
     recording = read_csv(path)
     columns = {name: recording[name] for name in recording.names}
     units = {name: recording.unit(name) for name in recording.names}
@@ -43,9 +44,9 @@ def _convention(_table: MotionTable, side: Side, _body_mass: float) -> Conventio
 
 
 def is_plain(path: str | Path) -> bool:
-    """Return whether a CSV file has other delimiters than the package, or no unit in square brackets after its time."""
+    """Return whether a CSV file has other delimiters than the package, or a column without unit in square brackets."""
     header = _header(path)
-    return _delimiter(header) != "," or "[" not in header.split(",")[0]
+    return _delimiter(header) != "," or not all("[" in cell for cell in header.split(","))
 
 
 def plain_names(path: str | Path) -> list[str]:
@@ -71,8 +72,7 @@ def read_plain_csv(path: str | Path) -> MotionTable:
     header = _header(path)
     delimiter, pairs = _delimiter(header), _named_columns(header)
     names, units = [name for name, _ in pairs], [unit for _, unit in pairs]
-    if names[0].lower() not in _TIMES:
-        raise DataError(f"{path}: the first column must be 'time', it is {one_line(names[0])[:_LONGEST_SHOWN]!r}")
+    _check_first_name(path, names[0])
     twice = first_twice(names)
     if twice is not None or "" in names:
         what = "a column has no name" if twice is None else f"there are two columns {one_line(twice)!r}"
@@ -91,6 +91,14 @@ def read_plain_csv(path: str | Path) -> MotionTable:
     with refused_as(DataError, str(path), DataError):
         kind = kind_of_comments(line for line in _text(path).splitlines() if line.startswith("#"))
     return MotionTable(str(path), recording.time, columns, {name: stated[name] for name in columns}, kind=kind)
+
+
+def _check_first_name(path: str | Path, name: str) -> None:
+    if name.lower() not in _TIMES:
+        raise DataError(
+            f"{path}: the first column must be 'time', it is {one_line(name)[:_LONGEST_SHOWN]!r}; a mean stride over 0 "
+            "to 100 % is written out as time, at least twice in a row"
+        )
 
 
 def _header(path: str | Path) -> str:
