@@ -83,13 +83,14 @@ def course_panels(one: Course, look: str, legend: str, title: str = "", limits: 
     def set_time(axes: "Axes") -> None:
         axes.set_xlim(one.times[0], one.times[-1])
 
+    def set_both(axes: "Axes") -> None:
+        # The lower one too: axes that are joined later take the limits of the one below them.
+        set_time(axes)
+        largest = max(map(abs, axes.dataLim.intervaly)) * 1.1 or 1.0
+        axes.set_ylim(-largest, largest)
+        axes.locator_params(axis="y", nbins=3)
+
     return [
         Panel(one.time, one.level, upper, title, legend=legend, then=set_time, shares_x=True),
-        Panel(one.time, one.change, lower, then=_centre, tall=0.5, shares_x=True),
+        Panel(one.time, one.change, lower, then=set_both, tall=0.5, shares_x=True),
     ]
-
-
-def _centre(axes: "Axes") -> None:
-    largest = max(map(abs, axes.dataLim.intervaly)) * 1.1 or 1.0
-    axes.set_ylim(-largest, largest)
-    axes.locator_params(axis="y", nbins=3)
