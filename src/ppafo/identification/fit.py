@@ -438,7 +438,7 @@ def _linear(work: _Work, point: Floats, left: Floats, slopes: Floats) -> tuple[_
         series = np.column_stack([left + slopes @ step, hidden])
         series[work.left_out] = 0.0
         noise = work.deviations(series)
-        known, rows = {}, np.column_stack([left, slopes, own_numbers * noise[:, None]]) / noise[:, None]
+        known, rows = {}, np.column_stack([np.column_stack([left, slopes]) / noise[:, None], own_numbers])
         for channel in work.channels:
             own = work.rows_of(channel)
             known[channel] = noise_of([series[one] / noise[one, None] for one in own], work.memory, work.is_motion)

@@ -112,8 +112,9 @@ def estimate_delay(curves: list[Curve], limit: float) -> Delay:
     between = shifts[max(0, best - 1)], shifts[min(_SHIFTS - 1, best + 1)]
     value = float(minimize_scalar(cost, bounds=between, method="bounded", options={"xatol": _ACCURACY * limit}).x)
     # A delay counts where it explains more than noise and the accuracy of the engine could.
-    gain, samples = cost(0.0) - cost(value), sum(curve.times.size for curve in thinned)
-    is_significant = gain > _SMALLEST_GAIN and gain * samples > _MINIMUM_GAIN * cost(value)
+    shifted = cost(value)
+    gain, samples = cost(0.0) - shifted, sum(curve.times.size for curve in thinned)
+    is_significant = gain > _SMALLEST_GAIN and gain * samples > _MINIMUM_GAIN * shifted
     if abs(value) < _RESOLUTION * float(np.median(np.diff(curves[0].times))) or not is_significant:
         return Delay(0.0, is_at_limit=False)
     return Delay(value, abs(value) > _AT_LIMIT * limit)
@@ -298,11 +299,8 @@ def _curves(measured: Measured, replayed: Replayed, device: Device, settings: Re
     for name, kind in COMPARED.items():
         values = measured_values(measured.recording, name)
         if values is not None and name not in replayed.inputs and name not in silent:
-            times, full_range, limit = (
-                measured.recording.time,
-                kind.full_range(device, gauge),
-                settings.thresholds.limit(name),
-            )
+            times, limit = measured.recording.time, settings.thresholds.limit(name)
+            full_range = kind.full_range(device, gauge)
             curves.append(Curve(name, kind.unit, times, values, model.time, model[name], full_range, limit))
     if not curves:
         word = "pressure_1" if settings.volume is not None else "anything beside the prescribed angle"
