@@ -31,7 +31,7 @@ class Endurance:
 
     ``discharge`` is the requested course. ``strides_when_warm`` is the number of strides that a bottle which stays at
     room temperature gives: what cooling costs. ``is_of_task_sequence`` is true where a stride is a task sequence,
-    ``is_of_recording`` where it is a whole recording, in which nobody need have walked.
+    ``is_of_recording`` where it is a whole recording, walked or not.
     """
 
     bottle: Bottle
