@@ -10,9 +10,11 @@ from ppafo.analyses.design.loading import load_design
 from ppafo.analyses.design.profile import answer as profile
 from ppafo.analyses.design.profile.answer import Sizing, size_for_profile
 from ppafo.analyses.design.profile.problem import SizingProblem
-from ppafo.analyses.design.wearer import solve as wearer
-from ppafo.analyses.design.wearer.solve import WearerSizing, Wish, size_for_wearer
+from ppafo.analyses.design.wearer import answer as wearer
+from ppafo.analyses.design.wearer.solve import size_for_wearer
+from ppafo.analyses.design.wearer.wish import WearerSizing, Wish
 from ppafo.errors import StudyError
+from ppafo.parameters.parts.catalogue import DEFAULT
 from ppafo.progress import Report, report_nothing
 from ppafo.report.finding import Finding
 
@@ -28,19 +30,22 @@ def design(
     torque: float | None = None,
     pressure: float | None = None,
     minutes: float | None = None,
+    toes: float | None = None,
+    catalogue: str | Path | None = None,
     progress: Report | None = None,
 ) -> Finding[Design] | Finding[Sizing] | Finding[WearerSizing]:
     """Return the device for a wearer or for a torque profile, or the designs that no other beats.
 
     A wearer has a body ``mass`` [kg] and may have a ``stature`` [m]; ``torque`` [N m], ``pressure`` [Pa absolute]
-    and ``minutes`` of walking [min] are what the device is for. Without a wearer, ``problem`` is a problem, or the name
+    and ``minutes`` of walking [min] are what the device is for, ``toes`` how far the toes clear the ground in mid-swing
+    [m]; its parts are from ``catalogue``, a name or a file. Without a wearer, ``problem`` is a problem, or the name
     or path of a design file; ``seed`` replaces the random seed of one with tasks. StudyError or ParameterError for bad
     input, and where every run with a valve fails.
     """
     wished = {"mass": mass, "torque": torque, "pressure": pressure, "minutes": minutes}
     report = progress or report_nothing
     if problem is None:
-        # A stature may be left out, so it is not among them.
+        # Stature, toes and catalogue may be left out, so they are not among them.
         missing = [f"--{name}" for name, value in wished.items() if value is None]
         if len(missing) == len(wished) and stature is None:
             raise StudyError(f"no design was given: name one, give a .toml file, or for a wearer {FOR_A_WEARER}")
@@ -48,8 +53,10 @@ def design(
             raise StudyError(f"for a wearer give {', '.join(missing)} too, for example {FOR_A_WEARER}")
         if seed is not None:
             raise StudyError("--seed: nothing is drawn for a wearer; leave it out")
-        return wearer.finding_of(size_for_wearer(Wish(mass, stature, torque, pressure, 60.0 * minutes), report))
-    given = [f"--{name}" for name, value in {**wished, "stature": stature}.items() if value is not None]
+        wish = Wish(mass, stature, torque, pressure, 60.0 * minutes, toes)
+        return wearer.finding_of(size_for_wearer(wish, report, DEFAULT if catalogue is None else catalogue))
+    of_a_wearer = {**wished, "stature": stature, "toes": toes, "catalogue": catalogue}
+    given = [f"--{name}" for name, value in of_a_wearer.items() if value is not None]
     if given:
         raise StudyError(f"{', '.join(given)}: the design file states what is wanted; give one or the other")
     chosen = load_design(problem, seed) if isinstance(problem, str | Path) else problem

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from ppafo.analyses.design.front.problem import DesignProblem
     from ppafo.analyses.design.profile.answer import Sizing
     from ppafo.analyses.design.profile.problem import SizingProblem
-    from ppafo.analyses.design.wearer.solve import WearerSizing
+    from ppafo.analyses.design.wearer.wish import WearerSizing
     from ppafo.analyses.endurance.answer import Endurance, Endurances
     from ppafo.analyses.endurance.solve import GasUse
     from ppafo.analyses.find.solve import Threshold
@@ -318,23 +318,28 @@ def design(
     torque: Torque | None = None,
     pressure: Pressure | None = None,
     minutes: Minutes | None = None,
+    toes: Length | None = None,
+    catalogue: Annotated[str | Path, Word("FILE")] | None = None,
     progress: Report | None = None,
 ) -> Finding[Design] | Finding[Sizing] | Finding[WearerSizing]:
     """Find a device: for a wearer, for a torque profile, or Pareto-optimal in error, gas and mass.
 
-    A wearer has a body mass and may have a stature; torque, pressure and minutes of walking are what the device is for.
+    A wearer has a body mass and may have a stature; torque, pressure and minutes of walking are what the device is for,
+    and the toes have to clear the ground.
     StudyError or ParameterError for bad input, and where every run with a valve fails.
 
     problem: name of a design file, or a .toml file
     mass: body mass of the wearer, '72.5 kg'
-    stature: height of the wearer, '1.75 m'
+    stature: height of the wearer, '1.75 m'; default: of a body mass index of 22 kg/m^2
     torque: peak torque of push-off, '2.5 N m'
     pressure: supply pressure, '50 psi_g'
     minutes: minutes of walking on one bottle
+    toes: lowest height of the toes in mid-swing; default: '1 cm', or the healthy gait's own where that is less
+    catalogue: a .toml file with parts of your own; default: the catalogue of the package
     """
     from ppafo.analyses.design.solve import design
 
-    return design(problem, seed, threads, mass, stature, torque, pressure, minutes, progress)
+    return design(problem, seed, threads, mass, stature, torque, pressure, minutes, toes, catalogue, progress)
 
 
 def bottle(
