@@ -177,7 +177,7 @@ def add_parameters(parser: argparse.ArgumentParser, command: Command, is_listing
         metavar="MODULE",
         action="append",
         default=[],
-        help="a module of your own, such as laws.py, whose objects files may name as laws:KIND; may be repeated",
+        help="a module of yours that files may name, such as laws.py",
     )
     if OUT not in names:
         what = "also write the result as files into this folder"
