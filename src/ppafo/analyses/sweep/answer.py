@@ -131,7 +131,7 @@ def load_study_results(folder: str | Path) -> Finding[StudyResults]:
     # A configuration or a metric in one of the two documents alone would be looked up in vain.
     is_same = names == described.configurations.keys() == described.completed_by_configuration.keys()
     if not is_same or any(own != document["metrics"].keys() for own in metrics):
-        raise DataError(f"{whose}: its configurations and metrics are not those of {MANIFEST}")
+        raise DataError(f"{whose}: its configurations and metrics differ from {MANIFEST}")
     return finding_of(StudyResults(place, document, summary))
 
 
