@@ -20,6 +20,7 @@ from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import SECTION
 from ppafo.parameters import declaration
 from ppafo.parameters.building import build_device
+from ppafo.parameters.declaration import alternatives
 from ppafo.parameters.device import VANE, Device
 from ppafo.parameters.overrides import check_valve
 from ppafo.parameters.parameter_set import (
@@ -32,6 +33,7 @@ from ppafo.parameters.parameter_set import (
     apply_overrides,
     chosen_valve,
 )
+from ppafo.plugins import Plugins, name_plugins
 from ppafo.units import check_unit
 
 # A dotted path names a valve: a dot or a blank in its name would make it another path.
@@ -171,8 +173,12 @@ def load_device(name_or_path: str | Path, valve: str | None = None, overrides: I
     return build_device(parameter_set, valve)
 
 
-def load_parameter_set(name_or_path: str | Path) -> ParameterSet:
-    """Return a parameter set by its name in the package or by the path of a TOML file."""
+def load_parameter_set(name_or_path: str | Path, *, plugins: Plugins = ()) -> ParameterSet:
+    """Return a parameter set by its name in the package or by the path of a TOML file.
+
+    ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
+    """
+    name_plugins(plugins)
     content, file = _FILE.read(name_or_path), label(str(name_or_path))
     return parse_parameter_set(content, file, Path(name_or_path).parent)
 
@@ -204,7 +210,7 @@ def parse_parameter_set(content: bytes, file: str, folder: Path | None = None) -
             hint = nearest_name(valve, parameter_set.valve_kinds)
             raise ParameterError(f"{parameter_set.file}: {path}: there is no valve '{valve}'{hint}")
         with refused_as(ParameterError, f"{parameter_set.file}: {path}.unit", UnitError):
-            check_unit(entry.unit)
+            check_unit(entry.unit, alternatives(declared[path])[0])
     return parameter_set
 
 
