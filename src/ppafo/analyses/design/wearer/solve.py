@@ -58,6 +58,8 @@ _LESS_PRESSURE = tuple(0.95 - 0.05 * place for place in range(12))
 """Times the gauge pressure that are tried where no bottle lasts."""
 _OFFERED = 5
 """Pairs of parts that are tried at less pressure: those with the most torque for their gas."""
+_FIRST = 4
+"""Pairs and pressures, from the least gas, that are walked on a bottle for an offer."""
 _USED = 0.8
 """Share of its gas above which no walk on a bottle is tried for an offer; the walk decides."""
 _ALLOWANCE = 1.15
@@ -326,8 +328,8 @@ def _instead(wish: Wish, tried: list[Tried], bottles: list[Part], shelf: Shelf, 
     weak = sorted(clear, key=lambda item: -item[1].torque)
     low = sorted(strong, key=lambda item: -item[1].toes)
     report(Progress(f"walking on {largest.name}", 0, 0, noun="bottles"))
-    offers = [_offered(*items[0], largest, shelf) for items in ((able,) if able else (weak, low)) if items]
-    made = [offer for offer in offers if offer is not None]
+    nearest = [] if able else [_offered(*items[0], largest, shelf) for items in (weak, low) if items]
+    made = [offer for offer in (_thriftiest(able, largest, shelf), *nearest) if offer is not None]
     yield from made
     if not able:
         more = (_offered(*item, largest, shelf) for item in _at_more_pressure(wish, tried))
@@ -336,6 +338,17 @@ def _instead(wish: Wish, tried: list[Tried], bottles: list[Part], shelf: Shelf, 
     if all(offer.wish.seconds < wish.seconds for offer in made):
         lasting = _lasting(wish, weak, largest, shelf)
         yield from [] if lasting is None else [lasting]
+
+
+def _thriftiest(able: list[tuple[Wish, Tried]], bottle: Part, shelf: Shelf) -> Offer | None:
+    """Return what walks on a bottle with the least gas, of the first few the one whose toes stay as high as wanted."""
+    offers = []
+    for asked, one in able[:_FIRST]:
+        offer = _offered(asked, one, bottle, shelf)
+        if offer is not None and offer.wish.clearance >= asked.clearance:
+            return offer
+        offers += [] if offer is None else [offer]
+    return next(iter(offers), None)
 
 
 def _lasting(wish: Wish, weak: list[tuple[Wish, Tried]], bottle: Part, shelf: Shelf) -> Offer | None:

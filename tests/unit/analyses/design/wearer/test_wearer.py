@@ -117,10 +117,9 @@ def test_where_nothing_does_it_what_is_offered_is_granted_when_it_is_asked_for()
     assert changes == [
         "less torque, fewer minutes",
         "more pressure, fewer minutes",
-        "less torque, less pressure",
         "less pressure, fewer minutes",
     ]
-    line = too_strong.instead[2]
+    line = too_strong.instead[0]
     words = re.search(OFFER, line)
     assert words is not None, line
     torque, pressure, minutes = (float(word) for word in words.groups()[:3])
@@ -140,7 +139,7 @@ def test_a_pressure_that_wastes_gas_is_answered_with_less_pressure_and_that_is_g
     tried = wearer._few_strides(wish, valve, actuator)
     assert tried[0].has(wish)
     assert wearer._lightest(wish, tried, [bottle], shelf, report_nothing) is None
-    (offer,) = wearer._instead(wish, tried, [bottle], shelf, report_nothing)
+    (offer, *_) = wearer._instead(wish, tried, [bottle], shelf, report_nothing)
     words = re.fullmatch(r"less pressure" + OFFER, offer.text(wish))
     assert words is not None, offer.text(wish)
     asked = replace(wish, pressure=101325.0 + float(words[2]) * PSI)
