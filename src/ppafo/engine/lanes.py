@@ -20,14 +20,14 @@ from numpy.typing import NDArray
 
 from ppafo import interrupts
 from ppafo.control.kind import ProfileKind
-from ppafo.engine.cache import kept_bytes, load_all
+from ppafo.engine.cache import load_all
 from ppafo.engine.lane_rows import VECTOR, lanes_of
-from ppafo.engine.lane_source import INLINE, SAME_MOMENT, write_lanes
+from ppafo.engine.lane_source import INLINE, write_lanes
 from ppafo.engine.loading import chosen_compiler, load_source
-from ppafo.engine.outline import Outline
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, rebuilt, row_numbers
 from ppafo.engine.source_text import SourceCollector
+from ppafo.engine.step.lane import SAME_MOMENT
 from ppafo.signals.meter import MeterKind
 
 Floats = NDArray[np.float64]
@@ -106,21 +106,19 @@ def load_programs(programs: Iterable[Program]) -> None:
 
 def _current_source(program: Program) -> str:
     """The source of a program, written anew where it is out of date."""
-    outline, source = write_source(program)
+    collector, source = write_source(program)
     # The kept text may rest on a function that a notebook has defined anew since.
-    if outline.made_from.is_current():
+    if collector.made_from.is_current():
         return source
     write_source.cache_clear()
     return write_source(program)[1]
 
 
 @lru_cache(maxsize=64)
-def write_source(program: Program, lanes: int = 0) -> tuple[Outline, str]:
+def write_source(program: Program, lanes: int = 0) -> tuple[SourceCollector, str]:
     """What a program is made from, and its source for some lanes, 0 for as many as fit; written once, then kept."""
-    outline = Outline(INLINE)
-    made_from = write_lanes(program, outline, lanes)
-    source = kept_bytes("lanes", made_from, lambda: write_lanes(program, SourceCollector(INLINE), lanes).encode())
-    return outline, source.decode()
+    collector = SourceCollector(INLINE)
+    return collector, write_lanes(program, collector, lanes)
 
 
 def run_batch(batch: Batch, threads: int | None = None) -> BatchResult:

@@ -5,10 +5,10 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from ppafo.control.kind import OPEN_LOOP
-from ppafo.engine.lane_source import SAME_MOMENT
+from ppafo.engine.step.lane import SAME_MOMENT
 from ppafo.engine.lanes import Floats
 from ppafo.engine.over_samples import over_samples
-from ppafo.engine.program import place_over_samples
+from ppafo.engine.linking import place_over_samples
 from ppafo.engine.rows import leaf_paths, rebuilt
 from ppafo.engine.run import Run
 from ppafo.engine.scheme.actuators import pressures_of, torque_of

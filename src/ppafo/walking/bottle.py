@@ -15,7 +15,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from ppafo.constants import GRAMS_PER_KILOGRAM
-from ppafo.engine.lane_samples import FELL
+FELL = "walk.fall_time"
 from ppafo.engine.lanes import BatchResult, Floats, begin_block
 from ppafo.engine.rows import leaf_paths, leaves, row_numbers
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.control.kind import PythonController
-from ppafo.engine.lane_samples import FELL
-from ppafo.engine.lane_samples import REQUEST as REQUEST_ROW
-from ppafo.engine.lane_source import SAME_MOMENT
+from ppafo.engine.channels import REQUEST as REQUEST_ROW
+from ppafo.engine.step.lane import SAME_MOMENT
 from ppafo.engine.lanes import Batch, BatchResult, Floats, add_meters, group_of, load_programs, meters_of, run_blocks
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, row_numbers
@@ -305,7 +304,7 @@ def _meter_batch(plain: Batch, request: Request) -> _MeteredBatch:
             f"{interval.max():.6g} s; give run.output_interval a value that does"
         )
     late = _late_totals(plain, available)
-    falls = {FELL} if program.reacts and (late or request.bands) else set[str]()
+    falls = {"walk.fall_time"} if program.reacts and (late or request.bands) else set[str]()
     traced = sorted({*read_from_traces, *request.bands, *late, *falls})
     every_sample = bool(read_from_traces or (late and (falls or request.bands)))
     # Totals alone need no more than the first sample and the last.
@@ -324,7 +323,7 @@ def _late_totals(plain: Batch, metrics: Mapping[str, MetricKind]) -> tuple[str, 
     needed = {channel for kind in metrics.values() for channel in kind.channels}
     if ends_there or needed.isdisjoint(ThermalTotals._fields):
         return ()
-    of_gas = (path for name, row in program.gas.states.items() for path in leaf_paths(row, name))
+    of_gas = (path for name, row in program.gas.STATES.items() for path in leaf_paths(row, name))
     return (*_OF_STATE, *of_gas)
 
 
