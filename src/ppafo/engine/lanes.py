@@ -12,8 +12,7 @@ import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from types import ModuleType
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +22,7 @@ from ppafo.control.kind import ProfileKind
 from ppafo.engine.cache import load_all
 from ppafo.engine.lane_rows import VECTOR, lanes_of
 from ppafo.engine.lane_source import INLINE, write_lanes
-from ppafo.engine.loading import chosen_compiler, load_source
+from ppafo.engine.loading import BACKEND_VARIABLE, chosen_compiler, load_source
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, rebuilt, row_numbers
 from ppafo.engine.source_text import SourceCollector
@@ -31,6 +30,9 @@ from ppafo.engine.step.lane import SAME_MOMENT
 from ppafo.signals.meter import MeterKind
 
 Floats = NDArray[np.float64]
+
+PYTHON = "python"
+"""Value of ``PPAFO_BACKEND`` that lets Python run the functions of the step as they are."""
 
 STEPS_PER_CALL = 10_000
 """Steps in one call of compiled code: some hundredths of a second, seconds where each step takes hundreds of parts."""
@@ -89,18 +91,31 @@ class BatchResult:
     record: Floats
 
 
-def load_program(program: Program) -> ModuleType:
-    """The compiled module of a program, from the disk cache where it is there.
+class Advancing(Protocol):
+    """A program that can be run: compiled, or by Python itself."""
+
+    @property
+    def advance(self) -> Callable[..., None]:
+        """Take a block of lanes some steps further."""
+
+
+def load_program(program: Program) -> Advancing:
+    """The compiled module of a program, from the disk cache where it is there; or the program as Python runs it.
 
     A program is written anew where a number or function that it was made from stands for something else by now.
     """
-    return load_source(_current_source(program))
+    if os.environ.get(BACKEND_VARIABLE) == PYTHON:
+        from ppafo.engine.interpreter import PythonProgram  # most computers have a compiler
+
+        return PythonProgram(program)
+    module: Any = load_source(_current_source(program))
+    return module  # type: ignore[no-any-return]
 
 
 def load_programs(programs: Iterable[Program]) -> None:
     """Load the compiled modules of programs that are all needed, so that what is compiled can be counted."""
     chosen = dict.fromkeys(programs)
-    if len(chosen) > 1:
+    if len(chosen) > 1 and os.environ.get(BACKEND_VARIABLE) != PYTHON:
         load_all([_current_source(program) for program in chosen], chosen_compiler(), load_source)
 
 
@@ -184,7 +199,7 @@ def join_results(results: Sequence[BatchResult]) -> BatchResult:
 class LaneBlock:
     """One block of runs in progress; ``states`` (rows, runs) may be read and written between two ``advance``."""
 
-    def __init__(self, module: ModuleType, program: Program, clock: Clock, parameters: Floats, states: Floats) -> None:
+    def __init__(self, module: Advancing, program: Program, clock: Clock, parameters: Floats, states: Floats) -> None:
         self._module = module
         self._clock = clock
         self._width = states.shape[1]
