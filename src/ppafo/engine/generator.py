@@ -33,11 +33,12 @@ class Composed:
     row: Any
     """The NamedTuple class of what it returns, None where that is one value."""
     is_phase: bool
+    ending: str
 
     @property
     def own(self) -> str:
         """Name of what it returns, where that is a row."""
-        return f"after_{self.function.__name__}"
+        return f"after_{self.function.__name__}{self.ending if self.name.endswith(self.ending) else ''}"
 
 
 @dataclass(slots=True)
@@ -140,7 +141,7 @@ class StepText:
         handed = tuple(item.arg for item in tree.args.args)
         handed = handed[: len([name for name in handed if name in effects.reads or name == NUMBER])]
         name = self._written(function, tree, handed, row)
-        return Composed(function, name, effects, handed, known, row, is_phase)
+        return Composed(function, name, effects, handed, known, row, is_phase, self.ending)
 
     def _written(self, function: FunctionType, tree: ast.FunctionDef, handed: tuple[str, ...], row: Any) -> str:
         """Put the text of a reduced function into the module; return its name there."""

@@ -5,7 +5,7 @@ for and stores those that it returns; for a single run it is the bare call. Func
 """
 
 import ast
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from types import FunctionType
 from typing import NamedTuple, Protocol
@@ -21,22 +21,25 @@ from ppafo.engine.step.lane import Now
 from ppafo.errors import ProgramError
 
 
+NEEDS_PARTS = "needs_parts"
+"""The last argument of a loop that has both steps: 1 where the error decides about the parts of a step, else 0."""
+
+
 class Call(NamedTuple):
-    """A call of a phase: the phase, and its own arguments as text."""
+    """A call of a phase: the phase, and its own arguments as text, by their names."""
 
     phase: Composed
-    given: list[str]
+    given: dict[str, str]
 
     def text(self, number: str) -> str:
         """The call for the lane of a number, with what the phase is handed."""
         handed = [number if name == NUMBER else name for name in self.phase.handed]
-        return f"{self.phase.name}({', '.join([*handed, *self.given])})"
+        own = [self.given[name] for name in self.phase.effects.takes]
+        return f"{self.phase.name}({', '.join([*handed, *own])})"
 
     def places(self, slot: Slot) -> list[str]:
         """Where in its history the phase sets a number, but for the lane."""
-        code = self.phase.function.__code__
-        own = [name for name in code.co_varnames[2 : code.co_argcount] if name not in self.phase.known]
-        given = {name: ast.parse(text, mode="eval").body for name, text in zip(own, self.given, strict=True)}
+        given = {name: ast.parse(text, mode="eval").body for name, text in self.given.items()}
         return [ast.unparse(with_arguments(place, given)) for place in slot.places]
 
 
@@ -60,17 +63,30 @@ class Rows(Protocol):
 
 
 class LoopText:
-    """Writes a function of the loop over steps, with those that it calls in their places."""
+    """Writes a function of the loop over steps, with those that it calls in their places.
 
-    def __init__(self, step: StepText, function: FunctionType, rows: Rows) -> None:
-        self.step, self.function, self.rows = step, function, rows
-        self.reduction = Reduction(step, function, {})
+    With the steps of two programs, the loop asks ``NEEDS_PARTS`` wherever these go on in another way.
+    """
+
+    def __init__(self, steps: Mapping[Rows, StepText], function: FunctionType) -> None:
+        (self.rows, self.step), *others = steps.items()
+        self.steps, self.function = steps, function
+        self.reduction = Reduction(self.step, function, {})
         local = frozenset({*function.__code__.co_varnames, *HISTORIES, "record"})
-        self.composer = step.composer(function, Names(local, step.kept, {"now": Now}))
+        self.composer = self.step.composer(function, Names(local, self.step.kept, {"now": Now}))
+        self.other = LoopText(dict(others), function) if others else None
 
     def lines(self) -> list[ast.stmt]:
         """Its statements."""
         return self.block(self.reduction.definition.tree.body)
+
+    def either(self, own: list[ast.stmt], other: list[ast.stmt]) -> list[ast.stmt]:
+        """What this program does, or what the one does that divides its steps."""
+        if [*map(ast.dump, own)] == [*map(ast.dump, other)]:
+            return own
+        (question,) = _parsed([f"{NEEDS_PARTS} == 1"])
+        assert isinstance(question, ast.Expr)
+        return [ast.If(question.value, other or [ast.Pass()], own)]
 
     def expression(self, node: ast.expr) -> ast.expr:
         """An expression of the loop, whose ``lanes`` are arrays of the module."""
@@ -89,7 +105,7 @@ class LoopText:
             case ast.Expr() | ast.Assert():
                 return []
             case ast.For(iter=ast.Name(id="lanes")):
-                return _parsed(self.rows.over_lanes([self.phase(item) for item in node.body]))
+                return self.phases(node)
             case ast.For(target=ast.Name()):
                 return [
                     ast.For(node.target, self.expression(node.iter), self.block(node.body), self.block(node.orelse))
@@ -118,10 +134,28 @@ class LoopText:
             (found,) = _parsed([asked])
             assert isinstance(found, ast.Expr)
             return [*_parsed(before), ast.If(found.value, self.block(node.body), self.block(node.orelse))]
-        whole = self.reduction.asked(node.test)
-        if isinstance(whole, ast.Constant):
-            return self.block(node.body if whole.value else node.orelse)
-        return [ast.If(self.expression(node.test), self.block(node.body), self.block(node.orelse))]
+        own = self.decided(node)
+        if own is None:
+            test = self.expression(node.test)
+            if isinstance(test, ast.Constant):
+                return self.block(node.body if test.value else node.orelse)
+            return [ast.If(test, self.block(node.body), self.block(node.orelse))]
+        other = None if self.other is None else self.other.decided(node)
+        if self.other is None or other is own:
+            return self.block(own)
+        return self.either(self.block(own), self.other.branch(node))
+
+    def decided(self, node: ast.If) -> list[ast.stmt] | None:
+        """The statements of a decision of the parts; None for any other."""
+        test = self.reduction.asked(node.test)
+        if not isinstance(test, ast.Constant):
+            return None
+        return node.body if test.value else node.orelse
+
+    def phases(self, node: ast.For) -> list[ast.stmt]:
+        """A loop over lanes."""
+        own = _parsed(self.rows.over_lanes([self.phase(item) for item in node.body]))
+        return own if self.other is None else self.either(own, self.other.phases(node))
 
     def phase(self, node: ast.stmt) -> Call:
         """The call of a phase in a loop over lanes."""
@@ -132,7 +166,7 @@ class LoopText:
         given = list(zip(names, node.value.args, strict=True))[2:]
         known = {name: self.reduction.value_of(item) for name, item in given}
         known = {name: value for name, value in known.items() if is_known_part(value)}
-        own = [ast.unparse(self.expression(item)) for name, item in given if name not in known]
+        own = {name: ast.unparse(self.expression(item)) for name, item in given if name not in known}
         return Call(self.step.phase(called, known), own)
 
     def called(self, node: ast.Call) -> list[ast.stmt]:
@@ -141,7 +175,7 @@ class LoopText:
         if isinstance(function, ast.Attribute) and isinstance(function.value, ast.Name) and function.value.id == "lanes":
             return _parsed(self.rows.acted(function.attr, [ast.unparse(self.expression(item)) for item in node.args]))
         called: FunctionType = self.reduction.outside(function)
-        inner = LoopText(self.step, called, self.rows)
+        inner = LoopText(self.steps, called)
         names = called.__code__.co_varnames[: called.__code__.co_argcount]
         given = zip(names[2:], map(self.expression, node.args[2:]), strict=True)
         begin: list[ast.stmt] = [
@@ -298,14 +332,16 @@ class RowsOfRun:
             text = call.text("0")
             if len(results) == 1:
                 lines.append(f"{results[0]} = {text}")
-            else:
-                whole = call.phase.own
-                lines += [f"{whole} = {text}", *(f"{name} = {whole}.{name}" for name in results)]
-            traced = [name for name, slot in slots.items() if slot.history == "trace"]
+                continue
+            whole = call.phase.own
+            lines.append(f"{whole} = {text}")
+            traced = [f"{whole}.{name}" for name, slot in slots.items() if slot.history == "trace"]
             if traced:
                 lines += ["samples.before = samples.last", f"samples.last = {self.outputs}(0.0, {', '.join(traced)})"]
+            else:
+                lines += [f"{name} = {whole}.{name}" for name in results]
             for name, slot in slots.items():
-                if name not in traced:
+                if slot.history != "trace":
                     lines.append(f"{slot.history}[{', '.join(call.places(slot))}, 0] = {name}")
         return lines or ["pass"]
 
@@ -351,14 +387,12 @@ def lane_loop(step: StepText, head: str, name: str, arguments: str, lanes: int =
         f"width = {rows.lanes if rows.lanes <= VECTOR else 'states.shape[1]'}",
         *over_rows(states, "x[row, lane] = states[row, lane]"),
         *over_rows(parameters, f"x[{states} + row, lane] = parameters[row, lane]"),
-        *_unparsed(LoopText(step, loop.advance, rows).lines()),
+        *_unparsed(LoopText({rows: step}, loop.advance).lines()),
         *over_rows(states, "states[row, lane] = x[row, lane]"),
     ]
     return "\n".join([head, f"def {name}({arguments}):", *indent(lines)])
 
 
-NEEDS_PARTS = "needs_parts"
-"""The last argument of a loop that has both steps: 1 where the error decides about the parts of a step, else 0."""
 LOOP_ARRAYS = {"signal_history": 3, "command_history": 2}
 """Arrays of a loop behind its states, parameters and samples, with how many extents they have; the last one is 1."""
 LOOP_NUMBERS = {
@@ -375,10 +409,10 @@ def run_loop(step: StepText, outputs: str, in_parts: StepText | None) -> str:
     It is for translation alone, as it writes into these. With ``in_parts``, the same program with steps that their
     error divides, it has both, and ``needs_parts`` chooses.
     """
-    whole = _unparsed(LoopText(step, loop.advance, RowsOfRun(step, outputs)).lines())
+    steps: dict[Rows, StepText] = {RowsOfRun(step, outputs): step}
     if in_parts is not None:
-        parted = _unparsed(LoopText(in_parts, loop.advance, RowsOfRun(in_parts, outputs)).lines())
-        whole = [f"if {NEEDS_PARTS} == 1:", *indent(parted), "else:", *indent(whole)]
+        steps[RowsOfRun(in_parts, outputs)] = in_parts
+    whole = _unparsed(LoopText(steps, loop.advance).lines())
     # A group without numbers is not in the row of all.
     taken = [
         f"{name} = {f'{given}.{name}' if leaf_paths(row, name) else '()'}"

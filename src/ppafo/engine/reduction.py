@@ -56,6 +56,8 @@ class Effects:
     """
 
     reads: dict[str, None] = field(default_factory=dict)
+    takes: tuple[str, ...] = ()
+    """Those of its own parameters that it asks."""
     groups: dict[str, Fields] = field(default_factory=dict)
     slots: dict[str, Slot] = field(default_factory=dict)
 
@@ -177,7 +179,9 @@ class Reduction:
         tree = copy(self.definition.tree)
         tree.body = self.block(tree.body)
         taken = {*self.effects.reads, *self.effects.results}
-        own = [name for name in self.parameters if name != "lane" and name not in self.known]
+        asked = {item.id for line in tree.body for item in names_in(line)}
+        own = [name for name in self.parameters if name != "lane" and name not in self.known and name in asked]
+        self.effects.takes = tuple(own)
         # A local name that is also a group's has another spelling.
         names = _Names({name for name in _bound(tree.body) | set(own) if name in taken})
         tree.body = [names.visit(item) for item in tree.body]
@@ -347,20 +351,14 @@ class Reduction:
         names = called.__code__.co_varnames[: called.__code__.co_argcount]
         if len(node.args) != len(names) or node.keywords:
             raise self.refuse(node, f"{called.__name__}({', '.join(names)}): its arguments are given in their order")
-        known, given = dict[str, Any](), list[ast.expr]()
-        for name, item in zip(names, node.args, strict=True):
-            value = self.value_of(item)
-            if name in ("parts", "lane"):
-                continue
-            if is_known_part(value):
-                known[name] = value
-            else:
-                given.append(self.visit(item))
+        own = list(zip(names, node.args, strict=True))[2:]
+        known = {name: self.value_of(item) for name, item in own}
+        known = {name: value for name, value in known.items() if is_known_part(value)}
         name = self.collector.add_called(self.function, called, known)
         effects = self.collector.effects_of(name)
         for row in effects.reads:
             self.read(row)
-        return name, given
+        return name, [self.visit(item) for own_name, item in own if own_name in effects.takes]
 
     def arguments(self, node: ast.expr) -> Iterator[ast.expr]:
         """An argument, or those that ``*(... for ... in ...)`` stands for."""
@@ -485,7 +483,10 @@ class Reduction:
             return ast.Name(_GROUP + name, ast.Store())
         if isinstance(item, ast.Subscript) and self.group(item.value) in HISTORIES:
             history, places = self.group(item.value), tuple(map(self.visit, _places(item)))
-            name = "_".join([history, *(str(place.value) for place in places if isinstance(place, ast.Constant))])
+            known = [place.value for place in places if isinstance(place, ast.Constant)]
+            # A trace has the names of its channels.
+            words = [self.collector.parts.traced[place] if history == "trace" else str(place) for place in known]
+            name = "_".join(["new", history.removesuffix("_history"), *words]).replace(".", "_")
             self.note_slot(name, Slot(history, places), item)
             return ast.Name(_GROUP + name, ast.Store())
         if not isinstance(item, ast.Name):

@@ -159,7 +159,10 @@ def look_at_reference(parts: Program, lanes: Lanes, interval: float, last_record
 
 
 def do_parts(parts: Program, lanes: Lanes, now: Now) -> None:
-    """A step in as many parts as the lane with the most of them needs."""
+    """A step in parts, as many as it needs.
+
+    A block of lanes has as many as the lane with the most of them.
+    """
     for part in range(MAXIMUM_PARTS):
         for lane in lanes:
             phases.measure_part(parts, lane, now)
@@ -177,7 +180,11 @@ def do_parts(parts: Program, lanes: Lanes, now: Now) -> None:
 
 
 def do_step(parts: Program, lanes: Lanes, now: Now) -> None:
-    """The phases of a step or part, each for all lanes: short loops let a processor work on several at once."""
+    """The phases of a step or part.
+
+    Each for all lanes: loops this short let the processor work on several at once. It looks some hundred instructions
+    ahead, and one lane's division or root waits for the one before.
+    """
     if parts.leg is not None:
         lead_walk(parts, lanes, now)
     for lane in lanes:

@@ -199,6 +199,9 @@ def c_text_of_run(
     documents = documents_of(collector) | _DOCUMENTS
     # A short name is taken only where it is unambiguous and C leaves it free; all others keep their module's path.
     own = {name: re.sub(r"\W", "_", item.__qualname__).strip("_") for name, item in collector.owners.items()}
+    # Functions of the step that divide it have their ending beside those that do not.
+    ending = _ENDINGS[IN_PARTS]
+    own |= {name: f"{word.removesuffix(ending)}{ending}" for name, word in own.items() if name.endswith(ending)}
     counts, taken = Counter(own.values()), _names_around()
     short = {name: word for name, word in own.items() if counts[word] == 1 and word not in taken and is_free(word)}
     return c_source(
