@@ -2,7 +2,7 @@
 
 import ast
 from collections import namedtuple
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from types import FunctionType
 from typing import Any
@@ -52,6 +52,8 @@ class StepText:
     collector: SourceCollector
     ending: str = ""
     """What the names of functions end with that another program has otherwise."""
+    further: Mapping[str, Any] = field(default_factory=dict)
+    """Classes of groups that are not the program's own."""
     states: dict[str, Any] = field(init=False)
     parameters: dict[str, Any] = field(init=False)
     of_step: dict[str, Any] = field(init=False)
@@ -67,10 +69,11 @@ class StepText:
     @property
     def rows(self) -> Mapping[str, Any]:
         """Classes of the groups that have rows."""
-        return self.parameters | self.states | self.of_step
+        return {**self.parameters, **self.states, **self.of_step, **self.further}
 
-    def phase(self, function: FunctionType, known: Mapping[str, Any] | None = None) -> Composed:
+    def phase(self, function: Callable[..., None], known: Mapping[str, Any] | None = None) -> Composed:
         """A function that the loop over steps calls: of what it sets it returns what later phases may read."""
+        assert isinstance(function, FunctionType), "it is no other callable"
         return self._composed(function, known or {}, is_phase=True)
 
     def add_called(self, inside: FunctionType, called: FunctionType, known: Mapping[str, Any]) -> str:

@@ -141,7 +141,7 @@ class PythonLanes:
 
     def slot(self, index: int, trace_every: int) -> int:
         """Where its trace is kept: one with less room than samples keeps the last."""
-        return index // trace_every % self.trace.shape[0]
+        return index // trace_every % len(self.trace)
 
 
 class Linked:

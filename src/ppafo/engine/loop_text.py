@@ -5,7 +5,7 @@ for and stores those that it returns; for a single run it is the bare call. Func
 """
 
 import ast
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
 from types import FunctionType
 from typing import NamedTuple, Protocol
@@ -68,9 +68,10 @@ class LoopText:
     With the steps of two programs, the loop asks ``NEEDS_PARTS`` wherever these go on in another way.
     """
 
-    def __init__(self, steps: Mapping[Rows, StepText], function: FunctionType) -> None:
+    def __init__(self, steps: Mapping[Rows, StepText], function: Callable[..., None]) -> None:
         (self.rows, self.step), *others = steps.items()
         self.steps, self.function = steps, function
+        assert isinstance(function, FunctionType), "it is no other callable"
         self.reduction = Reduction(self.step, function, {})
         local = frozenset({*function.__code__.co_varnames, *HISTORIES, "record"})
         self.composer = self.step.composer(function, Names(local, self.step.kept, {"now": Now}))
@@ -100,8 +101,8 @@ class LoopText:
     def statement(self, node: ast.stmt) -> list[ast.stmt]:
         """What a statement becomes."""
         match node:
-            case ast.Expr(value=ast.Call()):
-                return self.called(node.value)
+            case ast.Expr(value=ast.Call() as call):
+                return self.called(call)
             case ast.Expr() | ast.Assert():
                 return []
             case ast.For(iter=ast.Name(id="lanes")):
@@ -260,24 +261,30 @@ class RowsOfLanes:
 
     def over_lanes(self, calls: Sequence[Call]) -> list[str]:
         """A loop over all lanes of the block."""
-        lines: list[str] = []
-        for call in calls:
-            for name in call.phase.handed:
-                if name not in self.step.rows and name not in (NUMBER, *HISTORIES):
-                    raise ProgramError(f"{call.phase.name} asks for '{name}', which no phase before it has kept")
-            lines += [self.load(name) for name in call.phase.handed if name in self.step.rows]
-            results = call.phase.effects.results
-            if not results:
-                continue
-            whole = results[0] if len(results) == 1 else call.phase.own
-            lines.append(f"{whole} = {call.text('lane')}")
-            for group, fields in call.phase.effects.groups.items():
-                for path in leaf_paths(self.step.rows[group], group):
-                    if fields is None or path.split(".")[1].partition("[")[0] in fields:
-                        lines.append(f"{self.cells[path]} = {path if whole == group else f'{whole}.{path}'}")
-            for name, slot in call.phase.effects.slots.items():
-                lines.append(f"{slot.history}[{', '.join(call.places(slot))}, lane] = {name if whole == name else f'{whole}.{name}'}")
+        lines = [line for call in calls for line in self.called(call)]
         return ["for lane in range(width):", *indent(lines or ["pass"])]
+
+    def called(self, call: Call) -> list[str]:
+        """Lines for one lane: what the phase asks for, the call, and what it returns in its rows."""
+        effects, rows = call.phase.effects, self.step.rows
+        for name in call.phase.handed:
+            if name not in rows and name not in (NUMBER, *HISTORIES):
+                raise ProgramError(f"{call.phase.name} asks for '{name}', which no phase before it has kept")
+        if not effects.results:
+            return []
+        is_one = len(effects.results) == 1
+        whole = effects.results[0] if is_one else call.phase.own
+        lines = [self.load(name) for name in call.phase.handed if name in rows]
+        lines.append(f"{whole} = {call.text('lane')}")
+        for group, fields in effects.groups.items():
+            for path in leaf_paths(rows[group], group):
+                changes = fields is None or path.split(".")[1].partition("[")[0] in fields
+                if changes and path in self.cells:
+                    lines.append(f"{self.cells[path]} = {path if is_one else f'{whole}.{path}'}")
+        for name, slot in effects.slots.items():
+            cell = f"{slot.history}[{', '.join(call.places(slot))}, lane]"
+            lines.append(f"{cell} = {name if is_one else f'{whole}.{name}'}")
+        return lines
 
     def any_of(self, condition: ast.expr, is_none: bool) -> tuple[list[str], str]:
         """Lines that count lanes: a sum of whole numbers is taken of several at once, a largest float is not."""

@@ -61,7 +61,7 @@ class NoParameters(NamedTuple):
     """Stands where a program has no such component."""
 
 
-class Gas(Protocol):
+class GasPhases(Protocol):
     """How the gas in both chambers goes through a step of two stages: a module of ``engine.step``."""
 
     @property
@@ -111,7 +111,7 @@ class Gas(Protocol):
         """Count what the gas did on the vane."""
 
 
-class Feed(Protocol):
+class FeedPhases(Protocol):
     """What stands between constant pressures and the valve, with a state that the stages solve with the gas."""
 
     @property
@@ -145,7 +145,7 @@ class Feed(Protocol):
         """What that misses, over what is allowed [-]."""
 
 
-class Leg(Protocol):
+class LegPhases(Protocol):
     """A leg that walks with the device, in a step."""
 
     @property
@@ -200,7 +200,7 @@ class Leg(Protocol):
         """``lane.after`` and ``lane.walk_after``, state and walk after the step."""
 
 
-class Failing(Protocol):
+class FaultPhases(Protocol):
     """Faults of a plant in a walk, and a shut-off valve in its line."""
 
     @property
@@ -223,7 +223,7 @@ class Failing(Protocol):
         """Take a decision of the controller: the command ``ordered``, the state ``after`` it."""
 
 
-class Foot(Protocol):
+class FootPhases(Protocol):
     """A foot on a prescribed shank, which an unconstrained vane carries."""
 
     def torque(self, parts: "Program", lane: "Lane", time: float, angle: float) -> float:
@@ -259,13 +259,13 @@ class Program:
     angle: ProfileKind | None
     ideal_sensors: bool
     late_commands: bool
-    gas: Gas
+    gas: GasPhases
     late_signals: bool = False
     late_readings: bool = False
-    leg: Leg | None = None
+    leg: LegPhases | None = None
     takes_task_sequence: bool = False
-    faults: Failing | None = None
-    feed: Feed | None = None
+    faults: FaultPhases | None = None
+    feed: FeedPhases | None = None
     is_adaptive: bool = False
     samples_inside: bool = False
     meters: tuple[MeterKind, ...] = ()
@@ -296,7 +296,7 @@ class Program:
         }
 
     @property
-    def foot(self) -> Foot | None:
+    def foot(self) -> FootPhases | None:
         """How a foot on a prescribed shank goes through a step; None where the vane carries none."""
         if self.shank is None:
             return None

@@ -398,20 +398,20 @@ class Reduction:
     def statement(self, node: ast.stmt) -> list[ast.stmt]:
         """What a statement becomes."""
         match node:
-            case ast.Expr(value=ast.Call()):
-                return self.call_that_sets(node.value)
+            case ast.Expr(value=ast.Call() as call):
+                return self.call_that_sets(call)
             case ast.Expr() | ast.Assert():
                 return []
-            case ast.Return(value=ast.expr()):
-                return [ast.Return(self.visit(node.value))]
+            case ast.Return(value=ast.expr() as value):
+                return [ast.Return(self.visit(value))]
             case ast.If():
                 return self.branch(node)
             case ast.For():
                 return self.unrolled(node)
             case ast.Assign(targets=[target]):
                 return self.assignment(target, node.value)
-            case ast.AnnAssign(target=ast.Name(), value=ast.expr()):
-                return self.assignment(node.target, node.value)
+            case ast.AnnAssign(target=ast.Name() as target, value=ast.expr() as value):
+                return self.assignment(target, value)
         raise self.refuse(node, f"'{ast.unparse(node).splitlines()[0]}' is no statement of a phase")
 
     def branch(self, node: ast.If) -> list[ast.stmt]:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ppafo.engine.lanes import Batch, BatchResult, Clock, load_programs, run_blocks
 from ppafo.engine.linking import composed_with
-from ppafo.engine.program import Failing, LaneResult, LaneTiming, Leg, NoParameters, Program
+from ppafo.engine.program import FaultPhases, LaneResult, LaneTiming, LegPhases, NoParameters, Program
 from ppafo.engine.rows import leaves, rebuilt, row_numbers, table
 from ppafo.engine.scheme.actuators import pressures_of
 from ppafo.engine.scheme.motion import Pace
@@ -46,9 +46,9 @@ WHOLE = 1.0e-9
 class LegGroups(NamedTuple):
     """How a leg goes through a step, its groups of parameters, and its groups of states at the start."""
 
-    leg: Leg
+    leg: LegPhases
     takes_task_sequence: bool
-    faults: Failing | None
+    faults: FaultPhases | None
     parameters: list[Any]
     states: list[Any]
 
@@ -83,7 +83,7 @@ class Walk:
         parameters = [self.leg, self.share, self.gait, self.timing, self.sensors]
         parameters += [] if self.task_sequence is None else [self.task_sequence]
         states: list[Any] = [self.initial, NOTHING_SEEN]
-        faults: Failing | None = None
+        faults: FaultPhases | None = None
         if self.failing is not None:
             from ppafo.engine.step import failing as faults  # most runs have no fault
             from ppafo.model.plant_faults import POWERED

@@ -12,7 +12,7 @@ import numpy as np
 
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.kind import ControllerKind, ProfileKind
-from ppafo.engine.program import Feed, Gas, NoParameters, Program
+from ppafo.engine.program import FeedPhases, GasPhases, NoParameters, Program
 from ppafo.engine.rows import rebuilt
 from ppafo.engine.run import Lines, Run, WornLeg
 from ppafo.engine.scheme.actuators import volumes_of
@@ -199,7 +199,7 @@ def compose_run(
     )
 
 
-def _gas(components: Components, effects: Sequence[Effect]) -> Gas:
+def _gas(components: Components, effects: Sequence[Effect]) -> GasPhases:
     """Return what the gas keeps or exchanges; ScenarioError for an effect on the density of gas that has no step."""
     real = next((effect for effect in effects if gas_density in effect.laws), None)
     if real is None and components.thermal is None:
@@ -223,7 +223,7 @@ def _gas(components: Components, effects: Sequence[Effect]) -> Gas:
     return not_ideal
 
 
-def _feed(components: Components) -> Feed | None:
+def _feed(components: Components) -> FeedPhases | None:
     """What feeds the valve."""
     if components.supply_lines is None:
         return None

@@ -37,7 +37,7 @@ def predict(parts: Program, lane: Lane, command: float, length: float) -> None:
         rates = kind.slopes(lane[name], state, begun)
         lane[f"{name}_state_kept"] = state
         lane[f"{name}_state"] = kind.row(
-            *(straight_on(getattr(state, field), getattr(rates, field), length) for field in kind.row._fields)
+            *(straight_on(getattr(state, field), getattr(rates, field), length) for field in kind.fields)
         )
 
 
@@ -65,7 +65,7 @@ def error(parts: Program, lane: Lane, command: float, length: float) -> float:
     for name, kind in parts.stated_with_errors.items():
         state, after = lane[f"{name}_state"], lane[f"{name}_state_after"]
         rates = kind.slopes(lane[name], state, begun)
-        for field, allowed in zip(kind.row._fields, kind.tolerances, strict=True):
+        for field, allowed in zip(kind.fields, kind.tolerances, strict=True):
             straight = straight_on(getattr(state, field), getattr(rates, field), length)
             worst = max(worst, abs(getattr(after, field) - straight) / allowed)
     return worst
@@ -75,6 +75,6 @@ def are_bounded(parts: Program, lane: Lane) -> bool:
     """True where all states at the end of a step are numbers."""
     bounded = True
     for name, kind in parts.stated.items():
-        for field in kind.row._fields:
+        for field in kind.fields:
             bounded = bounded and abs(getattr(lane[f"{name}_state_after"], field)) < LARGEST
     return bounded
