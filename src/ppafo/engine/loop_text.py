@@ -140,7 +140,8 @@ class LoopText:
             test = self.expression(node.test)
             if isinstance(test, ast.Constant):
                 return self.block(node.body if test.value else node.orelse)
-            return [ast.If(test, self.block(node.body), self.block(node.orelse))]
+            body, otherwise = self.block(node.body), self.block(node.orelse)
+            return [ast.If(test, body or [ast.Pass()], otherwise)] if body or otherwise else []
         other = None if self.other is None else self.other.decided(node)
         if self.other is None or other is own:
             return self.block(own)

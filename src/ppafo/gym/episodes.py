@@ -25,9 +25,10 @@ from ppafo.engine.loop_text import Call, RowsOfLanes, indent, lane_loop
 from ppafo.engine.program import LaneStart, Program
 from ppafo.engine.rows import leaf_paths, numbers
 from ppafo.engine.run import batch_of
-from ppafo.engine.scheme.pneumatics import held_chambers
+from ppafo.engine.scheme.pneumatics import HeldChambers
 from ppafo.engine.source_text import SourceCollector
 from ppafo.engine.step.lane import Now
+from ppafo.engine.step.phases import hold_chambers
 from ppafo.engine.step.sample import fill_signals, remember_readings, sense
 from ppafo.errors import ScenarioError, UnitError
 from ppafo.gym.tasks import (
@@ -89,9 +90,6 @@ def observe(
     steps_in_all: int,
 ) -> None:
     """Sense, observe and judge one environment, and say whether its episode ends."""
-    if parts.hands_chambers_on:
-        # Chambers that a step hands on are computed when they are read.
-        lane.held = held_chambers(lane.plant, lane.state.angle)
     sense(parts, lane, now)
     time = now.step * lane.timing.step
     torque_wanted, rate, _ = parts.reference.value(lane.reference, time)
@@ -127,6 +125,7 @@ def _kernel(step: StepText, task: Task) -> list[str]:
     # Between two calls of the lane loop rows stand in the arrays, and what a step hands on is gone.
     rows = RowsOfLanes(step)
     rows.cells = {path: cell for path, cell in rows.cells.items() if path not in rows.step_at}
+    rows.cells.update({path: path.replace(".", "_") for path in leaf_paths(HeldChambers, "held")})
     count = len(rows.state_at)
     rows.cells.update({path: f"states[{row}, lane]" for path, row in rows.state_at.items()})
     rows.cells.update({path: f"parameters[{row - count}, lane]" for path, row in rows.parameter_at.items()})
@@ -149,6 +148,7 @@ def _kernel(step: StepText, task: Task) -> list[str]:
     ]
     given = {name: name for name in ("now", "error_weight", "gas_weight", "steps_in_all")}
     filled = rows.called(Call(step.phase(fill_signals), {"slot": "slot"})) if step.parts.late_signals else ["pass"]
+    held = rows.called(Call(step.phase(hold_chambers), {})) if step.parts.hands_chambers_on else []
     readings = rows.called(Call(step.phase(remember_readings), given)) if step.parts.late_readings else []
     within_bounds = [
         f"{rows.cells[path]} = {add(within)}({rows.cells[path]}, bounds[0, {row}], bounds[1, {row}])"
@@ -160,6 +160,7 @@ def _kernel(step: StepText, task: Task) -> list[str]:
         rows.load("start"),
         "step = moment - int(start.step)",
         "sample = step // steps_per_sample",
+        *held,
         "if step == 0:",
         "    for slot in range(signal_history.shape[1]):",
         # Late signals of an episode begin with the readings at its start.
