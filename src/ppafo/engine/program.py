@@ -381,11 +381,6 @@ class Program:
         return self.leg is not None
 
     @property
-    def reacts(self) -> bool:
-        """TEMPORARY"""
-        return False
-
-    @property
     def meter_groups(self) -> dict[str, MeterKind]:
         """Meters by the name of their group of state rows."""
         return {f"{kind.name}_meter": kind for kind in self.meters}

@@ -14,7 +14,7 @@ from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.kind import ControllerKind, ProfileKind
 from ppafo.engine.program import FeedPhases, GasPhases, NoParameters, Program
 from ppafo.engine.rows import rebuilt
-from ppafo.engine.run import Lines, Run, WornLeg
+from ppafo.engine.run import Lines, Run, Walk
 from ppafo.engine.scheme.actuators import volumes_of
 from ppafo.engine.scheme.pneumatics import KEPT_OF_PRESSURE, is_slow
 from ppafo.engine.step import isothermal
@@ -142,7 +142,7 @@ def compose_run(
     plant: PlantParameters,
     rule: StepRule,
     start: Start,
-    walk: WornLeg | None = None,
+    walk: Walk | None = None,
 ) -> Run:
     """Return the run of components: ``rule`` says how it is stepped, ``start`` where it begins, ``walk`` adds a leg.
 
@@ -232,7 +232,7 @@ def _feed(components: Components) -> FeedPhases | None:
     return lines
 
 
-def _program(components: Components, steps: Steps, walk: WornLeg | None, has_delay: bool) -> Program:
+def _program(components: Components, steps: Steps, walk: Walk | None, has_delay: bool) -> Program:
     """Return what the lanes are composed of."""
     is_late, effects = first(components.signal_delay) > 0.0, effects_of(components.device, components.sections)
     worn = None if walk is None else walk.groups()
