@@ -71,7 +71,7 @@ class StepText:
         """Classes of the groups that have rows."""
         return {**self.parameters, **self.states, **self.of_step, **self.further}
 
-    def phase(self, function: Callable[..., None], known: Mapping[str, Any] | None = None) -> Composed:
+    def phase(self, function: Callable[..., Any], known: Mapping[str, Any] | None = None) -> Composed:
         """A function that the loop over steps calls: of what it sets it returns what later phases may read."""
         assert isinstance(function, FunctionType), "it is no other callable"
         return self._composed(function, known or {}, is_phase=True)
