@@ -108,12 +108,16 @@ class StepText:
         """What replaces names from outside a function of the step that was reduced."""
         return Composer(
             function,
-            lambda item: self.composed[item].name if item in self.composed else self.collector.add_inside(function, item),
+            lambda item: self._name_inside(function, item),
             self.collector.note_read,
             self.handed_to,
             self.collector.stands_for,
             names,
         )
+
+    def _name_inside(self, function: FunctionType, item: Any) -> str:
+        """The name in the module of what a function of the step calls."""
+        return self.composed[item].name if item in self.composed else self.collector.add_inside(function, item)
 
     def _composed(self, function: FunctionType, known: Mapping[str, Any], is_phase: bool) -> Composed:
         done = self.composed.get(function)
@@ -143,10 +147,10 @@ class StepText:
             tree.body = [*tree.body, ast.copy_location(ast.Return(whole), tree)]
         handed = tuple(item.arg for item in tree.args.args)
         handed = handed[: len([name for name in handed if name in effects.reads or name == NUMBER])]
-        name = self._written(function, tree, handed, row)
+        name = self._written(function, tree, handed)
         return Composed(function, name, effects, handed, known, row, is_phase, self.ending)
 
-    def _written(self, function: FunctionType, tree: ast.FunctionDef, handed: tuple[str, ...], row: Any) -> str:
+    def _written(self, function: FunctionType, tree: ast.FunctionDef, handed: tuple[str, ...]) -> str:
         """Put the text of a reduced function into the module; return its name there."""
         file = function.__code__.co_filename
         ast.fix_missing_locations(tree)

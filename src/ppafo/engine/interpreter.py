@@ -2,15 +2,14 @@
 
 Where a program has something in the place of functions of the model, its actuator's and the laws of its effects, these
 stand in copies of the functions that call them: the same code with other names around it, so that breakpoints in their
-files hold. Compiled code goes on where Python raises, with what a division by zero gives: there the steps are done again
-with operations that go on, too.
+files hold. Compiled code goes on where Python raises, with what a division by zero gives: there the steps are done
+again with operations that go on, too.
 """
 
 import ast
 import inspect
 import math
 import textwrap
-import types
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields, is_dataclass, replace
 from functools import lru_cache
@@ -24,7 +23,6 @@ from ppafo.engine.linking import link_program
 from ppafo.engine.plain_python import parse_module
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, numbers, rebuild
-from ppafo.engine.source_text import is_row
 from ppafo.engine.step import loop
 from ppafo.engine.step.lane import Lane
 
@@ -234,7 +232,7 @@ def quotient(over: float, under: float) -> float:
     """A quotient as processors have it: infinite, or no number, where it is by zero."""
     if under != 0.0:
         return over / under
-    if over == 0.0 or over != over:
+    if over == 0.0 or math.isnan(over):
         return math.nan
     return math.copysign(math.inf, over) * math.copysign(1.0, under)
 

@@ -1,4 +1,4 @@
-"""What a program calls in the place of functions of the model, and single functions with the laws of effects in them."""
+"""What a program calls in the place of functions of the model; single functions with the laws of effects in them."""
 
 import math
 from collections import namedtuple

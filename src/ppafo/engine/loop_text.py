@@ -20,7 +20,6 @@ from ppafo.engine.step import loop
 from ppafo.engine.step.lane import Now
 from ppafo.errors import ProgramError
 
-
 NEEDS_PARTS = "needs_parts"
 """The last argument of a loop that has both steps: 1 where the error decides about the parts of a step, else 0."""
 
@@ -98,7 +97,7 @@ class LoopText:
         """Some statements."""
         return [line for item in statements for line in self.statement(item)]
 
-    def statement(self, node: ast.stmt) -> list[ast.stmt]:
+    def statement(self, node: ast.stmt) -> list[ast.stmt]:  # noqa: PLR0911 - one for each kind
         """What a statement becomes."""
         match node:
             case ast.Expr(value=ast.Call() as call):
@@ -174,7 +173,7 @@ class LoopText:
     def called(self, node: ast.Call) -> list[ast.stmt]:
         """The lines of a function of the loop, or what one of ``lanes`` does."""
         function = node.func
-        if isinstance(function, ast.Attribute) and isinstance(function.value, ast.Name) and function.value.id == "lanes":
+        if isinstance(function, ast.Attribute) and _is_lanes(function.value):
             return _parsed(self.rows.acted(function.attr, [ast.unparse(self.expression(item)) for item in node.args]))
         called: FunctionType = self.reduction.outside(function)
         inner = LoopText(self.steps, called)
@@ -188,6 +187,10 @@ class LoopText:
         return [*begin, *self.rows.noted(called), *inner.lines()]
 
 
+def _is_lanes(node: ast.expr) -> bool:
+    return isinstance(node, ast.Name) and node.id == "lanes"
+
+
 class _OfLanes(ast.NodeTransformer):
     """Puts arrays of the module in the place of those of ``lanes``, and what its functions give."""
 
@@ -195,7 +198,7 @@ class _OfLanes(ast.NodeTransformer):
         self.rows = rows
 
     def visit_Call(self, node: ast.Call) -> ast.expr:
-        if isinstance(node.func, ast.Attribute) and isinstance(node.func.value, ast.Name) and node.func.value.id == "lanes":
+        if isinstance(node.func, ast.Attribute) and _is_lanes(node.func.value):
             given = [ast.unparse(self.visit(item)) for item in node.args]
             (found,) = _parsed([self.rows.asked(node.func.attr, given)])
             assert isinstance(found, ast.Expr)
@@ -204,7 +207,7 @@ class _OfLanes(ast.NodeTransformer):
         return node
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
-        if isinstance(node.value, ast.Name) and node.value.id == "lanes":
+        if _is_lanes(node.value):
             return ast.Name("record" if node.attr == "records" else node.attr, ast.Load())
         self.generic_visit(node)
         return node
@@ -319,7 +322,7 @@ class RowsOfLanes:
         index, trace_every = given
         return f"{index} % {trace_every} == 0" if method == "traces" else f"{index} // {trace_every} % trace.shape[0]"
 
-    def noted(self, function: FunctionType) -> list[ast.stmt]:
+    def noted(self, function: FunctionType) -> list[ast.stmt]:  # noqa: ARG002 - a protocol
         """Nobody reads this."""
         return []
 
@@ -358,11 +361,11 @@ class RowsOfRun:
         text = ast.unparse(_OfRun().visit(deepcopy(condition)))
         return [], f"not {text}" if is_none else text
 
-    def acted(self, method: str, given: Sequence[str]) -> list[str]:
+    def acted(self, method: str, given: Sequence[str]) -> list[str]:  # noqa: ARG002 - a protocol
         """A single run records nothing, and waits for no other."""
         return ["pass"]
 
-    def asked(self, method: str, given: Sequence[str]) -> str:
+    def asked(self, method: str, given: Sequence[str]) -> str:  # noqa: ARG002 - a protocol
         """Each sample is an output."""
         return "True" if method == "traces" else "0"
 
@@ -386,7 +389,7 @@ def _unparsed(body: list[ast.stmt]) -> list[str]:
 
 
 def lane_loop(step: StepText, head: str, name: str, arguments: str, lanes: int = 0) -> str:
-    """The function ``name`` that takes a block of a program some steps further, for some lanes, 0 for as many as fit."""
+    """The function ``name`` that takes a block of some lanes, 0 for as many as fit, some steps further."""
     rows = RowsOfLanes(step, lanes)
     states, parameters = len(rows.state_at), len(rows.parameter_at)
     lines = [

@@ -50,9 +50,9 @@ Fields = frozenset[str] | None
 
 @dataclass(slots=True)
 class Effects:
-    """What a function reads of its lane, and what it sets: groups, with the fields that change, and numbers of histories.
+    """What a function reads of its lane, and what it sets, in the order in which it does.
 
-    Both in the order in which it does.
+    What it sets are groups, with the fields that change, and numbers of histories.
     """
 
     reads: dict[str, None] = field(default_factory=dict)
@@ -162,7 +162,8 @@ class Reduction:
         self.definition = definition_of(function)
         self.scope: dict[str, Any] = function.__globals__
         self.known: dict[str, Any] = {"parts": collector.parts, **known}
-        self.running = set(function.__code__.co_varnames) - self.known.keys()
+        # A name that a generator asks is no plain local one.
+        self.running = {*function.__code__.co_varnames, *function.__code__.co_cellvars} - self.known.keys()
         stored = [item.id for item in names_in(self.definition.tree) if isinstance(item.ctx, ast.Store)]
         self.times_set = {name: stored.count(name) for name in stored}
         self.effects = Effects()
@@ -256,15 +257,18 @@ class Reduction:
         return self.visit(node) if value is _UNKNOWN else ast.Constant(bool(value))
 
     def of_name(self, node: ast.Name) -> ast.expr:
+        """A name."""
         return ast.Name(self.renamed.get(node.id, node.id), node.ctx)
 
     def of_ifexp(self, node: ast.IfExp) -> ast.expr:
+        """A choice: the side that is decided on, else both."""
         test = self.asked(node.test)
         if isinstance(test, ast.Constant):
             return self.visit(node.body if test.value else node.orelse)
         return ast.IfExp(test, self.visit(node.body), self.visit(node.orelse))
 
     def of_boolop(self, node: ast.BoolOp) -> ast.expr:
+        """What is left of a link of conditions."""
         ends, made = isinstance(node.op, ast.Or), list[ast.expr]()
         for item in node.values:
             value = self.asked(item)
@@ -278,16 +282,19 @@ class Reduction:
         return made[0] if len(made) == 1 else ast.BoolOp(node.op, made)
 
     def of_unaryop(self, node: ast.UnaryOp) -> ast.expr:
+        """A sign or a negation."""
         inner = self.visit(node.operand)
         if isinstance(node.op, ast.Not) and isinstance(inner, ast.Constant):
             return ast.Constant(not inner.value)
         return ast.UnaryOp(node.op, inner)
 
     def of_attribute(self, node: ast.Attribute) -> ast.expr:
+        """A group, or a field."""
         name = self.group(node)
         return self.read(name) if name else self.whole(node)
 
     def of_subscript(self, node: ast.Subscript) -> ast.expr:
+        """A group by its name, a number of a history, or an item."""
         name = self.group(node)
         if name:
             group, *way = name.split(".")
@@ -321,6 +328,7 @@ class Reduction:
         return ast.Name(_GROUP + name, ast.Load())
 
     def of_call(self, node: ast.Call) -> ast.expr:
+        """A call, with what the function is handed."""
         called = self.outside(node.func)
         called = getattr(called, "__wrapped__", called)
         if called is getattr:
@@ -395,7 +403,7 @@ class Reduction:
                 break
         return made
 
-    def statement(self, node: ast.stmt) -> list[ast.stmt]:
+    def statement(self, node: ast.stmt) -> list[ast.stmt]:  # noqa: PLR0911 - one for each kind
         """What a statement becomes."""
         match node:
             case ast.Expr(value=ast.Call() as call):
@@ -508,10 +516,10 @@ class Reduction:
 
     def fields_changed(self, target: ast.expr, value: ast.expr) -> Fields:
         """Fields of a group that an assignment changes: those that ``_replace`` of the same group gives, else all."""
-        if isinstance(value, ast.Call) and isinstance(value.func, ast.Attribute) and value.func.attr == "_replace":
-            if self.group(target) and self.group(target) == self.group(value.func.value):
-                return frozenset(item.arg for item in value.keywords if item.arg is not None)
-        return None
+        if not isinstance(value, ast.Call) or not isinstance(value.func, ast.Attribute):
+            return None
+        is_part = value.func.attr == "_replace" and self.group(target) == self.group(value.func.value) != ""
+        return frozenset(item.arg for item in value.keywords if item.arg is not None) if is_part else None
 
     def number_by_number(self, row: Any, choice: ast.IfExp) -> ast.expr:
         """A choice between two rows as the row of the choices between their numbers: no branch, by any compiler."""

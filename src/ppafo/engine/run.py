@@ -14,7 +14,6 @@ from ppafo.engine.rows import leaves, rebuilt, row_numbers, table
 from ppafo.engine.scheme.actuators import pressures_of
 from ppafo.engine.scheme.motion import Pace
 from ppafo.engine.step.lane import MAXIMUM_PARTS
-from ppafo.kinds import kind_at
 from ppafo.model.columns import larger, over_runs, truncated
 from ppafo.model.effects.kind import Moment, State
 from ppafo.model.orifice import ExactOrifice

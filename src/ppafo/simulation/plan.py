@@ -19,7 +19,6 @@ from ppafo.engine.scheme.actuators import volumes_of
 from ppafo.engine.scheme.pneumatics import KEPT_OF_PRESSURE, is_slow
 from ppafo.engine.step import isothermal
 from ppafo.errors import ScenarioError
-from ppafo.kinds import kind_at
 from ppafo.model.actuators.vane import KIND as VANE
 from ppafo.model.catalog import ACTUATORS, VALVES
 from ppafo.model.columns import (

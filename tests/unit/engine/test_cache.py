@@ -14,8 +14,8 @@ from ppafo.engine.cache import load_generated
 from ppafo.engine.lane_source import lane_source
 from ppafo.engine.numba_compiler import NumbaCompiler
 from ppafo.engine.program import Program
-from ppafo.engine.step import isothermal
 from ppafo.engine.source_text import SourceCollector
+from ppafo.engine.step import isothermal
 from ppafo.errors import SimulationError
 from ppafo.model import orifice
 from ppafo.model.valves.proportional import IDEAL

@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 from ppafo.engine.lanes import write_source
-from ppafo.engine.step import loop
 from ppafo.engine.run import TOO_MANY_PARTS
+from ppafo.engine.step import loop
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.model.sensors import Measurement
 from ppafo.running import simulate

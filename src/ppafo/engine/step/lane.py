@@ -41,8 +41,8 @@ class Now(NamedTuple):
     """The step of all lanes: its number, the controller's sample, and the share of it that is to be done.
 
     The rest are places in rings of what comes late, which the loop works out once for all lanes: the commands that the
-    valve has before and after one arrives, signals that sensors show and take, and readings of a walk with the length of
-    their ring.
+    valve has before and after one arrives, signals that sensors show and take, and readings of a walk with the length
+    of their ring.
     """
 
     step: int
@@ -59,8 +59,8 @@ class Now(NamedTuple):
 class Lane:
     """The numbers of one run by group: ``lane.state``, or ``lane["state"]`` where the name depends on the parts.
 
-    Which groups there are is for ``Program`` to say. Groups of effects and meters have the names of these. Where a group
-    is ``Any``, the component that it belongs to has its class.
+    Which groups there are is for ``Program`` to say. Groups of effects and meters have the names of these. Where a
+    group is ``Any``, the component that it belongs to has its class.
     """
 
     # What a run is made of, and does not change.

@@ -68,9 +68,7 @@ def ended(parts: Program, lane: Lane, length: float) -> LineState:
             from_2,
             length,
         )
-    return supply_lines.end_lines(
-        lane.plant, lane.lines, lane.line_state, lane.fed_gas, lane.change, from_2, length
-    )
+    return supply_lines.end_lines(lane.plant, lane.lines, lane.line_state, lane.fed_gas, lane.change, from_2, length)
 
 
 def end(parts: Program, lane: Lane, length: float) -> None:

@@ -22,9 +22,7 @@ def stage(parts: Program) -> Mapping[str, type]:
 
 def begin(parts: Program, lane: Lane, next_angle: float, length: float) -> None:
     """The first stage."""
-    lane.real_gas = real_gas.begin_real_gas(
-        lane.plant, lane.state, lane.masses, next_angle, lane.flowing, length
-    )
+    lane.real_gas = real_gas.begin_real_gas(lane.plant, lane.state, lane.masses, next_angle, lane.flowing, length)
 
 
 def still(parts: Program, lane: Lane) -> StillGas:
@@ -47,9 +45,7 @@ def first_flows(parts: Program, lane: Lane) -> tuple[float, float, float]:
 def change(parts: Program, lane: Lane, length: float) -> None:
     """The second stage, and what both change."""
     lane.second = pneumatics.second_moving_stage(lane.real_gas.moving, lane.passing)
-    lane.real_change = real_gas.real_change(
-        lane.plant, lane.state, lane.masses, lane.real_gas, lane.second, length
-    )
+    lane.real_change = real_gas.real_change(lane.plant, lane.state, lane.masses, lane.real_gas, lane.second, length)
 
 
 def error(parts: Program, lane: Lane, ahead: float, length: float) -> float:

@@ -10,9 +10,7 @@ LARGEST = 1.0e300
 """A state beyond this, or one that is no number, is a failure."""
 
 
-def moment(
-    parts: Program, lane: Lane, state: PlantState, supplied: float, vented: float, command: float
-) -> Moment:
+def moment(parts: Program, lane: Lane, state: PlantState, supplied: float, vented: float, command: float) -> Moment:
     """What effects see of the plant in some state, with mean flows [kg/s]."""
     pressure_1, pressure_2 = chamber_pressures(lane.plant, state.angle, state.mass_1, state.mass_2)
     return Moment(state.angle, state.angular_velocity, pressure_1, pressure_2, supplied, vented, command)

@@ -78,9 +78,7 @@ def find_gait(parts: Program, lane: Lane) -> None:
 def find_gait_of_task(parts: Program, lane: Lane, now: Now) -> None:
     """The gait at the end of the step in a task sequence, with the marks of a stride."""
     end = time_of(parts, lane, now) + length_of(parts, lane)
-    lane.next_gait, lane.marks = gait_in_task_sequence(
-        lane.gait, lane.task_sequence, lane.gait_timing, lane.leg, end
-    )
+    lane.next_gait, lane.marks = gait_in_task_sequence(lane.gait, lane.task_sequence, lane.gait_timing, lane.leg, end)
 
 
 def begin(parts: Program, lane: Lane) -> None:

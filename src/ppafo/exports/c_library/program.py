@@ -150,7 +150,10 @@ def exported(program: Program) -> ExportedProgram:
     metrics = tuple(kind for kind in offered if program.walks == (WALK in kind.needs))
     # By name: the same metrics in another order are the same program.
     meters = dict(sorted({meter.name: meter for kind in metrics for meter in kind.meters}.items()))
-    outputs = (*(name for name in TRACED if name not in missing), *(walk_traces(program.state_rows()) if program.walks else ()))
+    outputs = (
+        *(name for name in TRACED if name not in missing),
+        *(walk_traces(program.state_rows()) if program.walks else ()),
+    )
     return ExportedProgram(replace(program, meters=tuple(meters.values()), traced=outputs), metrics)
 
 

@@ -8,11 +8,11 @@ import numpy as np
 
 from ppafo.control.kind import PythonController
 from ppafo.engine.channels import REQUEST as REQUEST_ROW
-from ppafo.engine.step.lane import SAME_MOMENT
 from ppafo.engine.lanes import Batch, BatchResult, Floats, add_meters, group_of, load_programs, meters_of, run_blocks
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, row_numbers
 from ppafo.engine.run import NEVER_FAILED, Members
+from ppafo.engine.step.lane import SAME_MOMENT
 from ppafo.errors import ScenarioError
 from ppafo.metrics import METRICS
 from ppafo.metrics.gas import ENERGIES
