@@ -9,9 +9,10 @@ from ppafo.engine.continuous_time import free_motion, real_gas_rates
 from ppafo.engine.generator import StepText
 from ppafo.engine.linking import link_program
 from ppafo.engine.loading import ARRAY, FLOAT, HEADER, INLINE, entry_text
-from ppafo.engine.program import NoParameters, Program
+from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, row_expression
 from ppafo.engine.source_text import SourceCollector, composed_lines
+from ppafo.engine.step.lane import NoParameters
 from ppafo.model.effects.kind import Moment
 from ppafo.model.leg import FootLoad
 from ppafo.model.orifice import ExactOrifice, exact_flow
@@ -196,7 +197,7 @@ def parameter_groups(program: Program) -> dict[str, type]:
     """Groups of numbers that the right-hand side needs, in order."""
     return {
         "plant": program.actuator.plant,
-        **program.gas.parameters,
+        **program.gas.PARAMETERS,
         "valve_orifice": ExactOrifice,
         "leak_orifice": ExactOrifice,
         "valve": program.valve.parameters,

@@ -148,7 +148,16 @@ class StepText:
         handed = tuple(item.arg for item in tree.args.args)
         handed = handed[: len([name for name in handed if name in effects.reads or name == NUMBER])]
         name = self._written(function, tree, handed)
-        return Composed(function, name, effects, handed, known, row, is_phase, self.ending)
+        return Composed(
+            function=function,
+            name=name,
+            effects=effects,
+            handed=handed,
+            known=known,
+            row=row,
+            is_phase=is_phase,
+            ending=self.ending,
+        )
 
     def _written(self, function: FunctionType, tree: ast.FunctionDef, handed: tuple[str, ...]) -> str:
         """Put the text of a reduced function into the module; return its name there."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, get_type_hints
+from typing import TYPE_CHECKING, Any, Protocol, get_type_hints
 
 from ppafo.control.kind import OPEN_LOOP, ControllerKind, ProfileKind
 from ppafo.control.profiles import CONSTANT
@@ -10,6 +10,7 @@ from ppafo.engine.channels import REQUEST, paths_of_traces
 from ppafo.engine.rows import leaf_paths
 from ppafo.engine.scheme.motion import FreePart, Pace, PartEnd, PartSlide, PrescribedStep
 from ppafo.engine.scheme.pneumatics import HeldChambers, SlopedFlows, StageFlows
+from ppafo.engine.step.lane import LaneResult, LaneStart, LaneTiming, NoParameters
 from ppafo.kinds import kind_at
 from ppafo.model.actuators.kind import ActuatorModel
 from ppafo.model.actuators.vane import MODEL as VANE
@@ -25,40 +26,6 @@ if TYPE_CHECKING:
 
 Rows = Mapping[str, type]
 """Groups of rows by their names."""
-
-
-class LaneTiming(NamedTuple):
-    """Longest step and sample period [s]; shares of a step by which commands and signals are late beyond whole steps.
-
-    ``tolerance`` is the error over the one that a run is allowed by default [-].
-    """
-
-    step: float
-    period: float
-    command_lag: float
-    signal_lag: float
-    tolerance: float
-
-
-class LaneResult(NamedTuple):
-    """Command in force [-], first time [s] at which a run left what is possible (huge where it did not).
-
-    ``too_many_parts`` is 1 where it failed because a step was cut into more parts than are made of one.
-    """
-
-    command: float
-    failure_time: float
-    too_many_parts: float
-
-
-class LaneStart(NamedTuple):
-    """Step of the block at which the run of a lane began, a whole number [-]."""
-
-    step: float
-
-
-class NoParameters(NamedTuple):
-    """Stands where a program has no such component."""
 
 
 class GasPhases(Protocol):
@@ -250,7 +217,7 @@ class Program:
     of them. ``starts_apart`` True lets the run of each lane begin at a step of its own, while others of the block are
     under way. ``actuator`` is what stands between the chambers and the joint. ``effects`` act in this order at the
     ports of their laws. ``shank`` None leaves an unconstrained vane to itself; otherwise it carries a foot on a shank
-    that moves so (``engine/step/foot.py``).
+    that moves so, and ``foot`` says how that goes through a step.
     """
 
     valve: ValveModel
@@ -274,6 +241,7 @@ class Program:
     actuator: ActuatorModel = VANE
     effects: tuple[Effect, ...] = ()
     shank: ProfileKind | None = None
+    foot: FootPhases | None = None
 
     def parameter_rows(self) -> dict[str, type]:
         """Groups of parameter rows of this program, in order."""
@@ -294,15 +262,6 @@ class Program:
             **({"load": kind_at("ppafo.model.leg:FootLoad"), "shank": shank.parameters} if shank is not None else {}),
             **{effect.name: effect.parameters for effect in self.effects},
         }
-
-    @property
-    def foot(self) -> FootPhases | None:
-        """How a foot on a prescribed shank goes through a step; None where the vane carries none."""
-        if self.shank is None:
-            return None
-        from ppafo.engine.step import foot  # few vanes carry a leg
-
-        return foot
 
     @property
     def shank_rests(self) -> bool:

@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from ppafo.engine.lanes import Batch, BatchResult, Clock, load_programs, run_blocks
 from ppafo.engine.linking import composed_with
-from ppafo.engine.program import FaultPhases, LaneResult, LaneTiming, LegPhases, NoParameters, Program
+from ppafo.engine.program import FaultPhases, LegPhases, Program
 from ppafo.engine.rows import leaves, rebuilt, row_numbers, table
 from ppafo.engine.scheme.actuators import pressures_of
 from ppafo.engine.scheme.motion import Pace
-from ppafo.engine.step.lane import MAXIMUM_PARTS
+from ppafo.engine.step.lane import MAXIMUM_PARTS, LaneResult, LaneTiming, NoParameters
 from ppafo.model.columns import larger, over_runs, truncated
 from ppafo.model.effects.kind import Moment, State
 from ppafo.model.orifice import ExactOrifice
@@ -82,7 +82,13 @@ class Walk:
 
             parameters += self.failing
             states.append(POWERED)
-        return LegGroups(walk, self.task_sequence is not None, faults, parameters, states)
+        return LegGroups(
+            leg=walk,
+            takes_task_sequence=self.task_sequence is not None,
+            faults=faults,
+            parameters=parameters,
+            states=states,
+        )
 
 
 @dataclass(frozen=True, slots=True)

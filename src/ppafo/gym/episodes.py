@@ -22,12 +22,12 @@ from ppafo.engine.lane_source import ARGUMENTS, COMPILED, HEADER, INLINE
 from ppafo.engine.lanes import SIGNAL_ROWS, Batch, Clock, Floats
 from ppafo.engine.loading import ARRAY, ARRAY_2D, ARRAY_3D, FLOAT, INT, entry_text, load_source, with_arrays
 from ppafo.engine.loop_text import Call, RowsOfLanes, indent, lane_loop
-from ppafo.engine.program import LaneStart, Program
+from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, numbers
 from ppafo.engine.run import batch_of
 from ppafo.engine.scheme.pneumatics import HeldChambers
 from ppafo.engine.source_text import SourceCollector
-from ppafo.engine.step.lane import Now
+from ppafo.engine.step.lane import LaneStart, Now
 from ppafo.engine.step.phases import hold_chambers
 from ppafo.engine.step.sample import fill_signals, remember_readings, sense
 from ppafo.errors import ScenarioError, UnitError

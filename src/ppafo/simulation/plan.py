@@ -12,12 +12,13 @@ import numpy as np
 
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.kind import ControllerKind, ProfileKind
-from ppafo.engine.program import FeedPhases, GasPhases, NoParameters, Program
+from ppafo.engine.program import FeedPhases, FootPhases, GasPhases, Program
 from ppafo.engine.rows import rebuilt
 from ppafo.engine.run import Lines, Run, Walk
 from ppafo.engine.scheme.actuators import volumes_of
 from ppafo.engine.scheme.pneumatics import KEPT_OF_PRESSURE, is_slow
 from ppafo.engine.step import isothermal
+from ppafo.engine.step.lane import NoParameters
 from ppafo.errors import ScenarioError
 from ppafo.model.actuators.vane import KIND as VANE
 from ppafo.model.catalog import ACTUATORS, VALVES
@@ -223,12 +224,21 @@ def _gas(components: Components, effects: Sequence[Effect]) -> GasPhases:
 
 
 def _feed(components: Components) -> FeedPhases | None:
-    """What feeds the valve."""
+    """Return what feeds the valve."""
     if components.supply_lines is None:
         return None
     from ppafo.engine.step import lines  # most runs have none
 
     return lines
+
+
+def _foot(components: Components) -> FootPhases | None:
+    """Return how a foot on a prescribed shank goes through a step."""
+    if components.leg is None:
+        return None
+    from ppafo.engine.step import foot  # few vanes carry a leg
+
+    return foot
 
 
 def _program(components: Components, steps: Steps, walk: Walk | None, has_delay: bool) -> Program:
@@ -255,6 +265,7 @@ def _program(components: Components, steps: Steps, walk: Walk | None, has_delay:
         samples_inside=bool(first(steps.record_every % 1.0)),
         effects=effects,
         shank=None if components.leg is None else components.leg.shank,
+        foot=_foot(components),
     )
 
 

@@ -14,7 +14,7 @@ def shank(parts: Program, lane: Lane, time: float) -> ShankNow:
         now: ShankNow = parts.shank.value(lane.shank, time)
         return now
     angle, rate, acceleration = parts.shank.value(lane.shank, time)
-    return ShankNow(angle, rate, acceleration, 0.0, 0.0)
+    return ShankNow(angle=angle, rate=rate, acceleration=acceleration, knee_forward=0.0, knee_up=0.0)
 
 
 def torque(parts: Program, lane: Lane, time: float, angle: float) -> float:

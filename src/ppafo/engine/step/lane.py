@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:  # rows of what few devices have
-    from ppafo.engine.program import LaneResult, LaneStart, LaneTiming
     from ppafo.engine.scheme.motion import FreePart, Pace, PartEnd, PartSlide, PrescribedStep
     from ppafo.engine.scheme.pneumatics import (
         Flows,
@@ -37,6 +36,40 @@ MAXIMUM_PARTS = 100_000
 """Most parts of one step, minutes without progress: a run that needs more has failed."""
 
 
+class LaneTiming(NamedTuple):
+    """Longest step and sample period [s]; shares of a step by which commands and signals are late beyond whole steps.
+
+    ``tolerance`` is the error over the one that a run is allowed by default [-].
+    """
+
+    step: float
+    period: float
+    command_lag: float
+    signal_lag: float
+    tolerance: float
+
+
+class LaneResult(NamedTuple):
+    """Command in force [-], first time [s] at which a run left what is possible (huge where it did not).
+
+    ``too_many_parts`` is 1 where it failed because a step was cut into more parts than are made of one.
+    """
+
+    command: float
+    failure_time: float
+    too_many_parts: float
+
+
+class LaneStart(NamedTuple):
+    """Step of the block at which the run of a lane began, a whole number [-]."""
+
+    step: float
+
+
+class NoParameters(NamedTuple):
+    """Stands where a program has no such component."""
+
+
 class Now(NamedTuple):
     """The step of all lanes: its number, the controller's sample, and the share of it that is to be done.
 
@@ -64,7 +97,7 @@ class Lane:
     """
 
     # What a run is made of, and does not change.
-    timing: "LaneTiming"
+    timing: LaneTiming
     plant: Any
     thermal: "ThermalParameters"
     valve: Any
@@ -85,7 +118,7 @@ class Lane:
     shank: Any
 
     # Where it stands.
-    result: "LaneResult"
+    result: LaneResult
     pace: "Pace"
     state: "PlantState"
     masses: Any
@@ -96,7 +129,7 @@ class Lane:
     unpowered: "Unpowered"
     line_state: "LineState"
     course: "Course"
-    start: "LaneStart"
+    start: LaneStart
     signal_history: NDArray[np.float64]
     command_history: NDArray[np.float64]
     trace: NDArray[np.float64]

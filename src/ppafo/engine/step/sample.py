@@ -61,7 +61,8 @@ def vane(parts: Program, lane: Lane, now: Now) -> Measurement:
     else:
         angle, pressure_1, pressure_2 = present_signals(parts, lane)
     if parts.ideal_sensors:
-        return Measurement(angle, pressure_1, pressure_2, torque_of(parts, lane, angle, pressure_1, pressure_2))
+        torque = torque_of(parts, lane, angle, pressure_1, pressure_2)
+        return Measurement(angle=angle, pressure_1=pressure_1, pressure_2=pressure_2, torque=torque)
     seen = measure(lane.sensors, angle, pressure_1, pressure_2, lane.plant.torque_constant, now.sample)
     # The sensors' torque follows from pressures by a constant, which another actuator does not have.
     return seen_with_torque(lane.plant, seen) if parts.has_shape else seen
@@ -101,9 +102,14 @@ def remember_command(parts: Program, lane: Lane, slot: int) -> None:
 def gait(parts: Program, lane: Lane) -> GaitMeasurement:
     """What perfect sensors of a walk show."""
     pressure_1, pressure_2 = present_pressures(parts, lane)
-    torque = actuator_torque(pressure_1, pressure_2, lane.plant.torque_constant)
-    heel_force, toe_force = lane.walk.heel_force, lane.walk.toe_force
-    return GaitMeasurement(lane.state.angle, pressure_1, pressure_2, torque, heel_force, toe_force)
+    return GaitMeasurement(
+        angle=lane.state.angle,
+        pressure_1=pressure_1,
+        pressure_2=pressure_2,
+        torque=actuator_torque(pressure_1, pressure_2, lane.plant.torque_constant),
+        heel_force=lane.walk.heel_force,
+        toe_force=lane.walk.toe_force,
+    )
 
 
 def measure_walk(parts: Program, lane: Lane, now: Now) -> None:

@@ -13,7 +13,15 @@ LARGEST = 1.0e300
 def moment(parts: Program, lane: Lane, state: PlantState, supplied: float, vented: float, command: float) -> Moment:
     """What effects see of the plant in some state, with mean flows [kg/s]."""
     pressure_1, pressure_2 = chamber_pressures(lane.plant, state.angle, state.mass_1, state.mass_2)
-    return Moment(state.angle, state.angular_velocity, pressure_1, pressure_2, supplied, vented, command)
+    return Moment(
+        angle=state.angle,
+        angular_velocity=state.angular_velocity,
+        pressure_1=pressure_1,
+        pressure_2=pressure_2,
+        supplied_flow=supplied,
+        vented_flow=vented,
+        command=command,
+    )
 
 
 def begun_moment(parts: Program, lane: Lane, command: float) -> Moment:

@@ -8,11 +8,12 @@ from ppafo.constants import UNIVERSAL_GAS_CONSTANT
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.engine.lanes import RECORDED_ANGLE, Segment
 from ppafo.engine.loop_text import indent
-from ppafo.engine.program import LaneResult, LaneTiming, Program
+from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, leaves, numbers, row_expression
 from ppafo.engine.run import NEVER_FAILED, moment_at_start, whole_and_rest
 from ppafo.engine.scheme.motion import Pace
 from ppafo.engine.source_text import Collector, composed_lines
+from ppafo.engine.step.lane import LaneResult, LaneTiming
 from ppafo.exports.c_library.boundary import Boundary
 from ppafo.exports.c_library.files import Relation, Setting, c_identifier
 from ppafo.exports.c_library.program import COUNTS
