@@ -7,6 +7,10 @@ from ppafo.engine.step.sample import reference_at, torque_of
 from ppafo.model.plant import ThermalParameters
 from ppafo.signals.meter import SAME_LEVEL, Course, FootSample, Sample, StrideSample, advance_course, is_away
 
+NO_FOOT = FootSample(**dict.fromkeys(FootSample._fields, 0.0))
+NO_STRIDE = StrideSample(**dict.fromkeys(StrideSample._fields, 0.0))
+"""What a sample has where there is no foot on the shank of a gait, or nothing walks."""
+
 
 def make_sample(parts: Program, lane: Lane, moment: float, number: int, interval: float) -> None:
     """``lane.sample``, number ``number`` at a ``moment`` counted in steps."""
@@ -50,7 +54,7 @@ def foot_of(parts: Program, lane: Lane, time: float) -> FootSample:
 def stride_of(parts: Program, lane: Lane, number: int, interval: float) -> StrideSample:
     """Where a walk is in its stride; zeros where nothing walks."""
     if parts.leg is None:
-        return StrideSample(*(0.0 for _ in StrideSample._fields))
+        return NO_STRIDE
     return StrideSample(
         supplied_mass=lane.state.supplied_mass,
         strides=lane.walk.strides,
