@@ -1,11 +1,12 @@
 """Units at the edge: text and units in, SI floats out, and back. Inside the package there are only SI floats.
 
-Three rules go beyond arithmetic:
+Four rules go beyond arithmetic:
 
 - A pressure says what it is: ``psi_g`` gauge, ``psi_a`` absolute, ``psi_d`` a difference; the suffix works on
   every unit of pressure. ``psi`` alone is refused, except inside a compound such as ``N m/psi``. In SI a level is
   ``Pa_a`` and a difference ``Pa_d``.
 - An angle is a dimension: ``75`` is no angle, ``75 deg`` is, and ``rad/s`` is not ``Hz``.
+- ``4 SI`` is the number 4 in the SI unit of what it is given to, for programs that have numbers.
 - Only the units listed here exist. A short list makes a misspelling an error and the start quick.
 
 pint reads units. Its answers for units in the files of the package are kept in ``known_units.json``, so that most
@@ -61,6 +62,8 @@ _UNITS = {
     "percent": "percent = 0.01",
 }
 _PRESSURES = ("Pa", "bar", "psi")
+SI = "SI"
+"""The unit of a number that is in SI already, whatever it is the number of."""
 _LEVEL, _DIFFERENCE = "Pa_a", "Pa_d"
 _KINDS = {"g": "gauge pressure", "a": "absolute pressure", "d": "pressure difference"}
 _KIND_BELONGS = "_g, _a and _d belong to a unit of pressure that stands alone, such as psi_g"
@@ -142,7 +145,8 @@ def percentage(fraction: float, digits: int) -> str:
 
 def check_unit(unit: str) -> None:
     """Refuse a unit that does not exist or is not written as ``kg``, ``N m s/rad`` or ``m^3/(s Pa)``."""
-    _parse_unit(unit)
+    if unit != SI:
+        _parse_unit(unit)
 
 
 def base_value(value: float, unit: str) -> float:
@@ -160,6 +164,8 @@ def dimension(unit: str) -> dict[str, int]:
 @functools.lru_cache(maxsize=512)
 def conversion(unit: str, si_unit: str) -> tuple[Decimal, Decimal, bool]:
     """Return scale, offset and whether the atmosphere is to be added; in decimals, so that 8.4 g is 0.0084 kg."""
+    if unit == SI:
+        return Decimal(1), Decimal(0), False
     given, kind = _parse_unit(unit)
     wanted, _ = _parse_unit(si_unit)
     if given.dimensions != wanted.dimensions:

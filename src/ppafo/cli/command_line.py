@@ -17,9 +17,9 @@ from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn, final
 
+from ppafo.arguments import Word, number, whole_number
 from ppafo.cli import output
-from ppafo.cli.arguments import Word, number, whole_number
-from ppafo.errors import PpafoError, nearest_name
+from ppafo.errors import ArgumentError, PpafoError, nearest_name
 from ppafo.kinds import kind_at
 
 if TYPE_CHECKING:
@@ -40,7 +40,8 @@ class Command:
     ``library`` is the ``TomlKind`` of the files that come with the package (``module:NAME``), for ``--list``, and
     ``listing`` what returns the entries of that list (``module:function``), by default the words of the files;
     ``listed`` is what these are called. ``default_folder`` takes the values of the parameters by name and returns where
-    the result is written unless ``--out`` says so; without it nothing is.
+    the result is written unless ``--out`` says so; without it nothing is. ``first_line`` is the first line of its
+    docstring, where loading the verb takes too long for a list of commands.
     """
 
     verb: str
@@ -48,6 +49,7 @@ class Command:
     listing: str = ""
     listed: str = ""
     default_folder: str = ""
+    first_line: str = ""
     found: Callable[..., Any] | None = None
     """The verb itself, of another package, in place of where it is."""
 
@@ -59,7 +61,7 @@ class Command:
     @property
     def summary(self) -> str:
         """The first line of the docstring of the verb, as an entry of a list has it."""
-        first = (self.function().__doc__ or "").strip().partition("\n")[0].rstrip(".")
+        first = self.first_line or (self.function().__doc__ or "").strip().partition("\n")[0].rstrip(".")
         return first[:1].lower() + first[1:]
 
     @property
@@ -145,6 +147,18 @@ def parameters_of(verb: Callable[..., Any]) -> Iterator[tuple[inspect.Parameter,
             yield parameter, reading_of(eval(annotation, names) if isinstance(annotation, str) else annotation)
 
 
+def argparse_reader(read: Callable[[str], Any]) -> Callable[[str], Any]:
+    """Return what reads a text for argparse, which prints the message of no error but its own."""
+
+    def reader(text: str) -> Any:
+        try:
+            return read(text)
+        except ArgumentError as error:
+            raise argparse.ArgumentTypeError(str(error)) from error
+
+    return reader
+
+
 def option_of(parameter: inspect.Parameter, reading: Reading) -> str:
     """Return the option that fills a parameter, empty where its place in the line does; a flag has no place."""
     if reading.word.option or not (reading.is_flag or parameter.kind is inspect.Parameter.KEYWORD_ONLY):
@@ -200,7 +214,7 @@ def _add_parameter(
                 word.off, action="store_false", dest=parameter.name, default=default, help=word.help.replace("%", "%%")
             )
         return
-    options |= {"metavar": word.metavar, "type": word.read, "choices": reading.choices}
+    options |= {"metavar": word.metavar, "type": argparse_reader(word.read), "choices": reading.choices}
     if not option:
         if reading.is_repeated:
             options["nargs"] = "+" if is_required and not is_listing else "*"

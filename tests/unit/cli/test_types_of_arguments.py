@@ -4,7 +4,7 @@ import argparse
 
 import pytest
 
-from ppafo.cli.arguments import fraction, quantity
+from ppafo.arguments import fraction, quantity
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ppafo.analyses.validate.solve import validate
-from ppafo.cli.arguments import quantity
+from ppafo.arguments import quantity
 from ppafo.errors import DataError, PpafoError
 from ppafo.parameters import load_device
 from ppafo.parameters.device import Device

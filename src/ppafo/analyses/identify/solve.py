@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ppafo.analyses.identify.answer import Identification, finding_of
+from ppafo.analyses.identify.answer import Identification
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.result import BenchResult
 from ppafo.identification.new_set import with_estimates
@@ -12,7 +12,6 @@ from ppafo.identification.problem import (
     ProblemFile,
     ProcedureProblem,
     Setting,
-    load_problem,
     run_procedure,
     window_of,
 )
@@ -24,15 +23,8 @@ from ppafo.parameters.loading import list_sets, load_parameter_set
 from ppafo.parameters.overrides import check_valve
 from ppafo.parameters.parameter_set import ParameterSet, apply_overrides, atmospheric_pressure, chosen_valve
 from ppafo.progress import Report, report_nothing
-from ppafo.report.finding import Finding
 from ppafo.storage.foreign import read_foreign
 from ppafo.storage.result_folder import read_recording
-
-
-def identify(problem: str | Path, progress: Report = report_nothing) -> Finding[Identification]:
-    """Return what the procedures of a problem file make of its recordings; see ``ppafo.cli.verbs.bench.identify``."""
-    path = Path(problem)
-    return finding_of(solve_problem(load_problem(path), path.parent, path.name, progress))
 
 
 def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Report = report_nothing) -> Identification:
@@ -106,7 +98,7 @@ def _base_set(problem: ProblemFile, folder: Path) -> ParameterSet:
     beside = folder / name
     base = load_parameter_set(beside if beside.suffix == ".toml" else name)
     check_valve(problem.device.overrides, problem.device.valve, f"device.valve = '{problem.device.valve}'")
-    return apply_overrides(base, problem.device.overrides, problem.device.valve)
+    return apply_overrides(base, problem.device.overrides, valve=problem.device.valve)
 
 
 def _source(
@@ -119,7 +111,7 @@ def _source(
     if columns is not None:
         recording = read_foreign(path, problem.columns[columns], None, atmosphere, f"{file}:{columns}")
     else:
-        recording = read_recording(path, atmosphere)
+        recording = read_recording(path, atmosphere=atmosphere)
     return source_of(path, recording)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import BaseModel
 
 from ppafo.analyses.sweep.results import SUMMARY, StudyResults
+from ppafo.arguments import checked
 from ppafo.errors import DataError
 from ppafo.report.finding import Finding, Part, columns_of, facts, files_of
 from ppafo.report.kind import TIME, Kind, of_channel, of_metric, of_path
@@ -113,6 +114,7 @@ def write_report(results: StudyResults) -> None:
         results.place.write(name, content)
 
 
+@checked()
 def load_study_results(folder: str | Path) -> Finding[StudyResults]:
     """Return the finished results of a study in a folder or at an address; DataError where there are none."""
     place = place_at(folder)
