@@ -2,6 +2,7 @@
 
 from ppafo.arguments.door import checked
 from ppafo.arguments.words import (
+    Address,
     Angle,
     Confidence,
     Count,
@@ -48,6 +49,7 @@ from ppafo.arguments.words import (
 )
 
 __all__ = [
+    "Address",
     "Angle",
     "Confidence",
     "Count",

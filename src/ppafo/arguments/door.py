@@ -4,14 +4,18 @@
 argument, says what it takes and quotes the value; so are words that Python itself would answer with a TypeError.
 """
 
+import contextlib
 import functools
 import inspect
+import re
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextvars import ContextVar
+from pathlib import Path
 from typing import Any, NamedTuple, ParamSpec, TypeVar
 
 from ppafo.arguments.values import Names, Taken, shown, taken
-from ppafo.errors import ArgumentError, nearest_name
+from ppafo.errors import ArgumentError, PpafoError, nearest_name
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -30,6 +34,42 @@ class _Signature(NamedTuple):
 
     parameters: Mapping[str, _Parameter]
     positional: tuple[str, ...]
+
+
+_says_arguments: ContextVar[bool] = ContextVar("_says_arguments", default=True)
+
+
+@contextlib.contextmanager
+def without_names() -> Iterator[None]:
+    """Leave errors inside as they are, without the name of an argument: a command line has words in its place."""
+    token = _says_arguments.set(False)
+    try:
+        yield
+    finally:
+        _says_arguments.reset(token)
+
+
+def _named(function: Callable[..., R], values: Mapping[str, Any]) -> R:
+    """Call a function; an error that quotes an argument and does not name it begins with its name."""
+    try:
+        return function(**values)
+    except PpafoError as error:
+        message = str(error)
+        quoted = [(text, name) for name, value in values.items() for text in _texts(value) if text in message]
+        # A text in quotation marks before one that the message has among others, and the longer of two within each other.
+        rank = {name: (f"'{text}'" in message, len(text)) for text, name in quoted}
+        name = max(rank, key=lambda each: rank[each], default="")
+        if name and not re.search(rf"\b{name.removesuffix('s').replace('_', '[_ -]')}", message, re.IGNORECASE):
+            error.args = (f"{name}: {message}",)
+        raise
+
+
+def _texts(value: Any) -> Iterator[str]:
+    """Yield the texts and paths of an argument."""
+    if isinstance(value, str | Path):
+        yield str(value)
+    elif isinstance(value, tuple):
+        yield from (str(each) for each in value if isinstance(each, str | Path))
 
 
 def checked(*formerly: str, **renamed: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
@@ -51,6 +91,10 @@ def checked(*formerly: str, **renamed: str) -> Callable[[Callable[P, R]], Callab
         @functools.wraps(function)
         def call(*args: P.args, **kwargs: P.kwargs) -> R:
             values = _values(function.__name__, signature(), args, kwargs, formerly, renamed)
+            if _says_arguments.get():
+                # Only the function that was called says which argument: those that it calls have others.
+                with without_names():
+                    return _named(function, values)
             return function(**values)  # type: ignore[call-arg]  # names and types are those of the signature
 
         return call

@@ -51,7 +51,7 @@ def shown(value: Any) -> str:
 
 def taken(annotation: Any, names: Names) -> Taken:
     """Return what a parameter with an annotation takes, whose text has these names."""
-    annotation = _evaluated(annotation, names)
+    annotation = evaluated(annotation, names)
     origin, inner = typing.get_origin(annotation), typing.get_args(annotation)
     if origin is Annotated:
         # Python flattens nested annotations with the outermost last: that one has the last word.
@@ -69,7 +69,7 @@ def taken(annotation: Any, names: Names) -> Taken:
     return _one(*_PLAIN[annotation]) if annotation in _PLAIN else _of_class(origin or annotation, inner, names)
 
 
-def _evaluated(annotation: Any, names: Names) -> Any:
+def evaluated(annotation: Any, names: Names) -> Any:
     """Return what the text of an annotation stands for; anything but a text as it is."""
     text = annotation.__forward_arg__ if isinstance(annotation, typing.ForwardRef) else annotation
     return eval(text, {}, names) if isinstance(text, str) else text

@@ -18,6 +18,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn, final
 
 from ppafo.arguments import Word, number, whole_number
+from ppafo.arguments.door import without_names
+from ppafo.arguments.values import Names, evaluated
 from ppafo.cli import output
 from ppafo.errors import ArgumentError, PpafoError, nearest_name
 from ppafo.kinds import kind_at
@@ -139,12 +141,11 @@ def reading_of(annotation: Any) -> Reading:
 
 def parameters_of(verb: Callable[..., Any]) -> Iterator[tuple[inspect.Parameter, Reading]]:
     """Return each parameter that words of the line fill, with how its text is read."""
-    names = vars(sys.modules[verb.__module__])
+    names = Names(vars(sys.modules[verb.__module__]))
     for parameter in inspect.signature(verb).parameters.values():
         if parameter.name != PROGRESS:
-            annotation = parameter.annotation
             # The texts of annotations are evaluated for the command that runs, and for no other.
-            yield parameter, reading_of(eval(annotation, names) if isinstance(annotation, str) else annotation)
+            yield parameter, reading_of(evaluated(parameter.annotation, names))
 
 
 def argparse_reader(read: Callable[[str], Any]) -> Callable[[str], Any]:
@@ -250,7 +251,7 @@ def run(parsed: argparse.Namespace, name: str, command: Command) -> int:
             folder = kind_at(command.default_folder)(values)
         # Before the verb runs: a folder that is refused must not cost a long run.
         output.check_output(folder, name)
-    with output.progress_line() as progress:
+    with output.progress_line() as progress, without_names():
         found = verb(**values, **({PROGRESS: progress} if PROGRESS in parameters else {}))
     return output.deliver(found, parsed.json, folder, name, has_written=OUT in parameters)
 

@@ -1,6 +1,7 @@
 """A walk of a neuromuscular gait model: with the device and with it off, until a fall where there is one."""
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -150,7 +151,7 @@ def reacting_finding(comparison: Comparison) -> Finding[ReactingPair]:
                 [
                     Part(
                         "The mean stride",
-                        panels=lambda: stride_panels(comparison),
+                        panels=partial(stride_panels, comparison),
                         name="mean-stride",
                         caption=_CURVES,
                         across=3,
@@ -166,9 +167,9 @@ def reacting_finding(comparison: Comparison) -> Finding[ReactingPair]:
         found=ReactingPair(comparison),
         passed=comparison.is_completed and stays and worn.is_helped,
         files={
-            "recording.nc": lambda: netcdf_bytes(worn.recording, None),
-            "recording.csv": lambda: marked_csv_bytes(worn.recording),
-            "recording-off.nc": lambda: netcdf_bytes(bare.recording, None),
+            "recording.nc": partial(netcdf_bytes, worn.recording, None),
+            "recording.csv": partial(marked_csv_bytes, worn.recording),
+            "recording-off.nc": partial(netcdf_bytes, bare.recording, None),
         },
     )
 

@@ -10,8 +10,8 @@ import pytest
 
 import ppafo
 from ppafo.analyses.endurance.answer import Endurance
-from ppafo.analyses.endurance.solve import endurance
-from ppafo.analyses.walk.answer import walk_with_and_without
+from ppafo.analyses.endurance.question import bottle as endurance
+from ppafo.analyses.walk.question import walk_with_and_without
 from ppafo.cli.main import main
 from ppafo.engine.lanes import BatchResult, run_batch, write_source
 from ppafo.engine.rows import leaf_paths, numbers, rebuild, row_numbers
@@ -186,9 +186,11 @@ def test_a_walk_on_a_bottle_ends_with_the_fall_and_strides_are_those_of_the_wear
     assert worn.metrics["fall_time"].value < worn.supply.ending.time < worn.metrics["fall_time"].value + 0.2 < 5.0
     assert worn.supply.ending.message.startswith("the wearer fell, and 25")
     assert bare.status.message.startswith("completed: the wearer fell"), "as long a walk, whoever fell in the other"
-    life = endurance(walk(load_walk(WALK), 0.1), overrides=["bottle.gas_mass=6 g", "bottle.volume=30 cm^3"]).found
+    life = endurance(
+        walk(load_walk(WALK), minutes=0.1), overrides=["bottle.gas_mass=6 g", "bottle.volume=30 cm^3"]
+    ).found
     assert isinstance(life, Endurance)
-    assert life.draw.stride_time == pytest.approx(walk(load_walk(WALK), 0.1).metrics["stride_time"].value)
+    assert life.draw.stride_time == pytest.approx(walk(load_walk(WALK), minutes=0.1).metrics["stride_time"].value)
     (tmp_path / "walk.json").write_text(json.dumps({"format": pair.to_dict()["format"]}))
     with pytest.raises(DataError, match="is the walk of a neuromuscular gait model: walk on the bottle"):
         endurance(tmp_path)
@@ -196,7 +198,7 @@ def test_a_walk_on_a_bottle_ends_with_the_fall_and_strides_are_those_of_the_wear
 
 @pytest.mark.long
 def test_a_weak_tibialis_falls_without_the_device_and_walks_on_with_it() -> None:
-    pair = walk_with_and_without(load_walk(WALK, [WEAK]), 0.25)
+    pair = walk_with_and_without(load_walk(WALK, [WEAK]), minutes=0.25)
     worn, bare = pair.found.comparison.with_device, pair.found.comparison.without_device
     assert worn.metrics["stays_up"].value == 1.0
     assert worn.metrics["lowest_toes"].value > 0.0
@@ -246,7 +248,7 @@ def test_the_same_wearer_with_the_device_off_takes_columns_as_well() -> None:
 
 @pytest.mark.long
 def test_the_answer_says_on_which_slope_a_wearer_falls_and_what_was_walked_before() -> None:
-    answer = walk_with_and_without(load_walk(WALK, ["wearer.slope=0.2", "controller.kind=off"]), 0.15)
+    answer = walk_with_and_without(load_walk(WALK, ["wearer.slope=0.2", "controller.kind=off"]), minutes=0.15)
     assert "with the device: the wearer falls on the slope of +20 % at" in str(answer.parts)
     assert "level ground" in str(answer.parts)
     assert not answer.passed
@@ -322,7 +324,7 @@ def test_a_gait_of_an_option_is_refused_as_one_of_the_file_is() -> None:
 def test_what_needs_a_prescribed_gait_refuses_in_one_line() -> None:
     scenario, line = load_walk(WALK), "needs a prescribed gait, and motion.kind = 'react' has none"
     with pytest.raises(ScenarioError, match=line):
-        walk_population(scenario, 0.1, 8)
+        walk_population(scenario, minutes=0.1, wearers=8)
     assert "lowest_toes is over the ground" in lacking(scenario, METRICS["toe_clearance"])
     assert "it needs a neuromuscular gait model (motion.kind = 'react')" in lacking(
         load_walk("solenoid"), METRICS["fall_time"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,9 +12,12 @@ from ppafo.progress import Report
 if TYPE_CHECKING:
     from ppafo.analyses.compare.answer import Compared
     from ppafo.report.finding import Finding
-    from ppafo.studies.study import Configurations, Study
+    from ppafo.simulation.scenario import Scenario
+    from ppafo.studies.study import Study
 
-Configured = Annotated["Configurations", Word("SCENARIO", is_repeated=True)]
+Configured = Annotated[
+    "Mapping[str, Scenario | str | Path] | Sequence[Scenario | str | Path]", Word("SCENARIO", is_repeated=True)
+]
 StudyLike = Annotated["Study | str | Path | Mapping[str, Any]", Word("STUDY", option="--study")]
 
 

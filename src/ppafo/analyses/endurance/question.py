@@ -10,10 +10,14 @@ from ppafo.arguments import Duration, Flow, Mass, Overrides, Word, checked
 
 if TYPE_CHECKING:
     from ppafo.analyses.endurance.answer import Endurance, Endurances
-    from ppafo.analyses.endurance.solve import GasUse
     from ppafo.report.finding import Finding
+    from ppafo.signals import Recording
+    from ppafo.walking import WalkResult
 
-GasUses = Annotated["GasUse | Sequence[GasUse]", Word("RECORDING", Path, is_repeated=True)]
+GasUses = Annotated[
+    "str | Path | Recording | WalkResult | Sequence[str | Path | Recording | WalkResult]",
+    Word("RECORDING", Path, is_repeated=True),
+]
 BottleLike = Annotated[str | Path, Word("BOTTLE")]
 
 

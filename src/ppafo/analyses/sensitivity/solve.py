@@ -7,6 +7,7 @@ since the formulas need whole blocks, and counted; the indices then hold for val
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -213,7 +214,7 @@ def finding_of(found: Influences) -> Finding[Influences]:
     )
     figure = Part(
         "Indices and their convergence",
-        panels=lambda: [draw(found, metric) for metric in found.metrics for draw in (_bars, _course)],
+        panels=partial(_panels, found),
         name="sensitivity",
         caption=_CAPTION,
         across=2,
@@ -228,6 +229,10 @@ def finding_of(found: Influences) -> Finding[Influences]:
         parts=(*(_part(found, metric) for metric in found.metrics), figure),
         found=found,
     )
+
+
+def _panels(found: Influences) -> list[Panel]:
+    return [draw(found, metric) for metric in found.metrics for draw in (_bars, _course)]
 
 
 def _part(found: Influences, metric: OfMetric) -> Part:

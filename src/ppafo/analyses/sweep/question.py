@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from ppafo.arguments import Count, Fraction, Name, Overrides, Seed, Threads, Word, checked
+from ppafo.arguments import Address, Count, Fraction, Name, Overrides, Seed, Threads, Word, checked
 from ppafo.progress import Report
 
 if TYPE_CHECKING:
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
 StudyLike = Annotated["Study | str | Path | Mapping[str, Any]", Word("STUDY")]
 Folder = Annotated[str | Path, Word("DIR")]
-Address = Annotated[str, Word("ADDRESS")]
 Agreed = Annotated[bool, Word(option="--yes")]
 StatisticWords = Annotated[str, Word("WORDS", option="--statistic")]
 MetricName = Annotated[str, Word("NAME", option="--metric")]

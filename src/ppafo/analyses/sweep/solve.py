@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from ppafo.analyses.sweep.answer import finding_of
 from ppafo.analyses.sweep.results import BANDS, SUMMARY, Columns, StudyResults
-from ppafo.arguments import Count, Name, Overrides, Seed, Threads, checked
+from ppafo.arguments import Address, Count, Overrides, Seed, Threads, checked
 from ppafo.documents.json_text import json_text
 from ppafo.errors import StudyError
 from ppafo.metrics import METRICS
@@ -187,7 +187,7 @@ def sweep(
     seed: Seed | None = None,
     threads: Threads | None = None,
     out: str | Path | None = None,
-    scheduler: Name | None = None,
+    scheduler: Address | None = None,
     agreed: bool = False,
     progress: Report | None = None,
 ) -> Finding[StudyResults]:

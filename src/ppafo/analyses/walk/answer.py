@@ -135,7 +135,7 @@ def wearers_finding(population: Population) -> Finding[Wearers]:
         ),
         found=Wearers(population),
         passed=not population.diverged,
-        files={"wearers.csv": lambda: wearers_csv(population)},
+        files={"wearers.csv": partial(wearers_csv, population)},
         command="walk",
     )
 
@@ -273,16 +273,16 @@ def finding_of(comparison: Comparison) -> Finding[WalkPair]:
         found=WalkPair(comparison),
         passed=comparison.is_completed and worn.is_helped,
         files={
-            "recording.nc": lambda: netcdf_bytes(worn.recording, None),
-            "recording.csv": lambda: marked_csv_bytes(worn.recording),
-            "recording-off.nc": lambda: netcdf_bytes(bare.recording, None),
-            "strides.csv": lambda: strides_csv(worn),
-            "strides-off.csv": lambda: strides_csv(bare),
-            "mean-stride.csv": lambda: mean_stride_csv(worn),
-            "mean-stride-off.csv": lambda: mean_stride_csv(bare),
+            "recording.nc": partial(netcdf_bytes, worn.recording, None),
+            "recording.csv": partial(marked_csv_bytes, worn.recording),
+            "recording-off.nc": partial(netcdf_bytes, bare.recording, None),
+            "strides.csv": partial(strides_csv, worn),
+            "strides-off.csv": partial(strides_csv, bare),
+            "mean-stride.csv": partial(mean_stride_csv, worn),
+            "mean-stride-off.csv": partial(mean_stride_csv, bare),
             **task_sequence_files(comparison),
         },
-        live=lambda: live_part([configuration]),
+        live=partial(live_part, [configuration]),
     )
 
 
