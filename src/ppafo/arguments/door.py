@@ -56,7 +56,7 @@ def _named(function: Callable[..., R], values: Mapping[str, Any]) -> R:
     except PpafoError as error:
         message = str(error)
         quoted = [(text, name) for name, value in values.items() for text in _texts(value) if text in message]
-        # A text in quotation marks before one that the message has among others, and the longer of two within each other.
+        # A text in quotation marks before one that stands among others, and of two within each other the longer one.
         rank = {name: (f"'{text}'" in message, len(text)) for text, name in quoted}
         name = max(rank, key=lambda each: rank[each], default="")
         if name and not re.search(rf"\b{name.removesuffix('s').replace('_', '[_ -]')}", message, re.IGNORECASE):

@@ -156,6 +156,8 @@ def minutes(text: str) -> float:
         value = float(text) if _NUMBER.fullmatch(text) else parse_quantity(text, "s") / 60.0
     except UnitError as error:
         raise ArgumentError(f"{text!r}: must be a number of minutes, or a time such as '90 s': {error}") from error
+    if not 0.0 < value < math.inf:
+        raise ArgumentError(f"{text}: must be above 0 min, and finite")
     return value
 
 

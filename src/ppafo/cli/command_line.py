@@ -63,7 +63,7 @@ class Command:
     @property
     def summary(self) -> str:
         """The first line of the docstring of the verb, as an entry of a list has it."""
-        first = self.first_line or (self.function().__doc__ or "").strip().partition("\n")[0].rstrip(".")
+        first = (self.first_line or (self.function().__doc__ or "").strip().partition("\n")[0]).rstrip(".")
         return first[:1].lower() + first[1:]
 
     @property
@@ -248,7 +248,8 @@ def run(parsed: argparse.Namespace, name: str, command: Command) -> int:
     if OUT not in parameters:
         folder = parsed.out
         if folder is None and command.default_folder:
-            folder = kind_at(command.default_folder)(values)
+            with without_names():
+                folder = kind_at(command.default_folder)(values)
         # Before the verb runs: a folder that is refused must not cost a long run.
         output.check_output(folder, name)
     with output.progress_line() as progress, without_names():
