@@ -38,11 +38,9 @@ def walk_with_and_without(
     wearers: number of different wearers to simulate instead of one
     seed: random seed of the wearers; default 1
     """
-    from ppafo.analyses.walk.answer import LONG, reporter, wearers_finding
-    from ppafo.kinds import kind_at
+    from ppafo.analyses.walk.answer import LONG, finding_of, reporter, wearers_finding
     from ppafo.simulation.scenario import Scenario
     from ppafo.walking.loading import check_duration_once, load_walk
-    from ppafo.walking.motion import walk_of
     from ppafo.walking.walk import compare_walks, walk_population
 
     chosen = scenario
@@ -55,5 +53,4 @@ def walk_with_and_without(
         advance = reporter(report, "wearers", 0.0)
         return wearers_finding(walk_population(chosen, minutes=minutes, wearers=wearers, seed=seed, progress=advance))
     comparison = compare_walks(chosen, minutes=minutes, progress=reporter(report, "min", LONG))
-    found: Finding[Any] = kind_at(walk_of(comparison.with_device.scenario).who.finding)(comparison)
-    return found
+    return finding_of(comparison)

@@ -23,7 +23,7 @@ from ppafo.parameters.audit.values import (
     check_statements,
 )
 from ppafo.parameters.loading import load_parameter_set, set_or_load
-from ppafo.parameters.parameter_set import ParameterSet, overridden_paths
+from ppafo.parameters.parameter_set import ParameterSet, overridden_paths, with_followers
 
 __all__ = ["Finding", "NamedValue", "Severity", "Side", "audit", "changed_paths"]
 
@@ -62,7 +62,7 @@ def audit(
     """
     audited = parameter_set if isinstance(parameter_set, ParameterSet) else load_parameter_set(parameter_set)
     of_parent = set_or_load(audited.parent or None if parent is None else parent)
-    evidence = Evidence(audited, audited.declarations())
+    evidence = Evidence(with_followers(audited), audited.declarations())
     found = [finding for check in CHECKS.values() for finding in check(evidence)]
     changed, ids = overridden_paths(audited), {finding.id for finding in found}
     judged = [_judge(finding, audited, changed, of_parent) for finding in found]
