@@ -198,12 +198,23 @@ def functions(recording: Path) -> dict[str, Function]:
             {"parameter_set": SET}, "valve", parameter_set="object", overrides="overrides", valve="name"
         ),
         "load_gait": _function({}, "", gait="name"),
-        "load_parameter_set": _function({"parameter_set": SET}, "", parameter_set="name"),
+        "load_parameter_set": _function({"parameter_set": SET}, "", parameter_set="name", plugins="names"),
         "load_scenario": _function(
-            {"scenario": TASK}, "parameter_set", scenario="name", overrides="overrides", parameter_set="object"
+            {"scenario": TASK},
+            "parameter_set",
+            scenario="name",
+            overrides="overrides",
+            parameter_set="object",
+            plugins="names",
         ),
         "load_study": _function(
-            {"study": STUDY}, "draws seed", study="object", overrides="overrides", draws="count", seed="seed"
+            {"study": STUDY},
+            "draws seed",
+            study="object",
+            overrides="overrides",
+            draws="count",
+            seed="seed",
+            plugins="names",
         ),
         "load_study_results": _function({"folder": "no-such-folder"}, "", folder="name"),
         "load_tuning": _function({"tuning": "pid-gains"}, "", tuning="object", overrides="overrides"),
@@ -216,6 +227,7 @@ def functions(recording: Path) -> dict[str, Function]:
             task_sequence="name",
             bottle="name",
             parameter_set="object",
+            plugins="names",
         ),
         "parts": _function({}, "part", part="name", catalogue="name"),
         "read_recording": _function({"path": recording}, "", path="name", atmosphere="positive"),
@@ -233,7 +245,7 @@ def functions(recording: Path) -> dict[str, Function]:
             configuration="name",
             independent="flag",
         ),
-        "simulate": _function({"scenario": TASK}, "", scenario="object", overrides="overrides"),
+        "simulate": _function({"scenario": TASK}, "", scenario="object", overrides="overrides", plugins="names"),
         "simulate_many": _function({"scenarios": [TASK]}, "threads", scenarios="names", threads="count"),
         "sweep": _function(
             {"study": STUDY, "draws": 8},
@@ -244,6 +256,7 @@ def functions(recording: Path) -> dict[str, Function]:
             out="path",
             scheduler="address",
             agreed="flag",
+            plugins="names",
         ),
         "tune": _function({"tuning": "pid-gains"}, none, **study, tuning="object"),
         "validate": _function(

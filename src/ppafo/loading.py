@@ -13,6 +13,7 @@ from ppafo.documents.toml_text import beside, label
 from ppafo.errors import ScenarioError, nearest_name
 from ppafo.parameters import ParameterSet
 from ppafo.parameters.loading import set_or_load
+from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation import loading as of_vanes
 from ppafo.simulation import schema
 from ppafo.simulation.declaration import kind_at
@@ -36,16 +37,22 @@ def list_all_scenarios() -> tuple[str, ...]:
 
 @checked("scenario", "overrides", "parameter_set", name_or_path="scenario")
 def load_scenario(
-    scenario: str | Path, overrides: Overrides = (), *, parameter_set: ParameterSet | str | Path | None = None
+    scenario: str | Path,
+    overrides: Overrides = (),
+    *,
+    parameter_set: ParameterSet | str | Path | None = None,
+    plugins: Plugins = (),
 ) -> Scenario:
     """Return a scenario, walks among them, by its name in the package or by the path of a TOML file, in SI units.
 
     ``overrides`` are texts whose path begins in the scenario, ``run.duration=1 s``, or in its device,
     ``valve.area=12.6mm^2``, or a dictionary of such paths, in which a number is in SI. ``parameter_set``, an object, a
     name or a file, takes the place of the set that the scenario names; what the scenario changes in its device is
-    changed in this one. ScenarioError, ParameterError or DataError for anything that cannot be
-    used.
+    changed in this one. ``plugins`` are modules of your own, files or names, whose objects files may name:
+    ``plugins=["laws.py"]`` for ``kind = "laws:KIND"``. ScenarioError, ParameterError or DataError for anything that
+    cannot be used.
     """
+    name_plugins(plugins)
     # Vanes first: the code of walks is loaded for a walk only.
     name, path = str(scenario), Path(scenario)
     parameter_set = set_or_load(parameter_set)

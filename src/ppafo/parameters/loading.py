@@ -34,6 +34,7 @@ from ppafo.parameters.parameter_set import (
     apply_overrides,
     chosen_valve,
 )
+from ppafo.plugins import Plugins, name_plugins
 from ppafo.units import check_unit
 
 # A dotted path names a valve: a dot or a blank in its name would make it another path.
@@ -176,8 +177,12 @@ def load_device(
 
 
 @checked(name_or_path="parameter_set")
-def load_parameter_set(parameter_set: str | Path) -> ParameterSet:
-    """Return a parameter set by its name in the package or by the path of a TOML file."""
+def load_parameter_set(parameter_set: str | Path, *, plugins: Plugins = ()) -> ParameterSet:
+    """Return a parameter set by its name in the package or by the path of a TOML file.
+
+    ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
+    """
+    name_plugins(plugins)
     content, file = _FILE.read(parameter_set), label(str(parameter_set))
     return parse_parameter_set(content, file, Path(parameter_set).parent)
 

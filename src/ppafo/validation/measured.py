@@ -175,7 +175,8 @@ def read_measured(
     if columns is None or place.is_dir():
         recording = read_recording(place, atmosphere=atmosphere)
     else:
-        recording = read_foreign(place, columns, atmosphere=atmosphere, map_name=map_name)
+        gas = f"{device.gas.molar_mass!r} kg/mol"
+        recording = read_foreign(place, columns, atmosphere=atmosphere, map_name=map_name, gas=gas)
     content = read_bytes(place / NETCDF_FILE if place.is_dir() else place)
     return check_recording(recording, device, str(source), hashlib.sha256(content).hexdigest())
 
