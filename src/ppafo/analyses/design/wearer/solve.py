@@ -244,7 +244,7 @@ def _lifts(request: tuple[str, ...], valve: Part, actuator: Part, gauge: float) 
 
 def _strides_of(valve: Part, actuator: Part, overrides: tuple[str, ...]) -> Tried | None:
     """Return a few strides with some settings; None where they are not walked with help."""
-    result = walk(load_walk(WALKS[valve.kind], overrides), _FEW)
+    result = walk(load_walk(WALKS[valve.kind], overrides), minutes=_FEW)
     if not result.status.is_completed or not result.is_helped or not result.averages:
         return None
     flow = result.metrics["gas"].value / walk_of(result.scenario).gait.stride_time
@@ -283,7 +283,7 @@ def _lightest(
 def _walked(one: Tried, bottle: str, seconds: float) -> WalkResult | None:
     """Walk for a time [s], or until the bottle ends it; None where it cannot feed the device at all."""
     try:
-        return walk(load_walk(WALKS[one.valve.kind], one.overrides, bottle=bottle), seconds / 60.0)
+        return walk(load_walk(WALKS[one.valve.kind], one.overrides, bottle=bottle), minutes=seconds / 60.0)
     except ScenarioError:
         return None
 

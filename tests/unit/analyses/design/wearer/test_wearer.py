@@ -48,7 +48,7 @@ def few() -> Catalogue:
 
 @pytest.fixture
 def little(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(wearer, "load_catalogue", lambda _name="parts": few())
+    monkeypatch.setattr(wearer, "load_catalogue", lambda _catalogue="parts": few())
 
 
 def sized(torque: float, minutes: float, pressure: float = 50.0, toes: float | None = None) -> WearerSizing:
