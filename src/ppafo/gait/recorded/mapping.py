@@ -160,8 +160,9 @@ def unsaid_axes(columns: GaitMap) -> list[str]:
     for name, mapped in (("shank_angle", columns.shank_angle), ("ankle_angle", columns.ankle_angle)):
         unsaid = [key for key in ("forward", "vertical") if key not in mapped.model_fields_set]
         if mapped.terms is None and unsaid:
-            taken = " and ".join(f'{key} = "{getattr(mapped, key)}"' for key in unsaid)
-            found.append(f"the gait map does not say {' and '.join(unsaid)} of {name}: {taken} was taken")
+            said = " and ".join(f'{key} = "{getattr(mapped, key)}"' for key in unsaid)
+            verb = "is" if len(unsaid) == 1 else "are"
+            found.append(f"the gait map does not say {' and '.join(unsaid)} of {name}: {said} {verb} assumed")
     return found
 
 

@@ -5,6 +5,8 @@ import re
 from collections.abc import Iterable
 
 _NEAR_WORD, _NEAR_WHOLE = 0.75, 0.85
+_PLUG_IN = re.compile(r"[RL][A-Z]\w*")
+"""A marker or an output of Plug-in Gait, by its side and its name."""
 _AXIS = re.compile(r"(.*)\.([xyz])")
 
 
@@ -20,7 +22,12 @@ def nearest_column(missing: str, known: Iterable[str]) -> str:
 def _likeness(missing: str, name: str) -> float:
     """Return how alike two names are, 0 for those that cannot mean the same."""
     (wanted, axis), (found, other_axis) = _parts(missing), _parts(name)
-    if axis != other_axis or _side(wanted) != _side(found):
+    if axis != other_axis:
+        return 0.0
+    if _PLUG_IN.fullmatch(wanted) and _PLUG_IN.fullmatch(found):
+        # The same marker of the other foot says that only that one was recorded.
+        return float(wanted[1:].lower() == found[1:].lower())
+    if _side(wanted) != _side(found):
         return 0.0
     words, others = (re.findall(r"[a-z]+|\d+", text.lower()) for text in (wanted, found))
     if len(words) == len(others) > 1:
@@ -41,8 +48,7 @@ def _side(name: str) -> str:
     for word in words:
         if word in ("r", "right", "l", "left"):
             return word[0]
-    # Plug-in Gait writes RKNE and LKneeAngles.
-    return name[0].lower() if re.match(r"[RL][A-Z]", name) else ""
+    return name[0].lower() if _PLUG_IN.match(name) else ""
 
 
 def _ratio(word: str, other: str) -> float:
