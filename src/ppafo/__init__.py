@@ -8,6 +8,9 @@
 Everything below is loaded when it is first used, so that ``import ppafo`` is quick.
 """
 
+# Before all else: an interrupt may come while the rest is loaded.
+import ppafo.first_moments as _first_moments  # noqa: F401, I001
+
 import importlib
 from functools import partial
 from typing import TYPE_CHECKING, Any
