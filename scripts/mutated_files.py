@@ -142,7 +142,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as place:
         here = Path(place)
         (here / "study.toml").write_text(STUDY + 'bands = ["torque"]\ntrajectories = ["pressure_1"]\nevery = "50 ms"\n')
-        ppafo.sweep(here / "study.toml", here / "study")
+        ppafo.sweep(here / "study.toml", out=here / "study")
         ppafo.simulate("torque-task-proportional", ["run.duration=0.1 s"]).save(here / "run")
         (here / "recording.csv").write_text(RECORDING)
         # Per kind: what is opened, the file that is damaged, how often, and what opens it.

@@ -40,7 +40,7 @@ STUDY: dict[str, Any] = {
 @pytest.fixture(scope="module")
 def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("study") / "out"
-    ppafo.sweep(STUDY, folder)
+    ppafo.sweep(STUDY, out=folder)
     return folder
 
 

@@ -89,7 +89,9 @@ def _library() -> Any:
 
 
 def _unreachable(address: str, error: Exception) -> StudyError:
-    return StudyError(f"--scheduler {address}: cannot be reached: {one_line(reason(error) if isinstance(error, OSError) else error)}")
+    return StudyError(
+        f"--scheduler {address}: cannot be reached: {one_line(reason(error) if isinstance(error, OSError) else error)}"
+    )
 
 
 async def _reach(address: str, distributed: Any) -> None:

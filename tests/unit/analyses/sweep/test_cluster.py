@@ -55,7 +55,7 @@ def two_workers(tmp_path: Path) -> Iterator[Any]:
 def test_a_worker_that_dies_in_the_middle_changes_nothing(small: Any, tmp_path: Path, two_workers: Any) -> None:
     small["sample"]["runs"] = 64
     here, there = tmp_path / "here", tmp_path / "there"
-    sweep(small, here, threads=1)
+    sweep(small, out=here, threads=1)
     victim = two_workers.workers[0].process.pid
     told: list[Progress] = []
 
@@ -64,7 +64,7 @@ def test_a_worker_that_dies_in_the_middle_changes_nothing(small: Any, tmp_path: 
         if len(told) == 3:
             os.kill(victim, signal.SIGKILL)
 
-    found = sweep(small, there, threads=1, scheduler=two_workers.scheduler_address, progress=watch).found
+    found = sweep(small, out=there, threads=1, scheduler=two_workers.scheduler_address, progress=watch).found
     assert [progress.done for progress in told][-1] == found.document["runs"] == 256
     assert len(told) == found.document["chunks"] == 52
     assert victim not in {nanny.process.pid for nanny in two_workers.workers.values()}
@@ -79,13 +79,13 @@ def test_bad_input_found_by_a_worker_is_one_line(small: Any, tmp_path: Path, two
     (tmp_path / "file").write_text("in the way", encoding="utf-8")
     out = tmp_path / "out"
     out.mkdir()
-    sweep(small, out)
+    sweep(small, out=out)
     (out / "finished" / "chunk-0000001.json").unlink()
     target = out / "runs" / "chunk-0000001.parquet"
     target.unlink()
     target.mkdir()
     with pytest.raises(Exception, match="cannot be written") as caught:
-        sweep(small, out, scheduler=two_workers.scheduler_address)
+        sweep(small, out=out, scheduler=two_workers.scheduler_address)
     assert "\n" not in str(caught.value)
 
 
@@ -95,7 +95,7 @@ def test_workers_that_write_elsewhere_are_noticed(
     elsewhere = tmp_path / "elsewhere"
     monkeypatch.setattr(cluster, "work_on_chunk", partial(_written_elsewhere, str(elsewhere)))
     with pytest.raises(StudyError, match="must be a folder that they share"):
-        sweep(small, tmp_path / "out", scheduler=two_workers.scheduler_address)
+        sweep(small, out=tmp_path / "out", scheduler=two_workers.scheduler_address)
 
 
 def _written_elsewhere(address: str, task: Task, number: int) -> Finished:
@@ -105,7 +105,7 @@ def _written_elsewhere(address: str, task: Task, number: int) -> Finished:
 def test_a_scheduler_that_is_not_there_is_one_line_at_once_and_leaves_no_folder(small: Any, tmp_path: Path) -> None:
     begun = time.monotonic()
     with pytest.raises(StudyError, match=r"^--scheduler tcp://127\.0\.0\.1:9: cannot be reached: connection refused$"):
-        sweep(small, tmp_path / "out", scheduler="tcp://127.0.0.1:9")
+        sweep(small, out=tmp_path / "out", scheduler="tcp://127.0.0.1:9")
     assert time.monotonic() - begun < 20.0
     assert not (tmp_path / "out").exists()
 
@@ -142,11 +142,11 @@ def test_a_scheduler_that_dies_in_the_middle_is_one_line_that_says_how_to_resume
             process.kill()
 
     with pytest.raises(StudyError, match=r"the connection was lost; \d+ of 52 chunks are finished and kept") as lost:
-        sweep(small, tmp_path / "there", threads=1, scheduler=address, progress=watch)
+        sweep(small, out=tmp_path / "there", threads=1, scheduler=address, progress=watch)
     assert "\n" not in str(lost.value)
     assert "run the same command again" in str(lost.value)
-    sweep(small, tmp_path / "there", threads=1)
-    sweep(small, tmp_path / "here", threads=1)
+    sweep(small, out=tmp_path / "there", threads=1)
+    sweep(small, out=tmp_path / "here", threads=1)
     assert contents(tmp_path / "there") == contents(tmp_path / "here")
 
 
@@ -159,9 +159,9 @@ def test_workers_get_the_modules_of_the_person(
     monkeypatch.setattr(plugins, "_named", {})
     monkeypatch.setenv(plugins.VARIABLE, "")
     small["outputs"]["metrics"] = ["my_metric:KIND"]
-    sweep(small, tmp_path / "here", threads=1, plugins=[tmp_path / "my_metric.py"])
+    sweep(small, out=tmp_path / "here", threads=1, plugins=[tmp_path / "my_metric.py"])
     monkeypatch.setattr(cluster, "work_on_chunk", _on_another_computer)
-    sweep(small, tmp_path / "there", threads=1, scheduler=two_workers.scheduler_address)
+    sweep(small, out=tmp_path / "there", threads=1, scheduler=two_workers.scheduler_address)
     assert contents(tmp_path / "there") == contents(tmp_path / "here")
     # What a worker has loaded it goes on with: another text of the same name would not be what was asked for.
     take_plugins([SentPlugin(Plugin("my_law", str(tmp_path)), ())])
@@ -202,4 +202,4 @@ def test_without_the_extra_the_option_says_what_to_install(
 ) -> None:
     monkeypatch.setitem(__import__("sys").modules, "distributed", None)
     with pytest.raises(StudyError, match=r"pip install 'ppafo\[cluster\]'"):
-        sweep(small, tmp_path / "out", scheduler="tcp://127.0.0.1:9")
+        sweep(small, out=tmp_path / "out", scheduler="tcp://127.0.0.1:9")
