@@ -389,7 +389,7 @@ def open_port(text: str, baud: int = DEFAULT_BAUD, listens: bool = False) -> Por
         try:
             device = serial.Serial(place, baud, timeout=0.0, write_timeout=_WRITE_TIMEOUT, exclusive=True)
             device.reset_input_buffer()
-        except (OSError, ValueError, OverflowError, *_terminal_errors()) as error:
+        except _errors_of_ports() as error:
             # pyserial writes the number and the words of the system twice, and names an ioctl that no user knows.
             number = error.errno if isinstance(error, OSError) else None
             why = one_line(error) if number is None else reason(OSError(number, os.strerror(number)))
@@ -400,13 +400,13 @@ def open_port(text: str, baud: int = DEFAULT_BAUD, listens: bool = False) -> Por
     raise ScenarioError(f"--port {one_line(text)}: must be {FORMS}")
 
 
-def _terminal_errors() -> tuple[type[Exception], ...]:
-    """What a terminal raises beside OSError, where the system has terminals."""
+def _errors_of_ports() -> tuple[type[Exception], ...]:
+    """What opening a port raises: a terminal has an error of its own, where the system has terminals."""
     try:
         import termios
     except ImportError:
-        return ()
-    return (termios.error,)
+        return (OSError, ValueError, OverflowError)
+    return (OSError, ValueError, OverflowError, termios.error)
 
 
 def _is_terminal(place: str) -> bool:
