@@ -16,9 +16,10 @@ from typing import Any
 
 import numpy as np
 
+from ppafo.engine.entries import HEADER, INLINE
 from ppafo.engine.lane_rows import HANDED, indent
 from ppafo.engine.lane_samples import REQUEST, TRACED, walk_traces
-from ppafo.engine.lane_source import HEADER, INLINE, lane_loop
+from ppafo.engine.lane_source import lane_loop
 from ppafo.engine.outline import Outline
 from ppafo.engine.program import Program, link_program
 from ppafo.engine.rows import leaf_paths
