@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from ppafo.engine.continuous_time import free_motion, real_gas_rates
+from ppafo.engine.entries import ARRAY, FLOAT, HEADER, INLINE, entry_text
 from ppafo.engine.led_leg import torque_lines
-from ppafo.engine.loading import ARRAY, FLOAT, HEADER, INLINE, entry_text
 from ppafo.engine.program import NoParameters, Program, link_program
 from ppafo.engine.rows import leaf_paths, row_expression
 from ppafo.engine.source_text import SourceCollector, composed_lines

@@ -293,7 +293,8 @@ class CCompiler:
                 library = _compiled(translated, Path(folder), self.command, self.flags)
                 _fill(module, library, entries_of(source))
         except OSError as error:
-            raise CompilerError(f"what {self.name} makes cannot be kept for an instant: {reason(error)}") from error
+            problem = f"what {self.name} makes cannot be kept for an instant: {reason(error)}"
+            raise CompilerError(problem, passing=True) from error
 
     def run_text(self, source: str, path: str, module: ModuleType) -> None:
         """Load the library beside ``path``."""
