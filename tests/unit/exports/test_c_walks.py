@@ -230,7 +230,7 @@ def test_every_sample_of_a_walk_has_the_bits_of_python(
     choose_compiler(name, overrides, monkeypatch)
     walked = load_walk(name, overrides)
     heads, samples, metrics = shown(tmp_path, shortened(walked, tmp_path, 8.0), "gcc", "-std=c99", "-O1")
-    result = walk(walked, 8.0 / 60.0)
+    result = walk(walked, minutes=8.0 / 60.0)
     recording = result.recording
     compared = [head for head in heads if head in recording.names]
     assert {"angle", "pressure_1", "torque", "command", "external_torque", "heel_force", "contact"} <= set(compared)
