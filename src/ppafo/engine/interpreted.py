@@ -1,22 +1,23 @@
 """A composed text as Python runs it, with what compiled code gives where Python would raise.
 
-It is the last resort: the bits are those of every compiler, the time is some hundred times theirs. Arrays are handed to
-it as memory views, whose elements are Python's own numbers.
+It is the last resort for what is no program of a device: an episode of an environment, a bench. Of programs Python runs
+the functions themselves (``interpreter.py``). The bits are those of every compiler, the time is some hundred times
+theirs. Arrays are handed over as memory views, whose elements are Python's own numbers.
 """
 
 import ast
 import linecache
-import math
 import traceback
 from collections import namedtuple
 from collections.abc import Callable
 from functools import lru_cache
-from types import ModuleType, SimpleNamespace
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 
 from ppafo.engine.entries import entry_types
+from ppafo.engine.going_on import MATH, power, quotient, whole_part
 from ppafo.engine.plain_python import parse_module, place_in, refusal
 
 
@@ -30,7 +31,7 @@ def interpreted(source: str) -> ModuleType:
     linecache.cache[path] = (len(source), None, source.splitlines(keepends=True), path)
     scope = module.__dict__
     scope |= {"math": MATH, "namedtuple": namedtuple, "entry": _entry, "inline": _as_it_is, "empty_rows": empty_rows}
-    scope |= {"_quotient": quotient, "_power": _power, "int": whole_part}
+    scope |= {"_quotient": quotient, "_power": power, "int": whole_part}
     exec(compile(tree, path, "exec"), scope)
     for name in entry_types(source):
         scope[name] = _with_views(scope[name], path, source.split("\n"))
@@ -83,50 +84,3 @@ def empty_rows(rows: int, lanes: int) -> memoryview:
     """Return the working array of a block."""
     made: Any = np.empty((rows, lanes))
     return memoryview(made)
-
-
-def quotient(over: float, under: float) -> float:
-    """Return a quotient as processors have it: infinite, or no number, where it is by zero."""
-    if under != 0.0:
-        return over / under
-    if over == 0.0 or math.isnan(over):
-        return math.nan
-    return math.copysign(math.inf, over) * math.copysign(1.0, under)
-
-
-def whole_part(value: float) -> int:
-    """Return a number without its fraction; the lowest integer for what has none or is beyond all of them."""
-    return int(value) if -(2.0**63) <= value < 2.0**63 else -(2**63)
-
-
-def _power(base: float, exponent: float) -> float:
-    return float(MATH.pow(base, exponent))
-
-
-def _going_on(function: Callable[..., float]) -> Callable[..., float]:
-    """A function of ``math`` that is infinite where it overflows, and no number where it has no value."""
-
-    def called(*given: float) -> float:
-        try:
-            return function(*given)
-        except OverflowError:
-            return math.inf
-        except ValueError:
-            return math.nan
-
-    return called
-
-
-def _logarithm(value: float) -> float:
-    return math.log(value) if value > 0.0 else (-math.inf if value == 0.0 else math.nan)
-
-
-def _root(value: float) -> float:
-    return math.nan if value < 0.0 else math.sqrt(value)
-
-
-MATH = SimpleNamespace(
-    **{name: _going_on(value) if callable(value) else value for name, value in vars(math).items() if name[0] != "_"}
-    | {"sqrt": _root, "log": _logarithm}
-)
-"""The module ``math``, with what compiled code gives where Python raises."""

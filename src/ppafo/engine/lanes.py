@@ -13,6 +13,7 @@ import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from types import ModuleType
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -20,16 +21,15 @@ from numpy.typing import NDArray
 
 from ppafo import interrupts
 from ppafo.control.kind import ProfileKind
-from ppafo.engine.cache import kept_bytes, load_all
+from ppafo.engine.cache import load_all
 from ppafo.engine.entries import INLINE
-from ppafo.engine.interpreted import interpreted
 from ppafo.engine.lane_rows import VECTOR, lanes_of
-from ppafo.engine.lane_source import SAME_MOMENT, write_lanes
-from ppafo.engine.loading import HOW_TO_INSTALL, compiled, compilers_to_try
-from ppafo.engine.outline import Outline
+from ppafo.engine.lane_source import write_lanes
+from ppafo.engine.loading import HOW_TO_INSTALL, compiled, compilers_to_try, runs_by_python
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, rebuilt, row_numbers
 from ppafo.engine.source_text import SourceCollector
+from ppafo.engine.step.lane import SAME_MOMENT
 from ppafo.progress import time_text
 from ppafo.signals.meter import MeterKind
 
@@ -105,38 +105,17 @@ class Advancing(Protocol):
         """Take a block of lanes some steps further."""
 
 
-class EachRun:
-    """A program that Python runs, one run of a block after the other."""
-
-    def __init__(self, program: Program) -> None:
-        self._advance = interpreted(write_source(program, 1)[1]).advance
-
-    def advance(
-        self,
-        states: Floats,
-        parameters: Floats,
-        signals: Floats,
-        commands: Floats,
-        record: Floats,
-        trace: Floats,
-        *clock: Any,
-    ) -> None:
-        """Take a block of lanes some steps further."""
-        for run in range(record.shape[2]):
-            one = slice(run, run + 1)
-            arrays = (states, parameters, signals, commands, record, trace)
-            self._advance(*(array[..., one] for array in arrays), *clock)
-        # Lanes that only fill a vector repeat the last run.
-        states[:, record.shape[2] :] = states[:, record.shape[2] - 1 : record.shape[2]]
-
-
 def load_program(program: Program) -> Advancing:
     """The compiled module of a program, from the disk cache where it is there; or the program as Python runs it.
 
     A program is written anew where a number or function that it was made from stands for something else by now.
     """
-    module: Any = compiled(_current_source(program))
-    return EachRun(program) if module is None else module
+    module: Any = None if runs_by_python() else compiled(_current_source(program))
+    if module is not None:
+        return module  # type: ignore[no-any-return]
+    from ppafo.engine.interpreter import PythonProgram  # most computers have a compiler
+
+    return PythonProgram(program)
 
 
 def load_programs(programs: Iterable[Program]) -> None:
@@ -149,21 +128,19 @@ def load_programs(programs: Iterable[Program]) -> None:
 
 def _current_source(program: Program) -> str:
     """The source of a program, written anew where it is out of date."""
-    outline, source = write_source(program)
+    collector, source = write_source(program)
     # The kept text may rest on a function that a notebook has defined anew since.
-    if outline.made_from.is_current():
+    if collector.made_from.is_current():
         return source
     write_source.cache_clear()
     return write_source(program)[1]
 
 
 @lru_cache(maxsize=64)
-def write_source(program: Program, lanes: int = 0) -> tuple[Outline, str]:
+def write_source(program: Program, lanes: int = 0) -> tuple[SourceCollector, str]:
     """What a program is made from, and its source for some lanes, 0 for as many as fit; written once, then kept."""
-    outline = Outline(INLINE)
-    made_from = write_lanes(program, outline, lanes)
-    source = kept_bytes("lanes", made_from, lambda: write_lanes(program, SourceCollector(INLINE), lanes).encode())
-    return outline, source.decode()
+    collector = SourceCollector(INLINE)
+    return collector, write_lanes(program, collector, lanes)
 
 
 def run_batch(batch: Batch, threads: int | None = None) -> BatchResult:
@@ -184,7 +161,7 @@ def run_blocks(batch: Batch, take: Callable[[slice, BatchResult], None], threads
     lanes = lanes_of(batch.program)
     starts = range(0, runs, lanes)
     workers = 1 if len(starts) == 1 else min(len(starts), threads or os.cpu_count() or 1)
-    if isinstance(module, EachRun):
+    if not isinstance(module, ModuleType):
         workers = 1  # threads of Python take turns
         _say_how_long(runs * batch.clock.step_count)
 

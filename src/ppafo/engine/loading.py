@@ -84,10 +84,16 @@ def compiled(source: str) -> ModuleType | None:
 
     As ``load_source``.
     """
-    compilers = compilers_to_try()
-    if not compilers and os.environ.get(BACKEND_VARIABLE) != PYTHON:
+    return None if runs_by_python() else _load_by(source, compilers_to_try())
+
+
+def runs_by_python() -> bool:
+    """Return whether no compiler is to be tried, which a line has said where nobody asked for it."""
+    if compilers_to_try():
+        return False
+    if os.environ.get(BACKEND_VARIABLE) != PYTHON:
         _say_slow(f"there is no compiler of C that works here; {HOW_TO_INSTALL}")
-    return _load_by(source, compilers)
+    return True
 
 
 @lru_cache(maxsize=64)

@@ -8,7 +8,7 @@ import numpy as np
 
 from ppafo.control.kind import PythonController
 from ppafo.engine.lanes import Advancing, Batch, BatchResult, LaneBlock, group_of, load_program, samples_in
-from ppafo.engine.program import python_place
+from ppafo.engine.linking import python_place
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.scheme.actuators import measurement_of
 from ppafo.errors import ScenarioError, SimulationError
