@@ -179,15 +179,8 @@ def _compiler_of_c(name: str) -> Compiler:
     return compiler(name)
 
 
-def _numba() -> Compiler:
-    """Return Numba."""
-    from ppafo.engine.numba_compiler import numba_compiler
-
-    return numba_compiler()
-
-
-# By name, as the engine knows nothing of the translation above it.
-offer({**{name: partial(_compiler_of_c, name) for name in ("clang", "gcc", "zig")}, "numba": _numba})
+# By name, as the engine knows nothing of the translation above it. A slow valve takes four times as long by clang.
+offer({name: partial(_compiler_of_c, name) for name in ("gcc", "clang", "zig")})
 
 
 def __getattr__(name: str) -> Any:
