@@ -272,7 +272,7 @@ KIND = replace(METRICS["rms_error"], name="own")
 def test_results_never_import_and_need_no_module_of_their_own(folder: Path) -> None:
     (folder / "own_metric.py").write_text(METRIC, encoding="utf-8")
     (folder / "study.toml").write_text(STUDY.replace("rms_error", "own_metric:KIND"), encoding="utf-8")
-    made = ppafo.sweep("study.toml", "out", plugins=["own_metric.py"])
+    made = ppafo.sweep("study.toml", out="out", plugins=["own_metric.py"])
     del sys.modules["own_metric"], METRICS["own_metric:KIND"]
     plugins._named.clear()
     os.environ.pop(plugins.VARIABLE)
