@@ -142,8 +142,40 @@ def noise_of(values: Floats) -> float:
     """
     if values.size < MINIMUM_SAMPLES:
         return 0.0
-    # Third differences take away what a parabola through the neighbours explains.
-    differences = np.abs(np.diff(values, n=3))
+    differences = _third_differences(values, 1)
     most = _KEPT * _SPREAD_OF_MEDIAN * float(np.median(differences))
     inner = differences[differences <= most]
     return float(np.sqrt(np.mean(inner * inner)) / _SHARE_OF_KEPT / _GAIN_OF_DIFFERENCES)
+
+
+def _third_differences(values: Floats, lag: int) -> Floats:
+    """Return sizes of third differences of samples ``lag`` apart, without what a parabola through them explains."""
+    first, second, third, fourth = (values[place * lag : values.size - (3 - place) * lag] for place in range(4))
+    return np.abs(fourth - 3.0 * third + 3.0 * second - first)
+
+
+_SHARE_OF_LAGS = 0.1
+"""Share of a recording over which noise may remember at most: beyond it, what a model lacks looks like noise."""
+
+_BY_CHANCE = 8.0
+"""Four standard errors of a quarter's size among differences that share samples, times the root of their number."""
+
+_QUARTER = 0.31864
+"""Size below which a quarter of normal deviates lie."""
+
+
+def correlated_noise_of(values: Floats) -> float:
+    """Return the standard deviation of noise that may be correlated, in what a model leaves [its unit].
+
+    Third differences of samples further apart see the noise that neighbours share. A quarter of the recording, where
+    they are smallest, speaks for all of it, as a model that is wrong is so while something moves. The spread about the
+    median, which a constant error does not move, is never exceeded.
+    """
+    if values.size < MINIMUM_SAMPLES:
+        return 0.0
+    lags = [2**power for power in range(values.size.bit_length()) if 3 * 2**power <= _SHARE_OF_LAGS * values.size]
+    sizes = [float(np.quantile(_third_differences(values, lag), 0.25)) for lag in lags]
+    apart = max(sizes, default=0.0) / (_QUARTER * _GAIN_OF_DIFFERENCES)
+    spread = _SPREAD_OF_MEDIAN * float(np.median(np.abs(values - np.median(values))))
+    correlated, white = min(apart, spread), noise_of(values)
+    return correlated if correlated > (1.0 + _BY_CHANCE / math.sqrt(values.size)) * white else white

@@ -13,7 +13,7 @@ from scipy.optimize import minimize_scalar
 from ppafo.errors import DataError
 from ppafo.parameters.device import Device
 from ppafo.signals import Recording
-from ppafo.signals.faults import noise_of
+from ppafo.signals.faults import correlated_noise_of, noise_of
 from ppafo.signals.recording import Floats
 from ppafo.simulation.recorded import DORSIFLEXION_SUPPLY, SUPPLY, regular_interval, start_of, with_fixed_volume
 from ppafo.simulation.scenario import Leg
@@ -149,7 +149,7 @@ class ChannelAgreement:
     """Errors (model less measured) in one channel, in its SI unit, after the common delay was taken out.
 
     ``rms``, ``bias`` and ``largest`` (with its sign, at ``largest_time`` [s]); ``rms_unaligned`` is the RMS error
-    without any shift; ``noise`` is the noise of its samples; ``variation`` is the standard deviation of the signal
+    without any shift; ``noise`` is the noise of its samples, correlated or not; ``variation`` is the standard deviation of the signal
     without its noise. ``limit`` is the largest fraction of ``full_range`` that passes.
     """
 
@@ -214,7 +214,8 @@ def channel_agreement(curve: Curve, delay: float) -> ChannelAgreement:
     weights = np.asarray(weights / weights.sum())
     error = curve.shift(delay, curve.times) - curve.values
     unaligned = curve.shift(0.0, curve.times) - curve.values
-    worst, noise = int(np.argmax(np.abs(error))), noise_in(curve.values, curve.full_range)
+    worst = int(np.argmax(np.abs(error)))
+    noise = max(noise_in(curve.values, curve.full_range), correlated_noise_of(error))
     # White noise is no part of what the signal goes through, and no model explains it.
     away = curve.values - weights @ curve.values
     variation = math.sqrt(max(float(weights @ away**2) - noise * noise, 0.0))

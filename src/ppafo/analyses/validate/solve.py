@@ -45,6 +45,12 @@ from ppafo.version import __version__
 LARGEST_DELAY = 1.0
 """Seconds; a recording that is later than this was not recorded with its command."""
 
+LITTLE = 0.03
+"""RMS error over the full range up to which a residual beside the noise, of which no cause is known, is a remark."""
+
+_EXPLAINS = 0.5
+"""Residual with the nearest cause over the residual without any, up to which that cause is worth naming."""
+
 
 @dataclass(frozen=True, slots=True)
 class Validation:
@@ -60,13 +66,15 @@ class Validation:
 
     @property
     def passes(self) -> bool:
-        """True where every error is within its limit and, without limits given, nothing but what any bench has is left.
+        """True where every error is within its limit and, without limits given, only what any bench has is left.
 
-        What no single cause explains is a disagreement as one that a cause explains is; of a recorded angle that is
-        followed causes are not searched.
+        A cause that is found and that not any bench has is a disagreement, however small. A residual that no single
+        cause explains is one only where it is more than ``LITTLE``, for no model has all that a device has. Of a
+        recorded angle that is followed causes are not searched.
         """
-        causes = self.causes
-        is_usual = causes.is_noise or (causes.tried == 0 if causes.found is None else causes.found.is_usual)
+        causes, channels = self.causes, [channel for item in self.recordings for channel in item.channels]
+        is_little = causes.tried == 0 or all(one.fraction <= LITTLE for one in channels)
+        is_usual = causes.is_noise or (is_little if causes.found is None else causes.found.is_usual)
         return (self.has_limits or is_usual) and all(recording.passes for recording in self.recordings)
 
     def json_document(self) -> dict[str, Any]:
@@ -264,15 +272,13 @@ def verdict(validation: Validation) -> str:
     count, name = len(validation.recordings), validation.device.name
     pairs = [(channel, agreement) for agreement in validation.recordings for channel in agreement.channels]
     worst = max((channel for channel, _ in pairs), key=lambda one: one.in_noise)
-    size = (
-        f"{worst.channel} is off by {worst.in_noise:.2g} times its noise ({100 * worst.fraction:.2g} % of full range)"
-    )
+    size = f"{worst.channel} is off by {_times(worst.in_noise)} times its noise ({100 * worst.fraction:.2g} % of full range)"
     failed = ", ".join(
         f"{channel.channel} in {agreement.file} ({100 * channel.fraction:.3g} %, limit {100 * channel.limit:.3g} %)"
         for channel, agreement in pairs
         if not channel.passes
     )
-    why = _why(validation.causes)
+    why = _why(validation.causes, worst.in_noise)
     if not validation.passes:
         # Where no channel is beyond its limit, an unusual cause alone is what fails the set.
         parts = (why, size, f"beyond the limit: {failed}") if why else (failed, size)
@@ -281,8 +287,12 @@ def verdict(validation: Validation) -> str:
     return f"{name} agrees with {count} recording{'s' * (count > 1)}: every RMS error is within its limit; {rest}"
 
 
-def _why(causes: Causes) -> str:
-    """Return what explains a disagreement, or what comes nearest; empty where nothing but noise is left."""
+def _why(causes: Causes, without: float) -> str:
+    """Return what explains a disagreement, or what comes nearest; empty where nothing but noise is left.
+
+    ``without`` is the largest error over noise [-] without any cause: a nearest one is named that takes half of it, or
+    wrong samples, which are seen whatever else is wrong.
+    """
     if causes.found is not None:
         others = f" (or, the same for these recordings: {', '.join(one.name for one in causes.found.same)})"
         usual = ", as on any bench" if causes.found.is_usual else ""
@@ -290,8 +300,15 @@ def _why(causes: Causes) -> str:
     if not causes.tried:
         return ""
     nearest = causes.nearest
-    near = "" if nearest is None else f"; nearest: {in_words(nearest)}, which leaves {nearest.left:.2g} times the noise"
-    return f"no single change explains it{near}"
+    explains = nearest is not None and (nearest.is_of_samples or nearest.left <= _EXPLAINS * without)
+    if nearest is None or not explains:
+        return "no single change explains it"
+    return f"no single change explains it; nearest: {in_words(nearest)}, which leaves {_times(nearest.left)} times the noise"
+
+
+def _times(size: float) -> str:
+    """Return how many times the noise, with two digits and without a power of ten."""
+    return f"{size:.2g}" if size < 100.0 else f"{size:.0f}"
 
 
 def in_words(one: Cause) -> str:

@@ -148,7 +148,7 @@ def validate(
 
     The model is run on the recorded command, supply pressure and external torque; errors are model less measured. With
     no threshold it is 10 % of full range, at least half of the variance of a signal beside its noise is explained, and
-    no single change of record, set or model may explain the recordings better than noise of the sensors could. The
+    no single change of record, set or model may explain the recordings; what no change explains may be 3 %. The
     result's ``found`` has ``passes`` and, in ``recordings``, one ``RecordingAgreement`` each: ``measured`` and
     ``model`` are recordings, their channels of shape (samples,) in SI; ``channels`` has RMS error, bias, largest error
     and delay [s] of each channel in its SI unit (rad, Pa, N m). DataError, ParameterError or SimulationError for bad
