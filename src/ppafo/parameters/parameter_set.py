@@ -16,9 +16,11 @@ from ppafo.model.gas import SPECIES
 from ppafo.parameters.declaration import RELIEVING_PATH, SPECIES_PATH, alternatives, quantities
 from ppafo.parameters.graph import (
     ATMOSPHERE_PATH,
+    DISPLACEMENT_PATH,
     PRESSURE_PATH,
     SAME_PRESSURE,
     SECOND_PRESSURE_PATH,
+    TORQUE_CONSTANT_PATH,
     Follows,
     acting,
     follows,
@@ -165,10 +167,11 @@ def atmospheric_pressure(parameter_set: ParameterSet) -> float:
 def links_of_set(
     parameter_set: ParameterSet, given: Collection[str] = (), atmosphere: float | None = None
 ) -> dict[str, tuple[Follows, ...]]:
-    """Return how pressures of a set follow others: gauge ones the atmosphere, the second regulator the first.
+    """Return how numbers of a set follow others: gauge pressures the atmosphere, the second regulator the first.
 
-    It does where the set has one pressure for both, unless it was ``given`` by an override and the first was not. With
-    an ``atmosphere`` [Pa absolute] they are compared at it, else at the set's.
+    The second regulator does where the set has one pressure for both, unless it was ``given`` by an override and the
+    first was not; with an ``atmosphere`` [Pa absolute] they are compared at it, else at the set's. The displacement of
+    a vane per radian is its torque constant, by virtual work, unless the set states another.
     """
     numbers = parameter_set.numbers
     found = {
@@ -182,6 +185,8 @@ def links_of_set(
         SECOND_PRESSURE_PATH in given and PRESSURE_PATH not in given
     ):
         found[SECOND_PRESSURE_PATH] = (follows(PRESSURE_PATH, when_set=True), *found[SECOND_PRESSURE_PATH])
+    if DISPLACEMENT_PATH in parameter_set.declarations() and DISPLACEMENT_PATH not in numbers:
+        found[DISPLACEMENT_PATH] = (follows(TORQUE_CONSTANT_PATH),)
     return {path: links for path, links in found.items() if links}
 
 
@@ -197,13 +202,27 @@ def has_one_pressure(parameter_set: ParameterSet, atmosphere: float | None = Non
     return math.isclose(first, second, rel_tol=SAME_PRESSURE)
 
 
-def with_second_pressure(parameter_set: ParameterSet) -> ParameterSet:
-    """Return the set with the first regulator's pressure for the second too, unless the set gives it apart."""
-    first = parameter_set.numbers.get(PRESSURE_PATH)
-    if first is None or SECOND_PRESSURE_PATH in parameter_set.numbers:
-        return parameter_set
-    second = first.model_copy(update={"note": f"follows {PRESSURE_PATH}"})
-    return replace(parameter_set, numbers={**parameter_set.numbers, SECOND_PRESSURE_PATH: second})
+def with_followers(parameter_set: ParameterSet) -> ParameterSet:
+    """Return the set with what it leaves to follow from another of its numbers.
+
+    The second regulator has the pressure of the first, and a vane displaces its torque constant per radian: what the
+    shaft does, T dtheta, is what the gas does, (P1 - P2) dV.
+    """
+    pressure, constant = (parameter_set.numbers.get(path) for path in (PRESSURE_PATH, TORQUE_CONSTANT_PATH))
+    followers = {}
+    if pressure is not None:
+        note = f"follows {PRESSURE_PATH}"
+        followers[SECOND_PRESSURE_PATH] = pressure.model_copy(update={"note": note, "key": ""})
+    if constant is not None and DISPLACEMENT_PATH in parameter_set.declarations():
+        followers[DISPLACEMENT_PATH] = Entry(
+            value=constant.value,
+            unit=f"{constant.unit}/rad",
+            origin="derived",
+            source="virtual work",
+            note=f"follows {TORQUE_CONSTANT_PATH}",
+            uncertainty=constant.uncertainty,
+        )
+    return replace(parameter_set, numbers={**followers, **parameter_set.numbers})
 
 
 def entry_in_si(entry: Entry, quantity: Quantity, atmosphere: float) -> float:
@@ -338,5 +357,5 @@ _CHANGES = {SPECIES_PATH: _with_species, RELIEVING_PATH: _with_relieving}
 
 def _before(parameter_set: ParameterSet, path: str) -> str:
     """Return what stood at the path, so that an override never hides the value it replaces."""
-    entry = parameter_set.entries().get(path)
+    entry = with_followers(parameter_set).entries().get(path)
     return f"the set has {entry_text(entry)} ({entry.origin}: {entry.source})" if entry else "the set has no value"

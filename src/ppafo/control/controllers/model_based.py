@@ -21,11 +21,11 @@ class NominalChambers(NamedTuple):
     """The believed device, SI units; conductances are Cd A C1 [kg/(s Pa)], ``gas_product`` is R T / M [J/kg]."""
 
     torque_constant: Annotated[float, Number("m^3", "believed K_actuator", 1.451e-5, 1.0e-9, 1.0)]
-    displacement_per_radian: Annotated[float, Number("m^3/rad", "believed B_vane", 2.35e-5, 1.0e-9, 1.0)]
+    displacement_per_radian: Annotated[float, Number("m^3/rad", "believed B_vane", 1.451e-5, 1.0e-9, 1.0)]
     angle_min: Annotated[float, Number("rad", "believed lower stop", math.radians(20.0), -10.0, 10.0)]
     angle_max: Annotated[float, Number("rad", "believed upper stop", math.radians(130.0), -10.0, 10.0)]
-    dead_volume_1: Annotated[float, Number("m^3", "believed dead volume of chamber 1", 2.65e-5, 1.0e-9, 1.0)]
-    dead_volume_2: Annotated[float, Number("m^3", "believed dead volume of chamber 2", 2.65e-5, 1.0e-9, 1.0)]
+    dead_volume_1: Annotated[float, Number("m^3", "believed dead volume of chamber 1", 3.6e-5, 1.0e-9, 1.0)]
+    dead_volume_2: Annotated[float, Number("m^3", "believed dead volume of chamber 2", 3.6e-5, 1.0e-9, 1.0)]
     gas_product: Annotated[float, Number("J/kg", "believed R T / M, of CO2 at 298 K", 5.6308454545e4, 1.0e3, 1.0e7)]
     valve_conductance: Annotated[
         float, Number("kg/(s Pa)", "believed Cd A C1 of the valve", 1.0040962467e-8, 1.0e-15, 1.0)
