@@ -149,8 +149,8 @@ class ChannelAgreement:
     """Errors (model less measured) in one channel, in its SI unit, after the common delay was taken out.
 
     ``rms``, ``bias`` and ``largest`` (with its sign, at ``largest_time`` [s]); ``rms_unaligned`` is the RMS error
-    without any shift; ``noise`` is the noise of its samples, correlated or not; ``variation`` is the standard deviation of the signal
-    without its noise. ``limit`` is the largest fraction of ``full_range`` that passes.
+    without any shift; ``noise`` is the noise of its samples, correlated or not; ``variation`` is the standard deviation
+    of the signal without its noise. ``limit`` is the largest fraction of ``full_range`` that passes.
     """
 
     channel: str

@@ -120,8 +120,9 @@ class _Record(NamedTuple):
     """A recording that is compared: channels and values (channels, samples) over their noise.
 
     ``engine`` is the error of the engine over the noise, ``good`` is 1 for a sample that a sensor made and 0 for
-    others, which ``words`` describe; ``has_few`` where these are isolated and so few that any bench has them. ``delay`` [s] was found with the model of the set; ``starts`` are how readings
-    change with the standard error of each start that was read.
+    others, which ``words`` describe; ``has_few`` where these are isolated and so few that any bench has them.
+    ``delay`` [s] was found with the model of the set; ``starts`` are how readings change with the standard error of
+    each start that was read.
     """
 
     measured: Measured
@@ -587,7 +588,7 @@ class _Wrong(NamedTuple):
 
 
 def _wrong_samples(values: Floats, residuals: Floats, one: ChannelAgreement, time: Floats) -> _Wrong | None:
-    """Return the samples of a channel that no sensor made: constant, clipped or isolated; ``residuals`` are their own."""
+    """Return samples of a channel that no sensor made: constant, clipped, or isolated among samples or residuals."""
     edges = np.flatnonzero(np.diff(values))
     lengths, levels = np.diff(np.concatenate([[-1], edges, [len(values) - 1]])), values[[*edges, -1]]
     if len(levels) == 1:

@@ -267,7 +267,7 @@ def test_a_number_far_from_the_set_is_named_beside_straight_lines_that_leave_the
     found = causes(run).found
     assert found is not None
     assert found.name == "friction.static_torque"
-    assert found.numbers["friction.static_torque"][0] == pytest.approx(float(torque.split()[0]), rel=0.01)
+    assert found.numbers["friction.static_torque"][0] == pytest.approx(float(torque.removesuffix(" N m")), rel=0.01)
 
 
 def test_an_outlier_on_a_flank_is_found_beside_the_model(bench: Recording) -> None:

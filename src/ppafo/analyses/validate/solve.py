@@ -272,7 +272,8 @@ def verdict(validation: Validation) -> str:
     count, name = len(validation.recordings), validation.device.name
     pairs = [(channel, agreement) for agreement in validation.recordings for channel in agreement.channels]
     worst = max((channel for channel, _ in pairs), key=lambda one: one.in_noise)
-    size = f"{worst.channel} is off by {_times(worst.in_noise)} times its noise ({100 * worst.fraction:.2g} % of full range)"
+    share = f"{100 * worst.fraction:.2g} % of full range"
+    size = f"{worst.channel} is off by {_times(worst.in_noise)} times its noise ({share})"
     failed = ", ".join(
         f"{channel.channel} in {agreement.file} ({100 * channel.fraction:.3g} %, limit {100 * channel.limit:.3g} %)"
         for channel, agreement in pairs
@@ -303,7 +304,8 @@ def _why(causes: Causes, without: float) -> str:
     explains = nearest is not None and (nearest.is_of_samples or nearest.left <= _EXPLAINS * without)
     if nearest is None or not explains:
         return "no single change explains it"
-    return f"no single change explains it; nearest: {in_words(nearest)}, which leaves {_times(nearest.left)} times the noise"
+    left = _times(nearest.left)
+    return f"no single change explains it; nearest: {in_words(nearest)}, which leaves {left} times the noise"
 
 
 def _times(size: float) -> str:
