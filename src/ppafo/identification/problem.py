@@ -7,7 +7,7 @@ flow of the open valve before its map, and the leak last, since its chambers mus
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -269,12 +269,20 @@ def run_procedure(sources: tuple[Source, ...], problem: ProcedureProblem, settin
     """
     settings = problem.settings(setting)
     try:
-        return _PROCEDURES[problem.kind](sources, settings)
+        found = _PROCEDURES[problem.kind](sources, settings)
     except IdentificationError as error:
         # What is wrong with a file is told by its name, what is wrong with a procedure by its place in the problem.
         if any(str(error).startswith(source.name) for source in sources):
             raise
         raise IdentificationError(f"{setting.place}: {error}") from error
+    anew = setting.tolerances.each_recording
+    if not anew or len(sources) == 1:
+        return found
+    said = (
+        f"bench.each_recording = {list(anew)} acts in a [trajectory] only: here zeros and gains are those of all "
+        f"{len(sources)} recordings; give each mounting of the sensors its own [[procedure]]"
+    )
+    return replace(found, remarks=(*found.remarks, said))
 
 
 def window_of(problem: ProcedureProblem, setting: Setting) -> tuple[float, float]:

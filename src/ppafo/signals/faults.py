@@ -135,6 +135,28 @@ def isolated_samples(values: Floats, noise: float) -> NDArray[np.bool_]:
     return np.asarray((away > 6.0 * noise) & (away > 3.0 * np.ptp(around[:, [0, 1, 3, 4]], axis=1)))
 
 
+_ROUNDING = 1.0e-9
+"""Fraction of a range [-] that is no step of a converter but how a file rounds."""
+
+
+def resolution_of(values: Floats) -> float:
+    """Return the step of the converter that made the values [their unit], 0 of a constant: the least between two."""
+    steps = np.diff(np.unique(values))
+    steps = steps[steps > _ROUNDING * steps.sum()]
+    return float(steps.min()) if steps.size else 0.0
+
+
+def rounding_of(values: Floats) -> Floats:
+    """Return the standard deviation [their unit] with which each value speaks, for what its converter rounds.
+
+    It is the resolution over sqrt(12) (GUM, JCGM 100:2008, F.2.2.1). A sensor at rest repeats one value with one error,
+    so that a run of n equal values says no more than one: each of them speaks with sqrt(n) times that.
+    """
+    edges = np.flatnonzero(np.diff(values, prepend=np.nan, append=np.nan))
+    lengths = np.diff(edges)
+    return resolution_of(values) / math.sqrt(12.0) * np.sqrt(np.repeat(lengths, lengths))
+
+
 def noise_of(values: Floats) -> float:
     """Return the standard deviation of white noise [unit of the signal], from third differences that are not unusual.
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from ppafo.errors import PpafoError
+from ppafo.linear_algebra import on_one_thread
 from ppafo.parameters.device import Device
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.signals.faults import correlated_noise_of, isolated_samples
@@ -168,6 +169,7 @@ class _Tried(NamedTuple):
         return float(self.left.squares.max()) < ONLY_NOISE and self.gain > 0.0
 
 
+@on_one_thread
 def causes_of(
     read: Sequence[Measured],
     agreements: Sequence[RecordingAgreement],

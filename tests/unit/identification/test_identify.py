@@ -122,7 +122,7 @@ def test_a_value_that_is_not_identified_is_written_as_fitted_and_not_counted(
     assert entry.note.startswith("holds for this model only")
     assert not outcome.is_good
     said = text_of(finding_of(outcome))
-    assert said.count("alone wants other numbers than all readings together") == 1
+    assert said.count("fitted alone, ") == 1
 
 
 def test_friction_that_grows_is_written_with_its_growth(solved: Solve) -> None:

@@ -13,12 +13,14 @@ from ppafo.analyses.design.profile.problem import SizingProblem
 from ppafo.analyses.design.wearer import solve as wearer
 from ppafo.analyses.design.wearer.solve import WearerSizing, Wish, size_for_wearer
 from ppafo.errors import StudyError
+from ppafo.linear_algebra import on_one_thread
 from ppafo.progress import Report, report_nothing
 from ppafo.report.finding import Finding
 
 FOR_A_WEARER = "--mass '72.5 kg' --torque '2.5 N m' --pressure '50 psi_g' --minutes 5"
 
 
+@on_one_thread
 def design(
     problem: DesignProblem | SizingProblem | str | Path | None = None,
     seed: int | None = None,

@@ -16,6 +16,7 @@ import numpy as np
 
 from ppafo.analyses.sensitivity.methods import METHODS, Evaluated, Indices, Method, changes
 from ppafo.errors import StudyError, nearest_name
+from ppafo.linear_algebra import on_one_thread
 from ppafo.progress import Report
 from ppafo.report.finding import Column, Finding, Part
 from ppafo.report.kind import Kind, of_metric
@@ -197,6 +198,7 @@ def _of_metric(name: str, values: Floats, design: Evaluated, method: Method, set
 DEFAULT_SAMPLES = {"sobol": 8192, "shapley": 2048}
 
 
+@on_one_thread
 def sensitivity(
     study: Study | str | Path | Mapping[str, Any],
     method: str | None = None,

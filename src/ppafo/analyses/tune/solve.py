@@ -24,6 +24,7 @@ from ppafo.analyses.tune.answer import (
 from ppafo.analyses.tune.problem import Effort, Gains, Problem, Spread, load_tuning
 from ppafo.control.kind import OPEN_LOOP
 from ppafo.errors import StudyError
+from ppafo.linear_algebra import on_one_thread
 from ppafo.metrics import METRICS
 from ppafo.parameters.device import VANE
 from ppafo.progress import Report
@@ -182,6 +183,7 @@ MINIMUM_ERRORS = ("peak_error", "rms_error_hold")
 _NOISE_CONFIDENCE = 0.95
 
 
+@on_one_thread
 def tune(
     tuning: Problem | str | Path | Mapping[str, Any] | None = None,
     overrides: Sequence[str] = (),

@@ -112,7 +112,7 @@ def validate(
     columns: ColumnMap | str | Path | None = None,
     progress: Report | None = None,
 ) -> Finding[Validation]:
-    """Return the errors (model less measured) of the model with a parameter set against each recording.
+    """Return the residuals (measured - model) of the model with a parameter set against each recording.
 
     Arguments, result and errors are those of the command, ``ppafo.cli.verbs.bench.validate``.
     """
@@ -186,7 +186,7 @@ def agreement_panels(agreement: RecordingAgreement, atmosphere: float) -> list[P
 
 
 def _channel_panels(agreement: RecordingAgreement, channel: ChannelAgreement, atmosphere: float) -> list[Panel]:
-    """Return samples and model over time, and below them model less measured."""
+    """Return samples and model over time, and below them their residual."""
     name, measured, model = channel.channel, agreement.measured, agreement.model
     given = measured_values(measured, name)
     assert given is not None, "a channel that is compared was measured"
@@ -197,7 +197,7 @@ def _channel_panels(agreement: RecordingAgreement, channel: ChannelAgreement, at
     course = Course(
         time=time,
         level=Kind(shown.title, "", "pressure" if is_chamber else shown.quantity),
-        change=Kind("Model less measured", "", shown.quantity),
+        change=Kind("Residual (measured - model)", "", shown.quantity),
         times=scale * measured.time,
         samples=given,
         # The measurement is late by the delay, so the model is read that much earlier.
@@ -235,7 +235,7 @@ def finding_of(validation: Validation) -> Finding[Validation]:
     hashes = [(item.file, f"sha256 {item.sha256}") for item in validation.recordings if item.sha256]
     method = (
         f"The model with the valve '{validation.device.valve_name}' was run with the inputs of each recording, from "
-        "the state of its first samples. An error is model less measured. Percentages are of the full range: the "
+        "the state of its first samples. A residual is measured - model. Percentages are of the full range: the "
         "angle between the stops, the gauge pressure of the supply, and twice that for the pressure difference. One "
         "common delay was removed before the errors were computed."
     )
@@ -353,7 +353,7 @@ def _part(validation: Validation, name: str, agreement: RecordingAgreement) -> P
         remarks=[f"note: {remark}" for remark in agreement.remarks],
         panels=partial(agreement_panels, agreement, validation.device.supply.atmospheric_pressure),
         name=f"{name}-agreement",
-        caption=f"Dots: {kind}. Lines: the model on the recorded inputs. Below each: model less measured, the limit of "
+        caption=f"Dots: {kind}. Lines: the model on the recorded inputs. Below each: the residual, measured - model, the limit of "
         "its RMS value dashed where it is in range.",
         across=across,
         size=(7.6 / across, 2.1),

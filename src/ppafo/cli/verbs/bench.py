@@ -146,7 +146,7 @@ def validate(
 ) -> Finding[Validation]:
     """Compare a parameter set with recordings, channel by channel.
 
-    The model is run on the recorded command, supply pressure and external torque; errors are model less measured. With
+    The model is run on the recorded command, supply pressure and external torque; residuals are measured - model. With
     no threshold it is 10 % of full range, at least half of the variance of a signal beside its noise is explained, and
     no single change of record, set or model may explain the recordings; what no change explains may be 3 %. The
     result's ``found`` has ``passes`` and, in ``recordings``, one ``RecordingAgreement`` each: ``measured`` and

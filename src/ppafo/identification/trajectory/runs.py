@@ -35,7 +35,7 @@ from ppafo.identification.trajectory.problem import (
 from ppafo.model.catalog import VALVES
 from ppafo.model.columns import at, over_runs
 from ppafo.parameters.plant import switches_of
-from ppafo.signals.faults import MINIMUM_SAMPLES, is_at_limit, noise_of, plateaus
+from ppafo.signals.faults import MINIMUM_SAMPLES, is_at_limit, noise_of, plateaus, rounding_of
 from ppafo.simulation.plan import plan_run, plan_runs
 from ppafo.simulation.recorded import (
     ANGLE,
@@ -220,7 +220,8 @@ def residuals_of(experiments: Sequence[PreparedExperiment], numbers: Sequence[Nu
 def blocks_of(experiments: Sequence[PreparedExperiment], numbers: Sequence[Number], point: Floats) -> tuple[Block, ...]:
     """Return the place of each channel of each recording among the residuals.
 
-    Its floor is the given noise or the error of the engine, which half as long steps with a quarter of the error show.
+    Its floor is the given noise, the error of the engine, which half as long steps with a quarter of the error show, or
+    what the converter of the sensor rounds.
     """
     blocks, first = [], 0
     coarse = signals_of(experiments, numbers, point[:, None])
@@ -234,7 +235,7 @@ def blocks_of(experiments: Sequence[PreparedExperiment], numbers: Sequence[Numbe
     for prepared, before, after in zip(experiments, coarse, fine, strict=True):
         for channel in prepared.channels:
             error = float(np.sqrt(np.mean(np.square(after[channel.name] - before[channel.name]))))
-            floor = max(channel.floor, error if math.isfinite(error) else 0.0)
+            floor = np.maximum(max(channel.floor, error if math.isfinite(error) else 0.0), rounding_of(channel.values))
             last = first + len(channel.values)
             blocks.append(Block(prepared.label, channel.name, slice(first, last), floor))
             first = last
