@@ -195,11 +195,11 @@ def fit(
 
     Squares are minimised within bounds, at first with a loss that is robust (soft L1); weights follow from what is left
     in each channel. Then residuals are whitened by the noise of each channel and the numbers step on until none gains.
-    Another start is followed only where it explains more than where the first ended. ``memory`` is the highest order of the autoregression, 0
-    for readings that were taken one by one. In recordings of motion (``is_motion``) sensors may drift, and samples
-    that an impact passes are left out; what a bench reads moves as slowly as its sensors drift. IdentificationError
-    where no run succeeds, and where samples are no more than the numbers that are sought, and for bounds that leave a
-    number no room about its start.
+    Another start is followed only where it explains more than where the first ended. ``memory`` is the highest order
+    of the autoregression, 0 for readings that were taken one by one. In recordings of motion (``is_motion``) sensors
+    may drift, and samples that an impact passes are left out; what a bench reads moves as slowly as its sensors
+    drift. IdentificationError where no run succeeds, and where samples are no more than the numbers that are sought,
+    and for bounds that leave a number no room about its start.
     """
     if not numbers or not blocks:
         raise IdentificationError(f"a fit of {len(numbers)} numbers to {len(blocks)} blocks: each needs at least one")

@@ -137,16 +137,20 @@ def isolated_samples(values: Floats, noise: float) -> NDArray[np.bool_]:
 
 _ROUNDING = 1.0e-9
 """Fraction of a range [-] that is no step of a converter but how a file rounds."""
+_SHARE_THAT_DIFFERS = 0.5
 
 
 def resolution_of(values: Floats) -> float:
-    """Return the step of the converter that made the values [their unit], 0 of a constant: the least between two."""
+    """Return the step of the converter that made the values [their unit], the least between two; 0 where none shows.
+
+    One shows where most values come again, as no noise and no motion makes them.
+    """
     steps = np.diff(np.unique(values))
     steps = steps[steps > _ROUNDING * steps.sum()]
-    return float(steps.min()) if steps.size else 0.0
+    return float(steps.min()) if 0 < steps.size < _SHARE_THAT_DIFFERS * values.size else 0.0
 
 
-def rounding_of(values: Floats) -> Floats:
+def rounding_of(values: Floats, resolution: float) -> Floats:
     """Return the standard deviation [their unit] with which each value speaks, for what its converter rounds.
 
     It is the resolution over sqrt(12) (GUM, JCGM 100:2008, F.2.2.1). A sensor at rest repeats one value with one error,
@@ -154,7 +158,7 @@ def rounding_of(values: Floats) -> Floats:
     """
     edges = np.flatnonzero(np.diff(values, prepend=np.nan, append=np.nan))
     lengths = np.diff(edges)
-    return resolution_of(values) / math.sqrt(12.0) * np.sqrt(np.repeat(lengths, lengths))
+    return resolution / math.sqrt(12.0) * np.sqrt(np.repeat(lengths, lengths))
 
 
 def noise_of(values: Floats) -> float:

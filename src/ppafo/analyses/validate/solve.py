@@ -353,8 +353,8 @@ def _part(validation: Validation, name: str, agreement: RecordingAgreement) -> P
         remarks=[f"note: {remark}" for remark in agreement.remarks],
         panels=partial(agreement_panels, agreement, validation.device.supply.atmospheric_pressure),
         name=f"{name}-agreement",
-        caption=f"Dots: {kind}. Lines: the model on the recorded inputs. Below each: the residual, measured - model, the limit of "
-        "its RMS value dashed where it is in range.",
+        caption=f"Dots: {kind}. Lines: the model on the recorded inputs. Below each: the residual, measured - "
+        "model, the limit of its RMS value dashed where it is in range.",
         across=across,
         size=(7.6 / across, 2.1),
     )

@@ -35,7 +35,7 @@ from ppafo.identification.trajectory.problem import (
 from ppafo.model.catalog import VALVES
 from ppafo.model.columns import at, over_runs
 from ppafo.parameters.plant import switches_of
-from ppafo.signals.faults import MINIMUM_SAMPLES, is_at_limit, noise_of, plateaus, rounding_of
+from ppafo.signals.faults import MINIMUM_SAMPLES, is_at_limit, noise_of, plateaus, resolution_of, rounding_of
 from ppafo.simulation.plan import plan_run, plan_runs
 from ppafo.simulation.recorded import (
     ANGLE,
@@ -235,7 +235,8 @@ def blocks_of(experiments: Sequence[PreparedExperiment], numbers: Sequence[Numbe
     for prepared, before, after in zip(experiments, coarse, fine, strict=True):
         for channel in prepared.channels:
             error = float(np.sqrt(np.mean(np.square(after[channel.name] - before[channel.name]))))
-            floor = np.maximum(max(channel.floor, error if math.isfinite(error) else 0.0), rounding_of(channel.values))
+            rounded = rounding_of(channel.values, resolution_of(channel.values))
+            floor = np.maximum(max(channel.floor, error if math.isfinite(error) else 0.0), rounded)
             last = first + len(channel.values)
             blocks.append(Block(prepared.label, channel.name, slice(first, last), floor))
             first = last
