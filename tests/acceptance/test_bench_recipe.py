@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from ppafo.analyses.identify.answer import Identification
-from ppafo.analyses.identify.solve import identify
+from ppafo.analyses.identify.question import identify
 from ppafo.cli.main import main
 from ppafo.parameters.loading import load_device
 

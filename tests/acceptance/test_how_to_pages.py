@@ -259,14 +259,14 @@ def test_the_controller_of_the_page_walks() -> None:
     words = shlex.split(extension("ppafo walk"))
     overrides = [after for word, after in itertools.pairwise(words) if word == "--set"]
     assert overrides[0] == "controller.kind=my_laws.hysteresis:KIND"
-    walked = ppafo.walk(words[2], 0.1, overrides)
+    walked = ppafo.walk(words[2], minutes=0.1, overrides=overrides)
     assert walked.status.is_completed
     assert "safe_state_time" not in walked.metrics
     assert walked.metrics["net_push_off_work"].value > 0.5
     command = walked.recording["command"]
     assert set(command.round(12)) <= {-1.0, 0.0, 1.0, VENT}
     # By its short name, as step 3 of the page has it, it is the same controller.
-    named = ppafo.walk(words[2], 0.1, ["controller.kind=hysteresis", *overrides[1:]])
+    named = ppafo.walk(words[2], minutes=0.1, overrides=["controller.kind=hysteresis", *overrides[1:]])
     assert (named.recording["command"] == command).all()
 
 

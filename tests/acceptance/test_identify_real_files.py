@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from ppafo.analyses.identify.answer import Identification
-from ppafo.analyses.identify.solve import identify
+from ppafo.analyses.identify.question import identify
 from ppafo.cli.main import main
 from tests.page_code import assert_shows
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ppafo.analyses.linearise.solve import linearise
+from ppafo.analyses.linearise.question import linearise
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.model.effects.laminar_leak import LaminarLeak, with_gap
 from ppafo.model.effects.leak_opening import LeakOpening, lifted
@@ -74,7 +74,7 @@ def test_a_valve_that_joins_the_chambers_passes_gas_where_the_leak_is_shut() -> 
 
 def test_a_linear_model_has_the_leak_as_a_difference_of_two_runs_has() -> None:
     venting = ("controller.kind=constant", "controller.command=-0.4", "run.duration=0.3 s", *OPENING)
-    rates = linearise("torque-task-proportional", 0.2, venting).found.rates
+    rates = linearise("torque-task-proportional", at=0.2, overrides=venting).found.rates
     step = ("run.step=0.01 ms", "run.output_interval=0.01 ms")
     found = simulate(load_scenario("torque-task-proportional", (*venting, *step))).recording
     here = int(np.searchsorted(found.time, 0.2 - 1e-9))
@@ -128,7 +128,7 @@ def test_play_changes_the_torque_and_a_column_of_it_is_the_single_runs() -> None
 @pytest.mark.parametrize(("text", "name"), [(PLAY[0], "spool_play"), ("effects.ice.blockage_per_gas=100 1/kg", "ice")])
 def test_a_linear_model_refuses_an_effect_with_a_state_in_one_line(text: str, name: str) -> None:
     with pytest.raises(SimulationError, match=f"effect '{name}' has a state of its own.*switch it off"):
-        linearise("torque-task-proportional", 0.2, ("run.duration=0.3 s", text))
+        linearise("torque-task-proportional", at=0.2, overrides=("run.duration=0.3 s", text))
 
 
 LINE = ("effects.line_resistance.area=8 mm^2",)
@@ -212,7 +212,7 @@ def test_a_column_of_the_second_virial_coefficient_has_the_bits_and_the_gas_of_t
 
 def test_a_linear_model_of_gas_that_is_not_ideal_is_a_difference_of_two_runs() -> None:
     moving = ("controller.kind=constant", "controller.command=-0.4", "run.duration=0.3 s", *REAL)
-    rates = linearise("torque-task-proportional", 0.2, moving).found.rates
+    rates = linearise("torque-task-proportional", at=0.2, overrides=moving).found.rates
     step = ("run.step=0.01 ms", "run.output_interval=0.01 ms")
     found = simulate(load_scenario("torque-task-proportional", (*moving, *step))).recording
     here = int(np.searchsorted(found.time, 0.2 - 1e-9))

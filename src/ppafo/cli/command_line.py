@@ -17,10 +17,13 @@ from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn, final
 
+from ppafo.arguments import Word, number, whole_number
+from ppafo.arguments.door import without_names
+from ppafo.arguments.values import Names, evaluated
 from ppafo.cli import output
-from ppafo.cli.arguments import Word, number, whole_number
-from ppafo.errors import PpafoError, nearest_name
+from ppafo.errors import ArgumentError, PpafoError, nearest_name
 from ppafo.kinds import kind_at
+from ppafo.plugins import name_modules_in, name_plugins
 
 if TYPE_CHECKING:
     from _typeshed import SupportsWrite
@@ -29,6 +32,8 @@ if TYPE_CHECKING:
 
 PROGRESS = "progress"
 """The parameter of a verb that reports how far it is; no word of the line fills it."""
+PLUGINS = "plugins"
+"""The parameter of Python calls for modules of the person; every command has ``--plugin`` in its place."""
 OUT = "out"
 """The parameter of a verb that writes its folder or file itself; every other command has ``--out DIR``."""
 
@@ -40,7 +45,8 @@ class Command:
     ``library`` is the ``TomlKind`` of the files that come with the package (``module:NAME``), for ``--list``, and
     ``listing`` what returns the entries of that list (``module:function``), by default the words of the files;
     ``listed`` is what these are called. ``default_folder`` takes the values of the parameters by name and returns where
-    the result is written unless ``--out`` says so; without it nothing is.
+    the result is written unless ``--out`` says so; without it nothing is. ``first_line`` is the first line of its
+    docstring, where loading the verb takes too long for a list of commands.
     """
 
     verb: str
@@ -48,6 +54,7 @@ class Command:
     listing: str = ""
     listed: str = ""
     default_folder: str = ""
+    first_line: str = ""
     found: Callable[..., Any] | None = None
     """The verb itself, of another package, in place of where it is."""
 
@@ -59,7 +66,7 @@ class Command:
     @property
     def summary(self) -> str:
         """The first line of the docstring of the verb, as an entry of a list has it."""
-        first = (self.function().__doc__ or "").strip().partition("\n")[0].rstrip(".")
+        first = (self.first_line or (self.function().__doc__ or "").strip().partition("\n")[0]).rstrip(".")
         return first[:1].lower() + first[1:]
 
     @property
@@ -137,12 +144,23 @@ def reading_of(annotation: Any) -> Reading:
 
 def parameters_of(verb: Callable[..., Any]) -> Iterator[tuple[inspect.Parameter, Reading]]:
     """Return each parameter that words of the line fill, with how its text is read."""
-    names = vars(sys.modules[verb.__module__])
+    names = Names(vars(sys.modules[verb.__module__]))
     for parameter in inspect.signature(verb).parameters.values():
-        if parameter.name != PROGRESS:
-            annotation = parameter.annotation
+        if parameter.name not in (PROGRESS, PLUGINS):
             # The texts of annotations are evaluated for the command that runs, and for no other.
-            yield parameter, reading_of(eval(annotation, names) if isinstance(annotation, str) else annotation)
+            yield parameter, reading_of(evaluated(parameter.annotation, names))
+
+
+def argparse_reader(read: Callable[[str], Any]) -> Callable[[str], Any]:
+    """Return what reads a text for argparse, which prints the message of no error but its own."""
+
+    def reader(text: str) -> Any:
+        try:
+            return read(text)
+        except ArgumentError as error:
+            raise argparse.ArgumentTypeError(str(error)) from error
+
+    return reader
 
 
 def option_of(parameter: inspect.Parameter, reading: Reading) -> str:
@@ -169,6 +187,13 @@ def add_parameters(parser: argparse.ArgumentParser, command: Command, is_listing
     if command.lists:
         parser.add_argument("--list", action="store_true", help="list what comes with the package")
     output.add_json_argument(parser)
+    parser.add_argument(
+        "--plugin",
+        metavar="MODULE",
+        action="append",
+        default=[],
+        help="a module of yours that files may name, such as laws.py",
+    )
     if OUT not in names:
         what = "also write the result as files into this folder"
         if command.default_folder:
@@ -200,7 +225,7 @@ def _add_parameter(
                 word.off, action="store_false", dest=parameter.name, default=default, help=word.help.replace("%", "%%")
             )
         return
-    options |= {"metavar": word.metavar, "type": word.read, "choices": reading.choices}
+    options |= {"metavar": word.metavar, "type": argparse_reader(word.read), "choices": reading.choices}
     if not option:
         if reading.is_repeated:
             options["nargs"] = "+" if is_required and not is_listing else "*"
@@ -224,7 +249,10 @@ def run(parsed: argparse.Namespace, name: str, command: Command) -> int:
         return _list(command, parsed.json)
     verb = command.function()
     parameters = inspect.signature(verb).parameters
-    values = {each: getattr(parsed, each) for each in parameters if each != PROGRESS}
+    values = {each: getattr(parsed, each) for each in parameters if each not in (PROGRESS, PLUGINS)}
+    name_plugins(parsed.plugin)
+    for text in _texts(values[each] for each in _NAMING if each in values):
+        name_modules_in(text)
     for parameter, reading in parameters_of(verb):
         if command.lists and values[parameter.name] is None and parameter.default is inspect.Parameter.empty:
             noun = reading.word.metavar.lower()
@@ -233,12 +261,25 @@ def run(parsed: argparse.Namespace, name: str, command: Command) -> int:
     if OUT not in parameters:
         folder = parsed.out
         if folder is None and command.default_folder:
-            folder = kind_at(command.default_folder)(values)
+            with without_names():
+                folder = kind_at(command.default_folder)(values)
         # Before the verb runs: a folder that is refused must not cost a long run.
         output.check_output(folder, name)
-    with output.progress_line() as progress:
+    with output.progress_line() as progress, without_names():
         found = verb(**values, **({PROGRESS: progress} if PROGRESS in parameters else {}))
     return output.deliver(found, parsed.json, folder, name, has_written=OUT in parameters)
+
+
+_NAMING = ("overrides", "tasks", "metric", "metrics", "also", "such_that", "form")
+"""Parameters whose words may name an object of a module, which the person thereby names."""
+
+
+def _texts(values: Iterable[Any]) -> Iterator[str]:
+    for value in values:
+        if isinstance(value, str):
+            yield value
+        elif isinstance(value, Iterable):
+            yield from _texts(value)
 
 
 def _list(command: Command, as_json: bool) -> int:

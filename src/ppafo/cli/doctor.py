@@ -5,7 +5,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from ppafo.cli.arguments import Name
+from ppafo.arguments import Name
 from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, Said
 from ppafo.documents.json_text import json_text
 from ppafo.errors import DataError, SimulationError, nearest_name

@@ -6,8 +6,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
+from pathlib import Path
 from typing import Any
 
+from ppafo.arguments import Overrides, checked
 from ppafo.errors import PpafoError, ScenarioError, UnitError
 from ppafo.loading import load_scenario
 from ppafo.page.html import block_of, packed_once, page_of
@@ -334,17 +336,15 @@ _TASKS = {"locked": "Torque task", "prescribed": "Moving ankle", "free": "Uncons
 _STEP = "Step response"
 
 
-def workbench(
-    scenarios: Iterable[str] = DEFAULT,
-    overrides: Sequence[str] = (),
-) -> bytes:
+@checked("scenarios", "overrides")
+def workbench(scenarios: Sequence[str | Path] = DEFAULT, *, overrides: Overrides = ()) -> bytes:
     """Return a page, one file of HTML, in which scenarios are simulated again while their numbers are changed.
 
     ``scenarios`` are names or files of scenarios and walks; those with the same kind of motion share a tab.
     ``overrides`` change all of them. Each tab opens with its first two scenarios.
     ScenarioError for none, too many or two of one name; ProgramError where a program has to be built and cannot be.
     """
-    content, modules, still = _content(list(scenarios), overrides, "page")
+    content, modules, still = _content([str(scenario) for scenario in scenarios], tuple(overrides), "page")
     return page_of(TITLE, content, modules, still)
 
 

@@ -3,7 +3,7 @@
 import functools
 import json
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from importlib import resources
 from pathlib import Path
 from types import GenericAlias
@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field
 
+from ppafo.arguments import Name, Overrides, checked
 from ppafo.documents.models import NAME, make_schema, one_of, optional, table, validate
 from ppafo.documents.toml_text import TomlKind, beside, label
 from ppafo.errors import ParameterError, UnitError, nearest_name, refused_as
@@ -20,6 +21,7 @@ from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import SECTION
 from ppafo.parameters import declaration
 from ppafo.parameters.building import build_device
+from ppafo.parameters.declaration import alternatives
 from ppafo.parameters.device import VANE, Device
 from ppafo.parameters.overrides import check_valve
 from ppafo.parameters.parameter_set import (
@@ -32,6 +34,7 @@ from ppafo.parameters.parameter_set import (
     apply_overrides,
     chosen_valve,
 )
+from ppafo.plugins import Plugins, name_plugins
 from ppafo.units import check_unit
 
 # A dotted path names a valve: a dot or a blank in its name would make it another path.
@@ -159,22 +162,36 @@ def list_sets() -> tuple[str, ...]:
     return _FILE.names()
 
 
-def load_device(name_or_path: str | Path, valve: str | None = None, overrides: Iterable[str] = ()) -> Device:
+@checked("parameter_set", "valve", "overrides", name_or_path="parameter_set")
+def load_device(
+    parameter_set: ParameterSet | str | Path, *, overrides: Overrides = (), valve: Name | None = None
+) -> Device:
     """Return the device of a parameter set with one of its valves (default: the set's own choice), in SI units.
 
     ``overrides`` are texts such as ``valve.area=12.6mm^2`` or ``supply.pressure=55 psi_g``. ParameterError for one of
     another valve than the one that is named.
     """
-    overrides = tuple(overrides)
     check_valve(overrides, valve, f"valve = '{valve}'")
-    parameter_set = apply_overrides(load_parameter_set(name_or_path), overrides, valve)
-    return build_device(parameter_set, valve)
+    loaded = parameter_set if isinstance(parameter_set, ParameterSet) else load_parameter_set(parameter_set)
+    return build_device(apply_overrides(loaded, overrides, valve=valve), valve)
 
 
-def load_parameter_set(name_or_path: str | Path) -> ParameterSet:
-    """Return a parameter set by its name in the package or by the path of a TOML file."""
-    content, file = _FILE.read(name_or_path), label(str(name_or_path))
-    return parse_parameter_set(content, file, Path(name_or_path).parent)
+@checked(name_or_path="parameter_set")
+def load_parameter_set(parameter_set: str | Path, *, plugins: Plugins = ()) -> ParameterSet:
+    """Return a parameter set by its name in the package or by the path of a TOML file.
+
+    ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
+    """
+    name_plugins(plugins)
+    content, file = _FILE.read(parameter_set), label(str(parameter_set))
+    return parse_parameter_set(content, file, Path(parameter_set).parent)
+
+
+def set_or_load(parameter_set: ParameterSet | str | Path | None) -> ParameterSet | None:
+    """Return a parameter set as it is, or load it by name or path; None for None."""
+    if parameter_set is None or isinstance(parameter_set, ParameterSet):
+        return parameter_set
+    return load_parameter_set(parameter_set)
 
 
 def parse_parameter_set(content: bytes, file: str, folder: Path | None = None) -> ParameterSet:
@@ -204,7 +221,7 @@ def parse_parameter_set(content: bytes, file: str, folder: Path | None = None) -
             hint = nearest_name(valve, parameter_set.valve_kinds)
             raise ParameterError(f"{parameter_set.file}: {path}: there is no valve '{valve}'{hint}")
         with refused_as(ParameterError, f"{parameter_set.file}: {path}.unit", UnitError):
-            check_unit(entry.unit)
+            check_unit(entry.unit, alternatives(declared[path])[0])
     return parameter_set
 
 

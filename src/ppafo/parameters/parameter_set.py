@@ -1,12 +1,13 @@
 """A parameter set: every value with its origin, as it was given, and in SI; values changed by dotted path."""
 
 import math
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 
+from ppafo.arguments import Name, Overrides, checked
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.models import StrictTable, Text, Texts
 from ppafo.errors import ParameterError, UnitError, nearest_name
@@ -14,6 +15,7 @@ from ppafo.model.catalog import EFFECTS, find_effects
 from ppafo.model.declaration import Quantity
 from ppafo.model.gas import SPECIES
 from ppafo.parameters.declaration import RELIEVING_PATH, SPECIES_PATH, alternatives, quantities
+from ppafo.parameters.flow_coefficients import USUAL_CRITICAL_RATIO, conductance_of
 from ppafo.parameters.graph import (
     ATMOSPHERE_PATH,
     DISPLACEMENT_PATH,
@@ -27,7 +29,7 @@ from ppafo.parameters.graph import (
     gauge_link,
 )
 from ppafo.parameters.overrides import CHOSEN_VALVE, NAMED_VALVE, Given, one_path, other_forms, override_set
-from ppafo.units import base_value, format_quantity, split_quantity, to_si
+from ppafo.units import SI, base_value, format_quantity, from_si, split_number, to_si
 
 if TYPE_CHECKING:  # few devices have a measured actuator
     from ppafo.model.actuators.table import Table
@@ -266,8 +268,11 @@ def entry_text(entry: Entry | TextEntry | FlagEntry) -> str:
 SOURCE = "override"
 
 
-def apply_overrides(parameter_set: ParameterSet, overrides: Iterable[str], valve: str | None = None) -> ParameterSet:
+@checked("parameter_set", "overrides", "valve")
+def apply_overrides(parameter_set: ParameterSet, overrides: Overrides, *, valve: Name | None = None) -> ParameterSet:
     """Return the set with values replaced; each override is a text such as ``valve.area=12.6mm^2``, in any order.
+
+    A dictionary of paths does as well, in which a number is in SI.
 
     ``valve.X`` means the valve that is chosen (``valve``, else the set's default), ``valves.NAME.X`` one by name.
     Naming another gas brings that gas's molar mass and heat capacity ratio, unless they are given too; giving an
@@ -313,15 +318,29 @@ def _with_number(parameter_set: ParameterSet, path: str, given: Given) -> Parame
         # Nothing is spelt alike: values of the same section stand for what there is.
         near = [name for name in allowed if name.startswith(f"{given.typed.partition('.')[0]}.")] or allowed
         hint = nearest_name(given.typed, allowed) or f"; for example {', '.join(near[:6])}"
-        raise ParameterError(f"override '{given}': {parameter_set.file} has no value '{given.typed}'{hint}")
+        worked = _in_conductance(given)
+        raise ParameterError(f"override '{given}': {parameter_set.file} has no value '{given.typed}'{hint}{worked}")
     try:
-        value, unit = split_quantity(given.text)
+        value, unit = split_number(given.text)
+        unit = declared[path].unit if unit == SI else unit
         entry = Entry(value=value, unit=unit, origin="assumed", source=SOURCE, note=_before(parameter_set, path))
         entry_in_si(entry, declared[path], atmospheric_pressure(parameter_set))
     except UnitError as error:
         raise ParameterError(f"override '{given}': {error}") from error
     kept = {key: old for key, old in parameter_set.numbers.items() if key not in other_forms(path)}
     return replace(parameter_set, numbers={**kept, path: entry})
+
+
+def _in_conductance(given: Given) -> str:
+    """Return Cv, Kv or a nominal flow as the two settings that say it; nothing for any other value."""
+    section, _, name = given.typed.rpartition(".")
+    conductance = conductance_of(name.lower(), given.text) if name.lower() in ("cv", "kv", "qn") else None
+    if conductance is None:
+        return ""
+    return (
+        f": --set '{section}.sonic_conductance={from_si(conductance, 'L/(s bar)', 'm^3/(s Pa)'):.4g} L/(s bar)' "
+        f"--set '{section}.critical_ratio={USUAL_CRITICAL_RATIO:g}'"
+    )
 
 
 def _with_species(parameter_set: ParameterSet, path: str, given: Given) -> ParameterSet:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ppafo.arguments import Count, Overrides, Seed, checked
 from ppafo.documents.models import validate
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import (
@@ -25,6 +26,7 @@ from ppafo.loading import load_scenario, placed, reloaded
 from ppafo.metrics import METRICS
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.overrides import other_forms, override_set
+from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation.numbers import chosen_path
 from ppafo.studies import declaration as declared
 from ppafo.studies.distributions import Above
@@ -40,17 +42,22 @@ def list_studies() -> tuple[str, ...]:
     return STUDY_FILES.names()
 
 
+@checked("study", "overrides", "draws", "seed")
 def load_study(
     study: str | Path | Mapping[str, Any],
-    overrides: Sequence[str] = (),
-    draws: int | None = None,
-    seed: int | None = None,
+    overrides: Overrides = (),
+    *,
+    draws: Count | None = None,
+    seed: Seed | None = None,
+    plugins: Plugins = (),
 ) -> Study:
     """Return a study by its name in the package, by the path of a TOML file, or from data laid out as such a file.
 
     ``overrides`` as on the command line change every configuration; ``draws`` and ``seed`` replace the number of draws
-    and the random seed of the file. StudyError for anything that is not usable.
+    and the random seed of the file. ``plugins`` are modules of your own whose objects files may name, as of
+    ``simulate``. StudyError for anything that is not usable.
     """
+    name_plugins(plugins)
     document, source = read_source(STUDY_FILES, study)
     tables = document.get("vary")
     for table in tables if isinstance(tables, list | tuple) else ():
@@ -60,9 +67,10 @@ def load_study(
     given = {key: value for key, value in (("runs", draws), ("seed", seed)) if value is not None}
     with refused_as(StudyError, source.file, StudyError):
         # What the command line changes is written into the document, as if it stood in the file.
-        if overrides:
+        changes = tuple(overrides)
+        if changes:
             for table, item in zip(document["configurations"], parsed.configurations, strict=True):
-                changed = _configuration(item, source.folder, overrides).scenario
+                changed = _configuration(item, source.folder, changes).scenario
                 table["overrides"] = list(changed.origin.overrides)
         if given and parsed.sample is None:
             raise StudyError(

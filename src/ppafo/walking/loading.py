@@ -8,6 +8,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from ppafo.arguments import Overrides, checked
 from ppafo.control.walking.catalog import TIMINGS, walking_controllers, with_timing
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import DataError, ParameterError, PpafoError, ScenarioError, one_line, refused_as
@@ -19,7 +20,9 @@ from ppafo.model.regulator import SupplyLines
 from ppafo.parameters import ParameterSet
 from ppafo.parameters.device import Device, Valve
 from ppafo.parameters.graph import Follows, Graph, Term
+from ppafo.parameters.loading import set_or_load
 from ppafo.parameters.overrides import split_override
+from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation.declaration import PERIOD, RATE, SUPPLY_LINE, SUPPLY_LINES, Reading, kind_at, line_paths, value_at
 from ppafo.simulation.loading import (
     Layout,
@@ -51,23 +54,26 @@ from ppafo.walking.declaration import (
     FAULTY,
     FORCES,
     OF_A_WALK,
+    PERSON,
     SEED,
+    STEP,
     WALK_SENSORS,
     fault_numbers,
     timing_of,
     walk_file,
 )
-from ppafo.walking.kind import WalkKind
 from ppafo.walking.motion import (
     WalkMotion,
     duration_problems,
+    record_interval,
     walk_of,
     with_duration,
 )
 from ppafo.walking.nominal import nominal_terms
-from ppafo.walking.planning import NO_REFERENCE, walking_valve
+from ppafo.walking.planning import NO_REFERENCE, planned_task_sequence, walking_valve
 from ppafo.walking.preparation import FaultSettings
 from ppafo.walking.task_sequence import load_task_sequence
+from ppafo.walking.wearer import links_of_stature, read_wearer, wearer_origin
 
 FILE = TomlKind("walk", "walk", resources.files("ppafo.walking") / "configurations", ScenarioError)
 DEFAULT_PERIOD = 1.0e-3
@@ -88,22 +94,27 @@ def check_duration_once(overrides: Iterable[str], minutes: float | None) -> None
         raise ScenarioError("--set run.duration: the same as --minutes; leave one out")
 
 
+@checked("scenario", "overrides", "gait", "task_sequence", "bottle", "parameter_set", name_or_path="scenario")
 def load_walk(
-    name_or_path: str | Path,
-    overrides: Iterable[str] = (),
+    scenario: str | Path,
+    overrides: Overrides = (),
+    *,
     gait: str | Path | None = None,
     task_sequence: str | Path | None = None,
     bottle: str | Path | None = None,
-    parameter_set: ParameterSet | None = None,
+    parameter_set: ParameterSet | str | Path | None = None,
+    plugins: Plugins = (),
 ) -> Scenario:
     """Return a scenario that is a walk by its name in the package or by the path of a TOML file, in SI units.
 
     ``overrides`` are texts such as ``controller.peak_torque=6 N m`` or ``valve.area=12.6mm^2``; ``gait``,
     ``task_sequence`` and ``bottle`` replace the file's. A gait that is named, by the file or by ``gait``, brings its
-    subject as the default wearer; ``parameter_set`` takes the place of the set that is named. ScenarioError,
-    ParameterError or DataError for anything that cannot be used.
+    subject as the default wearer; ``parameter_set`` takes the place of the set that is named. ``plugins``
+    are modules of your own whose objects files may name, as of ``simulate``. ScenarioError, ParameterError or DataError
+    for anything that cannot be used.
     """
-    file, given = label(str(name_or_path)), tuple(overrides)
+    name_plugins(plugins)
+    file, given = label(str(scenario)), tuple(overrides)
     named = {"gait": gait, "task_sequence": task_sequence, BOTTLE_NAME: bottle}
     instead = {path: str(item) for path, item in named.items() if item is not None}
     # Refuse an override beside another word for the same value, by path in ``others``.
@@ -115,10 +126,10 @@ def load_walk(
                 f"{file}: override '{path}={text}': the {path.partition('.')[0]} is given as '{one_line(other)}' "
                 "already; give it once"
             )
-    content = FILE.parse(FILE.read(name_or_path), file)
-    folder = Path(name_or_path).parent
+    content = FILE.parse(FILE.read(scenario), file)
+    folder = Path(scenario).parent
     return scenario_of(
-        ScenarioRequest(file, str(name_or_path), folder, content, given, parameter_set, instead), WALKING
+        ScenarioRequest(file, str(scenario), folder, content, given, set_or_load(parameter_set), instead), WALKING
     )
 
 
@@ -162,8 +173,6 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     if BOTTLE_NAME in instead:
         document.setdefault(BOTTLE, {})["name"] = instead[BOTTLE_NAME]
     reading = Reading(request.file, document, changed.paths)
-    kind = MOTIONS[kind_at(document, "motion") or WALK]
-    who: WalkKind = kind.walk
     hardware = read_hardware(reading, request, changed.device)
     device = read_device(reading, hardware)
     with refused_as(ParameterError, f"{reading.file}: [device]", ParameterError):
@@ -171,8 +180,6 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     named_sequence = _named_file("task_sequence", request, document)
     with _named_by("task_sequence", reading, request, ScenarioError):
         sequence = None if named_sequence is None else load_task_sequence(named_sequence)
-        if sequence is not None:
-            who.check_task_sequence(sequence)
     with _named_by("gait", reading, request, DataError):
         walked = load_gait(_named_file("gait", request, document) or NORMATIVE)
     is_named = "gait" in instead or "gait" in document
@@ -184,30 +191,36 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     line = line if line is None or bottle is None else bottle.fed(line)
     sensors = reading.section("sensors", WALK_SENSORS)
     faults = {sensor: _fault(reading, sensor) for sensor in FAULTY}
+    person = reading.number(f"wearer.{PERSON.name}", PERSON)
+    if person != int(person):
+        raise reading.refusal(f"wearer.{PERSON.name}", "must be a whole number")
     motion = WalkMotion(
-        motion_kind=kind,
+        motion_kind=MOTIONS[kind_at(document, "motion") or WALK],
         gait=walked,
+        wearer=read_wearer(reading, walked, is_named),
         timing=timing_of(document),
         forces={name: sensors[name] for name in FORCES},
         faults=faults,
+        task_sequence=sequence,
         bottle=bottle,
+        wearer_origin=wearer_origin(reading, walked, is_named),
+        person=person,
         broken=_broken(reading, line),
         shut_off=_shut_off(reading),
-        **who.read(reading, request, walked, is_named, sequence),
     )
     named = tuple(
         # The path of a file in full means the same from any folder.
         f"{path}={Path(name).absolute() if Path(name).suffix == '.toml' else name}"
         for path, name in instead.items()
     )
-    step = reading.number("run.step", who.step)
+    step = reading.number("run.step", STEP)
     controller, links = _control(reading, device, None if line is None else line.row(device.supply), sensors)
     room = device.supply.atmospheric_pressure
     scenario = Scenario(
         name=document["name"],
         description=document.get("description", ""),
         device=device,
-        run=RunSettings(DEFAULT_DURATION, step, who.interval(DEFAULT_DURATION)),
+        run=RunSettings(DEFAULT_DURATION, step, record_interval(DEFAULT_DURATION)),
         motion=motion,
         initial=Initial(room, room),
         controller=controller,
@@ -222,7 +235,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
         ),
         gas_model=read_gas_model(reading),
         supply_line=line,
-        links={**links, **who.links(reading.document)},
+        links={**links, **links_of_stature(reading.document)},
     )
     # Contradictions are looked for in the whole, once each number is usable by itself.
     check_walk(scenario, reading)
@@ -335,20 +348,20 @@ def _assumed(reading: Reading, bottle: BottleSupply | None) -> tuple[Assumption,
 def _duration(reading: Reading, scenario: Scenario) -> float:
     """Return the length of a walk [s]: its file's, else its task sequence's, else a minute, or ten on a bottle."""
     motion = walk_of(scenario)
-    of_task_sequence = motion.who.duration(motion)
     if value_at(reading.document, "run.duration") is not None:
         duration = reading.number("run.duration", DURATION)
         for is_bad, line in duration_problems(scenario, duration):
             if is_bad:
                 raise ScenarioError(f"{reading.file}: {line(0)}")
         return duration
-    if of_task_sequence is not None:
-        return of_task_sequence
+    if motion.task_sequence is not None:
+        # As long as the wearer with the gait as it is takes for it, whoever walks.
+        return float(planned_task_sequence(motion.task_sequence, motion.gait).duration)
     return DEFAULT_DURATION if motion.bottle is None else BOTTLE_DURATION
 
 
 WALKING = Layout(FILE, OF_A_WALK, walk_file, walk_file, build_walk)
-"""Scenarios whose motion is a walk of any kind."""
+"""Scenarios whose motion is a walk."""
 
 
 def lag_of_bandwidth(bandwidth: float) -> float:

@@ -2,13 +2,14 @@
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ppafo.arguments import Count, Minutes, Overrides, Seed, checked
 from ppafo.control.walking import event_on_off
 from ppafo.control.walking.fault_flags import FAULT_FLAGS
 from ppafo.engine.lane_rows import LANES
@@ -29,7 +30,7 @@ from ppafo.walking.contradictions import check_no_bottle
 from ppafo.walking.declaration import THRESHOLDS
 from ppafo.walking.events import FINDING_ROW, SAFE_ROW, VENTINGS_ROW
 from ppafo.walking.loading import load_walk
-from ppafo.walking.motion import SHORTEST_STRIDES, check_led, duration_problems, walk_of, with_duration
+from ppafo.walking.motion import SHORTEST_STRIDES, duration_problems, walk_of, with_duration
 from ppafo.walking.person import crowd_of, draw_gaits
 from ppafo.walking.planning import fed_device, plan_walk, plan_walks, task_sequence_of_walk, unrecorded
 from ppafo.walking.preparation import FaultSettings
@@ -47,14 +48,16 @@ def silent(done: float, total: float) -> None:  # both are there for those who l
     """Ignore the progress."""
 
 
+@checked("scenario", "minutes", "overrides", "gait", "progress", "task_sequence", "bottle")
 def walk(
     scenario: Scenario | str | Path,
-    minutes: float | None = None,
-    overrides: Iterable[str] = (),
+    *,
+    overrides: Overrides = (),
     gait: str | Path | None = None,
-    progress: Progress = silent,
     task_sequence: str | Path | None = None,
     bottle: str | Path | None = None,
+    minutes: Minutes | None = None,
+    progress: Progress = silent,
 ) -> WalkResult:
     """Walk for ``minutes`` [min]: a scenario that is a walk, the name of a shipped one, or a file.
 
@@ -72,7 +75,7 @@ def walk(
             )
         chosen = scenario
     else:
-        chosen = load_walk(scenario, overrides, gait, task_sequence, bottle)
+        chosen = load_walk(scenario, overrides, gait=gait, task_sequence=task_sequence, bottle=bottle)
     chosen = lasting(chosen, minutes)
     run, carried = plan_walk(chosen), walk_of(chosen).bottle
     custom = chosen.controller.custom
@@ -130,10 +133,7 @@ def lasting(scenario: Scenario, minutes: float | None) -> Scenario:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Comparison:
-    """A walk with the device, the same without it, and numbers of the healthy gait by name.
-
-    Without is without a device; of a body that walks by itself it is with the device off.
-    """
+    """A walk with the device, the same without it, and numbers of the healthy gait by name."""
 
     with_device: WalkResult
     without_device: WalkResult
@@ -145,12 +145,16 @@ class Comparison:
         return self.with_device.status.is_completed and self.without_device.status.is_completed
 
 
-def compare_walks(configuration: Scenario, minutes: float | None = None, progress: Progress = silent) -> Comparison:
-    """Walk ``minutes`` [min], or a whole task sequence, with the device and without, as its kind of motion says.
+@checked("scenario", "minutes", "progress", configuration="scenario")
+def compare_walks(
+    scenario: Scenario | str | Path, *, minutes: Minutes | None = None, progress: Progress = silent
+) -> Comparison:
+    """Walk ``minutes`` [min], or a whole task sequence, with the device and without.
 
     ScenarioError for bad input, SimulationError where its bottle ends the walk before there is anything to compare.
     """
-    worn = walk(configuration, minutes, progress=progress)
+    configuration = scenario if isinstance(scenario, Scenario) else load_walk(scenario)
+    worn = walk(configuration, minutes=minutes, progress=progress)
     # Refuse a walk that its bottle ended within the first strides.
     shortest = SHORTEST_STRIDES * walk_of(worn.scenario).gait.stride_time
     ending = None if worn.supply is None or worn.supply.ending.kind == WALKED else worn.supply.ending
@@ -161,9 +165,8 @@ def compare_walks(configuration: Scenario, minutes: float | None = None, progres
         )
     # As long as the bottle lasted, where one ended the walk.
     as_long = minutes if ending is None else float(worn.recording.time[-1]) / 60.0
-    who = walk_of(configuration).who
-    bare = walk(who.without(configuration), as_long, progress=progress)
-    return Comparison(worn, bare, who.healthy(configuration))
+    bare = walk(without_device(configuration), minutes=as_long, progress=progress)
+    return Comparison(worn, bare, healthy_metrics(configuration))
 
 
 def with_device_off(configuration: Scenario) -> Scenario:
@@ -298,11 +301,13 @@ class Population:
         return f"Population of {self.count} wearers, {self.scenario.name}, {self.minutes:g} min: {self.message}"
 
 
+@checked("scenario", "minutes", "wearers", "seed", "progress", configuration="scenario")
 def walk_population(
-    configuration: Scenario,
-    minutes: float | None,
-    wearers: int,
-    seed: int = 1,
+    scenario: Scenario | str | Path,
+    *,
+    wearers: Count,
+    minutes: Minutes | None = None,
+    seed: Seed = 1,
     progress: Progress = silent,
 ) -> Population:
     """Let many wearers walk for ``minutes`` [min], or all of a task sequence; the first is the configuration's.
@@ -311,7 +316,7 @@ def walk_population(
     """
     if not 1 <= wearers <= MAXIMUM_WEARERS:
         raise ScenarioError(f"the number of wearers must be from 1 to {MAXIMUM_WEARERS}, not {wearers}")
-    check_led(configuration, "walking with many wearers")
+    configuration = scenario if isinstance(scenario, Scenario) else load_walk(scenario)
     if walk_of(configuration).bottle is not None:
         raise ScenarioError("many wearers walk at a constant supply: leave out the bottle, or the number of wearers")
     if walk_of(configuration).person:

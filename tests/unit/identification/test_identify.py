@@ -10,7 +10,7 @@ from types import ModuleType
 import pytest
 
 from ppafo.analyses.identify.answer import Identification, finding_of
-from ppafo.analyses.identify.solve import identify
+from ppafo.analyses.identify.question import identify
 from ppafo.cli.main import main
 from ppafo.errors import IdentificationError, PpafoError
 from ppafo.identification.estimate import Estimate
@@ -245,7 +245,7 @@ def test_a_problem_without_a_device_is_refused() -> None:
 
 
 def test_a_refusal_about_all_recordings_names_the_procedure_of_the_file(solved: Solve, bench: Path) -> None:
-    leak = read_recording(bench / "leak.csv", 101325.0)
+    leak = read_recording(bench / "leak.csv", atmosphere=101325.0)
     first, second = (leak.channels[name] for name in ("pressure_1", "pressure_2"))
     write_csv(bench / "turned.csv", replace(leak, channels={"pressure_1": second, "pressure_2": first}))
     both = LEAK.replace('["leak.csv"]', '["leak.csv", "turned.csv"]')

@@ -12,7 +12,7 @@ import pytest
 
 import ppafo
 from ppafo.analyses.sensitivity.methods import METHODS
-from ppafo.analyses.walk.answer import walk_with_and_without
+from ppafo.analyses.walk.question import walk_with_and_without
 from ppafo.cli.main import main
 from ppafo.errors import DataError, PpafoError, ScenarioError
 from ppafo.loading import json_schema, list_all_scenarios, load_scenario, reloaded, scenario_from_dict
@@ -58,7 +58,7 @@ def test_every_shipped_walk_says_in_its_motion_that_it_is_one() -> None:
     template = (resources.files("ppafo.cli") / "templates" / "walk.toml").read_text(encoding="utf-8")
     texts = {name: shipped(name) for name in ppafo.list_walks()} | {"template": template}
     assert {name: tomllib.loads(text)["motion"]["kind"] for name, text in texts.items()} == {
-        name: "react" if name == "reacting" else "walk" for name in texts
+        name: "walk" for name in texts
     }
 
 

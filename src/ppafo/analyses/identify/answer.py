@@ -157,8 +157,12 @@ def finding_of(identification: Identification) -> Finding[Identification]:
         found=identification,
         passed=identification.is_good,
         kind=identification.kind,
-        files={f"{name}.toml": lambda: parameter_set_toml(new_set.parameter_set).encode()},
+        files={f"{name}.toml": partial(_toml_bytes, new_set.parameter_set)},
     )
+
+
+def _toml_bytes(parameter_set: ParameterSet) -> bytes:
+    return parameter_set_toml(parameter_set).encode()
 
 
 def _table(heading: str, estimates: Iterable[Estimate], before: ParameterSet, remarks: Sequence[str]) -> Part:

@@ -4,22 +4,24 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import numpy as np
-from pydantic import BaseModel
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from ppafo.analyses.sweep.results import SUMMARY, StudyResults
+from ppafo.arguments import checked
+from ppafo.documents.models import validate
 from ppafo.errors import DataError
 from ppafo.report.finding import Finding, Part, columns_of, facts, files_of
-from ppafo.report.kind import TIME, Kind, of_channel, of_metric, of_path
+from ppafo.report.kind import TIME, Kind, of_channel, of_path, of_stored_metric
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.setting_names import label_of
 from ppafo.report.style import BLUE, GREEN, GREY, ORANGE, VERMILION
 from ppafo.signals.recording import CHANNELS
 from ppafo.storage.places import place_at, read_document
 from ppafo.studies.sampling import NOISE
-from ppafo.study.manifest import read_manifest
+from ppafo.study.manifest import MANIFEST, read_manifest
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -113,27 +115,70 @@ def write_report(results: StudyResults) -> None:
         results.place.write(name, content)
 
 
+@checked()
 def load_study_results(folder: str | Path) -> Finding[StudyResults]:
     """Return the finished results of a study in a folder or at an address; DataError where there are none."""
     place = place_at(folder)
     document = read_manifest(place)
     try:
         summary = read_document(place, SUMMARY)
-        _Summary.model_validate(summary)
     except (OSError, ValueError) as error:
         raise DataError(
             f"{place.address}: the study is not finished (no complete {SUMMARY}); run it again to resume"
         ) from error
+    whose = f"{place.address}: {SUMMARY} is damaged; run the study again into this folder"
+    described = validate(_Summary, summary, whose, DataError)
+    names = {item["name"] for item in document["study"]["configurations"]}
+    metrics = [set(own) for own in described.configurations.values()]
+    # A configuration or a metric in one of the two documents alone would be looked up in vain.
+    is_same = names == described.configurations.keys() == described.completed_by_configuration.keys()
+    if not is_same or any(own != document["metrics"].keys() for own in metrics):
+        raise DataError(f"{whose}: its configurations and metrics differ from {MANIFEST}")
     return finding_of(StudyResults(place, document, summary))
 
 
-class _Summary(BaseModel):
+_Count = Annotated[int, Field(ge=0)]
+
+
+def _fraction(text: str) -> str:
+    if not 0.0 <= float(text) <= 1.0:
+        raise ValueError("must be a fraction from 0 to 1")
+    return text
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(strict=True)
+
+
+class _Described(_Part):
+    count: _Count
+    mean: float = 0.0
+    sd: float = 0.0
+    quantiles: dict[Annotated[str, AfterValidator(_fraction)], float] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _is_whole(self) -> Self:
+        if self.count and not {"mean", "quantiles"} <= self.model_fields_set:
+            raise ValueError("has values, and no mean or no quantiles")
+        return self
+
+
+class _Failure(_Part):
+    run: _Count
+    configuration: str
+    reason: str
+
+
+class _Summary(_Part):
     """What everybody may rely on in a summary."""
 
-    completed: int
-    diverged: int
-    refused: int
-    configurations: dict[str, dict[str, dict[str, Any]]]
+    completed: _Count
+    diverged: _Count
+    refused: _Count
+    completed_by_configuration: dict[str, _Count]
+    failures: list[_Failure]
+    quantile_definition: str
+    configurations: dict[str, dict[str, _Described]]
 
 
 def _metrics(results: StudyResults, name: str, metrics: Mapping[str, Mapping[str, Any]]) -> Part:
@@ -142,7 +187,7 @@ def _metrics(results: StudyResults, name: str, metrics: Mapping[str, Mapping[str
     head = ("metric", "unit", "runs", "mean", "sd", *(f"{100 * float(fraction):g} %" for fraction in fractions))
     rows = []
     for metric, item in metrics.items():
-        kind = of_metric(metric)
+        kind = _metric_kind(results, metric)
         cells = [metric, kind.shown_unit, f"{item['count']:,}"]
         if item["count"]:
             deviation = kind.change_number(item["sd"]) if "sd" in item else ""
@@ -159,8 +204,7 @@ def _figure(results: StudyResults, said: Sequence[str], remarks: Sequence[str]) 
     # As many configurations as colours that can be told apart; a seed is no axis, since its size says nothing.
     names = results.configurations[:MOST_CONFIGURATIONS]
     device = [path for path in results.varied if path != NOISE]
-    grid = [item["path"] for item in results.document["study"].get("vary", ()) if item["kind"] in _GRIDDED]
-    is_mapped = len(grid) == 2 or len(device) == 2
+    is_mapped = len(_grid(results)) == 2 or len(device) == 2
     count = max(1, len(metrics) * (len(names) if is_mapped else 1) + len(bands))
     # Maps of several configurations: a row for each metric.
     is_compared = is_mapped and len(names) > 1
@@ -172,23 +216,10 @@ def _figure(results: StudyResults, said: Sequence[str], remarks: Sequence[str]) 
         more = f" and {len(device) - _NAMED} more" if len(device) > _NAMED else ""
         title += f" over {len(device)} values: {', '.join(labels)}{more}"
 
-    def panels() -> list[Panel]:
-        if is_mapped:
-            draw = partial(_map, results, grid) if len(grid) == 2 else partial(_points, results, device)
-            drawn = [draw(metric, name, is_compared) for metric in metrics for name in names]
-        elif len(device) == 1:
-            drawn = [_over(results, device[0], metric, names) for metric in metrics]
-        else:
-            drawn = [_histogram(results, metric) for metric in metrics]
-        drawn += [_band(results, channel, names) for channel in bands]
-        # The first panel with curves names the configurations for all.
-        named = next((panel for panel in drawn if len(names) > 1 and any(mark.label for mark in panel.marks)), None)
-        return [replace(panel, legend="inside" if panel is named else "") for panel in drawn]
-
     return Part(
         said=said,
         remarks=remarks,
-        panels=panels,
+        panels=partial(_panels, results),
         name=FIGURE,
         caption=_CAPTION,
         across=len(names) if is_compared else 2 if count == 4 else min(_COLUMNS, count),
@@ -198,8 +229,38 @@ def _figure(results: StudyResults, said: Sequence[str], remarks: Sequence[str]) 
     )
 
 
+def _grid(results: StudyResults) -> list[str]:
+    """Return the paths that vary over a grid."""
+    return [item["path"] for item in results.document["study"].get("vary", ()) if item["kind"] in _GRIDDED]
+
+
+def _panels(results: StudyResults) -> list[Panel]:
+    """Return a panel for each metric, of each configuration where it is a map, and one for each band."""
+    metrics = list(results.document["metrics"])[:MOST_METRICS]
+    bands = list(results.document["study"]["outputs"].get("bands", ()))
+    names = results.configurations[:MOST_CONFIGURATIONS]
+    device, grid = [path for path in results.varied if path != NOISE], _grid(results)
+    is_mapped = len(grid) == 2 or len(device) == 2
+    is_compared = is_mapped and len(names) > 1
+    if is_mapped:
+        draw = partial(_map, results, grid) if len(grid) == 2 else partial(_points, results, device)
+        drawn = [draw(metric, name, is_compared) for metric in metrics for name in names]
+    elif len(device) == 1:
+        drawn = [_over(results, device[0], metric, names) for metric in metrics]
+    else:
+        drawn = [_histogram(results, metric) for metric in metrics]
+    drawn += [_band(results, channel, names) for channel in bands]
+    # The first panel with curves names the configurations for all.
+    named = next((panel for panel in drawn if len(names) > 1 and any(mark.label for mark in panel.marks)), None)
+    return [replace(panel, legend="inside" if panel is named else "") for panel in drawn]
+
+
 def _kind(results: StudyResults, path: str) -> Kind:
     return of_path(path, results.document["varied"][path]["unit"].removeprefix("-"))
+
+
+def _metric_kind(results: StudyResults, metric: str) -> Kind:
+    return of_stored_metric(metric, results.document["metrics"][metric]["unit"])
 
 
 def _histogram(results: StudyResults, metric: str) -> Panel:
@@ -218,7 +279,7 @@ def _histogram(results: StudyResults, metric: str) -> Panel:
         for (name, own), colour in zip(parts.items(), COLOURS, strict=False)
         if filled
     ]
-    return Panel(of_metric(metric), Kind(), marks, then=lambda axes: axes.set_yticks([]))
+    return Panel(_metric_kind(results, metric), Kind(), marks, then=lambda axes: axes.set_yticks([]))
 
 
 def _over(results: StudyResults, path: str, metric: str, names: Sequence[str]) -> Panel:
@@ -232,7 +293,7 @@ def _over(results: StudyResults, path: str, metric: str, names: Sequence[str]) -
         marks.append(
             Mark("line", across[name][order], values[name][order], label=name, colour=colour, style={"marker": "."})
         )
-    return Panel(_kind(results, path), of_metric(metric), marks)
+    return Panel(_kind(results, path), _metric_kind(results, metric), marks)
 
 
 def _map(results: StudyResults, grid: Sequence[str], metric: str, name: str, is_compared: bool) -> Panel:
@@ -246,7 +307,7 @@ def _map(results: StudyResults, grid: Sequence[str], metric: str, name: str, is_
     count = np.bincount(place[known], minlength=rows.size * columns.size)
     total = np.bincount(place[known], weights=values[known], minlength=rows.size * columns.size)
     mean = np.where(count > 0, total / np.maximum(count, 1), np.nan).reshape(rows.size, columns.size)
-    kind, items = of_metric(metric), {item["path"]: item for item in results.document["study"]["vary"]}
+    kind, items = _metric_kind(results, metric), {item["path"]: item for item in results.document["study"]["vary"]}
     kinds, places = [], []
     for path, levels in zip(grid, (columns, rows), strict=True):
         of_axis, is_listed = _kind(results, path), items[path]["kind"] == "list"
@@ -275,7 +336,7 @@ def _map(results: StudyResults, grid: Sequence[str], metric: str, name: str, is_
 
 def _points(results: StudyResults, device: Sequence[str], metric: str, name: str, is_compared: bool) -> Panel:
     """Return a metric as the colour of points over the two values that were drawn, for one configuration."""
-    most, kind = _MAXIMUM_POINTS * len(results.configurations), of_metric(metric)
+    most, kind = _MAXIMUM_POINTS * len(results.configurations), _metric_kind(results, metric)
     x, y, values = (results.thin(path, most)[name] for path in (*device, metric))
     marks = (Mark("points", x, y, kind.values(values)),)
     across, upward = (_kind(results, path) for path in device)

@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from ppafo.arguments import Confidence, Count, MaximumFailed, Name, Overrides, Seed, Threads, checked
 from ppafo.documents.json_text import plain
 from ppafo.errors import StudyError, UnitError, refused_as
 from ppafo.metrics import METRICS
@@ -309,21 +310,23 @@ PROBABILITY_WIDTH = "0.02"
 FIRST_DRAWS, MOST_DRAWS = 256, 2**20
 
 
+@checked("study", "metric", "statistic", "width", "configuration", "overrides", "seed", "first_draws", "draws")
 def estimate(
     study: Study | str | Path | Mapping[str, Any],
-    metric: str,
-    statistic: str = "mean",
-    width: str | None = None,
-    configuration: str | None = None,
-    overrides: Sequence[str] = (),
-    seed: int | None = None,
-    first_draws: int = FIRST_DRAWS,
-    draws: int = MOST_DRAWS,
-    confidence: float = 0.95,
-    maximum_failed: float = 0.01,
-    threads: int | None = None,
+    *,
+    metric: Name,
+    statistic: Name = "mean",
+    width: Name | None = None,
+    also: Sequence[Name] = (),
+    configuration: Name | None = None,
+    first_draws: Count = FIRST_DRAWS,
+    overrides: Overrides = (),
+    draws: Count = MOST_DRAWS,
+    seed: Seed | None = None,
+    confidence: Confidence = 0.95,
+    maximum_failed: MaximumFailed = 0.01,
+    threads: Threads | None = None,
     progress: Report | None = None,
-    also: Sequence[str] = (),
 ) -> Finding[Estimate]:
     """Return a statistic of a metric over the distributions of a study, drawn until its interval is ``width`` wide.
 

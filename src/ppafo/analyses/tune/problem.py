@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field
 
+from ppafo.arguments import Overrides, checked
 from ppafo.documents.models import NAME, StrictTable, Text, Texts, make_schema, validate
 from ppafo.documents.toml_text import TomlKind, beside
 from ppafo.errors import ParameterError, ScenarioError, StudyError, UnitError, first_twice, refused_as
@@ -246,7 +247,8 @@ def list_tunings() -> tuple[str, ...]:
     return TUNING.names()
 
 
-def load_tuning(tuning: str | Path | Mapping[str, Any], overrides: Sequence[str] = ()) -> Problem:
+@checked()
+def load_tuning(tuning: str | Path | Mapping[str, Any], overrides: Overrides = ()) -> Problem:
     """Return a tuning by its name in the package, by the path of a TOML file, or from data laid out as such a file.
 
     ``overrides`` change the scenario. StudyError for anything that is not usable.

@@ -10,10 +10,7 @@ from typing import Any
 import numpy as np
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.errors import DataError, nearest_name, one_line
-from ppafo.parameters import load_device
 from ppafo.parameters.device import Device
-from ppafo.progress import Progress, Report, report_nothing
 from ppafo.report.display_units import display_value, quantity_of_unit
 from ppafo.report.finding import Finding, Part, columns_of, facts
 from ppafo.report.kind import TIME, Kind
@@ -24,22 +21,16 @@ from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.foreign import ColumnMap, load_column_map
 from ppafo.validation import ChannelAgreement
 from ppafo.validation.agreement import (
-    DEFAULT_LIMIT,
     RecordingAgreement,
     ReplaySettings,
-    compare_recording,
     measured_values,
 )
-from ppafo.validation.causes import Cause, Causes, causes_of
+from ppafo.validation.causes import Cause, Causes
 from ppafo.validation.measured import (
     COMPARED,
     PRESSURE_1,
     PRESSURE_2,
-    Measured,
-    parse_thresholds,
-    read_measured,
 )
-from ppafo.validation.replay import MOTIONS, parse_initial
 from ppafo.version import __version__
 
 LARGEST_DELAY = 1.0
@@ -99,69 +90,7 @@ class Validation:
         }
 
 
-def validate(
-    parameter_set: str | Path,
-    recordings: Sequence[str | Path],
-    valve: str | None = None,
-    overrides: Sequence[str] = (),
-    motion: str = "free",
-    volume: float | None = None,
-    initial: Sequence[str] = (),
-    thresholds: Sequence[str] = (),
-    longest_delay: float = DEFAULT_LIMIT,
-    columns: ColumnMap | str | Path | None = None,
-    progress: Report | None = None,
-) -> Finding[Validation]:
-    """Return the residuals (measured - model) of the model with a parameter set against each recording.
-
-    Arguments, result and errors are those of the command, ``ppafo.cli.verbs.bench.validate``.
-    """
-    report = progress or report_nothing
-    device = load_device(parameter_set, valve, overrides)
-    if volume is not None and not volume > 0.0:
-        raise DataError(f"volume of {volume:g} m^3: must be above 0")
-    if not 0.0 <= longest_delay <= LARGEST_DELAY:
-        raise DataError(f"longest delay of {longest_delay:g} s: must be from 0 to {LARGEST_DELAY:g} s")
-    chosen = next((one for one in MOTIONS if one == motion), None)
-    if chosen is None:
-        near = nearest_name(motion, MOTIONS)
-        raise DataError(f"motion '{one_line(motion)}' is not one of {', '.join(MOTIONS)}{near}")
-    settings = ReplaySettings(
-        motion=chosen,
-        initial=parse_initial(initial, device.supply.atmospheric_pressure),
-        longest_delay=longest_delay,
-        thresholds=parse_thresholds(thresholds),
-        volume=volume,
-    )
-    if not recordings:
-        raise DataError("no recording was given; name at least one .csv or .nc file or result folder")
-    column_map = columns if columns is None or isinstance(columns, ColumnMap) else _column_map(str(columns))
-    map_name = "" if columns is column_map else str(columns)
-    read: list[Measured] = []
-    for path in recordings:
-        measured = read_measured(path, device, column_map, map_name)
-        # Given twice, under two names too, a recording would count twice as evidence.
-        same = next((one.file for one in read if one.sha256 == measured.sha256), None)
-        if same is not None:
-            raise DataError(f"{measured.file}: the same recording as {same}; give each once")
-        read.append(measured)
-    agreements = []
-    for measured in read:
-        report(Progress(f"replaying {measured.file}"))
-        agreements.append(compare_recording(measured, device, settings))
-    validation = Validation(
-        parameter_set=str(parameter_set),
-        device=device,
-        overrides=tuple(overrides),
-        settings=settings,
-        recordings=tuple(agreements),
-        causes=causes_of(read, agreements, device, settings, report),
-        has_limits=bool(thresholds),
-    )
-    return finding_of(validation)
-
-
-def _column_map(text: str) -> ColumnMap:
+def named_column_map(text: str) -> ColumnMap:
     """Return the map that is named as a file, and by name where the file has several."""
     path, separator, name = text.rpartition(".toml:")
     return load_column_map(f"{path}.toml", name) if separator and name else load_column_map(text)

@@ -286,8 +286,8 @@ def _parameter_set(scenario: Scenario) -> ParameterSet | None:
     own = [text for text in origin.overrides if is_of_device(split_override(text).typed)]
     try:
         found = load_parameter_set(set_name(section.get("set", device.name), folder))
-        of_file = apply_overrides(found, section.get("overrides", ()), device.valve_name)
-        return apply_overrides(of_file, own, device.valve_name)
+        of_file = apply_overrides(found, section.get("overrides", ()), valve=device.valve_name)
+        return apply_overrides(of_file, own, valve=device.valve_name)
     except PpafoError:
         return None
 

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from ppafo.analyses.sensitivity.methods import METHODS
-from ppafo.analyses.sensitivity.solve import Influences, Settings, analyse, overlapping_pairs, remarks, sensitivity
+from ppafo.analyses.sensitivity.question import sensitivity
+from ppafo.analyses.sensitivity.solve import Influences, Settings, analyse, overlapping_pairs, remarks
 from ppafo.errors import StudyError
 from ppafo.studies.distributions import Floats, LogNormalAround, NormalAround, OneOf, UniformBetween
 from ppafo.studies.draws import Uncertainty
@@ -286,7 +287,14 @@ def test_the_study_of_the_package_with_its_correlation_gets_shapley_effects() ->
 def test_noise_of_the_sensors_is_one_of_the_values_and_has_no_ends() -> None:
     noisy = ["run.duration=0.3 s", "sensors.pressure_noise=5 kPa_d"]
     finding = sensitivity(
-        STUDY, "sobol", ["rms_error"], 64, "proportional", overrides=noisy, independent=True, maximum_failed=0.0
+        STUDY,
+        method="sobol",
+        metrics=["rms_error"],
+        samples=64,
+        configuration="proportional",
+        overrides=noisy,
+        independent=True,
+        maximum_failed=0.0,
     )
     found = finding.found
     (metric,) = found.metrics
@@ -304,10 +312,10 @@ def test_noise_of_the_sensors_is_one_of_the_values_and_has_no_ends() -> None:
 
 def test_mistakes_are_one_line() -> None:
     with pytest.raises(StudyError, match="no method 'sobl', did you mean 'sobol'"):
-        sensitivity(STUDY, "sobl")
+        sensitivity(STUDY, method="sobl")
     with pytest.raises(StudyError, match="choose one: proportional, solenoid"):
         sensitivity(STUDY)
     with pytest.raises(StudyError, match=r"--method shapley.*--independent"):
-        sensitivity(STUDY, "sobol", configuration="solenoid", samples=64)
+        sensitivity(STUDY, method="sobol", configuration="solenoid", samples=64)
     with pytest.raises(StudyError, match="has no 'gas': it needs a walk"):
         sensitivity(STUDY, metrics=["gas"], configuration="solenoid")

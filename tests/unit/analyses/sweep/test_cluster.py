@@ -46,7 +46,7 @@ def two_workers(tmp_path: Path) -> Iterator[Any]:
 def test_a_worker_that_dies_in_the_middle_changes_nothing(small: Any, tmp_path: Path, two_workers: Any) -> None:
     small["sample"]["runs"] = 64
     here, there = tmp_path / "here", tmp_path / "there"
-    sweep(small, here, threads=1)
+    sweep(small, out=here, threads=1)
     victim = two_workers.workers[0].process.pid
     told: list[Progress] = []
 
@@ -55,7 +55,7 @@ def test_a_worker_that_dies_in_the_middle_changes_nothing(small: Any, tmp_path: 
         if len(told) == 3:
             os.kill(victim, signal.SIGKILL)
 
-    found = sweep(small, there, threads=1, scheduler=two_workers.scheduler_address, progress=watch).found
+    found = sweep(small, out=there, threads=1, scheduler=two_workers.scheduler_address, progress=watch).found
     assert [progress.done for progress in told][-1] == found.document["runs"] == 256
     assert len(told) == found.document["chunks"] == 52
     assert victim not in {nanny.process.pid for nanny in two_workers.workers.values()}
@@ -70,13 +70,13 @@ def test_bad_input_found_by_a_worker_is_one_line(small: Any, tmp_path: Path, two
     (tmp_path / "file").write_text("in the way", encoding="utf-8")
     out = tmp_path / "out"
     out.mkdir()
-    sweep(small, out)
+    sweep(small, out=out)
     (out / "finished" / "chunk-0000001.json").unlink()
     target = out / "runs" / "chunk-0000001.parquet"
     target.unlink()
     target.mkdir()
     with pytest.raises(Exception, match="cannot be written") as caught:
-        sweep(small, out, scheduler=two_workers.scheduler_address)
+        sweep(small, out=out, scheduler=two_workers.scheduler_address)
     assert "\n" not in str(caught.value)
 
 
@@ -86,7 +86,7 @@ def test_workers_that_write_elsewhere_are_noticed(
     elsewhere = tmp_path / "elsewhere"
     monkeypatch.setattr(cluster, "work_on_chunk", partial(_written_elsewhere, str(elsewhere)))
     with pytest.raises(StudyError, match="must be a folder that they share"):
-        sweep(small, tmp_path / "out", scheduler=two_workers.scheduler_address)
+        sweep(small, out=tmp_path / "out", scheduler=two_workers.scheduler_address)
 
 
 def _written_elsewhere(address: str, task: Task, number: int) -> Finished:
@@ -96,7 +96,7 @@ def _written_elsewhere(address: str, task: Task, number: int) -> Finished:
 def test_a_scheduler_that_is_not_there_is_one_line(small: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cluster, "_SECONDS_TO_CONNECT", 1)
     with pytest.raises(StudyError, match=r"--scheduler tcp://127\.0\.0\.1:9: cannot be reached"):
-        sweep(small, tmp_path / "out", scheduler="tcp://127.0.0.1:9")
+        sweep(small, out=tmp_path / "out", scheduler="tcp://127.0.0.1:9")
 
 
 @pytest.mark.parametrize("address", ["nix", "tcp://127.0.0.1:9"])
@@ -117,4 +117,4 @@ def test_without_the_extra_the_option_says_what_to_install(
 ) -> None:
     monkeypatch.setitem(__import__("sys").modules, "distributed", None)
     with pytest.raises(StudyError, match=r"pip install 'ppafo\[cluster\]'"):
-        sweep(small, tmp_path / "out", scheduler="tcp://127.0.0.1:9")
+        sweep(small, out=tmp_path / "out", scheduler="tcp://127.0.0.1:9")

@@ -229,10 +229,10 @@ def test_widths_are_read_in_the_unit_of_the_metric() -> None:
 
 
 def test_a_scenario_is_drawn_until_its_error_is_known() -> None:
-    found = estimate(STUDY, METRIC, width="10 %", configuration="proportional", first_draws=64, draws=1024).found
+    found = estimate(STUDY, metric=METRIC, width="10 %", configuration="proportional", first_draws=64, draws=1024).found
     assert found.is_met
     assert found.interval.low < 0.875 < found.interval.high
-    again = estimate(STUDY, METRIC, width="10 %", configuration="proportional", first_draws=64, draws=1024).found
+    again = estimate(STUDY, metric=METRIC, width="10 %", configuration="proportional", first_draws=64, draws=1024).found
     assert again == found
 
 

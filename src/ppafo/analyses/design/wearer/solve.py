@@ -278,7 +278,7 @@ def _few_strides(wish: Wish, valve: Part, actuator: Part) -> list[Tried]:
         # A controller requests no more than its limit, which therefore has to follow.
         if request is not None and request > _LIMIT:
             chosen += (f"controller.largest_torque={request:.4g} N m",)
-        result = walk(load_walk(WALKS[valve.kind], chosen), _FEW)
+        result = walk(load_walk(WALKS[valve.kind], chosen), minutes=_FEW)
         if not result.status.is_completed or not result.is_helped or not result.averages:
             continue
         stride = walk_of(result.scenario).gait.stride_time
@@ -320,7 +320,7 @@ def _lightest(
 def _walked(one: Tried, bottle: Part, seconds: float) -> WalkResult | None:
     """Walk for a time [s], or until the bottle ends it; None where it cannot feed the device at all."""
     try:
-        return walk(load_walk(WALKS[one.valve.kind], one.overrides, bottle=bottle.name), seconds / 60.0)
+        return walk(load_walk(WALKS[one.valve.kind], one.overrides, bottle=bottle.name), minutes=seconds / 60.0)
     except ScenarioError:
         return None
 
