@@ -21,8 +21,8 @@ from ppafo.engine.continuous_time import (
 )
 from ppafo.engine.lanes import BatchResult, run_batch, samples_in
 from ppafo.engine.led_leg import torque_of_leg
+from ppafo.engine.linking import python_place
 from ppafo.engine.loading import load_source, with_arrays
-from ppafo.engine.program import python_place
 from ppafo.engine.rows import leaf_paths, numbers, rebuild
 from ppafo.engine.run import Run, batch_of, states_at_start
 from ppafo.engine.scheme.actuators import measurement_of

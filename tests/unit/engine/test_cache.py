@@ -15,6 +15,7 @@ from ppafo.engine.lane_source import lane_source
 from ppafo.engine.numba_compiler import NumbaCompiler
 from ppafo.engine.program import Program
 from ppafo.engine.source_text import SourceCollector
+from ppafo.engine.step import isothermal
 from ppafo.errors import SimulationError
 from ppafo.model import orifice
 from ppafo.model.valves.proportional import IDEAL
@@ -80,7 +81,7 @@ def test_threads_that_load_one_module_at_once_all_get_the_whole_of_it(
 
 def program() -> Program:
     """A program as the torque task uses it."""
-    return Program(IDEAL, PROFILES["ramp_hold"], CONTROLLERS["pid"], PROFILES["constant"], True, False)
+    return Program(IDEAL, PROFILES["ramp_hold"], CONTROLLERS["pid"], PROFILES["constant"], True, False, isothermal)
 
 
 def test_source_of_a_program_is_the_same_every_time() -> None:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ppafo.engine.lane_samples import walk_traces
+from ppafo.engine.channels import walk_traces
 from ppafo.engine.lanes import Batch, run_batch
 from ppafo.engine.loading import BACKEND_VARIABLE, NUMBA
 from ppafo.engine.rows import row_numbers
@@ -186,7 +186,9 @@ def test_every_sample_of_drawn_settings_has_the_bits_of_the_lanes(
     program = item.program.program
     paths |= {name: f"state.{name}" for name in ("supplied_mass", "leaked_mass")}
     paths |= {
-        output: path for output, path in walk_traces(program).items() if path in row_numbers(program.state_rows())
+        output: path
+        for output, path in walk_traces(program.state_rows()).items()
+        if path in row_numbers(program.state_rows())
     }
     for values, batch in itertools.islice(batches(name, overrides, item.settings), 1, 1 + RUNS):
         found = samples_in_c(library, item.name, values, len(item.program.outputs))

@@ -13,13 +13,12 @@ import statistics
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import ModuleType
 from typing import TYPE_CHECKING, Any, NamedTuple, final
 
 import numpy as np
 
 from ppafo.documents.json_text import json_text, plain
-from ppafo.engine.lanes import load_program
+from ppafo.engine.lanes import Advancing, load_program
 from ppafo.engine.loading import chosen_compiler
 from ppafo.engine.run import Run, batch_of
 from ppafo.errors import ScenarioError
@@ -49,7 +48,7 @@ class Plant:
 
     scenario: Scenario
     run: Run
-    module: ModuleType
+    module: Advancing
     compiled_by: str
     period: float
 
