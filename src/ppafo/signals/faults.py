@@ -158,7 +158,7 @@ def rounding_of(values: Floats, resolution: float) -> Floats:
     """
     edges = np.flatnonzero(np.diff(values, prepend=np.nan, append=np.nan))
     lengths = np.diff(edges)
-    return resolution / math.sqrt(12.0) * np.sqrt(np.repeat(lengths, lengths))
+    return np.asarray(resolution / math.sqrt(12.0) * np.sqrt(np.repeat(lengths, lengths)))
 
 
 def noise_of(values: Floats) -> float:
@@ -177,7 +177,7 @@ def noise_of(values: Floats) -> float:
 def _third_differences(values: Floats, lag: int) -> Floats:
     """Return sizes of third differences of samples ``lag`` apart, without what a parabola through them explains."""
     first, second, third, fourth = (values[place * lag : values.size - (3 - place) * lag] for place in range(4))
-    return np.abs(fourth - 3.0 * third + 3.0 * second - first)
+    return np.asarray(np.abs(fourth - 3.0 * third + 3.0 * second - first))
 
 
 _SHARE_OF_LAGS = 0.1

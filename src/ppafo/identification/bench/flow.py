@@ -211,13 +211,14 @@ def solve_flow(
     ``pressures`` are two channels [Pa absolute], the one from which a positive flow [kg/s] comes first.
     """
     names, flow = (*pressures,), readings.measured
+    shown_first, shown_second = pressures.values()
 
     def law(at: Values) -> Floats:
         first, second = (true_pressure(at, name, shown) for name, shown in pressures.items())
         return read_flow(at, opening.gas, opening.flow(paths.sizes(at), first, second))
 
     numbers = (
-        *paths.sought(*opening.rough_sizes(*pressures.values(), flow)),
+        *paths.sought(*opening.rough_sizes(shown_first, shown_second, flow)),
         *flow_tolerances(opening.gas, tolerances, (names[0], names[1]), float(np.abs(flow).max())),
     )
     return solve(law, readings, numbers, confidence)

@@ -365,10 +365,10 @@ def _steady_leak(sources: tuple[Source, ...], settings: VaneLeakSettings) -> Ben
     # A leak of another law parts low from high pressures.
     is_high = difference > np.median(difference)
     halves = np.where(is_high, "flow at higher pressures", "flow at lower pressures").tolist()
-    paths, reported = Paths(size.path), (size,)
+    paths, reported = Paths(size.path), [size]
     if settings.law == "both":
         _, alone = opening.rough_sizes(first, second, flow)
-        reported = replace(size, size=alone.size), replace(_beside(has_volume=True), size=alone.beside)
+        reported = [replace(size, size=alone.size), replace(_beside(has_volume=True), size=alone.beside)]
         paths = Paths(size.path, beside=reported[1].path)
     found, model = solve_flow(
         opening,

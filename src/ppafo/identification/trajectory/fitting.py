@@ -218,6 +218,8 @@ def _estimate(problem: TrajectoryProblem, found: Fit, item: Number, place: int, 
     verdict: Verdict = "identified"
     if combination is not None:
         verdict = "not identifiable"
+        # So far from where it was linearised the interval of a straight line means nothing.
+        low, high = min(low, item.free.low), max(high, item.free.high)
         others = [other for other in combination if other != name]
         text = f"trades off against {' and '.join(others)}" if others else "the recordings are hardly sensitive to it"
         text += "; fix it, give a prior, or make another recording"

@@ -55,6 +55,9 @@ FIT_TOLERANCE = 0.02
 _FINER = 0.25
 _FITS = 1.0e-6
 
+_ZERO_OF_ANGLE = math.radians(1.0)
+"""Angle [rad] from a stop within which a sensor shows the stop."""
+
 _READ_INTERVAL = 5.0e-5
 """Seconds between two records that samples lie in between: a chamber fills within milliseconds ..."""
 _MAXIMUM_RECORDS = 100_000
@@ -110,9 +113,18 @@ def prepare(experiment: Experiment, numbers: Mapping[str, float], reach: float =
     channels = [
         Measured(name, recording[name][inside], experiment.noise.get(name, 0.0)) for name in experiment.channels
     ]
+    actuator = experiment.scenario.device.actuator
+    stops = actuator.angle_min, actuator.angle_max
     for channel in channels:
         clipped = max(plateaus(channel.values), key=lambda item: item.count)
-        if channel.floor == 0.0 and is_at_limit(channel.values, clipped) and not noise_of(channel.values) > 0.0:
+        # A vane that rests at its stop repeats one value on a coarse converter, and is at no limit of a sensor.
+        rests = channel.name == ANGLE and any(abs(clipped.value - stop) < _ZERO_OF_ANGLE for stop in stops)
+        if (
+            not rests
+            and channel.floor == 0.0
+            and is_at_limit(channel.values, clipped)
+            and not noise_of(channel.values) > 0.0
+        ):
             raise IdentificationError(
                 f"{said}: channel '{channel.name}' is exactly its {clipped.word} value for {clipped.count} of "
                 f"{channel.values.size} samples: its sensor is at its limit; end the recording before it, or give the "
