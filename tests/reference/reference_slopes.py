@@ -6,9 +6,9 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from ppafo.engine.continuous_time import free_motion, real_gas_rates
+from ppafo.engine.entries import ARRAY, FLOAT, HEADER, INLINE, entry_text
 from ppafo.engine.generator import StepText
 from ppafo.engine.linking import link_program
-from ppafo.engine.loading import ARRAY, FLOAT, HEADER, INLINE, entry_text
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, row_expression
 from ppafo.engine.source_text import SourceCollector, composed_lines

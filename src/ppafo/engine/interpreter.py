@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.engine.going_on import MATH, quotient, whole_part
 from ppafo.engine.linking import link_program
 from ppafo.engine.plain_python import parse_module
 from ppafo.engine.program import Program
@@ -181,7 +182,7 @@ class Linked:
         if isinstance(value, ModuleType) and value.__name__.startswith(OWN):
             return self._module(value)
         if value is math and self._goes_on:
-            return GOES_ON
+            return MATH
         return value
 
     def _module(self, module: ModuleType) -> Any:
@@ -223,31 +224,6 @@ def _names_of(code: CodeType) -> set[str]:
     """Names that a code reads, with those of the code in it."""
     found = set(code.co_names)
     return found.union(*(_names_of(item) for item in code.co_consts if isinstance(item, CodeType)))
-
-
-# Operations that go on.
-
-
-def quotient(over: float, under: float) -> float:
-    """A quotient as processors have it: infinite, or no number, where it is by zero."""
-    if under != 0.0:
-        return over / under
-    if over == 0.0 or math.isnan(over):
-        return math.nan
-    return math.copysign(math.inf, over) * math.copysign(1.0, under)
-
-
-def root(value: float) -> float:
-    """A square root, no number where it is of a negative one."""
-    return math.nan if value < 0.0 else math.sqrt(value)
-
-
-def whole_part(value: float) -> int:
-    """A number without its fraction; the lowest integer for what has none or is beyond all of them."""
-    return int(value) if -(2.0**63) <= value < 2.0**63 else -(2**63)
-
-
-GOES_ON = SimpleNamespace(**{**vars(math), "sqrt": root})
 
 
 class _GoingOn(ast.NodeTransformer):

@@ -6,12 +6,14 @@ any parameter that changed meanwhile, goes on its own between two changes, so th
 costs only a few calls.
 """
 
+import logging
 import math
 import os
 import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from types import ModuleType
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -20,19 +22,23 @@ from numpy.typing import NDArray
 from ppafo import interrupts
 from ppafo.control.kind import ProfileKind
 from ppafo.engine.cache import load_all
+from ppafo.engine.entries import INLINE
 from ppafo.engine.lane_rows import VECTOR, lanes_of
-from ppafo.engine.lane_source import INLINE, write_lanes
-from ppafo.engine.loading import BACKEND_VARIABLE, chosen_compiler, load_source
+from ppafo.engine.lane_source import write_lanes
+from ppafo.engine.loading import HOW_TO_INSTALL, compiled, compilers_to_try, runs_by_python
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, rebuilt, row_numbers
 from ppafo.engine.source_text import SourceCollector
 from ppafo.engine.step.lane import SAME_MOMENT
+from ppafo.progress import time_text
 from ppafo.signals.meter import MeterKind
+
+logger = logging.getLogger("ppafo")
 
 Floats = NDArray[np.float64]
 
-PYTHON = "python"
-"""Value of ``PPAFO_BACKEND`` that lets Python run the functions of the step as they are."""
+PYTHON_STEP, LONGEST_UNSAID = 2.0e-4, 120.0
+"""Time [s] that Python takes for a step, and for which nobody has to be prepared."""
 
 STEPS_PER_CALL = 10_000
 """Steps in one call of compiled code: some hundredths of a second, seconds where each step takes hundreds of parts."""
@@ -104,19 +110,20 @@ def load_program(program: Program) -> Advancing:
 
     A program is written anew where a number or function that it was made from stands for something else by now.
     """
-    if os.environ.get(BACKEND_VARIABLE) == PYTHON:
-        from ppafo.engine.interpreter import PythonProgram  # most computers have a compiler
+    module: Any = None if runs_by_python() else compiled(_current_source(program))
+    if module is not None:
+        return module  # type: ignore[no-any-return]
+    from ppafo.engine.interpreter import PythonProgram  # most computers have a compiler
 
-        return PythonProgram(program)
-    module: Any = load_source(_current_source(program))
-    return module  # type: ignore[no-any-return]
+    return PythonProgram(program)
 
 
 def load_programs(programs: Iterable[Program]) -> None:
     """Load the compiled modules of programs that are all needed, so that what is compiled can be counted."""
     chosen = dict.fromkeys(programs)
-    if len(chosen) > 1 and os.environ.get(BACKEND_VARIABLE) != PYTHON:
-        load_all([_current_source(program) for program in chosen], chosen_compiler(), load_source)
+    compilers = compilers_to_try()
+    if len(chosen) > 1 and compilers:
+        load_all([_current_source(program) for program in chosen], compilers[0], compiled)
 
 
 def _current_source(program: Program) -> str:
@@ -154,6 +161,9 @@ def run_blocks(batch: Batch, take: Callable[[slice, BatchResult], None], threads
     lanes = lanes_of(batch.program)
     starts = range(0, runs, lanes)
     workers = 1 if len(starts) == 1 else min(len(starts), threads or os.cpu_count() or 1)
+    if not isinstance(module, ModuleType):
+        workers = 1  # threads of Python take turns
+        _say_how_long(runs * batch.clock.step_count)
 
     # One iterator for all threads: a range iterator hands each start to one of them.
     waiting = iter(starts)
@@ -186,6 +196,17 @@ def run_blocks(batch: Batch, take: Callable[[slice, BatchResult], None], threads
                 done.result()
         finally:
             stop.set()
+
+
+def _say_how_long(steps: int) -> None:
+    """Say before it begins that Python takes minutes for so many steps."""
+    seconds = steps * PYTHON_STEP
+    if seconds > LONGEST_UNSAID:
+        logger.warning(
+            "ppafo: Python runs these models, which takes about %s; compiled it takes seconds: %s",
+            time_text(seconds),
+            HOW_TO_INSTALL,
+        )
 
 
 def join_results(results: Sequence[BatchResult]) -> BatchResult:

@@ -330,7 +330,6 @@ def advance_walk(
     # Trapezoidal rule over the angle that the ankle turned in this step.
     work = 0.5 * (given + walk.external_torque) * turned if on_toes else 0.0
     positive_work = max(work, 0.0)
-    # Numba takes more than 15 keywords only where no choice stands among them.
     return WalkState(
         contact=landed.contact,
         offset=landed.offset,

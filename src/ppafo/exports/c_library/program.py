@@ -17,9 +17,10 @@ from typing import Any
 import numpy as np
 
 from ppafo.engine.channels import REQUEST, TRACED, walk_traces
+from ppafo.engine.entries import HEADER, INLINE
 from ppafo.engine.generator import StepText
 from ppafo.engine.lane_rows import HANDED
-from ppafo.engine.lane_source import ARGUMENTS, COMPILED, HEADER, INLINE
+from ppafo.engine.lane_source import ARGUMENTS, COMPILED
 from ppafo.engine.linking import link_program
 from ppafo.engine.loop_text import LOOP_ARRAYS, LOOP_NUMBERS, indent, lane_loop, run_loop
 from ppafo.engine.program import Program
