@@ -43,7 +43,7 @@ from ppafo.report.display_units import quantity_text as shown_text
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.declaration import SUPPLY_LINE, THERMAL, Reading, kind_at, quantity_text, value_at
 from ppafo.simulation.scenario import SupplyLine
-from ppafo.units import format_quantity
+from ppafo.units import format_quantity, to_si
 
 BOTTLE = "bottle"
 BOTTLE_NAME = f"{BOTTLE}.name"
@@ -201,7 +201,9 @@ def read_bottle(reading: Reading, device: Device, folder: Path) -> BottleSupply 
         name = section["name"]
         path = Path(name)
         bottle = load_bottle(folder / path if path.suffix == ".toml" and not path.is_absolute() else name, own)
-    pressure, own_pressure = device.supply.pressure, bottle.regulator.set_pressure
+    pressure, stated = device.supply.pressure, bottle.entries[_SET_PRESSURE]
+    # Gauge is the same at both: a bottle's file knows no atmosphere, and stands in that of the device.
+    own_pressure = to_si(stated.value, stated.unit, "Pa_a", device.supply.atmospheric_pressure)
     # A bottle of the package is set to the paper's pressure, which says nothing of this walk; a user's file does.
     if path.suffix == ".toml" and abs(own_pressure - pressure) > _SAME_PRESSURE * pressure:
         room = device.supply.atmospheric_pressure
