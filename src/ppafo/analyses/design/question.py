@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from ppafo.arguments import FileOrName, Length, Mass, Minutes, Pressure, Seed, Threads, Torque, Word, checked
+from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report, report_nothing
 
 if TYPE_CHECKING:
@@ -32,6 +33,7 @@ def design(
     minutes: Minutes | None = None,
     toes: Length | None = None,
     catalogue: FileOrName | None = None,
+    plugins: Plugins = (),
     progress: Report | None = None,
 ) -> Finding[Design] | Finding[Sizing] | Finding[WearerSizing]:
     """Find a device: for a wearer, for a torque profile, or Pareto-optimal in error, gas and mass.
@@ -48,7 +50,9 @@ def design(
     minutes: minutes of walking on one bottle
     toes: lowest height of the toes in mid-swing; default: '1 cm', or the healthy gait's own where that is less
     catalogue: a .toml file with parts of your own; default: the catalogue of the package
+    plugins: modules of your own, files or names, whose objects files may name
     """
+    name_plugins(plugins)
     from ppafo.analyses.design.front import answer as front
     from ppafo.analyses.design.front.problem import with_seed
     from ppafo.analyses.design.front.solve import find_front
