@@ -8,6 +8,9 @@
 Everything below is loaded when it is first used, so that ``import ppafo`` is quick.
 """
 
+# Before all else: an interrupt may come while the rest is loaded.
+import ppafo.first_moments as _first_moments  # noqa: F401, I001
+
 import importlib
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -176,15 +179,8 @@ def _compiler_of_c(name: str) -> Compiler:
     return compiler(name)
 
 
-def _numba() -> Compiler:
-    """Return Numba."""
-    from ppafo.engine.numba_compiler import numba_compiler
-
-    return numba_compiler()
-
-
-# By name, as the engine knows nothing of the translation above it.
-offer({**{name: partial(_compiler_of_c, name) for name in ("clang", "gcc", "zig")}, "numba": _numba})
+# By name, as the engine knows nothing of the translation above it. A slow valve takes four times as long by clang.
+offer({name: partial(_compiler_of_c, name) for name in ("gcc", "clang", "zig")})
 
 
 def __getattr__(name: str) -> Any:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from ppafo.control.kind import OPEN_LOOP
-from ppafo.engine.lane_samples import TRACED
+from ppafo.engine.channels import TRACED
 from ppafo.errors import StudyError, UnitError, first_twice, nearest_name, refused_as
 from ppafo.loading import reloaded, scenario_or_load
 from ppafo.metrics import METRICS

@@ -10,11 +10,10 @@ from typing import Any
 import pytest
 
 import ppafo
-from ppafo.engine.loading import NUMBA, chosen_compiler
 
 HEAVY = frozenset(
     {
-        *("casadi", "dask", "h5netcdf", "h5py", "jax", "jinja2", "llvmlite", "matplotlib", "numba", "numpy", "pandas"),
+        *("casadi", "dask", "h5netcdf", "h5py", "jax", "jinja2", "matplotlib", "numpy", "pandas"),
         *("PIL", "pint", "pyarrow", "pydantic", "scipy", "sksundae", "xarray"),
     }
 )
@@ -52,8 +51,7 @@ def loaded_by(command: str) -> tuple[list[str], list[str]]:
 
 
 def heavy(modules: list[str]) -> set[str]:
-    compiler = {"numba", "llvmlite"} if chosen_compiler().name == NUMBA else set()
-    return {name.partition(".")[0] for name in modules} & HEAVY - compiler
+    return {name.partition(".")[0] for name in modules} & HEAVY
 
 
 def own(modules: list[str]) -> set[str]:

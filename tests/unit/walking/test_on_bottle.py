@@ -213,6 +213,17 @@ def test_a_file_that_sets_its_regulator_to_another_pressure_is_refused(tmp_path:
     assert walk_of(load_walk(WALK, lower, bottle=file)).bottle is not None
 
 
+@pytest.mark.parametrize("room", ["1.000 bar_a", "0.980 bar_a", "1.01325 bar_a"])
+def test_gauge_pressures_of_bottle_and_set_are_one_in_any_atmosphere(tmp_path: Path, room: str) -> None:
+    shipped = (Path(str(BOTTLES.shipped)) / f"{BOTTLE}.toml").read_text(encoding="utf-8")
+    file = tmp_path / "own.toml"
+    file.write_text(shipped.replace('50.0\nunit = "psi_g"', '5.5\nunit = "bar_g"'), encoding="utf-8")
+    wanted = [f"supply.atmospheric_pressure={room}", "supply.pressure=5.5 bar_g"]
+    supply = walk_of(load_walk(WALK, wanted, bottle=file)).bottle
+    assert supply is not None
+    assert supply.bottle.regulator.set_pressure == pytest.approx(1e5 * float(room.split(maxsplit=1)[0]) + 5.5e5)
+
+
 def test_a_bottle_of_the_package_is_set_to_the_pressure_of_the_walk_and_says_so() -> None:
     supply = walk_of(load_walk(WALK, ["supply.pressure=60 psi_g"], bottle=BOTTLE)).bottle
     assert supply is not None

@@ -12,7 +12,8 @@ from ppafo.control.profiles import CONSTANT
 from ppafo.engine.continuous_time import mode_at_rest, torque_on_vane
 from ppafo.engine.lanes import Floats, run_batch
 from ppafo.engine.led_leg import LedLeg, shank_at, torque_of_leg
-from ppafo.engine.program import Program, python_place
+from ppafo.engine.linking import python_place
+from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, leaves, numbers, rebuilt
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of, state_row_numbers
 from ppafo.errors import ScenarioError, SimulationError

@@ -209,6 +209,11 @@ def sweep(
     """
     name_plugins(plugins)
     chosen = study_of(study, overrides, draws, seed)
+    if scheduler is not None:
+        from ppafo.analyses.sweep.cluster import check_scheduler
+
+        # Before a folder is made: a wrong address must leave nothing.
+        check_scheduler(scheduler)
     kept = tempfile.TemporaryDirectory(prefix="ppafo-study-") if out is None else None
     place = place_at(kept.name if kept is not None else str(out))
     store = Store.claim(chosen, place, agreed, threads)
