@@ -14,7 +14,7 @@ import sys
 from pathlib import Path
 
 from ppafo.walking.loading import load_walk
-from ppafo.walking.task_sequence import led_task_sequences
+from ppafo.walking.task_sequence import FILE
 from ppafo.walking.walk import walk_population
 
 CONFIGURATIONS = ("solenoid", "proportional")
@@ -79,8 +79,8 @@ def arguments() -> argparse.Namespace:
     parser.add_argument(
         "--task-sequence",
         nargs="*",
-        default=led_task_sequences(),
-        choices=led_task_sequences(),
+        default=FILE.names(),
+        choices=FILE.names(),
         help="which task sequences",
     )
     parser.add_argument("--sensors", nargs="*", default=["ideal"], choices=list(SENSORS), help="which good sensors")

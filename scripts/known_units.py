@@ -12,10 +12,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import ppafo
 from ppafo import units
 from ppafo.errors import UnitError
 
-PACKAGE = Path(units.__file__).parent
+PACKAGE = Path(ppafo.__file__).parent
 _LONGEST = 40
 
 
@@ -41,6 +42,9 @@ def known_units() -> dict[str, list[Any]]:
     found = {}
     for unit in {unit for text in texts_of_package() for unit in _units_in(text)}:
         with contextlib.suppress(UnitError):
+            # A word that happens to be made of units, as mul is m uL, is no unit of the package.
+            if unit.isalpha() and " " in units.split_pressure_kind(unit)[0]:
+                continue
             parsed = units.unit_by_pint(unit)
             found[units.split_pressure_kind(unit)[0]] = [str(parsed.scale), str(parsed.offset), parsed.dimensions]
     return dict(sorted(found.items()))

@@ -29,7 +29,6 @@ WALKS = (
     "proportional-regulators",
     "solenoid",
     "solenoid-regulators",
-    "reacting",
 )
 SETS = ("ppafo2011", "ppafo2011-printed")
 

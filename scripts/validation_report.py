@@ -223,11 +223,6 @@ SECTIONS: Mapping[str, Mapping[str, Check]] = {
             "a simulator of its own with the properties of CoolProp",
             "tests/unit/walking/test_on_bottle.py",
         ),
-        "wearer": tested(
-            "The neuromuscular gait model: its parts, the first step, ten strides",
-            "a simulator of its own in which MuJoCo moves the segments",
-            "tests/reference/test_wearer_against_reference.py",
-        ),
     },
     "The same bits elsewhere": {
         "bits": bits,

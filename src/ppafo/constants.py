@@ -3,6 +3,12 @@
 UNIVERSAL_GAS_CONSTANT = 8.314
 """J/(mol K), as the paper prints it; the exact value is 8.314462618 (CODATA 2018), 0.006 % more."""
 
+MOLAR_GAS_CONSTANT = 8.314462618
+"""J/(mol K), CODATA 2018; densities of gas at a reference condition."""
+
+MOLAR_MASSES = {"CO2": 0.044, "air": 0.028965, "N2": 0.028013, "He": 0.0040026}
+"""kg/mol; sources are beside the gases in ``model/gas.py``."""
+
 STANDARD_ATMOSPHERE = 101325.0
 """Pa absolute; the zero of gauge pressure unless a parameter set says otherwise."""
 

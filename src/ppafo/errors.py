@@ -110,6 +110,16 @@ RENAMED_KEYS: Mapping[str, str] = {
 """Keys of files of earlier versions and what they are called now."""
 
 
+_OF_DATA_SHEETS: Mapping[str, str] = {
+    "cv": "3.87 L/(s bar) for each Cv [US gal/min, psi]",
+    "kv": "4.48 L/(s bar) for each Kv [m^3/h, bar]",
+    "qn": "qn/254 L/(s bar) for qn [L/min] from 6 to 5 bar gauge",
+}
+"""Flow of a valve on data sheets, in C of ISO 6358 at b = 0.3; ``parameters/flow_coefficients.py`` derives it."""
+_C, _B = "sonic_conductance", "critical_ratio"
+_SPELT_OTHERWISE = {"kvs": "kv", "qnn": "qn", "nominal_flow": "qn", "flow_coefficient": "cv", "flow_factor": "kv"}
+
+
 def nearest_name(name: str, allowed: Iterable[str]) -> str:
     """Return a hint such as ``, did you mean 'angle'?``, or an empty text where no allowed name is near.
 
@@ -124,6 +134,9 @@ def nearest_name(name: str, allowed: Iterable[str]) -> str:
         for now in (renamed, renamed.replace("_", "-")):
             if now in known:
                 return f", which is now called '{now}'"
+    sheet = _OF_DATA_SHEETS.get(_SPELT_OTHERWISE.get(last.lower(), last.lower()))
+    if sheet is not None and any(one.rpartition(".")[2] == _C for one in known):
+        return f", which is '{before}{dot}{_C}', {sheet}, with '{before}{dot}{_B}' 0.3"
     # 0.6 finds a transposed or forgotten letter, and is difflib's own default.
     near = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
     if not near:

@@ -37,7 +37,6 @@ PRIVATE_WORDS = (
     "time in the stride",
     "virtual rig",
     "volume per angle",
-    "who reacts?",
     "whole numbers?",
     "worlds",
     "worn",
@@ -53,7 +52,7 @@ ALLOWED_IN_PAGES: Mapping[str, tuple[str, str]] = {
 }
 """By page: words that stand there for something else, and for what."""
 
-COMPOSED = ("engine/", "translation/", "gym/episodes.py", "wearer/scheme.py")
+COMPOSED = ("engine/", "translation/", "gym/episodes.py")
 """Strings there are source text, in which a lane is a lane of a processor."""
 SOMETHING_ELSE = ("answers?", "whole numbers?")
 """Words that messages need for something else: an answer of a board, 'must be a whole number'."""
@@ -61,8 +60,6 @@ ALLOWED_IN_MESSAGES: Mapping[str, tuple[str, str]] = {
     "analyses/endurance/draw.py": ("'course'", "the old key of a walk"),
     "exports/c_library/program.py": ("'course'|course=", "source text, in which it is the time course of a reference"),
     "identification/trajectory/section.py": ("held: is now locked", "the old key of a problem file"),
-    "metrics/metric.py": ("wearer who reacts", "what recordings on disk are told apart by"),
-    "walking/result.py": ("walk of a wearer who reacts", "the format of a result on disk"),
 }
 """By file: what stands there as a name, and of what."""
 ALLOWED_IN_FILES: Mapping[str, tuple[str, str]] = {

@@ -30,7 +30,7 @@ from ppafo.model.sensors import (
     measure,
     measure_gait,
 )
-from ppafo.signals.meter import Course, FootSample, MeterKind, Sample, StrideSample, WearerSample
+from ppafo.signals.meter import Course, FootSample, MeterKind, Sample, StrideSample
 
 QUICKLY = '@njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)'
 ROUNDING = 1.0e-12
@@ -179,27 +179,13 @@ def meters(draw: random.Random) -> Iterator[Entry]:
         foot = FootSample(drawn[0] + 0.1, 0.9 * drawn[0], 0.01 * drawn[5])
         samples.append(Sample(float(number), *drawn, min(0.1 * number, 2.0), *temperatures, foot, stride))
     kinds: dict[str, MeterKind] = {meter.name: meter for kind in METRICS.values() for meter in kind.meters}
-    walked = [
-        WearerSample(
-            strides=float(number // 8),
-            way=0.1 * number,
-            clearances=0.01 * (number // 8),
-            muscle_work=0.5 * number,
-            umberger=2.0 * number,
-            bhargava=1.0 * number,
-            fall_time=-1.0 if number < 50 else 0.5,
-            time=0.01 * number,
-        )
-        for number in range(60)
-    ]
     for name, kind in kinds.items():
-        seen = walked if kind.of_wearer else samples
-        state = kind.start(course, seen[0])
+        state = kind.start(course, samples[0])
         tried = []
-        for sample in seen[1:]:
+        for sample in samples[1:]:
             tried.append((state, course, sample))
             state = kind.update(*tried[-1])
-        yield Entry(f"{name}_start", kind.start, [(course, sample) for sample in seen])
+        yield Entry(f"{name}_start", kind.start, [(course, sample) for sample in samples])
         yield Entry(f"{name}_update", kind.update, tried)
 
 

@@ -10,7 +10,7 @@ import pytest
 
 import ppafo
 
-GUESTS = ("gym", "page", "processor", "wearer")
+GUESTS = ("gym", "page", "processor")
 
 PROFILE = """
 schema_version = 1
@@ -130,29 +130,3 @@ def test_a_name_of_a_guest_says_that_it_is_not_installed(bare: Path, tmp_path: P
     assert done.stderr.rstrip().endswith(
         "AttributeError: ppafo.workbench is part of ppafo.page, which is not installed"
     )
-
-
-def test_a_motion_whose_folder_is_not_there_is_not_known(bare: Path, tmp_path: Path) -> None:
-    done = called(bare, tmp_path, "walk", "reacting")
-    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
-    assert "motion.kind = 'react' is not known; allowed: free, locked, prescribed, leg, walk" in done.stderr
-
-
-WALKED = """
-import sys
-import ppafo
-print(ppafo.compare_walks(ppafo.load_walk("proportional"), minutes=0.1).is_completed)
-print(*(name for name in sys.modules if name.startswith("ppafo.wearer")))
-"""
-
-
-def test_a_walk_along_a_gait_loads_nothing_of_the_wearer_who_reacts(tmp_path: Path) -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", WALKED],
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(Path(ppafo.__file__).parents[1])},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.stdout.split() == ["True"], done.stderr

@@ -35,8 +35,8 @@ K, PRODUCT, ROOM, SOURCE = 1.3, 8.314 * 298.0 / 0.044, 101_325.0, 101_325.0 + 50
 CHOKED = math.sqrt(K / PRODUCT * (2.0 / (K + 1.0)) ** ((K + 1.0) / (K - 1.0)))
 CONDUCTANCE = 0.113 * 12.6e-6 * CHOKED
 LEAK = 0.3 / 12.6
-VOLUME_1 = 26.5e-6 + 23.5e-6 * math.radians(55.0)
-VOLUME_2 = 26.5e-6 + 23.5e-6 * math.radians(55.0)
+VOLUME_1 = 36.0e-6 + 14.51e-6 * math.radians(55.0)
+VOLUME_2 = 36.0e-6 + 14.51e-6 * math.radians(55.0)
 PUSHED, JOINED = 0.15, 0.25
 """End of push-off and length of the joint [s] in the scripted runs."""
 

@@ -34,7 +34,6 @@ def test_every_scenario_and_walk_has_golden_hashes() -> None:
         ("", "proportional"),
         pytest.param("numba", CHEAP, marks=pytest.mark.long),
         pytest.param("numba", "off", marks=pytest.mark.long),
-        pytest.param("numba", "reacting", marks=[pytest.mark.long, pytest.mark.thorough]),
     ],
 )
 def test_the_golden_bits_are_found_on_this_computer(backend: str, name: str, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -79,11 +79,13 @@ def test_absolute_pressure_and_differences_ignore_the_atmosphere() -> None:
     assert parse_quantity("5 bar_d", "Pa_d", atmosphere=90e3) == 5e5
 
 
-@pytest.mark.parametrize("unit", ["psi", "bar", "kPa", "Pa"])
-@pytest.mark.parametrize("si_unit", ["Pa_a", "Pa_d"])
-def test_a_bare_pressure_is_refused_with_the_three_ways_to_say_it(unit: str, si_unit: str) -> None:
-    with pytest.raises(UnitError, match=f"'{unit}' does not say which pressure: write {unit}_g for gauge, {unit}_a"):
-        parse_quantity(f"50 {unit}", si_unit)
+@pytest.mark.parametrize("unit", ["psi", "bar", "kPa", "Pa", "MPa", "lbf/in^2", "kgf/cm2", "mmHg"])
+def test_a_bare_pressure_is_refused_with_the_ways_to_say_it_that_fit(unit: str) -> None:
+    said = f"'{unit}' does not say which pressure: write {unit}_"
+    with pytest.raises(UnitError, match=re.escape(f"{said}g for gauge or {unit}_a for absolute") + "$"):
+        parse_quantity(f"50 {unit}", "Pa_a")
+    with pytest.raises(UnitError, match=re.escape(f"{said}d for a difference") + "$"):
+        parse_quantity(f"50 {unit}", "Pa_d")
 
 
 def test_a_difference_is_refused_for_a_level() -> None:
@@ -126,31 +128,182 @@ def test_numbers_that_are_not_finite_are_refused_in_both_directions(value: float
 
 
 @pytest.mark.parametrize(
-    "unit", ["m)", "2 m", "m^", "m//s", "m/s kg", "mm2", "m;s", "(" * 50 + "m" + ")" * 50, "m" * 99]
+    "unit", ["m)", "2 m", "m^", "m//s", "m/s kg", "mm0", "m;s", "(" * 50 + "m" + ")" * 50, "m" * 99]
 )
 def test_what_is_not_written_like_a_unit_is_refused(unit: str) -> None:
     with pytest.raises(UnitError, match="is not a unit"):
         check_unit(unit)
 
 
+PSI = 6894.757293168361
+ATMOSPHERE = 101325.0
+LBF = 4.4482216152605
+
+
 @pytest.mark.parametrize(
-    ("unit", "meant"),
+    ("text", "si_unit", "value"),
     [
-        ("kPq/s", "'kPa'"),
-        ("kPq", "'kPa_g', 'kPa_a' or 'kPa_d'"),
-        ("psii_g", "'psi_g'"),
-        ("psig", "'psi_g'"),
-        ("Nm", "'N m'"),
-        ("Nms/rad", "'N m s/rad'"),
-        ("Nmm", "'N mm'"),
-        ("kgm^2", "'kg m^2'"),
-        ("J/kgK", "'J/(kg K)'"),
-        ("J/(kgK)", "'J/(kg K)'"),
-        ("degg", "'deg'"),
+        *(
+            (f"60 {unit}", "Pa_a", ATMOSPHERE + 60 * PSI)
+            for unit in ("psig", "PSIG", "psi(g)", "psi gauge", "lbf/in^2_g")
+        ),
+        *((f"60 {unit}", "Pa_a", 60 * PSI) for unit in ("psia", "psi_a", "psi (abs)", "lbs/in2_a", "lb/in^2 abs")),
+        ("2 psid", "Pa_d", 2 * PSI),
+        *(
+            (f"6 {unit}", "Pa_a", ATMOSPHERE + 6e5)
+            for unit in ("barg", "bar(g)", "bar (g)", "BAR G", "bar ü", "bar rel.")
+        ),
+        *((f"6 {unit}", "Pa_a", 6e5) for unit in ("bara", "bar(a)", "bar abs", "bar absolute", "bar_a")),
+        ("0.5 MPa(g)", "Pa_a", ATMOSPHERE + 5e5),
+        ("414 kN/m^2_g", "Pa_a", ATMOSPHERE + 414e3),
+        ("5 kgf/cm^2_a", "Pa_a", 5 * 98066.5),
+        ("5 kg/cm2G", "Pa_a", ATMOSPHERE + 5 * 98066.5),
+        ("5 kp/cm² (a)", "Pa_a", 5 * 98066.5),
+        ("1013.25 hPa_a", "Pa_a", 101325.0),
+        ("760 mmHg_a", "Pa_a", 760 * 133.322387415),
+        ("10 inH2O_d", "Pa_d", 2490.8891),
+        ("10 mmWS_d", "Pa_d", 98.0665),
+        ("77 degF", "K", 298.15),
+        ("77 °F", "K", 298.15),
+        ("25 deg C", "K", 298.15),
+        *((f"3 {unit}", "N m", 3.0) for unit in ("Nm", "N-m", "N.m", "N·m", "N*m")),
+        ("3 Nmm", "N m", 3e-3),
+        ("3 mNm", "N m", 3e-3),
+        *((f"30 {unit}", "N m", 30 * LBF * 0.0254) for unit in ("in-lb", "lb-in", "in lbf", "inlb", "lbf.in")),
+        ("2 ft-lb", "N m", 2 * LBF * 0.3048),
+        ("16 oz-in", "N m", LBF * 0.0254),
+        ("3 Nms/rad", "N m s/rad", 3.0),
+        ("2 kgcm^2", "kg m^2", 2e-4),
+        ("5 mm2", "m^2", 5e-6),
+        ("5 sq mm", "m^2", 5e-6),
+        ("9 m/s2", "m/s^2", 9.0),
+        ("10 min-1", "1/s", 1.0 / 6.0),
+        *((f"20 {unit}", "m^3", 2e-5) for unit in ("cc", "ccm", "cm3", "ml", "mL")),
+        ("1 cu in", "m^3", 0.0254**3),
+        *((f"1 {unit}", "m^3/(s Pa)", 1e-8) for unit in ("dm3/(s·bar)", "l/s/bar", "dm^3/(s*bar)", "L/(bar s)")),
+        ("60 l/min/bar", "m^3/(s Pa)", 1e-8),
+        ("5 mbarl/s", "Pa m^3/s", 0.5),
+        ("60 rpm", "rad/s", 2 * math.pi),
+        ("2 h", "s", 7200.0),
+        ("3 sec", "s", 3.0),
+        ("3 J/kgK", "J/(kg K)", 3.0),
     ],
 )
-def test_an_unknown_unit_names_the_nearest_one_or_the_product_that_it_is(unit: str, meant: str) -> None:
+def test_units_are_read_as_people_write_them(text: str, si_unit: str, value: float) -> None:
+    assert parse_quantity(text, si_unit) == pytest.approx(value, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        # 1.185 kg/m^3 is the density of ISO 6358 for 20 degC, 1 bar, 65 %; the others are p M/(R T).
+        ("60 L/min (ANR, air)", 1.185e-3),
+        ("60 l/min (ISO 8778, air)", 1.185e-3),
+        ("3.6 m3/h (anr, air)", 1.185e-3),
+        ("60 Nl/min (DIN 1343, air)", 101325.0 * 0.028965 / (8.314462618 * 273.15) * 1e-3),
+        ("60 slm (0 degC, 1.01325 bar_a, CO2)", 101325.0 * 0.044 / (8.314462618 * 273.15) * 1e-3),
+        ("3.6 Nm3/h (DIN 1343, N2)", 101325.0 * 0.028013 / (8.314462618 * 273.15) * 1e-3),
+        ("60 L/min (ANR, CO2)", 1e5 * 0.044 / (8.314462618 * 293.15) * 1e-3),
+        ("60000 sccm (25 °C, 1 atm, 0.0399 kg/mol)", 101325.0 * 0.0399 / (8.314462618 * 298.15) * 1e-3),
+        ("1 SCFM (70 degF, 14.696 psia, air)", 0.3048**3 / 60 * 101325.35 * 0.028965 / (8.314462618 * 294.2611)),
+    ],
+)
+def test_a_volume_flow_with_condition_and_gas_is_a_mass_flow(text: str, value: float) -> None:
+    assert parse_quantity(text, "kg/s") == pytest.approx(value, rel=1e-6)
+
+
+def test_normal_litres_and_litres_at_20_degrees_are_9_percent_apart() -> None:
+    normal, anr = (parse_quantity(f"1 L/min ({at}, N2)", "kg/s") for at in ("DIN 1343", "ANR"))
+    assert normal / anr == pytest.approx(1.0874, rel=1e-4)
+
+
+# What is asked about, with what was wanted.
+ASKED = [
+    *(
+        (f"60 {unit}", "Pa_a")
+        for unit in ("psi", "lbf/in^2", "kN/m^2", "N/cm2", "kgf/cm^2", "MPa", "mmHg", "inH2O", "lb/in2")
+    ),
+    *((f"5 {unit}", "Pa_d") for unit in ("psi", "bar", "kgf/cm^2", "mbar")),
+    *(
+        (f"5 {unit}", "kg/s")
+        for unit in ("L/min", "Nl/min", "slm", "SCFM", "scfh", "m3/h", "Nm^3/h", "sccm", "ln/min", "L/h")
+    ),
+    *((f"5 {unit}", "kg/s") for unit in ("L/min (ANR)", "l/min ANR", "Nl/min (DIN 1343)", "cfm (70 degF, 14.7 psia)")),
+    ("4,1 bar_g", "Pa_a"),
+    ("4,125 bar_g", "Pa_a"),
+    ("1,000 mL", "m^3"),
+    ("3 nm", "N m"),
+    ("3 NM", "N m"),
+    ("3 L/s.bar", "m^3/(s Pa)"),
+    ("3 L/s bar", "m^3/(s Pa)"),
+    ("20 C", "K"),
+    ("68 F", "K"),
+    ("20 degc", "K"),
+    ("3 KG", "kg"),
+    ("3 HPA_a", "Pa_a"),
+    ("3 psii_g", "Pa_a"),
+    ("3 psii", "Pa_a"),
+    ("3 kPq", "Pa_d"),
+    ("1 degg", "rad"),
+    ("5 mmm^2", "m^2"),
+]
+
+
+@pytest.mark.parametrize(("text", "si_unit"), ASKED)
+def test_every_proposed_remedy_works(text: str, si_unit: str) -> None:
+    """Follow every answer that a refusal proposes; each must be taken, or lead to one that is."""
+    left, number, followed = [text], text.split(maxsplit=1)[0], 0
+    while left:
+        asked = left.pop()
+        try:
+            parse_quantity(asked, si_unit)
+        except UnitError as error:
+            proposed = proposals(str(error), number)
+            assert proposed, f"{asked}: {error}"
+            assert followed < 20, f"{asked} goes round: {error}"
+            left += proposed
+            followed += len(proposed)
+    assert followed
+
+
+def proposals(message: str, number: str) -> list[str]:
+    """Return the quantities that a message tells to write."""
+    said = re.findall(r"(?:write|did you mean) (.*?)(?:, as the data sheet|, or with another|\?|;|$)", message)
+    texts = [quoted for part in said for quoted in re.findall(r"'([^']+)'", part)]
+    texts += [word for part in said for word in re.findall(r"(?:^|or )([^' ]+_[gad]) for", part)]
+    return [text if text[0].isdigit() else f"{number} {text}" for text in texts]
+
+
+@pytest.mark.parametrize(
+    ("text", "si_unit"),
+    [("3 kgs", "K"), ("3 nom", "Pa_a"), ("3 bor_g", "m"), ("3 dag", "m^2"), ("77 dogF", "rad"), ("3 xyz", "m")],
+)
+def test_nothing_is_suggested_that_would_not_fit(text: str, si_unit: str) -> None:
+    with pytest.raises(UnitError) as caught:
+        parse_quantity(text, si_unit)
+    assert "did you mean" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "si_unit", "meant"),
+    [
+        ("1 kPq/s", "Pa/s", "'kPa/s'"),
+        ("1 kPq", "Pa_a", "'kPa_g' or 'kPa_a'"),
+        ("1 psii_g", "Pa_a", "'psi_g'"),
+        ("1 nm", "N m", "'N m'"),
+        ("1 degg", "rad", "'deg'"),
+    ],
+)
+def test_an_unknown_unit_names_the_nearest_one_that_fits(text: str, si_unit: str, meant: str) -> None:
     with pytest.raises(UnitError, match=re.escape(f"is not a known unit, did you mean {meant}?")):
+        parse_quantity(text, si_unit)
+
+
+@pytest.mark.parametrize(
+    "unit", ["L/min (noon, air)", "L/min (5 m, 1 bar, air)", "L/min (0 degC, 1 bar_g, air)", "kg (ANR)"]
+)
+def test_what_is_no_reference_condition_is_refused(unit: str) -> None:
+    with pytest.raises(UnitError, match="reference condition"):
         check_unit(unit)
 
 
@@ -158,6 +311,7 @@ def test_pressures_that_are_listed_as_available_are_read_alone() -> None:
     with pytest.raises(UnitError) as caught:
         check_unit("qqq")
     listed = str(caught.value).partition("pressures as ")[2].partition(" (")[0].split(", ")
+    listed[-1] = listed[-1].partition(" ")[0]
     assert len(listed) == 9
     for unit in listed:
         to_si(1.0, unit, "Pa_d" if unit.endswith("_d") else "Pa_a")

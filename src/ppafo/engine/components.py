@@ -90,8 +90,7 @@ class LegScheme:
     ``loads`` and ``stored`` are as in ``GasScheme``. ``led``, ``handed`` and ``ended`` are rows that phases hand on:
     before the gas, from the step before, at the end. ``find`` makes what a step is handed by the one before, ``lead``
     are phases before the gas, ``assume`` where the gas takes the vane to be, ``reach`` phases that find where the
-    step ends, ``end`` the state after it. One that ``fails`` has faults of the plant, and a shut-off valve; one that
-    ``reacts`` has a body of its own, which no gait leads.
+    step ends, ``end`` the state after it. One that ``fails`` has faults of the plant, and a shut-off valve.
     """
 
     takes_task_sequence: bool
@@ -109,4 +108,3 @@ class LegScheme:
     reach: Callable[[Any, str], Phases]
     end: Callable[[Any], list[str]]
     fails: bool = False
-    reacts: bool = False

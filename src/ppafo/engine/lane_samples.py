@@ -18,15 +18,7 @@ from ppafo.model.plant import actuator_torque, chamber_pressures
 from ppafo.model.ports import shown_signals
 from ppafo.model.sensors import GaitMeasurement, Measurement, late_measurement, measure, measure_gait, samples_late
 from ppafo.model.valves.kind import VENT
-from ppafo.signals.meter import (
-    SAME_LEVEL,
-    FootSample,
-    Sample,
-    StrideSample,
-    WearerSample,
-    advance_course,
-    is_away,
-)
+from ppafo.signals.meter import SAME_LEVEL, FootSample, Sample, StrideSample, advance_course, is_away
 
 LEVEL = "safety.level"
 """Where a controller of walking keeps its level of help."""
@@ -285,35 +277,16 @@ def _meter_updates(rows: Rows) -> tuple[list[str], list[str]]:
     """Lines that begin the meters with the first sample, and those that take a further one."""
     program, add = rows.program, rows.add
     groups = program.meter_groups
-    sample = {group: "of_wearer" if kind.of_wearer else "sample" for group, kind in groups.items()}
     # A locked vane never moves: its meters of motion keep what the first sample gave them.
     moving = {group: kind for group, kind in groups.items() if not (program.is_locked and kind.of_motion)}
-    begin = [f"{group} = {add(kind.start)}(course, {sample[group]})" for group, kind in groups.items()]
+    begin = [f"{group} = {add(kind.start)}(course, sample)" for group, kind in groups.items()]
     begin += [line for group in groups for line in rows.store(group)]
     update = [rows.load(group) for group in moving]
-    # What comes after a fall is not counted; of the wearer's own meter it is known when that was.
-    stopping = {group for group, kind in moving.items() if program.reacts and not kind.of_wearer}
-    update += ["stands = walk.fall_time < 0.0"] if stopping else []
     for group, kind in moving.items():
-        later, flag = (f"{group}_later", "stands") if group in stopping else (group, "")
-        update += [f"{later} = {add(kind.update)}({group}, course, {sample[group]})"]
-        update += rows.store(group, later, flag)
+        update += [f"{group} = {add(kind.update)}({group}, course, sample)", *rows.store(group)]
     return begin, update
 
 
-FELL = "walk.fall_time"
-"""Path of the time of a fall [s], below 0 before one."""
-
-WEARER_ROWS = {
-    "strides": "walk.strides",
-    "way": "walker.pose.x",
-    "clearances": "walk.clearances",
-    "muscle_work": "walk.muscle_work",
-    "umberger": "reflexes.umberger",
-    "bhargava": "reflexes.bhargava",
-    "fall_time": FELL,
-}
-"""Numbers from which the sample of a neuromuscular gait model is made, beside its time."""
 SAMPLE_TIME = "next_record * (timing.step * interval)"
 """Expression of the time of a sample [s]."""
 
@@ -365,7 +338,7 @@ def sample_lines(rows: Rows, moment: str) -> list[str]:
         foot = {name: f"foot.{name}" for name in FootSample._fields}
     values |= {"foot": _row(add(FootSample), foot), "stride": _row(add(StrideSample), stride)}
     of_gas = (*program.gas.parameters, *program.gas.states)
-    lines = [
+    return [
         *[rows.load(group) for group in ("timing", "plant", "state", "result", "reference", *of_gas, *groups)],
         *present_pressures(rows),
         torque_line(rows, "state.angle"),
@@ -373,10 +346,6 @@ def sample_lines(rows: Rows, moment: str) -> list[str]:
         *on_gait,
         f"sample = {_row(add(Sample), values)}",
     ]
-    if any(kind.of_wearer for kind in program.meters):
-        wearer = {**WEARER_ROWS, "time": SAMPLE_TIME}
-        lines += [rows.load("walker"), rows.load("reflexes"), f"of_wearer = {_row(add(WearerSample), wearer)}"]
-    return lines
 
 
 def _row(name: str, values: dict[str, str]) -> str:

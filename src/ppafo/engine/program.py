@@ -176,11 +176,6 @@ class Program:
         return self.leg is not None and self.leg.takes_task_sequence
 
     @property
-    def reacts(self) -> bool:
-        """True where a neuromuscular gait model moves that leg."""
-        return self.leg is not None and self.leg.reacts
-
-    @property
     def fails(self) -> bool:
         """True where the plant of a walk may fail, or a shut-off valve is in its line."""
         return self.leg is not None and self.leg.fails

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,13 +49,6 @@ class LegGroups(NamedTuple):
     scheme: LegScheme
     parameters: list[Any]
     states: list[Any]
-
-
-class WornLeg(Protocol):
-    """A leg that walks with the device."""
-
-    def groups(self) -> LegGroups:
-        """Its scheme, and its groups of rows in the order of ``Program``."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +122,7 @@ class Run:
     command_delay: float
     needs_parts: bool = False
     tolerance: float = 1.0
-    walk: WornLeg | None = None
+    walk: Walk | None = None
     lines: Lines | None = None
     effects: tuple[Any, ...] = ()
     leg: "LedLeg | None" = None

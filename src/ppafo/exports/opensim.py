@@ -16,7 +16,7 @@ from ppafo.signals import Channel, Recording
 from ppafo.storage import read_recording
 from ppafo.storage.opensim import opensim_bytes, opensim_recording
 from ppafo.walking.loading import check_duration_once, load_walk
-from ppafo.walking.motion import check_led, walk_of
+from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WalkResult
 from ppafo.walking.strides import PHASES
 from ppafo.walking.walk import walk
@@ -51,7 +51,6 @@ def files_of_walk(
         check_strikes(strikes)
     check_duration_once(overrides, minutes)
     chosen = load_walk(name, overrides, gait)
-    check_led(chosen, "a torque file for OpenSim")
     few_strides = FEW_STRIDES if walk_of(chosen).task_sequence is None else None
     result = walk(chosen, few_strides if minutes is None else minutes)
     return opensim_files(result, side, strikes or ())

@@ -50,7 +50,7 @@ from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import LARGEST_SEED, Scenario
 from ppafo.studies.varying import VariedPath, in_its_unit, varied_path
 from ppafo.units import parse_quantity
-from ppafo.walking.motion import check_led, walk_of, with_duration
+from ppafo.walking.motion import walk_of, with_duration
 from ppafo.walking.person import draw_gaits
 from ppafo.walking.planning import batch_of_many, plan_walk
 from ppafo.walking.wearer import draw_builds
@@ -496,7 +496,6 @@ def walk_episodes(configuration: Scenario, randomise: bool, seconds: float) -> W
 
     ScenarioError for a walk with a task sequence or a bottle, or whose controller has no profile.
     """
-    check_led(configuration, "an environment")
     for name in ("task_sequence", "bottle"):
         if getattr(walk_of(configuration), name) is not None:
             raise ScenarioError(

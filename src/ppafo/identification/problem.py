@@ -31,7 +31,7 @@ from ppafo.identification.tolerances import DEFAULTS, BenchSection, Tolerances, 
 from ppafo.identification.trajectory.section import TrajectorySection, refuse_removed
 from ppafo.model.gas import SPECIES
 from ppafo.parameters.device import VANE
-from ppafo.parameters.parameter_set import Citation, ParameterSet, chosen_valve, number_in_si
+from ppafo.parameters.parameter_set import Citation, ParameterSet, chosen_valve, number_in_si, with_followers
 from ppafo.storage.foreign import ColumnMap
 
 _Recordings = Annotated[tuple[Text, ...], Field(strict=False, min_length=1, description="files, relative to this one")]
@@ -62,7 +62,7 @@ class Setting:
 
     def number(self, path: str) -> float:
         """Return the value at a path [SI]; IdentificationError where the set lacks it."""
-        value = number_in_si(self.parameter_set, path)
+        value = number_in_si(with_followers(self.parameter_set), path)
         if value is None:
             raise IdentificationError(f"{self.place}: needs {path}, which {self.parameter_set.file} does not have")
         return value
@@ -91,7 +91,7 @@ class Setting:
 
     def deviation(self, path: str, value: float, unit: str) -> float:
         """Return the standard deviation of a number that the set has or leaves to the problem, at a value [unit]."""
-        entry = self.parameter_set.numbers.get(path)
+        entry = with_followers(self.parameter_set).numbers.get(path)
         return self.tolerances.deviation_of(path, value, 0.0 if entry is None else stated_half_width(entry, unit))
 
     def valve_path(self, name: str | None) -> str:

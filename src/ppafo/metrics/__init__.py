@@ -4,7 +4,7 @@ To add a metric: a function and its MetricKind in a module of this folder, liste
 """
 
 from ppafo.kinds import Kinds
-from ppafo.metrics import gas, motion, strides, switching, tracking, wearer
+from ppafo.metrics import gas, motion, strides, switching, tracking
 from ppafo.metrics.metric import Metric, MetricKind
 from ppafo.signals import Recording
 
@@ -23,7 +23,6 @@ METRICS: Kinds[MetricKind] = Kinds(
             *switching.METRICS,
             *motion.METRICS,
             *strides.METRICS,
-            *wearer.METRICS,
         )
     },
 )

@@ -19,8 +19,6 @@ Floats = NDArray[np.float64]
 WALK, STEADY, REQUEST, LED_SHANK = "walk", "steady strides", "requested torque", "shank of a gait"
 """What a metric may need beside channels: a walk, one of equal strides, a controller of it that wants a torque; or a
 leg whose shank a gait leads."""
-LED, REACTS = "prescribed gait", "wearer who reacts"
-"""Whose walk it is: of a wearer whose gait is prescribed, or of a neuromuscular gait model."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from ppafo.metrics.metric import LED, REQUEST, STEADY, WALK, Floats, MetricKind, ReadAt, Readings, less, time_if_any
+from ppafo.metrics.metric import REQUEST, STEADY, WALK, Floats, MetricKind, ReadAt, Readings, less, time_if_any
 from ppafo.model.columns import choose, larger, root
 from ppafo.model.helping import HELPS, PUSH_OFF
 from ppafo.signals.meter import Course, MeterKind, Sample, StrideSample
@@ -209,7 +209,7 @@ METRICS = (
     _mean("gas"),
     _mean("positive_push_off_work"),
     _mean("net_push_off_work"),
-    _mean("toe_clearance", LED),
+    _mean("toe_clearance"),
     _mean("toe_landing"),
     _kind(
         "counted_strides",

@@ -8,6 +8,7 @@ heat through it: ``dE/dt = sum of m_dot h_up - P dV/dt + h A (T_wall - T)``. Gas
 import math
 from dataclasses import dataclass
 
+from ppafo.constants import MOLAR_MASSES
 from ppafo.model.columns import over_runs, root
 from ppafo.model.elementary import power
 
@@ -27,10 +28,10 @@ _WEBBOOK = "NIST Chemistry WebBook, SRD 69, at 298 K and 1 bar"
 SPECIES: dict[str, Species] = {
     species.name: species
     for species in (
-        Species("CO2", 0.044, 1.3, "the paper, p. 3, after equation (3); WebBook: 0.04401 kg/mol, 1.294"),
-        Species("air", 0.028965, 1.4, _WEBBOOK),
-        Species("N2", 0.028013, 1.401, _WEBBOOK),
-        Species("He", 0.0040026, 1.667, _WEBBOOK),
+        Species("CO2", MOLAR_MASSES["CO2"], 1.3, "the paper, p. 3, after equation (3); WebBook: 0.04401 kg/mol, 1.294"),
+        Species("air", MOLAR_MASSES["air"], 1.4, _WEBBOOK),
+        Species("N2", MOLAR_MASSES["N2"], 1.401, _WEBBOOK),
+        Species("He", MOLAR_MASSES["He"], 1.667, _WEBBOOK),
     )
 }
 

@@ -28,7 +28,7 @@ from ppafo.parameters.device import (
     Supply,
     Valve,
 )
-from ppafo.parameters.graph import ATMOSPHERE_PATH, SECOND_PRESSURE_PATH, Graph
+from ppafo.parameters.graph import ATMOSPHERE_PATH, DISPLACEMENT_PATH, SECOND_PRESSURE_PATH, Graph
 from ppafo.parameters.overrides import FORMS, either, in_two_forms
 from ppafo.parameters.parameter_set import (
     ParameterSet,
@@ -37,7 +37,7 @@ from ppafo.parameters.parameter_set import (
     entry_in_si,
     links_of_set,
     number_text,
-    with_second_pressure,
+    with_followers,
 )
 from ppafo.parameters.plant import shape_and_growth
 
@@ -57,7 +57,7 @@ def build_device(parameter_set: ParameterSet, valve: str | None = None, links: G
     """
     name = chosen_valve(parameter_set, valve)
     links = links_of_set(parameter_set) if links is None else links
-    parameter_set = with_second_pressure(parameter_set)
+    parameter_set = with_followers(parameter_set)
     _check_complete(parameter_set, name)
     read, kind = _reader(parameter_set), parameter_set.valve_kinds[name]
     relieving = parameter_set.flags.get(declaration.RELIEVING_PATH)
@@ -245,8 +245,8 @@ def missing_values(parameter_set: ParameterSet, valve: str) -> list[str]:
         needed += [f"{section}.{member.name}" for member in form]
     kind = parameter_set.valve_kinds[valve]
     needed += [f"valves.{valve}.{member.name}" for member in VALVES[kind].quantities if member.default is None]
-    # Without a pressure of its own, chamber 2 has the one of chamber 1.
-    missing = [path for path in needed if path not in (*parameter_set.numbers, SECOND_PRESSURE_PATH)]
+    # Without numbers of their own, chamber 2 has the pressure of chamber 1, and a vane displaces its torque constant.
+    missing = [path for path in needed if path not in (*parameter_set.numbers, SECOND_PRESSURE_PATH, DISPLACEMENT_PATH)]
     return missing + [path for path in (declaration.SPECIES_PATH,) if path not in parameter_set.texts]
 
 

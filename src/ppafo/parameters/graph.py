@@ -17,6 +17,7 @@ from ppafo.units import to_si
 
 ATMOSPHERE_PATH = "supply.atmospheric_pressure"
 PRESSURE_PATH, SECOND_PRESSURE_PATH = "supply.pressure", "supply.dorsiflexion_pressure"
+TORQUE_CONSTANT_PATH, DISPLACEMENT_PATH = "actuator.torque_constant", "actuator.displacement_per_radian"
 SAME_PRESSURE = 1.0e-6
 """Relative difference below which two pressures are one that was written in two units."""
 _LEVEL, _GAUGE = "Pa_a", "_g"

@@ -20,6 +20,7 @@ from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import SECTION
 from ppafo.parameters import declaration
 from ppafo.parameters.building import build_device
+from ppafo.parameters.declaration import alternatives
 from ppafo.parameters.device import VANE, Device
 from ppafo.parameters.overrides import check_valve
 from ppafo.parameters.parameter_set import (
@@ -204,7 +205,7 @@ def parse_parameter_set(content: bytes, file: str, folder: Path | None = None) -
             hint = nearest_name(valve, parameter_set.valve_kinds)
             raise ParameterError(f"{parameter_set.file}: {path}: there is no valve '{valve}'{hint}")
         with refused_as(ParameterError, f"{parameter_set.file}: {path}.unit", UnitError):
-            check_unit(entry.unit)
+            check_unit(entry.unit, alternatives(declared[path])[0])
     return parameter_set
 
 

@@ -14,18 +14,21 @@ from ppafo.model.catalog import EFFECTS, find_effects
 from ppafo.model.declaration import Quantity
 from ppafo.model.gas import SPECIES
 from ppafo.parameters.declaration import RELIEVING_PATH, SPECIES_PATH, alternatives, quantities
+from ppafo.parameters.flow_coefficients import USUAL_CRITICAL_RATIO, conductance_of
 from ppafo.parameters.graph import (
     ATMOSPHERE_PATH,
+    DISPLACEMENT_PATH,
     PRESSURE_PATH,
     SAME_PRESSURE,
     SECOND_PRESSURE_PATH,
+    TORQUE_CONSTANT_PATH,
     Follows,
     acting,
     follows,
     gauge_link,
 )
 from ppafo.parameters.overrides import CHOSEN_VALVE, NAMED_VALVE, Given, one_path, other_forms, override_set
-from ppafo.units import base_value, format_quantity, split_quantity, to_si
+from ppafo.units import base_value, format_quantity, from_si, split_number, to_si
 
 if TYPE_CHECKING:  # few devices have a measured actuator
     from ppafo.model.actuators.table import Table
@@ -165,10 +168,11 @@ def atmospheric_pressure(parameter_set: ParameterSet) -> float:
 def links_of_set(
     parameter_set: ParameterSet, given: Collection[str] = (), atmosphere: float | None = None
 ) -> dict[str, tuple[Follows, ...]]:
-    """Return how pressures of a set follow others: gauge ones the atmosphere, the second regulator the first.
+    """Return how numbers of a set follow others: gauge pressures the atmosphere, the second regulator the first.
 
-    It does where the set has one pressure for both, unless it was ``given`` by an override and the first was not. With
-    an ``atmosphere`` [Pa absolute] they are compared at it, else at the set's.
+    The second regulator does where the set has one pressure for both, unless it was ``given`` by an override and the
+    first was not; with an ``atmosphere`` [Pa absolute] they are compared at it, else at the set's. The displacement of
+    a vane per radian is its torque constant, by virtual work, unless the set states another.
     """
     numbers = parameter_set.numbers
     found = {
@@ -182,6 +186,8 @@ def links_of_set(
         SECOND_PRESSURE_PATH in given and PRESSURE_PATH not in given
     ):
         found[SECOND_PRESSURE_PATH] = (follows(PRESSURE_PATH, when_set=True), *found[SECOND_PRESSURE_PATH])
+    if DISPLACEMENT_PATH in parameter_set.declarations() and DISPLACEMENT_PATH not in numbers:
+        found[DISPLACEMENT_PATH] = (follows(TORQUE_CONSTANT_PATH),)
     return {path: links for path, links in found.items() if links}
 
 
@@ -197,13 +203,27 @@ def has_one_pressure(parameter_set: ParameterSet, atmosphere: float | None = Non
     return math.isclose(first, second, rel_tol=SAME_PRESSURE)
 
 
-def with_second_pressure(parameter_set: ParameterSet) -> ParameterSet:
-    """Return the set with the first regulator's pressure for the second too, unless the set gives it apart."""
-    first = parameter_set.numbers.get(PRESSURE_PATH)
-    if first is None or SECOND_PRESSURE_PATH in parameter_set.numbers:
-        return parameter_set
-    second = first.model_copy(update={"note": f"follows {PRESSURE_PATH}"})
-    return replace(parameter_set, numbers={**parameter_set.numbers, SECOND_PRESSURE_PATH: second})
+def with_followers(parameter_set: ParameterSet) -> ParameterSet:
+    """Return the set with what it leaves to follow from another of its numbers.
+
+    The second regulator has the pressure of the first, and a vane displaces its torque constant per radian: what the
+    shaft does, T dtheta, is what the gas does, (P1 - P2) dV.
+    """
+    pressure, constant = (parameter_set.numbers.get(path) for path in (PRESSURE_PATH, TORQUE_CONSTANT_PATH))
+    followers = {}
+    if pressure is not None:
+        note = f"follows {PRESSURE_PATH}"
+        followers[SECOND_PRESSURE_PATH] = pressure.model_copy(update={"note": note, "key": ""})
+    if constant is not None and DISPLACEMENT_PATH in parameter_set.declarations():
+        followers[DISPLACEMENT_PATH] = Entry(
+            value=constant.value,
+            unit=f"{constant.unit}/rad",
+            origin="derived",
+            source="virtual work",
+            note=f"follows {TORQUE_CONSTANT_PATH}",
+            uncertainty=constant.uncertainty,
+        )
+    return replace(parameter_set, numbers={**followers, **parameter_set.numbers})
 
 
 def entry_in_si(entry: Entry, quantity: Quantity, atmosphere: float) -> float:
@@ -294,15 +314,28 @@ def _with_number(parameter_set: ParameterSet, path: str, given: Given) -> Parame
         # Nothing is spelt alike: values of the same section stand for what there is.
         near = [name for name in allowed if name.startswith(f"{given.typed.partition('.')[0]}.")] or allowed
         hint = nearest_name(given.typed, allowed) or f"; for example {', '.join(near[:6])}"
-        raise ParameterError(f"override '{given}': {parameter_set.file} has no value '{given.typed}'{hint}")
+        worked = _in_conductance(given)
+        raise ParameterError(f"override '{given}': {parameter_set.file} has no value '{given.typed}'{hint}{worked}")
     try:
-        value, unit = split_quantity(given.text)
+        value, unit = split_number(given.text)
         entry = Entry(value=value, unit=unit, origin="assumed", source=SOURCE, note=_before(parameter_set, path))
         entry_in_si(entry, declared[path], atmospheric_pressure(parameter_set))
     except UnitError as error:
         raise ParameterError(f"override '{given}': {error}") from error
     kept = {key: old for key, old in parameter_set.numbers.items() if key not in other_forms(path)}
     return replace(parameter_set, numbers={**kept, path: entry})
+
+
+def _in_conductance(given: Given) -> str:
+    """Return Cv, Kv or a nominal flow as the two settings that say it; nothing for any other value."""
+    section, _, name = given.typed.rpartition(".")
+    conductance = conductance_of(name.lower(), given.text) if name.lower() in ("cv", "kv", "qn") else None
+    if conductance is None:
+        return ""
+    return (
+        f": --set '{section}.sonic_conductance={from_si(conductance, 'L/(s bar)', 'm^3/(s Pa)'):.4g} L/(s bar)' "
+        f"--set '{section}.critical_ratio={USUAL_CRITICAL_RATIO:g}'"
+    )
 
 
 def _with_species(parameter_set: ParameterSet, path: str, given: Given) -> ParameterSet:
@@ -338,5 +371,5 @@ _CHANGES = {SPECIES_PATH: _with_species, RELIEVING_PATH: _with_relieving}
 
 def _before(parameter_set: ParameterSet, path: str) -> str:
     """Return what stood at the path, so that an override never hides the value it replaces."""
-    entry = parameter_set.entries().get(path)
+    entry = with_followers(parameter_set).entries().get(path)
     return f"the set has {entry_text(entry)} ({entry.origin}: {entry.source})" if entry else "the set has no value"

@@ -134,16 +134,14 @@ def draw_stored_result(stored: StoredResult) -> "Figure":
 
 
 def draw_stored_walk(file: Path, document: Mapping[str, Any], recording: Recording) -> "Figure":
-    """Return the figure of the last seconds of a saved walk, with the fall or failure that ended it.
+    """Return the figure of the last seconds of a saved walk, with the failure that ended it, if any.
 
     ``document`` is what ``file`` holds, empty where there is none; DataError names the key that is of another form.
     """
     end = float(recording.time[-1])
     # A short walk is drawn whole, and then nothing is left out that had to be said.
     part = f"the last {_END_OF_WALK:g} s of {end:.4g} s" if recording.duration > _END_OF_WALK else ""
-    fall = _positive(file, document, "a time in s", "metrics", "fall_time", "value")
-    fallen = "" if fall is None else f"the wearer falls at {fall:.1f} s"
-    remark = "; ".join(text for text in (_ending(file, document), fallen, part) if text)
+    remark = "; ".join(text for text in (_ending(file, document), part) if text)
     atmosphere = stated_atmosphere(file, document, "configuration", "device")
     shown = recording.between(end - _END_OF_WALK, end)
     valve = str(_under(file, document, "configuration", "device", "valve").get("kind", ""))

@@ -39,23 +39,6 @@ class StrideSample(NamedTuple):
     time: float
 
 
-class WearerSample(NamedTuple):
-    """A neuromuscular gait model at a sample: totals since the start, as in the state of the leg.
-
-    ``strides``; ``way`` of the hip [m]; ``clearances`` [m]; ``muscle_work`` [J]; metabolic energy [J] by two
-    models; ``fall_time`` [s], below 0 before a fall; ``time`` [s].
-    """
-
-    strides: float
-    way: float
-    clearances: float
-    muscle_work: float
-    umberger: float
-    bhargava: float
-    fall_time: float
-    time: float
-
-
 class Sample(NamedTuple):
     """One sample of a recording: its number from 0, channels in SI units, and the channels of a foot and of a stride.
 
@@ -117,7 +100,7 @@ class MeterKind:
 
     ``start(course, sample)`` makes it at the first sample, ``update(state, course, sample)`` at each later one. What
     ``course`` says of the hold is right up to this sample. A meter without ``needs_course`` must not look at it; one
-    that is ``of_motion`` stays as it started while the vane stands still. One ``of_wearer`` takes a ``WearerSample``.
+    that is ``of_motion`` stays as it started while the vane stands still.
     """
 
     name: str
@@ -126,4 +109,3 @@ class MeterKind:
     update: Callable[[Any, Course, Any], Any]
     needs_course: bool = False
     of_motion: bool = False
-    of_wearer: bool = False

@@ -83,26 +83,6 @@ CHANNELS: dict[str, ChannelKind] = {
     "toe_height": ChannelKind(
         "m", "toes over the ground, against the healthy gait with a flat foot at the same instant"
     ),
-    "knee_angle": ChannelKind("rad", "knee angle of the leg with the device, 180 deg straight"),
-    "hip_angle": ChannelKind(
-        "rad", "hip angle of the leg with the device, 180 deg in line with the trunk, growing in extension"
-    ),
-    "other_ankle_angle": ChannelKind("rad", "ankle angle of the other leg, growing in plantarflexion"),
-    "other_knee_angle": ChannelKind("rad", "knee angle of the other leg, 180 deg straight"),
-    "other_hip_angle": ChannelKind("rad", "hip angle of the other leg"),
-    "trunk_lean": ChannelKind("rad", "lean of the trunk from the vertical, forward above 0"),
-    "hip_height": ChannelKind("m", "hip over the ground"),
-    "hip_position": ChannelKind("m", "hip in front of where it started"),
-    "ground_force": ChannelKind("N", "vertical force of the ground on the foot with the device"),
-    "other_ground_force": ChannelKind("N", "vertical force of the ground on the other foot"),
-    "wearer_ankle_moment": ChannelKind(
-        "N m", "moment of the wearer on the ankle without the device, plantarflexion above 0"
-    ),
-    "muscle_work": ChannelKind("J", "work of all muscles as they shorten since the start"),
-    **{
-        f"{name}_activation": ChannelKind(PLAIN_NUMBER, f"activation of the {name} of the leg with the device")
-        for name in ("soleus", "tibialis", "gastrocnemius", "vastus", "hamstring", "gluteus", "flexor")
-    },
     "mass_1": ChannelKind("kg", "gas in chamber 1"),
     "mass_2": ChannelKind("kg", "gas in chamber 2"),
     "temperature_1": ChannelKind("K", "temperature of the gas in chamber 1, of a gas with an energy balance"),

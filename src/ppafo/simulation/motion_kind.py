@@ -1,14 +1,12 @@
 """Kinds of motion by name: what each brings to the runs of its scenarios, and where it is found.
 
-A kind is loaded when a document or a scenario names it: a vane alone loads no walk, and a walk along a prescribed gait
-no neuromuscular model.
+A kind is loaded when a document or a scenario names it: a vane alone loads no walk.
 """
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from ppafo.errors import one_line
 from ppafo.kinds import Kinds, declared_kinds
 from ppafo.model.declaration import Quantity
 
@@ -26,8 +24,8 @@ class MotionKind:
     text where it has it. ``measured(scenario, run, times, rows)`` gives recording and metrics of rows (samples,) by
     path, and how a run that was completed ended, in words.
 
-    A kind has either a ``section``, which the file of a vane alone has as ``[motion]``, or a ``walk``, what the kinds
-    of walks differ in, a ``walking.kind.WalkKind``: the file of a walk is laid out in another way.
+    ``section`` is what the file of a vane alone has as ``[motion]``, None of a walk, whose file is laid out in another
+    way.
     """
 
     name: str
@@ -41,7 +39,6 @@ class MotionKind:
     lacks: Callable[..., str]
     measured: Callable[..., Any]
     section: "MotionSection | None" = None
-    walk: Any = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,8 +70,8 @@ class ProfileTable:
     own: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
-WALK, REACT = "walk", "react"
-"""The motion of a leg that a gait leads, and the motion of a neuromuscular gait model."""
+WALK = "walk"
+"""The motion of a leg that a gait leads."""
 
 VANE_MOTIONS = ("free", "locked", "prescribed", "leg")
 """Motions of a vane alone that this package has."""
@@ -87,13 +84,4 @@ MOTIONS: Kinds[MotionKind] = Kinds(_GROUP, "motion", MotionKind, declared_kinds(
 def is_walk(name: str) -> bool:
     """Tell whether a kind of motion is a walk; KindError where the kind cannot be used."""
     kind = MOTIONS.get(name)
-    return kind is not None and kind.walk is not None
-
-
-RENAMED_KEYS = {"wearer.reacts": 'motion.kind = "react" and wearer.name = "{value}"'}
-"""Keys of files of the version before, and what to write in their place."""
-
-
-def renamed_key(path: str, value: object) -> str:
-    """Return what to write in the place of an old key, with its value; an empty text for a key of today."""
-    return f"is now {RENAMED_KEYS[path].format(value=one_line(value))}" if path in RENAMED_KEYS else ""
+    return kind is not None and kind.section is None

@@ -25,7 +25,6 @@ from ppafo.parameters.overrides import (
     split_override,
 )
 from ppafo.simulation.declaration import ARITHMETIC, OF_A_VANE, Declared, kind_at, no_arithmetic, value_at
-from ppafo.simulation.motion_kind import RENAMED_KEYS, renamed_key
 from ppafo.units import number_text
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
@@ -33,8 +32,6 @@ _SEED, _VALVE = "sensors.seed", "device.valve"
 _OF_ANY_KIND = {"controller": frozenset({"kind", "rate", "period"})}
 _KIND = "kind"
 """Last name of paths that decide which other values their section has."""
-_OF_MOTION, _WEARER = "motion.kind", "wearer."
-"""The kind of motion decides about the wearer too."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,8 +68,6 @@ def apply_overrides(
             if path == ARITHMETIC:
                 instead = no_arithmetic(kind_at(changed, "controller"), own[path].text)
                 raise ScenarioError(f"override '{own[path]}': {instead}")
-            if path in RENAMED_KEYS:
-                raise ScenarioError(f"override '{own[path]}': {renamed_key(path, own[path].text)}")
             raise _unused(path, own, (*known, *declared.same), file)
     for path in waiting:
         if path in declared.appended:
@@ -121,9 +116,8 @@ def chosen_by(path: str, choosing: Iterable[str]) -> list[str]:
     """Return the paths that decide whether there is a value at a path, the nearest one last."""
     found = []
     for chosen in choosing:
-        own = (f"{chosen.rpartition('.')[0]}.",)
-        begins = (*own, _WEARER) if chosen == _OF_MOTION else own
-        found += [chosen] if chosen != path and path.startswith(begins) else []
+        own = f"{chosen.rpartition('.')[0]}."
+        found += [chosen] if chosen != path and path.startswith(own) else []
     return sorted(found, key=len)
 
 

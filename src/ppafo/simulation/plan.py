@@ -15,7 +15,7 @@ from ppafo.control.kind import ControllerKind, ProfileKind
 from ppafo.engine.components import GasScheme
 from ppafo.engine.program import NoParameters, Program
 from ppafo.engine.rows import rebuilt
-from ppafo.engine.run import Lines, Run, WornLeg
+from ppafo.engine.run import Lines, Run, Walk
 from ppafo.engine.scheme.actuators import volumes_of
 from ppafo.engine.scheme.isothermal_gas import ISOTHERMAL
 from ppafo.engine.scheme.pneumatics import KEPT_OF_PRESSURE, is_slow
@@ -143,7 +143,7 @@ def compose_run(
     plant: PlantParameters,
     rule: StepRule,
     start: Start,
-    walk: WornLeg | None = None,
+    walk: Walk | None = None,
 ) -> Run:
     """Return the run of components: ``rule`` says how it is stepped, ``start`` where it begins, ``walk`` adds a leg.
 
@@ -225,7 +225,7 @@ def _gas_scheme(components: Components, effects: Sequence[Effect]) -> GasScheme:
     return scheme
 
 
-def _program(components: Components, steps: Steps, walk: WornLeg | None, has_delay: bool) -> Program:
+def _program(components: Components, steps: Steps, walk: Walk | None, has_delay: bool) -> Program:
     """Return what the lanes are composed of."""
     is_late, effects = first(components.signal_delay) > 0.0, effects_of(components.device, components.sections)
     return Program(

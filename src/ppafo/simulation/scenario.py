@@ -341,7 +341,7 @@ class Scenario:
     @property
     def walks(self) -> bool:
         """True where a leg walks with the device, false for a vane alone."""
-        return self.motion.motion_kind.walk is not None
+        return self.motion.motion_kind.section is None
 
     @property
     def graph(self) -> Graph:

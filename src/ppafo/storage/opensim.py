@@ -316,13 +316,8 @@ def opensim_recording(
 ) -> tuple[Recording, tuple[str, ...]]:
     """Return a recording of a walk in OpenSim's names, zero and signs, and the channels that need ``body_mass`` [kg].
 
-    Moment and force per mass become the body's; without a body mass they are left out and named. DataError for
-    a neuromuscular gait model.
+    Moment and force per mass become the body's; without a body mass they are left out and named.
     """
-    if "other_hip_angle" in recording.names:
-        raise DataError(
-            f"{recording.label}: a neuromuscular gait model walks on two legs, which has no form of OpenSim yet"
-        )
     foot, ankle, mass = side[0], f"ankle_angle_{side[0]}", body_mass or 0.0
     units = {name: recording.unit(name) for name in recording.names}
     per_mass = [name for name in _PER_MASS if units.get(name) in ("N m/kg", "-", "N/kg")]

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.simulation.ensemble.running import reacts
 from ppafo.studies.distributions import Floats
 from ppafo.studies.sampling import correlate, uniform_numbers
 from ppafo.studies.study import Configuration, Study, with_followers
@@ -18,8 +17,6 @@ MAXIMUM_RUNS_OF_CHUNK = 65_536
 _FEWEST_RUNS_OF_CHUNK = 512
 _SLOW_RUNS_OF_CHUNK = 64
 """Where a Python object controls: some seconds, after which progress is said and nothing of it is lost."""
-_REACTING_RUNS_OF_CHUNK = 64
-"""Where the wearer reacts: a quarter of a minute of one processor, for walks of a minute."""
 _MAXIMUM_BYTES_OF_TRACES = 48_000_000
 
 
@@ -39,8 +36,6 @@ def chunk_size(study: Study) -> int:
         return study.runs_of_chunk
     if any(item.scenario.controller.custom is not None for item in study.configurations):
         return _SLOW_RUNS_OF_CHUNK
-    if any(reacts(item.scenario) for item in study.configurations):
-        return _REACTING_RUNS_OF_CHUNK
     bytes_of_run = 8 * len(study.outputs.traces) * max(samples_of(study, item) for item in study.configurations)
     size = MAXIMUM_RUNS_OF_CHUNK
     while size > _FEWEST_RUNS_OF_CHUNK and size * bytes_of_run > _MAXIMUM_BYTES_OF_TRACES:

@@ -12,7 +12,7 @@ from ppafo.metrics import METRICS
 from ppafo.metrics.tracking import ONE_INSTANT, settled_error
 from ppafo.progress import Progress, Report
 from ppafo.simulation.ensemble import run_ensemble
-from ppafo.simulation.ensemble.running import lacking, reacts
+from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import Floats
 from ppafo.studies.draws import check_metrics
@@ -24,8 +24,8 @@ _Made = Callable[[Mapping[str, Floats]], tuple[Rows, str]]
 FAILED = "failed"
 OSCILLATES = ("rms_error_hold", "oscillations_hold")
 """What says whether a metric at one instant can be believed."""
-_AT_ONCE, _SLOW_AT_ONCE, _REACTING_AT_ONCE = 16_384, 32, 64
-"""Runs between two reports: as a rule, where a Python object controls, and where the wearer reacts."""
+_AT_ONCE, _SLOW_AT_ONCE = 16_384, 32
+"""Runs between two reports: as a rule, and where a Python object controls."""
 
 
 @final
@@ -79,8 +79,7 @@ class Runs:
             reason = result.reasons[min(result.reasons)] if result.reasons else ""
             return {**values, FAILED: result.status != 0}, reason
 
-        at_once = _REACTING_AT_ONCE if reacts(scenario) else _AT_ONCE
-        self._begin(metrics, rows, tally, at_once if scenario.controller.custom is None else _SLOW_AT_ONCE)
+        self._begin(metrics, rows, tally, _AT_ONCE if scenario.controller.custom is None else _SLOW_AT_ONCE)
 
     @classmethod
     def of_model(cls, model: Callable[[Mapping[str, Floats]], Mapping[str, Any]], metrics: Sequence[str]) -> "Runs":

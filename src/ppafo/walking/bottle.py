@@ -15,7 +15,6 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from ppafo.constants import GRAMS_PER_KILOGRAM
-from ppafo.engine.lane_samples import FELL
 from ppafo.engine.lanes import BatchResult, Floats, begin_block
 from ppafo.engine.rows import leaf_paths, leaves, row_numbers
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of
@@ -527,8 +526,6 @@ def _use_bottle(
             (done, min(lanes.gauge(float(block.states[line, 0]), now) for line in lines)),
         ]
         use.ending = _ending(supply, state, now, max(gauge for _, gauge in gauges), time)
-        if use.ending is None and FELL in states and block.states[states[FELL], 0] >= 0.0:
-            use.ending = SupplyEnding(WALKED, f"the wearer fell, and {_grams(state.mass)} are left in the bottle", time)
         if schedule is not None and use.ending is None:
             if time >= schedule.longest:
                 break

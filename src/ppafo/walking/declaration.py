@@ -27,9 +27,8 @@ from ppafo.simulation.declaration import (
     gas_settings,
     kind_at,
     line_paths,
-    value_at,
 )
-from ppafo.simulation.motion_kind import MOTIONS, RENAMED_KEYS, VANE_MOTIONS, WALK, is_walk, renamed_key
+from ppafo.simulation.motion_kind import MOTIONS, VANE_MOTIONS, WALK, is_walk
 from ppafo.simulation.schema import (
     controller_table,
     file_model,
@@ -39,8 +38,11 @@ from ppafo.simulation.schema import (
     quantity_fields,
 )
 from ppafo.walking.bottle import BOTTLE, BOTTLE_NAME, BOTTLE_NUMBERS, BOTTLE_OVERRIDES
-from ppafo.walking.kind import WalkKind, kind_of_walk, walk_kind_of
 from ppafo.walking.preparation import DISTORTED, FROZEN
+from ppafo.walking.wearer import WEARER
+
+SUMMARY = "the device on a leg that walks along a prescribed gait"
+"""What the motion of a walk is."""
 
 THRESHOLDS = next(iter(TIMINGS))
 """The estimator of the gait phase of a walk file that names none."""
@@ -128,11 +130,11 @@ def fault_numbers(part: str, kind: str) -> tuple[Quantity, ...]:
     return FAULTS[part][kind].quantities if kind else ()
 
 
-def sections(kind: WalkKind, controller: str, timing: str, gas: str) -> dict[str, tuple[Quantity, ...]]:
+def sections(controller: str, timing: str, gas: str) -> dict[str, tuple[Quantity, ...]]:
     """Return the declarations of the numbers of any walk with these kinds, by section; an unknown kind has none."""
     laws = walking_controllers()
     return {
-        "wearer": kind.numbers,
+        "wearer": (*WEARER, PERSON),
         "controller": (RATE, PERIOD, *(laws[controller].quantities if controller in laws else ())),
         "timing": TIMINGS[timing].quantities if timing in TIMINGS else (),
         "sensors": (*WALK_SENSORS, SEED),
@@ -154,11 +156,6 @@ def timing_of(document: Mapping[str, Any]) -> str:
 def find_kinds(document: Mapping[str, Any], file: str) -> None:
     """Load the controller that a document names, where another package has it; ScenarioError where that fails."""
     motion = kind_at(document, "motion")
-    # Before the schema, which would only say that it does not know the old key.
-    for path in RENAMED_KEYS:
-        old = value_at(document, path)
-        if old is not None:
-            raise ScenarioError(f"{file}: {path} = {quote(old)}: {renamed_key(path, old)}")
     _check_motion(motion, f"{file}: motion.kind = {quote(motion)}")
     with refused_as(ScenarioError, f"{file}: controller.kind", KindError):
         load_walking_controller(kind_at(document, "controller"))
@@ -179,7 +176,7 @@ def _check_motion(kind: object, place: str) -> None:
         raise ScenarioError(f"{place} is not known{nearest_name(str(kind), known)}; allowed: {', '.join(known)}")
 
 
-def _texts(document: Mapping[str, Any]) -> tuple[str, ...]:
+def _texts(_document: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the paths of every text that a document can hold."""
     kinds = (
         "controller.kind",
@@ -187,14 +184,14 @@ def _texts(document: Mapping[str, Any]) -> tuple[str, ...]:
         "gas_model.kind",
         *(f"faults.{part}.kind" for part in FAULTS),
     )
-    return (*TEXTS, "motion.kind", "gait", "task_sequence", *walk_kind_of(document).texts, BOTTLE_NAME, *kinds)
+    return (*TEXTS, "motion.kind", "gait", "task_sequence", BOTTLE_NAME, *kinds)
 
 
 def _quantities(document: Mapping[str, Any]) -> dict[str, Quantity]:
     """Return the declaration of every number that a document with its kinds can hold, by path."""
     find_kinds(document, "the file of a walk")
     controller, gas = kind_at(document, "controller"), kind_at(document, "gas_model")
-    found = by_path(sections(walk_kind_of(document), controller, timing_of(document), gas) | {BOTTLE: BOTTLE_NUMBERS})
+    found = by_path(sections(controller, timing_of(document), gas) | {BOTTLE: BOTTLE_NUMBERS})
     for part, kinds in FAULTS.items():
         found |= by_path({f"faults.{part}": [item for fault in kinds.values() for item in fault.quantities]})
     return found | by_path({"shut_off": SHUT_OFF}) | line_paths()
@@ -225,13 +222,12 @@ def _fault(part: str) -> Any:
 
 
 def walk_file(document: Mapping[str, Any]) -> type[BaseModel]:
-    """Return the model of the file of a kind of walk, for the controllers that are loaded."""
-    named = kind_at(document, "motion") or WALK
-    return _walk_file(tuple(walking_controllers().items()), ((named, walk_kind_of(document)),))
+    """Return the model of the file of a walk, for the controllers that are loaded."""
+    return _walk_file(tuple(walking_controllers().items()), (kind_at(document, "motion") or WALK,))
 
 
 @functools.lru_cache(maxsize=8)
-def _walk_file(_controllers: Any, walks: tuple[tuple[str, WalkKind], ...]) -> type[BaseModel]:
+def _walk_file(_controllers: Any, motions: tuple[str, ...]) -> type[BaseModel]:
     seed = Annotated[int, Field(ge=0, le=LARGEST_SEED)]
     sensors = quantity_fields(WALK_SENSORS)
     sensors["seed"] = (seed, Field(1, description=SEED.summary))
@@ -256,13 +252,7 @@ def _walk_file(_controllers: Any, walks: tuple[tuple[str, WalkKind], ...]) -> ty
             str, "name of a task sequence, or the path of its file; stride after equal stride unless one is given"
         ),
     }
-    motion = one_of(
-        [table(f"{model_name(name)}Motion", kind_field(name, kind.summary) | which) for name, kind in walks]
-    )
-    wearer: dict[str, Any] = {}
-    for _, kind in walks:
-        texts = {path.partition(".")[2]: optional(str, summary) for path, summary in kind.texts.items()}
-        wearer |= texts | quantity_fields(kind.numbers)
+    motion = one_of([table(f"{model_name(name)}Motion", kind_field(name, SUMMARY) | which) for name in motions])
     own: dict[str, Any] = {
         "run": optional(table("WalkRun", run), "how long it is, and how it is computed"),
         "motion": optional(motion, "that it is a walk; gait and task sequence may stand here"),
@@ -273,7 +263,8 @@ def _walk_file(_controllers: Any, walks: tuple[tuple[str, WalkKind], ...]) -> ty
         ),
         "timing": optional(one_of(timings), "how the controller estimates the gait phase; thresholds unless given"),
         "wearer": optional(
-            table("Wearer", wearer), "who walks; the subject of the gait that is named, else the paper's, unless given"
+            table("Wearer", quantity_fields((*WEARER, PERSON))),
+            "who walks; the subject of the gait that is named, else the paper's, unless given",
         ),
         "sensors": optional(table("WalkSensors", sensors), "sensors of the controller; ideal unless given"),
         "faults": optional(table("Faults", faults), "sensors and parts of the plant that fail during the walk"),
@@ -293,5 +284,5 @@ def json_schema() -> dict[str, Any]:
     WALKING_CONTROLLERS.load_all()
     CONTROLLERS.load_all()
     MOTIONS.load_all()
-    walks = tuple((name, kind_of_walk(name)) for name in MOTIONS if is_walk(name))
-    return make_schema(_walk_file(tuple(walking_controllers().items()), walks), "ppafo walk")
+    motions = tuple(name for name in MOTIONS if is_walk(name))
+    return make_schema(_walk_file(tuple(walking_controllers().items()), motions), "ppafo walk")

@@ -53,22 +53,25 @@ from ppafo.walking.declaration import (
     FAULTY,
     FORCES,
     OF_A_WALK,
+    PERSON,
     SEED,
+    STEP,
     WALK_SENSORS,
     fault_numbers,
     timing_of,
     walk_file,
 )
-from ppafo.walking.kind import WalkKind
 from ppafo.walking.motion import (
     WalkMotion,
     duration_problems,
+    record_interval,
     walk_of,
     with_duration,
 )
-from ppafo.walking.planning import NO_REFERENCE, walking_valve
+from ppafo.walking.planning import NO_REFERENCE, planned_task_sequence, walking_valve
 from ppafo.walking.preparation import FaultSettings
 from ppafo.walking.task_sequence import load_task_sequence
+from ppafo.walking.wearer import links_of_stature, read_wearer, wearer_origin
 
 FILE = TomlKind("walk", "walk", resources.files("ppafo.walking") / "configurations", ScenarioError)
 DEFAULT_PERIOD = 1.0e-3
@@ -163,8 +166,6 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     if BOTTLE_NAME in instead:
         document.setdefault(BOTTLE, {})["name"] = instead[BOTTLE_NAME]
     reading = Reading(request.file, document, changed.paths)
-    kind = MOTIONS[kind_at(document, "motion") or WALK]
-    who: WalkKind = kind.walk
     hardware = read_hardware(reading, request, changed.device)
     device = read_device(reading, hardware)
     with refused_as(ParameterError, f"{reading.file}: [device]", ParameterError):
@@ -172,8 +173,6 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     named_sequence = _named_file("task_sequence", request, document)
     with _named_by("task_sequence", reading, request, ScenarioError):
         sequence = None if named_sequence is None else load_task_sequence(named_sequence)
-        if sequence is not None:
-            who.check_task_sequence(sequence)
     with _named_by("gait", reading, request, DataError):
         walked = load_gait(_named_file("gait", request, document) or NORMATIVE)
     is_named = "gait" in instead or "gait" in document
@@ -185,30 +184,36 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     line = line if line is None or bottle is None else bottle.fed(line)
     sensors = reading.section("sensors", WALK_SENSORS)
     faults = {sensor: _fault(reading, sensor) for sensor in FAULTY}
+    person = reading.number(f"wearer.{PERSON.name}", PERSON)
+    if person != int(person):
+        raise reading.refusal(f"wearer.{PERSON.name}", "must be a whole number")
     motion = WalkMotion(
-        motion_kind=kind,
+        motion_kind=MOTIONS[kind_at(document, "motion") or WALK],
         gait=walked,
+        wearer=read_wearer(reading, walked, is_named),
         timing=timing_of(document),
         forces={name: sensors[name] for name in FORCES},
         faults=faults,
+        task_sequence=sequence,
         bottle=bottle,
+        wearer_origin=wearer_origin(reading, walked, is_named),
+        person=person,
         broken=_broken(reading, line),
         shut_off=_shut_off(reading),
-        **who.read(reading, request, walked, is_named, sequence),
     )
     named = tuple(
         # The path of a file in full means the same from any folder.
         f"{path}={Path(name).absolute() if Path(name).suffix == '.toml' else name}"
         for path, name in instead.items()
     )
-    step = reading.number("run.step", who.step)
+    step = reading.number("run.step", STEP)
     controller, links = _control(reading, device, None if line is None else line.row(device.supply), sensors)
     room = device.supply.atmospheric_pressure
     scenario = Scenario(
         name=document["name"],
         description=document.get("description", ""),
         device=device,
-        run=RunSettings(DEFAULT_DURATION, step, who.interval(DEFAULT_DURATION)),
+        run=RunSettings(DEFAULT_DURATION, step, record_interval(DEFAULT_DURATION)),
         motion=motion,
         initial=Initial(room, room),
         controller=controller,
@@ -223,7 +228,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
         ),
         gas_model=read_gas_model(reading),
         supply_line=line,
-        links={**links, **who.links(reading.document)},
+        links={**links, **links_of_stature(reading.document)},
     )
     # Contradictions are looked for in the whole, once each number is usable by itself.
     check_walk(scenario, reading)
@@ -317,20 +322,20 @@ def _assumed(reading: Reading, bottle: BottleSupply | None) -> tuple[Assumption,
 def _duration(reading: Reading, scenario: Scenario) -> float:
     """Return the length of a walk [s]: its file's, else its task sequence's, else a minute, or ten on a bottle."""
     motion = walk_of(scenario)
-    of_task_sequence = motion.who.duration(motion)
     if value_at(reading.document, "run.duration") is not None:
         duration = reading.number("run.duration", DURATION)
         for is_bad, line in duration_problems(scenario, duration):
             if is_bad:
                 raise ScenarioError(f"{reading.file}: {line(0)}")
         return duration
-    if of_task_sequence is not None:
-        return of_task_sequence
+    if motion.task_sequence is not None:
+        # As long as the wearer with the gait as it is takes for it, whoever walks.
+        return float(planned_task_sequence(motion.task_sequence, motion.gait).duration)
     return DEFAULT_DURATION if motion.bottle is None else BOTTLE_DURATION
 
 
 WALKING = Layout(FILE, OF_A_WALK, walk_file, walk_file, build_walk)
-"""Scenarios whose motion is a walk of any kind."""
+"""Scenarios whose motion is a walk."""
 
 
 def lag_of_bandwidth(bandwidth: float) -> float:

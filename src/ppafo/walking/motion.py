@@ -5,19 +5,19 @@ What may vary in it stands below: its numbers by path, and its times, one by one
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from ppafo.control.walking.catalog import TIMINGS
-from ppafo.errors import ScenarioError
 from ppafo.gait import Gait
+from ppafo.gait.plausible import gait_file_remarks
 from ppafo.model.columns import Problem, at, over_runs
 from ppafo.model.declaration import Quantity
 from ppafo.model.plant_faults import SHUT_OFF
 from ppafo.simulation.clock import Clock
 from ppafo.simulation.declaration import THERMAL, line_paths
-from ppafo.simulation.motion_kind import WALK, MotionKind
+from ppafo.simulation.motion_kind import MotionKind
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.bottle import BottleSupply
 from ppafo.walking.declaration import (
@@ -29,22 +29,9 @@ from ppafo.walking.declaration import (
     fault_numbers,
     sections,
 )
-from ppafo.walking.kind import WalkKind
 from ppafo.walking.preparation import FaultSettings
 from ppafo.walking.task_sequence import TaskSequence
-from ppafo.walking.wearer import WEARER, Wearer
-
-
-class WalkingBody(Protocol):
-    """What walks by itself: its numbers by name, any of which may be an array (runs,), and its task sequence."""
-
-    @property
-    def settings(self) -> Mapping[str, Any]:
-        """Numbers of ``[wearer]`` by name."""
-
-    @property
-    def task_sequence(self) -> TaskSequence | None:
-        """The task sequence, None without one."""
+from ppafo.walking.wearer import WEARER, Wearer, who_walks
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,10 +42,9 @@ class WalkMotion:
     vane has, by name, and ``faults`` those that fail, by sensor; ``broken`` are parts of the plant that fail, and
     ``shut_off`` is the valve of the safe state, {} where none is fitted. ``task_sequence`` is what the wearer does
     one after the other, None where stride follows equal stride; ``bottle`` the one that the device hangs on, None where
-    its supply does not end. ``body`` is what walks by itself in a kind of walk without a prescribed gait, else None.
-    ``wearer_origin`` says in words whose body mass it is. ``person`` is the number of the person
-    of the population who walks, 0 for the wearer with the gait as it is, or a ``Person`` who is drawn already. It, and
-    numbers of wearer, ``forces`` and ``faults``, may be arrays (runs,).
+    its supply does not end. ``wearer_origin`` says in words whose body mass it is. ``person`` is the number of the
+    person of the population who walks, 0 for the wearer with the gait as it is, or a ``Person`` who is drawn already.
+    It, and numbers of wearer, ``forces`` and ``faults``, may be arrays (runs,).
     """
 
     motion_kind: MotionKind = field(compare=False)
@@ -73,23 +59,12 @@ class WalkMotion:
     person: Any = 0.0
     broken: Mapping[str, FaultSettings] = field(default_factory=dict)
     shut_off: Mapping[str, Any] = field(default_factory=dict)
-    body: WalkingBody | None = None
 
     @property
     def label(self) -> str:
         """The motion in a few words."""
-        return self.who.label(self)
-
-    @property
-    def who(self) -> WalkKind:
-        """What this kind of walk differs in from others."""
-        found: WalkKind = self.motion_kind.walk
-        return found
-
-    @property
-    def is_led(self) -> bool:
-        """True where a gait leads the leg."""
-        return self.body is None
+        along = "" if self.task_sequence is None else f", task sequence {self.task_sequence.name}"
+        return f"a walk, gait {self.gait.name}{along}"
 
 
 def walk_of(scenario: Scenario) -> WalkMotion:
@@ -99,21 +74,11 @@ def walk_of(scenario: Scenario) -> WalkMotion:
     return motion
 
 
-def check_led(scenario: Scenario, doing: str) -> None:
-    """Raise ScenarioError for a body that walks by itself, where ``doing`` needs a gait that is prescribed."""
-    motion = walk_of(scenario)
-    if not motion.is_led:
-        kind = motion.motion_kind.name
-        raise ScenarioError(
-            f"{scenario.name}: {doing} needs a prescribed gait, and motion.kind = '{kind}' has none: "
-            f"set it to '{WALK}' (simulate, walk, find, sweep, sensitivity and tune take both)"
-        )
-
-
 def person_remarks(scenario: Scenario) -> list[str]:
-    """Return who walks."""
+    """Return who walks, and what is odd about the zero of the gait's ankle."""
     motion = walk_of(scenario)
-    return motion.who.remarks(motion)
+    remarks = [f"remark: {text}" for text in gait_file_remarks(motion.gait)]
+    return [who_walks(motion.wearer, motion.gait, motion.wearer_origin), *remarks]
 
 
 SHORTEST_STRIDES = 5
@@ -143,10 +108,7 @@ PLACES: Mapping[str, tuple[str, ...]] = {
 def numbers_of_scenario(scenario: Scenario) -> dict[str, Quantity]:
     """Return the declaration of every number of a walk beside its device's, by path."""
     motion, control = walk_of(scenario), scenario.controller
-    found = sections(motion.who, control.kind, motion.timing, "" if scenario.gas_model is None else THERMAL)
-    if motion.body is not None:
-        settings = motion.body.settings
-        found["wearer"] = tuple(item for item in found["wearer"] if item.name in settings)
+    found = sections(control.kind, motion.timing, "" if scenario.gas_model is None else THERMAL)
     # An object in charge has no settings, and a timing is one of a controller that has some.
     found["timing"] = tuple(item for item in found["timing"] if item.name in control.settings)
     for part, fault in {**motion.faults, **motion.broken}.items():
@@ -162,8 +124,8 @@ def record_interval(seconds: float) -> float:
 
 def with_duration(scenario: Scenario, seconds: float) -> Scenario:
     """A walk of another length [s], recorded as often as that allows."""
-    interval = walk_of(scenario).who.interval(seconds)
-    return replace(scenario, run=replace(scenario.run, duration=seconds, output_interval=interval))
+    run = replace(scenario.run, duration=seconds, output_interval=record_interval(seconds))
+    return replace(scenario, run=run)
 
 
 def duration_problems(scenario: Scenario, seconds: Any) -> tuple[Problem, ...]:
@@ -190,8 +152,6 @@ def clock_with(scenario: Scenario, times: Mapping[str, Any]) -> tuple[Clock, tup
     # A rate is another word for the period, and stands in its place.
     if "controller.rate" in times:
         period = 1.0 / times["controller.rate"]
-    output = (
-        over_runs(walk_of(scenario).who.interval, duration) if "run.duration" in times else scenario.run.output_interval
-    )
+    output = over_runs(record_interval, duration) if "run.duration" in times else scenario.run.output_interval
     problems = duration_problems(scenario, duration) if "run.duration" in times else ()
     return Clock(duration, times.get("run.step", scenario.run.step), output, period), problems

@@ -12,11 +12,10 @@ from ppafo.engine.lanes import BatchResult, Floats
 from ppafo.engine.program import LaneResult
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, Walk, state_row_numbers
 from ppafo.metrics import METRICS, Metric, evaluate
-from ppafo.metrics.metric import LED, LED_SHANK, REACTS, REQUEST, STEADY, MetricKind, Metrics
+from ppafo.metrics.metric import LED_SHANK, REQUEST, STEADY, MetricKind, Metrics
 from ppafo.model.contact import SWING
 from ppafo.model.leg import centrifugal_torques, gravity_torques, mass_matrix, passive_torque
 from ppafo.signals import Channel, Recording
-from ppafo.simulation.motion_kind import REACT
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario
 from ppafo.simulation.simulate import Status
 from ppafo.simulation.vane_recording import gas_channels
@@ -52,8 +51,8 @@ REMEDY = "the step may be too long, or a value unrealistic: try a smaller run.st
 
 
 def led_leg(run: Run) -> Walk:
-    """The leg of a run that a gait leads."""
-    assert isinstance(run.walk, Walk), "a gait leads it"
+    """The leg of a run that walks."""
+    assert run.walk is not None, "a walk has a leg"
     return run.walk
 
 
@@ -161,7 +160,7 @@ def swing_knee_torque(run: Run, time: Floats, record: Mapping[str, Any]) -> Floa
     return np.where(record["walk.contact"] == SWING, inertial + turning.knee + weight.knee, 0.0)
 
 
-WALK_FORMAT, REACTING_WALK_FORMAT = "ppafo walk", "ppafo walk of a wearer who reacts"
+WALK_FORMAT = "ppafo walk"
 """What the results of walks say of themselves on the disk; analyses read them by it."""
 
 
@@ -233,68 +232,10 @@ def result_of_walk(scenario: Scenario, run: Run, outcome: BatchResult, supply: S
         # A recording has a sample, so a walk that fails at once keeps its start.
         kept[0] = True
         time, record = time[kept], {name: values[kept] for name, values in record.items()}
-    found: WalkResult = walk_of(scenario).who.result(scenario, run, time, record, status, supply)
-    return found
+    return _result(scenario, run, time, record, status, supply)
 
 
-def _status(failed: float, too_many_parts: bool, states: Floats) -> Status:
-    """How a walk ended that failed at a time [s], or never, with its last states."""
-    if failed >= NEVER_FAILED and bool(np.isfinite(states).all()):
-        return Status("completed", None, "completed")
-    # A number that is none at the end, which the run did not see itself, has no time: it counts from the start.
-    time = failed if failed < NEVER_FAILED else 0.0
-    return Status("diverged", time, f"diverged at t = {time:.6g} s; {TOO_MANY_PARTS if too_many_parts else REMEDY}")
-
-
-def measured(
-    scenario: Scenario, run: Run, time: Floats, record: Mapping[str, Floats]
-) -> tuple[Recording, Mapping[str, Metric], str]:
-    """Recording and metrics of a walk from its rows (samples,) by path, at these times [s]; and how it ended."""
-    check_no_bottle(scenario)
-    completed = Status("completed", None, "completed")
-    result: WalkResult = walk_of(scenario).who.result(scenario, run, time, record, completed, None)
-    of_recording = evaluate(result.recording)
-    offered = {name: metric for name, metric in of_recording.items() if not lacks(scenario, METRICS[name])}
-    return result.recording, {**offered, **result.metrics}, result.status.message
-
-
-def lacks(scenario: Scenario, kind: MetricKind) -> str:
-    """Why a walk has not what a metric needs, an empty text where it has."""
-    motion, control = walk_of(scenario), scenario.controller.kind
-    is_outside = control == PYTHON_CONTROLLER
-    has_request = not is_outside and hasattr(law_of(scenario).initial, "request")
-    subject, needs = motion.who.subject, kind.needs
-    reasons = (
-        (
-            "reference" in kind.channels,
-            "a walk has no one reference that its torque follows: push_off_error is the error in push-off",
-        ),
-        (bool(kind.traced), "it needs the whole run over time, which is not kept of a walk"),
-        (LED_SHANK in needs, "it needs a leg without ground, whose shank follows a gait"),
-        (REACTS in needs and subject != REACTS, f"it needs a neuromuscular gait model (motion.kind = '{REACT}')"),
-        (
-            LED in needs and subject != LED,
-            "it is measured from the gait that leads a leg, and none does here: lowest_toes is over the ground",
-        ),
-        (
-            STEADY in needs and motion.task_sequence is not None,
-            "it is a mean over equal strides, and a task sequence has others: leave the task sequence out",
-        ),
-        (REQUEST in needs and not has_request, f"its controller '{control}' requests no torque"),
-    )
-    return next((reason for is_so, reason in reasons if is_so), "")
-
-
-def integral_of_a_stride(result: WalkResult, values: Floats) -> float:
-    """Return the integral of a channel over the ankle angle, in its unit times rad, mean over the counted strides."""
-    turned = np.diff(result.recording["angle"])
-    done = np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * turned)])
-    planned = task_sequence_of_walk(result.scenario)
-    counted = result.helped & _counted(planned, result.recording, result.starts)
-    return float(np.diff(done[result.starts])[counted].mean())
-
-
-def led_result(
+def _result(
     scenario: Scenario,
     run: Run,
     time: Floats,
@@ -302,7 +243,7 @@ def led_result(
     status: Status,
     supply: SupplyCourse | None,
 ) -> WalkResult:
-    """The result of a leg that a gait leads, from its rows (samples,) by path up to where the run failed."""
+    """The result of a walk from its rows (samples,) by path, up to where the run failed."""
     walked, motion = scenario, walk_of(scenario)
     # Whom it is healthy for is the person who walked; what was planned stays in the result.
     gait, wearer = as_drawn(motion.gait, motion.wearer, motion.person)
@@ -337,6 +278,58 @@ def led_result(
         segments=segments,
         supply=supply,
     )
+
+
+def _status(failed: float, too_many_parts: bool, states: Floats) -> Status:
+    """How a walk ended that failed at a time [s], or never, with its last states."""
+    if failed >= NEVER_FAILED and bool(np.isfinite(states).all()):
+        return Status("completed", None, "completed")
+    # A number that is none at the end, which the run did not see itself, has no time: it counts from the start.
+    time = failed if failed < NEVER_FAILED else 0.0
+    return Status("diverged", time, f"diverged at t = {time:.6g} s; {TOO_MANY_PARTS if too_many_parts else REMEDY}")
+
+
+def measured(
+    scenario: Scenario, run: Run, time: Floats, record: Mapping[str, Floats]
+) -> tuple[Recording, Mapping[str, Metric], str]:
+    """Recording and metrics of a walk from its rows (samples,) by path, at these times [s]; and how it ended."""
+    check_no_bottle(scenario)
+    completed = Status("completed", None, "completed")
+    result = _result(scenario, run, time, record, completed, None)
+    of_recording = evaluate(result.recording)
+    offered = {name: metric for name, metric in of_recording.items() if not lacks(scenario, METRICS[name])}
+    return result.recording, {**offered, **result.metrics}, result.status.message
+
+
+def lacks(scenario: Scenario, kind: MetricKind) -> str:
+    """Why a walk has not what a metric needs, an empty text where it has."""
+    motion, control = walk_of(scenario), scenario.controller.kind
+    is_outside = control == PYTHON_CONTROLLER
+    has_request = not is_outside and hasattr(law_of(scenario).initial, "request")
+    needs = kind.needs
+    reasons = (
+        (
+            "reference" in kind.channels,
+            "a walk has no one reference that its torque follows: push_off_error is the error in push-off",
+        ),
+        (bool(kind.traced), "it needs the whole run over time, which is not kept of a walk"),
+        (LED_SHANK in needs, "it needs a leg without ground, whose shank follows a gait"),
+        (
+            STEADY in needs and motion.task_sequence is not None,
+            "it is a mean over equal strides, and a task sequence has others: leave the task sequence out",
+        ),
+        (REQUEST in needs and not has_request, f"its controller '{control}' requests no torque"),
+    )
+    return next((reason for is_so, reason in reasons if is_so), "")
+
+
+def integral_of_a_stride(result: WalkResult, values: Floats) -> float:
+    """Return the integral of a channel over the ankle angle, in its unit times rad, mean over the counted strides."""
+    turned = np.diff(result.recording["angle"])
+    done = np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * turned)])
+    planned = task_sequence_of_walk(result.scenario)
+    counted = result.helped & _counted(planned, result.recording, result.starts)
+    return float(np.diff(done[result.starts])[counted].mean())
 
 
 def _counted(planned: PlannedSequence | None, recording: Recording, starts: NDArray[np.intp]) -> NDArray[np.bool_]:

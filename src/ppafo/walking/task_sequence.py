@@ -22,7 +22,6 @@ from ppafo.model.gait import NEVER, PARTS, STANDS_AT, GaitNow, GaitTiming, Seque
 from ppafo.model.leg import LegParameters
 from ppafo.signals.recording import Floats
 from ppafo.simulation.declaration import Reading
-from ppafo.simulation.motion_kind import REACT
 from ppafo.simulation.schema import kind_field, model_name, number_type, quantity_fields
 from ppafo.walking.preparation import standing_on
 
@@ -41,10 +40,6 @@ CONTACT = Quantity("contact", "s", "how long the toes touch the ground in the sw
 TIME = Quantity("time", "1", "time of the stride over the others'", 0.75, 0.6, 1.6)
 LENGTH = Quantity("length", "1", "length in the middle of the stride over the others'", 0.6, 0.2, 1.4)
 SLOPE = Quantity("slope", "rad", "slope of the ground, above 0 uphill; level unless given", None, -0.175, 0.175)
-DISTANCE = Quantity("distance", "m", "length of the way, of a neuromuscular gait model", None, 0.2, 1.0e4)
-HEIGHT = Quantity("height", "m", "height of the step, below 0 down", None, -0.1, 0.1)
-FORCE = Quantity("force", "N", "push on the trunk, forward above 0", None, -1000.0, 1000.0)
-PUSHED_FOR = Quantity("duration", "s", "how long it lasts", 0.1, 1.0e-3, 10.0)
 RADIUS = Quantity("radius", "m", "radius of the turn; below 0 where the device is on the outer leg", 1.0, -10.0, 10.0)
 
 _PACE = (SPEED, CADENCE, WALKED_FOR, STRIDES)
@@ -52,21 +47,19 @@ KINDS: dict[str, tuple[str, tuple[Quantity, ...]]] = {
     "stand": ("stands on both feet", (DURATION,)),
     "rest": ("sits, the foot flat on the ground and nearly unloaded", (DURATION,)),
     "start": ("starts to walk", (SPEED, CADENCE, ONE_STRIDE)),
-    "walk": ("walks", (*_PACE, SLOPE, DISTANCE)),
+    "walk": ("walks", (*_PACE, SLOPE)),
     "ramp": ("changes the speed evenly", _PACE),
     "turn": ("walks along a curve: the inner leg takes shorter steps than the outer one", (*_PACE, RADIUS)),
     "stop": ("stops and stands", (ONE_STRIDE,)),
     "stairs": ("climbs: the toes meet the ground before the heel", _PACE),
     "scuff": ("one stride in which the toes touch the ground in mid-swing", (CONTACT,)),
     "stumble": ("one stride of another time, shorter or longer in its middle", (TIME, LENGTH)),
-    "step": ("a step of the ground, for a neuromuscular gait model", (HEIGHT,)),
-    "push": ("a push on the trunk, for a neuromuscular gait model", (FORCE, PUSHED_FOR)),
 }
 """Kinds of segment: what the wearer does, and the values that it takes."""
 
 _STANDING = ("stand", "rest", "stop")
 _NEED_WALKING = ("stop", "scuff", "stumble")
-_OPTIONAL = (*_PACE, SLOPE, DISTANCE)
+_OPTIONAL = (*_PACE, SLOPE)
 """Values that may be left out."""
 
 Numbers = Any
@@ -107,11 +100,6 @@ class TaskSequence:
     def refusal(self, number: int, reason: str) -> ScenarioError:
         """Return the error that says why a segment, counted from 0, is not usable."""
         return ScenarioError(f"{self.file}: segment {number + 1} ({self.segments[number].kind}): {reason}")
-
-
-def led_task_sequences() -> tuple[str, ...]:
-    """Return the names of the task sequences of the package that a wearer with a prescribed gait can walk."""
-    return tuple(name for name in FILE.names() if _without_gait(load_task_sequence(name)) is None)
 
 
 def load_task_sequence(name_or_path: str | Path) -> TaskSequence:
@@ -157,34 +145,12 @@ def _contradictions(segments: Iterable[Segment]) -> Iterator[tuple[int, str]]:
             yield index, "give either speed or cadence, not both"
         if "radius" in values and abs(values["radius"]) < TIGHTEST:
             yield index, f"radius must be at least {TIGHTEST:g} m, either way"
-        lengths = [name for name in ("duration", "strides", "distance") if name in values]
+        lengths = [name for name in ("duration", "strides") if name in values]
         if segment.kind in ("walk", "ramp", "stairs", "turn") and len(lengths) != 1:
-            others = " (or distance alone, for a neuromuscular gait model)" if segment.kind == "walk" else ""
-            yield index, f"give either duration or strides{', not both' if lengths else ''}{others}"
+            yield index, f"give either duration or strides{', not both' if lengths else ''}"
         if segment.kind == "ramp" and not {"speed", "cadence"} & values.keys():
             yield index, "give the speed or the cadence at its end"
         walks = segment.kind not in _STANDING
-
-
-_WITHOUT_GAIT = ("step", "push")
-"""What is for a body that walks by itself."""
-
-
-def check_led_task_sequence(sequence: TaskSequence) -> None:
-    """Raise ScenarioError for what a wearer with a prescribed gait cannot do."""
-    index = _without_gait(sequence)
-    if index is not None:
-        kind = sequence.segments[index].kind
-        what = "distance" if kind == "walk" else f"a {kind}"
-        raise sequence.refusal(
-            index, f"{what} is for a neuromuscular gait model, and this gait is prescribed: set motion.kind = '{REACT}'"
-        )
-
-
-def _without_gait(sequence: TaskSequence) -> int | None:
-    """The first segment, from 0, that a gait does not take, None where there is none."""
-    only = (segment.kind in _WITHOUT_GAIT or DISTANCE.name in segment.values for segment in sequence.segments)
-    return next((index for index, is_so in enumerate(only) if is_so), None)
 
 
 @functools.cache

@@ -29,7 +29,7 @@ from ppafo.walking.contradictions import check_no_bottle
 from ppafo.walking.declaration import THRESHOLDS
 from ppafo.walking.events import FINDING_ROW, SAFE_ROW, VENTINGS_ROW
 from ppafo.walking.loading import load_walk
-from ppafo.walking.motion import SHORTEST_STRIDES, check_led, duration_problems, walk_of, with_duration
+from ppafo.walking.motion import SHORTEST_STRIDES, duration_problems, walk_of, with_duration
 from ppafo.walking.person import crowd_of, draw_gaits
 from ppafo.walking.planning import fed_device, plan_walk, plan_walks, task_sequence_of_walk, unrecorded
 from ppafo.walking.preparation import FaultSettings
@@ -130,10 +130,7 @@ def lasting(scenario: Scenario, minutes: float | None) -> Scenario:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Comparison:
-    """A walk with the device, the same without it, and numbers of the healthy gait by name.
-
-    Without is without a device; of a body that walks by itself it is with the device off.
-    """
+    """A walk with the device, the same without it, and numbers of the healthy gait by name."""
 
     with_device: WalkResult
     without_device: WalkResult
@@ -146,7 +143,7 @@ class Comparison:
 
 
 def compare_walks(configuration: Scenario, minutes: float | None = None, progress: Progress = silent) -> Comparison:
-    """Walk ``minutes`` [min], or a whole task sequence, with the device and without, as its kind of motion says.
+    """Walk ``minutes`` [min], or a whole task sequence, with the device and without.
 
     ScenarioError for bad input, SimulationError where its bottle ends the walk before there is anything to compare.
     """
@@ -161,9 +158,8 @@ def compare_walks(configuration: Scenario, minutes: float | None = None, progres
         )
     # As long as the bottle lasted, where one ended the walk.
     as_long = minutes if ending is None else float(worn.recording.time[-1]) / 60.0
-    who = walk_of(configuration).who
-    bare = walk(who.without(configuration), as_long, progress=progress)
-    return Comparison(worn, bare, who.healthy(configuration))
+    bare = walk(without_device(configuration), as_long, progress=progress)
+    return Comparison(worn, bare, healthy_metrics(configuration))
 
 
 def with_device_off(configuration: Scenario) -> Scenario:
@@ -311,7 +307,6 @@ def walk_population(
     """
     if not 1 <= wearers <= MAXIMUM_WEARERS:
         raise ScenarioError(f"the number of wearers must be from 1 to {MAXIMUM_WEARERS}, not {wearers}")
-    check_led(configuration, "walking with many wearers")
     if walk_of(configuration).bottle is not None:
         raise ScenarioError("many wearers walk at a constant supply: leave out the bottle, or the number of wearers")
     if walk_of(configuration).person:

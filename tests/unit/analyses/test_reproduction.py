@@ -51,9 +51,9 @@ def test_a_claim_as_a_document_is_plain_data_with_all_that_a_reader_needs(reprod
     assert all(claim["verdict"] in VERDICTS and claim["source"] and claim["statement"] for claim in document)
 
 
-def test_sixteen_rows_have_six_verdicts(reproduction: Reproduction) -> None:
+def test_sixteen_rows_have_five_verdicts(reproduction: Reproduction) -> None:
     counts = verdict_counts(reproduction.claims)
-    assert tuple(counts.values()) == (2, 3, 6, 1, 3, 1)
+    assert tuple(counts.values()) == (2, 3, 6, 0, 4, 1)
     assert reproduction.json_document()["counts"] == counts
     assert count_sentence([claim.verdict for claim in reproduction.claims]).startswith(
         "16 claims: 2 consistent, 3 inconsistent as reported, 6 met"
@@ -117,7 +117,7 @@ def test_one_discharge_coefficient_is_consistent_where_both_valves_have_one_area
     assert any("atmospheric_pressure" in assumption for assumption in claim.assumptions)
 
 
-@pytest.mark.parametrize(("volume", "verdict"), [(51.0, "inconsistent_as_reported"), (18.0, "consistent")])
+@pytest.mark.parametrize(("volume", "verdict"), [(51.0, "inconsistent_as_reported"), (15.0, "consistent")])
 def test_the_swept_volume_is_judged_by_virtual_work(volume: float, verdict: str) -> None:
     assert arithmetic(actuator__displacement_per_radian=volume)["swept_volume"].verdict == verdict
 
@@ -139,8 +139,8 @@ def test_a_task_without_a_tie_at_its_start_has_no_phase(reproduction: Reproducti
 
 def test_what_u_is_decides_about_the_error_and_not_about_the_saving(reproduction: Reproduction) -> None:
     opening, five, ten = readings_of_u(reproduction.solenoid, reproduction.proportional)
-    assert (round(opening.error), round(five.error), round(ten.error)) == (16, -26, -72)
-    assert [round(row.error_within_reach) for row in (opening, five, ten)] == [84, 39, 9]
+    assert (round(opening.error), round(five.error), round(ten.error)) == (15, -27, -73)
+    assert [round(row.error_within_reach) for row in (opening, five, ten)] == [84, 37, 7]
     assert all(64.0 < row.gas < 66.5 for row in (opening, five, ten))
     assert readings_of_u(reproduction.step, reproduction.proportional) == ()
 

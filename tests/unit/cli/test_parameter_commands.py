@@ -162,7 +162,7 @@ def test_the_copy_of_a_set_names_it_as_parent_from_wherever_it_lies(
     (tmp_path / "below").mkdir()
     main(["new", "set", "first", "--from", "ppafo2011"])
     file = tmp_path / "first.toml"
-    file.write_text(file.read_text().replace("value = 23.5", "value = 31.5"))
+    file.write_text(file.read_text().replace("value = 36.0", "value = 31.5", 1))
     main(["new", "set", "second", "--from", "first.toml", "--out", "below/second.toml"])
     capsys.readouterr()
     main(["sets", "audit", "first.toml"])

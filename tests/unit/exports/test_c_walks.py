@@ -53,12 +53,10 @@ THERMAL = (
 )
 SLOW = ("valve.spool_frequency=30 Hz", "valve.slew_limit=20 1/s", "timing.kind=estimated")
 EVERYTHING = (*SEEN, *FAULTY, *THERMAL, *SLOW, "controller.rate=330 Hz", "run.step=0.4 ms")
-ON_RAMP = ("reacting", ("task_sequence=ramp-and-kerb", *SEEN, *THERMAL))
 VARIED: tuple[tuple[str, tuple[str, ...]], ...] = (
     *((name, ()) for name in list_walks()),
     ("proportional-regulators", EVERYTHING),
     ("proportional", ("task_sequence=first-steps",)),
-    ON_RAMP,
 )
 """Every shipped walk, one with all further features (sensors with faults, thermal gas, slow valve), task sequences."""
 
@@ -176,7 +174,7 @@ def samples_in_c(library: ctypes.CDLL, name: str, values: Values, outputs: int) 
 
 @pytest.mark.parametrize(
     ("name", "overrides"),
-    [pytest.param(*one, marks=pytest.mark.thorough) if one in (BY_NUMBA, ON_RAMP) else one for one in VARIED],
+    [pytest.param(*one, marks=pytest.mark.thorough) if one == BY_NUMBA else one for one in VARIED],
 )
 def test_every_sample_of_drawn_settings_has_the_bits_of_the_lanes(
     name: str, overrides: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch

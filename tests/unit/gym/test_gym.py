@@ -129,7 +129,7 @@ def test_another_seed_draws_another_episode_and_the_same_the_same() -> None:
     assert not np.array_equal(first[0], third[0])
     scenario = env.episode()
     half = 3.7e-6
-    assert abs(scenario.device.actuator.dead_volume_1 - 26.5e-6) <= half
+    assert abs(scenario.device.actuator.dead_volume_1 - 36.0e-6) <= half
     assert 1.0 <= scenario.reference.level <= 4.5
 
 

@@ -21,10 +21,10 @@ from ppafo.model.gait import (
 from ppafo.walking.gait_series import gait_series, gait_timing
 from ppafo.walking.planning import planned_task_sequence
 from ppafo.walking.task_sequence import (
+    FILE,
     PlannedSequence,
     Segment,
     TaskSequence,
-    led_task_sequences,
     load_task_sequence,
     pace_in_time,
     turns_walked,
@@ -46,7 +46,7 @@ def at(sequence: TimedSequence, time: float) -> GaitNow:
     return gait_in_task_sequence(SERIES, sequence, TIMING, LEG, time)[0]
 
 
-@pytest.mark.parametrize("name", led_task_sequences())
+@pytest.mark.parametrize("name", FILE.names())
 def test_angles_rates_and_accelerations_are_continuous_at_every_knot(name: str) -> None:
     sequence = planned_task_sequence(load_task_sequence(name), GAIT).timed
     knots = [part.start for part in sequence.parts if 0.0 < part.start < 1.0e5]
@@ -57,7 +57,7 @@ def test_angles_rates_and_accelerations_are_continuous_at_every_knot(name: str) 
             assert getattr(after, value) == pytest.approx(getattr(before, value), abs=2.0e-5), (knot, value)
 
 
-@pytest.mark.parametrize("name", led_task_sequences())
+@pytest.mark.parametrize("name", FILE.names())
 def test_phase_and_strides_per_second_are_continuous_at_every_knot(name: str) -> None:
     sequence = planned_task_sequence(load_task_sequence(name), GAIT).timed
     parts = [part for part in sequence.parts if part.start < 1.0e5]
@@ -66,7 +66,7 @@ def test_phase_and_strides_per_second_are_continuous_at_every_knot(name: str) ->
         assert begins[:6] == pytest.approx(ends[:6], abs=1.0e-9)
 
 
-@pytest.mark.parametrize("name", led_task_sequences())
+@pytest.mark.parametrize("name", FILE.names())
 def test_rates_and_accelerations_are_the_derivatives_of_the_angles(name: str) -> None:
     sequence = planned_task_sequence(load_task_sequence(name), GAIT).timed
     moments, step = np.random.default_rng(1).uniform(0.01, 45.0, 1500), 1.0e-3
@@ -183,7 +183,7 @@ def test_a_stumble_takes_one_stride_of_its_time() -> None:
     assert middle.stride == pytest.approx([1.0, 0.6, 1.0])
 
 
-@pytest.mark.parametrize("name", led_task_sequences())
+@pytest.mark.parametrize("name", FILE.names())
 def test_arrays_of_times_and_single_times_agree(name: str) -> None:
     sequence = planned_task_sequence(load_task_sequence(name), GAIT).timed
     time = np.linspace(0.0, 60.0, 301)

@@ -20,7 +20,7 @@ def test_the_completed_set_is_a_device_in_si_units() -> None:
     device = load_device("ppafo2011")
     assert device.gas.specific_gas_constant == pytest.approx(188.95, abs=0.01)
     assert device.actuator.torque_constant == 1.451e-5
-    assert device.actuator.displacement_per_radian == 23.5e-6
+    assert device.actuator.displacement_per_radian == 1.451e-5
     assert device.actuator.angle_max - device.actuator.angle_min == pytest.approx(math.radians(110.0))
     assert device.actuator.leak == Orifice(0.3e-6, 0.113)
     assert device.friction.viscous_damping == 0.032

@@ -19,7 +19,7 @@ from ppafo.walking.motion import walk_of, with_duration
 from ppafo.walking.planning import plan_walk, planned_task_sequence
 from ppafo.walking.result import WalkResult, integral_of_a_stride
 from ppafo.walking.strides import steady_strides, task_sequence_metrics
-from ppafo.walking.task_sequence import TaskSequence, led_task_sequences, load_task_sequence
+from ppafo.walking.task_sequence import FILE, TaskSequence, load_task_sequence
 from ppafo.walking.walk import Comparison
 
 HEAD = 'schema_version = 1\nname = "tried"\n'
@@ -108,7 +108,7 @@ def test_a_walk_file_names_its_task_sequence_by_a_path_beside_it(tmp_path: Path)
     assert replaced.name == "stairs"
 
 
-@pytest.mark.parametrize("name", led_task_sequences())
+@pytest.mark.parametrize("name", FILE.names())
 def test_the_segments_of_a_task_sequence_follow_each_other_and_walk_whole_strides(name: str) -> None:
     planned = planned_task_sequence(load_task_sequence(name), GAIT)
     ends = [float(span.end) for span in planned.spans]

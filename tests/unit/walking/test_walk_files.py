@@ -58,7 +58,7 @@ def test_every_shipped_walk_says_in_its_motion_that_it_is_one() -> None:
     template = (resources.files("ppafo.cli") / "templates" / "walk.toml").read_text(encoding="utf-8")
     texts = {name: shipped(name) for name in ppafo.list_walks()} | {"template": template}
     assert {name: tomllib.loads(text)["motion"]["kind"] for name, text in texts.items()} == {
-        name: "react" if name == "reacting" else "walk" for name in texts
+        name: "walk" for name in texts
     }
 
 

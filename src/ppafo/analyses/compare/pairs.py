@@ -36,9 +36,6 @@ COMPARED: dict[str, int] = {
     "net_push_off_work": 1,
     "push_off_error": -1,
     "toe_clearance": 1,
-    "stays_up": 1,
-    "lowest_toes": 1,
-    "muscle_work": -1,
 }
 """Metrics of the table: -1 where less is better, 1 where more is, 0 where neither is better as such."""
 

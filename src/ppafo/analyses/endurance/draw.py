@@ -19,7 +19,7 @@ from ppafo.storage.result_folder import read_json, read_recording
 from ppafo.walking import WalkResult
 from ppafo.walking.loading import WALKING
 from ppafo.walking.motion import walk_of
-from ppafo.walking.result import REACTING_WALK_FORMAT, WALK_FORMAT
+from ppafo.walking.result import WALK_FORMAT
 
 PEAK_WINDOW = 0.1
 """Seconds over which the largest flow of a recording is averaged; lines and regulator even out what is shorter."""
@@ -124,8 +124,7 @@ def walk_gas(result: WalkResult) -> WalkGas:
     """Return the gas of a walk."""
     configuration, sequence = result.scenario, walk_of(result.scenario).task_sequence
     gas = result.metrics.get("gas" if sequence is None else "task_sequence_gas")
-    # A neuromuscular gait model sets the pace, and one who took gas made strides.
-    time = result.metrics.get("stride_time" if sequence is None else "task_sequence_time")
+    time = None if sequence is None else result.metrics.get("task_sequence_time")
     return WalkGas(
         configuration.name,
         result.recording,
@@ -140,11 +139,6 @@ def read_walk_gas(folder: Path) -> WalkGas:
     """Return the gas of a walk from the folder that ``ppafo walk`` wrote; DataError where it says too little."""
     path = folder / WALK_FILE
     document = read_json(path)
-    if isinstance(document, dict) and document.get("format") == REACTING_WALK_FORMAT:
-        raise DataError(
-            f"{path}: is the walk of a neuromuscular gait model: walk on the bottle, with 'ppafo walk --bottle', or "
-            "give gas and time of a stride, with --gas-per-stride and --stride-time"
-        )
     if not isinstance(document, dict) or document.get("format") != WALK_FORMAT:
         raise DataError(f"{path}: is not the result of a ppafo walk (its 'format' is not '{WALK_FORMAT}')")
     status = _table(document, "status", path).get("kind", "completed")

@@ -118,9 +118,6 @@ def endurance_of_walk_gas(
     assert supply is not None, "a walk on a bottle"
     check_schedule(schedule)
     life = bottle_life(carried, schedule)
-    # Of a wearer whose strides no gait sets the time walked counts them, by the mean stride at the set pressure.
-    if not walk_of(carried).is_led:
-        life = replace(life, repeats=life.walked / at_set_pressure.stride_time)
     # A bottle may end before the first stride does.
     strides = max(life.repeats, 1.0e-9)
     stride_time, mass = life.walked / strides, life.course.regulated / strides

@@ -13,7 +13,7 @@ from ppafo.identification.source import Source
 from ppafo.parameters import apply_overrides as apply_to_set
 from ppafo.parameters import load_device, load_parameter_set
 from ppafo.parameters.parameter_set import SOURCE as OVERRIDE
-from ppafo.parameters.parameter_set import number_text
+from ppafo.parameters.parameter_set import number_text, with_followers
 from ppafo.rig import record
 from ppafo.signals import Recording
 from ppafo.simulation.declaration import quantities
@@ -52,7 +52,7 @@ def assumed_values(scenarios: Mapping[str, Scenario]) -> tuple[AssumedValue, ...
         changed = apply_overrides(origin.content, origin.overrides, scenario.name)
         written = origin.content["device"].get("overrides", ())
         of_file = apply_to_set(load_parameter_set(origin.parameter_set), written, origin.valve)
-        in_force = apply_to_set(of_file, changed.device, origin.valve)
+        in_force = with_followers(apply_to_set(of_file, changed.device, origin.valve))
         summaries = {path: quantity.summary for path, quantity in quantities(changed.document).items()}
         summaries |= {path: quantity.summary for path, quantity in in_force.declarations().items()}
         own = [

@@ -71,11 +71,6 @@ def share_of_healthy_moment(values: Values) -> float:
     return held_torque(values) / (walk_of(configuration).wearer.body_mass * float(moment.max()))
 
 
-def swept_volume(_values: Values) -> float:
-    """Displacement per radian [m^3/rad] of the device."""
-    return load_device(DEVICE).actuator.displacement_per_radian
-
-
 def walking_torque(values: Values) -> float:
     """Largest torque [N m] of the mean stride of the walk 'solenoid' at a supply pressure."""
     # As repr, so that the walk has this very number.
@@ -122,7 +117,6 @@ _OF_PRESSURE, _OF_RECYCLING = {"pressure": "Pa_a"}, {"holding_time": "s"}
 COMPUTATIONS: dict[str, Computation] = {
     "held_torque": Computation("N m", _OF_PRESSURE, held_torque),
     "share_of_healthy_moment": Computation("1", _OF_PRESSURE, share_of_healthy_moment),
-    "swept_volume": Computation("m^3/rad", {}, swept_volume),
     "walking_torque": Computation("N m", _OF_PRESSURE, walking_torque),
     "dorsiflexor_share": Computation("1", {}, dorsiflexor_share),
     "recycling_saving": Computation("1", _OF_RECYCLING, recycling_saving),

@@ -155,8 +155,8 @@ def _falls_in_motion(step: _Step) -> tuple[bool, str, str]:
     late, again = first - float(pressure[step.events.breakaway]), float(pressure[step.events.stop]) - last
     differences = []
     if late >= _SAME * step.levels.range:
-        rise = f"{late / PASCALS_PER_PSI:.1f} psi, until {step.milliseconds(peak)}"
-        differences.append(f"from breakaway it goes on rising by {rise}")
+        longer = 1e3 * (step.recording.time[peak] - step.events.breakaway_time)
+        differences.append(f"from breakaway it goes on rising for {longer:.0f} ms, by {late / PASCALS_PER_PSI:.1f} psi")
     if again >= _SAME * step.levels.range:
         differences.append(f"it rises again by {again / PASCALS_PER_PSI:.1f} psi before the stop")
     return holds, evidence, ", and ".join(differences)

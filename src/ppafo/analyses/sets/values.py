@@ -4,6 +4,7 @@ import textwrap
 from typing import Any
 
 from ppafo.parameters import ParameterSet
+from ppafo.parameters.parameter_set import with_followers
 from ppafo.report.finding import Finding, Part, columns_of
 
 _WIDTH = 110
@@ -13,7 +14,7 @@ _COLUMNS = ("path", "value", "unit", "origin", "source")
 
 def values_document(parameter_set: ParameterSet) -> dict[str, Any]:
     """Return every value of a set with its source, as plain data."""
-    citation = parameter_set.citation
+    citation, parameter_set = parameter_set.citation, with_followers(parameter_set)
     # By section only, so that within a section texts come first and numbers as they are declared.
     entries = sorted(parameter_set.entries().items(), key=lambda item: _SECTIONS.index(item[0].partition(".")[0]))
     return {

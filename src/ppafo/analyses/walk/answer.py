@@ -30,7 +30,6 @@ from ppafo.analyses.walk.task_sequence import (
     trust_remark,
 )
 from ppafo.documents.json_text import plain
-from ppafo.kinds import kind_at
 from ppafo.metrics.strides import PER_STRIDE
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE
 from ppafo.progress import Progress, Report, report_nothing
@@ -360,8 +359,7 @@ def walk_with_and_without(
         advance = _reporter(report, "wearers", 0.0)
         return wearers_finding(walk_population(chosen, minutes, wearers, seed, advance))
     comparison = compare_walks(chosen, minutes, _reporter(report, "min", _LONG))
-    found: Finding[Any] = kind_at(walk_of(comparison.with_device.scenario).who.finding)(comparison)
-    return found
+    return finding_of(comparison)
 
 
 def list_files() -> list[dict[str, Any]]:

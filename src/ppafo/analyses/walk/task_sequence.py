@@ -66,8 +66,8 @@ def _facts(worn: WalkResult, supply: SupplyCourse) -> list[tuple[str, str]]:
     liquid = f", {_GAS.text(end['liquid_mass'])} of it liquid" if "liquid_mass" in values else ""
     full = _GAS.text(supply.supply.mass)
     walked = f"after {worn.helped.size} whole strides"
-    # Strides of a gait that is prescribed are counted by time, as ``ppafo bottle`` counts them.
-    if motion.task_sequence is None and motion.is_led:
+    # Strides are counted by time, as ``ppafo bottle`` counts them.
+    if motion.task_sequence is None:
         strides = strides_text(supply.ending.time / motion.gait.stride_time)
         walked = f"{strides} strides, {worn.helped.size} of them whole between strikes"
     rows = [

@@ -124,9 +124,8 @@ that steps has turned by more before its toes leave the ground."""
 
 ROLLS = 0.33
 """Of the largest force in a stance, that toes carry more than the heel before they leave the ground: 0.98 and more on
-recorded gaits, 0.40 and more behind the hard heel strikes of neuromuscular gait models, for the heel is off the ground
-by then.
-Two channels that read one sensor have 0, swapped ones less than 0, toes that show 0.8 of the heel 0.3."""
+recorded gaits, for the heel is off the ground by then. Two channels that read one sensor have 0, swapped ones less
+than 0, toes that show 0.8 of the heel 0.3."""
 
 CARRIES = 100.0
 """Force [N] in a stance below which rolling is not judged: a sitting wearer's foot carries less."""

@@ -14,7 +14,6 @@ from ppafo.engine.lanes import SIGNAL_ROWS
 from ppafo.engine.run import NEVER_FAILED
 from ppafo.exports import filled, in_comment, in_markdown, template
 from ppafo.exports.c_library.program import ExportedProgram, Further, c_text_of_run
-from ppafo.kinds import kind_at
 from ppafo.metrics import METRICS
 from ppafo.model.catalog import VALVES
 from ppafo.model.declaration import Quantity
@@ -25,7 +24,9 @@ from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, Scenario
 from ppafo.version import __version__
 
 if TYPE_CHECKING:
+    from ppafo.gait import Gait
     from ppafo.walking.preparation import FaultSettings
+    from ppafo.walking.task_sequence import TaskSequence
 
 
 _FOLDER = "ppafo.exports.c_library"
@@ -390,6 +391,19 @@ def _followers(links: Graph) -> str:
     return _FOLLOWS.format(followers=", ".join(said) or "none")
 
 
+def _fixed_of_walk(gait: "Gait", sequence: "TaskSequence | None") -> tuple[tuple[str, ...], str]:
+    """What of a walk is fixed in the source, in words, and of what a library has precomputed numbers."""
+    way = "stride after equal stride"
+    if sequence is not None:
+        way = f"the task sequence `{sequence.name}`, which stays as it is"
+    led = (
+        f"the gait, `{gait.name}`: its series, its events and its stride of "
+        f"{gait.stride_time:.4g} s are numbers in the source",
+        f"how it is walked: {way}",
+    )
+    return led, "the gait alone" if sequence is None else "the gait and its task sequence alone"
+
+
 def words_of_walk(configuration: Scenario, links: Graph, failing: "Mapping[str, FaultSettings]") -> dict[str, str]:
     """What the page of the library says of this walk: settings follow others by ``links``, some sensors ``failing``."""
     faults = [f"{sensor} `{item.kind}`" for sensor, item in failing.items()]
@@ -397,7 +411,7 @@ def words_of_walk(configuration: Scenario, links: Graph, failing: "Mapping[str, 
     from ppafo.walking.planning import has_ideal_sensors
 
     motion = walk_of(configuration)
-    led, precomputed = kind_at(motion.who.exported).words(motion)
+    led, precomputed = _fixed_of_walk(motion.gait, motion.task_sequence)
     fixed = [
         *led,
         f"the valve, `{configuration.device.valve.kind}`, and the controller, `{configuration.controller.kind}`",

@@ -3,8 +3,8 @@
 What a gait comes to (series, events, how its heel rolls) and a task sequence in time are numbers written out.
 """
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 from ppafo.control.walking.catalog import walking_controllers
 from ppafo.engine.program import Program
@@ -13,7 +13,6 @@ from ppafo.errors import ScenarioError
 from ppafo.exports.c_library.boundary import Boundary
 from ppafo.exports.c_library.files import Relation, Setting, c_identifier
 from ppafo.exports.c_library.preparation import SAID, Writing, declared_settings
-from ppafo.kinds import kind_at
 from ppafo.model.declaration import Quantity
 from ppafo.model.gait import gait_at
 from ppafo.model.plant_faults import POWERED
@@ -25,9 +24,9 @@ from ppafo.simulation.numbers import device_numbers, number_at
 from ppafo.simulation.profiles import profile_parameters
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.contradictions import PAIRS
-from ppafo.walking.declaration import PERSON, fault_numbers
+from ppafo.walking.declaration import PERSON, STEP, fault_numbers
 from ppafo.walking.gait_series import fit_rocker, gait_series, gait_timing
-from ppafo.walking.motion import WalkMotion, walk_of
+from ppafo.walking.motion import record_interval, walk_of
 from ppafo.walking.planning import NO_REFERENCE, failing_of, law_of, task_sequence_of_walk
 from ppafo.walking.preparation import (
     DISTORTED,
@@ -67,19 +66,6 @@ _RELATIONS = (
 """Contradictions of a walk file between two numbers; those with a third, or with the gait, are left to the caller."""
 
 
-@dataclass(frozen=True, slots=True)
-class ExportedWalk:
-    """What an exported library has for a kind of walk.
-
-    ``leg`` are lines that make the leg and the plant with it, ``start`` make the states at the start; ``words`` say
-    of the motion what is fixed in the source, and of what a library has precomputed numbers.
-    """
-
-    leg: Callable[[Scenario, Writing], Iterator[str]]
-    start: Callable[[Scenario, Writing], Iterator[str]]
-    words: Callable[[WalkMotion], tuple[tuple[str, ...], str]]
-
-
 def check_can_leave(configuration: Scenario) -> None:
     """Raise ScenarioError for a walk that has no exported form."""
     if walk_of(configuration).person:
@@ -96,14 +82,14 @@ def check_can_leave(configuration: Scenario) -> None:
 
 def settings_of_walk(configuration: Scenario) -> tuple[Setting, ...]:
     """Every number of a walk in SI units, under the path that overrides know it by."""
-    run, who, control = configuration.run, walk_of(configuration).who, _control(configuration)
-    of_run = {"run.duration": run.duration, "run.step": run.step, "run.output_interval": who.interval(run.duration)}
+    run, control = configuration.run, _control(configuration)
+    of_run = {"run.duration": run.duration, "run.step": run.step, "run.output_interval": record_interval(run.duration)}
     times = of_run | {"controller.period": configuration.controller.period}
-    declared = declared_settings(configuration) | control | {f"run.{item.name}": item for item in (*RUN, who.step)}
+    declared = declared_settings(configuration) | control | {f"run.{item.name}": item for item in (*RUN, STEP)}
     # What fails of the plant, with its shut-off valve, is written out in the source; persons are drawn in Python.
     fixed = ("shut_off.", *(f"faults.{part}." for part in walk_of(configuration).broken), f"wearer.{PERSON.name}")
     # The structures of libraries have the times behind the device.
-    wearer = (f"wearer.{item.name}" for item in who.numbers)
+    wearer = (f"wearer.{item.name}" for item in (*WEARER, PERSON))
     paths = dict.fromkeys((*device_numbers(configuration.device), *of_run, *wearer, *times, *control, *declared))
     return tuple(
         Setting(
@@ -128,7 +114,7 @@ def _control(configuration: Scenario) -> dict[str, Quantity]:
 def links_of_walk(configuration: Scenario) -> Graph:
     """Settings of a walk that follow others as long as nobody changes them."""
     known = {item.path: item.value for item in settings_of_walk(configuration)}
-    recorded = {"run.output_interval": (Follows((Term(("run.duration",), walk_of(configuration).who.interval),)),)}
+    recorded = {"run.output_interval": (Follows((Term(("run.duration",), record_interval),)),)}
     # A plant alone has no settings of the controller that its walk had.
     links = {path: links for path, links in {**configuration.graph, **recorded}.items() if path in known}
     return holding(links, known.__getitem__)
@@ -156,10 +142,9 @@ def preparation_of_walk(configuration: Scenario, program: Program, collector: Co
 
 def _lines(configuration: Scenario, writing: Writing) -> Iterator[str]:
     """Lines from settings to the numbers of a run; each needs names that lines before it have made."""
-    form: ExportedWalk = kind_at(walk_of(configuration).who.exported)
     add = writing.add
     yield from writing.plant("bare", "0.0")
-    yield from form.leg(configuration, writing)
+    yield from _leg(configuration, writing)
 
     # Sensors with their faults, and the longest time by which one is late.
     faults = walk_of(configuration).faults
@@ -198,7 +183,7 @@ def _lines(configuration: Scenario, writing: Writing) -> Iterator[str]:
     if planned is not None:
         yield f"task_sequence = {writing.constant(planned.timed, 'task_sequence')}"
 
-    yield from form.start(configuration, writing)
+    yield from _start(configuration, writing)
     yield from writing.start()
 
 
@@ -242,20 +227,3 @@ def _start(configuration: Scenario, writing: Writing) -> Iterator[str]:
         yield f"walk = {add(walk_from_standing)}({add(standing_on)}({given}))"
     yield f"gait_seen = {writing.constant(NOTHING_SEEN, 'gait_seen')}"
     yield f"state = {add(vented_state)}(plant, walk.now.ankle, walk.now.ankle_rate)"
-
-
-def _words(motion: WalkMotion) -> tuple[tuple[str, ...], str]:
-    gait, sequence = motion.gait, motion.task_sequence
-    way = "stride after equal stride"
-    if sequence is not None:
-        way = f"the task sequence `{sequence.name}`, which stays as it is"
-    led = (
-        f"the gait, `{gait.name}`: its series, its events and its stride of "
-        f"{gait.stride_time:.4g} s are numbers in the source",
-        f"how it is walked: {way}",
-    )
-    return led, "the gait alone" if sequence is None else "the gait and its task sequence alone"
-
-
-LED_WALK = ExportedWalk(_leg, _start, _words)
-"""The walk along a prescribed gait."""

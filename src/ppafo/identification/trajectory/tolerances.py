@@ -134,12 +134,18 @@ def _of_run(tolerances: Tolerances, experiment: Experiment) -> dict[str, tuple[f
 def _of_set(
     tolerances: Tolerances, experiments: Sequence[Experiment], given: set[str], stated: Mapping[str, float]
 ) -> Iterator[FreeParameter]:
-    """Return the numbers of the device that are held, each with its own uncertainty, as the fit moves them."""
+    """Return the numbers of the device that are held, each with its own uncertainty, as the fit moves them.
+
+    A number that follows another has no uncertainty of its own: it moves with that one.
+    """
     scenario = experiments[0].scenario
+    following = {path for path, links in scenario.device.links.items() if not all(link.when_set for link in links)}
     off = {effect.section for effect, is_on in switches_of(scenario.device).items() if not is_on}
     for path, quantity in declared_numbers(scenario).items():
         section, _, name = path.rpartition(".")
         if path in given or section in ("motion", "initial", "recording", "motion.shank") or path.startswith("supply."):
+            continue
+        if path in following:
             continue
         value, half_width = number_at(scenario, path), stated.get(path, 0.0)
         # An effect that is off has no numbers that act.

@@ -1,7 +1,7 @@
 """The vane of the paper: two chambers whose volumes run linearly with the angle. Equations (2), (4), (5).
 
-Torque constant and displacement per radian are given apart, as they are reported. By virtual work they are one number
-but for losses; where they differ, the shaft does not get the work of the gas (docs/decisions/0014).
+By virtual work the displacement per radian is the torque constant, and follows it; a set may state another, as it was
+reported: then the shaft does not get the work of the gas (docs/decisions/0014).
 """
 
 from typing import Annotated, Any, NamedTuple

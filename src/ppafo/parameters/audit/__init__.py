@@ -21,7 +21,7 @@ from ppafo.parameters.audit.values import (
     check_statements,
 )
 from ppafo.parameters.loading import load_parameter_set
-from ppafo.parameters.parameter_set import ParameterSet, overridden_paths
+from ppafo.parameters.parameter_set import ParameterSet, overridden_paths, with_followers
 
 __all__ = ["Finding", "NamedValue", "Severity", "Side", "audit", "changed_paths"]
 
@@ -57,7 +57,7 @@ def audit(parameter_set: ParameterSet, parent: ParameterSet | None = None) -> li
     """
     if parent is None and parameter_set.parent:
         parent = load_parameter_set(parameter_set.parent)
-    evidence = Evidence(parameter_set, parameter_set.declarations())
+    evidence = Evidence(with_followers(parameter_set), parameter_set.declarations())
     found = [finding for check in CHECKS.values() for finding in check(evidence)]
     changed, ids = overridden_paths(parameter_set), {finding.id for finding in found}
     judged = [_judge(finding, parameter_set, changed, parent) for finding in found]

@@ -51,12 +51,15 @@ def check_virtual_work(evidence: Evidence) -> Iterator[Finding]:
                 *gas_sides,
             ),
             paragraph=(
-                f"A frictionless vane that turns by dtheta does the work T dtheta = (P1 - P2) dV, so that the torque "
-                f"constant {1e6 * torque_constant:.4g} cm^3 and the displacement per radian "
+                f"A vane that turns by dtheta does the work T dtheta = (P1 - P2) dV before friction, so that the "
+                f"torque constant {1e6 * torque_constant:.4g} cm^3 and the displacement per radian "
                 f"{1e6 * displacement_per_radian:.4g} cm^3/rad should be one number; the displacement is "
-                f"{displacement_per_radian / torque_constant:.2g} times the torque constant.{gas_text} "
-                "Measure the volume of gas that a full turn displaces; until then energy and efficiency figures are "
-                "uncertain by the same factor."
+                f"{displacement_per_radian / torque_constant:.2g} times the torque constant. The model takes it as it "
+                f"is: the shaft gets {100.0 * torque_constant / displacement_per_radian:.3g} % of the work p dV of the "
+                "gas, and nothing takes up the difference, for friction has numbers of its own."
+                f"{gas_text} "
+                f"Leave {_DISPLACEMENT_PER_RADIAN} out, and it follows the torque constant; or measure the volume of "
+                "gas that a full turn displaces. Until then energy and gas are uncertain by the same factor."
             ),
         )
 

@@ -5,7 +5,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ppafo.errors import UnitError
-from ppafo.parameters.parameter_set import Entry, ParameterSet, atmospheric_pressure, entry_in_si, entry_text
+from ppafo.parameters.parameter_set import (
+    Entry,
+    ParameterSet,
+    atmospheric_pressure,
+    entry_in_si,
+    entry_text,
+    with_followers,
+)
 
 _SAME = 1e-12
 """Relative difference that a change of unit leaves."""
@@ -26,6 +33,7 @@ def changes(parameter_set: ParameterSet, parent: ParameterSet) -> list[Change]:
 
     Numbers are compared in SI, so that a value in another unit is the same value; sources and notes do not count.
     """
+    parameter_set, parent = with_followers(parameter_set), with_followers(parent)
     kinds, old_kinds = _chosen(parameter_set), _chosen(parent)
     found = [
         Change(path, old_kinds.get(path, ""), kinds.get(path, ""), "")

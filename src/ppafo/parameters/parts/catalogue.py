@@ -47,13 +47,16 @@ GROUPS: dict[str, tuple[Quantity, ...]] = {
 
 NEEDED: dict[str, tuple[str, ...]] = {
     "valves": ("mass",),
-    "actuators": ("mass", *_OF_ACTUATOR),
+    "actuators": ("mass", "torque_constant"),
     "regulators": ("mass",),
     "bottles": ("content", "empty_mass"),
     "processors": ("mass", "power"),
     "batteries": ("mass", "energy"),
 }
-"""Figures without which a part is of no use to a study; a valve needs an orifice in one of its two forms besides."""
+"""Figures without which a part is of no use to a study; a valve needs an orifice in one of its two forms besides.
+
+The displacement of an actuator per radian is its torque constant where it is not given, as in a parameter set.
+"""
 
 
 def figures_of(group: str, kind: str) -> tuple[Quantity, ...]:
@@ -269,6 +272,8 @@ def _part(file: str, group: str, name: str, parsed: Any) -> Part:
             values[key] = to_si(figure.value, figure.unit, declared[key].unit, STANDARD_ATMOSPHERE)
         if not is_within(values[key], declared[key]):
             raise ParameterError(f"{shown}: must be {limits_text(declared[key])}")
+    if "torque_constant" in values:
+        values.setdefault("displacement_per_radian", values["torque_constant"])
     return Part(
         name, group, kind, parsed.maker, parsed.model, parsed.document, parsed.note, figures, values, parsed.unknown
     )

@@ -5,10 +5,8 @@ from dataclasses import dataclass
 from typing import NamedTuple, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ppafo.control.kind import PythonController
-from ppafo.engine.lane_samples import FELL
 from ppafo.engine.lane_samples import REQUEST as REQUEST_ROW
 from ppafo.engine.lane_source import SAME_MOMENT
 from ppafo.engine.lanes import Batch, BatchResult, Floats, add_meters, group_of, load_programs, meters_of, run_blocks
@@ -18,7 +16,7 @@ from ppafo.engine.run import NEVER_FAILED, Members
 from ppafo.errors import ScenarioError
 from ppafo.metrics import METRICS
 from ppafo.metrics.gas import ENERGIES
-from ppafo.metrics.metric import LED, LED_SHANK, REACTS, REQUEST, STEADY, WALK, MetricKind, Readings
+from ppafo.metrics.metric import LED_SHANK, REQUEST, STEADY, WALK, MetricKind, Readings
 from ppafo.model.gas import energy_per_content
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState, TrueMasses
 from ppafo.simulation.sampled import run_sampled
@@ -148,10 +146,9 @@ class Outcome:
             states[:, runs], ends[:, runs] = result.states, task.at_last_sample(result)
             for name, values in read_from_traces.items():
                 values[runs] = _read(task, name, task.readings(ends[:, runs], runs, result.record))
-            stood = task.stood(result)[:: task.band_stride]
             for name in self.request.bands:
                 trace = result.record[:: task.band_stride, batch.program.traced.index(name)]
-                self.traces[name][: len(trace), members[runs]] = np.where(stood, trace, np.nan)
+                self.traces[name][: len(trace), members[runs]] = trace
 
         if self.request.custom is None:
             run_blocks(batch, take, threads)
@@ -204,20 +201,9 @@ class _MeteredBatch:
             return result.states
         program, states = self.batch.program, result.states.copy()
         rows = row_numbers(program.state_rows())
-        last, runs = self.stood(result).sum(axis=0) - 1, np.arange(states.shape[1])
         for path in self.late_totals:
-            states[rows[path]] = result.record[last, program.traced.index(path), runs]
+            states[rows[path]] = result.record[-1, program.traced.index(path)]
         return states
-
-    def stood(self, result: BatchResult) -> NDArray[np.bool_]:
-        """Whether the wearer still stands at each sample of the traces (samples, runs); recordings end with a fall."""
-        program = self.batch.program
-        if FELL not in program.traced:
-            return np.ones((result.record.shape[0], result.record.shape[2]), dtype=np.bool_)
-        stood: NDArray[np.bool_] = result.record[:, program.traced.index(FELL)] < 0.0
-        # The first sample stays in any case, as in the recording of a single run.
-        stood[0] = True
-        return stood
 
     def readings(self, states: Floats, runs: slice, record: Floats | None) -> Readings:
         """The readings of some runs from their states at the last sample and, if there are, their traces."""
@@ -258,8 +244,6 @@ def has_channels(program: Program, kind: MetricKind) -> bool:
     has = {
         WALK: program.walks,
         STEADY: not program.takes_task_sequence,
-        LED: not program.reacts,
-        REACTS: program.reacts,
         LED_SHANK: program.is_on_gait,
         REQUEST: REQUEST_ROW in row_numbers(program.state_rows()),
     }
@@ -273,11 +257,6 @@ def has_channels(program: Program, kind: MetricKind) -> bool:
 def lacking(scenario: Scenario, kind: MetricKind) -> str:
     """Why no run of a scenario has what a metric needs, an empty text where it has."""
     return scenario.motion.motion_kind.lacks(scenario, kind)
-
-
-def reacts(scenario: Scenario) -> bool:
-    """True of a neuromuscular gait model, whose minute takes a fraction of a second, of other runs milliseconds."""
-    return not lacking(scenario, METRICS["fall_time"])
 
 
 def offered(scenario: Scenario) -> dict[str, MetricKind]:
@@ -305,9 +284,8 @@ def _meter_batch(plain: Batch, request: Request) -> _MeteredBatch:
             f"{interval.max():.6g} s; give run.output_interval a value that does"
         )
     late = _late_totals(plain, available)
-    falls = {FELL} if program.reacts and (late or request.bands) else set[str]()
-    traced = sorted({*read_from_traces, *request.bands, *late, *falls})
-    every_sample = bool(read_from_traces or (late and (falls or request.bands)))
+    traced = sorted({*read_from_traces, *request.bands, *late})
+    every_sample = bool(read_from_traces or (late and request.bands))
     # Totals alone need no more than the first sample and the last.
     trace_every = 1 if every_sample else stride if request.bands else max(1, plain.clock.samples - 1)
     batch = add_meters(plain, [meter for _, meter in meters], traced, trace_every if traced else 0)
@@ -315,12 +293,9 @@ def _meter_batch(plain: Batch, request: Request) -> _MeteredBatch:
 
 
 def _late_totals(plain: Batch, metrics: Mapping[str, MetricKind]) -> tuple[str, ...]:
-    """Paths of what totals are made of, where metrics need them and a run goes on after the last sample that counts.
-
-    The last step may, and so does all that comes after a fall.
-    """
+    """Paths of what totals are made of, where metrics need them and a run goes on after the last sample that counts."""
     clock, program = plain.clock, plain.program
-    ends_there = clock.record_every * (clock.samples - 1) >= clock.step_count - SAME_MOMENT and not program.reacts
+    ends_there = clock.record_every * (clock.samples - 1) >= clock.step_count - SAME_MOMENT
     needed = {channel for kind in metrics.values() for channel in kind.channels}
     if ends_there or needed.isdisjoint(ThermalTotals._fields):
         return ()

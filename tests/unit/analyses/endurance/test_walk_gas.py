@@ -253,8 +253,7 @@ def test_a_walk_whose_numbers_were_changed_in_python_is_not_taken_for_that_of_it
 @pytest.mark.parametrize(
     ("name", "numbers"),
     [
-        ("reacting", {"wearer.tibialis_strength": 0.5}),
-        ("reacting", {"wearer.left_soleus_force": 1.0}),
+        ("proportional", {"wearer.body_mass": 80.0}),
         ("solenoid", {"sensors.force_bandwidth": 20.0}),
         ("solenoid-regulators", {"supply_line.plantarflexion.droop": 1.0e9}),
     ],

@@ -22,7 +22,6 @@ from ppafo.signals.recording import CHANNELS
 from ppafo.storage.places import DiskFolder
 from ppafo.studies.loading import load_study
 from ppafo.study import store
-from ppafo.study.blocks import chunk_size
 from ppafo.study.store import Task, chunk_file, compute_chunk, estimate_bytes, stored_unit
 
 AREA = {"path": "valve.area", "kind": "uniform", "minimum": "10 mm^2", "maximum": "12 mm^2"}
@@ -411,9 +410,3 @@ def test_a_seed_takes_the_place_of_that_of_the_file(varying: Callable[..., Any])
 def test_a_loaded_study_is_not_changed_by_what_stands_beside_it(small: Any) -> None:
     with pytest.raises(StudyError, match="a loaded Study takes no overrides, draws or seed; give them to load_study"):
         sweep(load_study(small), draws=3)
-
-
-def test_a_thousand_wearers_who_react_are_kept_in_pieces_of_seconds() -> None:
-    study = load_study("weak-wearers-who-react", draws=1000)
-    assert study.runs == 3000
-    assert chunk_size(study) == 64

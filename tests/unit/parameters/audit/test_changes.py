@@ -9,10 +9,10 @@ PARENT = load_parameter_set("ppafo2011")
 
 
 def test_a_value_in_another_unit_is_no_change_and_one_with_another_number_is() -> None:
-    same = apply_overrides(PARENT, ["actuator.dead_volume_1=26500 mm^3", "gas.temperature=24.85 degC"])
+    same = apply_overrides(PARENT, ["actuator.dead_volume_1=36000 mm^3", "gas.temperature=24.85 degC"])
     assert changes(same, PARENT) == []
-    (change,) = changes(apply_overrides(PARENT, ["actuator.dead_volume_1=26501 mm^3"]), PARENT)
-    assert (change.path, change.before, change.after) == ("actuator.dead_volume_1", "26.5 cm^3", "26501 mm^3")
+    (change,) = changes(apply_overrides(PARENT, ["actuator.dead_volume_1=36001 mm^3"]), PARENT)
+    assert (change.path, change.before, change.after) == ("actuator.dead_volume_1", "36 cm^3", "36001 mm^3")
 
 
 def test_a_valve_of_another_kind_is_a_change() -> None:

@@ -1,0 +1,55 @@
+"""Cv, Kv and nominal flow of data sheets as C and b of ISO 6358, by which a valve passes gas.
+
+Nominal flow ``qn`` goes from p1 = 7 bar to p2 = 6 bar, absolute, in litres at ANR. By ISO 6358 it is ``C p1 s`` with
+``s = sqrt(1 - ((p2/p1 - b)/(1 - b))^2)``, 254.3 L/min per L/(s bar) at b = 0.3. A valve of Cv = 1 passes 984 L/min of
+it, by ``q = 22.48 Cv sqrt((p1 - p2) p2/(G T))`` of ANSI/(NFPA) T3.21.3 [ft^3/min, psi absolute, degrees Rankine, G = 1
+of air] at 20 degC. So C = 3.87 L/(s bar) per Cv; a Kv is 1.156 Cv.
+
+The number of a liquid, 17.0 mm^2 of orifice per Cv, is no use for gas: choked flow would be 13 % too small.
+"""
+
+import math
+
+from ppafo.errors import UnitError
+from ppafo.units import flow_of, is_volume_flow, split_number, to_si
+
+USUAL_CRITICAL_RATIO = 0.3
+"""b [-] of spool valves, where a data sheet does not say it."""
+
+CV_PER_KV = 1.156
+"""US gal/min at 1 psi per m^3/h at 1 bar, both of water (IEC 60534-1)."""
+
+_BEFORE, _BEHIND = 7.0, 6.0
+"""bar absolute of nominal flow."""
+_NFPA, _PSI_PER_BAR, _RANKINE, _LITRES_PER_CUBIC_FOOT = 22.48, 14.5038, 527.67, 28.3168
+_LITRE_PER_SECOND_BAR = 1.0e-8
+
+
+def conductance_of_nominal_flow(flow: float, critical_ratio: float = USUAL_CRITICAL_RATIO) -> float:
+    """Sonic conductance C [m^3/(s Pa)] of a valve with a nominal flow [L/min at ANR] from 7 to 6 bar absolute."""
+    share = math.sqrt(1.0 - ((_BEHIND / _BEFORE - critical_ratio) / (1.0 - critical_ratio)) ** 2)
+    return flow / 60.0 / (_BEFORE * share) * _LITRE_PER_SECOND_BAR
+
+
+def nominal_flow_of_cv(cv: float) -> float:
+    """Nominal flow [L/min] of air from 7 to 6 bar absolute through a valve with a Cv [US gal/min, psi]."""
+    drop, behind = (_BEFORE - _BEHIND) * _PSI_PER_BAR, _BEHIND * _PSI_PER_BAR
+    return _NFPA * cv * math.sqrt(drop * behind / _RANKINE) * _LITRES_PER_CUBIC_FOOT
+
+
+def conductance_of(name: str, text: str) -> float | None:
+    """Return C [m^3/(s Pa)] of ``cv``, ``kv`` or ``qn`` as it is written, ``0.05 m^3/h``; None for what is none."""
+    try:
+        value, unit = split_number(text)
+        is_flow = bool(unit) and is_volume_flow(unit)
+        # Normal litres are taken as those of the nominal flow.
+        litres = to_si(value, flow_of(unit)[0], "m^3/s") * 6.0e4 if is_flow else value
+    except UnitError:
+        return None
+    if value <= 0.0 or (unit and not is_flow):
+        return None
+    if name == "qn":
+        return conductance_of_nominal_flow(litres)
+    # Kv is in m^3/h unless it says L/min; Cv has no unit that anybody writes.
+    cv = CV_PER_KV * (litres * 0.06 if is_flow else value) if name == "kv" else value
+    return conductance_of_nominal_flow(nominal_flow_of_cv(cv))

@@ -1,0 +1,54 @@
+"""Units at the edge: text and units in, SI floats out, and back. Inside the package there are only SI floats.
+
+Three rules go beyond arithmetic:
+
+- A pressure says what it is: ``psi_g`` gauge, ``psi_a`` absolute, ``psi_d`` a difference; the suffix works on
+  every unit of pressure, quotients too. ``psi`` alone is refused, except inside a compound such as ``N m/psi``. In SI
+  a level is ``Pa_a`` and a difference ``Pa_d``.
+- An angle is a dimension: ``75`` is no angle, ``75 deg`` is, and ``rad/s`` is not ``Hz``.
+- Only the units listed in ``definitions.py`` exist. A short list makes a misspelling an error and the start quick.
+  What people write for them is brought to their spelling in ``spelling.py``.
+
+A volume flow becomes a mass flow by the reference condition and the gas behind it (``reference.py``): ``L/min (ANR,
+air)``.
+"""
+
+from ppafo.units.definitions import ParsedUnit, known_units, unit_by_pint
+from ppafo.units.quantity import (
+    base_value,
+    check_unit,
+    conversion,
+    dimension,
+    format_quantity,
+    from_si,
+    number_text,
+    parse_quantity,
+    percentage,
+    split_number,
+    split_quantity,
+    to_si,
+)
+from ppafo.units.reference import flow_of, is_volume_flow, with_condition
+from ppafo.units.spelling import split_pressure_kind
+
+__all__ = [
+    "ParsedUnit",
+    "base_value",
+    "check_unit",
+    "conversion",
+    "dimension",
+    "flow_of",
+    "format_quantity",
+    "from_si",
+    "is_volume_flow",
+    "known_units",
+    "number_text",
+    "parse_quantity",
+    "percentage",
+    "split_number",
+    "split_pressure_kind",
+    "split_quantity",
+    "to_si",
+    "unit_by_pint",
+    "with_condition",
+]

@@ -1,0 +1,173 @@
+"""Texts with a unit to SI floats, and back."""
+
+import functools
+import math
+import re
+from decimal import Decimal
+
+from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.errors import UnitError
+from ppafo.units.definitions import KINDS, ParsedUnit, UnknownUnitError
+from ppafo.units.hints import hint, pressures_to_write
+from ppafo.units.reference import MASS_FLOW, flow_of, is_volume_flow, read_unit, without_condition
+from ppafo.units.spelling import quote, split_pressure_kind
+
+LEVEL, DIFFERENCE = "Pa_a", "Pa_d"
+
+_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+_NOT_ZERO = re.compile(r"[^eE]*[1-9]", re.ASCII)
+_DECIMAL_COMMA = re.compile(r"([+-]?\d+),(\d+)(?![\d,.])", re.ASCII)
+CONDUCTANCE = "m^3/(s Pa)"
+
+
+def split_quantity(text: str) -> tuple[float, str]:
+    """Return number and unit of a text such as ``12.6mm^2``, ``50 psi_g`` or ``0.4 1/s``; the unit may be empty."""
+    value, unit = split_number(text)
+    check_unit(unit)
+    return value, unit
+
+
+def split_number(text: str) -> tuple[float, str]:
+    """Return number and unit of a text, whatever the unit is.
+
+    It is for one who knows what unit is wanted, and with it says what does not fit.
+    """
+    stripped = text.strip()
+    match = _NUMBER.match(stripped)
+    if match is None:
+        raise UnitError(f"{quote(text)} does not start with a number; write for example '12.6 mm^2' or '50 psi_g'")
+    unit = stripped[match.end() :].strip()
+    comma = _DECIMAL_COMMA.match(stripped)
+    if comma is not None:
+        rest = stripped[comma.end() :].strip()
+        whole = f" or '{f'{comma[1]}{comma[2]} {rest}'.rstrip()}'" if len(comma[2]) == 3 else ""
+        pointed = f"{comma[1]}.{comma[2]} {rest}".rstrip()
+        raise UnitError(f"{quote(text)} has a comma in its number; write '{pointed}'{whole}")
+    value = _finite(float(match.group()), text)
+    # float() rounds 1e-400 to 0 without a word, and 0 often means "none" in a file.
+    if value == 0.0 and _NOT_ZERO.match(match.group()):
+        raise UnitError(f"{quote(text)} is too small for a number of 64 bits, and would be 0; write 0 or a larger one")
+    return value, unit
+
+
+def number_text(text: str) -> str:
+    """Return a text for ``float`` or ``int``, which take digits of any script and ``1_000``; ValueError for those."""
+    if not text.isascii() or "_" in text:
+        raise ValueError(f"{quote(text)} is not a number")
+    return text
+
+
+def parse_quantity(text: str, si_unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
+    """Return the value of a text in ``si_unit``; gauge pressure counts from ``atmosphere`` [Pa absolute]."""
+    value, unit = split_number(text)
+    return to_si(value, unit, si_unit, atmosphere)
+
+
+def to_si(value: float, unit: str, si_unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
+    """Return ``value`` in ``si_unit``: ``Pa_a`` for a pressure level, ``Pa_d`` for a pressure difference."""
+    scale, offset, counts_from_atmosphere = conversion(unit, si_unit)
+    # In decimals: 8.4 g is the float nearest to 0.0084 kg, not one beside it.
+    exact = Decimal(repr(_finite(value, value))) * scale + offset
+    return _finite(float(exact) + (atmosphere if counts_from_atmosphere else 0.0), f"{value:g} {unit}")
+
+
+def from_si(value: float, unit: str, si_unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
+    """Return the SI ``value`` in ``unit``: the inverse of ``to_si``."""
+    scale, offset, counts_from_atmosphere = conversion(unit, si_unit)
+    above = _finite(value, value) - (atmosphere if counts_from_atmosphere else 0.0)
+    return float((Decimal(repr(above)) - offset) / scale)
+
+
+def format_quantity(value: float, unit: str) -> str:
+    """Return a text that ``split_quantity`` reads back to exactly the same number and unit."""
+    return f"{repr(float(value)).removesuffix('.0')} {unit}".rstrip()
+
+
+def percentage(fraction: float, digits: int) -> str:
+    """Return a fraction [-] as a percentage of so many digits, in which hundreds are no powers of ten: ``120 %``."""
+    return f"{float(f'{100.0 * fraction:.{digits}g}'):.12g} %"
+
+
+def check_unit(unit: str, near: str | None = None) -> None:
+    """Refuse a unit that does not exist or is not written as ``kg``, ``N m s/rad`` or ``m^3/(s Pa)``.
+
+    Of an unknown one only a unit is suggested that could stand for ``near``, where that is given.
+    """
+    _read(unit, near)
+
+
+def _read(unit: str, si_unit: str | None) -> tuple[ParsedUnit, str]:
+    """Return a unit as data with the kind of a pressure.
+
+    UnitError for an unknown one names what may be meant where ``si_unit`` is wanted.
+    """
+    try:
+        return read_unit(unit)
+    except UnknownUnitError as error:
+        _, kind = split_pressure_kind(unit)
+        raise UnitError(f"'{error.name}' is not a known unit{hint(error, kind, si_unit)}{error.available}") from error
+
+
+def base_value(value: float, unit: str) -> float:
+    """Return ``value`` in the base units (m, kg, s, K, mol, rad) of its own unit, whatever its dimension is."""
+    parsed, kind = _read(unit, None)
+    base = float(Decimal(repr(_finite(value, value))) * parsed.scale + parsed.offset)
+    return base + (STANDARD_ATMOSPHERE if kind == "g" else 0.0)
+
+
+def dimension(unit: str) -> dict[str, int]:
+    """Return the powers of the base dimensions of a unit, such as ``[mass]`` and ``[angle]``."""
+    return dict(_read(unit, None)[0].dimensions)
+
+
+@functools.lru_cache(maxsize=512)
+def conversion(unit: str, si_unit: str) -> tuple[Decimal, Decimal, bool]:
+    """Return scale, offset and whether the atmosphere is to be added; in decimals, so that 8.4 g is 0.0084 kg."""
+    wanted, _ = read_unit(si_unit)
+    if _is_flow_without_mass(unit):
+        if wanted.dimensions == MASS_FLOW:
+            raise UnitError(without_condition(unit))
+        if flow_of(unit)[2]:
+            raise UnitError(f"unit '{unit}' does not fit: {_describe_unit(si_unit)}")
+    given, kind = _read(unit, si_unit)
+    if given.dimensions != wanted.dimensions:
+        given_text = f"unit '{unit}'" if unit else "a number without a unit"
+        raise UnitError(f"{given_text} does not fit: {_describe_unit(si_unit)}")
+    is_pressure = si_unit in (LEVEL, DIFFERENCE)
+    if is_pressure and not kind:
+        raise UnitError(f"'{unit}' does not say which pressure: {pressures_to_write(unit, si_unit)}")
+    if is_pressure and (kind == "d") != (si_unit == DIFFERENCE):
+        raise UnitError(f"'{unit}' is a {KINDS[kind]}, {_describe_unit(si_unit)}")
+    counts_from_atmosphere = kind == "g" and si_unit == LEVEL
+    if wanted.scale == 1 and wanted.offset == 0:
+        return given.scale, given.offset, counts_from_atmosphere
+    return given.scale / wanted.scale, (given.offset - wanted.offset) / wanted.scale, counts_from_atmosphere
+
+
+def _is_flow_without_mass(unit: str) -> bool:
+    """Tell whether a unit is a volume per time, with nothing behind it that makes it a mass."""
+    try:
+        return not flow_of(unit)[1] and is_volume_flow(unit)
+    except UnitError:
+        return False
+
+
+def _describe_unit(si_unit: str) -> str:
+    if si_unit == LEVEL:
+        return "a pressure level is needed, for example '50 psi_g' or '446 kPa_a'"
+    if si_unit == DIFFERENCE:
+        return "a pressure difference is needed, for example '5 psi_d'"
+    if si_unit == "rad":
+        return "an angle is needed, for example '75 deg' or '1.3 rad'"
+    if si_unit == CONDUCTANCE:
+        return (
+            "a sonic conductance is needed, such as '1 L/(s bar)', a flow per pressure before the valve; a nominal "
+            "flow q from p1 to p2 (absolute) is C = q/(p1 sqrt(1 - ((p2/p1 - b)/(1 - b))^2)), with b = critical_ratio"
+        )
+    return f"a unit like '{si_unit}' is needed" if si_unit else "a plain number without a unit is needed"
+
+
+def _finite(value: float, shown: object) -> float:
+    if not math.isfinite(value):
+        raise UnitError(f"{quote(shown)} is not a finite number")
+    return value

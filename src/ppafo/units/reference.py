@@ -1,0 +1,193 @@
+"""Volume flow at a reference condition: the mass flow of a gas, which is what ``L/min (ANR, air)`` says.
+
+``m_dot = rho q``, where rho = p M/(R T) is the density of an ideal gas of molar mass M at the condition. Air in the
+atmosphere of ISO 8778, which is humid, has the 1.185 kg/m^3 of ISO 6358.
+
+Normal litres, slm and SCFM do not say their condition: makers mean 0, 15, 20, 21.1 or 25 degC by them.
+"""
+
+import re
+from decimal import Decimal
+from typing import NamedTuple
+
+from ppafo.constants import (
+    MOLAR_GAS_CONSTANT,
+    MOLAR_MASSES,
+    STANDARD_ATMOSPHERE,
+    STANDARD_REFERENCE_DENSITY_AIR,
+    STANDARD_REFERENCE_TEMPERATURE,
+)
+from ppafo.errors import UnitError, nearest_name
+from ppafo.units.definitions import PRESSURE, ParsedUnit, parse_unit
+from ppafo.units.spelling import says_kind
+
+MASS_FLOW = {"[mass]": 1, "[time]": -1}
+VOLUME_FLOW = {"[length]": 3, "[time]": -1}
+_MOLAR_MASS = {"[mass]": 1, "[substance]": -1}
+
+
+class Condition(NamedTuple):
+    """Temperature [K] and pressure [Pa absolute] at which a volume of gas is counted; humid as in ISO 8778, or dry."""
+
+    temperature: float
+    pressure: float
+    is_humid: bool = False
+
+
+_ANR = Condition(STANDARD_REFERENCE_TEMPERATURE, 1.0e5, is_humid=True)
+CONDITIONS: dict[str, Condition] = {
+    "ANR": _ANR,
+    "ISO 8778": _ANR,
+    "ISO 6358": _ANR,
+    "DIN 1343": Condition(273.15, STANDARD_ATMOSPHERE),
+    "ISO 2533": Condition(288.15, STANDARD_ATMOSPHERE),
+}
+"""Conditions by name: of pneumatics, of normal litres, of the standard atmosphere at sea level."""
+
+_BEHIND = re.compile(r"(?P<flow>.*[^/ ]) *\((?P<words>[^()]*)\)|(?P<bare>.*[^/ ])[ _]+(?P<name>ANR)")
+_NORMAL = re.compile(
+    r"(?:(?i:std\.?|standard|norm\.?|normal) +|[NSns](?=c?m\^?[23³]/|[lL]/|cc/))(?P<volume>[^ ]+/.+)"
+    r"|(?P<milli>m?)[lL](?:[ns]|\(n\))/(?P<per>\w+)"
+    r"|(?P<word>[NnSs][lL]p?m|[NS]LP?M|[Ss][Cc][Cc][Mm]|[Ss][Cc][Ff][MmHh])"
+)
+_WORDS = {"ccm": "cm^3/min", "cfm": "ft^3/min", "cfh": "ft^3/h"}
+_EXAMPLE = "70 degF, 14.696 psi_a"
+
+
+def flow_of(unit: str) -> tuple[str, str, bool]:
+    """Return the volume flow in a unit, the words behind it, and whether it calls itself normal or standard.
+
+    The words are the condition, and the gas where it is said; empty where there are none.
+    """
+    text = unit.strip()
+    behind = _BEHIND.fullmatch(text)
+    flow = text if behind is None else behind["flow"] or behind["bare"]
+    words = "" if behind is None else behind["words"] or behind["name"] or ""
+    # What stands behind bar (abs) or kgf/cm^2 (g) is no condition.
+    if words and says_kind(text):
+        return text, "", False
+    normal = _NORMAL.fullmatch(flow)
+    if normal is None:
+        return flow, words, False
+    if normal["word"]:
+        word = normal["word"].lower()
+        return _WORDS.get(word[1:], "L/min"), words, True
+    return normal["volume"] or f"{normal['milli']}L/{normal['per']}", words, True
+
+
+def is_volume_flow(unit: str) -> bool:
+    """Tell whether a unit is a volume per time, be its reference condition said or not; UnitError for no unit."""
+    flow, _, is_normal = flow_of(unit)
+    return is_normal or parse_unit(flow)[0].dimensions == VOLUME_FLOW
+
+
+def with_condition(unit: str, condition: str, gas: str) -> str:
+    """Return a unit of volume flow with what is known of its condition and gas and not said in it."""
+    flow, words, is_normal = flow_of(unit)
+    said = [word.strip() for word in _split(words) if word.strip()]
+    own = [word for word in said if _is_gas(word)]
+    place = ", ".join([word for word in said if word not in own]) or condition
+    name = unit.strip() if not words else unit.strip().removesuffix(")").removesuffix(words).rstrip(" (_")
+    whole = ", ".join(filter(None, (place, *(own or (gas,)))))
+    return f"{name if is_normal else flow} ({whole})" if whole else unit
+
+
+def read_unit(unit: str) -> tuple[ParsedUnit, str]:
+    """Return a unit as data with the kind of a pressure; a volume flow with condition and gas is a mass flow.
+
+    UnitError for what is no unit, for a flow that calls itself normal without a condition, and for one without a gas.
+    """
+    flow, words, is_normal = flow_of(unit)
+    if not words and not is_normal:
+        return parse_unit(unit)
+    parsed, _ = parse_unit(flow)
+    if parsed.dimensions != VOLUME_FLOW:
+        if is_normal:
+            return parse_unit(unit)
+        raise UnitError(f"'{unit}': a reference condition belongs to a volume flow, such as 'L/min (ANR, air)'")
+    if not words:
+        raise UnitError(without_condition(unit))
+    said = [word.strip() for word in _split(words) if word.strip()]
+    gases = [word for word in said if _is_gas(word)]
+    condition = condition_of(", ".join(word for word in said if word not in gases), unit)
+    if len(gases) != 1:
+        example = with_condition(unit, "", "air") if not gases else "L/min (ANR, air)"
+        raise UnitError(f"'{unit}' {'does not say the gas' if not gases else 'says two gases'}: {_write(example)}")
+    factor = Decimal(repr(density(condition, _molar_mass(gases[0]))))
+    return ParsedUnit(parsed.scale * factor, Decimal(0), MASS_FLOW), ""
+
+
+def _write(example: str) -> str:
+    return f"write '{example}', or with another of the gases {', '.join(MOLAR_MASSES)}, or a molar mass in kg/mol"
+
+
+def without_condition(unit: str) -> str:
+    """Return what is asked of a volume flow in place of a mass flow: its reference condition and its gas."""
+    named, normal, own = (with_condition(unit, at, "air") for at in ("ANR", "DIN 1343", _EXAMPLE))
+    return (
+        f"'{unit}' is a volume flow without its reference condition, by which it is a mass flow: write '{named}' "
+        f"(20 degC, 1 bar), '{normal}' (0 degC, 1.01325 bar) or '{own}', as the data sheet of the meter says, with the "
+        "gas; in a column map at = 'ANR' and gas = 'air'"
+    )
+
+
+def density(condition: Condition, molar_mass: float) -> float:
+    """Return the density [kg/m^3] of an ideal gas, ``p M/(R T)``; of air at ANR it is that of ISO 6358."""
+    if condition.is_humid and abs(molar_mass / MOLAR_MASSES["air"] - 1.0) < _AS_AIR:
+        return STANDARD_REFERENCE_DENSITY_AIR
+    return condition.pressure * molar_mass / (MOLAR_GAS_CONSTANT * condition.temperature)
+
+
+_AS_AIR = 5.0e-3
+"""Fraction by which a molar mass of air may differ from the one of the package."""
+
+
+def condition_of(text: str, unit: str) -> Condition:
+    """Return a condition by its name, or from a temperature and a pressure; UnitError, about a unit, for another text.
+
+    A pressure without a kind is absolute, as that of every reference condition.
+    """
+    name = re.sub(r"[\s_-]+", " ", text).upper()
+    if name in CONDITIONS:
+        return CONDITIONS[name]
+    temperature = pressure = None
+    for word in _split(text):
+        match = re.fullmatch(r"\s*([+-]?\d+(?:[.,]\d+)?)\s*(\S.*?)\s*", word)
+        if match is None:
+            break
+        parsed, kind = parse_unit(match[2])
+        value = Decimal(match[1].replace(",", ".")) * parsed.scale + parsed.offset
+        if parsed.dimensions == {"[temperature]": 1} and value > 0:
+            temperature = float(value)
+        elif parsed.dimensions == PRESSURE and kind in ("", "a") and value > 0:
+            pressure = float(value)
+        else:
+            break
+    else:
+        if temperature is not None and pressure is not None:
+            return Condition(temperature, pressure)
+    names = ", ".join(CONDITIONS)
+    raise UnitError(
+        f"'{unit}': '{text}' is no reference condition{nearest_name(name, CONDITIONS)}; it is one of {names}, or a "
+        f"temperature and an absolute pressure, such as '{_EXAMPLE}'"
+    )
+
+
+def _split(words: str) -> list[str]:
+    """Return what commas, semicolons and 'and' separate; a comma between digits is a decimal one."""
+    return re.split(r"(?<!\d),|,(?!\d)|;|\band\b|&|@", words)
+
+
+def _is_gas(word: str) -> bool:
+    return word.lower() in map(str.lower, MOLAR_MASSES) or word.endswith("/mol")
+
+
+def _molar_mass(word: str) -> float:
+    known = {name.lower(): mass for name, mass in MOLAR_MASSES.items()}
+    if word.lower() in known:
+        return known[word.lower()]
+    match = re.fullmatch(r"\s*(\d+(?:\.\d*)?(?:[eE][+-]?\d+)?)\s*(\S+)\s*", word)
+    parsed = None if match is None else parse_unit(match[2])[0]
+    if match is None or parsed is None or parsed.dimensions != _MOLAR_MASS or not float(match[1]) > 0.0:
+        raise UnitError(f"'{word}' is no molar mass, such as '0.044 kg/mol'")
+    return float(Decimal(match[1]) * parsed.scale)

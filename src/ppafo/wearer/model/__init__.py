@@ -1,1 +1,0 @@
-"""A wearer who answers: a planar body of seven segments, its muscles, their reflexes, and the ground."""
