@@ -28,4 +28,7 @@ def start() -> int:
 
 
 if __name__ == "__main__":
+    # ``python -m`` puts the working folder first, and with it whatever somebody called like a package that is absent.
+    if not sys.flags.safe_path and sys.path[:1] == [os.getcwd()]:  # noqa: PTH109
+        del sys.path[0]
     sys.exit(start())

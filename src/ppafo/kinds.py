@@ -3,29 +3,24 @@
 A catalogue names the place of a kind of this package, ``module:KIND``, which is loaded when the kind is looked up: a
 run loads the valve and the controller that it has, and no other. A guest, a package that no other imports, is reached
 by such a name alone; where its folder is not installed its kinds are not listed. Another package offers a kind as an
-entry point of the catalogue's group; a module that is no package is named with its object, ``my_module:KIND``. Nothing
-is looked for before a name is requested that is not here.
+entry point of the catalogue's group; an object of a module that the person named is ``my_module:KIND``. Nothing is
+looked for before a name is requested that is not here.
 """
 
 import importlib.util
 import logging
-import re
 import sys
 from collections.abc import Callable, Iterator, Mapping, MutableMapping
-from contextlib import contextmanager
 from functools import lru_cache
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from ppafo.errors import KindError, one_line
+from ppafo.plugins import OBJECT, is_working_folder, object_of, without_working_folder
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
 logger = logging.getLogger("ppafo")
-
-_OBJECT = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*")
-
 
 Kind = TypeVar("Kind")
 """What a catalogue holds: it has a ``name``, or is a function of another package, which its entry point names."""
@@ -98,7 +93,7 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
         """Load every kind that is installed; return one line for each that cannot be used, and log it."""
         self.load_own()
         problems = []
-        for point in _entry_points(self.group, tuple(sys.path)):
+        for point in _entry_points(self.group, _installed_path()):
             try:
                 if point.name in self._own:
                     name = f"{self.word} '{one_line(point.name)}' of {_package(point)}"
@@ -113,13 +108,9 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
     def _find(self, name: str) -> Kind | None:
         if not name:
             return None
-        if _OBJECT.fullmatch(name):
-            from importlib.metadata import EntryPoint
-
-            point = EntryPoint(name, name, self.group)
-            with _with_working_folder():
-                return self._load(point)
-        points = [point for point in _entry_points(self.group, tuple(sys.path)) if point.name == name]
+        if OBJECT.fullmatch(name):
+            return self._checked(lambda: object_of(name), f"{self.word} '{one_line(name)}'", "")
+        points = [point for point in _entry_points(self.group, _installed_path()) if point.name == name]
         # One entry found twice on the search path is no conflict.
         if len({(point.value, _package(point)) for point in points}) > 1:
             packages = ", ".join(sorted({_package(point) for point in points}))
@@ -131,16 +122,25 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
         return self._load(points[0])
 
     def _load(self, point: "EntryPoint") -> Kind:
-        where = f"{self.word} '{one_line(point.name)}' of {_package(point)}"
+        def load() -> Any:
+            with without_working_folder():
+                return point.load()
+
+        return self._checked(load, f"{self.word} '{one_line(point.name)}' of {_package(point)}", point.name)
+
+    def _checked(self, load: Callable[[], Any], where: str, called: str) -> Kind:
+        """Return what is loaded where it is a kind, of a name that was given; KindError where it is none."""
         try:
-            kind = point.load()
+            kind = load()
+        except KindError as error:
+            raise KindError(f"{where}: {one_line(error)}") from error
         except Exception as error:  # what another package does when it is imported is anybody's guess
             raise KindError(f"{where} cannot be loaded: {type(error).__name__}: {one_line(error)}") from error
         if not isinstance(kind, self._kind_type):
             is_a = f"is of type {type(kind).__name__}, not {self._kind_type.__name__}"
             raise KindError(f"{where} {is_a}")
-        name = getattr(kind, "name", point.name)
-        if ":" not in point.name and name != point.name:
+        name = getattr(kind, "name", called)
+        if called and name != called:
             raise KindError(f"{where} calls itself '{one_line(name)}'; entry point and kind need one name")
         return kind
 
@@ -196,31 +196,25 @@ def late(place: str) -> Callable[..., Any]:
     return called
 
 
+def _installed_path() -> tuple[str, ...]:
+    return tuple(folder for folder in sys.path if not is_working_folder(folder))
+
+
 @lru_cache(maxsize=32)
 def _entry_points(group: str, _path: tuple[str, ...]) -> tuple["EntryPoint", ...]:
     """Entry points of a group for a search path, in the order of their names."""
     from importlib.metadata import entry_points
 
-    # The path is part of the key, as it may grow while the program runs.
-    found = entry_points(group=group)
+    # The path is part of the key, as it may grow while the program runs. What lies in the working folder is no package
+    # that somebody installed, but a file of whoever made the folder.
+    found = [point for point in entry_points(group=group) if not _is_beside(point)]
     return tuple(sorted(found, key=lambda point: (point.name, point.value)))
+
+
+def _is_beside(point: "EntryPoint") -> bool:
+    return point.dist is not None and is_working_folder(str(point.dist.locate_file("")))
 
 
 def _package(point: "EntryPoint") -> str:
     distribution: Any = point.dist
     return f"'{point.module}'" if distribution is None else f"package '{one_line(distribution.name)}'"
-
-
-@contextmanager
-def _with_working_folder() -> Iterator[None]:
-    """Let modules be found in the working folder, after all others, as ``python -m`` does."""
-    folder = str(Path.cwd())
-    if folder in sys.path or "" in sys.path:
-        yield
-        return
-    sys.path.append(folder)
-    importlib.invalidate_caches()
-    try:
-        yield
-    finally:
-        sys.path.remove(folder)

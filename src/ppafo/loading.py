@@ -11,6 +11,7 @@ from typing import Any
 from ppafo.documents.toml_text import beside, label
 from ppafo.errors import ScenarioError, nearest_name
 from ppafo.parameters import ParameterSet
+from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation import loading as of_vanes
 from ppafo.simulation import schema
 from ppafo.simulation.declaration import kind_at
@@ -33,15 +34,21 @@ def list_all_scenarios() -> tuple[str, ...]:
 
 
 def load_scenario(
-    name_or_path: str | Path, overrides: Iterable[str] = (), parameter_set: ParameterSet | None = None
+    name_or_path: str | Path,
+    overrides: Iterable[str] = (),
+    parameter_set: ParameterSet | None = None,
+    *,
+    plugins: Plugins = (),
 ) -> Scenario:
     """Return a scenario, walks among them, by its name in the package or by the path of a TOML file, in SI units.
 
     ``overrides`` are texts whose path begins in the scenario, ``run.duration=1 s``, or in its device,
     ``valve.area=12.6mm^2``. ``parameter_set`` takes the place of the set that the scenario names; what the scenario
-    changes in its device is changed in this one. ScenarioError, ParameterError or DataError for anything that cannot be
-    used.
+    changes in its device is changed in this one. ``plugins`` are modules of your own, files or names, whose objects
+    files may name: ``plugins=["laws.py"]`` for ``kind = "laws:KIND"``. ScenarioError, ParameterError or DataError for
+    anything that cannot be used.
     """
+    name_plugins(plugins)
     # Vanes first: the code of walks is loaded for a walk only.
     name, path = str(name_or_path), Path(name_or_path)
     if name in of_vanes.list_scenarios():

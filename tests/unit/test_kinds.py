@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import ppafo
+from ppafo import plugins
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.errors import KindError, ScenarioError
 from ppafo.kinds import Kinds
@@ -118,13 +119,17 @@ def test_a_law_is_named_by_module_and_object_from_the_working_folder(
 ) -> None:
     (tmp_path / "beside.py").write_text(LAW.format(name="on_off", call="anything"))
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(plugins, "_named", {})
+    monkeypatch.setenv(plugins.VARIABLE, "")
     path = list(sys.path)
-    scenario = load_scenario("torque-task-proportional", ["controller.kind=beside:KIND"])
+    scenario = ppafo.load_scenario("torque-task-proportional", ["controller.kind=beside:KIND"], plugins=["beside"])
     assert scenario.controller.kind == "beside:KIND"
     assert sys.path == path
+    plugins.name_modules_in("controller.kind=nowhere:KIND")
     for name, problem in (
         ("nowhere:KIND", "No module named 'nowhere'"),
         ("beside:LAW", "has no attribute 'LAW'"),
+        ("json.tool:main", "you have not named the module 'json.tool'; if you trust it, add --plugin"),
         ("math:pi", "is of type float"),
     ):
         with pytest.raises(KindError, match=problem):
@@ -183,3 +188,37 @@ def test_a_kind_of_a_room_that_is_not_installed_is_not_listed_and_says_so() -> N
     laws.load_own()
     with pytest.raises(KindError, match=r"law 'there' is part of ppafo\.absent, which is not installed"):
         laws["there"]
+
+
+@pytest.mark.parametrize("given", ["laws/inner.py", "laws", "laws.inner", "laws.inner:KIND"])
+def test_a_package_is_named_by_its_folder_a_file_or_a_module(
+    given: str, install: Install, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    package = tmp_path / "laws"
+    package.mkdir()
+    (package / "__init__.py").write_text("")
+    (package / "inner.py").write_text(LAW.format(name="on_off", call="anything"))
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(plugins, "_named", {})
+    monkeypatch.setenv(plugins.VARIABLE, "")
+    plugins.name_plugins([given])
+    assert CONTROLLERS["laws.inner:KIND"].name == "anything"
+
+
+def test_a_module_of_the_name_of_another_one_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "json.py").write_text("KIND = 1")
+    monkeypatch.setattr(plugins, "_named", {})
+    monkeypatch.setenv(plugins.VARIABLE, "")
+    plugins.name_plugins(tmp_path / "json.py")
+    with pytest.raises(KindError, match=r"the module 'json' of .* has the name of another one .*; rename it"):
+        METRICS["json:KIND"]
+
+
+def test_child_processes_know_what_was_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "my_law.py").write_text(LAW.format(name="on_off", call="anything"))
+    monkeypatch.setattr(plugins, "_named", {})
+    monkeypatch.setenv(plugins.VARIABLE, "")
+    plugins.name_plugins(tmp_path / "my_law.py")
+    code = "from ppafo.control.catalog import CONTROLLERS\nprint(CONTROLLERS['my_law:KIND'].name)"
+    done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True)
+    assert (done.stdout, done.stderr) == ("anything\n", "")

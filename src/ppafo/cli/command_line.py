@@ -21,6 +21,7 @@ from ppafo.cli import output
 from ppafo.cli.arguments import Word, number, whole_number
 from ppafo.errors import PpafoError, nearest_name
 from ppafo.kinds import kind_at
+from ppafo.plugins import name_modules_in, name_plugins
 
 if TYPE_CHECKING:
     from _typeshed import SupportsWrite
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
 
 PROGRESS = "progress"
 """The parameter of a verb that reports how far it is; no word of the line fills it."""
+PLUGINS = "plugins"
+"""The parameter of Python calls for modules of the person; every command has ``--plugin`` in its place."""
 OUT = "out"
 """The parameter of a verb that writes its folder or file itself; every other command has ``--out DIR``."""
 
@@ -139,7 +142,7 @@ def parameters_of(verb: Callable[..., Any]) -> Iterator[tuple[inspect.Parameter,
     """Return each parameter that words of the line fill, with how its text is read."""
     names = vars(sys.modules[verb.__module__])
     for parameter in inspect.signature(verb).parameters.values():
-        if parameter.name != PROGRESS:
+        if parameter.name not in (PROGRESS, PLUGINS):
             annotation = parameter.annotation
             # The texts of annotations are evaluated for the command that runs, and for no other.
             yield parameter, reading_of(eval(annotation, names) if isinstance(annotation, str) else annotation)
@@ -169,6 +172,13 @@ def add_parameters(parser: argparse.ArgumentParser, command: Command, is_listing
     if command.lists:
         parser.add_argument("--list", action="store_true", help="list what comes with the package")
     output.add_json_argument(parser)
+    parser.add_argument(
+        "--plugin",
+        metavar="MODULE",
+        action="append",
+        default=[],
+        help="a module of yours that files may name, such as laws.py",
+    )
     if OUT not in names:
         what = "also write the result as files into this folder"
         if command.default_folder:
@@ -224,7 +234,10 @@ def run(parsed: argparse.Namespace, name: str, command: Command) -> int:
         return _list(command, parsed.json)
     verb = command.function()
     parameters = inspect.signature(verb).parameters
-    values = {each: getattr(parsed, each) for each in parameters if each != PROGRESS}
+    values = {each: getattr(parsed, each) for each in parameters if each not in (PROGRESS, PLUGINS)}
+    name_plugins(parsed.plugin)
+    for text in _texts(values[each] for each in _NAMING if each in values):
+        name_modules_in(text)
     for parameter, reading in parameters_of(verb):
         if command.lists and values[parameter.name] is None and parameter.default is inspect.Parameter.empty:
             noun = reading.word.metavar.lower()
@@ -239,6 +252,18 @@ def run(parsed: argparse.Namespace, name: str, command: Command) -> int:
     with output.progress_line() as progress:
         found = verb(**values, **({PROGRESS: progress} if PROGRESS in parameters else {}))
     return output.deliver(found, parsed.json, folder, name, has_written=OUT in parameters)
+
+
+_NAMING = ("overrides", "tasks", "metric", "metrics", "also", "such_that", "form")
+"""Parameters whose words may name an object of a module, which the person thereby names."""
+
+
+def _texts(values: Iterable[Any]) -> Iterator[str]:
+    for value in values:
+        if isinstance(value, str):
+            yield value
+        elif isinstance(value, Iterable):
+            yield from _texts(value)
 
 
 def _list(command: Command, as_json: bool) -> int:

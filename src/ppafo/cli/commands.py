@@ -9,6 +9,7 @@ from types import FunctionType
 from ppafo.cli.command_line import Command, Group, UsageError
 from ppafo.errors import nearest_name
 from ppafo.kinds import Kinds, is_installed, package_of
+from ppafo.plugins import name_modules_in
 
 _ANALYSES, _BENCH, _DEVICE = "ppafo.cli.verbs.analyses", "ppafo.cli.verbs.bench", "ppafo.cli.verbs.device"
 _TOOLS, _WALKING = "ppafo.cli.verbs.tools", "ppafo.cli.verbs.walking"
@@ -177,6 +178,7 @@ def check_words(words: list[str]) -> None:
             raise UsageError(f"'ppafo {' '.join(shown)}' is now 'ppafo {now}': {full}")
     _check_installed(given)
     word = given[0]
+    name_modules_in(word)
     if word in MOVED:
         raise UsageError(f"'{word}' is no longer a command of the package: run {MOVED[word]} in a checkout of ppafo")
     if word not in COMMANDS and word not in OTHERS:

@@ -33,6 +33,7 @@ from ppafo.parameters.parameter_set import (
     apply_overrides,
     chosen_valve,
 )
+from ppafo.plugins import Plugins, name_plugins
 from ppafo.units import check_unit
 
 # A dotted path names a valve: a dot or a blank in its name would make it another path.
@@ -172,8 +173,12 @@ def load_device(name_or_path: str | Path, valve: str | None = None, overrides: I
     return build_device(parameter_set, valve)
 
 
-def load_parameter_set(name_or_path: str | Path) -> ParameterSet:
-    """Return a parameter set by its name in the package or by the path of a TOML file."""
+def load_parameter_set(name_or_path: str | Path, *, plugins: Plugins = ()) -> ParameterSet:
+    """Return a parameter set by its name in the package or by the path of a TOML file.
+
+    ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
+    """
+    name_plugins(plugins)
     content, file = _FILE.read(name_or_path), label(str(name_or_path))
     return parse_parameter_set(content, file, Path(name_or_path).parent)
 

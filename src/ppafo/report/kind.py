@@ -108,7 +108,11 @@ TIME = Kind("Time", "s", "time")
 
 def of_metric(name: str, form: str = ".4g") -> Kind:
     """Return what a metric is."""
-    unit = METRICS[name].unit
+    return of_stored_metric(name, METRICS[name].unit, form)
+
+
+def of_stored_metric(name: str, unit: str, form: str = ".4g") -> Kind:
+    """Return what a metric is whose unit in SI is stored beside it, so that its kind need not be there any more."""
     return Kind(metric_words(name), unit, metric_quantity(unit), form)
 
 

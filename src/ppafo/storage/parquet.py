@@ -77,6 +77,9 @@ def read_parquet(file: io.BufferedIOBase, name: str, columns: Sequence[str] | No
             values = sum(group.column(place).num_values for group in groups for place in range(group.num_columns))
             if values > _MAXIMUM_VALUES:
                 raise DataError(f"{name}: has {values:,} values, more than any table of a study")
+            lost = [column for column in columns or () if column not in opened.schema_arrow.names]
+            if lost:
+                raise DataError(f"{name}: has no column '{one_line(lost[0])}'")
             return opened.read(columns=None if columns is None else list(columns))
     except (pa.ArrowException, OSError, ValueError) as error:
         raise DataError(f"{name}: is not a whole Parquet file: {one_line(error)[:120]}") from error

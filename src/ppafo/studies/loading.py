@@ -25,6 +25,7 @@ from ppafo.loading import load_scenario, placed, reloaded
 from ppafo.metrics import METRICS
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.overrides import other_forms, override_set
+from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation.numbers import chosen_path
 from ppafo.studies import declaration as declared
 from ppafo.studies.distributions import Above
@@ -45,12 +46,16 @@ def load_study(
     overrides: Sequence[str] = (),
     draws: int | None = None,
     seed: int | None = None,
+    *,
+    plugins: Plugins = (),
 ) -> Study:
     """Return a study by its name in the package, by the path of a TOML file, or from data laid out as such a file.
 
     ``overrides`` as on the command line change every configuration; ``draws`` and ``seed`` replace the number of draws
-    and the random seed of the file. StudyError for anything that is not usable.
+    and the random seed of the file. ``plugins`` are modules of your own whose objects files may name, as of
+    ``simulate``. StudyError for anything that is not usable.
     """
+    name_plugins(plugins)
     document, source = read_source(STUDY_FILES, study)
     tables = document.get("vary")
     for table in tables if isinstance(tables, list | tuple) else ():

@@ -10,17 +10,18 @@ import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import CodeType, FunctionType
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 import numpy as np
-from pydantic import BaseModel, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from ppafo.control.kind import PythonController
 from ppafo.documents.json_text import plain
 from ppafo.documents.models import quote, validate
 from ppafo.engine.lanes import write_source
-from ppafo.errors import DataError, StudyError
+from ppafo.errors import DataError, StudyError, one_line
 from ppafo.metrics import METRICS
+from ppafo.signals.recording import CHANNELS
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import scenario_document
 from ppafo.storage.places import Place, read_document
@@ -171,23 +172,89 @@ def read_manifest(place: Place) -> dict[str, Any]:
     return document
 
 
-class _Named(BaseModel):
+def _channel(name: str) -> str:
+    if name not in CHANNELS:
+        raise ValueError(f"there is no channel '{one_line(name)}'")
+    return name
+
+
+_Channel = Annotated[str, AfterValidator(_channel)]
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(strict=True)
+
+
+class _Named(_Part):
     name: str
 
 
+class _StoredSample(_Part):
+    method: str
+    runs: int
+    seed: int = 1
+
+
+class _StoredVaried(_Part):
+    path: str
+    kind: str
+    spacing: str = ""
+
+
+class _StoredCorrelation(_Part):
+    between: Annotated[list[str], Field(min_length=2, max_length=2)]
+    coefficient: float
+
+
+class _StoredOutputs(_Part):
+    bands: list[_Channel] = Field(default_factory=list)
+    trajectories: list[_Channel] = Field(default_factory=list)
+
+
 class _StoredStudy(_Named):
+    description: str = ""
     configurations: Annotated[list[_Named], Field(min_length=1)]
-    outputs: dict[str, Any]
+    sample: _StoredSample | None = None
+    correlations: list[_StoredCorrelation] = Field(default_factory=list)
+    vary: list[_StoredVaried] = Field(default_factory=list)
+    outputs: _StoredOutputs
 
 
-class _Stored(BaseModel):
+class _StoredUnit(_Part):
+    unit: str
+
+
+class _StoredAssumption(_Part):
+    path: str
+    value: str
+    note: str
+
+
+class _StoredScenario(_Part):
+    assumptions: list[_StoredAssumption]
+
+
+class _Stored(_Part):
     """What everybody may rely on in the document; how it differs from a study's is said elsewhere."""
 
     study: _StoredStudy
+    scenarios: dict[str, _StoredScenario]
+    sha256: str
     runs: Annotated[int, Field(ge=1)]
     chunks: Annotated[int, Field(ge=1)]
-    varied: dict[str, Any]
-    metrics: dict[str, dict[str, Any]]
+    varied: dict[str, _StoredUnit]
+    metrics: dict[str, _StoredUnit]
+
+    @model_validator(mode="after")
+    def _agrees(self) -> Self:
+        """Refuse chunks that the configurations cannot share, and an axis that does not vary."""
+        names = [item.name for item in self.study.configurations]
+        if len(set(names)) < len(names) or self.chunks % len(names) or self.chunks > self.runs:
+            raise ValueError(f"{self.chunks} chunks of {self.runs} runs do not fit {len(names)} configurations")
+        lost = [item.path for item in self.study.vary if item.path not in self.varied]
+        if lost:
+            raise ValueError(f"'{one_line(lost[0])}' varies and has no unit")
+        return self
 
 
 def check_same_study(place: Place, stored: Mapping[str, Any], requested: Mapping[str, Any]) -> None:

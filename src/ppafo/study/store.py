@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ppafo.documents.json_text import json_text
-from ppafo.errors import DataError, ScenarioError, StudyError, refused_as
+from ppafo.errors import DataError, ScenarioError, StudyError, one_line, refused_as
 from ppafo.metrics import METRICS
 from ppafo.signals.recording import CHANNELS
 from ppafo.simulation.ensemble import EnsembleResult, run_ensemble
@@ -32,13 +32,14 @@ from ppafo.studies.study import Study
 from ppafo.study.blocks import Chunk, chunk, chunk_count, drawn_values, samples_of, varied_columns
 from ppafo.study.manifest import MANIFEST, STUDY_COPY, check_same_study, manifest, read_manifest
 from ppafo.study.runs import unvaried
+from ppafo.study.sent_plugins import SentPlugin, take_plugins
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
 _TRIED_RUNS = 8
 STATUSES = ("completed", "diverged", "refused")
-_PLAIN = "-"
+_PLAIN, _OVER_TIME = "-", "_over_time"
 ASKED_ABOVE = 10_000_000_000
 """Bytes above which a study is only started with ``--yes``."""
 _FIXED_BYTES_OF_ROW = 3
@@ -48,11 +49,12 @@ _BYTES_OF_FILE = 12_000
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """What a worker needs beside the number of a chunk: study, address of the folder, threads."""
+    """What a worker needs beside the number of a chunk: study, address of the folder, threads, the person's modules."""
 
     study: Study
     address: str
     threads: int | None
+    plugins: tuple[SentPlugin, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,12 +132,36 @@ def stored_rows(place: Place, numbers: Sequence[int], columns: Sequence[str] | N
     for number in numbers:
         name = chunk_file(number)
         try:
-            yield read_parquet(place.open(name), name, columns)
+            table = read_parquet(place.open(name), name, columns)
+            check_types(table, name)
+            yield table
         except (DataError, OSError) as error:
             raise DataError(
                 f"{place.address}/{name}: is missing or damaged; run the study again into this folder to recompute "
                 "this chunk"
             ) from error
+
+
+_TEXTS = ("configuration", "status", "reason", "channel")
+
+
+def check_types(table: "pa.Table", name: str) -> None:
+    """Refuse columns of another type than a study writes: texts, numbers, lists of numbers; DataError says which."""
+    import pyarrow as pa
+
+    for field in table.schema:
+        kind = field.type
+        if field.name.endswith(_OVER_TIME):
+            is_list = pa.types.is_list(kind) and pa.types.is_floating(kind.value_type)
+            # As many samples in each row, or they are no matrix.
+            lengths = table.column(field.name).combine_chunks().value_lengths().to_numpy() if is_list else np.arange(2)
+            fits = bool(np.all(lengths == lengths[:1]))
+        elif field.name in _TEXTS:
+            fits = pa.types.is_string(kind) or pa.types.is_dictionary(kind)
+        else:
+            fits = pa.types.is_floating(kind) or pa.types.is_integer(kind)
+        if not fits:
+            raise DataError(f"{name}: column '{one_line(field.name)}' is of type {kind}")
 
 
 def compute_chunk(task: Task, number: int) -> tuple[Finished, bytes]:
@@ -182,12 +208,13 @@ def compute_chunk(task: Task, number: int) -> tuple[Finished, bytes]:
 
 def work_on_chunk(task: Task, number: int) -> Finished:
     """Compute and write a chunk: what a worker of a cluster does."""
+    take_plugins(task.plugins)
     return Store(task.study, place_at(task.address)).write(*compute_chunk(task, number))
 
 
 def trace_column(channel: str) -> str:
     """Return the name of the column with the values of a channel over time."""
-    return f"{channel}_over_time"
+    return f"{channel}{_OVER_TIME}"
 
 
 def chunk_file(number: int) -> str:

@@ -20,6 +20,7 @@ from ppafo.parameters import ParameterSet
 from ppafo.parameters.device import Device, Valve
 from ppafo.parameters.graph import Graph, Term
 from ppafo.parameters.overrides import split_override
+from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation.declaration import PERIOD, RATE, SUPPLY_LINE, Reading, kind_at, value_at
 from ppafo.simulation.following import numbers_of_lines, numbers_of_sensors, read_followers
 from ppafo.simulation.loading import (
@@ -99,14 +100,18 @@ def load_walk(
     task_sequence: str | Path | None = None,
     bottle: str | Path | None = None,
     parameter_set: ParameterSet | None = None,
+    *,
+    plugins: Plugins = (),
 ) -> Scenario:
     """Return a scenario that is a walk by its name in the package or by the path of a TOML file, in SI units.
 
     ``overrides`` are texts such as ``controller.peak_torque=6 N m`` or ``valve.area=12.6mm^2``; ``gait``,
     ``task_sequence`` and ``bottle`` replace the file's. A gait that is named, by the file or by ``gait``, brings its
-    subject as the default wearer; ``parameter_set`` takes the place of the set that is named. ScenarioError,
-    ParameterError or DataError for anything that cannot be used.
+    subject as the default wearer; ``parameter_set`` takes the place of the set that is named. ``plugins``
+    are modules of your own whose objects files may name, as of ``simulate``. ScenarioError, ParameterError or DataError
+    for anything that cannot be used.
     """
+    name_plugins(plugins)
     file, given = label(str(name_or_path)), tuple(overrides)
     named = {"gait": gait, "task_sequence": task_sequence, BOTTLE_NAME: bottle}
     instead = {path: str(item) for path, item in named.items() if item is not None}

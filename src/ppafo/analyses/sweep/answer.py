@@ -4,22 +4,23 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import numpy as np
-from pydantic import BaseModel
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from ppafo.analyses.sweep.results import SUMMARY, StudyResults
+from ppafo.documents.models import validate
 from ppafo.errors import DataError
 from ppafo.report.finding import Finding, Part, columns_of, facts, files_of
-from ppafo.report.kind import TIME, Kind, of_channel, of_metric, of_path
+from ppafo.report.kind import TIME, Kind, of_channel, of_path, of_stored_metric
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.setting_names import label_of
 from ppafo.report.style import BLUE, GREEN, GREY, ORANGE, VERMILION
 from ppafo.signals.recording import CHANNELS
 from ppafo.storage.places import place_at, read_document
 from ppafo.studies.sampling import NOISE
-from ppafo.study.manifest import read_manifest
+from ppafo.study.manifest import MANIFEST, read_manifest
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -119,21 +120,63 @@ def load_study_results(folder: str | Path) -> Finding[StudyResults]:
     document = read_manifest(place)
     try:
         summary = read_document(place, SUMMARY)
-        _Summary.model_validate(summary)
     except (OSError, ValueError) as error:
         raise DataError(
             f"{place.address}: the study is not finished (no complete {SUMMARY}); run it again to resume"
         ) from error
+    whose = f"{place.address}: {SUMMARY} is damaged; run the study again into this folder"
+    described = validate(_Summary, summary, whose, DataError)
+    names = {item["name"] for item in document["study"]["configurations"]}
+    metrics = [set(own) for own in described.configurations.values()]
+    # A configuration or a metric in one of the two documents alone would be looked up in vain.
+    is_same = names == described.configurations.keys() == described.completed_by_configuration.keys()
+    if not is_same or any(own != document["metrics"].keys() for own in metrics):
+        raise DataError(f"{whose}: its configurations and metrics differ from {MANIFEST}")
     return finding_of(StudyResults(place, document, summary))
 
 
-class _Summary(BaseModel):
+_Count = Annotated[int, Field(ge=0)]
+
+
+def _fraction(text: str) -> str:
+    if not 0.0 <= float(text) <= 1.0:
+        raise ValueError("must be a fraction from 0 to 1")
+    return text
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(strict=True)
+
+
+class _Described(_Part):
+    count: _Count
+    mean: float = 0.0
+    sd: float = 0.0
+    quantiles: dict[Annotated[str, AfterValidator(_fraction)], float] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _is_whole(self) -> Self:
+        if self.count and not {"mean", "quantiles"} <= self.model_fields_set:
+            raise ValueError("has values, and no mean or no quantiles")
+        return self
+
+
+class _Failure(_Part):
+    run: _Count
+    configuration: str
+    reason: str
+
+
+class _Summary(_Part):
     """What everybody may rely on in a summary."""
 
-    completed: int
-    diverged: int
-    refused: int
-    configurations: dict[str, dict[str, dict[str, Any]]]
+    completed: _Count
+    diverged: _Count
+    refused: _Count
+    completed_by_configuration: dict[str, _Count]
+    failures: list[_Failure]
+    quantile_definition: str
+    configurations: dict[str, dict[str, _Described]]
 
 
 def _metrics(results: StudyResults, name: str, metrics: Mapping[str, Mapping[str, Any]]) -> Part:
@@ -142,7 +185,7 @@ def _metrics(results: StudyResults, name: str, metrics: Mapping[str, Mapping[str
     head = ("metric", "unit", "runs", "mean", "sd", *(f"{100 * float(fraction):g} %" for fraction in fractions))
     rows = []
     for metric, item in metrics.items():
-        kind = of_metric(metric)
+        kind = _metric_kind(results, metric)
         cells = [metric, kind.shown_unit, f"{item['count']:,}"]
         if item["count"]:
             deviation = kind.change_number(item["sd"]) if "sd" in item else ""
@@ -202,6 +245,10 @@ def _kind(results: StudyResults, path: str) -> Kind:
     return of_path(path, results.document["varied"][path]["unit"].removeprefix("-"))
 
 
+def _metric_kind(results: StudyResults, metric: str) -> Kind:
+    return of_stored_metric(metric, results.document["metrics"][metric]["unit"])
+
+
 def _histogram(results: StudyResults, metric: str) -> Panel:
     """Return how often each value came, for every configuration."""
     parts = {name: values[np.isfinite(values)] for name, values in results.thin(metric, MAXIMUM_DRAWN).items()}
@@ -218,7 +265,7 @@ def _histogram(results: StudyResults, metric: str) -> Panel:
         for (name, own), colour in zip(parts.items(), COLOURS, strict=False)
         if filled
     ]
-    return Panel(of_metric(metric), Kind(), marks, then=lambda axes: axes.set_yticks([]))
+    return Panel(_metric_kind(results, metric), Kind(), marks, then=lambda axes: axes.set_yticks([]))
 
 
 def _over(results: StudyResults, path: str, metric: str, names: Sequence[str]) -> Panel:
@@ -232,7 +279,7 @@ def _over(results: StudyResults, path: str, metric: str, names: Sequence[str]) -
         marks.append(
             Mark("line", across[name][order], values[name][order], label=name, colour=colour, style={"marker": "."})
         )
-    return Panel(_kind(results, path), of_metric(metric), marks)
+    return Panel(_kind(results, path), _metric_kind(results, metric), marks)
 
 
 def _map(results: StudyResults, grid: Sequence[str], metric: str, name: str, is_compared: bool) -> Panel:
@@ -246,7 +293,7 @@ def _map(results: StudyResults, grid: Sequence[str], metric: str, name: str, is_
     count = np.bincount(place[known], minlength=rows.size * columns.size)
     total = np.bincount(place[known], weights=values[known], minlength=rows.size * columns.size)
     mean = np.where(count > 0, total / np.maximum(count, 1), np.nan).reshape(rows.size, columns.size)
-    kind, items = of_metric(metric), {item["path"]: item for item in results.document["study"]["vary"]}
+    kind, items = _metric_kind(results, metric), {item["path"]: item for item in results.document["study"]["vary"]}
     kinds, places = [], []
     for path, levels in zip(grid, (columns, rows), strict=True):
         of_axis, is_listed = _kind(results, path), items[path]["kind"] == "list"
@@ -275,7 +322,7 @@ def _map(results: StudyResults, grid: Sequence[str], metric: str, name: str, is_
 
 def _points(results: StudyResults, device: Sequence[str], metric: str, name: str, is_compared: bool) -> Panel:
     """Return a metric as the colour of points over the two values that were drawn, for one configuration."""
-    most, kind = _MAXIMUM_POINTS * len(results.configurations), of_metric(metric)
+    most, kind = _MAXIMUM_POINTS * len(results.configurations), _metric_kind(results, metric)
     x, y, values = (results.thin(path, most)[name] for path in (*device, metric))
     marks = (Mark("points", x, y, kind.values(values)),)
     across, upward = (_kind(results, path) for path in device)

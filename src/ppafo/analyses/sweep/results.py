@@ -7,19 +7,25 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ppafo.errors import StudyError, nearest_name
+from ppafo.errors import DataError, StudyError, nearest_name
 from ppafo.signals.recording import CHANNELS
 from ppafo.storage.parquet import as_numpy, column_names, matrix_of, read_parquet
 from ppafo.storage.places import Place
 from ppafo.study.runs import joined
-from ppafo.study.store import chunk_file, stored_rows, trace_column
+from ppafo.study.store import check_types, chunk_file, stored_rows, trace_column
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
 SUMMARY = "summary.json"
 BANDS = "bands.parquet"
+_OF_BANDS = ("configuration", "channel", "time", "runs")
 Columns = dict[str, np.ndarray[Any, Any]]
+
+
+def _is_of_bands(name: str) -> bool:
+    """Tell whether bands have a column of this name: a quantile is ``q0.05``."""
+    return name in _OF_BANDS or (name.startswith("q") and name[1:].replace(".", "", 1).replace("e-", "", 1).isdecimal())
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -94,7 +100,16 @@ class StudyResults:
 
     def bands(self) -> Columns:
         """Return the bands: configuration, channel, time and a column for each quantile."""
-        return as_numpy(read_parquet(self.place.open(BANDS), BANDS))
+        try:
+            table = read_parquet(self.place.open(BANDS), BANDS)
+            check_types(table, BANDS)
+            if not set(_OF_BANDS) < set(table.column_names) or not all(map(_is_of_bands, table.column_names)):
+                raise DataError(f"{BANDS}: has other columns than bands have")
+        except (DataError, OSError) as error:
+            raise DataError(
+                f"{self.place.address}/{BANDS}: is missing or damaged; run the study again into this folder"
+            ) from error
+        return as_numpy(table)
 
     def thin(self, column: str, maximum: int) -> dict[str, np.ndarray[Any, Any]]:
         """Return a column by name of the configuration, of about ``maximum`` runs in all: every so many of them."""

@@ -28,6 +28,7 @@ from ppafo.analyses.sweep.statistic import MOST_DRAWS, Estimate, estimate
 from ppafo.documents.json_text import json_text
 from ppafo.errors import StudyError
 from ppafo.metrics import METRICS
+from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report
 from ppafo.report.finding import Finding
 from ppafo.signals.recording import CHANNELS
@@ -41,6 +42,7 @@ from ppafo.studies.study import Study
 from ppafo.study.blocks import chunk_count, samples_of
 from ppafo.study.manifest import read_manifest
 from ppafo.study.runs import Tally, joined
+from ppafo.study.sent_plugins import plugins_to_send
 from ppafo.study.store import (
     STATUSES,
     Finished,
@@ -189,6 +191,8 @@ def sweep(
     scheduler: str | None = None,
     agreed: bool = False,
     progress: Report | None = None,
+    *,
+    plugins: Plugins = (),
 ) -> Finding[StudyResults]:
     """Return the results of a study: a name, a TOML file, data laid out as one, or a Study.
 
@@ -196,12 +200,14 @@ def sweep(
     live in a temporary folder as long as the returned object. ``overrides`` change every configuration, ``draws``
     and ``seed`` replace the number of draws and the random seed of the file. ``threads`` are this process's, all
     cores by default; ``scheduler`` is the address of a Dask scheduler whose workers do the work, ``agreed`` the consent
-    to a folder that takes much of the disk, and ``progress`` hears of every finished chunk.
+    to a folder that takes much of the disk, and ``progress`` hears of every finished chunk. ``plugins`` are modules of
+    your own whose objects files may name, as of ``simulate``.
 
     Columns of the results are arrays of shape (runs,), trajectories (runs, samples), in SI units, pressures absolute;
     nan where a run failed, which is a row that says so. StudyError for a study that cannot be used or does not fit onto
     the disk, and where the folder has results of another one; DataError for a folder that cannot be used.
     """
+    name_plugins(plugins)
     chosen = study_of(study, overrides, draws, seed)
     kept = tempfile.TemporaryDirectory(prefix="ppafo-study-") if out is None else None
     place = place_at(kept.name if kept is not None else str(out))
@@ -304,7 +310,7 @@ def _work(task: Task, store: Store, scheduler: str | None, progress: Report | No
     else:
         from ppafo.analyses.sweep.cluster import compute_on_cluster
 
-        compute_on_cluster(scheduler, task, sorted(missing), count)
+        compute_on_cluster(scheduler, replace(task, plugins=plugins_to_send()), sorted(missing), count)
         place.tidy()
         names = place.names()
         if any(note_file(number) not in names for number in missing):

@@ -144,7 +144,7 @@ from ppafo.study.manifest import manifest
 from ppafo.studies.loading import load_study
 document = {DOCUMENT!r}
 document["configurations"][0]["overrides"] += ["controller.kind=beside:KIND"]
-print(manifest(load_study(document))["programs"])
+print(manifest(load_study(document, plugins=["beside.py"]))["programs"])
 """
     told = []
     for text in (COMPOSED, f"# A remark.\n{COMPOSED}", COMPOSED.replace("0.5 *", "0.6 *")):

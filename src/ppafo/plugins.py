@@ -1,0 +1,185 @@
+"""Modules of the person: of a word ``module:OBJECT``, only a module that the person named is imported.
+
+Files come from others and run no code, so that a word in a file finds an object only where the person named its module:
+on the command line, as ``plugins`` of a call in Python, or by importing it.
+"""
+
+import importlib
+import importlib.machinery
+import os
+import re
+import sys
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ppafo.errors import KindError, one_line
+
+Plugins = Iterable[str | Path]
+"""Files (``laws.py``) or modules (``my_laws.hysteresis``) of the person."""
+
+VARIABLE = "PPAFO_PLUGINS"
+"""What child processes inherit: they know the modules that were named here."""
+
+_NAME = r"[^\W\d]\w*(?:\.[^\W\d]\w*)*"
+_MODULE, OBJECT = re.compile(_NAME), re.compile(rf"{_NAME}:[^\W\d]\w*")
+_OBJECT_IN_TEXT = re.compile(rf"(?<![\w.:/])({_NAME}):[^\W\d]\w*(?![\w.:/])")
+_SUFFIX, _PACKAGE = ".py", "__init__.py"
+
+
+@dataclass(frozen=True, slots=True)
+class Plugin:
+    """A module by its name, and the folder in which it lies; without a folder it is looked for as any other."""
+
+    module: str
+    folder: str = ""
+
+
+_named: dict[str, Plugin] = {}
+
+
+def name_plugins(plugins: Plugins | str | Path) -> None:
+    """Let words in files find objects of these modules; KindError where one is not there. Nothing is imported yet."""
+    for plugin in (plugins,) if isinstance(plugins, str | Path) else plugins:
+        add_plugin(_found(plugin))
+
+
+def name_modules_in(text: str) -> None:
+    """Name the modules of all words ``module:OBJECT`` in a text of the person's, such as the value of ``--set``."""
+    for module in _OBJECT_IN_TEXT.findall(text):
+        add_plugin(_of_module(module))
+
+
+def add_plugin(plugin: Plugin) -> None:
+    """Name a module that is known by its folder; KindError where another folder has a module of that name."""
+    earlier = {item.module: item for item in named_plugins()}.get(plugin.module)
+    if earlier is not None and earlier.folder and plugin.folder and earlier.folder != plugin.folder:
+        raise KindError(f"plugin '{plugin.module}': is in {earlier.folder} and in {plugin.folder}; rename one of them")
+    if earlier is None or plugin.folder:
+        _named[plugin.module] = plugin
+    os.environ[VARIABLE] = os.pathsep.join(f"{item.module}={item.folder}" for item in _named.values())
+
+
+def named_plugins() -> tuple[Plugin, ...]:
+    """Return what was named so far, here or in the process that started this one."""
+    for text in filter(None, os.environ.get(VARIABLE, "").split(os.pathsep)):
+        module, _, folder = text.partition("=")
+        _named.setdefault(module, Plugin(module, folder))
+    return tuple(_named.values())
+
+
+def _found(plugin: str | Path) -> Plugin:
+    """Return the plug-in of a path or a name; KindError where there is none."""
+    text = str(plugin)
+    path = Path(text).absolute()
+    if path.suffix == _SUFFIX and path.is_file():
+        return _of_path(path)
+    if (path / _PACKAGE).is_file():
+        return _of_path(path)
+    module = text.partition(":")[0]
+    if path.suffix == _SUFFIX or not _MODULE.fullmatch(module):
+        raise KindError(f"plugin '{one_line(text)}': there is no such file; give a .py file, or the name of a module")
+    named = _of_module(module)
+    if not named.folder and not _is_installed(module.partition(".")[0]):
+        raise KindError(f"plugin '{one_line(text)}': there is no such module here; give the path of its .py file")
+    return named
+
+
+def _of_path(path: Path) -> Plugin:
+    """Return the module of a file, with the names of the packages that it lies in."""
+    parts, folder = [path.stem], path.parent
+    while (folder / _PACKAGE).is_file():
+        parts.insert(0, folder.name)
+        folder = folder.parent
+    return Plugin(".".join(parts), str(folder))
+
+
+def _of_module(module: str) -> Plugin:
+    """Return the module of a name: of the working folder where nothing else has that name."""
+    top, here = module.partition(".")[0], str(Path.cwd())
+    if _is_installed(top) or importlib.machinery.PathFinder.find_spec(top, [here]) is None:
+        return Plugin(module)
+    return Plugin(module, here)
+
+
+def _is_installed(top: str) -> bool:
+    """Tell whether a module is there without the working folder."""
+    if top in sys.modules or top in sys.builtin_module_names:
+        return True
+    with without_working_folder():
+        return importlib.machinery.PathFinder.find_spec(top) is not None
+
+
+def object_of(word: str) -> Any:
+    """Return the object of a word ``module:OBJECT``; KindError where nobody named its module, which is not imported.
+
+    A module that the program has loaded already counts as named: nothing of it is run. What a module raises while it
+    is imported is for the caller.
+    """
+    module, _, name = word.partition(":")
+    named = {plugin.module: plugin for plugin in named_plugins()}
+    # Who names a package means its modules too.
+    parents = [module[:end] for end, character in enumerate(module) if character == "."]
+    plugin = next((named[one] for one in (module, *reversed(parents)) if one in named), None)
+    if plugin is None and module not in sys.modules:
+        raise KindError(
+            f"a file runs no code, and you have not named the module '{module}'; if you trust it, add "
+            f"--plugin {_remedy(module)} (in Python plugins=['{_remedy(module)}'])"
+        )
+    loaded = sys.modules[module] if plugin is None else _imported(module, plugin.folder)
+    if plugin is None and name not in vars(loaded):
+        # Not asked by getattr, which may call a function of the module.
+        raise AttributeError(f"module '{module}' has no attribute '{name}'")
+    return getattr(loaded, name)
+
+
+def _remedy(module: str) -> str:
+    """Return what names a module that a file asks for: its file where that is in the working folder."""
+    file = Path(*module.split(".")).with_suffix(_SUFFIX)
+    if not file.is_file():
+        return module if Path(module.partition(".")[0]).is_dir() else f"PATH/{file.as_posix()}"
+    return file.as_posix() if _of_path(file.absolute()).module == module else module
+
+
+def _imported(module: str, folder: str) -> Any:
+    with _searched_last(folder):
+        loaded = importlib.import_module(module)
+    files = [*getattr(loaded, "__path__", ()), getattr(loaded, "__file__", None) or ""]
+    if folder and not any(Path(file).is_relative_to(folder) for file in files):
+        raise KindError(f"the module '{module}' of {folder} has the name of another one ({files[-1]}); rename it")
+    return loaded
+
+
+@contextmanager
+def _searched_last(folder: str) -> Iterator[None]:
+    """Let modules be found in a folder after all others, so that it hides none of them."""
+    if not folder or folder in sys.path:
+        yield
+        return
+    sys.path.append(folder)
+    importlib.invalidate_caches()
+    try:
+        yield
+    finally:
+        sys.path.remove(folder)
+
+
+@contextmanager
+def without_working_folder() -> Iterator[None]:
+    """Let modules be found only where packages are installed: where Python looks for them, but for this folder."""
+    before = sys.path[:]
+    sys.path[:] = [folder for folder in before if not is_working_folder(folder)]
+    try:
+        yield
+    finally:
+        sys.path[:] = before
+
+
+def is_working_folder(folder: str | Path) -> bool:
+    """Tell whether an entry of the search path is the working folder, which may hold files of others."""
+    try:
+        return os.path.samefile(folder or ".", ".")  # noqa: PTH121
+    except OSError:  # the search path has folders that are not there
+        return False
