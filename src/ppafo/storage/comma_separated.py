@@ -12,7 +12,7 @@ import io
 import math
 import re
 from array import array
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -23,6 +23,7 @@ from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import DataError, UnitError, first_twice, nearest_name, one_line, refused_as
 from ppafo.signals import CHANNELS, Channel, Recording, RecordingKind
 from ppafo.signals.recording import BETWEEN, PLAIN_NUMBER, TIME, TIME_UNIT, Between, Floats
+from ppafo.storage.clock import counted_on
 from ppafo.storage.files import read_bytes, text_of, write_file
 
 _OTHERS = (
@@ -31,6 +32,9 @@ _OTHERS = (
 )
 _HEADER = re.compile(r"\s*(\w+)\s*\[\s*([^\[\]]+?)\s*\]\s*(\w*)\s*", re.ASCII)
 _LEVEL = "Pa_a"
+_OWN_COLUMNS = (
+    "; columns of your own need a column map, --columns FILE.toml:NAME, or columns = 'NAME' in a problem file"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +68,7 @@ def parse_header(cells: list[str]) -> list[Column]:
             remedy = next((f"; {one} need a column map with {key}" for mark, one, key in _OTHERS if mark in cell), "")
             raise DataError(
                 f"the header must name columns as 'name [unit]', separated by commas; '{one_line(shown)}' is not one"
-                f"{remedy or ('' if cell.strip() else '; does the line end with a comma?')}"
+                f"{remedy or (_OWN_COLUMNS if cell.strip() else '; does the line end with a comma?')}"
             )
         name, unit, word = match[1], match[2], match[3]
         # Time itself does nothing between its samples.
@@ -82,17 +86,17 @@ def parse_header(cells: list[str]) -> list[Column]:
     return columns
 
 
-def check_clock(time: Floats, lines: Sequence[int]) -> None:
+def check_clock(time: Floats, lines: Sequence[int], noun: str = "line") -> None:
     """Refuse a clock [s] that goes backwards or stands still; ``lines`` are the lines of the rows in the file.
 
-    DataError names the line.
+    DataError names the line, or what ``noun`` calls it.
     """
     stalled = np.flatnonzero(np.diff(time) <= 0.0)
     if stalled.size:
         index = int(stalled[0]) + 1
         word = "stands still" if time[index] == time[index - 1] else "goes backwards"
         raise DataError(
-            f"line {lines[index]}, column '{TIME}': the clock {word}: {time[index]:.9g} s follows "
+            f"{noun} {lines[index]}, column '{TIME}': the clock {word}: {time[index]:.9g} s follows "
             f"{time[index - 1]:.9g} s; time must increase from sample to sample"
         )
 
@@ -178,19 +182,21 @@ def read_csv(path: str | Path, label: str | None = None, atmosphere: float = STA
             )
         lines = text.splitlines()
         first = next((number for number, line in enumerate(lines) if not line.startswith("#")), len(lines))
-        rows = csv.reader(islice(lines, first, None), strict=True)
-        header = next(rows, [])
+        mark = _mark(next(islice(lines, first, None), ""))
+        rows = csv.reader(islice(lines, first, None), delimiter=mark, strict=True)
+        header = _whole_cells(next(rows, []), mark)
         if not header and not any(lines[first:]):
             raise DataError("has no header")
         columns = parse_header(header)
-        values = _table(header, rows, first)
+        values = _table(header, rows if mark == "," else _with_points(rows), first)
         if not len(values):
             raise DataError("has a header but no samples")
-        check_clock(values[:, 0], range(first + 2, first + 2 + len(values)))
         series = []
         for index, column in enumerate(columns):
             with refused_as(DataError, f"column '{column.name} [{column.unit}]'", UnitError):
                 series.append(in_si(column, values[:, index], atmosphere))
+        series[0] = counted_on(series[0])
+        check_clock(series[0], range(first + 2, first + 2 + len(values)))
         named = {
             column.name: Channel(one, column.si_unit, column.between)
             for column, one in zip(columns[1:], series[1:], strict=True)
@@ -200,6 +206,27 @@ def read_csv(path: str | Path, label: str | None = None, atmosphere: float = STA
         raise DataError(f"{path}: is not a CSV file: {error}") from error
     except DataError as error:
         raise DataError(f"{path}: {error}") from error
+
+
+def _mark(header: str) -> str:
+    """Return what separates the columns of a header: a tab or a semicolon only where all cells then are columns."""
+    return next((mark for mark in "\t;" if mark in header and all(map(_HEADER.fullmatch, header.split(mark)))), ",")
+
+
+def _whole_cells(cells: list[str], mark: str) -> list[str]:
+    """Return the cells of a header with the pieces of a unit that has a comma in it put together again."""
+    whole: list[str] = []
+    for cell in cells:
+        if whole and "[" in whole[-1] and "]" not in whole[-1]:
+            whole[-1] += mark + cell
+        else:
+            whole.append(cell)
+    return whole
+
+
+def _with_points(rows: Iterable[list[str]]) -> Iterator[list[str]]:
+    """Return rows whose columns no comma separates with decimal points, whichever mark they have."""
+    return ([cell.replace(",", ".") if _DECIMAL_COMMA.fullmatch(cell) else cell for cell in row] for row in rows)
 
 
 def kind_of_comments(comments: Iterable[str]) -> RecordingKind:

@@ -264,12 +264,15 @@ def read_document(folder: str | Path) -> dict[str, Any]:
 _RESULT = FolderKind("ppafo result", RUN_FILE, read_document)
 
 
+TEXT_SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".log", ".asc")
+"""Of tables of text."""
+
 WALK_RECORDING = "recording.nc"
 """What the folder of a walk has in place of a result."""
 
 
 def read_recording(path: str | Path, atmosphere: float = STANDARD_ATMOSPHERE) -> Recording:
-    """Return the recording in a ``.nc`` or ``.csv`` file, or in a result folder, of a walk too.
+    """Return the recording in a ``.nc`` file or a table of text such as ``.csv``, or in a result folder, of a walk too.
 
     Gauge pressure in a CSV file counts from ``atmosphere`` [Pa absolute]. DataError for a file that is not usable.
     """
@@ -286,7 +289,12 @@ def read_recording(path: str | Path, atmosphere: float = STANDARD_ATMOSPHERE) ->
         # The HDF5 library can crash on a damaged file, or go round in it for ever, and would take this process with it.
         check_can_be_read(place, "ppafo.storage.netcdf", "read_netcdf", "h5py")
         return read_netcdf(place)
-    if place.suffix == ".csv":
+    if place.suffix.lower() == ".mat":
+        raise DataError(
+            f"{path}: is a .mat file, whose variables have no units: name them in a column map, "
+            "--columns FILE.toml:NAME"
+        )
+    if place.suffix.lower() in TEXT_SUFFIXES:
         found = read_csv(place, atmosphere=atmosphere)
         run_file = place.parent / RUN_FILE
         if place.name != CSV_FILE or not run_file.exists():
@@ -296,4 +304,7 @@ def read_recording(path: str | Path, atmosphere: float = STANDARD_ATMOSPHERE) ->
         with refused_as(DataError, run_file, DataError):
             kind = recording_kind(str(described.get("kind", found.kind)))
         return replace(found, label=str(described.get("label", found.label)), kind=kind)
-    raise DataError(f"{path}: is neither a .nc or .csv file nor a result folder")
+    raise DataError(
+        f"{path}: is neither a .nc nor a {', '.join(TEXT_SUFFIXES)} file nor a result folder; a table of another "
+        "suffix is read through a column map, --columns FILE.toml:NAME"
+    )

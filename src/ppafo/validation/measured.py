@@ -168,7 +168,8 @@ def read_measured(path: str | Path, device: Device, columns: ColumnMap | None = 
     if columns is None or place.is_dir():
         recording = read_recording(place, atmosphere)
     else:
-        recording = read_foreign(place, columns, atmosphere=atmosphere, map_name=map_name)
+        gas = f"{device.gas.molar_mass!r} kg/mol"
+        recording = read_foreign(place, columns, atmosphere=atmosphere, map_name=map_name, gas=gas)
     content = read_bytes(place / NETCDF_FILE if place.is_dir() else place)
     return check_recording(recording, device, str(path), hashlib.sha256(content).hexdigest())
 

@@ -22,7 +22,13 @@ from ppafo.identification.trajectory.section import Setting as FitSetting
 from ppafo.identification.trajectory.section import solve_section
 from ppafo.parameters.loading import list_sets, load_parameter_set
 from ppafo.parameters.overrides import check_valve
-from ppafo.parameters.parameter_set import ParameterSet, apply_overrides, atmospheric_pressure, chosen_valve
+from ppafo.parameters.parameter_set import (
+    ParameterSet,
+    apply_overrides,
+    atmospheric_pressure,
+    chosen_valve,
+    number_in_si,
+)
 from ppafo.progress import Report, report_nothing
 from ppafo.report.finding import Finding
 from ppafo.storage.foreign import read_foreign
@@ -117,7 +123,9 @@ def _source(
     if path.is_dir():
         raise IdentificationError(f"{path}: is a folder, which has no hash; name the recording in it")
     if columns is not None:
-        recording = read_foreign(path, problem.columns[columns], None, atmosphere, f"{file}:{columns}")
+        molar_mass = number_in_si(parameter_set, "gas.molar_mass")
+        gas = "" if molar_mass is None else f"{molar_mass!r} kg/mol"
+        recording = read_foreign(path, problem.columns[columns], None, atmosphere, f"{file}:{columns}", gas)
     else:
         recording = read_recording(path, atmosphere)
     return source_of(path, recording)

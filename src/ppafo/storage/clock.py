@@ -1,0 +1,177 @@
+"""Clocks of loggers: times of day with and without a date, and counters that begin again, as seconds."""
+
+import re
+from collections.abc import Sequence
+from datetime import date
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from ppafo.errors import DataError, one_line
+from ppafo.signals.recording import Floats
+
+DateOrder = Literal["day month", "month day"]
+Form = Literal["h:min", "min:s"]
+
+_DAY = 86400.0
+_TIME = re.compile(
+    r"T?(?P<first>\d{1,4}):(?P<second>\d{2})(?::(?P<third>\d{2}))?(?:[.,:](?P<fraction>\d+))?"
+    r"(?:\s*(?P<half>[AaPp])\.?\s?[Mm]\b\.?)?(?:\s*(?P<zone>Z\b|[+-]\d{2}:?(?:\d{2})?|[A-Z]{2,5}\b(?:[+-]\d{1,2})?))?"
+    r"(?:\[[\w/]+\])?"
+)
+_COMPACT = re.compile(r"(?P<date>\d{8})T(?P<hour>\d{2})(?P<minute>\d{2})(?P<second>\d{2})(?P<rest>.*)")
+_YEAR_FIRST = re.compile(r"(\d{4})[-/.]?(\d{2})[-/.]?(\d{2})|(\d{4})[-/.](\d{1,2})[-/.](\d{1,2})")
+_DOTTED = re.compile(r"(\d{1,2})\.\s?(\d{1,2})\.\s?(\d{2,4})")
+_SLASHED = re.compile(r"(\d{1,2})[/-](\d{1,2})[/-](\d{2,4})")
+_MONTHS = ("jan", "feb", "mar mär mrz", "apr", "may mai", "jun", "jul", "aug", "sep", "oct okt", "nov", "dec dez")
+_MONTH = {name: number for number, names in enumerate(_MONTHS, start=1) for name in names.split()}
+_LONGEST_SHOWN = 40
+
+
+class _Stamp(NamedTuple):
+    """A time of day [s], what is said of its zone, and the words of the date beside it."""
+
+    seconds: float
+    zone: str
+    date: str
+
+
+def is_clock(cell: str) -> bool:
+    """Tell whether a cell is a time of day, with a date or without, and no number."""
+    text = cell.strip()
+    return _COMPACT.fullmatch(text) is not None or _TIME.search(text) is not None
+
+
+def clock_seconds(
+    cells: Sequence[str],
+    rows: Sequence[str],
+    dates: Sequence[str] | None = None,
+    order: DateOrder | None = None,
+    form: Form | None = None,
+) -> Floats:
+    """Return the seconds since the first of some times of day; ``rows`` say where each stands, for messages.
+
+    Without a date a fall by more than half a day is midnight. DataError for a cell that is no time, for what may be
+    two times, and for a clock that changes its zone by name.
+    """
+    stamps = [_stamp(cell, form, row) for cell, row in zip(cells, rows, strict=True)]
+    zones = dict.fromkeys(re.sub(r"[+-].*", "", stamp.zone) for stamp in stamps)
+    if len(zones) > 1:
+        raise DataError(f"the clock changes its time zone ({', '.join(zones)}): give times of one zone, or numbers")
+    seconds = np.array([stamp.seconds - _offset(stamp.zone) for stamp in stamps])
+    words = [stamp.date for stamp in stamps] if dates is None else [cell.strip() for cell in dates]
+    if any(words):
+        days = _days(words, rows, seconds, order)
+        return np.asarray(_DAY * (days - days[0]) + (seconds - seconds[0]))
+    midnights = np.concatenate(([0.0], np.cumsum(np.diff(seconds) < -0.5 * _DAY)))
+    return np.asarray(seconds - seconds[0] + _DAY * midnights)
+
+
+def _stamp(cell: str, form: Form | None, row: str) -> _Stamp:
+    text = one_line(cell.strip())
+    compact = _COMPACT.fullmatch(text)
+    if compact is not None:
+        text = f"{compact['date']} {compact['hour']}:{compact['minute']}:{compact['second']}{compact['rest']}"
+    found = _TIME.search(text)
+    if found is None:
+        raise DataError(f"{row}: {text[:_LONGEST_SHOWN]!r} is no time of day such as '08:00:10,5'")
+    first, second, third = int(found["first"]), int(found["second"]), found["third"]
+    if third is None:
+        # 00:10.5 has a fraction, which minutes have not.
+        is_minutes = form == "min:s" or (form is None and found["fraction"] is not None)
+        if form is None and not is_minutes:
+            raise DataError(
+                f"{row}: {text[:_LONGEST_SHOWN]!r} may be hours and minutes or minutes and seconds; give "
+                'clock = "h:min" or clock = "min:s"'
+            )
+        hour, minute, whole = (0, first, second) if is_minutes else (first, second, 0)
+    else:
+        hour, minute, whole = first, second, int(third)
+    half = (found["half"] or "").lower()
+    is_whole_hour = 1 <= hour <= 12 if half else True
+    if (third is not None and minute > 59) or whole > 60 or not is_whole_hour:
+        raise DataError(f"{row}: {text[:_LONGEST_SHOWN]!r} is no time of day")
+    if half:
+        hour = hour % 12 + (12 if half == "p" else 0)
+    fraction = float(f"0.{found['fraction']}") if found["fraction"] else 0.0
+    beside = f"{text[: found.start()]} {text[found.end() :]}".strip(" T,;")
+    return _Stamp(3600.0 * hour + 60.0 * minute + whole + fraction, found["zone"] or "", beside)
+
+
+def _offset(zone: str) -> float:
+    """Return by how many seconds a zone is ahead, as far as it says so in digits."""
+    match = re.search(r"([+-])(\d{1,2}):?(\d{2})?$", zone)
+    if match is None:
+        return 0.0
+    return (-1.0 if match[1] == "-" else 1.0) * (3600.0 * int(match[2]) + 60.0 * int(match[3] or 0))
+
+
+def _days(words: Sequence[str], rows: Sequence[str], seconds: Floats, order: DateOrder | None) -> Floats:
+    """Return the day of every date as a number; which of two numbers is the month must show, or be said."""
+    known: dict[tuple[str, DateOrder], int | None] = {}
+    orders: tuple[DateOrder, ...] = ("day month", "month day") if order is None else (order,)
+    readings = []
+    for which in orders:
+        for word in dict.fromkeys(words):
+            known[word, which] = _ordinal(word, which)
+        days = [known[word, which] for word in words]
+        missing = next((index for index, day in enumerate(days) if day is None), None)
+        if missing is None:
+            readings.append(np.array(days, dtype=np.float64))
+            continue
+        bad = missing
+    if not readings:
+        shown = words[bad][:_LONGEST_SHOWN]
+        raise DataError(f"{rows[bad]}: {shown!r} is no date such as '2026-03-21', '21.03.2026' or '03/21/2026'")
+    # The days between two rows count, not the date; one that goes backwards is none.
+    growing = [days for days in readings if (np.diff(_DAY * days + seconds) > 0.0).all()] or readings
+    steps = [days - days[0] for days in growing]
+    if len(steps) > 1 and not np.array_equal(steps[0], steps[1]):
+        raise DataError(
+            f"{rows[0]}: the date {words[0][:_LONGEST_SHOWN]!r} may begin with the day or with the month; give "
+            'date_order = "day month" or date_order = "month day"'
+        )
+    return growing[0]
+
+
+def _ordinal(word: str, order: DateOrder) -> int | None:
+    """Return a date as a number of days, None where it is none; weekdays do not count."""
+    text = word.strip(" ,")
+    if match := _YEAR_FIRST.fullmatch(text):
+        year, month, day = (int(part) for part in match.groups() if part is not None)
+    elif match := _DOTTED.fullmatch(text):
+        day, month, year = (int(part) for part in match.groups())
+    elif match := _SLASHED.fullmatch(text):
+        first, second, year = (int(part) for part in match.groups())
+        day, month = (first, second) if order == "day month" else (second, first)
+    else:
+        parts = [part for part in re.split(r"[\s,./-]+", text) if part]
+        months = [_MONTH[part[:3].lower()] for part in parts if part[:3].lower() in _MONTH]
+        numbers = sorted((int(part) for part in parts if part.isascii() and part.isdigit()), key=lambda one: one > 31)
+        if len(months) != 1 or len(numbers) != 2:
+            return None
+        month, (day, year) = months[0], numbers
+    try:
+        return date(year + 2000 if year < 100 else year, month, day).toordinal()
+    except ValueError:
+        return None
+
+
+_COUNTERS = (2.0**32 * 1.0e-6, 2.0**32 * 1.0e-3)
+"""Seconds after which a counter of 32 bits begins again, of microseconds and of milliseconds."""
+_LARGEST_STEP = 10.0
+"""Times the usual interval; a longer one across the fall is a clock that was set back, and no counter."""
+
+
+def counted_on(time: Floats) -> Floats:
+    """Return a time [s] without the falls of a counter of 32 bits, ``micros()`` or ``millis()``; any other as it is."""
+    steps = np.diff(time)
+    falls = steps < 0.0
+    if not falls.any() or not (steps > 0.0).any():
+        return time
+    usual = float(np.median(steps[steps > 0.0]))
+    for period in _COUNTERS:
+        across = steps[falls] + period
+        if (across > 0.0).all() and (across <= _LARGEST_STEP * usual).all():
+            return np.asarray(time + period * np.concatenate(([0.0], np.cumsum(falls))))
+    return time

@@ -1,0 +1,215 @@
+"""Variables of MATLAB files: version 4 to 7 by SciPy, 7.3 (HDF5) by h5py. Nothing in them is run.
+
+A field of a structure is ``a.b``, one of an array of structures ``a(2).b``, a column of a matrix ``M(:,3)`` and a row
+``M(3,:)``. A structure with ``data`` and ``colheaders``, as ``importdata`` makes it, has a column by each of its
+labels. Objects (timeseries, timetable, table, datetime) are for MATLAB alone, and are only named.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ppafo.errors import DataError, one_line
+from ppafo.signals.recording import Floats
+from ppafo.storage.files import read_bytes
+from ppafo.storage.trial_reading import check_can_be_read
+
+MATLAB_SUFFIX = ".mat"
+_HDF5 = b"\x89HDF\r\n\x1a\n"
+_HDF5_AT = 512
+"""Byte at which HDF5 begins, behind the header of MATLAB."""
+_MOST_COLUMNS, _DEEPEST, _MOST_ELEMENTS = 300, 8, 300
+_LABELS = ("colheaders", "labels", "names")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MatlabFile:
+    """Columns of numbers and of texts by name, every other text in the file, and variables that are objects."""
+
+    columns: Mapping[str, Floats]
+    texts: Mapping[str, list[str]]
+    words: tuple[str, ...] = ()
+    objects: tuple[str, ...] = ()
+
+    def said_of_objects(self) -> str:
+        """Return what to do with the objects of the file, as the end of a message; nothing where there are none."""
+        if not self.objects:
+            return ""
+        return (
+            f"; {', '.join(self.objects)} is an object that only MATLAB reads: save ts.Time and ts.Data of a "
+            'timeseries by themselves, or of a table s = table2struct(T, "ToScalar", true) with save -struct'
+        )
+
+
+@dataclass(slots=True)
+class _Found:
+    columns: dict[str, Floats] = field(default_factory=dict)
+    texts: dict[str, list[str]] = field(default_factory=dict)
+    words: list[str] = field(default_factory=list)
+    objects: list[str] = field(default_factory=list)
+
+
+def read_matlab(path: str | Path) -> MatlabFile:
+    """Return the variables in a ``.mat`` file of any version. DataError for a file that is none."""
+    is_hdf5 = read_bytes(path)[_HDF5_AT : _HDF5_AT + len(_HDF5)] == _HDF5
+    # A damaged file can end a library of C code; another process tries it first.
+    check_can_be_read(Path(path), __name__, "open_matlab", "h5py" if is_hdf5 else "scipy.io")
+    return open_matlab(path)
+
+
+def open_matlab(path: str | Path) -> MatlabFile:
+    """Return what ``read_matlab`` does; damage can end the process."""
+    content = read_bytes(path)
+    found = _Found()
+    try:
+        if content[_HDF5_AT : _HDF5_AT + len(_HDF5)] == _HDF5:
+            _read_hdf5(path, found)
+        else:
+            _read_older(path, found)
+    except (OSError, ValueError, TypeError, KeyError, IndexError, NotImplementedError, RuntimeError) as error:
+        raise DataError(f"{path}: cannot be read as a .mat file: {one_line(error)}") from error
+    if not found.columns and not found.texts:
+        file = MatlabFile({}, {}, objects=tuple(found.objects))
+        raise DataError(f"{path}: has no variable of numbers{file.said_of_objects()}")
+    return MatlabFile(found.columns, found.texts, tuple(found.words), tuple(found.objects))
+
+
+class _Object(NamedTuple):
+    """A variable that is an object of MATLAB, by its class where the file says it."""
+
+    kind: str = ""
+
+
+Tree = dict[str, Any] | list[Any] | NDArray[Any] | str | _Object
+"""A variable as plain data: a structure, a cell array or an array of structures, numbers, a text, or an object."""
+
+
+def _read_older(path: str | Path, found: _Found) -> None:
+    import zlib
+
+    from scipy.io import loadmat
+    from scipy.io.matlab import MatReadError
+
+    try:
+        variables = loadmat(str(path), struct_as_record=False)
+    except (MatReadError, zlib.error) as error:
+        raise ValueError(one_line(error)) from error
+    for name, value in variables.items():
+        # What MATLAB keeps for its objects has no name of its own.
+        if name in ("__function_workspace__", "None"):
+            found.objects += [] if found.objects else ["a variable"]
+        elif not name.startswith("__"):
+            _add(name, _tree_of(value), 0, found)
+
+
+def _tree_of(value: Any) -> Tree:
+    """Return a variable of SciPy as plain data."""
+    from scipy.io.matlab import mat_struct
+
+    if isinstance(value, mat_struct):
+        return {name: _tree_of(getattr(value, name)) for name in value._fieldnames}
+    if isinstance(value, str):
+        return value.strip()
+    if not isinstance(value, np.ndarray) or value.dtype.names:
+        return _Object()
+    if value.dtype == object:
+        items = [_tree_of(item) for item in value.ravel(order="F")[:_MOST_ELEMENTS]]
+        return items[0] if len(items) == 1 and isinstance(items[0], dict) else items
+    if value.dtype.kind in "US":
+        texts = [str(item).strip() for item in value.ravel()]
+        return texts[0] if len(texts) == 1 else list(texts)
+    return value
+
+
+def _read_hdf5(path: str | Path, found: _Found) -> None:
+    import h5py
+
+    with h5py.File(path, "r") as file:
+        for name, item in file.items():
+            if not name.startswith("#"):
+                _add(name, _tree_of_hdf5(item, file, 0), 0, found)
+
+
+def _tree_of_hdf5(item: Any, file: Any, depth: int) -> Tree:
+    """Return a variable of h5py as plain data; arrays lie the other way round than in MATLAB."""
+    import h5py
+
+    stated = item.attrs.get("MATLAB_class", b"")
+    kind = stated.decode("ascii", "replace") if isinstance(stated, bytes) else str(stated)
+    if item.attrs.get("MATLAB_empty", 0) or depth > _DEEPEST:
+        return []
+    if item.attrs.get("MATLAB_object_decode", 0):
+        return _Object(kind)
+    if isinstance(item, h5py.Group):
+        fields = {name: _tree_of_hdf5(field, file, depth + 1) for name, field in item.items()}
+        # Of an array of structures each field has the values of all.
+        is_array = fields and all(
+            isinstance(field, h5py.Dataset) and field.dtype == h5py.ref_dtype and not field.attrs.get("MATLAB_class")
+            for field in item.values()
+        )
+        if is_array:
+            lists = {name: field for name, field in fields.items() if isinstance(field, list)}
+            size = min(map(len, lists.values()), default=0)
+            return [{name: field[place] for name, field in lists.items()} for place in range(size)]
+        return fields
+    if item.dtype == h5py.ref_dtype:
+        references = item[()].ravel()[:_MOST_ELEMENTS]
+        return [_tree_of_hdf5(file[reference], file, depth + 1) for reference in references if reference]
+    array = np.asarray(item[()]).T
+    return "".join(map(chr, array.ravel().tolist())).strip() if kind == "char" else array
+
+
+def _add(name: str, tree: Tree, depth: int, found: _Found) -> None:
+    """Add what is below a name to what was found."""
+    if depth > _DEEPEST:
+        return
+    if isinstance(tree, dict):
+        for key, item in tree.items():
+            _add(f"{name}.{key}", item, depth + 1, found)
+        _add_labelled(name, found)
+    elif isinstance(tree, list):
+        if tree and all(isinstance(item, str) for item in tree):
+            found.texts[name] = tree
+        for number, item in enumerate(tree, start=1):
+            if isinstance(item, dict):
+                _add(f"{name}({number})", item, depth + 1, found)
+        found.words += [item for item in tree if isinstance(item, str)]
+    elif isinstance(tree, str):
+        found.texts[name] = [tree]
+        found.words.append(tree)
+    elif isinstance(tree, _Object):
+        found.objects.append(f"{name} ({tree.kind})" if tree.kind else name)
+    else:
+        _add_numbers(name, tree, found)
+
+
+def _add_numbers(name: str, array: NDArray[Any], found: _Found) -> None:
+    """Add a vector by its name, and of a matrix every column and every row, as far as there are not too many."""
+    if array.dtype.kind not in "iufb" or array.size == 0:
+        return
+    numbers = np.squeeze(np.asarray(array, dtype=np.float64))
+    if numbers.ndim <= 1:
+        found.columns[name] = np.atleast_1d(numbers)
+    elif numbers.ndim == 2:
+        found.columns.update(_lines_of(name, numbers))
+
+
+def _lines_of(name: str, matrix: Floats) -> Iterator[tuple[str, Floats]]:
+    rows, columns = matrix.shape
+    if columns <= _MOST_COLUMNS:
+        yield from ((f"{name}(:,{number + 1})", matrix[:, number]) for number in range(columns))
+    if rows <= _MOST_COLUMNS:
+        yield from ((f"{name}({number + 1},:)", matrix[number]) for number in range(rows))
+
+
+def _add_labelled(name: str, found: _Found) -> None:
+    """Add the columns of ``data`` by their labels, where a structure has as many of them."""
+    labels = next((found.texts[f"{name}.{key}"] for key in _LABELS if f"{name}.{key}" in found.texts), [])
+    for number, label in enumerate(labels, start=1):
+        column = found.columns.get(f"{name}.data(:,{number})")
+        if column is not None and f"{name}.data(:,{len(labels) + 1})" not in found.columns and label:
+            found.columns.setdefault(label, column)

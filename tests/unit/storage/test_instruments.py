@@ -1,0 +1,303 @@
+"""Files in the form in which real instruments and programs write them: LabVIEW, Arduino, Excel, MATLAB and Simulink."""
+
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+import scipy.io
+
+from ppafo.errors import DataError
+from ppafo.storage.foreign import ColumnMap, read_foreign
+from ppafo.storage.matlab import read_matlab
+from ppafo.storage.result_folder import read_recording
+
+LVM = """LabVIEW Measurement\t
+Writer_Version\t2
+Separator\tTab
+Decimal_Separator\t,
+X_Columns\tOne
+Date\t2026/03/21
+Time\t08:00:00,123
+***End_of_Header***\t
+\t
+Channels\t2\t\t\t
+Samples\t3\t3\t\t
+Y_Unit_Label\tVolts\tVolts\t\t
+X0\t0,0000000000000000E+0\t0,0000000000000000E+0\t\t
+Delta_X\t0,001000\t0,001000\t\t
+***End_of_Header***\t\t\t\t
+X_Value\tDruck\tDruck_0\tComment
+0,000000\t1,500000\t0,100000
+0,001000\t1,600000E+0\t0,200000
+0,002000\t1,700000\t0,300000
+"""
+
+
+def columns(channels: dict[str, Any], **keys: Any) -> ColumnMap:
+    return ColumnMap.model_validate({"channels": channels, **keys})
+
+
+def written(folder: Path, name: str, content: str | bytes) -> Path:
+    path = folder / name
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return path
+
+
+TIME = {"column": "X_Value", "unit": "s"}
+DRUCK = {"column": "Druck", "unit": "bar_g", "factor": 2.0}
+
+
+@pytest.mark.parametrize("name", ["test.txt", "test.lvm", "test.dat"])
+def test_labview_with_a_header_and_decimal_commas(tmp_path: Path, name: str) -> None:
+    path = written(tmp_path, name, LVM)
+    chosen = columns({"time": TIME, "pressure_1": DRUCK}, delimiter="tab", decimal="comma", skip_lines=15)
+    found = read_foreign(path, chosen)
+    assert found.time.tolist() == [0.0, 0.001, 0.002]
+    assert np.allclose(found["pressure_1"], 101325.0 + 2e5 * np.array([1.5, 1.6, 1.7]))
+
+
+def test_a_header_further_down_is_answered_with_what_to_skip(tmp_path: Path) -> None:
+    path = written(tmp_path, "test.txt", LVM)
+    with pytest.raises(DataError, match=r'line 16 has it: give skip_lines = 15 and delimiter = "tab"') as caught:
+        read_foreign(path, columns({"time": TIME, "pressure_1": DRUCK}, delimiter="tab", decimal="comma"))
+    assert "channels.time.column = 'X_Value'" in str(caught.value)
+
+
+def test_excel_with_semicolons_and_an_empty_column_at_the_end(tmp_path: Path) -> None:
+    text = "\ufeffZeit (s);p1 (bar);Weg\r\n0,0;1.234,5;auf\r\n0,1;1.235,5;ab;\r\n0,2;1.236,5;Auf\r\n"
+    path = written(tmp_path, "excel.csv", text)
+    chosen = columns(
+        {
+            "time": {"column": "Zeit (s)", "unit": "s"},
+            "pressure_1": {"column": "p1 (bar)", "unit": "mbar_a", "thousands": "point"},
+            "direction": {"column": "Weg"},
+        },
+        delimiter="semicolon",
+        decimal="comma",
+    )
+    found = read_foreign(path, chosen)
+    assert np.allclose(found["pressure_1"], [123450.0, 123550.0, 123650.0])
+    assert found["direction"].tolist() == [1.0, -1.0, 1.0]
+
+
+@pytest.mark.parametrize(
+    "words", [("up", "down"), ("AUF", "AB"), ("rising", "falling"), ("+", "-"), ("1", "-1"), ("steigend", "fallend")]
+)
+def test_words_for_directions(tmp_path: Path, words: tuple[str, str]) -> None:
+    path = written(tmp_path, "a.csv", f"t,way\n0,{words[0]}\n1,{words[1]}\n")
+    found = read_foreign(path, columns({"time": {"column": "t", "unit": "s"}, "direction": {"column": "way"}}))
+    assert found["direction"].tolist() == [1.0, -1.0]
+
+
+def test_words_of_ones_own_and_words_that_nobody_knows(tmp_path: Path) -> None:
+    path = written(tmp_path, "a.csv", "t,way\n0,heave\n1,lower\n")
+    direction: dict[str, Any] = {"column": "way"}
+    with pytest.raises(DataError, match=r"line 2, column 'way': 'heave' is not .*channels\.direction\.words"):
+        read_foreign(path, columns({"time": {"column": "t", "unit": "s"}, "direction": direction}))
+    direction["words"] = {"heave": 1.0, "lower": -1.0}
+    found = read_foreign(path, columns({"time": {"column": "t", "unit": "s"}, "direction": direction}))
+    assert found["direction"].tolist() == [1.0, -1.0]
+
+
+LITRES = {"column": "Q", "unit": "L/min"}
+
+
+@pytest.mark.parametrize(
+    ("flow", "density"),
+    [
+        ({**LITRES, "at": "ANR", "gas": "air"}, 1.185),
+        ({**LITRES, "unit": "Nl/min", "at": "DIN 1343", "gas": "air"}, 1.2923),
+        ({**LITRES, "unit": "slm", "at": "0 degC, 1.01325 bar_a", "gas": "CO2"}, 1.9631),
+        ({**LITRES, "unit": "L/min (DIN 1343)"}, 1.9631),
+        ({**LITRES, "at": "ANR"}, 1.8052),
+    ],
+)
+def test_a_flow_meter_shows_volume_at_a_condition(tmp_path: Path, flow: dict[str, Any], density: float) -> None:
+    path = written(tmp_path, "flow.csv", "t,Q\n0,60\n1,120\n")
+    if "at" not in flow:
+        flow = {**flow, "unit": "L/min (DIN 1343, CO2)"}
+    chosen = columns({"time": {"column": "t", "unit": "s"}, "mass_flow": flow})
+    found = read_foreign(path, chosen, gas="0.044 kg/mol")
+    assert np.allclose(found["mass_flow"], density * 1e-3 * np.array([1.0, 2.0]), rtol=2e-4)
+
+
+@pytest.mark.parametrize("unit", ["L/min", "Nl/min", "slm", "SCFM", "m^3/h"])
+def test_a_volume_flow_without_its_condition_asks_for_it(tmp_path: Path, unit: str) -> None:
+    path = written(tmp_path, "flow.csv", "t,Q\n0,60\n1,120\n")
+    chosen = columns({"time": {"column": "t", "unit": "s"}, "mass_flow": {"column": "Q", "unit": unit}})
+    with pytest.raises(DataError, match=r"channels\.mass_flow\.unit = .*at = 'ANR' and gas = 'air'"):
+        read_foreign(path, chosen)
+
+
+def test_a_condition_of_no_flow_is_named_with_its_key(tmp_path: Path) -> None:
+    path = written(tmp_path, "flow.csv", "t,Q\n0,60\n1,120\n")
+    chosen = columns({"time": {"column": "t", "unit": "s"}, "torque": {"column": "Q", "unit": "N m", "at": "ANR"}})
+    with pytest.raises(DataError, match=r"channels\.torque\.unit .*belong to a volume flow"):
+        read_foreign(path, chosen)
+
+
+def test_a_header_may_state_condition_and_gas(tmp_path: Path) -> None:
+    path = written(tmp_path, "flow.csv", "time [s],mass_flow [L/min (ANR, air)],angle [deg]\n0,60,1\n1,60,2\n")
+    assert np.allclose(read_recording(path)["mass_flow"], 1.185e-3)
+
+
+@pytest.mark.parametrize("mark", ["\t", ";", ","])
+def test_a_txt_file_is_a_table_of_what_separates_its_columns(tmp_path: Path, mark: str) -> None:
+    text = "time [ms],pressure_1 [barg]\n0,1.5\n10,1.6\n".replace(",", mark)
+    path = written(tmp_path, "a.txt", text if mark == "," else text.replace(".", ","))
+    found = read_recording(path)
+    assert found.time.tolist() == [0.0, 0.01]
+    assert np.allclose(found["pressure_1"], [251325.0, 261325.0])
+
+
+@pytest.mark.parametrize("header", ["time (s),angle (deg)", "Time,Angle", "t_s,phi"])
+def test_a_header_of_ones_own_names_the_option(tmp_path: Path, header: str) -> None:
+    with pytest.raises(DataError, match=r"--columns FILE\.toml:NAME"):
+        read_recording(written(tmp_path, "a.csv", f"{header}\n0,1\n1,2\n"))
+
+
+SECONDS, PRESSURE = np.arange(5) * 0.01, np.array([1.0, 1.1, 1.2, 1.3, 1.4])
+
+
+def saved_v5(path: Path) -> None:
+    """A To Workspace block in all three formats that are no objects, a matrix, and what importdata makes."""
+    signals = np.zeros(2, dtype=[("values", object), ("label", object)])
+    signals["values"][0], signals["values"][1] = PRESSURE[:, None], 2 * PRESSURE[:, None]
+    signals["label"][:] = ["p1", "p2"]
+    scipy.io.savemat(
+        path,
+        {
+            "t": SECONDS[:, None],
+            "p1": PRESSURE[None, :],
+            "M": np.column_stack([SECONDS, PRESSURE, 2 * PRESSURE]),
+            "log": {"time": SECONDS[:, None], "signals": signals, "blockName": "model/p"},
+            "ts": {"Time": SECONDS[:, None], "Data": PRESSURE.reshape(1, 1, -1), "Name": "p"},
+            "opts": {"data": np.column_stack([SECONDS, PRESSURE]), "colheaders": np.array(["time", "p"], dtype=object)},
+            "cells": np.array([f"08:00:0{second}" for second in range(5)], dtype=object),
+            "scalar": 3.0,
+        },
+    )
+
+
+def saved_v73(path: Path) -> None:
+    """The same as MATLAB lays it out in HDF5: transposed, texts as codes, references for arrays of structures."""
+    with h5py.File(path, "w", userblock_size=512) as file:
+
+        def numbers(group: h5py.Group, name: str, values: Any) -> h5py.Dataset:
+            made = group.create_dataset(name, data=np.atleast_2d(np.asarray(values, dtype=float)).T)
+            made.attrs["MATLAB_class"] = np.bytes_("double")
+            return made
+
+        def text(group: h5py.Group, name: str, value: str) -> h5py.Dataset:
+            made = group.create_dataset(name, data=np.array([[ord(letter)] for letter in value], dtype=np.uint16))
+            made.attrs["MATLAB_class"] = np.bytes_("char")
+            return made
+
+        def cells(group: h5py.Group, name: str, values: list[str]) -> None:
+            hidden = [text(file["#refs#"], f"{name}{place}", value).ref for place, value in enumerate(values)]
+            made = group.create_dataset(name, data=np.array(hidden, dtype=h5py.ref_dtype)[:, None])
+            made.attrs["MATLAB_class"] = np.bytes_("cell")
+
+        def structure(group: h5py.Group, name: str) -> h5py.Group:
+            made = group.create_group(name)
+            made.attrs["MATLAB_class"] = np.bytes_("struct")
+            return made
+
+        file.create_group("#refs#")
+        numbers(file, "t", SECONDS[:, None])
+        numbers(file, "p1", PRESSURE)
+        numbers(file, "M", np.column_stack([SECONDS, PRESSURE, 2 * PRESSURE]))
+        log = structure(file, "log")
+        numbers(log, "time", SECONDS[:, None])
+        signals = structure(log, "signals")
+        values = [numbers(file["#refs#"], f"v{one}", one * PRESSURE[:, None]).ref for one in (1, 2)]
+        signals.create_dataset("values", data=np.array(values, dtype=h5py.ref_dtype)[:, None])
+        labels = [text(file["#refs#"], f"l{one}", f"p{one}").ref for one in (1, 2)]
+        signals.create_dataset("label", data=np.array(labels, dtype=h5py.ref_dtype)[:, None])
+        stamped = structure(file, "ts")
+        numbers(stamped, "Time", SECONDS[:, None])
+        numbers(stamped, "Data", PRESSURE[:, None])
+        opts = structure(file, "opts")
+        numbers(opts, "data", np.column_stack([SECONDS, PRESSURE]))
+        cells(opts, "colheaders", ["time", "p"])
+        cells(file, "cells", [f"08:00:0{second}" for second in range(5)])
+        thing = file.create_dataset("thing", data=np.zeros((1, 6), dtype=np.uint32))
+        thing.attrs["MATLAB_class"], thing.attrs["MATLAB_object_decode"] = np.bytes_("timeseries"), 3
+    content = bytearray(path.read_bytes())
+    content[:116] = b"MATLAB 7.3 MAT-file".ljust(116)
+    content[124:128] = b"\x00\x02IM"
+    path.write_bytes(bytes(content))
+
+
+@pytest.fixture(params=[saved_v5, saved_v73], ids=["v5", "v7.3"])
+def matlab(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
+    path = tmp_path / "run.mat"
+    request.param(path)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("time", "pressure", "factor"),
+    [
+        ("t", "p1", 1.0),
+        ("M(:,1)", "M(:, 3)", 2.0),
+        (1, 2, 1.0),
+        ("log.time", "log.signals(1).values", 1.0),
+        ("log.time", "log.signals(2).values", 2.0),
+        ("ts.Time", "ts.Data", 1.0),
+        ("time", "p", 1.0),
+        ("opts.data(:,1)", "opts.data(:,2)", 1.0),
+    ],
+)
+def test_variables_of_matlab(matlab: Path, time: str | int, pressure: str | int, factor: float) -> None:
+    channels = {"time": {"column": time, "unit": "s"}, "pressure_1": {"column": pressure, "unit": "bar_a"}}
+    found = read_foreign(matlab, columns(channels))
+    assert np.allclose(found.time, SECONDS)
+    assert np.allclose(found["pressure_1"], 1e5 * factor * PRESSURE)
+
+
+def test_times_of_day_and_rates_with_variables_of_matlab(matlab: Path) -> None:
+    pressure = {"column": "p1", "unit": "bar_a"}
+    stamped = read_foreign(matlab, columns({"time": {"column": "cells"}, "pressure_1": pressure}))
+    assert stamped.time.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
+    assert np.allclose(
+        read_foreign(matlab, columns({"time": {"rate": "100 Hz"}, "pressure_1": pressure})).time, SECONDS
+    )
+
+
+@pytest.mark.parametrize(
+    ("column", "message"),
+    [
+        ("p11", "channels.pressure_1.column = 'p11': the file has no such column, did you mean 'p1'"),
+        ("scale", "it has"),
+    ],
+)
+def test_a_variable_that_is_not_there_is_named_with_its_key(matlab: Path, column: str, message: str) -> None:
+    channels = {"time": {"column": "t", "unit": "s"}, "pressure_1": {"column": column, "unit": "bar_a"}}
+    with pytest.raises(DataError) as caught:
+        read_foreign(matlab, columns(channels))
+    assert message in str(caught.value)
+
+
+def test_an_object_of_matlab_is_named_with_what_to_save(tmp_path: Path) -> None:
+    saved_v73(tmp_path / "run.mat")
+    assert read_matlab(tmp_path / "run.mat").objects == ("thing (timeseries)",)
+    channels = {"time": {"column": "thing.Time", "unit": "s"}}
+    with pytest.raises(DataError, match=r"thing \(timeseries\) is an object .* save ts\.Time and ts\.Data"):
+        read_foreign(tmp_path / "run.mat", columns(channels))
+
+
+@pytest.mark.parametrize(
+    "content", [b"no matlab at all" * 50, b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM" + b"\xff" * 99]
+)
+def test_what_is_no_matlab_file_is_one_line(tmp_path: Path, content: bytes) -> None:
+    with pytest.raises(DataError, match=r"a\.mat: ") as caught:
+        read_matlab(written(tmp_path, "a.mat", content))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_matlab_file_without_a_map_says_what_it_needs(matlab: Path) -> None:
+    with pytest.raises(DataError, match="column map, --columns"):
+        read_recording(matlab)
