@@ -94,7 +94,8 @@ def time_of_spool(valve: Any, period: float) -> float:
 def time_of_pair(valve: Any, period: float) -> float:
     """The same of a pair of on/off valves: a coil waits for its next switching, where that is longer."""
     delay: float = max(valve.opening_delay, valve.closing_delay)
-    return delay + max(SAMPLES_LATE * period, valve.switching_interval)
+    wait: float = max(SAMPLES_LATE * period, valve.switching_interval)
+    return delay + wait
 
 
 def lag_of_sensor(bandwidth: float) -> float:
