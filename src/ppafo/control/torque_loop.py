@@ -86,6 +86,16 @@ def learning_gain(proportional: float) -> float:
     return 0.5 * proportional
 
 
+def torque_rate(loop: TorqueLoop) -> float:
+    """R [N m/s]."""
+    return loop.rate
+
+
+def dead_time(loop: TorqueLoop) -> float:
+    """Theta [s]."""
+    return loop.dead_time
+
+
 def lead(loop: TorqueLoop) -> float:
     """Time [s] by which a learnt table is read ahead: 18.5 ms and the dead time."""
     return USUAL_LEAD + loop.dead_time

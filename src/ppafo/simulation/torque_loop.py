@@ -22,6 +22,8 @@ from ppafo.simulation.mean_chambers import MeanChambers, Surroundings, chambers_
 from ppafo.simulation.nominal import flow_of_area, flow_of_sonic
 
 PERIOD_PATH = "controller.period"
+RATE, DEAD_TIME = "torque rate at full opening", "dead time of the torque loop"
+"""Names of what the gains are made of, among the terms."""
 
 
 class FlowNumbers(NamedTuple):
@@ -161,6 +163,8 @@ _OF_LOOP: dict[str, Callable[[TorqueLoop], float]] = {
     torque_loop.BOUNDARY: torque_loop.boundary_layer,
     torque_loop.CONVERGENCE: torque_loop.convergence_rate,
     torque_loop.LEAD: torque_loop.lead,
+    RATE: torque_loop.torque_rate,
+    DEAD_TIME: torque_loop.dead_time,
 }
 """What follows the torque loop alone, and by which rule."""
 
