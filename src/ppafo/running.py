@@ -2,12 +2,17 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ppafo.loading import scenario_or_load
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation import simulate as of_loaded
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Result
+
+if TYPE_CHECKING:
+    from ppafo.control.kind import ControllerKind
+    from ppafo.simulation.oscillation import Gains, Oscillation
 
 
 def simulate(scenario: Scenario | str | Path, overrides: Sequence[str] = (), *, plugins: Plugins = ()) -> Result:
@@ -20,3 +25,39 @@ def simulate(scenario: Scenario | str | Path, overrides: Sequence[str] = (), *, 
     """
     name_plugins(plugins)
     return of_loaded.simulate(scenario_or_load(scenario, overrides))
+
+
+def gains(scenario: Scenario) -> "Gains | None":
+    """Return the gains in force of a scenario's torque law; None for a law that has none."""
+    from ppafo.simulation.oscillation import gains_of
+
+    law = _law(scenario)
+    return None if law is None else gains_of(scenario, law)
+
+
+def oscillation(result: Result) -> "Oscillation | None":
+    """Return the verdict on a run whose torque loop oscillates; None where it does not."""
+    from ppafo.simulation.oscillation import oscillation_of
+
+    law, metrics = _law(result.scenario), {name: metric.value for name, metric in result.metrics.items()}
+    if law is None:
+        return None
+    time = result.recording.time
+    strides = metrics.get("strides", 0.0) if result.scenario.walks else 0.0
+    stride_time = float(time[-1] - time[0]) / strides if strides > 0.0 else 0.0
+    return oscillation_of(result.scenario, law, result.recording, metrics, stride_time)
+
+
+def _law(scenario: Scenario) -> "ControllerKind | None":
+    """Return the controller of a scenario; None for a Python object."""
+    from ppafo.simulation.scenario import PYTHON_CONTROLLER
+
+    if scenario.controller.kind == PYTHON_CONTROLLER:
+        return None
+    if scenario.walks:
+        from ppafo.walking.planning import law_of
+
+        return law_of(scenario)
+    from ppafo.control.catalog import CONTROLLERS
+
+    return CONTROLLERS[scenario.controller.kind]

@@ -4,20 +4,23 @@ A loop that is too fast for the dead time of its valve opens it fully one way an
 command from beyond +0.5 to beyond -0.5 or back; in a walk both belong to one task, without venting in between.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ppafo.metrics.metric import Floats, MetricKind, ReadAt
+from ppafo.metrics.metric import REQUEST, WALK, Floats, MetricKind, ReadAt
+from ppafo.model.columns import choose, larger, root
+from ppafo.model.helping import MID_STANCE
 from ppafo.model.valves.kind import VENTS_ABOVE
 from ppafo.signals import Recording
 from ppafo.signals.meter import Course, MeterKind, Sample
 
+Masks = NDArray[np.bool_]
+
 HALF_OPEN = 0.5
 """Command [-] beyond which a valve counts as open one way."""
-
-NO_TASK = 0.0
-"""Phase of a run without a gait."""
 
 
 class Reversals(NamedTuple):
@@ -25,7 +28,7 @@ class Reversals(NamedTuple):
 
     way: float
     task: float
-    count: float
+    turns: float
 
 
 def way_of(command: float) -> float:
@@ -43,7 +46,7 @@ def update_reversals(state: Reversals, _course: Course, sample: Sample) -> Rever
     command, task = sample.command, sample.stride.phase
     begins = task != state.task or command > VENTS_ABOVE
     before, now = 0.0 if begins else state.way, way_of(command)
-    return Reversals(now if now != 0.0 else before, task, state.count + (1.0 if before * now < 0.0 else 0.0))
+    return Reversals(now if now != 0.0 else before, task, state.turns + (1.0 if before * now < 0.0 else 0.0))
 
 
 REVERSALS = MeterKind("reversals", Reversals, start_reversals, update_reversals)
@@ -91,7 +94,62 @@ def peak_torque(recording: Recording) -> float:
     return float(np.max(np.abs(recording["torque"])))
 
 
+class Asked(NamedTuple):
+    """Squared torque errors [N^2 m^2] of the samples in which a controller of walking asks for a torque; how many."""
+
+    squares: float
+    samples: float
+
+
+def is_asked(command: float, task: float) -> bool:
+    """Return whether a controller of walking asks for a torque: in mid-stance, and where it vents, it does not."""
+    return command <= VENTS_ABOVE and task != MID_STANCE
+
+
+def start_asked(_course: Course, _sample: Sample) -> Asked:
+    """Nothing is asked for before a walk."""
+    return Asked(0.0, 0.0)
+
+
+def update_asked(state: Asked, _course: Course, sample: Sample) -> Asked:
+    """One sample more, where a torque is asked for."""
+    error, counts = sample.reference - sample.torque, is_asked(sample.command, sample.stride.phase)
+    return Asked(state.squares + (error * error if counts else 0.0), state.samples + (1.0 if counts else 0.0))
+
+
+ASKED = MeterKind("asked", Asked, start_asked, update_asked)
+
+
+def asked_samples(recording: Recording) -> Masks:
+    """Return the samples of a walk in which its controller asks for a torque (samples,)."""
+    return np.asarray((recording["command"] <= VENTS_ABOVE) & (recording["controller_phase"] != MID_STANCE))
+
+
+def torque_error(recording: Recording) -> float | None:
+    """RMS error of the torque [N m] in a walk where one is asked for; None where none is."""
+    asked = asked_samples(recording)
+    if not asked.any():
+        return None
+    return float(np.sqrt(np.mean((recording["reference"] - recording["torque"])[asked] ** 2)))
+
+
+def root_mean(squares: Floats, samples: Floats) -> Floats:
+    """Root of a mean of squares; nan for none (runs,)."""
+    found: Floats = root(choose(samples > 0.0, squares / larger(samples, 1.0), math.nan))
+    return found
+
+
 METRICS = (
+    MetricKind(
+        "torque_error",
+        "N m",
+        "RMS of requested torque less actuator torque where the controller requests one",
+        (),
+        None,
+        ReadAt(("meters.asked.squares", "meters.asked.samples"), root_mean),
+        (ASKED,),
+        needs=(WALK, REQUEST),
+    ),
     MetricKind(
         "peak_torque",
         "N m",
@@ -107,7 +165,7 @@ METRICS = (
         "times that the command turns from more than half open one way to more than half open the other",
         ("command",),
         command_reversals,
-        ReadAt(("meters.reversals.count",)),
+        ReadAt(("meters.reversals.turns",)),
         (REVERSALS,),
     ),
 )

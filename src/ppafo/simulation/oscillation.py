@@ -9,11 +9,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ppafo.control import torque_loop
 from ppafo.control.kind import ControllerKind
-from ppafo.model.valves.kind import VENTS_ABOVE
+from ppafo.metrics.command import asked_samples
 from ppafo.signals import Recording
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario
@@ -39,6 +38,7 @@ _OF_LOOP = frozenset(
 )
 _FIRST = (torque_loop.PROPORTIONAL_GAIN, torque_loop.BOUNDARY, torque_loop.CONVERGENCE)
 """What sets how fast a loop is."""
+_SLOPES = ("derivative_gain", "damping")
 _NEAR = 0.02
 """Fraction by which a gain may differ from another one that is called the same."""
 
@@ -144,7 +144,7 @@ def oscillation_of(
     reversals, duration = metrics.get(REVERSALS, 0.0), float(np.ptp(recording.time[[0, -1]]))
     if "reference" not in recording or reversals <= most_reversals(scenario, law, duration, stride_time):
         return None
-    asked = wanted_samples(recording)
+    asked = asked_samples(recording) if scenario.walks else np.ones(len(recording), dtype=np.bool_)
     reference, torque = recording["reference"][asked], recording["torque"][asked]
     scale, per = (stride_time, "stride") if stride_time > 0.0 else (1.0, "second")
     return Oscillation(
@@ -154,11 +154,6 @@ def oscillation_of(
         wanted=float(np.sqrt(np.mean(reference**2))),
         remedy=_remedy(scenario, law),
     )
-
-
-def wanted_samples(recording: Recording) -> NDArray[np.bool_]:
-    """Return the samples in which a law asks for a torque: all but those in which the valve vents."""
-    return np.asarray(recording["command"] <= VENTS_ABOVE)
 
 
 def _remedy(scenario: Scenario, law: ControllerKind) -> str:
@@ -172,4 +167,7 @@ def _remedy(scenario: Scenario, law: ControllerKind) -> str:
     now = float(scenario.controller.settings[item.name])
     if abs(now - right) <= _NEAR * right:
         return f"{item.name} is this device's: look for what delays it (sensors, lines), or give half of it"
-    return f"for this device `{item.name} = {right:.3g} {item.unit}`"
+    # The rules leave the slope of the error alone.
+    slopes = [name for name in _SLOPES if scenario.controller.settings.get(name, 0.0) > 0.0]
+    rest = "".join(f" and `{name} = 0`" for name in slopes)
+    return f"for this device `{item.name} = {right:.3g} {item.unit}`{rest}"
