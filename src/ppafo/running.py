@@ -1,10 +1,12 @@
 """Runs one scenario by its name, by its file or as it is: a vane alone, or a leg that walks."""
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ppafo.loading import scenario_or_load
+from ppafo.model.columns import first
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation import simulate as of_loaded
 from ppafo.simulation.scenario import Scenario
@@ -46,6 +48,21 @@ def oscillation(result: Result) -> "Oscillation | None":
     strides = metrics.get("strides", 0.0) if result.scenario.walks else 0.0
     stride_time = float(time[-1] - time[0]) / strides if strides > 0.0 else 0.0
     return oscillation_of(result.scenario, law, result.recording, metrics, stride_time)
+
+
+def most_reversals(scenario: Scenario) -> float:
+    """Return the ``command_reversals`` of a run above which its loop oscillates; infinite for a law that may turn."""
+    from ppafo.simulation import oscillation as rules
+
+    law = _law(scenario)
+    if law is None:
+        return math.inf
+    stride_time = 0.0
+    if scenario.walks:
+        from ppafo.walking.motion import walk_of
+
+        stride_time = float(walk_of(scenario).gait.stride_time)
+    return rules.most_reversals(scenario, law, first(scenario.run.duration), stride_time)
 
 
 def _law(scenario: Scenario) -> "ControllerKind | None":

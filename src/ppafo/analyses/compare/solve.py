@@ -11,6 +11,7 @@ from ppafo.errors import StudyError, first_twice, nearest_name
 from ppafo.progress import Report
 from ppafo.report.finding import Finding
 from ppafo.report.kind import Interval
+from ppafo.running import oscillation
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate_many
 from ppafo.studies.draws import (
@@ -86,6 +87,7 @@ def compare(
                 configuration=name,
                 status=result.status,
                 metrics={name: metric for name, metric in result.metrics.items() if name in COMPARED},
+                oscillation=oscillation(result) if result.status.is_completed else None,
                 failed_draws=0 if rows_of_case is None else failures_of(rows_of_case),
                 reason=reason,
                 scenario=scenario,
@@ -184,10 +186,11 @@ def _on_task(
             found = compare_pairs(name, first.rows[name], other.rows[name], COMPARED[name], confidence, again)
             pairs[other.configuration] += [] if found is None else [found]
     best: dict[str, dict[str, Interval]] = {}
-    rows = [case.rows for case in cases if case.rows is not None]
+    judged = [case for case in cases if case.oscillation is None]
+    rows = [case.rows for case in judged if case.rows is not None]
     for name in metrics if rows else ():
         if COMPARED[name]:
             # All at once: no pair says which of three is the best.
             shares = best_probabilities([each[name] for each in rows], COMPARED[name], confidence)
-            best[name] = dict(zip([case.configuration for case in cases], shares, strict=False))
+            best[name] = dict(zip([case.configuration for case in judged], shares, strict=False))
     return OnTask(task, list(overrides), cases, front_of(cases), pairs, best)

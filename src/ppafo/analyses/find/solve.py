@@ -21,7 +21,7 @@ from ppafo.studies.draws import Limit, atmosphere_of, check_metrics, level_of, s
 from ppafo.studies.sampling import NOISE
 from ppafo.studies.study import with_overrides
 from ppafo.studies.varying import VariedPath, varied_path
-from ppafo.study.runs import Runs, Tally, settled, with_companions
+from ppafo.study.runs import Runs, Tally, oscillating, settled, with_companions
 from ppafo.units import split_quantity
 
 DEFAULT_GRID, FEWEST, MOST = 64, 3, 100_000
@@ -107,10 +107,15 @@ def find(
     seeds = seeds_of_noise([base], [path.path], 0, STREAMS, _SEED)
     tally = Tally(grid * max(1, seeds.size), progress)
     search = _Search(
-        path.path, condition, Runs(base, with_companions([condition.metric], base), tally, (), threads), seeds
+        base, path.path, condition, Runs(base, with_companions([condition.metric], base), tally, (), threads), seeds
     )
     search.run(np.linspace(low, high, grid))
     if not np.isfinite(search.metrics).any():
+        if search.oscillating:
+            raise StudyError(
+                f"scenario '{base.name}': in every run from {path.quote(low)} to {path.quote(high)} the torque loop "
+                "oscillates: leave its gains out, so that they follow the device"
+            )
         reason = search.runs.reason
         raise StudyError(
             f"scenario '{base.name}': no run from {path.quote(low)} to {path.quote(high)} has a "
@@ -127,12 +132,13 @@ def find(
 class _Search:
     """What was tried so far: values, the metric of each and its standard deviation over the noise, in that order."""
 
-    def __init__(self, path: str, condition: Limit, runs: Runs, seeds: Floats) -> None:
-        self._path, self.condition, self.runs, self.seeds = path, condition, runs, seeds
+    def __init__(self, base: Scenario, path: str, condition: Limit, runs: Runs, seeds: Floats) -> None:
+        self._base, self._path, self.condition, self.runs, self.seeds = base, path, condition, runs, seeds
         self.values: Floats = np.empty(0)
         self.metrics: Floats = np.empty(0)
         self.spread: Floats = np.empty(0)
         self.unsettled = 0
+        self.oscillating = 0
 
     def run(self, values: Floats) -> None:
         """Try values, each over all streams of noise."""
@@ -144,6 +150,10 @@ class _Search:
         # One instant of a loop that oscillates may meet the condition by chance.
         judged = settled(rows, self.condition.metric)
         self.unsettled += int(np.count_nonzero(judged > rows[self.condition.metric]))
+        # A loop whose command turns all the time meets no condition that anybody would build on.
+        turns = oscillating(rows, self._base)
+        self.oscillating += int(np.count_nonzero(turns))
+        judged = np.where(turns, np.nan, judged)
         found = judged.reshape(streams, values.size)
         self.values = np.concatenate([self.values, values])
         self.metrics = np.concatenate([self.metrics, found.mean(axis=0)])
@@ -238,6 +248,10 @@ def _finding(scenario: str, path: VariedPath, search: _Search, highest: bool, gr
         remarks.append(
             f"in {search.unsettled} runs the loop oscillates on the hold, and {condition.metric} is one instant of "
             "that: their rms_error_hold was taken in its place"
+        )
+    if search.oscillating:
+        remarks.append(
+            f"in {search.oscillating} of {search.runs.count} runs the torque loop oscillates: they count as not met"
         )
     if search.runs.failures:
         remarks.append(
