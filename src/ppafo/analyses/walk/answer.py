@@ -196,7 +196,7 @@ def torque_loop_data(worn: WalkResult) -> dict[str, Any]:
 
 
 SCHEMA_VERSION = 1
-REVERSALS_PER_STRIDE = "reversals_per_stride"
+REVERSALS_PER_STRIDE, LARGEST_TORQUE = "reversals_per_stride", "largest_torque"
 _ROWS: tuple[Row, ...] = (
     ("body_mass", "Body mass of the wearer", "mass", 1),
     ("gas", "Gas per stride", "gas mass", 3),
@@ -206,6 +206,7 @@ _ROWS: tuple[Row, ...] = (
     ("net_push_off_work", "Net work on the wearer in push-off", "energy", 2),
     ("torque_error", "Torque error where one is requested, RMS", "torque", 2),
     ("peak_torque", "Peak torque", "torque", 1),
+    (LARGEST_TORQUE, "... limit of the controller", "torque", 1),
     (REVERSALS_PER_STRIDE, "Command reversals per stride", "", 1),
     ("lowest_toes", "Lowest toes over the ground in mid-swing", "body length", 1),
     ("toe_landing", "Strides that begin on the toes", "fraction", 0),
@@ -318,6 +319,7 @@ def comparison_table(comparison: Comparison) -> list[Column]:
         values |= per_stride_values(metrics)
         values |= {name: toes(one.value) if name == "lowest_toes" else one.value for name, one in metrics.items()}
         columns.append((head, values))
+    columns[0][1][LARGEST_TORQUE] = worn.scenario.controller.settings.get(LARGEST_TORQUE)
     # The positive work of a healthy ankle is what the device's is a share of.
     if "positive_push_off_work" in comparison.healthy:
         columns[-1][1]["push_off_share"] = 1.0
