@@ -118,7 +118,8 @@ def read_opensim(path: str | Path, gaps: Sequence[str] = ()) -> OpenSimTable:
             remarks.insert(0, said)
     except DataError as error:
         raise DataError(f"{path}: {error}".replace(f"{path}: {path}:", f"{path}:")) from error
-    columns = {label: values[:, index] for index, label in enumerate(labels) if index > 0}
+    columns, doubled = _columns(labels, values)
+    remarks += [f"line {number}: there are two columns {label!r}, which differ: neither is read" for label in doubled]
     return OpenSimTable(
         header.name, time, columns, header.in_degrees, number + 1, tuple(remarks), header.kind, header.is_old
     )
@@ -166,13 +167,21 @@ def _labels(lines: list[str], header: _Header) -> tuple[int, list[str]]:
             if labels[0].lower() != TIME:
                 first = one_line(labels[0])[:_LONGEST_SHOWN]
                 raise DataError(f"line {number}: the first column must be '{TIME}', it is {first!r}")
-            twice = first_twice(labels)
-            if twice is not None:
-                raise DataError(f"line {number}: there are two columns {twice!r}; rename or remove one")
             if "" in labels:
                 raise DataError(f"line {number}: column {labels.index('') + 1} has no name")
             return number, labels
     raise DataError(f"has nothing after '{_END}': the file is cut off")
+
+
+def _columns(labels: Sequence[str], values: Floats) -> tuple[dict[str, Floats], list[str]]:
+    """Return the columns by label, without time; and the labels of those that are there with different numbers."""
+    columns: dict[str, Floats] = {}
+    doubled: dict[str, None] = {}
+    for index, label in enumerate(labels[1:], start=1):
+        if label in columns and not np.array_equal(columns[label], values[:, index], equal_nan=True):
+            doubled[label] = None
+        columns.setdefault(label, values[:, index])
+    return {label: column for label, column in columns.items() if label not in doubled}, list(doubled)
 
 
 def _number(cell: str, line: int, label: str, gaps: Sequence[str] = ()) -> float:
