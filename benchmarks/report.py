@@ -1,6 +1,5 @@
 """The table of the benchmark: on which machine, what was measured, against which target, met or not."""
 
-import importlib
 import os
 import platform
 from collections.abc import Sequence
@@ -9,7 +8,9 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-PACKAGES = ("ppafo", "numpy", "numba", "llvmlite", "scipy", "scikit-sundae")
+from ppafo.translation.native import described_processor
+
+PACKAGES = ("ppafo", "numpy", "scipy", "scikit-sundae")
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,8 +46,7 @@ def describe_machine() -> Machine:
 
 def has_avx512() -> bool:
     """True where the compiler may use vectors of eight doubles."""
-    codegen = importlib.import_module("numba.core.codegen")
-    return "+avx512f" in str(codegen.get_host_cpu_features()).split(",")
+    return "avx512f" in described_processor().split()
 
 
 def _processor() -> str:

@@ -1,8 +1,8 @@
-"""Whether every run has its golden bits: by Numba for several processors, by compilers of C, on other machines.
+"""Whether every run has its golden bits: by compilers of C, by Python, on other machines.
 
     python scripts/bits.py
     python scripts/bits.py --targets here
-    python scripts/bits.py --names torque-task-solenoid --targets numba:generic "gcc -O1 -fsanitize=address,undefined"
+    python scripts/bits.py --names torque-task-solenoid --targets "gcc -O1 -fsanitize=address,undefined"
     python scripts/bits.py --renew
     python scripts/bits.py --translate 200
 
@@ -30,9 +30,10 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from ppafo.engine.compilers import FLAGS
-from ppafo.engine.lane_source import INLINE, write_lanes
+from ppafo.engine.entries import INLINE
+from ppafo.engine.lane_source import write_lanes
 from ppafo.engine.lanes import Batch, run_batch
-from ppafo.engine.loading import BACKEND_VARIABLE, NUMBA
+from ppafo.engine.loading import BACKEND_VARIABLE, PYTHON
 from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import SimulationError
 from ppafo.golden_bits import GOLDEN, Hashes, digest, golden_hashes, names, plain_batch
@@ -47,12 +48,8 @@ __all__ = ["digest", "drawn_batch", "failures", "plain_batch"]
 WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-Werror")
 HERE = "here"
 """This computer with the compiler that the package chooses."""
-PROCESSORS = ("generic", "haswell", "skylake-avx512", "host")
-INSTRUCTIONS = {"haswell": "avx2", "skylake-avx512": "avx512f"}
-"""What a processor must have to run what is compiled for another."""
 LEVELS = ("-O0", "-O1", "-O2", "-O3", "-O3 -march=native")
 TARGETS = (
-    *(f"numba:{processor}" for processor in PROCESSORS),
     *(f"{command} {level}" for command in ("gcc", "clang") for level in LEVELS),
     "zig -O3",
     *MACHINES,
@@ -65,23 +62,16 @@ def title_of(target: str) -> str:
         return "this computer"
     if target in MACHINES:
         return f"C by zig, {MACHINES[target].title}"
-    kind, _, processor = target.partition(":")
-    return f"Numba for {'this processor' if processor == 'host' else processor}" if processor else f"C by {kind}"
+    return "Python itself" if target == PYTHON else f"C by {target}"
 
 
 def missing_for(target: str) -> str:
     """Return what a target needs that is not here; empty where all is."""
-    if target == HERE:
+    if target in (HERE, PYTHON):
         return ""
     if target in MACHINES:
         return MACHINES[target].missing()
-    kind, _, processor = target.partition(":")
-    if processor:
-        told = Path("/proc/cpuinfo")
-        needed = INSTRUCTIONS.get(processor, "")
-        has_all = not needed or (told.exists() and needed in told.read_text(encoding="utf-8", errors="replace").split())
-        return "" if has_all else f"a processor with {needed}"
-    command = kind.split()[0]
+    command = target.split(maxsplit=1)[0]
     if command != "zig":
         return "" if which(command) else command
     try:
@@ -111,11 +101,7 @@ def _from_c(batch: Batch, target: str) -> Runner:
 
 def hashes_on(target: str, chosen: Sequence[str]) -> Hashes:
     """Return the hashes of a target, found in a process of its own."""
-    processor = target.partition(":")[2]
-    env = {} if target == HERE else {BACKEND_VARIABLE: NUMBA}
-    if processor not in ("", "host"):
-        # Without a list of features Numba would add those of this machine.
-        env |= {"NUMBA_CPU_NAME": processor, "NUMBA_CPU_FEATURES": ""}
+    env = {BACKEND_VARIABLE: PYTHON} if target == PYTHON else {}
     if "address" in target:
         sanitizer = subprocess.run(["gcc", "-print-file-name=libasan.so"], capture_output=True, text=True, check=True)
         env |= {"LD_PRELOAD": sanitizer.stdout.strip(), "ASAN_OPTIONS": "detect_leaks=0"}
@@ -171,7 +157,7 @@ def main() -> int:
         "--targets",
         nargs="+",
         default=list(TARGETS),
-        help=f"{HERE}, numba:PROCESSOR, 'COMPILER FLAGS', {', '.join(MACHINES)}",
+        help=f"{HERE}, {PYTHON}, 'COMPILER FLAGS', {', '.join(MACHINES)}",
     )
     parser.add_argument("--renew", action="store_true", help="write the golden hashes anew")
     parser.add_argument("--translate", metavar="COUNT", type=int, default=0, help="only translate drawn programs")

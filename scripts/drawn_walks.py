@@ -340,7 +340,7 @@ def failing_walk(valve: str, part: str, kind: str, draws: np.random.Generator) -
     begins = float(draws.uniform(3.0, 4.1))
     given = [f"faults.{part}.kind={kind}", f"faults.{part}.time={begins!r} s", SHUT_OFF]
     base = load_walk(valve, [f"wearer.person={int(draws.integers(1, 100_000))}", *given])
-    return walk(with_numbers(base, drawn_device(base, draws)), 0.17), begins
+    return walk(with_numbers(base, drawn_device(base, draws)), minutes=0.17), begins
 
 
 def row_without(valve: str, found: list[Outcome]) -> str:

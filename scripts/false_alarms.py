@@ -50,7 +50,7 @@ HEAD = (
 def counted(configuration: str, sequence: str, sensors: str, who: str, wearers: int) -> dict[str, object]:
     """Walk a task sequence with many wearers: how many they were, were stopped, had less help, by which last flag."""
     overrides = [f"task_sequence={sequence}", *SENSORS[sensors], *WEARERS[who]]
-    people = walk_population(load_walk(configuration, overrides), None, wearers)
+    people = walk_population(load_walk(configuration, overrides), wearers=wearers)
     return {
         "wearers": people.count,
         "diverged": people.diverged,

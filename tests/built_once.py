@@ -77,13 +77,16 @@ class _RefusedError(Exception):
         self.done = done
 
 
-def _asked_once(asked: Callable[[Sequence[str], str, str], Done]) -> Callable[[Sequence[str], str, str], Done]:
-    def ask(line: Sequence[str], remedy: str, folder: str) -> Done:
+_Asked = Callable[[Sequence[str], str, str, Path], Done]
+
+
+def _asked_once(asked: _Asked) -> _Asked:
+    def ask(line: Sequence[str], remedy: str, folder: str, scratch: Path) -> Done:
         target = Path(folder) / line[line.index("-o") + 1]
         beside = {file.name: file.read_bytes() for file in sorted(Path(folder).iterdir())}
 
         def build() -> bytes:
-            done = asked(line, remedy, folder)
+            done = asked(line, remedy, folder, scratch)
             if done.returncode != 0 or not target.is_file():
                 raise _RefusedError(done)
             return target.read_bytes()

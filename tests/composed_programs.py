@@ -8,10 +8,7 @@ from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.engine.lanes import RECORDED_ANGLE
 from ppafo.engine.program import Program
-from ppafo.engine.scheme.isothermal_gas import ISOTHERMAL
-from ppafo.engine.scheme.supply_lines import LINES
-from ppafo.engine.scheme.thermal_gas import ENERGY_BALANCE
-from ppafo.engine.scheme.walking import STRIDES, TASK_SEQUENCE
+from ppafo.engine.step import energy_balance, isothermal, lines, walk
 from ppafo.metrics import METRICS
 from ppafo.metrics.metric import MetricKind
 from ppafo.model.catalog import EFFECTS, VALVES
@@ -68,9 +65,10 @@ def drawn_programs(count: int, seed: int = 1) -> Iterator[Program]:
             effects=tuple(
                 item for item in EFFECTS.values() if not (walks and item.section == "sensors") and draw.random() < 0.3
             ),
-            gas=ENERGY_BALANCE if draw.random() < 0.4 else ISOTHERMAL,
-            leg=(TASK_SEQUENCE if draw.random() < 0.5 else STRIDES) if walks else None,
-            feed=LINES if draw.random() < 0.4 else None,
+            gas=energy_balance if draw.random() < 0.4 else isothermal,
+            leg=walk if walks else None,
+            takes_task_sequence=walks and draw.random() < 0.5,
+            feed=lines if draw.random() < 0.4 else None,
             # A free vane always goes through its steps in parts, a leg never as its error asks.
             is_adaptive=not walks and (angle is None or draw.random() < 0.5),
             samples_inside=draw.random() < 0.2,

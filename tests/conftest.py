@@ -3,7 +3,7 @@
 import dataclasses
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -13,19 +13,10 @@ import pytest
 from ppafo.analyses.reproduce.answer import Reproduction
 from ppafo.analyses.reproduce.solve import reproduce_paper
 from ppafo.engine import cache
-from ppafo.engine.loading import BACKEND_VARIABLE, NUMBA
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
 
 pytest_plugins = ("tests.costs", "tests.built_once", "tests.repeatable")
-TESTS = Path(__file__).parent
-BY_NUMBA = (
-    "unit/engine/test_compile",
-    "unit/engine/test_source_text",
-    "unit/cli/test_start_up.py",
-    "contract/test_compiled_kinds.py",
-)
-"""Tests of what Numba does. The first compiler of this computer compiles for the others, with the same bits."""
 
 
 def pytest_configure() -> None:
@@ -45,16 +36,6 @@ def _unwatched(run: Callable[..., ModuleType]) -> Callable[..., ModuleType]:
             sys.settrace(tracer)
 
     return call
-
-
-@pytest.fixture(scope="module", autouse=True)
-def compiler_of_models(request: pytest.FixtureRequest) -> Iterator[None]:
-    """Let Numba compile what is BY_NUMBA."""
-    place = Path(request.node.path).relative_to(TESTS).as_posix()
-    with pytest.MonkeyPatch.context() as patch:
-        if place.startswith(BY_NUMBA):
-            patch.setenv(BACKEND_VARIABLE, NUMBA)
-        yield
 
 
 @pytest.fixture

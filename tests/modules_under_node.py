@@ -152,7 +152,7 @@ def walked_in_python(name: str, module: WasmModule, settings: Floats) -> list[Wa
         except PpafoError:
             found.append(None)
             continue
-        found.append(walk(walked, seconds / 60.0))
+        found.append(walk(walked, minutes=seconds / 60.0))
     return found
 
 

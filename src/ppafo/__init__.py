@@ -8,6 +8,9 @@
 Everything below is loaded when it is first used, so that ``import ppafo`` is quick.
 """
 
+# Before all else: an interrupt may come while the rest is loaded.
+import ppafo.first_moments as _first_moments  # noqa: F401, I001
+
 import importlib
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -16,33 +19,34 @@ from ppafo.engine.compilers import Compiler, offer
 from ppafo.version import __version__ as __version__
 
 if TYPE_CHECKING:
+    from ppafo.analyses.compare.question import compare as compare
     from ppafo.analyses.design.front.answer import Design as Design
     from ppafo.analyses.design.loading import load_design as load_design
     from ppafo.analyses.design.profile.answer import Sizing as Sizing
+    from ppafo.analyses.design.question import design as design
     from ppafo.analyses.endurance.answer import Endurance as Endurance
+    from ppafo.analyses.endurance.question import bottle as bottle
     from ppafo.analyses.endurance.solve import endurance_of_walk as endurance_of_walk
+    from ppafo.analyses.find.question import find as find
     from ppafo.analyses.identify.answer import Identification as Identification
+    from ppafo.analyses.identify.question import identify as identify
     from ppafo.analyses.linearise.answer import LinearModel as LinearModel
+    from ppafo.analyses.linearise.question import linearise as linearise
     from ppafo.analyses.parts.solve import Parts as Parts
     from ppafo.analyses.parts.solve import parts as parts
     from ppafo.analyses.reproduce.answer import Reproduction as Reproduction
+    from ppafo.analyses.reproduce.question import reproduce as reproduce
+    from ppafo.analyses.sensitivity.question import sensitivity as sensitivity
     from ppafo.analyses.sweep.answer import load_study_results as load_study_results
     from ppafo.analyses.sweep.results import StudyResults as StudyResults
     from ppafo.analyses.sweep.solve import sweep as sweep
     from ppafo.analyses.sweep.statistic import estimate as estimate
     from ppafo.analyses.tune.problem import list_tunings as list_tunings
     from ppafo.analyses.tune.problem import load_tuning as load_tuning
+    from ppafo.analyses.tune.question import tune as tune
+    from ppafo.analyses.validate.question import validate as validate
     from ppafo.analyses.validate.solve import Validation as Validation
-    from ppafo.cli.verbs.analyses import bottle as bottle
-    from ppafo.cli.verbs.analyses import compare as compare
-    from ppafo.cli.verbs.analyses import design as design
-    from ppafo.cli.verbs.analyses import find as find
-    from ppafo.cli.verbs.analyses import linearise as linearise
-    from ppafo.cli.verbs.analyses import reproduce as reproduce
-    from ppafo.cli.verbs.analyses import sensitivity as sensitivity
-    from ppafo.cli.verbs.analyses import tune as tune
-    from ppafo.cli.verbs.bench import identify as identify
-    from ppafo.cli.verbs.bench import validate as validate
+    from ppafo.errors import ArgumentError as ArgumentError
     from ppafo.errors import DataError as DataError
     from ppafo.errors import IdentificationError as IdentificationError
     from ppafo.errors import KindError as KindError
@@ -58,8 +62,8 @@ if TYPE_CHECKING:
     from ppafo.gait import load_gait as load_gait
     from ppafo.loading import load_scenario as load_scenario
     from ppafo.loading import scenario_from_dict as scenario_from_dict
+    from ppafo.measuring import evaluate as evaluate
     from ppafo.metrics import Metric as Metric
-    from ppafo.metrics import evaluate as evaluate
     from ppafo.model.sensors import Measurement as Measurement
     from ppafo.page.workbench import workbench as workbench
     from ppafo.parameters import ParameterSet as ParameterSet
@@ -74,13 +78,13 @@ if TYPE_CHECKING:
     from ppafo.parameters.parts import load_catalogue as load_catalogue
     from ppafo.report.finding import Finding as Finding
     from ppafo.running import simulate as simulate
+    from ppafo.running import simulate_many as simulate_many
     from ppafo.signals import Channel as Channel
     from ppafo.signals import Recording as Recording
     from ppafo.simulation.loading import list_scenarios as list_scenarios
     from ppafo.simulation.scenario import Scenario as Scenario
     from ppafo.simulation.simulate import Result as Result
     from ppafo.simulation.simulate import Status as Status
-    from ppafo.simulation.simulate import simulate_many as simulate_many
     from ppafo.storage import read_recording as read_recording
     from ppafo.storage import read_result as read_result
     from ppafo.studies.loading import list_studies as list_studies
@@ -92,18 +96,16 @@ if TYPE_CHECKING:
     from ppafo.walking.walk import walk as walk
 
 _HOMES = {
-    "ppafo.cli.verbs.analyses": (
-        "bottle",
-        "compare",
-        "design",
-        "find",
-        "linearise",
-        "reproduce",
-        "sensitivity",
-        "tune",
-    ),
-    "ppafo.cli.verbs.bench": ("identify", "validate"),
+    "ppafo.analyses.compare.question": ("compare",),
+    "ppafo.analyses.design.question": ("design",),
+    "ppafo.analyses.find.question": ("find",),
+    "ppafo.analyses.identify.question": ("identify",),
+    "ppafo.analyses.linearise.question": ("linearise",),
+    "ppafo.analyses.reproduce.question": ("reproduce",),
+    "ppafo.analyses.sensitivity.question": ("sensitivity",),
+    "ppafo.analyses.tune.question": ("tune",),
     "ppafo.errors": (
+        "ArgumentError",
         "DataError",
         "IdentificationError",
         "KindError",
@@ -118,7 +120,8 @@ _HOMES = {
     "ppafo.gait": ("Gait", "list_gaits", "load_gait"),
     "ppafo.page.workbench": ("workbench",),
     "ppafo.loading": ("load_scenario", "scenario_from_dict"),
-    "ppafo.metrics": ("Metric", "evaluate"),
+    "ppafo.measuring": ("evaluate",),
+    "ppafo.metrics": ("Metric",),
     "ppafo.model.sensors": ("Measurement",),
     "ppafo.parameters": ("ParameterSet", "apply_overrides", "list_sets", "load_device", "load_parameter_set"),
     "ppafo.parameters.audit": ("audit",),
@@ -128,6 +131,7 @@ _HOMES = {
     "ppafo.analyses.design.loading": ("load_design",),
     "ppafo.analyses.design.profile.answer": ("Sizing",),
     "ppafo.analyses.endurance.answer": ("Endurance",),
+    "ppafo.analyses.endurance.question": ("bottle",),
     "ppafo.analyses.endurance.solve": ("endurance_of_walk",),
     "ppafo.analyses.identify.answer": ("Identification",),
     "ppafo.analyses.linearise.answer": ("LinearModel",),
@@ -138,12 +142,13 @@ _HOMES = {
     "ppafo.analyses.sweep.solve": ("sweep",),
     "ppafo.analyses.sweep.statistic": ("estimate",),
     "ppafo.analyses.tune.problem": ("list_tunings", "load_tuning"),
+    "ppafo.analyses.validate.question": ("validate",),
     "ppafo.analyses.validate.solve": ("Validation",),
-    "ppafo.running": ("simulate",),
+    "ppafo.running": ("simulate", "simulate_many"),
     "ppafo.signals": ("Channel", "Recording"),
     "ppafo.simulation.loading": ("list_scenarios",),
     "ppafo.simulation.scenario": ("Scenario",),
-    "ppafo.simulation.simulate": ("Result", "Status", "simulate_many"),
+    "ppafo.simulation.simulate": ("Result", "Status"),
     "ppafo.storage": ("read_recording", "read_result"),
     "ppafo.studies.loading": ("list_studies", "load_study"),
     "ppafo.report.finding": ("Finding",),
@@ -174,15 +179,8 @@ def _compiler_of_c(name: str) -> Compiler:
     return compiler(name)
 
 
-def _numba() -> Compiler:
-    """Return Numba."""
-    from ppafo.engine.numba_compiler import numba_compiler
-
-    return numba_compiler()
-
-
-# By name, as the engine knows nothing of the translation above it.
-offer({**{name: partial(_compiler_of_c, name) for name in ("clang", "gcc", "zig")}, "numba": _numba})
+# By name, as the engine knows nothing of the translation above it. A slow valve takes four times as long by clang.
+offer({name: partial(_compiler_of_c, name) for name in ("gcc", "clang", "zig")})
 
 
 def __getattr__(name: str) -> Any:

@@ -15,6 +15,10 @@ class PpafoError(Exception):
     parts: tuple[str, ...] = ()
 
 
+class ArgumentError(PpafoError):
+    """An argument of a function or of a command is not usable; the message names it and says what it takes."""
+
+
 class UnitError(PpafoError):
     """A text is not a quantity, or its unit does not fit; the reader of a file adds the file and the key."""
 

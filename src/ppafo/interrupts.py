@@ -10,6 +10,8 @@ import sys
 from types import FrameType, TracebackType
 from typing import Any
 
+from ppafo.first_moments import end
+
 SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
 _received: list[int] = []
 """Numbers of the signals that came; a list, since appending to it cannot be interrupted."""
@@ -19,7 +21,7 @@ def listen() -> None:
     """Let the signals end this process by KeyboardInterrupt; one that whoever started it lets be ignored stays so."""
     for name in SIGNALS:
         number = getattr(signal, name, None)
-        if number is not None and signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
+        if number is not None and signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler, end):
             signal.signal(number, _interrupt)
     sys.unraisablehook = _without_dropped_interrupts
     sys.excepthook = _without_interrupts

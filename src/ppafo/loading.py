@@ -8,9 +8,11 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from ppafo.arguments import Overrides, checked
 from ppafo.documents.toml_text import beside, label
 from ppafo.errors import ScenarioError, nearest_name
 from ppafo.parameters import ParameterSet
+from ppafo.parameters.loading import set_or_load
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation import loading as of_vanes
 from ppafo.simulation import schema
@@ -33,24 +35,27 @@ def list_all_scenarios() -> tuple[str, ...]:
     return *of_vanes.list_scenarios(), *list_walks()
 
 
+@checked("scenario", "overrides", "parameter_set", name_or_path="scenario")
 def load_scenario(
-    name_or_path: str | Path,
-    overrides: Iterable[str] = (),
-    parameter_set: ParameterSet | None = None,
+    scenario: str | Path,
+    overrides: Overrides = (),
     *,
+    parameter_set: ParameterSet | str | Path | None = None,
     plugins: Plugins = (),
 ) -> Scenario:
     """Return a scenario, walks among them, by its name in the package or by the path of a TOML file, in SI units.
 
     ``overrides`` are texts whose path begins in the scenario, ``run.duration=1 s``, or in its device,
-    ``valve.area=12.6mm^2``. ``parameter_set`` takes the place of the set that the scenario names; what the scenario
-    changes in its device is changed in this one. ``plugins`` are modules of your own, files or names, whose objects
-    files may name: ``plugins=["laws.py"]`` for ``kind = "laws:KIND"``. ScenarioError, ParameterError or DataError for
-    anything that cannot be used.
+    ``valve.area=12.6mm^2``, or a dictionary of such paths, in which a number is in SI. ``parameter_set``, an object, a
+    name or a file, takes the place of the set that the scenario names; what the scenario changes in its device is
+    changed in this one. ``plugins`` are modules of your own, files or names, whose objects files may name:
+    ``plugins=["laws.py"]`` for ``kind = "laws:KIND"``. ScenarioError, ParameterError or DataError for anything that
+    cannot be used.
     """
     name_plugins(plugins)
     # Vanes first: the code of walks is loaded for a walk only.
-    name, path = str(name_or_path), Path(name_or_path)
+    name, path = str(scenario), Path(scenario)
+    parameter_set = set_or_load(parameter_set)
     if name in of_vanes.list_scenarios():
         return of_vanes.load_scenario(name, overrides, parameter_set)
     from ppafo.walking.loading import FILE, list_walks, load_walk
@@ -68,12 +73,16 @@ def load_scenario(
     return of_vanes.scenario_of(request, _layout(document))
 
 
-def scenario_from_dict(content: Mapping[str, Any], overrides: Iterable[str] = ()) -> Scenario:
+@checked()
+def scenario_from_dict(content: Mapping[str, Any], overrides: Overrides = (), *, plugins: Plugins = ()) -> Scenario:
     """Return a scenario, walks among them, from nested dictionaries that are laid out as a scenario file is.
 
     Quantities are texts with their unit, ``{"angle": "75 deg"}``; relative paths begin in the working folder.
     ScenarioError, ParameterError or DataError for anything that cannot be used.
+
+    ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
     """
+    name_plugins(plugins)
     request = of_vanes.request_of_dict(content, overrides)
     return of_vanes.scenario_of(request, _layout(request.content))
 

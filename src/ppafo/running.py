@@ -1,10 +1,11 @@
-"""Runs one scenario by its name, by its file or as it is: a vane alone, or a leg that walks."""
+"""Runs scenarios by name, by file or as they are, a vane alone or a leg that walks."""
 
 import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ppafo.arguments import Overrides, Threads, checked
 from ppafo.loading import scenario_or_load
 from ppafo.model.columns import first
 from ppafo.plugins import Plugins, name_plugins
@@ -17,8 +18,12 @@ if TYPE_CHECKING:
     from ppafo.simulation.oscillation import Gains, Oscillation
 
 
-def simulate(scenario: Scenario | str | Path, overrides: Sequence[str] = (), *, plugins: Plugins = ()) -> Result:
-    """Run one scenario: an object, or the name of a shipped one or a file, with ``overrides`` as on the command line.
+@checked()
+def simulate(scenario: Scenario | str | Path, overrides: Overrides = (), *, plugins: Plugins = ()) -> Result:
+    """Run one scenario: an object, or the name of a shipped one or a file.
+
+    ``overrides`` are texts as on the command line, ``["supply.pressure=70 psi_g"]``, or a dictionary,
+    ``{"supply.pressure": "70 psi_g", "reference.level": 4.0}``, in which a number is in SI.
 
     A scenario that walks is one walk with the device; ``compare_walks`` shows it beside the same without. A run that
     diverges is a Result with that status, up to the time of failure. ``plugins`` are modules of your own, files or
@@ -78,3 +83,15 @@ def _law(scenario: Scenario) -> "ControllerKind | None":
     from ppafo.control.catalog import CONTROLLERS
 
     return CONTROLLERS[scenario.controller.kind]
+
+
+@checked("scenarios", "threads")
+def simulate_many(
+    scenarios: Sequence[Scenario | str | Path], *, threads: Threads | None = None, plugins: Plugins = ()
+) -> list[Result]:
+    """Run many scenarios side by side, objects, names or files, each exactly as if it ran alone.
+
+    ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
+    """
+    name_plugins(plugins)
+    return of_loaded.simulate_many([scenario_or_load(scenario) for scenario in scenarios], threads)

@@ -69,7 +69,7 @@ def shown_below(words: list[str]) -> list[str]:
 
 @pytest.mark.parametrize(("name", "change", "numbers"), REGULATED)
 def test_a_row_of_the_regulators_is_what_comes_out(name: str, change: str, numbers: str) -> None:
-    metrics = ppafo.walk(name, 0.2, overrides=re.findall(r"`(.*)`", change)).metrics
+    metrics = ppafo.walk(name, minutes=0.2, overrides=re.findall(r"`(.*)`", change)).metrics
     gas, work, toes = (metrics[metric].value for metric in ("gas", "positive_push_off_work", "lowest_toes"))
     assert numbers == f"{1e3 * gas:.3f} | {work:.2f} | {f'{1e2 * toes:.1f}' if toes >= 0.0 else 'would drag'}"
 

@@ -21,7 +21,7 @@ import ppafo
 from ppafo.cli.main import main
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
-from ppafo.engine.plain_python import mistake
+from ppafo.errors import ProgramError
 from ppafo.model.catalog import ACTUATORS, VALVES
 from ppafo.model.sensors import Measurement
 from ppafo.model.valves.kind import VENT
@@ -217,20 +217,15 @@ def test_the_controller_of_the_page_keeps_its_command_inside_the_band(hysteresis
     assert hysteresis.update(parameters, state, 2.0, above, 1e-3)[0] == -1.0
 
 
-def test_the_message_on_the_controller_page_is_the_real_one() -> None:
+def test_the_message_on_the_controller_page_is_the_real_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     shown = extension("my_laws/hysteresis.py:")
-    law = extension("KIND = ControllerKind").replace("measurement.torque", "measurement.torqe").splitlines()
-    number = next(place for place, line in enumerate(law, 1) if "measurement.torqe" in line)
-    source = "\n".join(
-        [
-            "Measurement = namedtuple('Measurement', ['angle', 'torque'])",
-            f"# origin hysteresis.py: {number} {number + 1}",
-            "@njit",
-            law[number - 1].strip(),
-        ]
-    )
-    report = "Unknown attribute 'torqe' of type Measurement(float64 x 2)\n\nFile \"x.py\", line 4:"
-    assert f"my_laws/{mistake(report, source)}" == shown.strip()
+    law = extension("KIND = ControllerKind").replace("measurement.torque", "measurement.torqe")
+    (tmp_path / "my_laws").mkdir()
+    (tmp_path / "my_laws" / "hysteresis.py").write_text(law, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ProgramError) as refused:
+        ppafo.simulate("torque-task-solenoid", ["controller.kind=my_laws.hysteresis:KIND", "run.duration=20 ms"])
+    assert str(refused.value) == shown.strip()
 
 
 def test_the_controller_of_the_page_is_compiled_and_named_in_a_scenario(hysteresis: ModuleType) -> None:
@@ -259,14 +254,14 @@ def test_the_controller_of_the_page_walks() -> None:
     words = shlex.split(extension("ppafo walk"))
     overrides = [after for word, after in itertools.pairwise(words) if word == "--set"]
     assert overrides[0] == "controller.kind=my_laws.hysteresis:KIND"
-    walked = ppafo.walk(words[2], 0.1, overrides)
+    walked = ppafo.walk(words[2], minutes=0.1, overrides=overrides)
     assert walked.status.is_completed
     assert "safe_state_time" not in walked.metrics
     assert walked.metrics["net_push_off_work"].value > 0.5
     command = walked.recording["command"]
     assert set(command.round(12)) <= {-1.0, 0.0, 1.0, VENT}
     # By its short name, as step 3 of the page has it, it is the same controller.
-    named = ppafo.walk(words[2], 0.1, ["controller.kind=hysteresis", *overrides[1:]])
+    named = ppafo.walk(words[2], minutes=0.1, overrides=["controller.kind=hysteresis", *overrides[1:]])
     assert (named.recording["command"] == command).all()
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ppafo.analyses.identify.solve import identify
+from ppafo.analyses.identify.question import identify
 from ppafo.errors import PpafoError
 
 ROOT = Path(__file__).parents[2]

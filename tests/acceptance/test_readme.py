@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from ppafo.analyses.reproduce.answer import Reproduction, Studies, finding_of, finding_of_studies
-from ppafo.analyses.reproduce.solve import reproduce
+from ppafo.analyses.reproduce.question import reproduce
 from ppafo.cli.commands import COMMANDS
 from ppafo.cli.main import build_parser, main
 from ppafo.golden_bits import golden_hashes
@@ -177,7 +177,7 @@ def test_the_answers_of_the_five_minutes_are_those_of_runs() -> None:
     assert f"{error(first)} N m, {gas(first)} g" in lines["1"]
     assert f"{error(more)} N m, {gas(more)} g" in lines["2"]
     assert f"{error(pair)} and {error(first)} N m, {gas(pair)} and {gas(first)} g" in lines["3"]
-    metrics = walk("solenoid", 0.2).metrics
+    metrics = walk("solenoid", minutes=0.2).metrics
     assert f"{1e3 * metrics['gas'].value:.3g} g a stride" in lines["4"]
 
 

@@ -38,7 +38,7 @@ def test_the_python_of_the_page_reads_what_the_study_wrote(tmp_path: Path, monke
 
     monkeypatch.chdir(tmp_path)
     document = tomllib.loads(blocks("toml")[0])
-    sweep(document, "out/my-study", overrides=["run.duration=0.2 s"], draws=8)
+    sweep(document, out="out/my-study", overrides=["run.duration=0.2 s"], draws=8)
     names: dict[str, object] = {}
     # The clusters further down need a scheduler.
     for text in re.findall(r"^```python\n(.*?)^```", PAGE.partition("## On a cluster")[0], re.DOTALL | re.MULTILINE):
@@ -53,7 +53,7 @@ def test_the_python_of_the_page_reads_what_the_study_wrote(tmp_path: Path, monke
 def test_the_tree_of_the_page_is_what_a_study_writes(tmp_path: Path) -> None:
     document = tomllib.loads(blocks("toml")[0])
     document["outputs"]["trajectories"] = ["torque"]
-    sweep(document, tmp_path / "out", overrides=["run.duration=0.1 s"], draws=2)
+    sweep(document, out=tmp_path / "out", overrides=["run.duration=0.1 s"], draws=2)
     written = {path.relative_to(tmp_path / "out").parts[0] for path in (tmp_path / "out").rglob("*")}
     tree = PAGE.partition("## What comes out")[2].partition("The columns say")[0]
     assert {name for name in written if name not in tree} == set()

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import ppafo
-from ppafo.analyses.find.solve import find
+from ppafo.analyses.find.question import find
 from ppafo.analyses.sweep.statistic import estimate
 from ppafo.analyses.tune.problem import load_tuning
-from ppafo.analyses.tune.solve import tune
+from ppafo.analyses.tune.question import tune
 from ppafo.loading import load_scenario
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.studies.loading import load_study
@@ -24,7 +24,12 @@ PAGE = (Path(__file__).parents[2] / "docs" / "how-to" / "walk.md").read_text(enc
 def test_the_pressure_of_the_page_lifts_the_foot_as_the_walk_alone_says() -> None:
     given = ["run.duration=20 s"]
     found = find(
-        "proportional", "supply.dorsiflexion_pressure=20..48 psi_g", "toe_clearance >= -18 mm", False, 16, given
+        "proportional",
+        vary="supply.dorsiflexion_pressure=20..48 psi_g",
+        such_that="toe_clearance >= -18 mm",
+        highest=False,
+        grid=16,
+        overrides=given,
     ).found
     assert found.value is not None
     shown = re.search(r"dorsiflexion_pressure = ([\d.]+) psi_g", PAGE)
@@ -58,7 +63,9 @@ def test_a_person_of_a_study_is_the_one_of_that_number() -> None:
 
 
 def test_the_probability_over_wearers_is_that_of_the_draws_below_the_limit() -> None:
-    found = estimate("wearers", "toe_clearance", "probability above -18 mm", "0.5", first_draws=64, draws=64).found
+    found = estimate(
+        "wearers", metric="toe_clearance", statistic="probability above -18 mm", width="0.5", first_draws=64, draws=64
+    ).found
     above = found.values > -0.018
     assert found.interval.value == pytest.approx(above.mean(), abs=0.02)
     assert 0.3 < above.mean() < 0.9

@@ -1,4 +1,4 @@
-"""Habits that no linter knows: rows are built by keyword, Numba can compile what it must, every test can fail."""
+"""Habits that no linter knows: rows are built by keyword, every test can fail."""
 
 import ast
 from collections.abc import Iterator, Mapping
@@ -7,8 +7,6 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 MOST_BY_POSITION = 3
-MOST_WITH_CHOICES = 15
-COMPILED = ("model", "control", "engine/scheme", "signals", "metrics")
 """Rooms whose functions are compiled."""
 CHECKERS = ("assert", "check", "raises", "warns", "fail")
 
@@ -49,15 +47,6 @@ def built_by_position(tree: ast.Module, module: str, known: Rows) -> Iterator[st
                 yield f"{module}:{node.lineno}: {node.func.id}"
 
 
-def choices_in_long_calls(tree: ast.Module, module: str) -> Iterator[str]:
-    """Calls with so many names that Numba compiles none with a choice or a comparison chain inside."""
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Call) and len(node.keywords) >= MOST_WITH_CHOICES:
-            values = [item.value for item in node.keywords]
-            if any(isinstance(inner, ast.IfExp | ast.BoolOp) for value in values for inner in ast.walk(value)):
-                yield f"{module}:{node.lineno}: {ast.unparse(node.func)}"
-
-
 def silent_tests(tree: ast.Module) -> Iterator[str]:
     """Tests that neither assert nor call what asserts: a function of their file that does, or one named so."""
     functions = {node.name: node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
@@ -88,24 +77,6 @@ def test_a_row_built_by_position_is_found() -> None:
     known = {("here", "Row"): 4}
     text = "Row(1, 2, 3, 4)\nRow(*four)\nRow(1, 2, 3, last=4)\nRow(first=1, second=2, third=3, last=4)\n"
     assert list(built_by_position(ast.parse(text), "here", known)) == ["here:1: Row", "here:2: Row"]
-
-
-def test_no_call_of_many_names_has_a_choice_inside_where_numba_compiles() -> None:
-    compiled = {
-        path: tree
-        for path, tree in trees().items()
-        if path.relative_to(ROOT / "src/ppafo").as_posix().startswith(COMPILED)
-    }
-    assert len(compiled) > 50
-    found = [line for path, tree in compiled.items() for line in choices_in_long_calls(tree, module_of(path))]
-    # What puts a kind together is not compiled.
-    assert [line for line in found if not line.endswith(": LegScheme")] == []
-
-
-def test_a_choice_in_a_call_of_many_names_is_found() -> None:
-    names = ", ".join(f"n{number}={number}" for number in range(14))
-    text = f"f({names})\nf({names}, last=1 if x else 2)\nf(last=1 if x else 2)\n"
-    assert list(choices_in_long_calls(ast.parse(text), "here")) == ["here:2: f"]
 
 
 def test_every_test_asserts_something() -> None:

@@ -12,7 +12,7 @@ import pytest
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.kind import ControllerKind, ProfileKind
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
-from ppafo.engine.lane_samples import TRACED
+from ppafo.engine.channels import TRACED
 from ppafo.engine.rows import leaf_paths, numbers, rebuild
 from ppafo.metrics import METRICS, MetricKind
 from ppafo.model.catalog import VALVES

@@ -13,8 +13,7 @@ import pytest
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.engine.cache import load_generated
-from ppafo.engine.loading import HEADER
-from ppafo.engine.numba_compiler import NumbaCompiler
+from ppafo.engine.entries import HEADER, INLINE
 from ppafo.engine.rows import leaf_paths, numbers, rebuild
 from ppafo.engine.source_text import SourceCollector
 from ppafo.metrics import METRICS
@@ -31,8 +30,8 @@ from ppafo.model.sensors import (
     measure_gait,
 )
 from ppafo.signals.meter import Course, FootSample, MeterKind, Sample, StrideSample
+from tests.compilers_here import first_compiler
 
-QUICKLY = '@njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)'
 ROUNDING = 1.0e-12
 """Relative difference that the last bits of sines and exponentials may make."""
 
@@ -217,8 +216,8 @@ def places(value: Any, path: str) -> list[str]:
 
 @pytest.fixture(scope="module")
 def compiled() -> Any:
-    """One module whose ``run(which, x, y)`` calls the entry of that number."""
-    collector = SourceCollector(QUICKLY)
+    """One module whose ``run(x, y, which)`` calls the entry of that number."""
+    collector = SourceCollector(INLINE)
     lines = []
     for number, entry in enumerate(ENTRIES.values()):
         given = ", ".join(
@@ -228,8 +227,8 @@ def compiled() -> Any:
         paths = places(entry.function(*entry.arguments[0]), result)
         lines += [f"    if which == {number}:", f"        {result} = {collector.add(entry.function)}({given})"]
         lines += [f"        y[{place}] = {path}" for place, path in enumerate(paths)]
-    loop = '@njit("void(int64, float64[::1], float64[::1])", cache=True, error_model="numpy")\ndef run(which, x, y):'
-    return load_generated("\n".join([HEADER, collector.text(), loop, *lines]) + "\n", NumbaCompiler())
+    loop = '@entry("void(float64[::1], float64[::1], int64)")\ndef run(x, y, which):'
+    return load_generated("\n".join([HEADER, collector.text(), loop, *lines]) + "\n", first_compiler())
 
 
 @pytest.mark.parametrize("name", ENTRIES)
@@ -239,7 +238,7 @@ def test_an_entry_gives_the_same_compiled_and_interpreted(compiled: Any, name: s
     for arguments in entry.arguments:
         expected = numbers(result if isinstance(result := entry.function(*arguments), tuple) else (result,))
         found = np.full(len(expected), math.nan)
-        compiled.run(list(ENTRIES).index(name), np.array(numbers(arguments)), found)
+        compiled.run(np.array(numbers(arguments)), found, list(ENTRIES).index(name))
         assert found == pytest.approx(expected, rel=ROUNDING, abs=1.0e-15)
         results.add(tuple(expected))
     assert (

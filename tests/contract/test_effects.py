@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ppafo.analyses.linearise.solve import linearise
+from ppafo.analyses.linearise.question import linearise
 from ppafo.cli.main import main
 from ppafo.engine.lanes import LaneBlock
 from ppafo.engine.rows import row_numbers
@@ -137,7 +137,8 @@ def test_the_reference_solver_has_the_same_law() -> None:
 def test_a_linear_model_has_it_as_a_difference_of_two_runs_has() -> None:
     venting = ("controller.kind=constant", "controller.command=-0.4", "run.duration=0.3 s")
     rates = [
-        linearise("torque-task-proportional", 0.2, (*venting, text)).found.rates for text in (f"{AREA}=0 mm^2", NARROW)
+        linearise("torque-task-proportional", at=0.2, overrides=(*venting, text)).found.rates
+        for text in (f"{AREA}=0 mm^2", NARROW)
     ]
     step = ("run.step=0.01 ms", "run.output_interval=0.01 ms")
     found = simulate(load_scenario("torque-task-proportional", (*venting, NARROW, *step))).recording
@@ -213,7 +214,7 @@ def test_the_page_has_its_words_and_the_bits_of_python() -> None:
 
 def test_it_walks() -> None:
     texts = ((), (NARROW,), (NARROW, *ICE), (NARROW, *ICE, REAL))
-    without, narrow, iced, real = (walk(load_walk("proportional", given), 0.1) for given in texts)
+    without, narrow, iced, real = (walk(load_walk("proportional", given), minutes=0.1) for given in texts)
     for one, other in ((narrow, without), (iced, narrow), (real, iced)):
         assert one.status.is_completed
         assert slower(one, other)
@@ -229,11 +230,11 @@ def test_it_walks_on_a_bottle_and_follows_the_temperature_of_its_gas(monkeypatch
         passed_on(self, rows, values)
 
     monkeypatch.setattr(LaneBlock, "set_parameters", watched)
-    with_mesh = walk(load_walk("proportional", [NARROW, BOTTLE]), 0.1)
+    with_mesh = walk(load_walk("proportional", [NARROW, BOTTLE]), minutes=0.1)
     assert with_mesh.status.is_completed
     assert with_mesh.supply is not None
     warmth = with_mesh.supply.values["gas_temperature"]
     assert warmth.min() < 0.995 * warmth[0]
     resistances = np.array([row["mesh.resistance"] for row in given])
     np.testing.assert_allclose(resistances / resistances[0], warmth[: len(given)] / warmth[0], rtol=1e-12)
-    assert slower(with_mesh, walk(load_walk("proportional", [BOTTLE]), 0.1))
+    assert slower(with_mesh, walk(load_walk("proportional", [BOTTLE]), minutes=0.1))

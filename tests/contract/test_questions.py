@@ -6,6 +6,7 @@ The command of the how-to page is installed as a package of its own would be, an
 import inspect
 import json
 import re
+import subprocess
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -13,12 +14,16 @@ from pathlib import Path
 import pytest
 
 import ppafo
+from ppafo.analyses.endurance.solve import LONGEST
+from ppafo.analyses.find.solve import DEFAULT_GRID
+from ppafo.analyses.linearise.solve import EQUILIBRIUM
+from ppafo.analyses.reproduce.publication import SEED
 from ppafo.cli import output
 from ppafo.cli.command_line import Command, Group, option_of, parameters_of
 from ppafo.cli.commands import COMMANDS, OTHERS, RENAMED
 from ppafo.cli.main import build_parser, main
 from ppafo.exports.hil.wire import DEFAULT_BAUD, RATE
-from ppafo.kinds import kind_at
+from ppafo.validation.agreement import DEFAULT_LIMIT
 from tests.page_code import block_with, write_package
 
 VERBS: dict[str, Command] = {
@@ -26,21 +31,19 @@ VERBS: dict[str, Command] = {
     for name, one in COMMANDS.items()
     for action, command in (one.actions if isinstance(one, Group) else {"": one}).items()
 }
-SOLVERS = {
-    "bottle": "ppafo.analyses.endurance.solve:endurance",
-    "compare": "ppafo.analyses.compare.solve:compare",
-    "design": "ppafo.analyses.design.solve:design",
-    "find": "ppafo.analyses.find.solve:find",
-    "identify": "ppafo.analyses.identify.solve:identify",
-    "linearise": "ppafo.analyses.linearise.solve:linearise",
-    "reproduce": "ppafo.analyses.reproduce.solve:reproduce",
-    "sensitivity": "ppafo.analyses.sensitivity.solve:sensitivity",
-    "sweep": "ppafo.analyses.sweep.solve:sweep_into_folder",
-    "tune": "ppafo.analyses.tune.solve:tune",
-    "validate": "ppafo.analyses.validate.solve:validate",
-    "walk": "ppafo.analyses.walk.answer:walk_with_and_without",
-}
-NO_VERB_OF_THEIR_NAME = ("sweep", "walk")
+QUESTIONS = (
+    "bottle",
+    "compare",
+    "design",
+    "find",
+    "identify",
+    "linearise",
+    "reproduce",
+    "sensitivity",
+    "tune",
+    "validate",
+)
+"""Commands whose function is the one of Python by the same name."""
 MOST_COMMANDS = 22
 
 
@@ -61,15 +64,30 @@ def test_every_parameter_of_a_verb_has_its_help_and_every_option_one_meaning(nam
     assert {*named, "--json", "--out"} <= parser.options()
 
 
-@pytest.mark.parametrize("name", SOLVERS)
-def test_defaults_of_a_verb_are_those_of_what_solves_it(name: str) -> None:
-    solver = inspect.signature(kind_at(SOLVERS[name])).parameters
-    verb = inspect.signature(VERBS[name].function()).parameters
-    assert set(verb) == set(solver)
-    for each in verb.values():
-        default = solver[each.name].default
-        if default is not inspect.Parameter.empty and each.default is not inspect.Parameter.empty:
-            assert each.default == default, each.name
+@pytest.mark.parametrize("name", [name for name, command in VERBS.items() if command.first_line])
+def test_the_line_of_a_command_in_the_list_is_the_first_of_its_docstring(name: str) -> None:
+    assert (VERBS[name].function().__doc__ or "").strip().partition("\n")[0] == VERBS[name].first_line
+
+
+@pytest.mark.parametrize("name", QUESTIONS)
+def test_the_arguments_of_a_question_are_read_without_what_answers_it(name: str) -> None:
+    code = f"import sys; from ppafo.cli.main import main; main(['{name}', '--help'])"
+    script = f"import atexit, sys; atexit.register(lambda: print('numpy' in sys.modules)); {code}"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "False"
+
+
+def test_defaults_that_are_written_in_a_signature_are_those_of_the_modules() -> None:
+    defaults = {
+        "bottle longest": LONGEST,
+        "validate longest_delay": DEFAULT_LIMIT,
+        "linearise at": EQUILIBRIUM,
+        "reproduce study": SEED,
+        "find grid": DEFAULT_GRID,
+    }
+    for words, value in defaults.items():
+        name, argument = words.split()
+        assert inspect.signature(VERBS[name].function()).parameters[argument].default == value, words
 
 
 def test_defaults_of_the_wire_are_those_of_the_protocol() -> None:
@@ -78,7 +96,7 @@ def test_defaults_of_the_wire_are_those_of_the_protocol() -> None:
     assert (hil["rate"].default, hil["baud"].default, record["baud"].default) == (RATE, DEFAULT_BAUD, DEFAULT_BAUD)
 
 
-@pytest.mark.parametrize("name", [name for name in SOLVERS if name not in NO_VERB_OF_THEIR_NAME])
+@pytest.mark.parametrize("name", QUESTIONS)
 def test_the_function_of_a_command_is_the_verb_of_python_with_its_errors_documented(name: str) -> None:
     verb = VERBS[name].function()
     assert getattr(ppafo, name) is verb

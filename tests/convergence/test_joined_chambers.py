@@ -57,7 +57,9 @@ class Course(NamedTuple):
 
 def stepped(*overrides: str) -> Course:
     """Push-off and then lifting with a vane held at 75 deg, by the functions of the lanes in plain Python."""
-    device = load_device("ppafo2011", "solenoid_recycling", (f"valve.joining_time={JOINED} s", *overrides))
+    device = load_device(
+        "ppafo2011", valve="solenoid_recycling", overrides=(f"valve.joining_time={JOINED} s", *overrides)
+    )
     plant = plant_parameters(device)
     valve, coils = solenoid_recycling.prepare(valve_settings(device.valve)), solenoid_recycling.RecyclingState()
     state = vented_state(plant, math.radians(75.0), 0.0)
@@ -152,7 +154,7 @@ def test_isothermal_chambers_meet_where_both_share_their_gas_and_lose_none() -> 
 
 def test_gas_that_a_joint_carries_is_that_of_a_leak_of_its_size() -> None:
     """What the reference solver adds for a joint, with an energy balance, against its own leak."""
-    plant = plant_parameters(load_device("ppafo2011", "solenoid_recycling"))
+    plant = plant_parameters(load_device("ppafo2011", valve="solenoid_recycling"))
     thermal = ThermalParameters(heat_capacity_ratio=K, wall_exchange=0.0, temperature=298.0)
     shut = ExactOrifice(conductance=0.0, is_iso6358=0.0, number=K, linear_ratio=0.999)
     wide = shut._replace(conductance=plant.valve_conductance)
@@ -169,7 +171,9 @@ def test_gas_that_a_joint_carries_is_that_of_a_leak_of_its_size() -> None:
 
 def test_a_free_vane_with_joined_chambers_agrees_with_the_reference_solver() -> None:
     scenario = load_scenario("torque-task-solenoid", ("run.duration=0.9 s",))
-    device = load_device("ppafo2011", "solenoid_recycling", ("valve.joining_time=60 ms", "valve.holding_time=50 ms"))
+    device = load_device(
+        "ppafo2011", valve="solenoid_recycling", overrides=("valve.joining_time=60 ms", "valve.holding_time=50 ms")
+    )
     wish = ProfileChoice("sine", {"level": 0.0, "amplitude": 4.0, "frequency": 2.0, "phase": 0.0})
     free = load_scenario("step-response").motion
     scenario = dataclasses.replace(scenario, device=device, reference=wish, motion=free)

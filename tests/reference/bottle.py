@@ -298,7 +298,7 @@ def main(words: list[str]) -> None:
 
     for coupling in words or ["1 ms", "10 ms", "100 ms", "500 ms"]:
         changes = [f"bottle.coupling={coupling}", "bottle.fill=0.3", "bottle.temperature=280 K"]
-        found = walk("solenoid-regulators", 1.0, changes, bottle="paper-co2-9oz")
+        found = walk("solenoid-regulators", minutes=1.0, overrides=changes, bottle="paper-co2-9oz")
         gaps = differences(found, independent_run(found, float(found.recording.time[-1])))
         line = f"{coupling}: {found.supply.ending.time:.6g} s, "
         sys.stdout.write(line + ", ".join(f"{name} {gap:.3g}" for name, gap in gaps.items()) + "\n")

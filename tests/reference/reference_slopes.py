@@ -6,11 +6,13 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from ppafo.engine.continuous_time import free_motion, real_gas_rates
-from ppafo.engine.led_leg import torque_lines
-from ppafo.engine.loading import ARRAY, FLOAT, HEADER, INLINE, entry_text
-from ppafo.engine.program import NoParameters, Program, link_program
+from ppafo.engine.entries import ARRAY, FLOAT, HEADER, INLINE, entry_text
+from ppafo.engine.generator import StepText
+from ppafo.engine.linking import link_program
+from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, row_expression
 from ppafo.engine.source_text import SourceCollector, composed_lines
+from ppafo.engine.step.lane import NoParameters
 from ppafo.model.effects.kind import Moment
 from ppafo.model.leg import FootLoad
 from ppafo.model.orifice import ExactOrifice, exact_flow
@@ -70,7 +72,7 @@ def gas_rates(
     source_2 = admitted_flow(source_2, plant.relieving)
     vent_1 = exact_flow(pressure_1, plant.atmospheric_pressure, exhaust_path(openings.vent_1 * full), valve_orifice)
     vent_2 = exact_flow(pressure_2, plant.atmospheric_pressure, exhaust_path(openings.vent_2 * full), valve_orifice)
-    leak_conductance = leakage_path(leak_orifice.conductance, pressure_1, pressure_2)
+    leak_conductance = leakage_path(leak_orifice.conductance, pressure_1, pressure_2, plant.leak_curve)
     leak = exact_flow(pressure_1, pressure_2, leak_conductance, leak_orifice)
     return GasRates(
         mass_1=source_1 - vent_1 - leak,
@@ -115,7 +117,7 @@ def thermal_gas_rates(
     supply_1, supply_2 = admitted_flow(supply_1, plant.relieving), admitted_flow(supply_2, plant.relieving)
     outlet_1 = exact_flow(pressure_1, room, exhaust_path(openings.vent_1 * full), valve_orifice)
     outlet_2 = exact_flow(pressure_2, room, exhaust_path(openings.vent_2 * full), valve_orifice)
-    leak_conductance = leakage_path(leak_orifice.conductance, pressure_1, pressure_2)
+    leak_conductance = leakage_path(leak_orifice.conductance, pressure_1, pressure_2, plant.leak_curve)
     across = exact_flow(pressure_1, pressure_2, leak_conductance, leak_orifice)
     source_1 = transport(thermal, source_pressure_1, pressure_1, 1.0, warmth_1, supply_1)
     source_2 = transport(thermal, source_pressure_2, pressure_2, 1.0, warmth_2, supply_2)
@@ -195,7 +197,7 @@ def parameter_groups(program: Program) -> dict[str, type]:
     """Groups of numbers that the right-hand side needs, in order."""
     return {
         "plant": program.actuator.plant,
-        **program.gas.parameters,
+        **program.gas.PARAMETERS,
         "valve_orifice": ExactOrifice,
         "leak_orifice": ExactOrifice,
         "valve": program.valve.parameters,
@@ -223,7 +225,7 @@ def right_hand_side_source(program: Program) -> str:
         lines += ["angle = y[0]", "rate = y[1] if way != 0.0 else 0.0"]
     else:
         lines += [f"angle, rate, _ = {add(program.angle.value)}(path, t)"]
-    lines += [*state_lines(program, add), *slope_lines(program, add)]
+    lines += [*state_lines(program, add), *slope_lines(program, collector)]
     fill = entry_text(
         "fill", dict.fromkeys(ARRAYS, ARRAY) | dict.fromkeys(NUMBERS, FLOAT), composed_lines(lines, collector.needs)
     )
@@ -244,8 +246,18 @@ def state_lines(program: Program, add: Callable[..., str]) -> list[str]:
     return [f"{name} = {row_expression(row, name, cells, add)}" for name, row in rows.items()]
 
 
-def slope_lines(program: Program, add: Callable[..., str]) -> list[str]:
+def torque_of_leg(program: Program, collector: SourceCollector) -> str:
+    """Expression for the torque of a leg on the vane [N m]; the rows that it asks for are handed over later."""
+    if program.foot is None:
+        return "0.0"
+    composed = StepText(program, collector).phase(program.foot.torque)
+    own = {"time": "t", "angle": "y[0]"}
+    return f"{composed.name}({', '.join(own[name] for name in composed.effects.takes)})"
+
+
+def slope_lines(program: Program, collector: SourceCollector) -> list[str]:
     """Lines from parameters, ``angle``, ``rate`` and states at a time ``t`` to the ``slopes`` of the unknowns ``y``."""
+    add = collector.add
     lines = [
         f"openings = {add(program.valve.instant)}(valve, valve_state, command)",
         f"pressure_1, pressure_2 = {add(chamber_pressures)}(plant, angle, y[2], y[3])",
@@ -256,7 +268,7 @@ def slope_lines(program: Program, add: Callable[..., str]) -> list[str]:
     ]
     if program.angle is None:
         moved = f"{add(free_motion)}(plant, y[0], y[1], pressure_1, pressure_2, added, way)"
-        lines += [*torque_lines(program, add, "t", "y[0]"), f"slopes[0], slopes[1] = {moved}"]
+        lines += [f"added = {torque_of_leg(program, collector)}", f"slopes[0], slopes[1] = {moved}"]
     else:
         lines += ["slopes[0] = 0.0", "slopes[1] = 0.0"]
     lines += [f"valve_state_moves = {add(program.valve.rates)}(valve, valve_state, command)"]

@@ -19,10 +19,11 @@ from ppafo.engine.continuous_time import (
     roots_at_rest,
     roots_sliding,
 )
+from ppafo.engine.entries import with_arrays
 from ppafo.engine.lanes import BatchResult, run_batch, samples_in
 from ppafo.engine.led_leg import torque_of_leg
-from ppafo.engine.loading import load_source, with_arrays
-from ppafo.engine.program import python_place
+from ppafo.engine.linking import python_place
+from ppafo.engine.loading import load_source
 from ppafo.engine.rows import leaf_paths, numbers, rebuild
 from ppafo.engine.run import Run, batch_of, states_at_start
 from ppafo.engine.scheme.actuators import measurement_of

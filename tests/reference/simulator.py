@@ -10,7 +10,6 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ppafo.simulation.scenario import FreeMotion, Scenario
 
@@ -163,7 +162,6 @@ class Answer(NamedTuple):
     steps: int
 
 
-@njit(cache=True)
 def follow(path: Path, time: float) -> tuple[float, float]:
     """Value and rate of a profile."""
     if path.kind == SINE:
@@ -179,7 +177,6 @@ def follow(path: Path, time: float) -> tuple[float, float]:
     return path.a, 0.0
 
 
-@njit(cache=True)
 def bend(path: Path, time: float) -> float:
     """Second derivative of a profile without corners."""
     if path.kind == SINE:
@@ -188,7 +185,6 @@ def bend(path: Path, time: float) -> float:
     return 0.0
 
 
-@njit(cache=True)
 def flow_function(ratio: float, hole: Restriction) -> float:
     """Flow over choked flow, equations (6) and (7) as printed, or ISO 6358."""
     if ratio <= hole.critical:
@@ -202,7 +198,6 @@ def flow_function(ratio: float, hole: Restriction) -> float:
     return subsonic / choked
 
 
-@njit(cache=True)
 def flow(up: float, down: float, warmth: float, hole: Restriction, linear: float) -> float:
     """Mass flow [kg/s], ``up`` not below ``down``; ``warmth`` is the temperature upstream over that of the device."""
     ratio = down / up
@@ -212,7 +207,6 @@ def flow(up: float, down: float, warmth: float, hole: Restriction, linear: float
     return hole.conductance * up * value / math.sqrt(warmth)
 
 
-@njit(cache=True)
 def place_of(rig: Rig, time: float, y: Any) -> tuple[float, float]:
     """Angle and angular velocity of the vane."""
     if rig.led > 0.0:
@@ -220,7 +214,6 @@ def place_of(rig: Rig, time: float, y: Any) -> tuple[float, float]:
     return y[ANGLE], y[VELOCITY]
 
 
-@njit(cache=True)
 def gas_of(rig: Rig, angle: float, y: Any) -> tuple[float, float, float, float]:
     """Both pressures [Pa] and both temperatures over that of the device."""
     volume_1 = rig.dead_1 + rig.displacement_per_radian * (angle - rig.lowest)
@@ -238,7 +231,6 @@ def gas_of(rig: Rig, angle: float, y: Any) -> tuple[float, float, float, float]:
     )
 
 
-@njit(cache=True)
 def exchange(rig: Rig, inside: float, warmth: float, outside: float, share: float, oneway: bool) -> tuple[float, float]:
     """Flow into a chamber through a share of the valve's area [kg/s]; the same times its warmth."""
     if share <= 0.0:
@@ -252,7 +244,6 @@ def exchange(rig: Rig, inside: float, warmth: float, outside: float, share: floa
     return -leaving, -leaving * warmth
 
 
-@njit(cache=True)
 def shares_of(rig: Rig, y: Any, coils: Any) -> tuple[float, float, float, float]:
     """Shares of the area: source to chamber 1, chamber 1 to the room, source to chamber 2, chamber 2 to the room."""
     if rig.valve.solenoid > 0.0:
@@ -262,28 +253,26 @@ def shares_of(rig: Rig, y: Any, coils: Any) -> tuple[float, float, float, float]
     return towards_1, towards_2, towards_2, towards_1
 
 
-@njit(cache=True)
 def turning_inertia(rig: Rig) -> float:
     """What turns about the ankle [kg m^2]."""
     return rig.inertia + rig.leg.inertia
 
 
-@njit(cache=True)
 def stride(leg: Leg, curve: int, time: float) -> tuple[float, float, float]:
     """Value, rate and second derivative of a curve of the gait."""
     turn, terms = 2.0 * math.pi, leg.curves.shape[1] // 2
-    value, rate, second = leg.curves[curve, 0], 0.0, 0.0
+    terms_of = leg.curves[curve].tolist()
+    value, rate, second = terms_of[0], 0.0, 0.0
     for number in range(1, terms + 1):
         pace = turn * number * leg.frequency
         place = turn * number * (leg.start + leg.frequency * time)
-        along, across = leg.curves[curve, number], leg.curves[curve, terms + number]
+        along, across = terms_of[number], terms_of[terms + number]
         value += along * math.cos(place) + across * math.sin(place)
         rate += pace * (across * math.cos(place) - along * math.sin(place))
         second -= pace * pace * (along * math.cos(place) + across * math.sin(place))
     return value, rate, second
 
 
-@njit(cache=True)
 def torque_on_foot(rig: Rig, time: float, angle: float) -> float:
     """What shank and weight do to the body that turns about the ankle [N m], plantarflexion positive.
 
@@ -306,7 +295,6 @@ def torque_on_foot(rig: Rig, time: float, angle: float) -> float:
     return turning_inertia(rig) * shank_bend + falls
 
 
-@njit(cache=True)
 def net_torque(rig: Rig, time: float, angle: float, pressure_1: float, pressure_2: float) -> float:
     """What drives the vane before friction and damping [N m], equations (1) and (11)."""
     actuator = rig.torque_constant * (pressure_1 - pressure_2)
@@ -316,12 +304,12 @@ def net_torque(rig: Rig, time: float, angle: float, pressure_1: float, pressure_
     return actuator - gravity - rig.external
 
 
-@njit(cache=True)
-def rates(rig: Rig, time: float, y: Any, way: float, coils: Any, target: float, slope: Any) -> None:
+def rates(rig: Rig, time: float, state: Any, way: float, coils: Any, target: float, slopes: Any) -> None:
     """Time derivatives of all unknowns, equations (1) to (10)."""
+    # Python's own numbers are quicker than an array's elements.
+    y, slope = state.tolist(), [0.0] * state.size
     angle, velocity = place_of(rig, time, y)
     pressure_1, pressure_2, warmth_1, warmth_2 = gas_of(rig, angle, y)
-    slope[:] = 0.0
     if abs(way) == 1.0:
         torque = net_torque(rig, time, angle, pressure_1, pressure_2) - rig.viscous * velocity - way * rig.dynamic
         slope[ANGLE] = velocity
@@ -359,30 +347,19 @@ def rates(rig: Rig, time: float, y: Any, way: float, coils: Any, target: float, 
             slope[SPOOL] = y[SPOOL_RATE]
             slope[SPOOL_RATE] = natural * natural * (y[ASKED] - y[SPOOL])
             slope[SPOOL_RATE] -= 2.0 * rig.valve.damping * natural * y[SPOOL_RATE]
+    slopes[:] = slope
 
 
-@njit(cache=True)
 def trial(
     rig: Rig, time: float, h: float, y: Any, way: float, coils: Any, target: float, work: Any, sizes: Any
 ) -> float:
     """Error of one step over what is allowed at a tolerance of 1; the result is in the last row of ``work``."""
-    worst = 0.0
     for stage in range(7):
-        for n in range(y.size):
-            total = 0.0
-            for earlier in range(stage):
-                total += WEIGHTS[stage, earlier] * work[earlier, n]
-            work[7, n] = y[n] + h * total
+        work[7] = y + h * (WEIGHTS[stage, :stage] @ work[:stage])
         rates(rig, time + TIMES[stage] * h, work[7], way, coils, target, work[stage])
-    for n in range(y.size):
-        error = 0.0
-        for stage in range(7):
-            error += ERRORS[stage] * work[stage, n]
-        worst = max(worst, abs(h * error) / sizes[n])
-    return worst
+    return float(np.max(np.abs(h * (ERRORS @ work[:7])) / sizes))
 
 
-@njit(cache=True)
 def leaves(rig: Rig, time: float, y: Any) -> float:
     """1 or -1 where a vane at rest begins to move that way, else 0: friction or a stop holds it, equation (10)."""
     pressure_1, pressure_2, _, _ = gas_of(rig, y[ANGLE], y)
@@ -394,7 +371,6 @@ def leaves(rig: Rig, time: float, y: Any) -> float:
     return 0.0
 
 
-@njit(cache=True)
 def happened(rig: Rig, time: float, y: Any, way: float) -> bool:
     """True where a step has gone past a breakaway, a reversal or a stop."""
     if way == LED:
@@ -405,7 +381,6 @@ def happened(rig: Rig, time: float, y: Any, way: float) -> bool:
     return beyond or y[VELOCITY] * way <= 0.0
 
 
-@njit(cache=True)
 def what_follows(rig: Rig, time: float, y: Any, way: float) -> tuple[float, bool]:
     """The way from here on, with the state changed, and whether this was an impact."""
     impact = False
@@ -424,13 +399,11 @@ def what_follows(rig: Rig, time: float, y: Any, way: float) -> tuple[float, bool
     return leaves(rig, time, y), impact
 
 
-@njit(cache=True)
 def rounded(value: float, resolution: float) -> float:
     """The nearest whole number of quanta, a half away from 0."""
     return math.copysign(math.floor(abs(value) / resolution + 0.5) * resolution, value) if resolution > 0.0 else value
 
 
-@njit(cache=True)
 def decide(rig: Rig, time: float, seen: Any, memory: Any) -> float:
     """Command of one sample; ``memory`` has integral, last error, filtered slope and a mark of the first sample."""
     law = rig.law
@@ -452,14 +425,12 @@ def decide(rig: Rig, time: float, seen: Any, memory: Any) -> float:
     return command
 
 
-@njit(cache=True)
 def opening_asked(valve: Valve, command: float) -> float:
     """Opening that a command asks of a spool: nothing inside the dead band, all at full command."""
     size = max(abs(command) - valve.dead_band, 0.0) / (1.0 - valve.dead_band)
     return math.copysign(min(size, 1.0), command)
 
 
-@njit(cache=True)
 def settle_coils(valve: Valve, coils: Any, command: float, time: float) -> float:
     """Let both coils do what is due; when one acts next. A coil: position, order, when taken, when followed."""
     soonest = NEVER
@@ -481,7 +452,6 @@ def settle_coils(valve: Valve, coils: Any, command: float, time: float) -> float
     return soonest
 
 
-@njit(cache=True)
 def corner_after(path: Path, time: float) -> float:
     """The next corner of a profile."""
     if path.kind == RAMP_HOLD:
@@ -491,7 +461,6 @@ def corner_after(path: Path, time: float) -> float:
     return NEVER
 
 
-@njit(cache=True)
 def advance(
     rig: Rig,
     time: float,
@@ -550,7 +519,6 @@ def advance(
     return way, h
 
 
-@njit(cache=True)
 def settle_loop(rig: Rig, time: float, y: Any, due: Any, seen: Any, commands: Any, memory: Any) -> float:
     """Measure, decide and pass on what is due; the command that the valve has now, none before the first."""
     law = rig.law
@@ -567,7 +535,6 @@ def settle_loop(rig: Rig, time: float, y: Any, due: Any, seen: Any, commands: An
     return commands[due[ARRIVED] - 1] if due[ARRIVED] > 0 else 0.0
 
 
-@njit(cache=True)
 def settle_valve(valve: Valve, y: Any, coils: Any, command: float, time: float) -> tuple[float, float]:
     """Where the spool is asked to go, and the next time at which the valve does something abrupt by itself."""
     if valve.solenoid > 0.0:
@@ -580,7 +547,6 @@ def settle_valve(valve: Valve, y: Any, coils: Any, command: float, time: float) 
     return target, NEVER
 
 
-@njit(cache=True)
 def next_known(rig: Rig, time: float, due: Any, samples: int, record: float) -> float:
     """The next instant known ahead: a record, a measurement, a decision, a late command, a corner of the path."""
     law = rig.law
@@ -594,7 +560,6 @@ def next_known(rig: Rig, time: float, due: Any, samples: int, record: float) -> 
     return soonest
 
 
-@njit(cache=True)
 def first_way(rig: Rig, y: Any) -> float:
     """The way of the vane at the start; one that is thrown at the stop it stands on rebounds at once."""
     if rig.led > 0.0:
@@ -605,7 +570,6 @@ def first_way(rig: Rig, y: Any) -> float:
     return what_follows(rig, 0.0, y, way)[0] if happened(rig, 0.0, y, way) else way
 
 
-@njit(cache=True)
 def solve(rig: Rig, y: Any, interval: float, records: Any, impacts: Any, tolerance: float) -> Any:
     """Fill the records, a row every ``interval`` [s]; steps, impacts and events counted."""
     counts, due = np.zeros(3, np.int64), np.zeros(3, np.int64)

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ppafo.analyses.identify.solve import identify
-from ppafo.analyses.validate.solve import validate
+from ppafo.analyses.identify.question import identify
+from ppafo.analyses.validate.question import validate
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.storage import write_csv

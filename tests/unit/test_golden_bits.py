@@ -12,8 +12,10 @@ from ppafo.golden_bits import digest, golden_hashes, names, plain_batch
 from ppafo.simulation.loading import list_scenarios
 from ppafo.walking import list_walks
 from scripts import bits, golden_bits
+from tests.compilers_here import compilers_here
 
 needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
+needs_zig = pytest.mark.skipif("zig" not in compilers_here(), reason="no zig on this machine")
 CHEAP = "torque-task-proportional"
 
 
@@ -32,8 +34,8 @@ def test_every_scenario_and_walk_has_golden_hashes() -> None:
         pytest.param("gcc", "off", marks=needs_gcc),
         ("", "solenoid"),
         ("", "proportional"),
-        pytest.param("numba", CHEAP, marks=pytest.mark.long),
-        pytest.param("numba", "off", marks=pytest.mark.long),
+        pytest.param("zig", CHEAP, marks=[pytest.mark.long, needs_zig]),
+        pytest.param("zig", "off", marks=[pytest.mark.long, needs_zig]),
     ],
 )
 def test_the_golden_bits_are_found_on_this_computer(backend: str, name: str, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,13 +1,13 @@
 """``print(result)`` is what the command prints, and the short form is one line; neither prints an array."""
 
-from inspect import isfunction
 from pathlib import Path
 
 import pytest
 
 import ppafo
+from ppafo.cli.command_line import Group
+from ppafo.cli.commands import COMMANDS
 from ppafo.cli.main import main
-from ppafo.cli.verbs import analyses, bench, walking
 
 FEWEST_ANALYSES = 14
 
@@ -29,9 +29,15 @@ def test_a_printed_answer_is_what_its_command_prints(capsys: pytest.CaptureFixtu
 
 
 def test_every_analysis_returns_a_finding_which_prints_saves_and_draws_itself() -> None:
-    verbs = [one for module in (analyses, bench, walking) for one in vars(module).values() if isfunction(one)]
-    own = [one for one in verbs if one.__module__.startswith("ppafo.cli.verbs.")]
-    returned = {one.__name__: one.__annotations__["return"] for one in own}
+    commands = [
+        each for one in COMMANDS.values() for each in (one.actions.values() if isinstance(one, Group) else [one])
+    ]
+    own = [command.function() for command in commands]
+    words = ((one.__name__, one.__annotations__["return"]) for one in own)
+    returned = {
+        name: result if isinstance(result, str) else str(result) if "[" in str(result) else result.__name__
+        for name, result in words
+    }
     found = {name for name, words in returned.items() if all("Finding[" in part for part in words.split(" | "))}
     assert len(found) >= FEWEST_ANALYSES
     others = {name: words for name, words in returned.items() if name not in found}

@@ -17,9 +17,11 @@ from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn, final
 
+from ppafo.arguments import Word, number, whole_number
+from ppafo.arguments.door import without_names
+from ppafo.arguments.values import Names, evaluated
 from ppafo.cli import output
-from ppafo.cli.arguments import Word, number, whole_number
-from ppafo.errors import PpafoError, nearest_name
+from ppafo.errors import ArgumentError, PpafoError, nearest_name
 from ppafo.kinds import kind_at
 from ppafo.plugins import name_modules_in, name_plugins
 
@@ -43,7 +45,8 @@ class Command:
     ``library`` is the ``TomlKind`` of the files that come with the package (``module:NAME``), for ``--list``, and
     ``listing`` what returns the entries of that list (``module:function``), by default the words of the files;
     ``listed`` is what these are called. ``default_folder`` takes the values of the parameters by name and returns where
-    the result is written unless ``--out`` says so; without it nothing is.
+    the result is written unless ``--out`` says so; without it nothing is. ``first_line`` is the first line of its
+    docstring, where loading the verb takes too long for a list of commands.
     """
 
     verb: str
@@ -51,6 +54,7 @@ class Command:
     listing: str = ""
     listed: str = ""
     default_folder: str = ""
+    first_line: str = ""
     found: Callable[..., Any] | None = None
     """The verb itself, of another package, in place of where it is."""
 
@@ -62,7 +66,7 @@ class Command:
     @property
     def summary(self) -> str:
         """The first line of the docstring of the verb, as an entry of a list has it."""
-        first = (self.function().__doc__ or "").strip().partition("\n")[0].rstrip(".")
+        first = (self.first_line or (self.function().__doc__ or "").strip().partition("\n")[0]).rstrip(".")
         return first[:1].lower() + first[1:]
 
     @property
@@ -140,12 +144,23 @@ def reading_of(annotation: Any) -> Reading:
 
 def parameters_of(verb: Callable[..., Any]) -> Iterator[tuple[inspect.Parameter, Reading]]:
     """Return each parameter that words of the line fill, with how its text is read."""
-    names = vars(sys.modules[verb.__module__])
+    names = Names(vars(sys.modules[verb.__module__]))
     for parameter in inspect.signature(verb).parameters.values():
         if parameter.name not in (PROGRESS, PLUGINS):
-            annotation = parameter.annotation
             # The texts of annotations are evaluated for the command that runs, and for no other.
-            yield parameter, reading_of(eval(annotation, names) if isinstance(annotation, str) else annotation)
+            yield parameter, reading_of(evaluated(parameter.annotation, names))
+
+
+def argparse_reader(read: Callable[[str], Any]) -> Callable[[str], Any]:
+    """Return what reads a text for argparse, which prints the message of no error but its own."""
+
+    def reader(text: str) -> Any:
+        try:
+            return read(text)
+        except ArgumentError as error:
+            raise argparse.ArgumentTypeError(str(error)) from error
+
+    return reader
 
 
 def option_of(parameter: inspect.Parameter, reading: Reading) -> str:
@@ -210,7 +225,7 @@ def _add_parameter(
                 word.off, action="store_false", dest=parameter.name, default=default, help=word.help.replace("%", "%%")
             )
         return
-    options |= {"metavar": word.metavar, "type": word.read, "choices": reading.choices}
+    options |= {"metavar": word.metavar, "type": argparse_reader(word.read), "choices": reading.choices}
     if not option:
         if reading.is_repeated:
             options["nargs"] = "+" if is_required and not is_listing else "*"
@@ -246,10 +261,11 @@ def run(parsed: argparse.Namespace, name: str, command: Command) -> int:
     if OUT not in parameters:
         folder = parsed.out
         if folder is None and command.default_folder:
-            folder = kind_at(command.default_folder)(values)
+            with without_names():
+                folder = kind_at(command.default_folder)(values)
         # Before the verb runs: a folder that is refused must not cost a long run.
         output.check_output(folder, name)
-    with output.progress_line() as progress:
+    with output.progress_line() as progress, without_names():
         found = verb(**values, **({PROGRESS: progress} if PROGRESS in parameters else {}))
     return output.deliver(found, parsed.json, folder, name, has_written=OUT in parameters)
 

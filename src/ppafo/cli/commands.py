@@ -11,21 +11,22 @@ from ppafo.errors import nearest_name
 from ppafo.kinds import Kinds, is_installed, package_of
 from ppafo.plugins import name_modules_in
 
-_ANALYSES, _BENCH, _DEVICE = "ppafo.cli.verbs.analyses", "ppafo.cli.verbs.bench", "ppafo.cli.verbs.device"
+_ANALYSES, _BENCH, _DEVICE = "ppafo.analyses", "ppafo.cli.verbs.bench", "ppafo.cli.verbs.device"
 _TOOLS, _WALKING = "ppafo.cli.verbs.tools", "ppafo.cli.verbs.walking"
 _SETS, _GAITS = f"{_DEVICE}:sets_list", f"{_WALKING}:gait_list"
 _STUDIES = "ppafo.studies.loading:STUDY_FILES", "ppafo.analyses.sweep.solve:studies_of_the_package"
 
 
-def _of_scenario(verb: str) -> Command:
+def _of_scenario(verb: str, first_line: str = "") -> Command:
     """Return a command that takes scenarios and walks by name."""
-    return Command(verb, listing="ppafo.cli.simulate:list_descriptions", listed="scenario")
+    return Command(verb, listing="ppafo.cli.simulate:list_descriptions", listed="scenario", first_line=first_line)
 
 
 _EVERY: dict[str, dict[str, Command | Group]] = {
     "the paper": {
         "reproduce": Command(
-            f"{_ANALYSES}:reproduce",
+            f"{_ANALYSES}.reproduce.question:reproduce",
+            first_line="Reproduce the paper's experiments and check its claims.",
             library="ppafo.analyses.reproduce.publication:FILE",
             listing="ppafo.analyses.reproduce.publication:list_studies",
         ),
@@ -40,7 +41,7 @@ _EVERY: dict[str, dict[str, Command | Group]] = {
                 "list": Command(f"{_DEVICE}:sets_list"),
                 "show": Command(f"{_DEVICE}:sets_show", listing=_SETS),
                 "audit": Command(f"{_DEVICE}:sets_audit", listing=_SETS),
-                "parts": Command(f"{_DEVICE}:sets_parts"),
+                "parts": Command(f"{_ANALYSES}.parts.solve:parts"),
             },
         ),
     },
@@ -52,19 +53,50 @@ _EVERY: dict[str, dict[str, Command | Group]] = {
                 "record": Command(f"{_BENCH}:rig_record"),
             },
         ),
-        "identify": Command(f"{_BENCH}:identify"),
-        "validate": Command(f"{_BENCH}:validate", listing=_SETS),
+        "identify": Command(
+            f"{_ANALYSES}.identify.question:identify",
+            first_line="Identify a parameter set, with uncertainty, from bench recordings.",
+        ),
+        "validate": Command(
+            f"{_ANALYSES}.validate.question:validate",
+            listing=_SETS,
+            first_line="Compare a parameter set with recordings, channel by channel.",
+        ),
     },
     "decide": {
-        "sweep": Command(f"{_ANALYSES}:sweep", *_STUDIES),
-        "compare": _of_scenario(f"{_ANALYSES}:compare"),
-        "sensitivity": Command(f"{_ANALYSES}:sensitivity", *_STUDIES),
-        "find": _of_scenario(f"{_ANALYSES}:find"),
-        "tune": Command(f"{_ANALYSES}:tune", library="ppafo.analyses.tune.problem:TUNING"),
-        "linearise": _of_scenario(f"{_ANALYSES}:linearise"),
-        "design": Command(f"{_ANALYSES}:design", library="ppafo.analyses.design.loading:FILE"),
+        "sweep": Command(
+            f"{_ANALYSES}.sweep.question:sweep_into_folder",
+            *_STUDIES,
+            first_line="Run a study: many runs, one row each, resumable; or a statistic to a wanted precision.",
+        ),
+        "compare": _of_scenario(
+            f"{_ANALYSES}.compare.question:compare", "Compare configurations, also over an uncertain device."
+        ),
+        "sensitivity": Command(
+            f"{_ANALYSES}.sensitivity.question:sensitivity",
+            *_STUDIES,
+            first_line="Rank uncertain values by their influence: Sobol or Shapley indices, signed changes.",
+        ),
+        "find": _of_scenario(
+            f"{_ANALYSES}.find.question:find", "Find the lowest or highest value that meets a condition on a metric."
+        ),
+        "tune": Command(
+            f"{_ANALYSES}.tune.question:tune",
+            first_line="Tune gains for an objective under constraints, optionally robust.",
+            library="ppafo.analyses.tune.problem:TUNING",
+        ),
+        "linearise": _of_scenario(
+            f"{_ANALYSES}.linearise.question:linearise",
+            "Make a linear model of the plant near one point, for control design.",
+        ),
+        "design": Command(
+            f"{_ANALYSES}.design.question:design",
+            first_line="Find a device: for a wearer, for a torque profile, or Pareto-optimal in error, gas and mass.",
+            library="ppafo.analyses.design.loading:FILE",
+        ),
         "bottle": Command(
-            f"{_ANALYSES}:bottle",
+            f"{_ANALYSES}.endurance.question:bottle",
+            first_line="Compute how long a bottle of gas lasts, and why it ends.",
             listing="ppafo.parameters.bottles.bottle:described_bottles",
             listed="bottle",
         ),
@@ -80,7 +112,8 @@ _EVERY: dict[str, dict[str, Command | Group]] = {
             },
         ),
         "walk": Command(
-            f"{_WALKING}:walk",
+            f"{_ANALYSES}.walk.question:walk_with_and_without",
+            first_line="Simulate walking with the device, without it, and healthy.",
             library="ppafo.walking.loading:FILE",
             listing="ppafo.analyses.walk.answer:list_files",
             default_folder="ppafo.analyses.walk.answer:default_folder",

@@ -5,7 +5,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from ppafo.cli.arguments import Name
+from ppafo.arguments import Name
 from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, Said
 from ppafo.documents.json_text import json_text
 from ppafo.errors import DataError, SimulationError, nearest_name
@@ -51,6 +51,7 @@ def doctor(
     warm: bool = False,
     clear: bool = False,
     bits: bool = False,
+    programs: bool = False,
     schema: Name | None = None,
 ) -> Said:
     """Show compilers and compiled models of this computer, check its bits; print the schema of a file.
@@ -59,12 +60,13 @@ def doctor(
 
     warm: compile the models of the scenarios of the package
     clear: remove all compiled models, and try each compiler again
+    programs: list the compiled models one by one, with their sizes and when each was last used
     bits: run each scenario and walk of the package for a moment, and compare every bit with those it has elsewhere
     schema: print the JSON Schema of a file format instead, such as scenario
     """
     from ppafo.engine import cache
 
-    asked = {"--warm": warm, "--clear": clear, "--bits": bits, "--schema": schema}
+    asked = {"--warm": warm, "--clear": clear, "--bits": bits, "--schema": schema, "--programs": programs}
     given = [option for option, value in asked.items() if value]
     # Two of them contradict each other, or are two answers.
     if len(given) > 1:
@@ -84,7 +86,7 @@ def doctor(
 
         compile_models(load_scenario(name) for name in list_scenarios())
     document = models_document(folder, why_not) | ({"freed": cleared} if clear else {})
-    return Said(models_text(document), document, "doctor")
+    return Said(models_text(document, programs), document, "doctor")
 
 
 def _bits() -> Said:
@@ -128,8 +130,8 @@ def models_document(folder: Path | None, why_not: str) -> dict[str, Any]:
     }
 
 
-def models_text(document: dict[str, Any]) -> str:
-    """Return ``models_document`` in words."""
+def models_text(document: dict[str, Any], one_by_one: bool) -> str:
+    """Return ``models_document`` in words, the programs as their number or ``one_by_one``."""
     lines = [f"compilers: {', '.join(document['compilers'])}", f"folder: {document['folder'] or 'none'}"]
     if document["not_used"]:
         lines.append(f"not used: {document['not_used']}")
@@ -138,7 +140,7 @@ def models_text(document: dict[str, Any]) -> str:
     lines.append(f"programs: {len(document['programs'])}, {_megabytes(document['size'])}")
     if document["made_from_programs"]:
         lines.append(f"texts of programs and their forms for pages: {_megabytes(document['made_from_programs'])}")
-    for item in document["programs"]:
+    for item in document["programs"] if one_by_one else ():
         days = item["unused_days"]
         # One day or several by the number as it is shown, which is rounded.
         ago = "today" if days < 1.0 else f"{days:.0f} day{'' if int(days + 0.5) == 1 else 's'} ago"

@@ -1,7 +1,7 @@
 """``ppafo export figure DIR``: draws what a folder of results holds again, without running anything again."""
 
+from ppafo.arguments import File, Folder
 from ppafo.cli import output
-from ppafo.cli.arguments import File, Folder
 from ppafo.cli.output import Said
 from ppafo.errors import DataError
 

@@ -4,8 +4,8 @@ import sys
 from pathlib import Path
 from typing import Annotated
 
+from ppafo.arguments import Count, Folder, Overrides, Patience, Port, Scenario, Word, counting_number
 from ppafo.cli import output
-from ppafo.cli.arguments import Count, Folder, Overrides, Patience, Port, Scenario, Word, counting_number
 from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_INTERRUPTED, Said
 from ppafo.errors import ScenarioError
 

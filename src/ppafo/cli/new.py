@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from ppafo.cli.arguments import File, Name, Word
+from ppafo.arguments import File, Name, Word
 from ppafo.cli.output import Said
 from ppafo.errors import DataError, nearest_name, one_line
 from ppafo.kinds import kind_at

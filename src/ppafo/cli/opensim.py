@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Literal
 
+from ppafo.arguments import Folder, Gait, Mass, Minutes, Overrides, Word, times
 from ppafo.cli import output
-from ppafo.cli.arguments import Folder, Gait, Mass, Minutes, Overrides, Word, times
 from ppafo.cli.output import Said
 from ppafo.errors import DataError
 
@@ -54,7 +54,7 @@ def export_opensim(
     return output.export(
         out,
         COMMAND,
-        lambda: files_of_walk(walk, overrides, gait, minutes, side, strikes),
+        lambda: files_of_walk(walk, tuple(overrides), gait, minutes, side, strikes),
         lambda _: _next(out, "device_torque.sto"),
     )
 

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ppafo.arguments import Folder, Overrides, Scenario
 from ppafo.cli import output
-from ppafo.cli.arguments import Folder, Overrides, Scenario
 from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, Said
 from ppafo.documents.json_text import json_text
 

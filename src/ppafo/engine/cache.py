@@ -134,7 +134,7 @@ def load_generated(source: str, compiler: Compiler) -> ModuleType:
         return sys.modules[wanted.name] if wanted.name in sys.modules else _import_program(wanted)
 
 
-def load_all(sources: Iterable[str], compiler: Compiler, load: Callable[[str], ModuleType]) -> None:
+def load_all(sources: Iterable[str], compiler: Compiler, load: Callable[[str], object]) -> None:
     """Import the modules with these sources by ``load``; several that ``compiler`` must make are made side by side."""
     missing = [source for source in dict.fromkeys(sources) if not is_kept(source, compiler)]
     # One alone is compiled where it is needed, with its own message.
@@ -293,7 +293,7 @@ def _is_whole(kept: Path) -> bool:
     """Return whether a program's folder is as it was written, file by file."""
     try:
         stated = json.loads(read_regular_file(kept / _CHECKSUMS))
-        # What else lies there is no part of it: Numba tries, for an instant, whether it could write a file of its own.
+        # What else lies there is no part of it.
         files = stated.items() if isinstance(stated, dict) else ()
         return _is_own(kept, [name for name, _ in files]) and all(
             hashlib.sha256(read_regular_file(kept / name)).hexdigest() == given for name, given in files

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from types import ModuleType
 from typing import Protocol
 
-from ppafo.errors import SimulationError
+from ppafo.errors import ProgramError, SimulationError
 
 FLAGS = ("-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-fwrapv")
 """Flags of gcc and clang: strict arithmetic; without the third last gcc is up to 20 times slower."""
@@ -25,10 +25,15 @@ class CompilerError(SimulationError):
         self.names, self.passing = names, passing
 
 
+class UntranslatableError(ProgramError):
+    """A law has no form in the language of the compiler, and is none the worse for it: Python can run it."""
+
+
 class Compiler(Protocol):
     """Makes a module that does what the composed text says; both ways fill ``module``.
 
-    They raise ProgramError where the text cannot be compiled, and CompilerError where the compiler does not work.
+    They raise ProgramError for a mistake in the text, UntranslatableError where it has no form in the language of the
+    compiler, and CompilerError where the compiler does not work.
     ``path`` is where the text lies, alone in its folder, or no absolute path where nothing is kept.
     """
 

@@ -6,7 +6,7 @@ A vane that sticks, slides or stands at a stop is in modes, which root functions
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from ppafo.engine.program import python_place
+from ppafo.engine.linking import python_place
 from ppafo.engine.run import Run
 from ppafo.engine.scheme.real_gas import content_rate
 from ppafo.model.plant import (

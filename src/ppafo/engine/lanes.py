@@ -6,6 +6,7 @@ any parameter that changed meanwhile, goes on its own between two changes, so th
 costs only a few calls.
 """
 
+import logging
 import math
 import os
 import threading
@@ -13,24 +14,31 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from types import ModuleType
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ppafo import interrupts
 from ppafo.control.kind import ProfileKind
-from ppafo.engine.cache import kept_bytes, load_all
+from ppafo.engine.cache import load_all
+from ppafo.engine.entries import INLINE
 from ppafo.engine.lane_rows import VECTOR, lanes_of
-from ppafo.engine.lane_source import INLINE, SAME_MOMENT, write_lanes
-from ppafo.engine.loading import chosen_compiler, load_source
-from ppafo.engine.outline import Outline
+from ppafo.engine.lane_source import write_lanes
+from ppafo.engine.loading import HOW_TO_INSTALL, compiled, compilers_to_try, runs_by_python
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, rebuilt, row_numbers
 from ppafo.engine.source_text import SourceCollector
+from ppafo.engine.step.lane import SAME_MOMENT
+from ppafo.progress import time_text
 from ppafo.signals.meter import MeterKind
 
+logger = logging.getLogger("ppafo")
+
 Floats = NDArray[np.float64]
+
+PYTHON_STEP, LONGEST_UNSAID = 2.0e-4, 120.0
+"""Time [s] that Python takes for a step, and for which nobody has to be prepared."""
 
 STEPS_PER_CALL = 10_000
 """Steps in one call of compiled code: some hundredths of a second, seconds where each step takes hundreds of parts."""
@@ -89,38 +97,50 @@ class BatchResult:
     record: Floats
 
 
-def load_program(program: Program) -> ModuleType:
-    """The compiled module of a program, from the disk cache where it is there.
+class Advancing(Protocol):
+    """A program that can be run: compiled, or by Python itself."""
+
+    @property
+    def advance(self) -> Callable[..., None]:
+        """Take a block of lanes some steps further."""
+
+
+def load_program(program: Program) -> Advancing:
+    """The compiled module of a program, from the disk cache where it is there; or the program as Python runs it.
 
     A program is written anew where a number or function that it was made from stands for something else by now.
     """
-    return load_source(_current_source(program))
+    module: Any = None if runs_by_python() else compiled(_current_source(program))
+    if module is not None:
+        return module  # type: ignore[no-any-return]
+    from ppafo.engine.interpreter import PythonProgram  # most computers have a compiler
+
+    return PythonProgram(program)
 
 
 def load_programs(programs: Iterable[Program]) -> None:
     """Load the compiled modules of programs that are all needed, so that what is compiled can be counted."""
     chosen = dict.fromkeys(programs)
-    if len(chosen) > 1:
-        load_all([_current_source(program) for program in chosen], chosen_compiler(), load_source)
+    compilers = compilers_to_try()
+    if len(chosen) > 1 and compilers:
+        load_all([_current_source(program) for program in chosen], compilers[0], compiled)
 
 
 def _current_source(program: Program) -> str:
     """The source of a program, written anew where it is out of date."""
-    outline, source = write_source(program)
+    collector, source = write_source(program)
     # The kept text may rest on a function that a notebook has defined anew since.
-    if outline.made_from.is_current():
+    if collector.made_from.is_current():
         return source
     write_source.cache_clear()
     return write_source(program)[1]
 
 
 @lru_cache(maxsize=64)
-def write_source(program: Program, lanes: int = 0) -> tuple[Outline, str]:
+def write_source(program: Program, lanes: int = 0) -> tuple[SourceCollector, str]:
     """What a program is made from, and its source for some lanes, 0 for as many as fit; written once, then kept."""
-    outline = Outline(INLINE)
-    made_from = write_lanes(program, outline, lanes)
-    source = kept_bytes("lanes", made_from, lambda: write_lanes(program, SourceCollector(INLINE), lanes).encode())
-    return outline, source.decode()
+    collector = SourceCollector(INLINE)
+    return collector, write_lanes(program, collector, lanes)
 
 
 def run_batch(batch: Batch, threads: int | None = None) -> BatchResult:
@@ -141,6 +161,9 @@ def run_blocks(batch: Batch, take: Callable[[slice, BatchResult], None], threads
     lanes = lanes_of(batch.program)
     starts = range(0, runs, lanes)
     workers = 1 if len(starts) == 1 else min(len(starts), threads or os.cpu_count() or 1)
+    if not isinstance(module, ModuleType):
+        workers = 1  # threads of Python take turns
+        _say_how_long(runs * batch.clock.step_count)
 
     # One iterator for all threads: a range iterator hands each start to one of them.
     waiting = iter(starts)
@@ -175,6 +198,17 @@ def run_blocks(batch: Batch, take: Callable[[slice, BatchResult], None], threads
             stop.set()
 
 
+def _say_how_long(steps: int) -> None:
+    """Say before it begins that Python takes minutes for so many steps."""
+    seconds = steps * PYTHON_STEP
+    if seconds > LONGEST_UNSAID:
+        logger.warning(
+            "ppafo: Python runs these models, which takes about %s; compiled it takes seconds: %s",
+            time_text(seconds),
+            HOW_TO_INSTALL,
+        )
+
+
 def join_results(results: Sequence[BatchResult]) -> BatchResult:
     """Return the results of neighbouring blocks as one."""
     if len(results) == 1:
@@ -186,7 +220,7 @@ def join_results(results: Sequence[BatchResult]) -> BatchResult:
 class LaneBlock:
     """One block of runs in progress; ``states`` (rows, runs) may be read and written between two ``advance``."""
 
-    def __init__(self, module: ModuleType, program: Program, clock: Clock, parameters: Floats, states: Floats) -> None:
+    def __init__(self, module: Advancing, program: Program, clock: Clock, parameters: Floats, states: Floats) -> None:
         self._module = module
         self._clock = clock
         self._width = states.shape[1]

@@ -4,18 +4,16 @@ Foot, foot plate and vane turn as one body, whose inertia the plant has; what sh
 here. A walk's free foot has the same physics with more around it (``scheme/walking.py``).
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ppafo.control.kind import ProfileKind
-from ppafo.control.profiles import CONSTANT
 from ppafo.engine.over_samples import over_samples
 from ppafo.engine.program import Program
 from ppafo.model.gait import ShankSeries, shank_in_gait
-from ppafo.model.leg import FootLoad, ShankNow, torque_on_foot, torque_on_resting_foot
+from ppafo.model.leg import FootLoad, ShankNow, torque_on_foot
 
 GAIT_SHANK = ProfileKind(
     name="gait",
@@ -56,21 +54,3 @@ def torque_of_leg(program: Program, leg: LedLeg, time: float, angle: float) -> f
     """Torque of a leg on the vane [N m] at a time [s] and an angle [rad], positive in plantarflexion."""
     assert program.shank is not None, "a leg has a shank"
     return torque_on_foot(leg.load, shank_at(program.shank, leg.shank, time), angle)
-
-
-def torque_lines(program: Program, add: Callable[..., str], time: str, angle: str) -> list[str]:
-    """Lines that make ``added`` [N m], the torque of a leg on the vane at expressions of time [s] and angle [rad]."""
-    kind = program.shank
-    if kind is None:
-        return ["added = 0.0"]
-    if kind is CONSTANT:
-        # A shank that rests needs one sine instead of two in each part of a step.
-        return [f"added = {add(torque_on_resting_foot)}(load, shank.level, {angle})"]
-    if kind is GAIT_SHANK:
-        lines = [f"shank_now = {add(kind.value)}(shank, {time})"]
-    else:
-        lines = [
-            f"shank_angle, shank_rate, shank_acceleration = {add(kind.value)}(shank, {time})",
-            f"shank_now = {add(ShankNow)}(shank_angle, shank_rate, shank_acceleration, 0.0, 0.0)",
-        ]
-    return [*lines, f"added = {add(torque_on_foot)}(load, shank_now, {angle})"]

@@ -1,11 +1,10 @@
 """The part of Python that the engine compiles, and the one line that says what is wrong with anything else.
 
-What can be seen in the text is refused before it is composed; what only a compiler finds comes as its many lines about
-a generated program (``mistake``), and becomes one line about the file that a user wrote.
+What can be seen in the text is refused before it is composed; what only shows with the types of values is refused by
+the walk through the whole (``translation/walk.py``), as a line of the file that a user wrote (``place_in``).
 """
 
 import ast
-import linecache
 import re
 import threading
 from collections.abc import Iterable
@@ -13,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-from ppafo.errors import ProgramError, nearest_name, one_line
+from ppafo.errors import ProgramError, one_line
 
 ORIGIN = "# origin"
 """Beginning of the line before each function that says which lines of which file it was made from."""
@@ -196,12 +195,7 @@ def _assigned_names(target: ast.AST) -> set[str]:
     return {item.id for item in ast.walk(target) if isinstance(item, ast.Name)}
 
 
-_LINE = re.compile(r'File ".*?", line (\d+):')
 _ORIGIN = re.compile(rf"{re.escape(ORIGIN)} (?P<file>.*): (?P<lines>[\d ]+)$")
-_ROW = re.compile(r"^(\w+) = namedtuple\('\w+', (\[.*\])\)$", re.MULTILINE)
-_LONGEST = 300
-_SIGNS = {"add": "+", "sub": "-", "mul": "*", "truediv": "/", "floordiv": "//", "mod": "%", "pow": "**", "neg": "-"}
-_SIGNS |= {"lt": "<", "le": "<=", "gt": ">", "ge": ">=", "eq": "==", "ne": "!="}
 
 
 class Place(NamedTuple):
@@ -212,42 +206,12 @@ class Place(NamedTuple):
     next_line: int
 
 
-class Report(NamedTuple):
-    """What the compiler said, the generated text, the line of it that is at fault, and that line as it was written."""
-
-    said: str
-    source: str
-    text: str
-    written: str
-
-
-def mistake(said: str, source: str) -> ProgramError:
-    """Return the error for a program that the compiler refused with a report of many lines."""
-    lines = source.split("\n")
-    numbers = [int(number) for number in _LINE.findall(said.partition("During:")[0] or said) or _LINE.findall(said)]
-    # The first is the innermost; several are the ways through one function, in an order that changes.
-    number = min(numbers, default=0)
-    text = lines[number - 1].strip() if 0 < number <= len(lines) else ""
-    found = place_in(lines, number)
-    if found is None:
-        # A line of the loop: where the last function of a file that it calls was defined.
-        names = reversed(re.findall(r"\w+", text))
-        defined = (at for name in names for at, line in enumerate(lines, 1) if line.startswith(f"def {name}("))
-        called = next(defined, None)
-        found = None if called is None else place_in(lines, called)
-    written = linecache.getline(found.file, found.line).strip() if found else ""
-    problem = _told_problem(Report(said=said, source=source, text=text, written=written or text))
-    if found is None:
-        return ProgramError(f"the model cannot be compiled: {problem}")
-    return refusal(found.file, _line_of(said, found), problem)
-
-
 def place_in(lines: list[str], number: int) -> Place | None:
     """Where line ``number`` of a generated text comes from; None for lines that belong to no function of a file."""
     for start in range(min(number, len(lines)) - 1, -1, -1):
         origin = _ORIGIN.match(lines[start])
         if origin is None:
-            if lines[start].startswith("@njit(") and start + 1 < number and not lines[start - 1].startswith(ORIGIN):
+            if lines[start].startswith("@entry(") and start + 1 < number and not lines[start - 1].startswith(ORIGIN):
                 return None
             continue
         at = [int(item) for item in origin["lines"].split()]
@@ -257,81 +221,3 @@ def place_in(lines: list[str], number: int) -> Place | None:
             return None
         return Place(origin["file"], at[index], min(line for line in at if line > at[index]))
     return None
-
-
-def _line_of(report: str, place: Place) -> int:
-    """The line of the statement on which the name that the report is about stands."""
-    unknown = re.search(r"Unknown attribute '(\w+)'", report)
-    if unknown:
-        for line in range(place.line, place.next_line):
-            if re.search(rf"\.\s*{unknown[1]}\b", linecache.getline(place.file, line)):
-                return line
-    return place.line
-
-
-def _told_problem(report: Report) -> str:
-    """What a report of Numba says is wrong, in words; its first line where it is of a kind that is not known here."""
-    said, written = report.said, report.written
-    if found := re.search(r"Unknown attribute '(\w+)' of type (.+)", said):
-        problem = _without_attribute(report, found[1], found[2])
-    elif found := re.search(r"Can't unify return type from the following types: (.+)", said):
-        kinds = sorted({kind_of(kind) for kind in _split(found[1])})
-        problem = f"the ways through the function return different things: {' or '.join(kinds)}"
-    elif (found := re.search(r">>> (\w+)\((.*)\)", said)) and "No implementation of function" in said:
-        operator, kinds = found[1], [kind_of(kind) for kind in _split(found[2])]
-        what = f"'{_SIGNS[operator]}'" if operator in _SIGNS else f"{operator}()"
-        problem = f"{what} cannot be compiled for {' and '.join(kinds)}, in '{written}'"
-    elif found := re.search(r"to signature '\((.*)\)' due to \"TypeError: (.+)\"", said):
-        called, given = re.search(r"def (\w+)", written), re.search(r"\w(\([^=]*\))$", report.text)
-        engine = f"the engine calls it with {given[1]}: " if called and given else ""
-        problem = f"{called[1] if called else written}({found[1]}): {engine}{found[2].rstrip('.')}"
-    elif found := re.search(
-        r"failed to unpack (.+)|Tuple '.*' length (?:mismatch|does not match)|wrong tuple length", said
-    ):
-        kind = f", not {kind_of(found[1])}" if found[1] else ""
-        problem = f"'{written}' needs as many values as there are names{kind}"
-    else:
-        lines = [line.strip() for line in said.splitlines() if line.strip()]
-        # Lines that every report of Numba has and that tell a user nothing.
-        same = ("Failed in nopython", "During:", "File ", "- Resolution")
-        lines = [line for line in lines if not line.startswith(same)]
-        where = f"'{written}' cannot be compiled: " if written else ""
-        problem = where + one_line(lines[0] if lines else "no reason given")[:_LONGEST]
-    return problem
-
-
-def _without_attribute(report: Report, name: str, kind: str) -> str:
-    """What to say of a value of a kind that has no such attribute, with those that it has."""
-    if kind.startswith("Module"):
-        return f"'math.{name}' cannot be compiled"
-    owner = re.search(rf"([\w.]+)\.{name}\b", report.text)
-    what = owner[1] if owner else "it"
-    rows = dict(_ROW.findall(report.source))
-    fields = re.findall(r"\w+", rows.get(kind.partition("(")[0], ""))
-    hint = nearest_name(name, fields) or (f"; it has {', '.join(fields)}" if fields else "")
-    return f"{what} has no '{name}'{hint}" if fields else f"{what} is {kind_of(kind)} and has no '{name}'"
-
-
-def kind_of(kind: str) -> str:
-    """A type as the compiler writes it, in words."""
-    kind = kind.strip()
-    if re.match(r"(Literal\[int\]|u?int|float|bool)", kind):
-        return "a number"
-    if kind.startswith(("Tuple", "UniTuple")):
-        return "a tuple"
-    if kind.startswith("none") or kind == "None":
-        return "nothing"
-    named = re.match(r"\w+(?=\()", kind)
-    return f"a {named[0].rpartition('_')[2]}" if named else kind
-
-
-def _split(kinds: str) -> list[str]:
-    """Types that stand between commas, of which some have commas in them."""
-    parts, depth = [""], 0
-    for character in kinds:
-        depth += {"(": 1, "[": 1, ")": -1, "]": -1}.get(character, 0)
-        if character == "," and depth == 0:
-            parts.append("")
-        else:
-            parts[-1] += character
-    return parts

@@ -1,64 +1,203 @@
 """Which compiled components a run is made of, and what these put in the place of functions of the model."""
 
-import math
-from collections import namedtuple
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import lru_cache
-from typing import Any, NamedTuple, get_type_hints
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol, get_type_hints
 
 from ppafo.control.kind import OPEN_LOOP, ControllerKind, ProfileKind
 from ppafo.control.profiles import CONSTANT
-from ppafo.engine.components import Feed, GasScheme, LegScheme
-from ppafo.engine.over_samples import called_over_samples, in_columns
-from ppafo.engine.scheme.actuators import links_of
-from ppafo.engine.scheme.isothermal_gas import ISOTHERMAL
+from ppafo.engine.channels import REQUEST, paths_of_traces
+from ppafo.engine.rows import leaf_paths
 from ppafo.engine.scheme.motion import FreePart, Pace, PartEnd, PartSlide, PrescribedStep
 from ppafo.engine.scheme.pneumatics import HeldChambers, SlopedFlows, StageFlows
-from ppafo.engine.source_text import Collector, SourceCollector
-from ppafo.errors import ProgramError
+from ppafo.engine.step.lane import LaneResult, LaneStart, LaneTiming, NoParameters
 from ppafo.kinds import kind_at
 from ppafo.model.actuators.kind import ActuatorModel
 from ppafo.model.actuators.vane import MODEL as VANE
-from ppafo.model.effects.kind import Effect, State, effect_problem, laws_in_order
-from ppafo.model.plant import PlantState
+from ppafo.model.effects.kind import Effect, State
+from ppafo.model.plant import PlantParameters, PlantState, SinglePort
+from ppafo.model.ports import exhaust_path, gas_density, ideal_density, leakage_path, supply_path
 from ppafo.model.sensors import SensorParameters
 from ppafo.model.valves.kind import ValveModel
-from ppafo.signals.meter import Course, MeterKind
+from ppafo.signals.meter import Course, FootSample, MeterKind
+
+if TYPE_CHECKING:
+    from ppafo.engine.step.lane import Lane, Now
+
+Rows = Mapping[str, type]
+"""Groups of rows by their names."""
 
 
-class LaneTiming(NamedTuple):
-    """Longest step and sample period [s]; shares of a step by which commands and signals are late beyond whole steps.
+class GasPhases(Protocol):
+    """How the gas in both chambers goes through a step of two stages: a module of ``engine.step``."""
 
-    ``tolerance`` is the error over the one that a run is allowed by default [-].
-    """
+    @property
+    def PARAMETERS(self) -> Rows:  # noqa: N802 - constants of modules
+        """Groups of its parameters."""
 
-    step: float
-    period: float
-    command_lag: float
-    signal_lag: float
-    tolerance: float
+    @property
+    def STATES(self) -> Rows:  # noqa: N802
+        """Groups of its states."""
+
+    @property
+    def CHANGE(self) -> Rows:  # noqa: N802
+        """What a step adds to the state."""
+
+    @property
+    def START(self) -> Callable[..., Any] | None:  # noqa: N802
+        """``START(plant, initial)`` makes the only group of states; None where there is none."""
+
+    def stage(self, parts: "Program") -> Rows:
+        """What the first stage leaves for later phases."""
+
+    def begin(self, parts: "Program", lane: "Lane", next_angle: float, length: float) -> None:
+        """The first stage over a length [s], with volumes that run to an angle [rad]."""
+
+    def ends(self, parts: "Program", lane: "Lane") -> tuple[float, float]:
+        """Pressures [Pa] to which it leads."""
+
+    def first_flows(self, parts: "Program", lane: "Lane") -> tuple[float, float, float]:
+        """Its flows [kg/s]: from the supplies, and into both chambers."""
+
+    def change(self, parts: "Program", lane: "Lane", length: float) -> None:
+        """The second stage, and what both change."""
+
+    def error(self, parts: "Program", lane: "Lane", ahead: float, length: float) -> float:
+        """Error of the pressures over what is allowed [-], with volumes that ran to an angle [rad]."""
+
+    def shift_error(self, parts: "Program", lane: "Lane", shift: float, ahead: float, length: float) -> float:
+        """The same of a valve whose opening moves by a share."""
+
+    def add(self, parts: "Program", lane: "Lane") -> None:
+        """``lane.fed``, the state with the gas of the step, and ``lane.warmed``, the true masses if it has any."""
+
+    def move(self, parts: "Program", lane: "Lane", state: PlantState, assumed: float, reached: float) -> PlantState:
+        """A state whose vane came to another angle [rad] than assumed."""
+
+    def work(self, parts: "Program", lane: "Lane") -> None:
+        """Count what the gas did on the vane."""
 
 
-class LaneResult(NamedTuple):
-    """Command in force [-], first time [s] at which a run left what is possible (huge where it did not).
+class FeedPhases(Protocol):
+    """What stands between constant pressures and the valve, with a state that the stages solve with the gas."""
 
-    ``too_many_parts`` is 1 where it failed because a step was cut into more parts than are made of one.
-    """
+    @property
+    def PARAMETERS(self) -> Rows:  # noqa: N802
+        """Groups of its parameters."""
 
-    command: float
-    failure_time: float
-    too_many_parts: float
+    @property
+    def STATES(self) -> Rows:  # noqa: N802
+        """Groups of its states."""
+
+    @property
+    def NEXT(self) -> Rows:  # noqa: N802
+        """Its states at the end of a part that may be refused."""
+
+    def stage(self, parts: "Program") -> Rows:
+        """What the first stage leaves for later phases, that of the gas among it."""
+
+    def source(self, parts: "Program", lane: "Lane") -> PlantParameters:
+        """The plant at the pressures that feed it as a step begins."""
+
+    def source_ahead(self, parts: "Program", lane: "Lane") -> PlantParameters:
+        """The same after the first stage."""
+
+    def begin(self, parts: "Program", lane: "Lane", next_angle: float, length: float) -> None:
+        """The first stage, with that of the gas."""
+
+    def end(self, parts: "Program", lane: "Lane", length: float) -> None:
+        """Its state at the end of a step or part."""
+
+    def error(self, parts: "Program", lane: "Lane") -> float:
+        """What that misses, over what is allowed [-]."""
 
 
-class LaneStart(NamedTuple):
-    """Step of the block at which the run of a lane began, a whole number [-]."""
+class LegPhases(Protocol):
+    """A leg that walks with the device, in a step."""
 
-    step: float
+    @property
+    def STATES(self) -> Rows:  # noqa: N802
+        """Groups of its states."""
+
+    @property
+    def CARRIED(self) -> Rows:  # noqa: N802
+        """What a step is handed by the one before."""
+
+    @property
+    def ENDED(self) -> Rows:  # noqa: N802
+        """What phases hand on of where the foot would be, and where it ends."""
+
+    def parameters(self, parts: "Program") -> Rows:
+        """Groups of its parameters."""
+
+    def led(self, parts: "Program") -> Rows:
+        """What says where the gait is at the end of a step."""
+
+    def carry(self, parts: "Program", lane: "Lane") -> None:
+        """What a step is handed by the one before, where there was none."""
+
+    def find_place(self, parts: "Program", lane: "Lane", now: "Now") -> None:
+        """Where the gait is at the end of the step."""
+
+    def find_measured(self, parts: "Program", lane: "Lane") -> None:
+        """What was measured there."""
+
+    def find_gait(self, parts: "Program", lane: "Lane") -> None:
+        """The gait there."""
+
+    def find_gait_of_task(self, parts: "Program", lane: "Lane", now: "Now") -> None:
+        """The gait there in a task sequence."""
+
+    def begin(self, parts: "Program", lane: "Lane") -> None:
+        """Where the step would lead the foot."""
+
+    def assumed_angle(self, parts: "Program", lane: "Lane") -> float:
+        """Angle [rad] to which the volumes run."""
+
+    def hold_ahead(self, parts: "Program", lane: "Lane") -> None:
+        """The chambers there."""
+
+    def reach(self, parts: "Program", lane: "Lane") -> None:
+        """Where the step ends, unless an event leads elsewhere."""
+
+    def depart(self, parts: "Program", lane: "Lane") -> None:
+        """Where it ends then."""
+
+    def end(self, parts: "Program", lane: "Lane", length: float) -> None:
+        """``lane.after`` and ``lane.walk_after``, state and walk after the step."""
 
 
-class NoParameters(NamedTuple):
-    """Stands where a program has no such component."""
+class FaultPhases(Protocol):
+    """Faults of a plant in a walk, and a shut-off valve in its line."""
+
+    @property
+    def PARAMETERS(self) -> Rows:  # noqa: N802
+        """Groups of their parameters."""
+
+    @property
+    def STATES(self) -> Rows:  # noqa: N802
+        """Groups of their states."""
+
+    def failed_plant(self, parts: "Program", lane: "Lane", time: float) -> PlantParameters:
+        """The plant as faults leave it at a time [s]."""
+
+    def failed_ports(
+        self, parts: "Program", lane: "Lane", source: PlantParameters, port_1: Any, port_2: Any, time: float
+    ) -> tuple[Any, Any]:
+        """The ports of both chambers behind a source as faults leave them at a time [s]."""
+
+    def decide(self, parts: "Program", lane: "Lane", now: "Now", ordered: float, after: Any) -> None:
+        """Take a decision of the controller: the command ``ordered``, the state ``after`` it."""
+
+
+class FootPhases(Protocol):
+    """A foot on a prescribed shank, which an unconstrained vane carries."""
+
+    def torque(self, parts: "Program", lane: "Lane", time: float, angle: float) -> float:
+        """Torque on the vane [N m] at a time [s] and an angle [rad]."""
+
+    def sample(self, parts: "Program", lane: "Lane", time: float) -> FootSample:
+        """The foot beside the one that was measured, at a time [s] of a gait."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,13 +209,15 @@ class Program:
     ``late_signals`` True a delay. ``late_readings`` True lets sensors of a walk be whole samples late.
     ``late_commands`` True adds a dead time before the valve. ``gas`` is what the gas keeps or exchanges, ``feed`` what
     feeds it, None for constant pressures. ``leg`` is a walking one that the device is on, whose foot is free or where
-    the ground and a gait lead it (``angle`` is None then; its sensors are its own). ``is_adaptive`` True divides each
+    the ground and a gait lead it (``angle`` is None then; its sensors are its own); it walks stride after stride, or
+    ``takes_task_sequence``: it stands, starts, changes its speed and stops. ``faults`` are those of the plant, with a
+    shut-off valve, None where a walk has neither. ``is_adaptive`` True divides each
     step as its error asks, ``samples_inside`` True where recorded samples lie between the steps. ``meters`` are updated
     at every sample that a recording would have, ``traced`` names channels, or paths of the state, that are kept at some
     of them. ``starts_apart`` True lets the run of each lane begin at a step of its own, while others of the block are
     under way. ``actuator`` is what stands between the chambers and the joint. ``effects`` act in this order at the
     ports of their laws. ``shank`` None leaves an unconstrained vane to itself; otherwise it carries a foot on a shank
-    that moves so (``engine/led_leg.py``).
+    that moves so, and ``foot`` says how that goes through a step.
     """
 
     valve: ValveModel
@@ -85,11 +226,13 @@ class Program:
     angle: ProfileKind | None
     ideal_sensors: bool
     late_commands: bool
+    gas: GasPhases
     late_signals: bool = False
     late_readings: bool = False
-    gas: GasScheme = ISOTHERMAL
-    leg: LegScheme | None = None
-    feed: Feed | None = None
+    leg: LegPhases | None = None
+    takes_task_sequence: bool = False
+    faults: FaultPhases | None = None
+    feed: FeedPhases | None = None
     is_adaptive: bool = False
     samples_inside: bool = False
     meters: tuple[MeterKind, ...] = ()
@@ -98,6 +241,7 @@ class Program:
     actuator: ActuatorModel = VANE
     effects: tuple[Effect, ...] = ()
     shank: ProfileKind | None = None
+    foot: FootPhases | None = None
 
     def parameter_rows(self) -> dict[str, type]:
         """Groups of parameter rows of this program, in order."""
@@ -105,22 +249,28 @@ class Program:
         return {
             "timing": LaneTiming,
             "plant": self.actuator.plant,
-            **self.gas.parameters,
+            **self.gas.PARAMETERS,
             "valve": self.valve.parameters,
             "controller": NoParameters if self.controller is None else self.controller.parameters,
             "reference": self.reference.parameters,
             "path": NoParameters if self.angle is None else self.angle.parameters,
             "sensors": SensorParameters,
-            **({} if self.leg is None else self.leg.parameters),
-            **({} if self.feed is None else self.feed.parameters),
+            **({} if self.leg is None else self.leg.parameters(self)),
+            **({} if self.faults is None else self.faults.PARAMETERS),
+            **({} if self.feed is None else self.feed.PARAMETERS),
             # By its place, for few vanes carry a leg.
             **({"load": kind_at("ppafo.model.leg:FootLoad"), "shank": shank.parameters} if shank is not None else {}),
             **{effect.name: effect.parameters for effect in self.effects},
         }
 
     @property
+    def shank_rests(self) -> bool:
+        """True where the shank of that foot never moves."""
+        return self.shank is CONSTANT
+
+    @property
     def is_on_gait(self) -> bool:
-        """True where a gait leads the shank of a leg, whose knee moves too (``engine/led_leg.py``)."""
+        """True where a gait leads the shank of a leg, whose knee moves too (``engine/step/foot.py``)."""
         return self.shank is not None and self.shank.name == "gait"
 
     @property
@@ -134,6 +284,24 @@ class Program:
         return {effect.name: effect.state for effect in self.effects if effect.state is not None}
 
     @property
+    def stated_with_errors(self) -> dict[str, State]:
+        """Those of ``stated`` whose error may shorten a step."""
+        return {name: kind for name, kind in self.stated.items() if kind.tolerances}
+
+    @property
+    def stated_at_ports(self) -> dict[str, State]:
+        """Those of ``stated`` that laws take which act on flows and gas."""
+        ports = (supply_path, exhaust_path, leakage_path, gas_density, ideal_density)
+        laws = [(effect, effect.laws[port]) for effect in self.effects for port in ports if port in effect.laws]
+        asked = {effect.name for effect, law in laws if effect.state_name in law.__code__.co_varnames}
+        return {name: kind for name, kind in self.stated.items() if name in asked}
+
+    @property
+    def ports_with_laws(self) -> frozenset[str]:
+        """Names of the ports at which effects act."""
+        return frozenset(port.__name__ for effect in self.effects for port in effect.laws)
+
+    @property
     def effect_states(self) -> dict[str, type]:
         """Groups of rows of the states of effects, by their names."""
         return {f"{name}_state": kind.row for name, kind in self.stated.items()}
@@ -144,11 +312,12 @@ class Program:
             "result": LaneResult,
             "pace": Pace,
             "state": PlantState,
-            **self.gas.states,
+            **self.gas.STATES,
             "valve_state": self.valve.state,
             "controller_state": NoParameters if self.controller is None else type(self.controller.initial),
-            **({} if self.leg is None else self.leg.states),
-            **({} if self.feed is None else self.feed.states),
+            **({} if self.leg is None else self.leg.STATES),
+            **({} if self.faults is None else self.faults.STATES),
+            **({} if self.feed is None else self.feed.STATES),
             **self.effect_states,
             "course": Course if self.follows_reference else NoParameters,
             **{group: kind.state for group, kind in self.meter_groups.items()},
@@ -158,12 +327,12 @@ class Program:
     @property
     def is_thermal(self) -> bool:
         """True where the gas has an energy balance."""
-        return bool(self.gas.parameters)
+        return bool(self.gas.PARAMETERS)
 
     @property
     def has_true_masses(self) -> bool:
         """True where the true masses of the gas stand beside what ``PlantState`` counts."""
-        return bool(self.gas.states)
+        return bool(self.gas.STATES)
 
     @property
     def walks(self) -> bool:
@@ -171,24 +340,50 @@ class Program:
         return self.leg is not None
 
     @property
-    def takes_task_sequence(self) -> bool:
-        """True where that leg walks a task sequence: it stands, starts, changes its speed and stops."""
-        return self.leg is not None and self.leg.takes_task_sequence
-
-    @property
-    def fails(self) -> bool:
-        """True where the plant of a walk may fail, or a shut-off valve is in its line."""
-        return self.leg is not None and self.leg.fails
-
-    @property
-    def chambers(self) -> str:
-        """What the first stage of the chambers is called in a step."""
-        return "gas" if self.feed is None else self.feed.chambers
-
-    @property
     def meter_groups(self) -> dict[str, MeterKind]:
         """Meters by the name of their group of state rows."""
         return {f"{kind.name}_meter": kind for kind in self.meters}
+
+    @property
+    def moving_meters(self) -> dict[str, MeterKind]:
+        """Those of ``meter_groups`` that change after the first sample: a locked vane never moves."""
+        return {group: kind for group, kind in self.meter_groups.items() if not (self.is_locked and kind.of_motion)}
+
+    @property
+    def traced_paths(self) -> dict[int, str]:
+        """Where a lane has the channels that are traced, by their places."""
+        paths = paths_of_traces(self.state_rows(), self.walks, self.has_true_masses)
+        return {row: paths.get(name, name) for row, name in enumerate(self.traced)}
+
+    @property
+    def takes_samples(self) -> bool:
+        """True where meters or traces take samples in the place of a recording."""
+        return bool(self.meters or self.traced)
+
+    @property
+    def initial_controller_state(self) -> Any:
+        """State of the controller before its first sample."""
+        return None if self.controller is None else self.controller.initial
+
+    @property
+    def has_level_of_help(self) -> bool:
+        """True where a controller of walking says how much it helps."""
+        return hasattr(getattr(self.initial_controller_state, "safety", None), "level")
+
+    @property
+    def has_phase(self) -> bool:
+        """True where a controller of walking has a phase of the gait."""
+        return hasattr(getattr(self.initial_controller_state, "phase", None), "phase")
+
+    @property
+    def requests_torque(self) -> bool:
+        """True where a controller of walking keeps the torque that it wants."""
+        return REQUEST in leaf_paths(self.state_rows()["controller_state"], "controller_state")
+
+    @property
+    def has_single_ports(self) -> bool:
+        """True where one path of each chamber is open, false where a valve blends them."""
+        return bool(get_type_hints(self.valve.connect)["return"] == tuple[SinglePort, SinglePort])
 
     @property
     def has_reference(self) -> bool:
@@ -233,135 +428,24 @@ class Program:
 
     def step_rows(self) -> dict[str, type]:
         """Groups of numbers that a phase of a step hands to the later ones, in order."""
-        free = FreePart if self.leg is None else self.leg.begun
-        begun = free if self.angle is None else (NoParameters if self.is_locked else PrescribedStep)
-        gas = self.gas.begun(self) if self.feed is None else self.feed.begun(self)
+        leg, feed, is_alone = self.leg, self.feed, self.angle is None and self.leg is None
         # In the order of declaration: plant, what the valve shows beside its openings, result.
         _, shown, _ = get_type_hints(self.valve.connect).values()
         return {
-            **({} if self.leg is None else self.leg.led),
+            **({} if leg is None else leg.led(self)),
             **({"held": HeldChambers} if self.hands_chambers_on else {}),
-            **({} if self.leg is None else self.leg.handed),
-            "begun": begun,
+            **({} if leg is None else leg.CARRIED),
+            **({"begun": FreePart} if is_alone else {}),
+            **({"prescribed": PrescribedStep} if self.angle is not None and not self.is_locked else {}),
             "flowing": SlopedFlows,
-            "gas": gas,
+            **(self.gas.stage(self) if feed is None else feed.stage(self)),
             "passing": StageFlows,
             "shown": shown,
-            **({"change": self.gas.change} if self.angle is None else {}),
-            **({"slid": PartSlide, "moved": PartEnd} if self.angle is None and self.leg is None else {}),
-            **({} if self.leg is None else self.leg.ended),
+            **(self.gas.CHANGE if self.angle is None else {}),
+            **({"slid": PartSlide, "moved": PartEnd} if is_alone else {}),
+            **({} if leg is None else leg.ENDED),
             **({"next_valve": self.valve.state} if self.is_parted else {}),
-            **(
-                {self.feed.stored[name]: row for name, row in self.feed.states.items()}
-                if self.is_parted and self.feed is not None
-                else {}
-            ),
+            **(feed.NEXT if self.is_parted and feed is not None else {}),
+            **(dict.fromkeys(("length", "before", "remaining"), float) if self.is_parted else {}),
+            **({"gas_error": float} if self.is_adaptive and self.angle is None else {}),
         }
-
-
-def link_program(program: Program, collector: Collector) -> None:
-    """Let a collector call what the components of a program have in the place of functions of the model.
-
-    ProgramError for an effect that cannot act, or whose name other rows of the program have.
-    """
-    own = links_of(program.actuator)
-    collector.links.update(own)
-    if not program.effects:
-        return
-    # Names of rows without any effect: two effects that share a name are refused by the catalogue.
-    bare = replace(program, effects=())
-    taken = {*bare.parameter_rows(), *bare.state_rows(), *bare.step_rows()}
-    for effect in program.effects:
-        if taken & set(effect.rows):
-            raise ProgramError(f"effect '{effect.name}': other rows of a program have this name; it needs another")
-    link_effects(program.effects, collector, own)
-
-
-def link_effects(effects: Sequence[Effect], collector: Collector, own: Mapping[Any, Any] | None = None) -> None:
-    """Let a collector call the laws of effects at their ports, of which an actuator may have its ``own``.
-
-    ProgramError for an effect that cannot act.
-    """
-    for effect in effects:
-        problem = effect_problem(effect)
-        if problem:
-            raise ProgramError(f"effect '{effect.name}': {problem}")
-    for key, stands in laws_in_order(effects).items():
-        collector.links[key] = (own or {}).get(stands, stands)
-    for effect in effects:
-        for law in effect.laws.values():
-            # By the names of its parameters: a law says itself which structs it needs.
-            asked = law.__code__.co_varnames[: law.__code__.co_argcount]
-            collector.effects[law] = tuple(row for row in effect.rows if row in asked)
-
-
-class Composed(NamedTuple):
-    """A function of the model as Python calls it with effects: before its own arguments it takes ``needed`` rows.
-
-    ``of_columns`` is the same over columns of samples, None where it has no such form.
-    """
-
-    function: Callable[..., Any]
-    needed: tuple[str, ...]
-    of_columns: Callable[..., Any] | None
-
-
-def composed_with(function: Callable[..., Any], effects: Sequence[Effect]) -> Composed | None:
-    """Return a function of the model with the laws of effects in it; None where no effect acts in it."""
-    if not effects:
-        return None
-    collector, composed = _composed_with(function, tuple(effects))
-    if collector.made_from.is_current():
-        return composed
-    _composed_with.cache_clear()
-    return _composed_with(function, tuple(effects))[1]
-
-
-@lru_cache(maxsize=64)
-def _composed_with(
-    function: Callable[..., Any], effects: tuple[Effect, ...]
-) -> tuple[SourceCollector, Composed | None]:
-    collector = SourceCollector("")
-    link_effects(effects, collector)
-    name = collector.add(function)
-    if name not in collector.needs:
-        return collector, None
-    scope: dict[str, Any] = {"math": math, "namedtuple": namedtuple}
-    text = collector.text()
-    # The composed text runs as plain Python: solvers and recordings call single functions, not programs.
-    exec(text, scope)
-    return collector, Composed(scope[name], tuple(collector.needs[name]), in_columns(text, name))
-
-
-def python_place(
-    place: Callable[..., Any], effects: Sequence[Effect], rows: Sequence[Any]
-) -> Callable[..., Any] | None:
-    """Return a port as Python calls it with effects and their parameters; None where no effect acts there.
-
-    Before its own arguments it takes the states of effects by name. Any other function of the model will do too.
-    """
-    composed = composed_with(place, effects)
-    if composed is None:
-        return None
-    given = {effect.name: row for effect, row in zip(effects, rows, strict=True)}
-
-    def called(states: Mapping[str, Any], *own: float) -> Any:
-        return composed.function(*((given | dict(states))[row] for row in composed.needed), *own)
-
-    return called
-
-
-def place_over_samples(
-    place: Callable[..., Any], effects: Sequence[Effect], rows: Sequence[Any]
-) -> Callable[..., Any] | None:
-    """Return what ``python_place`` does, for states and arguments whose numbers are columns (samples,)."""
-    composed = composed_with(place, effects)
-    if composed is None:
-        return None
-    given = {effect.name: row for effect, row in zip(effects, rows, strict=True)}
-
-    def called(states: Mapping[str, Any], *own: Any) -> Any:
-        of_effects = ((given | dict(states))[row] for row in composed.needed)
-        return called_over_samples(composed.function, composed.of_columns, *of_effects, *own)
-
-    return called

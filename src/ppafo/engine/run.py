@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.engine.components import LegScheme
-from ppafo.engine.lane_step import MAXIMUM_PARTS
 from ppafo.engine.lanes import Batch, BatchResult, Clock, load_programs, run_blocks
-from ppafo.engine.program import LaneResult, LaneTiming, NoParameters, Program, composed_with
+from ppafo.engine.linking import composed_with
+from ppafo.engine.program import FaultPhases, LegPhases, Program
 from ppafo.engine.rows import leaves, rebuilt, row_numbers, table
 from ppafo.engine.scheme.actuators import pressures_of
 from ppafo.engine.scheme.motion import Pace
-from ppafo.kinds import kind_at
+from ppafo.engine.step.lane import MAXIMUM_PARTS, LaneResult, LaneTiming, NoParameters
 from ppafo.model.columns import larger, over_runs, truncated
 from ppafo.model.effects.kind import Moment, State
 from ppafo.model.orifice import ExactOrifice
@@ -46,7 +45,9 @@ WHOLE = 1.0e-9
 class LegGroups(NamedTuple):
     """How a leg goes through a step, its groups of parameters, and its groups of states at the start."""
 
-    scheme: LegScheme
+    leg: LegPhases
+    takes_task_sequence: bool
+    faults: FaultPhases | None
     parameters: list[Any]
     states: list[Any]
 
@@ -69,18 +70,25 @@ class Walk:
 
     def groups(self) -> LegGroups:
         """Its scheme, and its groups of rows in the order of ``Program``."""
-        fails = "" if self.failing is None else "FAILING_"
-        which = "STRIDES" if self.task_sequence is None else "TASK_SEQUENCE"
-        scheme: LegScheme = kind_at(f"ppafo.engine.scheme.walking:{fails}{which}")
+        from ppafo.engine.step import walk  # most devices walk on no leg
+
         parameters = [self.leg, self.share, self.gait, self.timing, self.sensors]
         parameters += [] if self.task_sequence is None else [self.task_sequence]
-        states = [self.initial, NOTHING_SEEN]
+        states: list[Any] = [self.initial, NOTHING_SEEN]
+        faults: FaultPhases | None = None
         if self.failing is not None:
-            from ppafo.model.plant_faults import POWERED  # most runs have no fault
+            from ppafo.engine.step import failing as faults  # most runs have no fault
+            from ppafo.model.plant_faults import POWERED
 
             parameters += self.failing
             states.append(POWERED)
-        return LegGroups(scheme, parameters, states)
+        return LegGroups(
+            leg=walk,
+            takes_task_sequence=self.task_sequence is not None,
+            faults=faults,
+            parameters=parameters,
+            states=states,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,7 +170,7 @@ def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:
         step=run.step, period=run.period, command_lag=command_lag, signal_lag=signal_lag, tolerance=run.tolerance
     )
     plant, valve = [run.plant, run.thermal], [run.valve]
-    _, walk, walk_states = (None, [], []) if run.walk is None else run.walk.groups()
+    walk, walk_states = ([], []) if run.walk is None else run.walk.groups()[-2:]
     lines, line_states = ([], []) if run.lines is None else ([run.lines.parameters], [run.lines.initial])
     leg = [] if run.leg is None else [run.leg.load, run.leg.shank]
     rest = [run.controller, run.reference, run.path, run.sensors, *walk, *lines, *leg, *run.effects]
@@ -211,7 +219,7 @@ def _alike_together(run: Run, runs: int, members: Members) -> Members:
 
 def gas_at_start(run: Run) -> Any:
     """State that the gas of a run has beside ``PlantState`` at its beginning; of columns for each run."""
-    program, start = run.program, run.program.gas.start
+    program, start = run.program, run.program.gas.START
     if start is None:
         return NoParameters()
     composed = composed_with(start, program.effects)

@@ -49,12 +49,27 @@ def each(convert: Callable[[float], float], row: Row) -> Row:
     return found
 
 
+def is_step_function(function: object) -> bool:
+    """True for a function of the step: its first parameter is ``parts``, what the device is made of."""
+    return isinstance(function, FunctionType) and function.__code__.co_varnames[:1] == ("parts",)
+
+
+@dataclass(frozen=True, slots=True)
+class Names:
+    """Names of a function that was written anew: all that it has, values that some stand for, classes of rows."""
+
+    local: frozenset[str]
+    kept: Mapping[str, Any]
+    rows: Mapping[str, Any]
+
+
 class Composer(ast.NodeTransformer):
     """Rewrites the body of one function; ``add`` adds another to the module, ``note`` keeps what was looked up.
 
     ``rows_of`` says which rows of effects a function that was added needs: each call hands them over before its own
     arguments. ``needed`` has those that this function must be handed in its turn, because it has no such parameter.
-    ``stands_for`` says which class a declared row has in this module.
+    ``stands_for`` says which class a declared row has in this module, ``names`` what a function has that was written
+    anew.
     """
 
     def __init__(
@@ -64,15 +79,18 @@ class Composer(ast.NodeTransformer):
         note: Callable[[Mapping[str, Any], str, Any], None],
         rows_of: Callable[[str], tuple[str, ...]] = lambda _name: (),
         stands_for: Callable[[Any], Any] = lambda row: row,
+        names: Names | None = None,
     ) -> None:
         self.function = function
         self.add = add
         self.note = note
         self.rows_of = rows_of
         self.stands_for = stands_for
-        self.local = frozenset(function.__code__.co_varnames)
-        self.kinds: dict[str, Any] = dict(function.__annotations__)
-        self.given = frozenset(_parameters(function.__code__))
+        self.local = frozenset(function.__code__.co_varnames) if names is None else names.local
+        self.kept: Mapping[str, Any] = {} if names is None else names.kept
+        self.rows: Mapping[str, Any] = {} if names is None else names.rows
+        self.kinds: dict[str, Any] = {**function.__annotations__, **self.rows}
+        self.given = frozenset(_parameters(function.__code__)) if names is None else names.local
         self.needed: set[str] = set()
 
     def refuse(self, where: ast.AST, problem: str) -> ProgramError:
@@ -91,7 +109,7 @@ class Composer(ast.NodeTransformer):
         parts = getattr(kind, "__args__", ())
         named = zip(target.elts, parts, strict=False) if isinstance(target, ast.Tuple) else ((target, kind),)
         for item, found in named:
-            if isinstance(item, ast.Name):
+            if isinstance(item, ast.Name) and item.id not in self.rows:
                 # A name that stands for two kinds stands for none: nothing may then be written out for it.
                 self.kinds[item.id] = found if self.kinds.get(item.id, found) is found else None
         return ast.copy_location(ast.Assign(node.targets, self.visit(node.value)), node)
@@ -163,8 +181,8 @@ class Composer(ast.NodeTransformer):
 
         ProgramError where they do not fit.
         """
-        if any(isinstance(item, ast.Starred) for item in node.args):
-            return []  # how many there are is known only to the compiler
+        if is_step_function(called) or any(isinstance(item, ast.Starred) for item in node.args):
+            return []  # its groups are handed over by name; how many there are is known only to the compiler
         is_function = isinstance(called, types.FunctionType)
         takes: tuple[str, ...] = _parameters(called.__code__) if is_function else called._fields
         if len(node.args) == len(takes) and not node.keywords and not (is_function and called.__kwdefaults__):
@@ -239,6 +257,8 @@ class Composer(ast.NodeTransformer):
 
     def value_of(self, node: ast.expr) -> Any:
         """What a name or ``module.name`` stands for now outside the function. ProgramError where it has no value."""
+        if isinstance(node, ast.Name) and node.id in self.kept:
+            return self.kept[node.id]
         if isinstance(node, ast.Name) and node.id not in self.local:
             scope = self.function.__globals__
             if node.id in scope:
@@ -446,6 +466,23 @@ class SourceCollector:
         """All definitions, callees first."""
         return "\n\n\n".join(self.definitions.values())
 
+    def note_read(self, scope: Mapping[str, Any], name: str, value: Any) -> None:
+        """Keep that a name was looked up while composing, and what it stood for."""
+        self.made_from.reads.append(Read(scope, name, value))
+
+    def stands_for(self, row: Any) -> Any:
+        """The class that a declared row has in this module."""
+        return self.links.get((row, "_replace"), row)
+
+    def define(self, name: str, item: Any, text: str) -> None:
+        """Add a text that was written elsewhere for a function."""
+        self.owners[name], self.definitions[name] = item, text
+
+    def decorated(self, tree: ast.FunctionDef, file: str) -> str:
+        """The text of a function that is composed, with the lines of its file."""
+        lines = " ".join(map(str, [tree.lineno, *_line_numbers(tree.body), (tree.end_lineno or tree.lineno) + 1]))
+        return f"{ORIGIN} {one_line(file)}: {lines}\n{self.decorator}\n{ast.unparse(tree)}"
+
     def _function_text(self, function: Any, name: str) -> str:
         tree = parse_definition(function, self.adapt)
         file = function.__code__.co_filename
@@ -461,10 +498,10 @@ class SourceCollector:
         self.made_from.functions.append(made)
         composer = Composer(
             function,
-            lambda item: self._add_inside(function, item),
-            lambda scope, read, value: self.made_from.reads.append(Read(scope, read, value)),
+            lambda item: self.add_inside(function, item),
+            self.note_read,
             lambda callee: self.needs.get(callee, ()),
-            lambda row: self.links.get((row, "_replace"), row),
+            self.stands_for,
         )
         arguments = tree.args
         asked = self.effects.get(function, ())
@@ -490,11 +527,9 @@ class SourceCollector:
         if asked or handed:
             own = [item.arg for item in arguments.args if item.arg in asked]
             self.needs[name] = (*handed, *own)
-        lines = " ".join(map(str, [tree.lineno, *_line_numbers(tree.body), (tree.end_lineno or tree.lineno) + 1]))
-        text = ast.unparse(tree)
-        return f"{ORIGIN} {one_line(file)}: {lines}\n{self.decorator}\n{text}"
+        return self.decorated(tree, file)
 
-    def _add_inside(self, function: Any, item: Any) -> str:
+    def add_inside(self, function: Any, item: Any) -> str:
         """Add what a function calls; a law of an effect that calls its own port gets what was there before it."""
         if (function, item) in self.links:
             return self._add(self.links[function, item])

@@ -50,9 +50,9 @@ def files_of_walk(
     if strikes is not None:
         check_strikes(strikes)
     check_duration_once(overrides, minutes)
-    chosen = load_walk(name, overrides, gait)
+    chosen = load_walk(name, overrides, gait=gait)
     few_strides = FEW_STRIDES if walk_of(chosen).task_sequence is None else None
-    result = walk(chosen, few_strides if minutes is None else minutes)
+    result = walk(chosen, minutes=few_strides if minutes is None else minutes)
     return opensim_files(result, side, strikes or ())
 
 

@@ -118,9 +118,13 @@ def _end(values: Floats) -> float:
 
 
 def delay_remarks(walk: MeanStride) -> list[str]:
-    """Return which curves of a mean stride are on another clock than the force, or the shank, and by how much."""
+    """Return which curves of a mean stride are on another clock than the force, or the shank, and by how much.
+
+    Curves of one file are on one clock, so that nothing is said of them.
+    """
     other = "vertical_force" if "vertical_force" in walk.curves else "shank_angle"
     late = {name: seconds for name, seconds in delays(walk).items() if abs(seconds) > LARGEST_DELAY}
+    late = {name: seconds for name, seconds in late.items() if walk.file[name] != walk.file[other]}
     # Curves that are late by the same time are on one other clock, and are named together.
     together = max(late.values(), default=0.0) - min(late.values(), default=0.0) < LARGEST_DELAY
     groups = [tuple(late)] if late and together else [(name,) for name in late]

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field
 
+from ppafo.arguments import checked
 from ppafo.documents.models import NAME, QUANTITY, make_schema, optional, table, validate
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import DataError, UnitError, refused_as
@@ -188,12 +189,13 @@ def list_gaits() -> tuple[str, ...]:
     return _FILE.names()
 
 
-def load_gait(name_or_path: str | Path = NORMATIVE) -> Gait:
+@checked(name_or_path="gait")
+def load_gait(gait: str | Path = NORMATIVE) -> Gait:
     """Return a gait by its name in the package or by the path of a gait file (TOML), in SI units.
 
     DataError where it cannot be used.
     """
-    return parse_gait(_FILE.read(name_or_path), str(name_or_path))
+    return parse_gait(_FILE.read(gait), str(gait))
 
 
 def parse_gait(content: bytes, file: str) -> Gait:

@@ -4,6 +4,7 @@ The figure has the curves over the stride, in the units of the field, with band,
 """
 
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -117,7 +118,7 @@ def gait_finding(gait: Gait, imported: ImportedGait | None = None) -> Finding[Ga
             Part(remarks=[f"remark: {text}" for text in imported.remarks] if imported else ()),
             Part(
                 "Stride",
-                panels=lambda: gait_panels(gait, imported),
+                panels=partial(gait_panels, gait, imported),
                 name="gait",
                 caption=_CAPTION,
                 size=(7.0, 1.7),
@@ -127,8 +128,12 @@ def gait_finding(gait: Gait, imported: ImportedGait | None = None) -> Finding[Ga
         ),
         found=GaitFound(gait, imported),
         kind=gait.origin,
-        files={f"{gait.name}.toml": lambda: gait_toml(gait).encode()},
+        files={f"{gait.name}.toml": partial(_toml_bytes, gait)},
     )
+
+
+def _toml_bytes(gait: Gait) -> bytes:
+    return gait_toml(gait).encode()
 
 
 def _plus_minus(deviation: float) -> str:

@@ -10,26 +10,32 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import final
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.control.walking.assistance import TorqueProfile
-from ppafo.engine.lane_rows import VECTOR, LaneRows, indent, lanes_of
-from ppafo.engine.lane_samples import SIGNALS, current_readings, pressures_of, sense, sense_gait
-from ppafo.engine.lane_source import HEADER, INLINE, lane_loop
+from ppafo.engine.entries import ARRAY, ARRAY_2D, ARRAY_3D, FLOAT, HEADER, INLINE, INT, entry_text, with_arrays
+from ppafo.engine.generator import StepText
+from ppafo.engine.lane_rows import VECTOR, lanes_of
+from ppafo.engine.lane_source import ARGUMENTS, COMPILED
 from ppafo.engine.lanes import SIGNAL_ROWS, Batch, Clock, Floats
-from ppafo.engine.loading import ARRAY, ARRAY_2D, ARRAY_3D, FLOAT, INT, entry_text, load_source, with_arrays
-from ppafo.engine.program import LaneStart, Program
-from ppafo.engine.rows import leaf_paths, numbers, row_expression
+from ppafo.engine.loading import load_source
+from ppafo.engine.loop_text import Call, RowsOfLanes, indent, lane_loop
+from ppafo.engine.program import Program
+from ppafo.engine.rows import leaf_paths, numbers
 from ppafo.engine.run import batch_of
-from ppafo.engine.scheme.pneumatics import HeldChambers, held_chambers
+from ppafo.engine.scheme.pneumatics import HeldChambers
 from ppafo.engine.source_text import SourceCollector
+from ppafo.engine.step.lane import LaneStart, Now
+from ppafo.engine.step.phases import hold_chambers
+from ppafo.engine.step.sample import fill_signals, remember_readings, sense
 from ppafo.errors import ScenarioError, UnitError
 from ppafo.gym.tasks import (
     Goal,
     Memory,
+    Outcome,
     Requested,
     Task,
     finite,
@@ -38,7 +44,7 @@ from ppafo.gym.tasks import (
     valve_or_vent,
     within,
 )
-from ppafo.model.plant import actuator_torque
+from ppafo.model.plant import actuator_torque, chamber_pressures
 from ppafo.model.sensors import Measurement
 from ppafo.parameters import load_parameter_set
 from ppafo.parameters.graph import ATMOSPHERE_PATH, gauge_link
@@ -61,46 +67,76 @@ Places = NDArray[np.intp]
 OWN = {"goal": Goal, "memory": Memory}
 """Rows of an environment beside the rows of its run."""
 OWN_PATHS = [path for name, row in OWN.items() for path in leaf_paths(row, name)]
-OUTCOMES = 5
-REWARD, ERROR, SUPPLIED, FAILED, THROUGH = range(OUTCOMES)
-"""Rows of the outcomes: reward, error, gas since the episode began [kg], 1 where it fails or is through, else 0."""
+OUTCOMES = len(Outcome._fields)
+FAILED = Outcome._fields.index("failed")
+"""Row of the outcomes from which on they are truth values."""
 
 _PARAMETERS = {
     **dict.fromkeys(("all_states", "all_parameters"), ARRAY_2D),
     **{"all_signals": ARRAY_3D, "all_commands": ARRAY_2D, "record": ARRAY_3D, "trace": ARRAY_3D, "all_own": ARRAY_2D},
     **{"actions": ARRAY_2D, "bounds": ARRAY_2D, "chosen": ARRAY, "observations": ARRAY_2D, "outcomes": ARRAY_2D},
     **dict.fromkeys(("error_weight", "gas_weight"), FLOAT),
-    **dict.fromkeys(("now", "steps", "steps_in_all", "steps_per_sample", "signal_delay", "command_delay"), INT),
+    **dict.fromkeys(("moment", "steps", "steps_in_all", "steps_per_sample", "signal_delay", "command_delay"), INT),
 }
 """Parameters of ``go_on``; a name that begins with ``all`` holds the rows of all blocks, one block after another."""
+
+
+def observe(
+    parts: Program,
+    lane: Any,
+    task: Task,
+    now: Now,
+    error_weight: float,
+    gas_weight: float,
+    steps_in_all: int,
+) -> None:
+    """Sense, observe and judge one environment, and say whether its episode ends."""
+    sense(parts, lane, now)
+    time = now.step * lane.timing.step
+    torque_wanted, rate, _ = parts.reference.value(lane.reference, time)
+    wanted = Requested(torque_wanted, rate)
+    pressure_1, pressure_2 = chamber_pressures(lane.plant, lane.state.angle, lane.state.mass_1, lane.state.mass_2)
+    torque = actuator_torque(pressure_1, pressure_2, lane.plant.torque_constant)
+    gas = lane.state.supplied_mass - lane.memory.supplied_mass
+    lane.memory = task.kept(lane.memory, lane.state.supplied_mass, lane.seen, time)
+    lane.view = task.observed(lane.seen, lane.goal, lane.memory, wanted, lane.result.command, time)
+    phase = lane.walk.now.phase if parts.leg is not None else 0.0
+    error = task.error(lane.goal, wanted, lane.state.angle, phase, torque)
+    lane.outcome = Outcome(
+        reward=finite(reward_of(error, gas, error_weight, gas_weight, lane.timing.period)),
+        error=finite(error),
+        supplied=finite(lane.state.supplied_mass),
+        failed=1.0 if lane.result.failure_time <= time else 0.0,
+        through=1.0 if now.step >= steps_in_all else 0.0,
+    )
 
 
 @lru_cache(maxsize=16)
 def kernel_source(program: Program, task: Task) -> str:
     """Source text of the module whose ``go_on`` takes all environments of a program a step further."""
     collector = SourceCollector(INLINE)
-    loop = lane_loop(program, collector, "advance")
-    step = _step(LaneRows(program, collector), task)
-    return "\n\n\n".join([HEADER, collector.text(), loop, entry_text("go_on", _PARAMETERS, step)])
+    step = StepText(program, collector, further={**OWN, "view": task.view, "outcome": Outcome})
+    loop = lane_loop(step, COMPILED, "advance", ARGUMENTS)
+    kernel = _kernel(step, task)
+    return "\n\n\n".join([HEADER, collector.text(), loop, entry_text("go_on", _PARAMETERS, kernel)])
 
 
-def _step(rows: LaneRows, task: Task) -> list[str]:
+def _kernel(step: StepText, task: Task) -> list[str]:
     """Lines of ``go_on``: block by block the commands, the lane loop, and what is observed at its end."""
-    # Between two calls of the lane loop, rows stand in the arrays; chambers of a locked vane are computed when read.
+    # Between two calls of the lane loop rows stand in the arrays, and what a step hands on is gone.
+    rows = RowsOfLanes(step)
+    rows.cells = {path: cell for path, cell in rows.cells.items() if path not in rows.step_at}
+    rows.cells.update({path: path.replace(".", "_") for path in leaf_paths(HeldChambers, "held")})
+    count = len(rows.state_at)
     rows.cells.update({path: f"states[{row}, lane]" for path, row in rows.state_at.items()})
-    first = len(rows.state_at)
-    rows.cells.update({path: f"parameters[{row - first}, lane]" for path, row in rows.parameter_at.items()})
+    rows.cells.update({path: f"parameters[{row - count}, lane]" for path, row in rows.parameter_at.items()})
     rows.cells.update({path: f"own[{row}, lane]" for row, path in enumerate(OWN_PATHS)})
-    if rows.program.hands_chambers_on:
-        rows.cells.update({path: f"chambers{path.removeprefix('held')}" for path in leaf_paths(HeldChambers, "held")})
-    command = rows.add(valve_or_vent if task.walks else valve_command)
-    given = f"{command}(actions[place, 0], actions[place, actions.shape[1] - 1])"
-    call = (
-        "advance(states, parameters, signal_history, command_history, record, trace, "
-        "now - steps, steps, -1, steps_per_sample, 1.0, -1, 0, 0, signal_delay, command_delay)"
-    )
+    rows.cells.update({f"outcome.{name}": f"outcomes[{row}, first + lane]" for row, name in enumerate(Outcome._fields)})
+    rows.cells.update({path: f"observations[first + lane, {row}]" for row, path in enumerate(task.observed_paths)})
+    add = step.collector.add
+    command = add(valve_or_vent if task.walks else valve_command)
     heights = {
-        "states": str(len(rows.state_at)),
+        "states": str(count),
         "parameters": str(len(rows.parameter_at)),
         "own": str(len(OWN_PATHS)),
         "signal_history": str(SIGNAL_ROWS),
@@ -111,65 +147,48 @@ def _step(rows: LaneRows, task: Task) -> list[str]:
         f"{name} = {whole.get(name, f'all_{name}')}[block * {height}:(block + 1) * {height}]"
         for name, height in heights.items()
     ]
-    late = "late = (now - signal_delay) % signal_history.shape[1]"
+    given = {name: name for name in ("now", "error_weight", "gas_weight", "steps_in_all")}
+    filled = rows.called(Call(step.phase(fill_signals), {"slot": "slot"})) if step.parts.late_signals else ["pass"]
+    held = rows.called(Call(step.phase(hold_chambers), {})) if step.parts.hands_chambers_on else []
+    readings = rows.called(Call(step.phase(remember_readings), given)) if step.parts.late_readings else []
+    within_bounds = [
+        f"{rows.cells[path]} = {add(within)}({rows.cells[path]}, bounds[0, {row}], bounds[1, {row}])"
+        for row, path in enumerate(task.observed_paths)
+    ]
+    observed = [
+        "if chosen[first + lane] == 0.0:",
+        "    continue",
+        rows.load("start"),
+        "step = moment - int(start.step)",
+        "sample = step // steps_per_sample",
+        *held,
+        "if step == 0:",
+        "    for slot in range(signal_history.shape[1]):",
+        # Late signals of an episode begin with the readings at its start.
+        *indent(indent(filled)),
+        f"now = {add(Now)}(step, sample, 1.0, 0, 0, late, 0, sample % slots, slots)",
+        *readings,
+        *rows.called(Call(step.phase(observe, {"task": task}), given)),
+        *within_bounds,
+    ]
     body = [
         *parts,
         "first = block * states.shape[1]",
         "width = min(states.shape[1], actions.shape[0] - first)",
+        "slots = signal_history.shape[1]",
         # A call with 0 steps senses and observes alone: this is how episodes begin.
         "if steps > 0:",
         "    for lane in range(states.shape[1]):",
         # Lanes without an environment take the action of the last one.
         "        place = min(first + lane, actions.shape[0] - 1)",
-        f"        {rows.cells['result.command']} = {given}",
-        f"    {call}",
-        *([late] if rows.program.late_signals else []),
-        *rows.over_lanes(_observed(rows, task)),
+        f"        {rows.cells['result.command']} = {command}(actions[place, 0], actions[place, actions.shape[1] - 1])",
+        "    advance(states, parameters, signal_history, command_history, record, trace, moment - steps, steps, -1, "
+        "steps_per_sample, 1.0, -1, 0, 0, signal_delay, command_delay)",
+        "late = (moment - signal_delay) % slots",
+        "for lane in range(width):",
+        *indent(observed),
     ]
     return [f"for block in range(all_states.shape[0] // {heights['states']}):", *indent(body)]
-
-
-def _observed(rows: LaneRows, task: Task) -> list[str]:
-    """Lines that sense, observe and judge one environment, and say whether its episode ends."""
-    program, add = rows.program, rows.add
-    groups = ["timing", "plant", "state", "result", "reference", "start", *(["walk"] if program.walks else [])]
-    held = [f"chambers = {add(held_chambers)}(plant, state.angle)"] if program.hands_chambers_on else []
-    reference = add(program.reference.value)
-    view, error, kept = (f"{add(function)}({given})" for function, given in (task.observed, task.error, task.kept))
-    observation = "observations[first + lane, {0}] = {1}({2}, bounds[0, {0}], bounds[1, {0}])"
-    # Late signals of an episode begin with the readings at its start.
-    stored = [f"signal_history[{row}, slot, lane] = {name}" for row, name in enumerate(SIGNALS)]
-    filled = ["for slot in range(signal_history.shape[1]):", *indent(stored)]
-    at_start = ["if step_index == 0:", *indent([*current_readings(rows), *filled])] if program.late_signals else []
-    pressures = f"true_1, true_2 = {pressures_of(rows, 'state')}"
-    weights = "error_weight, gas_weight, timing.period"
-    return [
-        "if chosen[first + lane] == 0.0:",
-        "    continue",
-        *[rows.load(group) for group in groups],
-        *[f"{name} = {row_expression(row, name, rows.cells, add)}" for name, row in OWN.items()],
-        "step_index = now - int(start.step)",
-        "sample_index = step_index // steps_per_sample",
-        "time = step_index * timing.step",
-        *held,
-        *at_start,
-        *(sense_gait(rows) if program.walks else sense(rows)),
-        f"wanted, wanted_rate, _ = {reference}(reference, time)",
-        f"requested = {add(Requested)}(wanted, wanted_rate)",
-        pressures,
-        f"torque = {add(actuator_torque)}(true_1, true_2, plant.torque_constant)",
-        "gas = state.supplied_mass - memory.supplied_mass",
-        f"memory = {kept}",
-        *[f"{rows.cells[path]} = {path}" for path in leaf_paths(Memory, "memory")],
-        f"view = {view}",
-        f"error = {error}",
-        *[observation.format(column, add(within), path) for column, path in enumerate(task.observed_paths)],
-        f"outcomes[{REWARD}, first + lane] = {add(finite)}({add(reward_of)}(error, gas, {weights}))",
-        f"outcomes[{ERROR}, first + lane] = {add(finite)}(error)",
-        f"outcomes[{SUPPLIED}, first + lane] = {add(finite)}(state.supplied_mass)",
-        f"outcomes[{FAILED}, first + lane] = 1.0 if result.failure_time <= time else 0.0",
-        f"outcomes[{THROUGH}, first + lane] = 1.0 if step_index >= steps_in_all else 0.0",
-    ]
 
 
 @dataclass(frozen=True, slots=True)

@@ -81,6 +81,19 @@ class WalkView(NamedTuple):
     command: float
 
 
+class Outcome(NamedTuple):
+    """What a step leads to: reward [-], error, gas from the supply so far [kg], 1 where it failed or is through.
+
+    Gas counts from the begin of the episode.
+    """
+
+    reward: float
+    error: float
+    supplied: float
+    failed: float
+    through: float
+
+
 def sensed_of(seen: Measurement | GaitMeasurement) -> Sensed:
     """What every task shows of a measurement."""
     return Sensed(
@@ -88,17 +101,23 @@ def sensed_of(seen: Measurement | GaitMeasurement) -> Sensed:
     )
 
 
-def view_torque(seen: Measurement, goal: Goal, memory: Memory, wanted: Requested, command: float) -> TorqueView:
+def view_torque(
+    seen: Measurement, goal: Goal, memory: Memory, wanted: Requested, command: float, time: float
+) -> TorqueView:
     """What is observed while a torque is followed."""
     return TorqueView(sensed=sensed_of(seen), requested=wanted.torque, requested_rate=wanted.rate, command=command)
 
 
-def view_angle(seen: Measurement, goal: Goal, memory: Memory, wanted: Requested, command: float) -> AngleView:
+def view_angle(
+    seen: Measurement, goal: Goal, memory: Memory, wanted: Requested, command: float, time: float
+) -> AngleView:
     """What is observed while the vane turns to an angle."""
     return AngleView(sensed=sensed_of(seen), requested=goal.angle, command=command)
 
 
-def view_walk(seen: GaitMeasurement, goal: Goal, memory: Memory, time: float, command: float) -> WalkView:
+def view_walk(
+    seen: GaitMeasurement, goal: Goal, memory: Memory, wanted: Requested, command: float, time: float
+) -> WalkView:
     """What is observed at a time [s] of a walk."""
     return WalkView(
         sensed=sensed_of(seen),
@@ -109,30 +128,30 @@ def view_walk(seen: GaitMeasurement, goal: Goal, memory: Memory, time: float, co
     )
 
 
-def remember(memory: Memory, supplied_mass: float) -> Memory:
+def remember(memory: Memory, supplied_mass: float, seen: Measurement, time: float) -> Memory:
     """The memory after a sample, with the gas [kg] that the supply has given by then."""
     return Memory(supplied_mass, memory.strike, memory.loaded)
 
 
-def remember_strike(memory: Memory, supplied_mass: float, heel_force: float, time: float) -> Memory:
+def remember_strike(memory: Memory, supplied_mass: float, seen: GaitMeasurement, time: float) -> Memory:
     """The memory of a walk after a sample, where the heel sensor shows a force [N] at a time [s]."""
     # Two thresholds, so that noise about one of them is not counted as a row of strikes.
-    strikes = (memory.loaded < 0.5) & (heel_force > LOADED)
-    stays = 0.0 if heel_force < UNLOADED else memory.loaded
+    strikes = (memory.loaded < 0.5) & (seen.heel_force > LOADED)
+    stays = 0.0 if seen.heel_force < UNLOADED else memory.loaded
     return Memory(supplied_mass, time if strikes else memory.strike, 1.0 if strikes else stays)
 
 
-def torque_error(wanted: float, torque: float) -> float:
+def torque_error(goal: Goal, wanted: Requested, angle: float, phase: float, torque: float) -> float:
     """Requested less true torque [N m]."""
-    return wanted - torque
+    return wanted.torque - torque
 
 
-def angle_error(goal: Goal, angle: float) -> float:
+def angle_error(goal: Goal, wanted: Requested, angle: float, phase: float, torque: float) -> float:
     """Requested less true angle [rad]."""
     return goal.angle - angle
 
 
-def stride_error(goal: Goal, phase: float, torque: float) -> float:
+def stride_error(goal: Goal, wanted: Requested, angle: float, phase: float, torque: float) -> float:
     """Torque of the profile at a phase of the true stride, in turns, less the true torque [N m]."""
     return profile_torque(goal.profile, phase) - torque
 
@@ -165,18 +184,18 @@ def valve_or_vent(action: float, other: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """A task: what is observed, and the source text of what differs in the kernel.
+    """A task: what is observed, and what its error is.
 
-    ``view`` has the observed numbers. ``observed`` makes one of them, ``error`` the error, ``kept`` the memory; each
-    is a function, and the names in the kernel that it gets. ``unit`` is the unit of the error. A task that ``walks``
-    is on a leg that walks.
+    ``view`` has the observed numbers. ``observed(seen, goal, memory, wanted, command, time)`` makes one of them,
+    ``error(goal, wanted, angle, phase, torque)`` the error, ``kept(memory, supplied_mass, seen, time)`` the memory.
+    ``unit`` is the unit of the error. A task that ``walks`` is on a leg that walks.
     """
 
     name: str
     view: type
-    observed: tuple[Callable[..., Any], str]
-    error: tuple[Callable[..., Any], str]
-    kept: tuple[Callable[..., Any], str]
+    observed: Callable[..., Any]
+    error: Callable[..., float]
+    kept: Callable[..., Memory]
     unit: str
     error_weight: float
     gas_weight: float
@@ -188,16 +207,15 @@ class Task:
         return leaf_paths(self.view, "view")
 
 
-_SUPPLIED = "memory, state.supplied_mass"
 TASKS = {
     task.name: task
     for task in (
         Task(
             "torque",
             TorqueView,
-            (view_torque, "seen, goal, memory, requested, result.command"),
-            (torque_error, "requested.torque, torque"),
-            (remember, _SUPPLIED),
+            view_torque,
+            torque_error,
+            remember,
             "N m",
             1.0,
             1.0,
@@ -205,9 +223,9 @@ TASKS = {
         Task(
             "angle",
             AngleView,
-            (view_angle, "seen, goal, memory, requested, result.command"),
-            (angle_error, "goal, state.angle"),
-            (remember, _SUPPLIED),
+            view_angle,
+            angle_error,
+            remember,
             "rad",
             10.0,
             1.0,
@@ -215,9 +233,9 @@ TASKS = {
         Task(
             "walk",
             WalkView,
-            (view_walk, "seen, goal, memory, time, result.command"),
-            (stride_error, "goal, walk.now.phase, torque"),
-            (remember_strike, f"{_SUPPLIED}, seen.heel_force, time"),
+            view_walk,
+            stride_error,
+            remember_strike,
             "N m",
             1.0,
             1.0,

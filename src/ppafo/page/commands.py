@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ppafo.cli.arguments import File, Overrides, Scenario
+from ppafo.arguments import File, Overrides, Scenario
 
 if TYPE_CHECKING:
     from ppafo.cli.output import Said
@@ -28,7 +28,7 @@ def workbench(
     if not is_page(out):
         check_new_file(out)
     names = list(scenarios) or list(DEFAULT)
-    page = workbench(names, overrides)
+    page = workbench(names, overrides=overrides)
     write_file(out, page)
     document = {"file": str(out), "bytes": len(page), "scenarios": names}
     return Said(f"written: {out} ({len(page) / 1e3:.0f} kB, {', '.join(names)})", document)

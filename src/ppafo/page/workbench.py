@@ -6,8 +6,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
+from pathlib import Path
 from typing import Any
 
+from ppafo.arguments import Overrides, checked
 from ppafo.errors import PpafoError, ScenarioError, UnitError
 from ppafo.loading import load_scenario
 from ppafo.page.html import block_of, packed_once, page_of
@@ -17,6 +19,7 @@ from ppafo.page.wasm import WasmModule, module_of
 from ppafo.page.words import words
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.overrides import over
+from ppafo.plugins import Plugins, name_plugins
 from ppafo.report.finding import LivePart
 from ppafo.report.setting_names import label_of
 from ppafo.report.style import PAGE_LOOKS
@@ -334,17 +337,18 @@ _TASKS = {"locked": "Torque task", "prescribed": "Moving ankle", "free": "Uncons
 _STEP = "Step response"
 
 
-def workbench(
-    scenarios: Iterable[str] = DEFAULT,
-    overrides: Sequence[str] = (),
-) -> bytes:
+@checked("scenarios", "overrides")
+def workbench(scenarios: Sequence[str | Path] = DEFAULT, *, overrides: Overrides = (), plugins: Plugins = ()) -> bytes:
     """Return a page, one file of HTML, in which scenarios are simulated again while their numbers are changed.
 
     ``scenarios`` are names or files of scenarios and walks; those with the same kind of motion share a tab.
     ``overrides`` change all of them. Each tab opens with its first two scenarios.
     ScenarioError for none, too many or two of one name; ProgramError where a program has to be built and cannot be.
+
+    ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
     """
-    content, modules, still = _content(list(scenarios), overrides, "page")
+    name_plugins(plugins)
+    content, modules, still = _content([str(scenario) for scenario in scenarios], tuple(overrides), "page")
     return page_of(TITLE, content, modules, still)
 
 

@@ -3,7 +3,7 @@
 import functools
 import json
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from importlib import resources
 from pathlib import Path
 from types import GenericAlias
@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field
 
+from ppafo.arguments import Name, Overrides, checked
 from ppafo.documents.models import NAME, make_schema, one_of, optional, table, validate
 from ppafo.documents.toml_text import TomlKind, beside, label
 from ppafo.errors import ParameterError, UnitError, nearest_name, refused_as
@@ -161,26 +162,43 @@ def list_sets() -> tuple[str, ...]:
     return _FILE.names()
 
 
-def load_device(name_or_path: str | Path, valve: str | None = None, overrides: Iterable[str] = ()) -> Device:
+@checked("parameter_set", "valve", "overrides", name_or_path="parameter_set")
+def load_device(
+    parameter_set: ParameterSet | str | Path,
+    *,
+    overrides: Overrides = (),
+    valve: Name | None = None,
+    plugins: Plugins = (),
+) -> Device:
     """Return the device of a parameter set with one of its valves (default: the set's own choice), in SI units.
 
     ``overrides`` are texts such as ``valve.area=12.6mm^2`` or ``supply.pressure=55 psi_g``. ParameterError for one of
     another valve than the one that is named.
+
+    ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
     """
-    overrides = tuple(overrides)
+    name_plugins(plugins)
     check_valve(overrides, valve, f"valve = '{valve}'")
-    parameter_set = apply_overrides(load_parameter_set(name_or_path), overrides, valve)
-    return build_device(parameter_set, valve)
+    loaded = parameter_set if isinstance(parameter_set, ParameterSet) else load_parameter_set(parameter_set)
+    return build_device(apply_overrides(loaded, overrides, valve=valve), valve)
 
 
-def load_parameter_set(name_or_path: str | Path, *, plugins: Plugins = ()) -> ParameterSet:
+@checked(name_or_path="parameter_set")
+def load_parameter_set(parameter_set: str | Path, *, plugins: Plugins = ()) -> ParameterSet:
     """Return a parameter set by its name in the package or by the path of a TOML file.
 
     ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
     """
     name_plugins(plugins)
-    content, file = _FILE.read(name_or_path), label(str(name_or_path))
-    return parse_parameter_set(content, file, Path(name_or_path).parent)
+    content, file = _FILE.read(parameter_set), label(str(parameter_set))
+    return parse_parameter_set(content, file, Path(parameter_set).parent)
+
+
+def set_or_load(parameter_set: ParameterSet | str | Path | None) -> ParameterSet | None:
+    """Return a parameter set as it is, or load it by name or path; None for None."""
+    if parameter_set is None or isinstance(parameter_set, ParameterSet):
+        return parameter_set
+    return load_parameter_set(parameter_set)
 
 
 def parse_parameter_set(content: bytes, file: str, folder: Path | None = None) -> ParameterSet:

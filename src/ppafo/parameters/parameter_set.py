@@ -1,12 +1,13 @@
 """A parameter set: every value with its origin, as it was given, and in SI; values changed by dotted path."""
 
 import math
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 
+from ppafo.arguments import Name, Overrides, checked
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.models import StrictTable, Text, Texts
 from ppafo.errors import ParameterError, UnitError, nearest_name
@@ -28,7 +29,7 @@ from ppafo.parameters.graph import (
     gauge_link,
 )
 from ppafo.parameters.overrides import CHOSEN_VALVE, NAMED_VALVE, Given, one_path, other_forms, override_set
-from ppafo.units import base_value, format_quantity, from_si, split_number, to_si
+from ppafo.units import SI, base_value, format_quantity, from_si, split_number, to_si
 
 if TYPE_CHECKING:  # few devices have a measured actuator
     from ppafo.model.actuators.table import Table
@@ -267,8 +268,11 @@ def entry_text(entry: Entry | TextEntry | FlagEntry) -> str:
 SOURCE = "override"
 
 
-def apply_overrides(parameter_set: ParameterSet, overrides: Iterable[str], valve: str | None = None) -> ParameterSet:
+@checked("parameter_set", "overrides", "valve")
+def apply_overrides(parameter_set: ParameterSet, overrides: Overrides, *, valve: Name | None = None) -> ParameterSet:
     """Return the set with values replaced; each override is a text such as ``valve.area=12.6mm^2``, in any order.
+
+    A dictionary of paths does as well, in which a number is in SI.
 
     ``valve.X`` means the valve that is chosen (``valve``, else the set's default), ``valves.NAME.X`` one by name.
     Naming another gas brings that gas's molar mass and heat capacity ratio, unless they are given too; giving an
@@ -318,6 +322,7 @@ def _with_number(parameter_set: ParameterSet, path: str, given: Given) -> Parame
         raise ParameterError(f"override '{given}': {parameter_set.file} has no value '{given.typed}'{hint}{worked}")
     try:
         value, unit = split_number(given.text)
+        unit = declared[path].unit if unit == SI else unit
         entry = Entry(value=value, unit=unit, origin="assumed", source=SOURCE, note=_before(parameter_set, path))
         entry_in_si(entry, declared[path], atmospheric_pressure(parameter_set))
     except UnitError as error:

@@ -3,8 +3,8 @@
 import shlex
 from collections.abc import Sequence
 
+from ppafo.arguments import Count, Folder, Name, Overrides, Scenario
 from ppafo.cli import output
-from ppafo.cli.arguments import Count, Folder, Name, Overrides, Scenario
 from ppafo.cli.output import Said
 from ppafo.errors import ScenarioError, nearest_name
 
@@ -67,7 +67,7 @@ def export_firmware(
     if table:
         found = words.table(TARGETS if target is None else (target,), samples)
     else:
-        found = words.tried(scenarios, target or TARGETS[0], samples, overrides)
+        found = words.tried(scenarios, target or TARGETS[0], samples, tuple(overrides))
     code = output.EXIT_GOOD if found.agrees else output.EXIT_CHECK_FAILED
     said = Said(found.text, found.document, "processor", code, draw=found.draw)
     if out is not None:

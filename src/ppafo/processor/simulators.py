@@ -140,7 +140,7 @@ def built(contents: Mapping[str, bytes], folder: Path, goals: Sequence[str] = ("
     """Write the files of a firmware into a folder and make what is asked for; SimulationError where that fails."""
     for name, content in contents.items():
         (folder / name).write_bytes(content)
-    done = asked(["make", "-C", str(folder), *goals])
+    done = asked(["make", "-C", str(folder), *goals], scratch=folder.absolute())
     if done.returncode != 0:
         # Make says which goal failed; the line of the compiler says why.
         said = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr)

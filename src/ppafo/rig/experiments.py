@@ -101,7 +101,9 @@ def record_static_torque(request: Request) -> Outcome:
     limit against the way the pressure goes: the limit of the rig's law at speed 0, a play operator without inertia, for
     which no solver is needed.
     """
-    device = real_device(load_device(request.parameter_set, request.valve, request.overrides), request.preset)
+    device = real_device(
+        load_device(request.parameter_set, overrides=request.overrides, valve=request.valve), request.preset
+    )
     rising = np.arange(1, round(HIGHEST / STEP) + 1) * STEP
     once = np.concatenate([rising, rising[::-1]])
     directions = np.repeat([1.0, -1.0], rising.size)
@@ -216,7 +218,9 @@ def record_steady_leak(request: Request) -> Outcome:
 
 
 def _bench(request: Request) -> tuple[Device, RigPhysics]:
-    device = real_device(load_device(request.parameter_set, request.valve, request.overrides), request.preset)
+    device = real_device(
+        load_device(request.parameter_set, overrides=request.overrides, valve=request.valve), request.preset
+    )
     return device, rig_physics(device, request.preset)
 
 
@@ -248,7 +252,7 @@ def record_step_response(request: Request) -> Outcome:
 def record_torque_task(request: Request) -> Outcome:
     """Return the torque task of figure 8 with the controller that belongs to the kind of valve."""
     # Overrides may be of the scenario, which is chosen by the valve first.
-    kind = load_device(request.parameter_set, request.valve).valve.kind
+    kind = load_device(request.parameter_set, valve=request.valve).valve.kind
     scenario = _of_package(f"torque-task-{kind}", request)
     return _recorded("torque-task", scenario, rig_run(scenario, request), (*_IN_MOTION, "reference", "torque"))
 
@@ -269,7 +273,7 @@ def record_vane_leak(request: Request) -> Outcome:
     sections = {section.partition(".")[0] for section in SECTIONS} | {"valve", "valves"}
     # What belongs to the scenario is no override of a device.
     of_device = [item for item in request.overrides if item.strip().partition(".")[0] in sections]
-    actuator = load_device(request.parameter_set, request.valve, of_device).actuator
+    actuator = load_device(request.parameter_set, overrides=of_device, valve=request.valve).actuator
     motion = {"kind": "locked", "angle": f"{0.5 * (actuator.angle_min + actuator.angle_max)!r} rad"}
     initial = {"pressure_1": "supply", "pressure_2": "atmosphere"}
     scenario = _of_bench("vane-leak", request, motion, initial, "30 s")

@@ -19,8 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.engine.continuous_time import SAME_TIME, Roots, after_stop, roots_at_rest, roots_sliding
+from ppafo.engine.entries import ARRAY, FLOAT, HEADER, INLINE, entry_text, with_arrays
 from ppafo.engine.led_leg import torque_of_leg
-from ppafo.engine.loading import ARRAY, FLOAT, HEADER, INLINE, entry_text, load_source, with_arrays
+from ppafo.engine.loading import load_source
 from ppafo.engine.rows import leaf_paths, numbers, rebuild, row_expression
 from ppafo.engine.run import Run
 from ppafo.engine.source_text import SourceCollector

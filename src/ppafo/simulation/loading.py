@@ -163,11 +163,11 @@ def read_hardware(reading: Reading, request: ScenarioRequest, overrides: tuple[s
                 f"--set device.valve={parameter_set.default_valve}"
             )
         name = chosen_valve(parameter_set, valve)
-        parameter_set = apply_device_overrides(parameter_set, section.get("overrides", ()), valve)
+        parameter_set = apply_device_overrides(parameter_set, section.get("overrides", ()), valve=valve)
     except ParameterError as error:
         raise _of_device(reading, error) from error
     before = atmospheric_pressure(parameter_set) if overrides else None
-    changed = apply_device_overrides(parameter_set, overrides, valve)
+    changed = apply_device_overrides(parameter_set, overrides, valve=valve)
     given = {split_override(text, ScenarioError).typed for text in overrides}
     return Hardware(changed, name, links_of_set(changed, given, before))
 

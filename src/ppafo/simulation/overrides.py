@@ -25,7 +25,7 @@ from ppafo.parameters.overrides import (
     split_override,
 )
 from ppafo.simulation.declaration import ARITHMETIC, OF_A_VANE, Declared, kind_at, no_arithmetic, value_at
-from ppafo.units import number_text
+from ppafo.units import SI, number_text
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _SEED, _VALVE = "sensors.seed", "device.valve"
@@ -209,7 +209,7 @@ def _set(document: dict[str, Any], path: str, text: str, file: str, declared: De
         table.pop(other.rpartition(".")[2], None)
     if path == _SEED:
         try:
-            table[name] = int(number_text(text))
+            table[name] = int(number_text(text.removesuffix(SI).strip()))
         except ValueError as error:
             raise ScenarioError(f"override '{path}={text}': must be a whole number") from error
         return

@@ -12,15 +12,14 @@ import numpy as np
 
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.kind import ControllerKind, ProfileKind
-from ppafo.engine.components import GasScheme
-from ppafo.engine.program import NoParameters, Program
+from ppafo.engine.program import FeedPhases, FootPhases, GasPhases, Program
 from ppafo.engine.rows import rebuilt
 from ppafo.engine.run import Lines, Run, Walk
 from ppafo.engine.scheme.actuators import volumes_of
-from ppafo.engine.scheme.isothermal_gas import ISOTHERMAL
 from ppafo.engine.scheme.pneumatics import KEPT_OF_PRESSURE, is_slow
+from ppafo.engine.step import isothermal
+from ppafo.engine.step.lane import NoParameters
 from ppafo.errors import ScenarioError
-from ppafo.kinds import kind_at
 from ppafo.model.actuators.vane import KIND as VANE
 from ppafo.model.catalog import ACTUATORS, VALVES
 from ppafo.model.columns import (
@@ -200,17 +199,15 @@ def compose_run(
     )
 
 
-_ENERGY_BALANCE = "ppafo.engine.scheme.thermal_gas:ENERGY_BALANCE"
-_REAL = "ppafo.engine.scheme.real_gas:REAL"
-_LINES = "ppafo.engine.scheme.supply_lines:LINES"
-"""Where components of programs are that most runs do not have."""
-
-
-def _gas_scheme(components: Components, effects: Sequence[Effect]) -> GasScheme:
+def _gas(components: Components, effects: Sequence[Effect]) -> GasPhases:
     """Return what the gas keeps or exchanges; ScenarioError for an effect on the density of gas that has no step."""
     real = next((effect for effect in effects if gas_density in effect.laws), None)
+    if real is None and components.thermal is None:
+        return isothermal
     if real is None:
-        return ISOTHERMAL if components.thermal is None else kind_at(_ENERGY_BALANCE)
+        from ppafo.engine.step import energy_balance  # most runs keep their temperature
+
+        return energy_balance
     lacks = {
         "gas_model.kind=thermal": components.thermal is not None,
         "[supply_line]": components.supply_lines is not None,
@@ -221,13 +218,33 @@ def _gas_scheme(components: Components, effects: Sequence[Effect]) -> GasScheme:
         if is_there:
             off = " and ".join(f"{real.section}.{name}=0" for name in real.switch)
             raise ScenarioError(f"effect '{real.name}' does not work together with {what} yet; omit it, or set {off}")
-    scheme: GasScheme = kind_at(_REAL)
-    return scheme
+    from ppafo.engine.step import not_ideal  # most runs have ideal gas
+
+    return not_ideal
+
+
+def _feed(components: Components) -> FeedPhases | None:
+    """Return what feeds the valve."""
+    if components.supply_lines is None:
+        return None
+    from ppafo.engine.step import lines  # most runs have none
+
+    return lines
+
+
+def _foot(components: Components) -> FootPhases | None:
+    """Return how a foot on a prescribed shank goes through a step."""
+    if components.leg is None:
+        return None
+    from ppafo.engine.step import foot  # few vanes carry a leg
+
+    return foot
 
 
 def _program(components: Components, steps: Steps, walk: Walk | None, has_delay: bool) -> Program:
     """Return what the lanes are composed of."""
     is_late, effects = first(components.signal_delay) > 0.0, effects_of(components.device, components.sections)
+    worn = None if walk is None else walk.groups()
     return Program(
         actuator=ACTUATORS[components.device.actuator.kind].model,
         valve=components.valve,
@@ -238,14 +255,17 @@ def _program(components: Components, steps: Steps, walk: Walk | None, has_delay:
         late_commands=has_delay,
         late_signals=walk is None and is_late,
         late_readings=walk is not None and is_late,
-        gas=_gas_scheme(components, effects),
-        leg=None if walk is None else walk.groups().scheme,
-        feed=None if components.supply_lines is None else kind_at(_LINES),
+        gas=_gas(components, effects),
+        leg=None if worn is None else worn.leg,
+        takes_task_sequence=worn is not None and worn.takes_task_sequence,
+        faults=None if worn is None else worn.faults,
+        feed=_feed(components),
         is_adaptive=bool(first(steps.needs_parts)),
         # A broken number of steps to a sample puts samples inside steps.
         samples_inside=bool(first(steps.record_every % 1.0)),
         effects=effects,
         shank=None if components.leg is None else components.leg.shank,
+        foot=_foot(components),
     )
 
 

@@ -2,14 +2,13 @@
 
 import math
 from collections.abc import Callable
-from types import ModuleType
 from typing import Any, final
 
 import numpy as np
 
 from ppafo.control.kind import PythonController
-from ppafo.engine.lanes import Batch, BatchResult, LaneBlock, group_of, load_program, samples_in
-from ppafo.engine.program import python_place
+from ppafo.engine.lanes import Advancing, Batch, BatchResult, LaneBlock, group_of, load_program, samples_in
+from ppafo.engine.linking import python_place
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.scheme.actuators import measurement_of
 from ppafo.errors import ScenarioError, SimulationError
@@ -23,7 +22,7 @@ from ppafo.model.valves.kind import VENT, VENTS_ABOVE
 class SampledRun:
     """A batch of one in progress, whose command [-] somebody else gives sample by sample."""
 
-    def __init__(self, batch: Batch, module: ModuleType | None = None) -> None:
+    def __init__(self, batch: Batch, module: Advancing | None = None) -> None:
         program, clock = batch.program, batch.clock
         self.samples = math.ceil(clock.step_count / clock.steps_per_sample)
         self.taken = 0

@@ -5,13 +5,13 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from ppafo.control.kind import OPEN_LOOP
-from ppafo.engine.lane_source import SAME_MOMENT
 from ppafo.engine.lanes import Floats
+from ppafo.engine.linking import place_over_samples
 from ppafo.engine.over_samples import over_samples
-from ppafo.engine.program import place_over_samples
 from ppafo.engine.rows import leaf_paths, rebuilt
 from ppafo.engine.run import Run
 from ppafo.engine.scheme.actuators import pressures_of, torque_of
+from ppafo.engine.step.lane import SAME_MOMENT
 from ppafo.metrics import evaluate
 from ppafo.metrics.metric import Metric
 from ppafo.model.gas import energy_per_content

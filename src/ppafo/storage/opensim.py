@@ -23,9 +23,10 @@ from pathlib import Path
 import numpy as np
 
 from ppafo.constants import STANDARD_GRAVITY
-from ppafo.errors import DataError, first_twice, one_line
+from ppafo.errors import DataError, one_line
 from ppafo.signals import Channel, Recording, RecordingKind
 from ppafo.signals.recording import TIME, Floats
+from ppafo.storage.doubled_names import doubled, said_of_doubled, told_apart, without_copies
 from ppafo.storage.files import read_bytes, text_of, write_file
 
 _END = "endheader"
@@ -78,7 +79,8 @@ def read_opensim(path: str | Path, gaps: Sequence[str] = ()) -> OpenSimTable:
     try:
         lines = _text_lines(path)
         header = _header(lines)
-        number, labels = _labels(lines, header)
+        number, written = _labels(lines, header)
+        labels = told_apart(written)
         # The numbers, row by row; blank lines may only follow the last row.
         first = number + 1
         last = len(lines)
@@ -118,8 +120,10 @@ def read_opensim(path: str | Path, gaps: Sequence[str] = ()) -> OpenSimTable:
             remarks.insert(0, said)
     except DataError as error:
         raise DataError(f"{path}: {error}".replace(f"{path}: {path}:", f"{path}:")) from error
-    columns, doubled = _columns(labels, values)
-    remarks += [f"line {number}: there are two columns {label!r}, which differ: neither is read" for label in doubled]
+    twins = doubled(written[1:], labels[1:])
+    named = {label: values[:, index] for index, label in enumerate(labels) if index > 0}
+    columns = without_copies(named, twins)
+    remarks += said_of_doubled(twins, columns, "columns")
     return OpenSimTable(
         header.name, time, columns, header.in_degrees, number + 1, tuple(remarks), header.kind, header.is_old
     )
@@ -171,17 +175,6 @@ def _labels(lines: list[str], header: _Header) -> tuple[int, list[str]]:
                 raise DataError(f"line {number}: column {labels.index('') + 1} has no name")
             return number, labels
     raise DataError(f"has nothing after '{_END}': the file is cut off")
-
-
-def _columns(labels: Sequence[str], values: Floats) -> tuple[dict[str, Floats], list[str]]:
-    """Return the columns by label, without time; and the labels of those that are there with different numbers."""
-    columns: dict[str, Floats] = {}
-    doubled: dict[str, None] = {}
-    for index, label in enumerate(labels[1:], start=1):
-        if label in columns and not np.array_equal(columns[label], values[:, index], equal_nan=True):
-            doubled[label] = None
-        columns.setdefault(label, values[:, index])
-    return {label: column for label, column in columns.items() if label not in doubled}, list(doubled)
 
 
 def _number(cell: str, line: int, label: str, gaps: Sequence[str] = ()) -> float:
@@ -263,11 +256,15 @@ _UNITS = ("mm", "cm", "m")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MarkerTable:
-    """Markers over time [s]: coordinates (3, frames) by name in ``unit``; NaN where a marker was not seen."""
+    """Markers over time [s]: coordinates (3, frames) by name in ``unit``; NaN where a marker was not seen.
+
+    ``remarks`` say which have the names of others in the file.
+    """
 
     time: Floats
     markers: Mapping[str, Floats]
     unit: str
+    remarks: tuple[str, ...] = ()
 
 
 def read_trc(path: str | Path) -> MarkerTable:
@@ -287,11 +284,10 @@ def read_trc(path: str | Path) -> MarkerTable:
         cells = [cell.strip() for cell in line.split("\t")]
         if len(cells) < 3 or cells[1].lower() != "time":
             raise DataError("line 4: must begin with 'Frame#', 'Time' and the names of markers, separated by tabs")
-        names = [name for name in cells[2:] if name]
-        twice = first_twice(names)
-        if twice is not None or not names:
-            what = "no marker" if twice is None else f"two markers {one_line(twice)[:_LONGEST_SHOWN]!r}"
-            raise DataError(f"line 4: names {what}; every marker needs a name of its own")
+        written = [name for name in cells[2:] if name]
+        if not written:
+            raise DataError("line 4: names no marker; every marker needs a name of its own")
+        names = told_apart(written)
         labels = [f"{axis} of {name}" for name in names for axis in "XYZ"]
         rows, wanted = [], 2 + len(labels)
         numbers = [number for number, line in enumerate(lines, 1) if number > _HEAD_LINES and line.strip()]
@@ -310,8 +306,10 @@ def read_trc(path: str | Path) -> MarkerTable:
         _check_clock(values[:, 0], numbers)
     except DataError as error:
         raise DataError(f"{path}: {error}".replace(f"{path}: {path}:", f"{path}:")) from error
-    markers = {name: values[:, 1 + 3 * place : 4 + 3 * place].T for place, name in enumerate(names)}
-    return MarkerTable(values[:, 0], markers, unit)
+    twins = doubled(written, names)
+    named = {name: values[:, 1 + 3 * place : 4 + 3 * place].T for place, name in enumerate(names)}
+    markers = without_copies(named, twins)
+    return MarkerTable(values[:, 0], markers, unit, tuple(said_of_doubled(twins, markers, "markers")))
 
 
 _ANGLES = {"ankle_angle": "{}", "angle": "{}", "healthy_angle": "healthy_{}"}

@@ -14,6 +14,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from ppafo.arguments import Pressure, checked
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.json_text import json_document, json_text
 from ppafo.documents.regular_file import read_regular_file
@@ -233,6 +234,7 @@ def check_result_folder(folder: str | Path) -> None:
     check_owned_folder(Path(folder), _RESULT)
 
 
+@checked()
 def read_result(folder: str | Path) -> StoredResult:
     """Return what a result folder holds. DataError for a folder that holds none."""
     place = Path(folder)
@@ -271,7 +273,8 @@ WALK_RECORDING = "recording.nc"
 """What the folder of a walk has in place of a result."""
 
 
-def read_recording(path: str | Path, atmosphere: float = STANDARD_ATMOSPHERE) -> Recording:
+@checked("path", "atmosphere")
+def read_recording(path: str | Path, *, atmosphere: Pressure = STANDARD_ATMOSPHERE) -> Recording:
     """Return the recording in a ``.nc`` file or a table of text such as ``.csv``, or in a result folder, of a walk too.
 
     Gauge pressure in a CSV file counts from ``atmosphere`` [Pa absolute]. DataError for a file that is not usable.

@@ -110,14 +110,14 @@ def with_new_noise(columns: Columns) -> Columns:
 
 def study_of(
     study: Study | str | Path | Mapping[str, Any],
-    overrides: Sequence[str] = (),
+    overrides: Iterable[str] = (),
     draws: int | None = None,
     seed: int | None = None,
 ) -> Study:
     """Return a study as it is, or as ``load_study`` reads a name, file or data; StudyError for both at once."""
     if not isinstance(study, Study):
-        return load_study(study, overrides, draws, seed)
-    if overrides or draws is not None or seed is not None:
+        return load_study(study, overrides, draws=draws, seed=seed)
+    if tuple(overrides) or draws is not None or seed is not None:
         raise StudyError("a loaded Study takes no overrides, draws or seed; give them to load_study, or give its name")
     return study
 
@@ -168,7 +168,7 @@ def choose_configuration(study: Study, name: str | None) -> Configuration:
 
 
 def drawn_in(
-    study: Study | str | Path | Mapping[str, Any], overrides: Sequence[str], name: str | None, independent: bool = False
+    study: Study | str | Path | Mapping[str, Any], overrides: Iterable[str], name: str | None, independent: bool = False
 ) -> tuple[Study, Configuration, Uncertainty]:
     """Return a study, one of its configurations, and what is drawn in that, the noise of the sensors with it.
 

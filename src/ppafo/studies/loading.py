@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ppafo.arguments import Count, Overrides, Seed, checked
 from ppafo.documents.models import validate
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import (
@@ -41,12 +42,13 @@ def list_studies() -> tuple[str, ...]:
     return STUDY_FILES.names()
 
 
+@checked("study", "overrides", "draws", "seed")
 def load_study(
     study: str | Path | Mapping[str, Any],
-    overrides: Sequence[str] = (),
-    draws: int | None = None,
-    seed: int | None = None,
+    overrides: Overrides = (),
     *,
+    draws: Count | None = None,
+    seed: Seed | None = None,
     plugins: Plugins = (),
 ) -> Study:
     """Return a study by its name in the package, by the path of a TOML file, or from data laid out as such a file.
@@ -65,9 +67,10 @@ def load_study(
     given = {key: value for key, value in (("runs", draws), ("seed", seed)) if value is not None}
     with refused_as(StudyError, source.file, StudyError):
         # What the command line changes is written into the document, as if it stood in the file.
-        if overrides:
+        changes = tuple(overrides)
+        if changes:
             for table, item in zip(document["configurations"], parsed.configurations, strict=True):
-                changed = _configuration(item, source.folder, overrides).scenario
+                changed = _configuration(item, source.folder, changes).scenario
                 table["overrides"] = list(changed.origin.overrides)
         if given and parsed.sample is None:
             raise StudyError(

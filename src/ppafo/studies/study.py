@@ -2,13 +2,13 @@
 
 import math
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
 from ppafo.control.kind import OPEN_LOOP
-from ppafo.engine.lane_samples import TRACED
+from ppafo.engine.channels import TRACED
 from ppafo.errors import StudyError, UnitError, first_twice, nearest_name, refused_as
 from ppafo.loading import reloaded, scenario_or_load
 from ppafo.metrics import METRICS
@@ -186,7 +186,7 @@ Configurations = Mapping[str, Scenario | str | Path] | Sequence[Scenario | str |
 
 
 def choose_configurations(
-    configurations: Configurations | None, study: Study | None, overrides: Sequence[str]
+    configurations: Configurations | None, study: Study | None, overrides: Iterable[str]
 ) -> tuple[Configuration, ...]:
     """Return the given scenarios, else the configurations of the study; at least two, each with its own name."""
     # Distributions that hold in some configurations only name those of the study, not the ones given here.
@@ -210,17 +210,19 @@ def choose_configurations(
         found = tuple(map(Configuration, names, scenarios))
     if len(found) < 2:
         raise StudyError(f"a comparison needs at least two configurations, there is {len(found)}")
-    return tuple(replace(item, scenario=with_overrides(item.scenario, overrides)) for item in found)
+    changes = tuple(overrides)
+    return tuple(replace(item, scenario=with_overrides(item.scenario, changes)) for item in found)
 
 
-def with_overrides(scenario: Scenario, overrides: Sequence[str]) -> Scenario:
+def with_overrides(scenario: Scenario, overrides: Iterable[str]) -> Scenario:
     """Return a scenario with overrides; StudyError where it was changed in Python, which would be lost.
 
     A Python object that controls it stays in charge.
     """
-    if not overrides:
+    changes = tuple(overrides)
+    if not changes:
         return scenario
-    of_object = [text for text in overrides if scenario.controller.custom is not None and _SETTING.match(text)]
+    of_object = [text for text in changes if scenario.controller.custom is not None and _SETTING.match(text)]
     if of_object:
         raise StudyError(f"override '{of_object[0]}': scenario '{scenario.name}' is controlled by a Python object")
     # Overrides load the file anew, so what was replaced in Python would silently come back.
@@ -228,4 +230,4 @@ def with_overrides(scenario: Scenario, overrides: Sequence[str]) -> Scenario:
         raise StudyError(
             f"scenario '{scenario.name}' was changed in Python; overrides need the scenario as it is in its file"
         )
-    return reloaded(scenario, overrides)
+    return reloaded(scenario, changes)

@@ -281,7 +281,7 @@ def stated_normal(place: VariedPath, scenario: Scenario) -> tuple[NormalAround, 
     # What the set reports with the overrides of the scenario: one that replaces a value takes its uncertainty away.
     parameters = load_parameter_set(set_name(origin.parameter_set, folder))
     for given in (origin.content["device"].get("overrides", ()), own):
-        parameters = apply_overrides(parameters, given, origin.valve)
+        parameters = apply_overrides(parameters, given, valve=origin.valve)
     inside = f"valves.{origin.valve}.{path.removeprefix('valve.')}" if path.startswith("valve.") else path
     entry = parameters.numbers.get(inside)
     if entry is None or not entry.uncertainty:

@@ -15,7 +15,8 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from dataclasses import dataclass, field
 from importlib.resources import files
 
-from ppafo.engine.lane_source import INLINE, write_lanes
+from ppafo.engine.entries import INLINE
+from ppafo.engine.lane_source import write_lanes
 from ppafo.engine.program import Program
 from ppafo.engine.source_text import SourceCollector
 from ppafo.translation import typed

@@ -1,4 +1,4 @@
-"""A program built from its C by a compiler of this machine; it does what the module compiled by Numba does.
+"""A program built from its C by a compiler of this machine; it does what Python does with the composed text.
 
 Handing an array to C costs Python about a microsecond, a number a twentieth of that. So the arrays of an entry are
 packed into one block of memory, once where they stay the same.
@@ -137,7 +137,7 @@ _NUMBERS: dict[Scalar, Any] = {FLOAT: ctypes.c_double, INT: ctypes.c_int64}
 
 @dataclass(frozen=True, slots=True)
 class NativeEntry:
-    """An entry of a library, called as an entry compiled by Numba: arrays, then numbers.
+    """An entry of a library, called as Python calls it: arrays, then numbers.
 
     ``function`` takes its arrays, of these dimensions, one after another as ``layout`` writes each ``ppafo_array``.
     """
@@ -222,12 +222,13 @@ def load_entries(library: Path, entries: Entries) -> dict[str, NativeEntry]:
 FOR_GCC = ("-fno-thread-jumps", "-fno-ssa-phiopt", "-fno-tree-pre", "--param", "sra-max-scalarization-size-Ospeed=4096")
 """What lets gcc take lanes side by side: without them it makes jumps of choices first. The bits stay as they are."""
 _LIBRARY_AS_IT_RUNS = tuple(f"-fno-builtin-{name}" for name in sorted(LIBRARY))
-"""Else a compiler works out what it can by itself, to other last bits than the library's, which Numba calls."""
+"""Else a compiler works out what it can by itself, to other last bits than the library's, which Python calls."""
 _THIS_PROCESSOR = "-march=native" if platform.machine().lower() in ("x86_64", "amd64", "i686") else "-mcpu=native"
 _WIDEST_VECTORS = ("-mprefer-vector-width=512",) if _THIS_PROCESSOR.startswith("-march") else ()
 _LIBRARY_FILE = {"win32": "program.dll", "darwin": "program.dylib"}.get(sys.platform, "program.so")
-COMPILERS = ("clang", "gcc", "zig")
-"""In the order of preference: lanes are about as quick by each."""
+COMPILERS = ("gcc", "clang", "zig")
+"""In the order of preference: most lanes are about as quick by each, a slow valve takes four times as long by the last
+two."""
 _INTERRUPTED = (-signal.SIGINT, -signal.SIGTERM)
 _PASSING = (
     "no space left",
@@ -292,7 +293,8 @@ class CCompiler:
                 library = _compiled(translated, Path(folder), self.command, self.flags)
                 _fill(module, library, entries_of(source))
         except OSError as error:
-            raise CompilerError(f"what {self.name} makes cannot be kept for an instant: {reason(error)}") from error
+            problem = f"what {self.name} makes cannot be kept for an instant: {reason(error)}"
+            raise CompilerError(problem, passing=True) from error
 
     def run_text(self, source: str, path: str, module: ModuleType) -> None:
         """Load the library beside ``path``."""

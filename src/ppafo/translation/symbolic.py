@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
 
-from ppafo.engine.program import link_effects
+from ppafo.engine.linking import link_effects
 from ppafo.engine.rows import is_number, members
 from ppafo.engine.source_text import SourceCollector, emitted_name, is_row
 from ppafo.errors import ProgramError, SimulationError

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
-from ppafo.engine.loading import entry_types
+from ppafo.engine.entries import entry_types
 
 
 @dataclass(frozen=True, slots=True)

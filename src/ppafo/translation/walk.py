@@ -5,15 +5,17 @@ type, so that it is bound here. What is outside the subset is refused with the f
 """
 
 import ast
+import linecache
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field
 from itertools import chain
-from typing import Any
+from typing import Any, Protocol
 
+from ppafo.engine.compilers import UntranslatableError
 from ppafo.engine.plain_python import parse_module, place_in, refusal
-from ppafo.errors import ProgramError
+from ppafo.errors import ProgramError, nearest_name
 from ppafo.translation import typed
 from ppafo.translation.scopes import Names, changed, needed
 from ppafo.translation.typed import (
@@ -57,7 +59,7 @@ class Expressions:
     """Expressions of one function: its names with their types, those that only count up from 0, rows and functions.
 
     ``library`` has the functions of the C library that it may call. ``made`` gives a function for types of its
-    parameters, ``refused`` the error for a place.
+    parameters, ``refused`` the error for what has no translation, ``mistaken`` that for what has no meaning either.
     """
 
     types: Mapping[str, Type]
@@ -67,6 +69,7 @@ class Expressions:
     library: frozenset[str]
     made: Callable[[str, tuple[Type, ...]], Function]
     refused: Callable[[ast.AST, str], ProgramError]
+    mistaken: "Mistaken"
 
     def term(self, node: ast.expr) -> Term:
         """The value of an expression."""
@@ -136,7 +139,7 @@ class Expressions:
         owner = self.term(node.value)
         row = owner.type.row if isinstance(owner.type, Shared) else owner.type
         if not isinstance(row, Row) or node.attr not in dict(row.fields):
-            raise self.refused(node, f"'{ast.unparse(node)}' is no field")
+            raise self.mistaken(node, _without_field(ast.unparse(node.value), node.attr, row), f".{node.attr}")
         return typed.field_of(owner, node.attr)
 
     def _of_subscript(self, node: ast.Subscript) -> Term:
@@ -240,6 +243,7 @@ class Expressions:
                 raise self.refused(node, f"'{ast.unparse(node)}', {problem}")
             return Term("pow", FLOAT, parts)
         sign = SIGN_OF.get(type(node.op), "")
+        self.check_sides(node, sign, self.term(node.left), self.term(node.right))
         left, right = self.scalar(node.left, INT), self.scalar(node.right, INT)
         is_whole = left.type == right.type == INT
         if not sign or (not is_whole and sign in WHOLE_ONLY | {"//", "%"}):
@@ -250,6 +254,12 @@ class Expressions:
         kind = INT if is_whole and sign != "/" else FLOAT
         return Term(sign, kind, (converted(left, kind), converted(right, kind)))
 
+    def check_sides(self, node: ast.expr, sign: str, left: Term, right: Term) -> None:
+        """Refuse a sign between a number and what is none. ProgramError says which it stands between."""
+        if isinstance(left.type, Scalar) != isinstance(right.type, Scalar):
+            sides = f"{kind_of(left.type)} and {kind_of(right.type)}"
+            raise self.mistaken(node, f"'{sign}' cannot be compiled for {sides}, in '{{written}}'")
+
     def _of_boolop(self, node: ast.BoolOp) -> Term:
         parts = [self.term(item) for item in node.values]
         if any(part.type != BOOL for part in parts):
@@ -257,6 +267,9 @@ class Expressions:
         return _linked(node, parts)
 
     def _of_compare(self, node: ast.Compare) -> Term:
+        sides = [self.term(item) for item in (node.left, *node.comparators)]
+        for op, left, right in zip(node.ops, sides, sides[1:], strict=False):
+            self.check_sides(node, SIGN_OF.get(type(op), ""), left, right)
         values = [self.scalar(item, INT) for item in (node.left, *node.comparators)]
         # A chain of comparisons is joined by "and"; its terms are free of side effects, so each may stand twice.
         made: Term | None = None
@@ -327,8 +340,13 @@ class Expressions:
         # Defaults first, then arguments by place, then by name: the last one holds.
         given |= dict(zip(names, map(self.term, node.args), strict=False))
         given |= {str(item.arg): self.term(item.value) for item in node.keywords}
-        if set(given) != set(names):
-            raise self.refused(node, f"'{ast.unparse(node)}' does not give every argument")
+        # What functions call each other with is known since they were composed; this is a call of the engine's own.
+        missing, own = [item for item in names if item not in given], self.definitions[name]
+        if missing or len(node.args) > len(placed) or len(given) > len(names):
+            problem = f"missing a required argument: '{missing[0]}'" if missing else "too many arguments"
+            called = f"({', '.join(map(ast.unparse, node.args))})"
+            problem = f"{{name}}({', '.join(names)}): the engine calls it with {called}: {problem}"
+            raise self.mistaken(own, problem)
         types = tuple(given[item].type for item in names)
         # An array of known shape is a local one, which C hands over as a pointer of another type.
         if any(isinstance(kind, Array) and kind.shape for kind in types):
@@ -372,6 +390,37 @@ def _linked(node: ast.BoolOp, parts: list[Term]) -> Term:
     for part in parts[1:]:
         made = Term(SIGN_OF[type(node.op)], BOOL, (made, part))
     return made
+
+
+class Mistaken(Protocol):
+    """The error for a mistake: its place in the composed text, what it is, and what the line has that is at fault."""
+
+    def __call__(self, where: ast.AST, problem: str, sought: str = "") -> ProgramError:
+        """Make it."""
+
+
+def _as_written(problem: str, written: str) -> str:
+    """A problem with the line in it, and the name that it defines, if any."""
+    name = written.removeprefix("def ").partition("(")[0]
+    return problem.replace("{written}", written).replace("{name}", name)
+
+
+def kind_of(kind: Type) -> str:
+    """What a value is, in words."""
+    if isinstance(kind, Scalar):
+        return "a number"
+    if isinstance(kind, Row):
+        return f"a {kind.name.rpartition('_')[2]}"
+    return "a tuple" if isinstance(kind, Items) else "no number"
+
+
+def _without_field(owner: str, name: str, kind: Type) -> str:
+    """What to say of a value that has no such field, with those that it has."""
+    if not isinstance(kind, Row):
+        return f"{owner} is {kind_of(kind)} and has no '{name}'"
+    fields = [field for field, _ in kind.fields]
+    hint = nearest_name(name, fields) or f"; it has {', '.join(fields)}"
+    return f"{owner} has no '{name}'{hint}"
 
 
 _INSTEAD = {
@@ -447,8 +496,22 @@ class _ModuleWalk:
         found = place_in(self.lines, number)
         problem = f"{problem}, which cannot be translated"
         if found is None:
-            return ProgramError(f"the lane loop, line {number} of the composed module: {problem}")
-        return refusal(found.file, found.line, problem)
+            return UntranslatableError(f"the lane loop, line {number} of the composed module: {problem}")
+        return UntranslatableError(str(refusal(found.file, found.line, problem)))
+
+    def mistaken(self, where: ast.AST, problem: str, sought: str = "") -> ProgramError:
+        """The error for a mistake at a place in the composed text, as it was written: the line that has ``sought``.
+
+        ``{written}`` in the problem is that line, ``{name}`` the name of the function there.
+        """
+        number = getattr(where, "lineno", 0)
+        found = place_in(self.lines, number)
+        if found is None:
+            written = self.lines[number - 1].strip()
+            return ProgramError(f"the model cannot be compiled: {_as_written(problem, written)}")
+        lines = range(found.line, max(found.line + 1, found.next_line))
+        line = next((at for at in lines if sought and sought in linecache.getline(found.file, at)), found.line)
+        return refusal(found.file, line, _as_written(problem, linecache.getline(found.file, line).strip()))
 
 
 class _FunctionWalk:
@@ -473,8 +536,10 @@ class _FunctionWalk:
             module.library,
             made=module.function,
             refused=module.refused,
+            mistaken=module.mistaken,
         )
         self.returns: Type | None = None
+        self.first_return: ast.Return | None = None
         self.has_widened = False
         self.flags = 0
         self.flag = ""
@@ -548,11 +613,13 @@ class _FunctionWalk:
         value = self.values.term(node.value)
         kind = value.type if self.returns is None else joined(self.returns, value.type)
         if kind is None:
-            raise self.refused(node, "a function that returns values of different forms")
+            kinds = sorted({kind_of(item) for item in (self.returns, value.type) if item is not None})
+            problem = f"the ways through the function return different things: {' or '.join(kinds)}"
+            raise self.module.mistaken(self.first_return or node, problem)
         if self.returns is not None and typed.mixes(self.returns, value.type):
             raise self.refused(node, "a function that returns a whole number in one place and a float in another")
         self.has_widened |= self.returns is not None and kind != self.returns
-        self.returns = kind
+        self.returns, self.first_return = kind, self.first_return or node
         return [typed.Return(converted(value, kind))]
 
     def do_for(self, node: ast.For) -> list[Statement]:
@@ -691,7 +758,8 @@ class _FunctionWalk:
         is_stored = len(names) < len(target.elts)
         kind = value.type
         if not isinstance(kind, Items | Row) or len(types_in(kind)) != len(target.elts):
-            raise self.refused(node, f"'{ast.unparse(target)}' does not fit what is on the right")
+            other = "" if isinstance(kind, Items | Row) else f", not {kind_of(kind)}"
+            raise self.module.mistaken(node, f"'{{written}}' needs as many values as there are names{other}")
         before: list[Statement] = []
         if value.kind != "build" or value.reads & set(names) or (is_stored and value.reads):
             whole = self.fresh("_and_".join(name for name in names if name != "_") or "items", kind)

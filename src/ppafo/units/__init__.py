@@ -1,11 +1,12 @@
 """Units at the edge: text and units in, SI floats out, and back. Inside the package there are only SI floats.
 
-Three rules go beyond arithmetic:
+Four rules go beyond arithmetic:
 
 - A pressure says what it is: ``psi_g`` gauge, ``psi_a`` absolute, ``psi_d`` a difference; the suffix works on
   every unit of pressure, quotients too. ``psi`` alone is refused, except inside a compound such as ``N m/psi``. In SI
   a level is ``Pa_a`` and a difference ``Pa_d``.
 - An angle is a dimension: ``75`` is no angle, ``75 deg`` is, and ``rad/s`` is not ``Hz``.
+- ``4 SI`` is the number 4 in the SI unit of what it is given to: so programs write the numbers that they have.
 - Only the units listed in ``definitions.py`` exist. A short list makes a misspelling an error and the start quick.
   What people write for them is brought to their spelling in ``spelling.py``.
 
@@ -15,6 +16,7 @@ air)``.
 
 from ppafo.units.definitions import ParsedUnit, known_units, unit_by_pint
 from ppafo.units.quantity import (
+    SI,
     base_value,
     check_unit,
     conversion,
@@ -32,6 +34,7 @@ from ppafo.units.reference import flow_of, is_volume_flow, with_condition
 from ppafo.units.spelling import split_pressure_kind
 
 __all__ = [
+    "SI",
     "ParsedUnit",
     "base_value",
     "check_unit",

@@ -13,6 +13,8 @@ from ppafo.units.reference import MASS_FLOW, flow_of, is_volume_flow, read_unit,
 from ppafo.units.spelling import quote, split_pressure_kind
 
 LEVEL, DIFFERENCE = "Pa_a", "Pa_d"
+SI = "SI"
+"""The unit of a number that is in SI already, whatever it is the number of: programs have such."""
 
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _NOT_ZERO = re.compile(r"[^eE]*[1-9]", re.ASCII)
@@ -93,7 +95,8 @@ def check_unit(unit: str, near: str | None = None) -> None:
 
     Of an unknown one only a unit is suggested that could stand for ``near``, where that is given.
     """
-    _read(unit, near)
+    if unit != SI:
+        _read(unit, near)
 
 
 def _read(unit: str, si_unit: str | None) -> tuple[ParsedUnit, str]:
@@ -123,6 +126,8 @@ def dimension(unit: str) -> dict[str, int]:
 @functools.lru_cache(maxsize=512)
 def conversion(unit: str, si_unit: str) -> tuple[Decimal, Decimal, bool]:
     """Return scale, offset and whether the atmosphere is to be added; in decimals, so that 8.4 g is 0.0084 kg."""
+    if unit == SI:
+        return Decimal(1), Decimal(0), False
     wanted, _ = read_unit(si_unit)
     if _is_flow_without_mass(unit):
         if wanted.dimensions == MASS_FLOW:

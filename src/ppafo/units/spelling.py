@@ -60,7 +60,7 @@ _MEANT = {
     "day": ("days",),
     "deg": ("degs", "degree", "degrees"),
     "rad": ("rads", "radian", "radians"),
-    "rev": ("turn", "turns", "revs", "revolution", "revolutions"),
+    "rev": ("revs", "revolution", "revolutions"),
     "rev/min": ("rpm", "RPM"),
     "Hz": ("hz", "HZ"),
     "L": ("litre", "litres", "liter", "liters", "ltr"),

@@ -158,20 +158,27 @@ class Measured:
         return name in self.recording
 
 
-def read_measured(path: str | Path, device: Device, columns: ColumnMap | None = None, map_name: str = "") -> Measured:
-    """Return the recording of a file or result folder; DataError where it cannot be compared with a model.
+def read_measured(
+    source: Recording | str | Path, device: Device, columns: ColumnMap | None = None, map_name: str = ""
+) -> Measured:
+    """Return a recording, or the one of a file or result folder; DataError where it cannot be compared with a model.
 
     A file with columns of its own is read through a column map; ``map_name`` is what messages call this one.
     """
-    place = Path(path)
+    if isinstance(source, Recording):
+        values = [source.time, *(source[name] for name in sorted(source.names))]
+        return check_recording(
+            source, device, source.label, hashlib.sha256(np.concatenate(values).tobytes()).hexdigest()
+        )
+    place = Path(source)
     atmosphere = device.supply.atmospheric_pressure
     if columns is None or place.is_dir():
-        recording = read_recording(place, atmosphere)
+        recording = read_recording(place, atmosphere=atmosphere)
     else:
         gas = f"{device.gas.molar_mass!r} kg/mol"
         recording = read_foreign(place, columns, atmosphere=atmosphere, map_name=map_name, gas=gas)
     content = read_bytes(place / NETCDF_FILE if place.is_dir() else place)
-    return check_recording(recording, device, str(path), hashlib.sha256(content).hexdigest())
+    return check_recording(recording, device, str(source), hashlib.sha256(content).hexdigest())
 
 
 def check_recording(recording: Recording, device: Device, file: str, sha256: str = "") -> Measured:

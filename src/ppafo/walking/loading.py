@@ -8,6 +8,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from ppafo.arguments import Overrides, checked
 from ppafo.control.walking.catalog import TIMINGS, walking_controllers, with_timing
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import DataError, ParameterError, PpafoError, ScenarioError, one_line, refused_as
@@ -19,6 +20,7 @@ from ppafo.model.regulator import SupplyLines
 from ppafo.parameters import ParameterSet
 from ppafo.parameters.device import Device, Valve
 from ppafo.parameters.graph import Graph, Term
+from ppafo.parameters.loading import set_or_load
 from ppafo.parameters.overrides import split_override
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation.declaration import PERIOD, RATE, SUPPLY_LINE, Reading, kind_at, value_at
@@ -93,14 +95,15 @@ def check_duration_once(overrides: Iterable[str], minutes: float | None) -> None
         raise ScenarioError("--set run.duration: the same as --minutes; leave one out")
 
 
+@checked("scenario", "overrides", "gait", "task_sequence", "bottle", "parameter_set", name_or_path="scenario")
 def load_walk(
-    name_or_path: str | Path,
-    overrides: Iterable[str] = (),
+    scenario: str | Path,
+    overrides: Overrides = (),
+    *,
     gait: str | Path | None = None,
     task_sequence: str | Path | None = None,
     bottle: str | Path | None = None,
-    parameter_set: ParameterSet | None = None,
-    *,
+    parameter_set: ParameterSet | str | Path | None = None,
     plugins: Plugins = (),
 ) -> Scenario:
     """Return a scenario that is a walk by its name in the package or by the path of a TOML file, in SI units.
@@ -112,7 +115,7 @@ def load_walk(
     for anything that cannot be used.
     """
     name_plugins(plugins)
-    file, given = label(str(name_or_path)), tuple(overrides)
+    file, given = label(str(scenario)), tuple(overrides)
     named = {"gait": gait, "task_sequence": task_sequence, BOTTLE_NAME: bottle}
     instead = {path: str(item) for path, item in named.items() if item is not None}
     # Refuse an override beside another word for the same value, by path in ``others``.
@@ -124,10 +127,10 @@ def load_walk(
                 f"{file}: override '{path}={text}': the {path.partition('.')[0]} is given as '{one_line(other)}' "
                 "already; give it once"
             )
-    content = FILE.parse(FILE.read(name_or_path), file)
-    folder = Path(name_or_path).parent
+    content = FILE.parse(FILE.read(scenario), file)
+    folder = Path(scenario).parent
     return scenario_of(
-        ScenarioRequest(file, str(name_or_path), folder, content, given, parameter_set, instead), WALKING
+        ScenarioRequest(file, str(scenario), folder, content, given, set_or_load(parameter_set), instead), WALKING
     )
 
 

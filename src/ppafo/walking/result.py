@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.engine.lanes import BatchResult, Floats
-from ppafo.engine.program import LaneResult
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, Walk, state_row_numbers
+from ppafo.engine.step.lane import LaneResult
 from ppafo.metrics import METRICS, Metric, evaluate
 from ppafo.metrics.metric import LED_SHANK, REQUEST, STEADY, MetricKind, Metrics
 from ppafo.model.contact import SWING

@@ -2,13 +2,14 @@
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ppafo.arguments import Count, Minutes, Overrides, Seed, checked
 from ppafo.control.walking import event_on_off
 from ppafo.control.walking.fault_flags import FAULT_FLAGS
 from ppafo.engine.lane_rows import LANES
@@ -21,6 +22,7 @@ from ppafo.metrics.strides import PER_STRIDE
 from ppafo.model.helping import STOPPED
 from ppafo.model.leg import passive_torque
 from ppafo.parameters.device import Actuator, FootPlate, Friction
+from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation.plan import MAXIMUM_STEPS
 from ppafo.simulation.sampled import run_sampled
 from ppafo.simulation.scenario import Control, Scenario
@@ -47,14 +49,17 @@ def silent(done: float, total: float) -> None:  # both are there for those who l
     """Ignore the progress."""
 
 
+@checked("scenario", "minutes", "overrides", "gait", "progress", "task_sequence", "bottle")
 def walk(
     scenario: Scenario | str | Path,
-    minutes: float | None = None,
-    overrides: Iterable[str] = (),
+    *,
+    overrides: Overrides = (),
     gait: str | Path | None = None,
-    progress: Progress = silent,
     task_sequence: str | Path | None = None,
     bottle: str | Path | None = None,
+    minutes: Minutes | None = None,
+    plugins: Plugins = (),
+    progress: Progress = silent,
 ) -> WalkResult:
     """Walk for ``minutes`` [min]: a scenario that is a walk, the name of a shipped one, or a file.
 
@@ -63,7 +68,10 @@ def walk(
     and a ``gait``, ``task_sequence`` or ``bottle`` in place of its own. A walk that diverges is a result with that
     status, up to the time of failure. ScenarioError or ParameterError for bad input. ``progress`` gets the minutes done
     and those in all, part by part.
+
+    ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
     """
+    name_plugins(plugins)
     if isinstance(scenario, Scenario):
         if any(item is not None for item in (gait, task_sequence, bottle)) or tuple(overrides):
             raise ScenarioError(
@@ -72,7 +80,7 @@ def walk(
             )
         chosen = scenario
     else:
-        chosen = load_walk(scenario, overrides, gait, task_sequence, bottle)
+        chosen = load_walk(scenario, overrides, gait=gait, task_sequence=task_sequence, bottle=bottle)
     chosen = lasting(chosen, minutes)
     run, carried = plan_walk(chosen), walk_of(chosen).bottle
     custom = chosen.controller.custom
@@ -142,12 +150,16 @@ class Comparison:
         return self.with_device.status.is_completed and self.without_device.status.is_completed
 
 
-def compare_walks(configuration: Scenario, minutes: float | None = None, progress: Progress = silent) -> Comparison:
+@checked("scenario", "minutes", "progress", configuration="scenario")
+def compare_walks(
+    scenario: Scenario | str | Path, *, minutes: Minutes | None = None, progress: Progress = silent
+) -> Comparison:
     """Walk ``minutes`` [min], or a whole task sequence, with the device and without.
 
     ScenarioError for bad input, SimulationError where its bottle ends the walk before there is anything to compare.
     """
-    worn = walk(configuration, minutes, progress=progress)
+    configuration = scenario if isinstance(scenario, Scenario) else load_walk(scenario)
+    worn = walk(configuration, minutes=minutes, progress=progress)
     # Refuse a walk that its bottle ended within the first strides.
     shortest = SHORTEST_STRIDES * walk_of(worn.scenario).gait.stride_time
     ending = None if worn.supply is None or worn.supply.ending.kind == WALKED else worn.supply.ending
@@ -158,7 +170,7 @@ def compare_walks(configuration: Scenario, minutes: float | None = None, progres
         )
     # As long as the bottle lasted, where one ended the walk.
     as_long = minutes if ending is None else float(worn.recording.time[-1]) / 60.0
-    bare = walk(without_device(configuration), as_long, progress=progress)
+    bare = walk(without_device(configuration), minutes=as_long, progress=progress)
     return Comparison(worn, bare, healthy_metrics(configuration))
 
 
@@ -294,11 +306,13 @@ class Population:
         return f"Population of {self.count} wearers, {self.scenario.name}, {self.minutes:g} min: {self.message}"
 
 
+@checked("scenario", "minutes", "wearers", "seed", "progress", configuration="scenario")
 def walk_population(
-    configuration: Scenario,
-    minutes: float | None,
-    wearers: int,
-    seed: int = 1,
+    scenario: Scenario | str | Path,
+    *,
+    wearers: Count,
+    minutes: Minutes | None = None,
+    seed: Seed = 1,
     progress: Progress = silent,
 ) -> Population:
     """Let many wearers walk for ``minutes`` [min], or all of a task sequence; the first is the configuration's.
@@ -307,6 +321,7 @@ def walk_population(
     """
     if not 1 <= wearers <= MAXIMUM_WEARERS:
         raise ScenarioError(f"the number of wearers must be from 1 to {MAXIMUM_WEARERS}, not {wearers}")
+    configuration = scenario if isinstance(scenario, Scenario) else load_walk(scenario)
     if walk_of(configuration).bottle is not None:
         raise ScenarioError("many wearers walk at a constant supply: leave out the bottle, or the number of wearers")
     if walk_of(configuration).person:

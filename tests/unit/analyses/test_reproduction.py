@@ -18,7 +18,8 @@ from ppafo.analyses.reproduce.claim import (
     load_reported,
     verdict_counts,
 )
-from ppafo.analyses.reproduce.solve import EXPERIMENTS, ORDER, reproduce, reproduce_paper
+from ppafo.analyses.reproduce.question import reproduce
+from ppafo.analyses.reproduce.solve import EXPERIMENTS, ORDER, reproduce_paper
 from ppafo.analyses.reproduce.torque_task import phased_runs, readings_of_u, torque_task_observations
 from ppafo.errors import PpafoError, SimulationError
 from ppafo.parameters.audit.evidence import Evidence

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from ppafo.cli.arguments import whole_number
+from ppafo.arguments import whole_number
 from ppafo.cli.command_line import Group, parameters_of
 from ppafo.cli.commands import COMMANDS
 from ppafo.cli.main import main

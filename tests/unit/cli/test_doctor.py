@@ -12,22 +12,22 @@ from ppafo.cli.completion import completion_script
 from ppafo.cli.main import main
 from ppafo.engine import loading
 from ppafo.engine.cache import load_generated
-from ppafo.engine.numba_compiler import NumbaCompiler
 from ppafo.loading import load_scenario
 from ppafo.simulation import simulate
 from ppafo.simulation.scenario import Scenario
+from tests.compilers_here import first_compiler
 
-SOURCE = 'from numba import njit\n\n\n@njit("float64(float64)", cache=True)\ndef thrice(x):\n    return 3.0 * x\n'
+SOURCE = '@entry("void(float64[::1])")\ndef thrice(x):\n    x[0] = 3.0 * x[0]\n'
 
 
 def test_cache_is_shown_and_cleared(fresh_cache: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    load_generated(SOURCE, NumbaCompiler())
+    load_generated(SOURCE, first_compiler())
     assert main(["doctor", "--json"]) == 0
     shown = json.loads(capsys.readouterr().out)
     assert shown["folder"] == str(fresh_cache)
     assert shown["compilers"] == [compiler.name for compiler in loading.compilers_to_try()]
     assert shown["not_used"] is None
-    assert [item["name"].startswith("ppafo_numba_") for item in shown["programs"]] == [True]
+    assert [item["name"].startswith(f"ppafo_{first_compiler().name}_") for item in shown["programs"]] == [True]
     assert shown["size"] == shown["programs"][0]["size"] > 1000
     assert main(["doctor", "--clear", "--json"]) == 0
     cleared = json.loads(capsys.readouterr().out)

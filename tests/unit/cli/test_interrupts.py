@@ -186,3 +186,30 @@ def cpu_seconds(process: int) -> float:
     except (FileNotFoundError, ProcessLookupError):
         return 0.0
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+LOADING = """
+import os, signal, sys
+sys.orig_argv = {started!r}
+class Interrupts:
+    def find_spec(self, name, path=None, target=None):
+        if name == "ppafo.engine":
+            os.kill(os.getpid(), signal.SIGINT)
+sys.meta_path.insert(0, Interrupts())
+signal.signal(signal.SIGINT, signal.default_int_handler)
+import ppafo
+"""
+
+
+@pytest.mark.parametrize(
+    ("started", "code"), [(["python", "-m", "ppafo"], 130), (["python", "mine.py"], -signal.SIGINT)]
+)
+def test_an_interrupt_while_the_package_loads_is_one_line_of_the_command_alone(started: list[str], code: int) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", LOADING.format(started=started)], check=False, capture_output=True, text=True
+    )
+    assert done.returncode == code
+    # A program that imports the package has its own way to end.
+    is_command = code == 130
+    assert (done.stderr == "ppafo: interrupted; nothing is half written\n") == is_command
+    assert ("KeyboardInterrupt" in done.stderr) != is_command

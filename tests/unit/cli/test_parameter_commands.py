@@ -71,7 +71,7 @@ def test_an_unwritable_folder_is_one_line_and_exit_code_2(tmp_path: Path, capsys
         (["sets", "list"], "ppafo.parameters.load_parameter_set"),
         (["sets", "show", "ppafo2011"], "ppafo.parameters.load_parameter_set"),
         (["doctor", "--schema", "scenario"], "ppafo.loading.json_schema"),
-        (["reproduce"], "ppafo.analyses.reproduce.solve.reproduce"),
+        (["reproduce"], "ppafo.analyses.reproduce.solve.reproduce_paper"),
         (["simulate", "step-response"], "ppafo.simulation.simulate.simulate"),
     ],
 )

@@ -1,10 +1,9 @@
 """Types of arguments: what a text becomes, and what is refused."""
 
-import argparse
-
 import pytest
 
-from ppafo.cli.arguments import fraction, quantity
+from ppafo.arguments import fraction, quantity
+from ppafo.errors import ArgumentError
 
 
 @pytest.mark.parametrize(
@@ -16,7 +15,7 @@ def test_a_text_with_a_unit_becomes_a_number_in_si(text: str, unit: str, value: 
 
 @pytest.mark.parametrize("text", ["10", "10 kg", "ten min", ""])
 def test_a_text_without_the_unit_is_refused_by_name(text: str) -> None:
-    with pytest.raises(argparse.ArgumentTypeError) as caught:
+    with pytest.raises(ArgumentError) as caught:
         quantity("s")(text)
     assert str(caught.value).startswith(f"{text}: ")
 
@@ -24,5 +23,5 @@ def test_a_text_without_the_unit_is_refused_by_name(text: str) -> None:
 @pytest.mark.parametrize("text", ["\uff10.5", "\u0661%", "0_1", "1.5"])
 def test_a_fraction_is_written_in_the_digits_of_ascii(text: str) -> None:
     assert fraction("50%") == 0.5
-    with pytest.raises(argparse.ArgumentTypeError, match="must be a number from 0 to 1"):
+    with pytest.raises(ArgumentError, match="must be a number from 0 to 1"):
         fraction(text)

@@ -242,11 +242,12 @@ def bursting(monkeypatch: pytest.MonkeyPatch) -> None:
     """Walks with a supply far from any real one."""
     load = loading.load_walk
 
-    def changed(*given: Any) -> Any:
-        configuration = load(*given)
+    def changed(*given: Any, **named: Any) -> Any:
+        configuration = load(*given, **named)
         supply = replace(configuration.device.supply, pressure=1.0e18)
         return replace(configuration, device=replace(configuration.device, supply=supply))
 
+    monkeypatch.setattr("ppafo.walking.loading.load_walk", changed)
     monkeypatch.setattr(answer, "load_walk", changed)
 
 

@@ -11,13 +11,15 @@ import pytest
 
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.engine.cache import load_generated
+from ppafo.engine.entries import INLINE
 from ppafo.engine.lane_source import lane_source
-from ppafo.engine.numba_compiler import NumbaCompiler
 from ppafo.engine.program import Program
 from ppafo.engine.source_text import SourceCollector
+from ppafo.engine.step import isothermal
 from ppafo.errors import SimulationError
 from ppafo.model import orifice
 from ppafo.model.valves.proportional import IDEAL
+from tests.compilers_here import ScriptCompiler
 from tests.reference.reference_slopes import right_hand_side_source
 
 START = """
@@ -72,7 +74,7 @@ def test_threads_that_load_one_module_at_once_all_get_the_whole_of_it(
     monkeypatch.setenv("PPAFO_CACHE_DIR", str(tmp_path))
     source = "import time\ntime.sleep(0.2)\nlast_line = 1\n"
     with ThreadPoolExecutor(4) as pool:
-        modules = list(pool.map(lambda _: load_generated(source, NumbaCompiler()), range(4)))
+        modules = list(pool.map(lambda _: load_generated(source, ScriptCompiler()), range(4)))
         assert [module.last_line for module in modules] == [1] * 4
     assert len({id(module) for module in modules}) == 1
     del sys.modules[modules[0].__name__]
@@ -80,7 +82,7 @@ def test_threads_that_load_one_module_at_once_all_get_the_whole_of_it(
 
 def program() -> Program:
     """A program as the torque task uses it."""
-    return Program(IDEAL, PROFILES["ramp_hold"], CONTROLLERS["pid"], PROFILES["constant"], True, False)
+    return Program(IDEAL, PROFILES["ramp_hold"], CONTROLLERS["pid"], PROFILES["constant"], True, False, isothermal)
 
 
 def test_source_of_a_program_is_the_same_every_time() -> None:
@@ -112,16 +114,16 @@ NUMBERS = [1.0, 2.0]
 
 def test_function_that_cannot_be_compiled_is_refused_by_name() -> None:
     with pytest.raises(SimulationError, match=r"uses_a_list.*NUMBERS"):
-        SourceCollector("@njit").add(uses_a_list)
+        SourceCollector(INLINE).add(uses_a_list)
 
 
 def test_function_without_source_is_refused() -> None:
     with pytest.raises(SimulationError, match="source text is not available"):
-        SourceCollector("@njit").add(math.sqrt)
+        SourceCollector(INLINE).add(math.sqrt)
 
 
 def test_collector_puts_callees_before_callers() -> None:
-    collector = SourceCollector("@njit")
+    collector = SourceCollector(INLINE)
     collector.add(orifice.orifice_flow)
     names = list(collector.definitions)
     assert names.index("model_orifice_fitted_flow_function") < names.index("model_orifice_orifice_flow")

@@ -9,8 +9,8 @@ import pytest
 
 from ppafo.engine import cache
 from ppafo.engine.cache import announce, compile_side_by_side, estimate_seconds, load_generated
-from ppafo.engine.numba_compiler import NumbaCompiler
 from ppafo.errors import ProgramError
+from tests.compilers_here import ScriptCompiler
 
 QUICK = "answer = {}\n"
 
@@ -56,9 +56,9 @@ def test_the_time_expected_is_that_of_what_this_computer_has_compiled_by_length(
 def test_models_that_are_needed_together_are_compiled_side_by_side_with_one_message(
     fresh_cache: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    numba, together = NumbaCompiler(), threading.Barrier(2, timeout=60.0)
+    compiler, together = ScriptCompiler(), threading.Barrier(2, timeout=60.0)
     sources = [QUICK.format(number) for number in (time.time(), 2.5, 3.5)]
-    load_generated(sources[1], numba)
+    load_generated(sources[1], compiler)
     loaded = []
 
     def load(source: str) -> ModuleType:
@@ -66,9 +66,9 @@ def test_models_that_are_needed_together_are_compiled_side_by_side_with_one_mess
             together.wait()
             time.sleep(0.2)
         loaded.append(source)
-        return load_generated(source, numba)
+        return load_generated(source, compiler)
 
-    cache.load_all([*sources, sources[0]], numba, load)
+    cache.load_all([*sources, sources[0]], compiler, load)
     assert set(loaded) == {sources[0], sources[2]}
     assert [message.partition(", about")[0] for message in caplog.messages[:1]] == [
         "ppafo: compiling 2 models for this computer"

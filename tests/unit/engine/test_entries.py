@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ppafo.engine.loading import (
+from ppafo.engine.entries import (
     ARRAY,
     ARRAY_2D,
     FLOAT,

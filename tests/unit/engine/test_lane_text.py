@@ -1,8 +1,16 @@
-"""The text of a lane loop says no more than what is needed."""
+"""The text of a lane loop: how many lanes a block has, and what a rare phase costs where no lane needs it."""
 
-from ppafo.engine.components import RarePhase
-from ppafo.engine.lane_rows import FIRST_CACHE, LANES, VECTOR, LaneRows, lanes_of, over_lanes
+import re
+from typing import Any
+
+from ppafo.engine.generator import StepText
+from ppafo.engine.lane_rows import FIRST_CACHE, LANES, VECTOR, lanes_of
+from ppafo.engine.lane_source import lane_source
+from ppafo.engine.loop_text import LoopText, RowsOfLanes
+from ppafo.engine.program import Program
 from ppafo.engine.source_text import SourceCollector
+from ppafo.engine.step import loop
+from ppafo.engine.step.lane import Lane
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.walking.loading import load_walk
@@ -10,48 +18,43 @@ from ppafo.walking.motion import with_duration
 from ppafo.walking.planning import plan_walk
 
 
-def test_loads_that_nothing_asks_for_are_left_out_and_what_others_need_stays() -> None:
-    lines = [
-        "plant = Plant(x[1, lane], Box(x[2, lane]))",
-        "state = State(x[3, lane])",
-        "walk = Walk(x[4, lane])",
-        "empty = ()",
-        "part = wrap(state)",
-        "length = 2.0 * state.angle",
-        "x[5, lane] = plant.mass",
-    ]
-    assert over_lanes(lines) == [
-        "for lane in range(width):",
-        "    plant = Plant(x[1, lane], Box(x[2, lane]))",
-        "    state = State(x[3, lane])",
-        "    length = 2.0 * state.angle",
-        "    x[5, lane] = plant.mass",
-    ]
-
-
-def test_load_that_is_made_anew_from_itself_stays() -> None:
-    lines = ["state = State(x[1, lane])", "state = moved(state)", "x[1, lane] = state.angle"]
-    assert over_lanes(lines)[1:] == [f"    {line}" for line in lines]
-
-
-def test_line_that_gathers_over_the_lanes_for_what_follows_the_loop_stays() -> None:
-    lines = ["reference = Profile(x[1, lane])", "earliest = min(earliest, x[2, lane])"]
-    assert over_lanes(lines) == ["for lane in range(width):", "    earliest = min(earliest, x[2, lane])"]
-
-
 def test_blocks_are_as_large_as_the_first_cache_allows_and_never_less_than_a_vector() -> None:
     task = plan_run(load_scenario("torque-task-solenoid")).program
     walk = plan_walk(with_duration(load_walk("solenoid"), 6.0)).program
     assert (lanes_of(task), lanes_of(walk)) == (LANES, VECTOR)
-    rows = LaneRows(walk, SourceCollector("")).aside
+    rows = RowsOfLanes(StepText(walk, SourceCollector(""))).aside
     assert 8 * VECTOR * rows <= FIRST_CACHE < 8 * 2 * VECTOR * rows
 
 
+def test_a_phase_loads_the_groups_that_it_asks_for_and_stores_what_it_changes() -> None:
+    text = lane_source(plan_run(load_scenario("torque-task-proportional")).program)
+    first = text[text.index("def advance") :]
+    held = first[first.index("for lane in range(width):\n        plant") :].split("for step in")[0]
+    assert "engine_step_phases_hold_chambers(plant, state)" in held
+    assert "timing" not in held
+    # Of the result of a run a step changes one number.
+    finished = first[first.index("after_finish = ") :]
+    assert len(re.findall(r"= after_finish\.result\.", finished)) == 1
+
+
+def passed_over(parts: Program, lanes: Any) -> None:
+    """A loop with a phase that few lanes need."""
+    if any(lane.slid.departs > 0.0 for lane in lanes):
+        for lane in lanes:
+            loop.phases.begin_step(parts, lane)
+
+
 def test_a_rare_phase_is_passed_over_where_no_lane_needs_it() -> None:
-    rows = LaneRows(plan_run(load_scenario("step-response")).program, SourceCollector(""))
-    text = "\n".join(rows.over_phases([], [["x[1, lane] = 1.0"], RarePhase(["x[2, lane] = 3.0"], "x[0, lane]")]))
-    for needed, left in (([0.0, 0.0], [2.0, 2.0]), ([0.0, 1.0], [3.0, 3.0])):
-        cells = {(row, lane): value for lane, first in enumerate(needed) for row, value in enumerate((first, 0.0, 2.0))}
-        exec(text, {"x": cells, "width": 2})
-        assert [cells[2, lane] for lane in range(2)] == left
-        assert [cells[1, lane] for lane in range(2)] == [1.0, 1.0]
+    step = StepText(plan_run(load_scenario("step-response")).program, SourceCollector(""))
+    rows = RowsOfLanes(step)
+    asked, (row_of_before,) = rows.step_at["slid.departs"], [rows.step_at["before"]]
+    from ppafo.engine.loop_text import _unparsed
+
+    text = "\n".join(_unparsed(LoopText({rows: step}, passed_over).lines()))
+    assert isinstance(Lane(), Lane)
+    for needed, left in (([0.0, 0.0], [2.0, 2.0]), ([0.0, 1.0], [0.0, 0.0])):
+        cells = {(asked, lane): value for lane, value in enumerate(needed)}
+        cells |= {(row_of_before, lane): 2.0 for lane in range(2)}
+        scope: dict[str, Any] = {"x": cells, "width": 2}
+        exec("\n".join([step.collector.text(), text]), scope)
+        assert [cells[row_of_before, lane] for lane in range(2)] == left

@@ -5,8 +5,7 @@ from typing import Annotated, Any, NamedTuple
 
 import pytest
 
-from ppafo.engine.outline import Outline
-from ppafo.engine.program import link_effects, link_program
+from ppafo.engine.linking import link_effects, link_program
 from ppafo.engine.source_text import SourceCollector, composed_lines
 from ppafo.errors import ProgramError
 from ppafo.model.declaration import Number
@@ -186,13 +185,3 @@ def test_a_name_that_other_rows_have_is_refused() -> None:
     program = plan_run(load_scenario("step-response")).program
     with pytest.raises(ProgramError, match="other rows of a program have this name"):
         link_program(replace(program, effects=(replace(FIRST, name="valve", laws={}),)), SourceCollector(""))
-
-
-def test_an_outline_knows_effects_and_their_order() -> None:
-    found = set()
-    for effects in ((), (FIRST,), (SECOND,), (FIRST, SECOND), (SECOND, FIRST)):
-        outline = Outline("")
-        link_effects(effects, outline)
-        outline.add(around)
-        found.add(outline.text())
-    assert len(found) == 5

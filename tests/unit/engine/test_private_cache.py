@@ -2,25 +2,27 @@
 
 import json
 import os
-import pickle
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from ppafo.engine import cache
 from ppafo.engine.cache import cache_folder, clear, evict, list_programs, load_generated, refusal
-from ppafo.engine.numba_compiler import NumbaCompiler
+from ppafo.translation import native
+from tests.compilers_here import first_compiler
 
-SOURCE = 'from numba import njit\n\n\n@njit("float64(float64)", cache=True)\ndef twice(x):\n    return 2.0 * x\n'
+SOURCE = '@entry("void(float64[::1])")\ndef twice(x):\n    x[0] = 2.0 * x[0]\n'
+LIBRARY = "program.so"
 
 RUN = f"""
-import sys
-from ppafo.engine.cache import load_generated
-from ppafo.engine.numba_compiler import NumbaCompiler
-print(load_generated({SOURCE!r}, NumbaCompiler()).twice(21.0))
+import numpy as np
+from ppafo.engine.loading import load_source
+x = np.array([21.0])
+load_source({SOURCE!r}).twice(x)
+print(x[0])
 """
 
 
@@ -34,20 +36,25 @@ def compiled(fresh_cache: Path) -> Path:
 
 def loaded() -> float:
     """What the program says when it is loaded as a new process loads it."""
-    module = load_generated(SOURCE, NumbaCompiler())
-    value = float(module.twice(21.0))
+    module = load_generated(SOURCE, first_compiler())
+    x = np.array([21.0])
+    module.twice(x)
     del sys.modules[module.__name__]
-    return value
+    return float(x[0])
 
 
-class Trap:
-    """Makes a folder where it is unpickled."""
-
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
-
-    def __reduce__(self) -> tuple[Callable[[str], None], tuple[str]]:
-        return os.mkdir, (str(self._folder),)
+def set_trap(library: Path, sprung: Path) -> None:
+    """Put a library in the place of a program's that makes a folder where it is loaded."""
+    code = (
+        "#include <sys/stat.h>\n"
+        f'__attribute__((constructor)) static void spring(void) {{ mkdir("{sprung}", 0700); }}\n'
+        "void twice_packed(void *arrays) { (void)arrays; }\n"
+        "int ppafo_rounds_as_written(double a, double b, double c, double d) { return a + b + c + d > -9.0; }\n"
+    )
+    trap = sprung.with_name("trap.c")
+    trap.write_text(code, encoding="utf-8")
+    command = native.compiler(first_compiler().name).command
+    subprocess.run([*command, "-shared", "-fPIC", str(trap), "-o", str(library)], check=True)
 
 
 def spoil(path: Path) -> None:
@@ -57,7 +64,7 @@ def spoil(path: Path) -> None:
     path.write_bytes(bytes(content))
 
 
-@pytest.mark.parametrize("ending", ["nbc", "nbi", "py", "json"])
+@pytest.mark.parametrize("ending", ["so", "c", "py", "json"])
 @pytest.mark.parametrize("damage", ["cut", "empty", "spoilt", "gone", "pipe", "folder"])
 def test_damaged_program_is_compiled_anew(compiled: Path, ending: str, damage: str) -> None:
     (path,) = compiled.rglob(f"*.{ending}")
@@ -78,8 +85,7 @@ def test_damaged_program_is_compiled_anew(compiled: Path, ending: str, damage: s
 
 
 def test_what_another_process_tries_beside_a_program_is_no_damage(compiled: Path) -> None:
-    (index,) = compiled.rglob("*.nbi")
-    index.with_name("tmpabcdefgh").write_bytes(b"")
+    (compiled / "tmpabcdefgh").write_bytes(b"")
     before = compiled.stat().st_ino
     assert loaded() == 42.0
     assert compiled.stat().st_ino == before
@@ -107,8 +113,7 @@ def test_unwritable_cache_leads_to_no_shared_temporary_folder(tmp_path: Path, mo
 def test_compiled_code_in_a_folder_that_is_not_private_is_not_run(
     compiled: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str
 ) -> None:
-    (index,) = compiled.rglob("*.nbi")
-    index.write_bytes(pickle.dumps(Trap(tmp_path / "sprung")))
+    set_trap(compiled / LIBRARY, tmp_path / "sprung")
     (compiled / "checksums.json").write_text(str(cache._checksums(compiled)).replace("'", '"'))
     folder = compiled.parent
     if kind == "others can write":
@@ -132,18 +137,6 @@ def test_cache_folder_is_made_for_its_user_alone(fresh_cache: Path) -> None:
     finally:
         os.umask(before)
     assert fresh_cache.stat().st_mode & 0o077 == 0
-
-
-def test_files_of_numba_stay_in_the_program_wherever_its_own_variable_points(
-    fresh_cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    from numba.core import config
-
-    monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path / "numba"))
-    assert loaded() == 42.0
-    assert not (tmp_path / "numba").exists()
-    assert list(fresh_cache.rglob("*.nbc"))
-    assert str(tmp_path / "numba") == config.CACHE_DIR
 
 
 def test_user_without_home_and_without_an_entry_goes_without_a_cache(
@@ -171,6 +164,7 @@ def test_full_disk_is_no_error(tmp_path: Path) -> None:
     )
     assert done.stdout == "42.0\n", done.stderr
     assert "is not kept" in done.stderr
+    assert "models are run by Python, some hundred times slower, instead in this run" in done.stderr
     assert list((tmp_path / "programs").iterdir()) == []
 
 
@@ -186,7 +180,7 @@ def test_two_processes_that_compile_the_same_program_leave_it_whole(tmp_path: Pa
 
 
 def test_program_that_no_one_used_for_long_is_removed_and_a_used_one_stays(compiled: Path) -> None:
-    old = compiled.with_name(compiled.name.replace("ppafo_numba", "ppafo_old"))
+    old = compiled.with_name(compiled.name.replace(f"ppafo_{first_compiler().name}", "ppafo_old"))
     left = compiled.with_name(".writing-0123456789abcdef")
     for place in (old, left):
         place.mkdir()
@@ -198,7 +192,7 @@ def test_program_that_no_one_used_for_long_is_removed_and_a_used_one_stays(compi
 def test_programs_beyond_the_largest_size_are_removed_oldest_first(
     compiled: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    older = compiled.with_name(compiled.name.replace("ppafo_numba", "ppafo_older"))
+    older = compiled.with_name(compiled.name.replace(f"ppafo_{first_compiler().name}", "ppafo_older"))
     older.mkdir()
     (older / "large").write_bytes(bytes(1000))
     used = compiled.stat().st_mtime
@@ -231,8 +225,7 @@ def test_clearing_leaves_what_is_not_a_program(compiled: Path) -> None:
 
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root can make files of another user")
 def test_program_that_another_user_left_in_the_folder_is_not_run(compiled: Path, tmp_path: Path) -> None:
-    (index,) = compiled.rglob("*.nbi")
-    index.write_bytes(pickle.dumps(Trap(tmp_path / "sprung")))
+    set_trap(compiled / LIBRARY, tmp_path / "sprung")
     sums = compiled / "checksums.json"
     sums.write_text(json.dumps(cache._checksums(compiled)))
     for place in (compiled, *compiled.rglob("*")):
@@ -245,8 +238,7 @@ def test_program_that_another_user_left_in_the_folder_is_not_run(compiled: Path,
 @pytest.mark.skipif(not hasattr(os, "geteuid"), reason="no permission bits here")
 @pytest.mark.parametrize("which", ["folder", "file", "checksums"])
 def test_program_into_which_others_can_write_is_compiled_anew(compiled: Path, which: str) -> None:
-    (index,) = compiled.rglob("*.nbi")
-    place = {"folder": compiled, "file": index, "checksums": compiled / "checksums.json"}[which]
+    place = {"folder": compiled, "file": compiled / LIBRARY, "checksums": compiled / "checksums.json"}[which]
     place.chmod(0o777)
     assert loaded() == 42.0
     assert place.stat().st_mode & 0o022 == 0

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ppafo.engine.lane_samples import walk_traces
+from ppafo.engine.channels import walk_traces
 from ppafo.engine.lanes import Batch, run_batch
-from ppafo.engine.loading import BACKEND_VARIABLE, NUMBA
+from ppafo.engine.loading import BACKEND_VARIABLE, PYTHON
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import batch_of
 from ppafo.errors import ScenarioError
@@ -60,16 +60,14 @@ VARIED: tuple[tuple[str, tuple[str, ...]], ...] = (
 )
 """Every shipped walk, one with all further features (sensors with faults, thermal gas, slow valve), task sequences."""
 
-BY_NUMBA = ("proportional-regulators", EVERYTHING)
-"""The walk whose lanes Numba compiles, so that no translator stands on both sides; it takes a minute.
-
-What Numba makes of a walk without a device is compared in continuous integration (``unit/test_golden_bits.py``)."""
+BY_PYTHON = ("proportional-regulators", EVERYTHING)
+"""The walk whose lanes Python runs, so that no translator stands on both sides; it takes minutes."""
 
 
 def choose_compiler(name: str, overrides: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let Numba compile the lanes of ``BY_NUMBA``."""
-    if (name, overrides) == BY_NUMBA:
-        monkeypatch.setenv(BACKEND_VARIABLE, NUMBA)
+    """Let Python run the lanes of ``BY_PYTHON``."""
+    if (name, overrides) == BY_PYTHON:
+        monkeypatch.setenv(BACKEND_VARIABLE, PYTHON)
 
 
 def written(walked: Scenario, folder: Path) -> str:
@@ -174,7 +172,7 @@ def samples_in_c(library: ctypes.CDLL, name: str, values: Values, outputs: int) 
 
 @pytest.mark.parametrize(
     ("name", "overrides"),
-    [pytest.param(*one, marks=pytest.mark.thorough) if one == BY_NUMBA else one for one in VARIED],
+    [pytest.param(*one, marks=pytest.mark.thorough) if one == BY_PYTHON else one for one in VARIED],
 )
 def test_every_sample_of_drawn_settings_has_the_bits_of_the_lanes(
     name: str, overrides: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -186,7 +184,9 @@ def test_every_sample_of_drawn_settings_has_the_bits_of_the_lanes(
     program = item.program.program
     paths |= {name: f"state.{name}" for name in ("supplied_mass", "leaked_mass")}
     paths |= {
-        output: path for output, path in walk_traces(program).items() if path in row_numbers(program.state_rows())
+        output: path
+        for output, path in walk_traces(program.state_rows()).items()
+        if path in row_numbers(program.state_rows())
     }
     for values, batch in itertools.islice(batches(name, overrides, item.settings), 1, 1 + RUNS):
         found = samples_in_c(library, item.name, values, len(item.program.outputs))
@@ -224,7 +224,7 @@ def shortened(walked: Scenario, folder: Path, seconds: float) -> str:
 
 @pytest.mark.parametrize(
     ("name", "overrides"),
-    [pytest.param(*one, marks=pytest.mark.thorough) if one == BY_NUMBA else one for one in VARIED],
+    [pytest.param(*one, marks=pytest.mark.thorough) if one == BY_PYTHON else one for one in VARIED],
 )
 def test_every_sample_of_a_walk_has_the_bits_of_python(
     name: str, overrides: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -232,7 +232,7 @@ def test_every_sample_of_a_walk_has_the_bits_of_python(
     choose_compiler(name, overrides, monkeypatch)
     walked = load_walk(name, overrides)
     heads, samples, metrics = shown(tmp_path, shortened(walked, tmp_path, 8.0), "gcc", "-std=c99", "-O1")
-    result = walk(walked, 8.0 / 60.0)
+    result = walk(walked, minutes=8.0 / 60.0)
     recording = result.recording
     compared = [head for head in heads if head in recording.names]
     assert {"angle", "pressure_1", "torque", "command", "external_torque", "heel_force", "contact"} <= set(compared)

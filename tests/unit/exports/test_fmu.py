@@ -9,6 +9,7 @@ import shutil
 import struct
 import subprocess
 import sys
+import tempfile
 import zipfile
 from collections.abc import Iterator
 from dataclasses import replace
@@ -17,7 +18,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ppafo.errors import ScenarioError
+from ppafo.errors import ProgramError, ScenarioError
+from ppafo.exports import fmu
 from ppafo.exports.c_library import c_library
 from ppafo.exports.fmu import closed_loop, functional_unit, host_platform
 from ppafo.exports.fmu.description import FIXED_NAMES
@@ -353,3 +355,18 @@ def test_no_name_of_a_scenario_meets_another_name_of_its_unit(tmp_path: Path) ->
             words = ["gcc", "-std=c99", "-fsyntax-only", file]
             done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
             assert done.returncode == 0, (front, done.stderr)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="the compiler is a script of a shell")
+def test_what_a_compiler_leaves_goes_away_with_its_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    compiler, temporary = tmp_path / "cc", tmp_path / "temporary"
+    # As one that is killed in the middle.
+    compiler.write_text('#!/bin/sh\ntouch "${TMPDIR:?}/cc1234.s"\nexit 1\n', encoding="utf-8")
+    compiler.chmod(0o700)
+    temporary.mkdir()
+    monkeypatch.setenv("TMPDIR", str(temporary))
+    monkeypatch.setattr(tempfile, "tempdir", str(temporary))
+    monkeypatch.setattr(fmu, "compiler_for", lambda _name: [str(compiler)])
+    with pytest.raises(ProgramError, match="does not build the library"):
+        fmu.build("linux64", {"unit.c": b""}, "unit.c")
+    assert list(temporary.iterdir()) == []

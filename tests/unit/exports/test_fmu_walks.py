@@ -44,7 +44,7 @@ def plant(tmp_path_factory: pytest.TempPathFactory) -> str:
 @pytest.fixture(scope="module")
 def walked() -> WalkResult:
     """The walk by Python."""
-    return walk(NAME, SECONDS / 60.0)
+    return walk(NAME, minutes=SECONDS / 60.0)
 
 
 def outputs_of(unit: str) -> list[str]:
@@ -135,7 +135,7 @@ def test_under_the_commands_of_a_walk_the_plant_on_its_leg_moves_with_its_bits(
     plant: str, overrides: tuple[str, ...], tmp_path: Path
 ) -> None:
     unit = written(tmp_path, NAME, 2, is_plant=True, overrides=overrides) if overrides else plant
-    recording = walk(NAME, SECONDS / 60.0, overrides).recording
+    recording = walk(NAME, minutes=SECONDS / 60.0, overrides=overrides).recording
     seen = ("angle", "pressure_1", "pressure_2", "torque", "supplied_mass", "external_torque", "contact", "toe_force")
     instance = Instance(unit)
     assert set(seen) < set(outputs_of(unit))

@@ -337,6 +337,18 @@ def test_a_port_that_is_none_is_one_line(
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="no such devices")
+@pytest.mark.parametrize("place", ["/dev/null", "/dev/zero", "folder", "file", "pipe"])
+def test_what_is_no_serial_port_is_said_in_words(place: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("serial")
+    monkeypatch.chdir(tmp_path)
+    Path("folder").mkdir()
+    Path("file").touch()
+    os.mkfifo("pipe")
+    with pytest.raises(ScenarioError, match=rf"^--port serial:{place}: cannot be opened: it is no serial port$"):
+        open_port(f"serial:{place}")
+
+
 def test_without_pyserial_one_line_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "serial", None)
     with pytest.raises(ScenarioError, match=r"needs pyserial: pip install 'ppafo\[hil\]'$"):

@@ -336,3 +336,23 @@ def test_an_hour_of_samples_needs_little_memory() -> None:
     grown = tracemalloc.get_traced_memory()[0]
     tracemalloc.stop()
     assert grown / 20_000 < 200.0
+
+
+@pytest.mark.parametrize(
+    "stray",
+    [
+        sample_bytes(Sample(0, 7, WRAP - 1, 5_000_000, {"angle": 1})),
+        sample_bytes(Sample(OVER, 7, WRAP - 1, 5_000_000, {"angle": 1})),
+        sample_bytes(Sample(0, 7, WRAP // 2, 3_000_000_000, {"angle": 1})),
+        sample_bytes(Sample(0, 6, WRAP - 1, 0, {"angle": 1})),
+        sample_bytes(Sample(COMPUTED, 7, WRAP - 1, 5_000_000, {"torque": 1, "angle": 1})),
+    ],
+)
+@pytest.mark.parametrize("place", [0, 1, 20, 50])
+def test_a_stray_sample_costs_none_of_the_others(stray: bytes, place: int) -> None:
+    good = [sample_bytes(Sample(0, 7, number, 1000 * number, {"angle": number})) for number in range(50)]
+    found = played([*good[:place], stray, *good[place:]])
+    assert np.array_equal(np.rint(found.recording["angle"] * 1e6), np.arange(50))
+    assert found.recording.time == pytest.approx(0.001 * np.arange(50))
+    assert (found.recording.kind, found.lost, found.ended) == ("measured", 0, "silence of the bench")
+    assert sum(found.ignored.values()) == 1

@@ -17,7 +17,7 @@ from ppafo.walking.walk import walk
 
 @pytest.fixture(scope="module")
 def walked() -> WalkResult:
-    return walk("solenoid", 0.1)
+    return walk("solenoid", minutes=0.1)
 
 
 def test_the_whole_walk_is_in_opensims_sign(walked: WalkResult, tmp_path: Path) -> None:

@@ -17,12 +17,16 @@ HALF_A_STRIDE, PER_SECOND = 104, 200
 
 
 @pytest.fixture
-def remarks_of(csv_of: Callable[..., Path]) -> Callable[[dict[str, Floats]], tuple[str, ...]]:
-    """Remarks on a walk whose knee and centre of pressure are left out."""
+def remarks_of(csv_of: Callable[..., Path], tmp_path: Path) -> Callable[..., tuple[str, ...]]:
+    """Remarks on a walk whose knee and centre of pressure are left out; some columns may be in a file of their own."""
 
-    def said(columns: dict[str, Floats]) -> tuple[str, ...]:
+    def said(columns: dict[str, Floats], apart: tuple[str, ...] = ()) -> tuple[str, ...]:
         kept = {name: values for name, values in columns.items() if name in (SHANK, ANKLE, MOMENT, FORCE)}
-        return import_gait([csv_of(kept)], ImportSettings(62.0)).remarks
+        files = []
+        if apart:
+            own = csv_of({name: kept.pop(name) for name in apart})
+            files = [own.rename(tmp_path / "apart.csv")]
+        return import_gait([csv_of(kept), *files], ImportSettings(62.0)).remarks
 
     return said
 
@@ -37,11 +41,11 @@ def later(columns: dict[str, Floats], names: tuple[str, ...], seconds: float) ->
 @pytest.mark.parametrize("names", [(SHANK, ANKLE), (SHANK,), (ANKLE,)])
 def test_angles_on_another_clock_than_the_plates_are_said_with_the_delay(
     columns: dict[str, Floats],
-    remarks_of: Callable[[dict[str, Floats]], tuple[str, ...]],
+    remarks_of: Callable[..., tuple[str, ...]],
     names: tuple[str, ...],
     seconds: float,
 ) -> None:
-    remark = next(line for line in remarks_of(later(columns, names, seconds)) if "on one clock" in line)
+    remark = next(line for line in remarks_of(later(columns, names, seconds), names) if "on one clock" in line)
     which = " and ".join(name.partition(" ")[0] for name in names)
     assert remark.startswith(f"{which}: about ")
     assert float(remark.partition("about ")[2].split()[0]) == pytest.approx(1000.0 * abs(seconds), abs=12.0)
@@ -49,12 +53,19 @@ def test_angles_on_another_clock_than_the_plates_are_said_with_the_delay(
 
 
 def test_an_ankle_on_another_clock_than_the_shank_is_said_without_a_force(
-    columns: dict[str, Floats], remarks_of: Callable[[dict[str, Floats]], tuple[str, ...]]
+    columns: dict[str, Floats], remarks_of: Callable[..., tuple[str, ...]]
 ) -> None:
     angles = {name: columns[name] for name in (SHANK, ANKLE)}
     assert not [line for line in remarks_of(angles) if "clock" in line]
-    (remark,) = (line for line in remarks_of(later(angles, (ANKLE,), 0.05)) if "clock" in line)
+    (remark,) = (line for line in remarks_of(later(angles, (ANKLE,), 0.05), (ANKLE,)) if "clock" in line)
     assert "behind shank_angle" in remark
+
+
+@pytest.mark.parametrize("names", [(SHANK, ANKLE), (SHANK,), (ANKLE,), (MOMENT,)])
+def test_curves_of_one_file_are_on_one_clock(
+    columns: dict[str, Floats], remarks_of: Callable[..., tuple[str, ...]], names: tuple[str, ...]
+) -> None:
+    assert not [line for line in remarks_of(later(columns, names, 0.05)) if "clock" in line]
 
 
 @pytest.mark.parametrize(
@@ -70,7 +81,7 @@ def test_an_ankle_on_another_clock_than_the_shank_is_said_without_a_force(
 )
 def test_a_curve_of_another_size_than_the_others_let_expect_is_said(
     columns: dict[str, Floats],
-    remarks_of: Callable[[dict[str, Floats]], tuple[str, ...]],
+    remarks_of: Callable[..., tuple[str, ...]],
     name: str,
     factor: float,
     words: str,
@@ -81,7 +92,7 @@ def test_a_curve_of_another_size_than_the_others_let_expect_is_said(
 
 
 def test_a_moment_without_a_force_is_judged_by_its_peak(
-    columns: dict[str, Floats], remarks_of: Callable[[dict[str, Floats]], tuple[str, ...]]
+    columns: dict[str, Floats], remarks_of: Callable[..., tuple[str, ...]]
 ) -> None:
     given = {name: columns[name] for name in (SHANK, ANKLE, MOMENT)}
     assert not any("ankle_moment" in line for line in remarks_of(given))
@@ -90,7 +101,7 @@ def test_a_moment_without_a_force_is_judged_by_its_peak(
 
 
 def test_the_ankle_of_the_other_foot_is_refused_as_such_and_not_as_a_wrong_zero(
-    columns: dict[str, Floats], remarks_of: Callable[[dict[str, Floats]], tuple[str, ...]]
+    columns: dict[str, Floats], remarks_of: Callable[..., tuple[str, ...]]
 ) -> None:
     other = later(columns, (ANKLE,), HALF_A_STRIDE / PER_SECOND)
     with pytest.raises(DataError, match=r"ankle_angle is 50 % of the stride from where this shank has it: it is of"):
@@ -99,7 +110,7 @@ def test_the_ankle_of_the_other_foot_is_refused_as_such_and_not_as_a_wrong_zero(
 
 @pytest.mark.parametrize("speed", [1.07, 1.2, 1.46, 1.59])
 def test_the_built_in_gait_at_other_speeds_has_no_remark(
-    csv_of: Callable[..., Path], remarks_of: Callable[[dict[str, Floats]], tuple[str, ...]], speed: float
+    csv_of: Callable[..., Path], remarks_of: Callable[..., tuple[str, ...]], speed: float
 ) -> None:
     walk = walk_recording(at_speed(load_gait(), speed), 4)
     given = {f"{name} [{walk.unit(name)}]": np.array(walk[name]) for name in ("shank_angle", "ankle_angle")}

@@ -151,8 +151,8 @@ def test_a_label_of_two_points_refuses_nothing_but_itself(
     nobody = np.zeros((3, np.arange(0.0, walk.duration, 0.01).size))
     found = import_gait([written({"C1": nobody, "Other:C1": nobody})], ImportSettings(normative.body_mass))
     assert same(found.gait, normative)
-    assert "points not read, for they share a label: 'C1'" in "\n".join(found.remarks)
-    with pytest.raises(DataError, match="share a label: 'RANK'"):
+    assert "points of one name, 'C1': they are 'C1#1', 'C1#2' here" in "\n".join(found.remarks)
+    with pytest.raises(DataError, match=r"has 'RANK' more than once, .* 'RANK#1' or 'RANK#2', in a gait map"):
         import_gait([written({"Other:RANK": nobody})], ImportSettings(normative.body_mass))
     content = open_c3d(written({"C1": nobody}))
     content["parameters"]["POINT"]["LABELS"]["value"] = content["parameters"]["POINT"]["LABELS"]["value"][:-1]

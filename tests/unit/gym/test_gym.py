@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import ppafo
-from ppafo.engine.loading import BACKEND_VARIABLE, NUMBA
+from ppafo.engine.loading import BACKEND_VARIABLE
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.model.sensors import Measurement, measure
 
@@ -180,8 +180,7 @@ def test_many_are_as_each_would_be_alone(name: str, count: int, mode: AutoresetM
 @pytest.mark.parametrize("name", TASK_NAMES)
 def test_every_compiler_gives_the_same_bits(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     found = {}
-    # Numba takes half a minute for each task.
-    for compiler in [item for item in compilers_here() if item != NUMBA or name == TORQUE]:
+    for compiler in compilers_here():
         monkeypatch.setenv(BACKEND_VARIABLE, compiler)
         many = vector(name, AutoresetMode.NEXT_STEP, 35)
         many.action_space.seed(1)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ppafo.analyses.identify.answer import Identification, finding_of
-from ppafo.analyses.identify.solve import identify
+from ppafo.analyses.identify.question import identify
 from ppafo.cli.main import main
 from ppafo.errors import PpafoError
 from ppafo.identification.problem import json_schema

@@ -11,7 +11,7 @@ from ppafo.parameters.device import Orifice, SonicOrifice
 
 def problem_of(*overrides: str, valve: str | None = None) -> str:
     with pytest.raises(ParameterError) as caught:
-        load_device("ppafo2011", valve, overrides)
+        load_device("ppafo2011", valve=valve, overrides=overrides)
     assert "\n" not in str(caught.value)
     return str(caught.value)
 

@@ -27,20 +27,22 @@ def problem_of(override: str) -> str:
 
 
 def test_valve_means_the_valve_that_is_chosen() -> None:
-    device = load_device("ppafo2011", "solenoid", ("valve.area=5mm^2",))
+    device = load_device("ppafo2011", valve="solenoid", overrides=("valve.area=5mm^2",))
     assert device.valve.orifice == Orifice(5e-6, 0.113)
 
 
 def test_a_valve_by_name_is_changed_whichever_is_chosen() -> None:
-    changed = apply_overrides(COMPLETED, ["valves.solenoid.area=5mm^2"], "proportional").numbers
+    changed = apply_overrides(COMPLETED, ["valves.solenoid.area=5mm^2"], valve="proportional").numbers
     assert changed["valves.solenoid.area"].value == 5.0
     assert changed["valves.proportional.area"].value == 31.6
 
 
 def test_a_value_of_another_valve_than_the_one_that_is_named_beside_it_is_refused_with_both() -> None:
     with pytest.raises(ParameterError, match=r"override 'valves\.solenoid\.area=5mm\^2' and valve = 'proportional'"):
-        load_device("ppafo2011", "proportional", ("valves.solenoid.area=5mm^2",))
-    assert load_device("ppafo2011", "solenoid", ("valves.solenoid.area=5mm^2",)).valve.orifice == Orifice(5e-6, 0.113)
+        load_device("ppafo2011", valve="proportional", overrides=("valves.solenoid.area=5mm^2",))
+    assert load_device(
+        "ppafo2011", valve="solenoid", overrides=("valves.solenoid.area=5mm^2",)
+    ).valve.orifice == Orifice(5e-6, 0.113)
 
 
 def test_an_override_stays_visible_and_tells_what_it_replaced() -> None:

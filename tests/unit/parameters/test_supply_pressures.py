@@ -89,7 +89,7 @@ def test_audit_prints_the_flow_of_a_valve_in_the_gas_of_the_set() -> None:
     overrides = ["valve.sonic_conductance=1 dm^3/(s bar)", "valve.critical_ratio=0.3", "gas.temperature=293.15 K"]
     flows = {}
     for gas in ("air", "CO2"):
-        changed = apply_overrides(load_parameter_set("ppafo2011"), [*overrides, f"gas.species={gas}"], "solenoid")
+        changed = apply_overrides(load_parameter_set("ppafo2011"), [*overrides, f"gas.species={gas}"], valve="solenoid")
         found = {finding.id: finding for finding in audit(changed)}["open-flow-of-solenoid"]
         assert "counts for air" in found.paragraph
         flows[gas] = found.sides[0].value

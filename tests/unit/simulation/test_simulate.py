@@ -14,9 +14,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ppafo.engine import lane_step
 from ppafo.engine.lanes import write_source
 from ppafo.engine.run import TOO_MANY_PARTS
+from ppafo.engine.step import loop
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.model.sensors import Measurement
 from ppafo.running import simulate
@@ -257,7 +257,7 @@ def test_a_step_that_is_not_done_in_the_most_parts_ends_the_run_with_time_and_re
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """A coil that switches inside a step, after 10.3 ms, cuts it in two; here one part is the most."""
-    monkeypatch.setattr(lane_step, "MAXIMUM_PARTS", 1)
+    monkeypatch.setattr(loop, "MAXIMUM_PARTS", 1)
     write_source.cache_clear()
     try:
         result = simulate("torque-task-solenoid", ["run.duration=0.1 s", "valve.opening_delay=10.3 ms"])

@@ -39,7 +39,6 @@ def test_markers_are_read_and_what_was_not_seen_is_a_gap(tmp_path: Path, end: st
         (HEAD.replace("\tmm\n", "\tinch\n") + ROWS, "line 3: Units is 'inch'; allowed are mm, cm, m"),
         (HEAD.replace("\tUnits", "") + ROWS, "line 3: Units is ''; allowed are mm, cm, m"),
         (HEAD.replace("Time", "Clock") + ROWS, "line 4: must begin with 'Frame#', 'Time'"),
-        (HEAD.replace("R.Ankle", "RKNE") + ROWS, "line 4: names two markers 'RKNE'; every marker needs a name"),
         (HEAD.replace("RKNE", "").replace("R.Ankle", "") + ROWS, "line 4: names no marker"),
         (HEAD + ROWS.replace("\t6\n2", "\t6\t7\n2"), "line 7 has 9 values for 8 columns"),
         (HEAD + ROWS.replace("\t4\t", "\tfour\t", 1), "line 7, column 'X of R.Ankle': 'four' is not a finite number"),
@@ -64,3 +63,16 @@ def test_a_file_that_is_no_text_is_refused(tmp_path: Path) -> None:
     path.write_bytes(b"PathFileType\xff\xfe\n" * 8)
     with pytest.raises(DataError, match="is not a text file in UTF-8"):
         read_trc(path)
+
+
+def test_two_markers_of_one_name_have_their_numbers(tmp_path: Path) -> None:
+    found = read_trc(table(HEAD.replace("R.Ankle", "RKNE") + ROWS, tmp_path))
+    assert list(found.markers) == ["RKNE#1", "RKNE#2"]
+    assert found.markers["RKNE#2"][:, 1].tolist() == [4.0, 5.0, 6.0]
+    assert found.remarks == ("markers of one name, 'RKNE': they are 'RKNE#1', 'RKNE#2' here",)
+
+
+def test_the_same_marker_twice_is_one(tmp_path: Path) -> None:
+    rows = "1\t0.00\t1\t2\t3\t1\t2\t3\n2\t0.01\t\t\t\t\t\t\n"
+    found = read_trc(table(HEAD.replace("R.Ankle", "RKNE") + rows, tmp_path))
+    assert (list(found.markers), found.remarks) == (["RKNE"], ())

@@ -167,19 +167,23 @@ def test_a_condition_of_find_counts_from_the_atmosphere_of_the_scenario(monkeypa
         find_module, "_Search", lambda _path, condition, *_: limits.append(condition.limit) or stopped()
     )
     with pytest.raises(KeyboardInterrupt):
-        ppafo.find(TASK, "supply.pressure=200..300 kPa_a", f"{METRIC} <= 50 kPa_g", overrides=HIGH_UP)
+        ppafo.find(TASK, vary="supply.pressure=200..300 kPa_a", such_that=f"{METRIC} <= 50 kPa_g", overrides=HIGH_UP)
     assert limits == [pytest.approx(130.0e3)]
     with pytest.raises(StudyError, match=REFUSED):
-        ppafo.find(TASK, f"{ATMOSPHERE}=70..90 kPa_a", f"{METRIC} <= 50 kPa_g", overrides=HIGH_UP)
+        ppafo.find(TASK, vary=f"{ATMOSPHERE}=70..90 kPa_a", such_that=f"{METRIC} <= 50 kPa_g", overrides=HIGH_UP)
 
 
 def test_a_probability_counts_from_the_atmosphere_of_the_scenario(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[Statistic] = []
     monkeypatch.setattr(statistic_module, "draw_until", lambda *given: asked.append(given[3]))
-    ppafo.estimate(high_study("supply.pressure", "300 kPa_a", "400 kPa_a"), METRIC, "probability above 50 kPa_g")
+    ppafo.estimate(
+        high_study("supply.pressure", "300 kPa_a", "400 kPa_a"), metric=METRIC, statistic="probability above 50 kPa_g"
+    )
     assert asked == [parse_statistic("probability above 50 kPa_g", METRIC, 80.0e3)]
     with pytest.raises(StudyError, match=REFUSED):
-        ppafo.estimate(high_study(ATMOSPHERE, "70 kPa_a", "90 kPa_a"), METRIC, "probability above 50 kPa_g")
+        ppafo.estimate(
+            high_study(ATMOSPHERE, "70 kPa_a", "90 kPa_a"), metric=METRIC, statistic="probability above 50 kPa_g"
+        )
 
 
 def test_a_constraint_of_a_tuning_counts_from_the_atmosphere_of_the_scenario() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import ppafo
-from ppafo.analyses.compare.solve import compare
+from ppafo.analyses.compare.question import compare
 from ppafo.analyses.sweep.statistic import Statistic, StoppingRule, draw_until, mean_of, quantile_of
 from ppafo.errors import StudyError
 from ppafo.report.kind import Interval
@@ -42,7 +42,7 @@ def changed(**changes: Any) -> dict[str, Any]:
 @pytest.mark.parametrize("with_study", [True, False])
 def test_scenarios_that_differ_in_nothing_but_their_seed_are_equal_in_every_draw(with_study: bool) -> None:
     one, other = (ppafo.load_scenario("torque-task-proportional", [*NOISY, f"sensors.seed={seed}"]) for seed in (1, 9))
-    found = compare({"one": one, "other": other}, changed() if with_study else None, draws=64)
+    found = compare({"one": one, "other": other}, study=changed() if with_study else None, draws=64)
     (task,) = found.found.tasks
     error = next(item for item in task.pairs["other"] if item.metric == "rms_error")
     assert error.equal == 1.0

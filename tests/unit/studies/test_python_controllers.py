@@ -69,7 +69,7 @@ def test_it_is_compared_over_an_uncertain_device_with_progress_and_overrides() -
     base, heard = ppafo.load_scenario(TASK, SHORT), list[Progress]()
     pair = {"mine": base.controlled_by(Integral(0.1)), "stronger": base.controlled_by(Integral(0.4))}
     level = ["reference.level=2 N m"]
-    found = ppafo.compare(pair, "torque-task-uncertainty", overrides=level, draws=64, progress=heard.append)
+    found = ppafo.compare(pair, study="torque-task-uncertainty", overrides=level, draws=64, progress=heard.append)
     assert [item.done for item in heard] == [32, 64, 96, 128]
     (task,) = found.found.tasks
     (better,) = [item.better for item in task.pairs["stronger"] if item.metric == "rms_error"]
@@ -95,7 +95,7 @@ def test_it_is_swept_chunk_by_chunk(tmp_path: Path) -> None:
     (configuration,) = study.configurations
     own = replace(configuration, scenario=configuration.scenario.controlled_by(Integral()))
     heard: list[Progress] = []
-    results = ppafo.sweep(replace(study, configurations=(own,)), tmp_path / "out", progress=heard.append).found
+    results = ppafo.sweep(replace(study, configurations=(own,)), out=tmp_path / "out", progress=heard.append).found
     assert heard[-1].done == 70
     assert results.document["chunks"] == 2
     table = results.table()

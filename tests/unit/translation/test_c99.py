@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
+from ppafo.engine.entries import INLINE
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import ProgramError
@@ -26,13 +27,13 @@ from scripts.bits import digest, drawn_batch, failures, plain_batch
 from tests.composed_programs import drawn_programs
 
 WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-Werror", "-fsyntax-only", "-ffp-contract=off")
-ENTRY = '@njit("void(float64[:, ::1], float64[:, ::1])")'
+ENTRY = '@entry("void(float64[:, ::1], float64[:, ::1])")'
 needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
 
 
 def module_of(function: Callable[..., Any], given: str, results: int) -> str:
     """A composed module whose ``advance`` calls a function for each column of ``x`` and writes its results to ``y``."""
-    collector = SourceCollector("@njit")
+    collector = SourceCollector(INLINE)
     name = collector.add(function)
     lines = [f"        {', '.join(f'y[{row}, lane]' for row in range(results))} = {name}({given})"]
     if results > 1:
@@ -224,13 +225,13 @@ def test_c_has_the_bits_of_python_where_its_own_names_numbers_and_places_are_oth
 
 
 ROWS_OF_BLOCKS = f"""
-@njit
+@inline
 def note(x, y, first, lane):
     y[first, lane], y[first + 1, lane] = y[first + 1, lane], y[first, lane]
     y[first, lane], kept = swapped(x[first, lane], x[first + 1, lane])
     y[first + 1, lane] += kept
 
-@njit
+@inline
 def swapped(left, right):
     return right, left
 
@@ -247,7 +248,7 @@ def advance(x, y):
 
 @needs_gcc
 def test_a_call_that_returns_nothing_is_done_and_parts_of_arrays_are_written_in_place(tmp_path: Path) -> None:
-    scope: dict[str, Any] = {"njit": lambda given: given if callable(given) else lambda function: function}
+    scope: dict[str, Any] = {"inline": lambda function: function, "entry": lambda _types: lambda function: function}
     exec(ROWS_OF_BLOCKS, scope)
     columns, found, expected = np.arange(1.0, 13.0).reshape(4, 3), np.ones((4, 3)), np.ones((4, 3))
     scope["advance"](columns, expected)

@@ -1,6 +1,5 @@
 """What cannot carry a comparison is refused in one line, or remarked on; never a silent wrong number."""
 
-import argparse
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -8,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ppafo.analyses.validate.solve import validate
-from ppafo.cli.arguments import quantity
-from ppafo.errors import DataError, PpafoError
+from ppafo.analyses.validate.question import validate
+from ppafo.arguments import quantity
+from ppafo.errors import ArgumentError, DataError, PpafoError
 from ppafo.parameters import load_device
 from ppafo.parameters.device import Device
 from ppafo.signals import Channel, Recording
@@ -104,7 +103,7 @@ def test_the_same_file_without_a_mistake_is_taken(tmp_path: Path) -> None:
 
 def test_gauge_pressures_count_from_the_atmosphere_of_the_set(tmp_path: Path) -> None:
     path = written(tmp_path, HEADER, *ROWS)
-    device = load_device("ppafo2011", None, ["supply.atmospheric_pressure=90 kPa_a"])
+    device = load_device("ppafo2011", valve=None, overrides=["supply.atmospheric_pressure=90 kPa_a"])
     assert read_measured(path, device).recording["pressure_1"][0] == 90000.0
 
 
@@ -201,7 +200,7 @@ def test_other_settings_are_checked() -> None:
         with pytest.raises(DataError, match="longest delay"):
             validate("ppafo2011", ["r.csv"], longest_delay=read(text))
     for text in ("5", "5 V"):
-        with pytest.raises(argparse.ArgumentTypeError, match=text):
+        with pytest.raises(ArgumentError, match=text):
             read(text)
     with pytest.raises(DataError, match="did you mean 'measured'"):
         validate("ppafo2011", ["r.csv"], motion="mesured")

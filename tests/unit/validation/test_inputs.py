@@ -147,7 +147,7 @@ def test_a_supply_unlike_that_of_the_set_is_followed_and_said(agree: Agree) -> N
 
 
 def test_a_recorded_external_torque_moves_the_vane(agree: Agree) -> None:
-    device = load_device("ppafo2011", None, ["foot_plate.gravity_torque=0 N m"])
+    device = load_device("ppafo2011", valve=None, overrides=["foot_plate.gravity_torque=0 N m"])
     still = recording_of(np.full((2, TIMES.size), 1.5e5), np.full(TIMES.size, 4e5), np.full(TIMES.size, 1.3))
     still = still.with_channel("command", np.zeros(TIMES.size), "-")
     still = still.with_channel("pressure_1", np.linspace(1.5e5, 1.6e5, TIMES.size), "Pa")

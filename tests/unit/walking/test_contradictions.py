@@ -80,7 +80,7 @@ REPORTED_VANE = (
 @pytest.mark.parametrize("name", [name for name in list_walks() if name != "off"])
 def test_no_shipped_walk_compresses_a_chamber_by_more_than_is_asked_for(name: str) -> None:
     def compressed(*overrides: str) -> float:
-        result = walk(load_walk(name, overrides), 0.15)
+        result = walk(load_walk(name, overrides), minutes=0.15)
         highest = max(result.recording[chamber].max() for chamber in ("pressure_1", "pressure_2"))
         return float(highest / result.scenario.device.supply.pressure)
 
@@ -159,16 +159,16 @@ def test_force_sensors_need_a_gait_with_a_ground_reaction(tmp_path: Path) -> Non
 @pytest.mark.parametrize("minutes", [0.05, -1.0, 61.0, float("nan"), float("inf")])
 def test_a_walk_too_short_or_too_long_is_refused(minutes: float) -> None:
     with pytest.raises(ScenarioError, match=r"must be 0\.087 min \(5 strides\) or more, and at most 60 min"):
-        walk("solenoid", minutes)
+        walk("solenoid", minutes=minutes)
 
 
 def test_overrides_beside_a_configuration_are_refused() -> None:
     configuration = load_walk("off")
     with pytest.raises(ScenarioError, match="a Scenario takes them in load_walk"):
-        walk(configuration, 0.1, ["wearer.body_mass=80 kg"])
+        walk(configuration, minutes=0.1, overrides=["wearer.body_mass=80 kg"])
 
 
 @pytest.mark.parametrize("count", [0, -3, 1_000_001])
 def test_a_number_of_wearers_that_cannot_walk_is_refused(count: int) -> None:
     with pytest.raises(ScenarioError, match="must be from 1 to 1000000"):
-        walk_population(load_walk("off"), 0.1, count)
+        walk_population(load_walk("off"), minutes=0.1, wearers=count)

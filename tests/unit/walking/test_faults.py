@@ -176,26 +176,26 @@ NOISE = [
 @pytest.mark.parametrize("sensors", [IDEAL, STEPS, NOISE], ids=["ideal", "steps", "noise"])
 def test_nobody_of_two_hundred_wearers_is_vented_without_a_fault(name: str, sensors: list[str]) -> None:
     configuration = load_walk(name, [f"sensors.{text}" for text in sensors])
-    people = walk_population(configuration, 0.4, 200, seed=1)
+    people = walk_population(configuration, minutes=0.4, wearers=200, seed=1)
     assert (people.count, people.diverged, people.vented, people.paused) == (200, 0, 0, 0)
     assert people.outcomes["gas"].min() > 1.0e-4
 
 
 def test_wearers_whose_controller_paused_or_stopped_are_counted_with_the_sign() -> None:
     given = ["faults.heel.kind=stuck", "faults.heel.time=3 s", "controller.largest_drop=10000 N"]
-    people = walk_population(load_walk("solenoid", given), 0.15, 9)
+    people = walk_population(load_walk("solenoid", given), minutes=0.15, wearers=9)
     assert (people.vented, people.paused) == (0, 9)
     assert sum(people.fault_flags.values()) == 9
     assert set(people.fault_flags) <= {"no_heel", "toe_strides"}
     configuration = load_walk("solenoid", ["faults.toe.kind=frozen", "faults.toe.time=3.2 s"])
-    people = walk_population(configuration, 0.15, 9)
+    people = walk_population(configuration, minutes=0.15, wearers=9)
     assert people.vented + people.paused == 9
     assert people.vented >= 5
 
 
 def test_a_toe_channel_that_shows_the_heel_brakes_no_push_off() -> None:
     fault = ["faults.toe.kind=distorted", "faults.toe.time=0 s", "faults.toe.crosstalk=1"]
-    result = walk(load_walk("proportional", fault), 0.09)
+    result = walk(load_walk("proportional", fault), minutes=0.09)
     on_toes = result.recording["contact"] == TOE
     assert -result.recording["torque"][on_toes].min() < 0.5
     assert [event.fault_flag.name for event in result.events if event.fault_flag is not None][:1] == ["no_toe_off"]

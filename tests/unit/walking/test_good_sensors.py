@@ -29,7 +29,7 @@ SENSORS = {
 @pytest.mark.parametrize("sensors", SENSORS)
 def test_a_wearer_with_any_part_of_the_healthy_moment_is_helped_without_alarm(valve: str, sensors: str) -> None:
     for fraction in (0.0, 0.4, 0.8, 0.9, 1.0):
-        result = walk(load_walk(valve, [f"wearer.residual_share={fraction}", *SENSORS[sensors]]), MINUTES)
+        result = walk(load_walk(valve, [f"wearer.residual_share={fraction}", *SENSORS[sensors]]), minutes=MINUTES)
         assert result.status.is_completed
         assert "safe_state_time" not in result.metrics
         assert result.metrics["net_push_off_work"].value > 1.0
@@ -45,13 +45,13 @@ def test_a_slow_walk_is_helped_without_alarm(valve: str, sensors: str) -> None:
         overrides = [f"wearer.residual_share={fraction}", *SENSORS[sensors]]
         configuration = load_walk(valve, overrides)
         configuration = replace(configuration, motion=replace(walk_of(configuration), gait=slow))
-        result = walk(configuration, MINUTES)
+        result = walk(configuration, minutes=MINUTES)
         assert "safe_state_time" not in result.metrics
         assert result.metrics["net_push_off_work"].value > 1.0
 
 
 def test_a_nondisabled_wearer_keeps_the_gait_and_the_device_takes_over_part_of_lifting_the_foot() -> None:
-    comparison = compare_walks(load_walk("proportional", ["wearer.keeps_gait=1"]), MINUTES)
+    comparison = compare_walks(load_walk("proportional", ["wearer.keeps_gait=1"]), minutes=MINUTES)
     worn, bare = comparison.with_device, comparison.without_device
     for result in (worn, bare):
         assert "safe_state_time" not in result.metrics
@@ -64,24 +64,26 @@ def test_a_nondisabled_wearer_keeps_the_gait_and_the_device_takes_over_part_of_l
 @pytest.mark.parametrize("valve", ["solenoid", "proportional"])
 def test_a_nondisabled_wearer_stops_without_a_pause(valve: str) -> None:
     """The last foot comes down slowly: its toes carried nothing until it was flat to the last degree, and it paused."""
-    result = walk(load_walk(valve, ["wearer.keeps_gait=1"], task_sequence="corridor"), 0.35)
+    result = walk(load_walk(valve, ["wearer.keeps_gait=1"], task_sequence="corridor"), minutes=0.35)
     assert result.recording.time[-1] > 19.0
     assert not result.events
 
 
 def test_nondisabled_wearers_whose_feet_roll_slowly_are_helped_without_a_pause() -> None:
-    people = walk_population(load_walk("solenoid", ["wearer.keeps_gait=1"]), 0.12, 24)
+    people = walk_population(load_walk("solenoid", ["wearer.keeps_gait=1"]), minutes=0.12, wearers=24)
     assert (people.vented, people.paused) == (0, 0)
 
 
 def test_coarse_sensors_take_no_help_away_in_a_task_sequence_with_stops() -> None:
     """Their steps hold a reading for long: half to seven tenths of the wearers paused by a sensor that seemed still."""
-    people = walk_population(load_walk("solenoid", SENSORS["coarse"], task_sequence="corridor"), None, 24)
+    people = walk_population(
+        load_walk("solenoid", SENSORS["coarse"], task_sequence="corridor"), minutes=None, wearers=24
+    )
     assert people.vented == 0
     assert not [name for name in people.fault_flags if name.startswith(("still_", "frozen_"))]
 
 
 def test_an_impaired_wearer_has_no_moment_of_dorsiflexors_to_speak_of() -> None:
-    result = walk(load_walk("proportional"), MINUTES)
+    result = walk(load_walk("proportional"), minutes=MINUTES)
     assert "dorsiflexor_moment" not in result.recording
     assert "dorsiflexor_moment" not in result.metrics

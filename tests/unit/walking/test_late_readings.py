@@ -27,7 +27,7 @@ def test_a_late_heel_sensor_shows_the_next_strike_as_much_later() -> None:
     sound = [f"faults.heel.{item}" for item in ("kind=distorted", f"time={BEGINS} s", "delay=0.001 s")]
     strikes = []
     for given in (sound, late):
-        recording = walk(load_walk("solenoid", given), 0.1).recording
+        recording = walk(load_walk("solenoid", given), minutes=0.1).recording
         begins = np.diff(recording["controller_phase"] == 1.0, prepend=False) & (recording["controller_phase"] == 1.0)
         times = recording.time[begins]
         # The heel is on the ground when the fault begins: the first strike after it is that of the next stride.
@@ -46,7 +46,9 @@ def test_what_is_known_of_valve_and_sensors_may_delay_a_pressure() -> None:
 @pytest.mark.parametrize("valve", ["solenoid", "proportional"])
 def test_forces_that_come_65_ms_late_lift_only_within_two_and_a_half_strides(valve: str) -> None:
     words = ("kind=distorted", f"time={BEGINS} s", "delay=0.065 s")
-    result = walk(load_walk(valve, [f"faults.{sensor}.{word}" for sensor in ("heel", "toe") for word in words]), 0.12)
+    result = walk(
+        load_walk(valve, [f"faults.{sensor}.{word}" for sensor in ("heel", "toe") for word in words]), minutes=0.12
+    )
     lifted = np.flatnonzero(result.recording["safe_state"] > 0.0)
     assert BEGINS < result.recording.time[lifted[0]] < BEGINS + 2.5 * 1.04
     assert set(result.recording["safe_state"][lifted]) == {1.0}, "and so it stays"

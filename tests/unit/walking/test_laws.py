@@ -29,7 +29,7 @@ LARGEST_ERROR = {
 @pytest.fixture(scope="module")
 def walked() -> Callable[[str], WalkResult]:
     def run(name: str) -> WalkResult:
-        return walk(load_walk("proportional", [f"controller.kind={name}"]), MINUTES)
+        return walk(load_walk("proportional", [f"controller.kind={name}"]), minutes=MINUTES)
 
     return lru_cache(run)
 
@@ -62,14 +62,16 @@ def test_the_foot_is_free_in_mid_stance_and_clears_the_ground_in_mid_swing(
 
 
 def test_solenoid_valves_lift_the_toes_too_because_the_push_off_ends_in_time() -> None:
-    in_time, late = (walk(load_walk("solenoid", given), MINUTES) for given in ([], ["controller.push_off_end=0.65"]))
+    in_time, late = (
+        walk(load_walk("solenoid", given), minutes=MINUTES) for given in ([], ["controller.push_off_end=0.65"])
+    )
     assert in_time.metrics["lowest_toes"].value > 0.0 > late.metrics["lowest_toes"].value
     assert in_time.metrics["net_push_off_work"].value > 0.8
 
 
 @pytest.mark.parametrize("zone", [[], ["controller.dead_zone=1 N m", "controller.release=0.3 N m"]])
 def test_the_dead_zone_works_on_solenoid_valves(zone: list[str]) -> None:
-    result = walk(load_walk("solenoid", ["controller.kind=event_on_off_dead_zone", *zone]), MINUTES)
+    result = walk(load_walk("solenoid", ["controller.kind=event_on_off_dead_zone", *zone]), minutes=MINUTES)
     assert result.status.is_completed
     assert "safe_state_time" not in result.metrics
     assert result.metrics["net_push_off_work"].value > 0.8
@@ -81,7 +83,7 @@ def test_the_error_of_the_learning_law_falls_from_stride_to_stride(walked: Calla
     errors = push_off_errors(result)
     assert errors[-3:].mean() < 0.7 * errors[0]
     overrides = ["controller.kind=event_damped_learning", "controller.learning_gain=0 1/(N m)"]
-    without = walk(load_walk("proportional", overrides), MINUTES)
+    without = walk(load_walk("proportional", overrides), minutes=MINUTES)
     assert without.metrics["push_off_error"].value > 1.2 * result.metrics["push_off_error"].value
     assert np.ptp(push_off_errors(without)[SETTLING:]) < 0.02, "nothing is learnt without a gain"
 

@@ -25,7 +25,7 @@ SMALL = ["bottle.fill=0.15", "bottle.temperature=262 K"]
 
 @pytest.fixture(scope="module")
 def small() -> WalkResult:
-    return walk(WALK, 0.15, SMALL, bottle=BOTTLE)
+    return walk(WALK, minutes=0.15, overrides=SMALL, bottle=BOTTLE)
 
 
 def test_mass_and_energy_close(small: WalkResult) -> None:
@@ -37,7 +37,7 @@ def test_mass_and_energy_close(small: WalkResult) -> None:
 
 
 def test_a_bottle_of_a_gram_ends_empty_and_its_gas_stays_what_a_gas_can_be() -> None:
-    found = walk(WALK, 0.1, ["bottle.gas_mass=1 g", "bottle.volume=1.5 cm^3"], bottle=BOTTLE)
+    found = walk(WALK, minutes=0.1, overrides=["bottle.gas_mass=1 g", "bottle.volume=1.5 cm^3"], bottle=BOTTLE)
     assert found.supply is not None
     values = found.supply.values
     assert found.supply.ending.kind == "empty"
@@ -78,7 +78,7 @@ def test_an_independent_simulator_coupled_at_every_stage_says_the_same(
 
 
 def test_a_tenfold_finer_coupling_changes_little(small: WalkResult) -> None:
-    fine = walk(WALK, 0.15, [*SMALL, "bottle.coupling=10 ms"], bottle=BOTTLE)
+    fine = walk(WALK, minutes=0.15, overrides=[*SMALL, "bottle.coupling=10 ms"], bottle=BOTTLE)
     assert fine.metrics["total_gas"].value == pytest.approx(small.metrics["total_gas"].value, rel=5e-4)
     for name in ("bottle_temperature", "regulator_temperature", "gas_temperature"):
         assert fine.recording[name][-1] == pytest.approx(small.recording[name][-1], abs=0.05)
@@ -86,15 +86,18 @@ def test_a_tenfold_finer_coupling_changes_little(small: WalkResult) -> None:
 
 def test_a_bottle_whose_gas_comes_warm_feeds_as_a_supply_without_end() -> None:
     warm = [f"bottle.hose.{name}" for name in ("effectiveness=1", "heat_capacity=1e6 J/K")]
-    found = walk(WALK, 0.1, [*warm, "bottle.regulator.area=50 mm^2"], bottle=BOTTLE)
-    plain = walk(WALK, 0.1)
+    found = walk(WALK, minutes=0.1, overrides=[*warm, "bottle.regulator.area=50 mm^2"], bottle=BOTTLE)
+    plain = walk(WALK, minutes=0.1)
     assert found.recording["gas_temperature"] == pytest.approx(298.0, abs=1e-3)
     for name in ("gas", "net_push_off_work", "lowest_toes"):
         assert found.metrics[name].value == pytest.approx(plain.metrics[name].value, rel=1e-4, abs=1e-5)
 
 
 def test_cold_gas_costs_torque_and_takes_more_gas() -> None:
-    cold, plain = walk(WALK, 0.15, ["bottle.temperature=270 K"], bottle=BOTTLE), walk(WALK, 0.15)
+    cold, plain = (
+        walk(WALK, minutes=0.15, overrides=["bottle.temperature=270 K"], bottle=BOTTLE),
+        walk(WALK, minutes=0.15),
+    )
     assert cold.metrics["gas"].value > 1.04 * plain.metrics["gas"].value
     assert cold.averages["torque"].mean.max() < plain.averages["torque"].mean.max()
 
@@ -111,7 +114,7 @@ ENDINGS = {
 
 @pytest.mark.parametrize("kind", ENDINGS)
 def test_the_walk_ends_with_its_supply_and_says_why_and_when(kind: str) -> None:
-    found = walk(WALK, 0.2, ENDINGS[kind], bottle=BOTTLE)
+    found = walk(WALK, minutes=0.2, overrides=ENDINGS[kind], bottle=BOTTLE)
     assert found.supply is not None
     ending, end = found.supply.ending, float(found.recording.time[-1])
     assert ending.kind == kind
@@ -162,7 +165,7 @@ def test_a_walk_that_diverges_ends_so_and_says_what_was_let_through_before(
 
 
 def test_ice_narrows_the_seat_until_the_gas_lacks_no_more_than_it_is_given() -> None:
-    found = walk(WALK, 0.2, [*ENDINGS["iced"], "bottle.least_torque=0.01"], bottle=BOTTLE)
+    found = walk(WALK, minutes=0.2, overrides=[*ENDINGS["iced"], "bottle.least_torque=0.01"], bottle=BOTTLE)
     assert found.supply is not None
     opened = found.supply.values["seat_open"]
     assert opened[0] == 1.0
@@ -210,6 +213,17 @@ def test_a_file_that_sets_its_regulator_to_another_pressure_is_refused(tmp_path:
     assert walk_of(load_walk(WALK, lower, bottle=file)).bottle is not None
 
 
+@pytest.mark.parametrize("room", ["1.000 bar_a", "0.980 bar_a", "1.01325 bar_a"])
+def test_gauge_pressures_of_bottle_and_set_are_one_in_any_atmosphere(tmp_path: Path, room: str) -> None:
+    shipped = (Path(str(BOTTLES.shipped)) / f"{BOTTLE}.toml").read_text(encoding="utf-8")
+    file = tmp_path / "own.toml"
+    file.write_text(shipped.replace('50.0\nunit = "psi_g"', '5.5\nunit = "bar_g"'), encoding="utf-8")
+    wanted = [f"supply.atmospheric_pressure={room}", "supply.pressure=5.5 bar_g"]
+    supply = walk_of(load_walk(WALK, wanted, bottle=file)).bottle
+    assert supply is not None
+    assert supply.bottle.regulator.set_pressure == pytest.approx(1e5 * float(room.split(maxsplit=1)[0]) + 5.5e5)
+
+
 def test_a_bottle_of_the_package_is_set_to_the_pressure_of_the_walk_and_says_so() -> None:
     supply = walk_of(load_walk(WALK, ["supply.pressure=60 psi_g"], bottle=BOTTLE)).bottle
     assert supply is not None
@@ -232,7 +246,7 @@ def test_what_is_named_twice_is_refused(path: str, value: str) -> None:
 def test_many_wearers_and_an_energy_balance_have_no_bottle() -> None:
     configuration = load_walk(WALK, bottle=BOTTLE)
     with pytest.raises(ScenarioError, match="many wearers walk at a constant supply"):
-        walk_population(configuration, 0.1, 3)
+        walk_population(configuration, minutes=0.1, wearers=3)
     changes = ["gas_model.kind=thermal", "gas_model.heat_transfer_coefficient=50 W/(m^2 K)"]
     with pytest.raises(ScenarioError, match=r"gas_model\.kind.*not with a bottle"):
         load_walk(WALK, [*changes, "gas_model.wall_area_per_volume=100 1/m"], bottle=BOTTLE)

@@ -42,12 +42,12 @@ def errors(result: WalkResult) -> dict[str, float]:
 
 @pytest.fixture(scope="module")
 def fractional() -> WalkResult:
-    return walk("solenoid", MINUTES, ["timing.kind=fractional"])
+    return walk("solenoid", minutes=MINUTES, overrides=["timing.kind=fractional"])
 
 
 @pytest.fixture(scope="module")
 def thresholds() -> WalkResult:
-    return walk("solenoid", MINUTES)
+    return walk("solenoid", minutes=MINUTES)
 
 
 def test_events_are_known_when_they_happen(fractional: WalkResult, thresholds: WalkResult) -> None:

@@ -27,7 +27,7 @@ CONFIGURATIONS = ("solenoid", "proportional")
 
 @lru_cache(maxsize=4)
 def compared(name: str) -> Comparison:
-    return compare_walks(load_walk(name), 0.15)
+    return compare_walks(load_walk(name), minutes=0.15)
 
 
 def texts(figure: "Figure") -> list[str]:
@@ -100,7 +100,7 @@ def test_the_mean_stride_shows_both_walks_and_the_healthy_gait() -> None:
 @lru_cache
 def failing() -> WalkResult:
     """A walk whose toe sensor dies after seven seconds."""
-    return walk("solenoid", 0.2, ["faults.toe.kind=stuck", "faults.toe.time=7 s"])
+    return walk("solenoid", minutes=0.2, overrides=["faults.toe.kind=stuck", "faults.toe.time=7 s"])
 
 
 def test_pictures_of_the_leg_show_a_stride_with_help_where_there_was_one() -> None:
@@ -159,7 +159,7 @@ def test_the_animation_has_two_strides_of_frames_at_half_speed() -> None:
 
 
 def test_histograms_hold_every_wearer() -> None:
-    people = walk_population(load_walk("proportional"), 0.1, 60, seed=2)
+    people = walk_population(load_walk("proportional"), minutes=0.1, wearers=60, seed=2)
     figure = population_figure(people)
     filled = next(patch for patch in figure.axes[0].patches if patch.get_fill())
     assert filled.get_data().values.sum() == 60  # type: ignore[attr-defined]
@@ -178,7 +178,7 @@ def test_the_walk_over_time_shows_no_push_off_where_the_device_did_not_push() ->
 
 
 def test_the_mean_stride_says_how_many_strides_it_is_the_mean_of() -> None:
-    failing = walk("solenoid", 0.25, overrides=["faults.toe.kind=stuck", "faults.toe.time=4 s"])
+    failing = walk("solenoid", minutes=0.25, overrides=["faults.toe.kind=stuck", "faults.toe.time=4 s"])
     counted = int(settled(failing.helped).sum())
     assert 0 < counted < failing.helped.size
     assert failing.metrics["counted_strides"].value == counted

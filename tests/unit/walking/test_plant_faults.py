@@ -20,7 +20,7 @@ SHUT_OFF = "shut_off.area=10 mm^2"
 
 def broken(name: str, part: str, kind: str, *more: str) -> WalkResult:
     given = [f"faults.{part}.kind={kind}", f"faults.{part}.time={FAILS} s", *more]
-    return walk(load_walk(name, given), 0.16)
+    return walk(load_walk(name, given), minutes=0.16)
 
 
 def test_every_fault_of_the_catalogue_sets_fields_that_there_are() -> None:
@@ -97,7 +97,9 @@ def test_a_fault_that_a_part_does_not_have_and_a_regulator_behind_lines_are_refu
 
 def test_a_controller_that_is_silent_for_too_long_is_shut_off_by_the_watchdog_and_a_shorter_silence_is_not() -> None:
     late = ("faults.controller.kind=late", "faults.controller.time=3.2 s", SHUT_OFF)
-    patient, watched = (walk("solenoid", 0.12, (*late, *more)) for more in (("shut_off.silence=1 s",), ()))
+    patient, watched = (
+        walk("solenoid", minutes=0.12, overrides=(*late, *more)) for more in (("shut_off.silence=1 s",), ())
+    )
     seen = [
         [(event.time, event.fault_flag.name) for event in found.events if event.fault_flag]
         for found in (patient, watched)

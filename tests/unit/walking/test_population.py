@@ -31,7 +31,7 @@ MINUTES = 0.15
 @pytest.mark.parametrize("name", ["solenoid", "proportional", "off"])
 def test_the_first_wearer_is_that_of_the_configuration(name: str) -> None:
     configuration = load_walk(name)
-    people = walk_population(configuration, MINUTES, 9, seed=3)
+    people = walk_population(configuration, minutes=MINUTES, wearers=9, seed=3)
     run = plan_walk(with_duration(configuration, 60.0 * MINUTES))
     rows = state_row_numbers(run)
     alone = run_batch(batch_of(run)).states[:, 0]
@@ -60,7 +60,7 @@ def with_heel_of(run: Run, shared: Run, stature: float) -> Run:
 
 def test_any_wearer_walks_as_it_would_alone() -> None:
     configuration, index, count = load_walk("solenoid"), 3, 5
-    people = walk_population(configuration, MINUTES, count, seed=3)
+    people = walk_population(configuration, minutes=MINUTES, wearers=count, seed=3)
     generator = np.random.default_rng(3)
     build = draw_builds(count, generator)
     gaits = draw_gaits(walk_of(configuration).gait, build.stature, generator)
@@ -101,7 +101,7 @@ def test_any_wearer_walks_as_it_would_alone() -> None:
 
 def test_the_same_seed_gives_the_same_wearers_and_another_one_others() -> None:
     configuration = load_walk("solenoid")
-    first, again, other = (walk_population(configuration, MINUTES, 40, seed) for seed in (1, 1, 2))
+    first, again, other = (walk_population(configuration, minutes=MINUTES, wearers=40, seed=seed) for seed in (1, 1, 2))
     for name, values in first.outcomes.items():
         np.testing.assert_array_equal(values, again.outcomes[name])
     assert not np.array_equal(first.outcomes["gas"], other.outcomes["gas"])
@@ -152,7 +152,9 @@ def test_the_way_of_the_knee_is_as_long_as_people_are_tall() -> None:
 def test_wearers_that_diverge_are_counted_and_left_out() -> None:
     configuration = load_walk("solenoid")
     supply = replace(configuration.device.supply, pressure=1.0e18)
-    people = walk_population(replace(configuration, device=replace(configuration.device, supply=supply)), MINUTES, 8)
+    people = walk_population(
+        replace(configuration, device=replace(configuration.device, supply=supply)), minutes=MINUTES, wearers=8
+    )
     assert people.diverged == 8
     assert people.count == 0
     assert "8 of 8 wearers diverged and are left out; the step may be too long" in people.message
@@ -162,10 +164,12 @@ def test_progress_of_many_wearers_is_told(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr(sys.modules[walk_population.__module__], "STEPS_AT_ONCE", 1.0)
     told: list[tuple[float, float]] = []
     configuration = load_walk("off")
-    grouped = walk_population(configuration, MINUTES, 70, 1, lambda done, total: told.append((done, total)))
+    grouped = walk_population(
+        configuration, minutes=MINUTES, wearers=70, seed=1, progress=lambda done, total: told.append((done, total))
+    )
     assert told == [(32.0, 70.0), (64.0, 70.0), (70.0, 70.0)]
     monkeypatch.undo()
     np.testing.assert_array_equal(
         grouped.outcomes["net_push_off_work"],
-        walk_population(configuration, MINUTES, 70, 1).outcomes["net_push_off_work"],
+        walk_population(configuration, minutes=MINUTES, wearers=70, seed=1).outcomes["net_push_off_work"],
     )

@@ -28,7 +28,7 @@ MINUTES = 0.15
 
 @lru_cache(maxsize=4)
 def compared(name: str) -> Comparison:
-    return compare_walks(load_walk(name), MINUTES)
+    return compare_walks(load_walk(name), minutes=MINUTES)
 
 
 @pytest.mark.parametrize("name", ["solenoid", "proportional"])
@@ -106,13 +106,15 @@ def test_the_lowest_toes_are_those_of_the_mean_stride_in_mid_swing() -> None:
 
 
 def test_the_name_of_a_configuration_is_as_good_as_the_configuration() -> None:
-    by_name = walk("off", MINUTES)
-    np.testing.assert_array_equal(by_name.recording["angle"], walk(load_walk("off"), MINUTES).recording["angle"])
+    by_name = walk("off", minutes=MINUTES)
+    np.testing.assert_array_equal(
+        by_name.recording["angle"], walk(load_walk("off"), minutes=MINUTES).recording["angle"]
+    )
 
 
 def test_progress_is_told_up_to_the_end() -> None:
     told: list[tuple[float, float]] = []
-    walk("off", 4.0, progress=lambda done, total: told.append((done, total)))
+    walk("off", minutes=4.0, progress=lambda done, total: told.append((done, total)))
     assert len(told) >= 2
     assert told[-1][0] == told[-1][1] == pytest.approx(4.0, abs=1e-3)
 
@@ -120,7 +122,7 @@ def test_progress_is_told_up_to_the_end() -> None:
 def diverging() -> WalkResult:
     configuration = load_walk("solenoid")
     supply = replace(configuration.device.supply, pressure=1.0e18)
-    return walk(replace(configuration, device=replace(configuration.device, supply=supply)), MINUTES)
+    return walk(replace(configuration, device=replace(configuration.device, supply=supply)), minutes=MINUTES)
 
 
 def test_a_walk_that_diverges_says_when_and_what_to_do() -> None:

@@ -68,7 +68,7 @@ def test_an_unknown_line_of_a_walk_file_is_named(tmp_path: Path) -> None:
 
 
 def test_the_recording_has_line_pressures_only_where_there_are_lines() -> None:
-    with_lines, without = walk("solenoid-regulators", 0.1).recording, walk("solenoid", 0.1).recording
+    with_lines, without = walk("solenoid-regulators", minutes=0.1).recording, walk("solenoid", minutes=0.1).recording
     assert {"line_pressure_1", "line_pressure_2", "regulated_mass"} == set(with_lines.names) - set(without.names)
     assert with_lines["line_pressure_1"][0] == pytest.approx(446.06e3, rel=1e-4)
     assert np.ptp(with_lines["line_pressure_1"]) > 1.0e3
@@ -84,7 +84,7 @@ def test_a_tenfold_droop_costs_work_and_a_smaller_step_changes_little() -> None:
     droop = "supply_line.plantarflexion.droop"
     drooping = with_numbers(base, {droop: 10.0 * number_at(base, droop)})
     found = {
-        name: walk(configuration, 0.1).metrics["net_push_off_work"].value
+        name: walk(configuration, minutes=0.1).metrics["net_push_off_work"].value
         for name, configuration in {
             "base": base,
             "fine": replace(base, run=replace(base.run, step=1.0e-4)),
@@ -96,8 +96,8 @@ def test_a_tenfold_droop_costs_work_and_a_smaller_step_changes_little() -> None:
 
 
 def test_many_wearers_have_lines_of_their_own() -> None:
-    people = walk_population(load_walk("solenoid-regulators"), 0.1, 40, seed=3)
-    ideal = walk_population(load_walk("solenoid"), 0.1, 40, seed=3)
+    people = walk_population(load_walk("solenoid-regulators"), minutes=0.1, wearers=40, seed=3)
+    ideal = walk_population(load_walk("solenoid"), minutes=0.1, wearers=40, seed=3)
     assert people.count == ideal.count == 40
     assert np.ptp(people.outcomes["gas"]) > 0.0
     assert float(people.outcomes["gas"].mean()) < 0.98 * float(ideal.outcomes["gas"].mean())

@@ -276,9 +276,9 @@ def test_on_stairs_the_toes_are_loaded_first_also_with_a_device_that_lifts_them(
 
 def test_a_task_sequence_has_the_same_bits_alone_and_in_a_population() -> None:
     configuration = load_walk("solenoid", LENIENT, task_sequence="stairs")
-    people = walk_population(configuration, 0.3, 20, seed=2)
-    alone = walk_population(configuration, 0.3, 1, seed=2)
-    single = walk(configuration, 0.3)
+    people = walk_population(configuration, minutes=0.3, wearers=20, seed=2)
+    alone = walk_population(configuration, minutes=0.3, wearers=1, seed=2)
+    single = walk(configuration, minutes=0.3)
     for name, values in people.outcomes.items():
         assert values[0] == alone.outcomes[name][0], name
     assert people.outcomes["gas"].size == 20
@@ -289,6 +289,6 @@ def test_a_task_sequence_has_the_same_bits_alone_and_in_a_population() -> None:
 
 def test_a_population_walks_until_the_slowest_is_through() -> None:
     configuration = load_walk("solenoid", task_sequence="first-steps")
-    people = walk_population(configuration, None, 12, seed=2)
+    people = walk_population(configuration, minutes=None, wearers=12, seed=2)
     assert people.diverged == 0
     assert 60.0 * people.minutes > planned_task_sequence(load_task_sequence("first-steps"), GAIT).duration

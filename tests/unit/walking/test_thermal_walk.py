@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ppafo.engine.scheme.thermal_gas import ENERGY_BALANCE
+from ppafo.engine.step import energy_balance
 from ppafo.errors import ScenarioError
 from ppafo.metrics import evaluate
 from ppafo.simulation.scenario import GasModel
@@ -37,12 +37,12 @@ def test_warm_gas_has_steps_that_follow_the_faster_chambers() -> None:
     assert warm.program.is_thermal
     assert not plain.program.is_thermal
     assert plain.step / warm.step >= 1.0
-    assert warm.program == replace(plain.program, gas=ENERGY_BALANCE)
+    assert warm.program == replace(plain.program, gas=energy_balance)
 
 
 @pytest.mark.parametrize("name", ["solenoid", "solenoid-regulators"])
 def test_a_walk_with_warm_gas_keeps_mass_to_rounding_and_energy_and_comes_to_the_isothermal_walk(name: str) -> None:
-    warm, rigid, plain = (walk(load_walk(name, given), 0.1) for given in (WARM, RIGID, ()))
+    warm, rigid, plain = (walk(load_walk(name, given), minutes=0.1) for given in (WARM, RIGID, ()))
     for result in (warm, rigid):
         assert result.status.is_completed
         supplied = float(np.ptp(result.recording["supplied_mass"]))
@@ -60,7 +60,7 @@ def test_a_walk_with_warm_gas_keeps_mass_to_rounding_and_energy_and_comes_to_the
 
 def test_many_wearers_walk_with_warm_gas_and_the_first_is_that_of_the_configuration() -> None:
     configuration = load_walk("solenoid", WARM)
-    people, alone = walk_population(configuration, 0.1, 3, seed=3), walk(configuration, 0.1)
+    people, alone = walk_population(configuration, minutes=0.1, wearers=3, seed=3), walk(configuration, minutes=0.1)
     assert people.count == 3
     strides = 6.0 / people.traits["stride_time"][0]
     assert people.outcomes["gas"][0] * strides == pytest.approx(alone.recording["supplied_mass"][-1], rel=1e-3)

@@ -12,7 +12,7 @@ import pytest
 
 import ppafo
 from ppafo.analyses.sensitivity.methods import METHODS
-from ppafo.analyses.walk.answer import walk_with_and_without
+from ppafo.analyses.walk.question import walk_with_and_without
 from ppafo.cli.main import main
 from ppafo.errors import DataError, PpafoError, ScenarioError
 from ppafo.loading import json_schema, list_all_scenarios, load_scenario, reloaded, scenario_from_dict

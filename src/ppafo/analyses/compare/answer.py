@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -135,14 +136,14 @@ def finding_of(found: Compared) -> Finding[Compared]:
     pareto, change = (
         Part(
             "Error against gas",
-            panels=lambda: [_pareto(found, task) for task in found.tasks],
+            panels=partial(_pareto_panels, found),
             name="pareto",
             caption=_PARETO,
             is_detail=True,
         ),
         Part(
             "Spread of the change",
-            panels=lambda: [_change(found, task, metric) for task in found.tasks for metric in (_ERROR, _GAS)],
+            panels=partial(_change_panels, found),
             name="change",
             caption="Change against the baseline in each draw; the dashed line is the nominal device.",
             across=2,
@@ -164,7 +165,7 @@ def finding_of(found: Compared) -> Finding[Compared]:
         ),
         found=found,
         passed=all(case.status.is_completed for task in found.tasks for case in task.cases),
-        live=lambda: live_part([case.scenario for task in found.tasks for case in task.cases]),
+        live=partial(live_part, [case.scenario for task in found.tasks for case in task.cases]),
     )
 
 
@@ -278,6 +279,14 @@ _MAXIMUM_DOTS = 1500
 _BINS = 40
 _SHOWN = (0.5, 99.5)
 """Percentiles between which changes are drawn: a few far ones would make all others one bar."""
+
+
+def _pareto_panels(found: Compared) -> list[Panel]:
+    return [_pareto(found, task) for task in found.tasks]
+
+
+def _change_panels(found: Compared) -> list[Panel]:
+    return [_change(found, task, metric) for task in found.tasks for metric in (_ERROR, _GAS)]
 
 
 def _pareto(found: Compared, task: OnTask) -> Panel:

@@ -8,9 +8,11 @@ from pydantic import TypeAdapter
 
 from ppafo.analyses.design.front.problem import DesignFile, DesignProblem, design_problem
 from ppafo.analyses.design.profile.problem import SizingFile, SizingProblem, sizing_problem
+from ppafo.arguments import Seed, checked
 from ppafo.documents.models import SCHEMA, validate
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import StudyError
+from ppafo.plugins import Plugins, name_plugins
 
 FILE = TomlKind("design", "design", resources.files("ppafo.analyses.design") / "library", StudyError)
 
@@ -31,13 +33,19 @@ def read_design_file(name_or_path: str | Path) -> tuple[DesignFile | SizingFile,
     return validate(DesignFile, document, file, StudyError), file
 
 
-def load_design(name_or_path: str | Path, seed: int | None = None) -> DesignProblem | SizingProblem:
+@checked("problem", "seed", name_or_path="problem")
+def load_design(
+    problem: str | Path, *, seed: Seed | None = None, plugins: Plugins = ()
+) -> DesignProblem | SizingProblem:
     """Return the problem of a design file, by its name in the package or by its path; paths in it begin in its folder.
 
     ``seed`` replaces the seed of a file with tasks. StudyError or ParameterError for what is not usable, in one line.
+
+    ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
     """
-    document, file = read_design_file(name_or_path)
-    folder = Path(name_or_path).parent
+    name_plugins(plugins)
+    document, file = read_design_file(problem)
+    folder = Path(problem).parent
     if isinstance(document, DesignFile):
         return design_problem(document, file, folder, seed)
     if seed is not None:

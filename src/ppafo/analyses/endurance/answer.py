@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -109,7 +110,7 @@ def finding_of(found: Endurance) -> Finding[Endurance]:
             Part(columns=facts(_facts(found))),
             Part(
                 "The bottle over time",
-                panels=lambda: endurance_panels(found),
+                panels=partial(endurance_panels, found),
                 name="endurance",
                 caption=_CAPTION,
                 size=(7.0, 1.9),
@@ -128,7 +129,7 @@ def finding_of(found: Endurance) -> Finding[Endurance]:
             ),
         ),
         found=found,
-        files={"bottle.csv": lambda: marked_csv_bytes(found.discharge.recording)},
+        files={"bottle.csv": partial(marked_csv_bytes, found.discharge.recording)},
     )
 
 

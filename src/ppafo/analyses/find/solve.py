@@ -1,27 +1,22 @@
 """The lowest or highest value that meets a condition on a metric: a grid, then ever smaller brackets."""
 
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.errors import ScenarioError, StudyError, UnitError, one_line, refused_as
-from ppafo.loading import scenario_or_load
-from ppafo.progress import Report
 from ppafo.report.finding import Column, Finding, Part
 from ppafo.report.kind import of_metric, of_path
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import BLACK, GREEN, VERMILION
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import Floats
-from ppafo.studies.draws import Limit, atmosphere_of, check_metrics, level_of, seeds_of_noise
+from ppafo.studies.draws import Limit
 from ppafo.studies.sampling import NOISE
-from ppafo.studies.study import with_overrides
 from ppafo.studies.varying import VariedPath, varied_path
-from ppafo.study.runs import Runs, Tally, oscillating, settled, with_companions
+from ppafo.study.runs import Runs, oscillating, settled
 from ppafo.units import split_quantity
 
 DEFAULT_GRID, FEWEST, MOST = 64, 3, 100_000
@@ -31,9 +26,9 @@ STREAMS = 16
 """Noise streams over which every value is tried where sensors are noisy, the same for all."""
 ACCURACY = 1.0e-6
 """Width of the last bracket, as a fraction of the range."""
-_SEED = 1
+SEED = 1
 _RANGE = re.compile(r"\s*([^=\s]+)\s*=\s*(.+?)\s*\.\.\s*(.+?)\s*")
-_CONDITION = re.compile(r"\s*(\w+)\s*(<=|>=)\s*(.+?)\s*")
+CONDITION = re.compile(r"\s*(\w+)\s*(<=|>=)\s*(.+?)\s*")
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,61 +70,7 @@ class Threshold:
     tried: list[Tried]
 
 
-def find(
-    scenario: Scenario | str | Path,
-    vary: str,
-    such_that: str,
-    highest: bool = False,
-    grid: int = DEFAULT_GRID,
-    overrides: Sequence[str] = (),
-    threads: int | None = None,
-    progress: Report | None = None,
-) -> Finding[Threshold]:
-    """Return the lowest value (or the ``highest``) [SI] of a number of a scenario that meets a condition on a metric.
-
-    ``vary`` is the number with its range, ``"supply.pressure=20..90 psi_g"``; ``such_that`` the condition,
-    ``"final_error <= 0.3 N m"``. How it is searched, and what that does not see, ``ppafo.find`` describes.
-    """
-    base = with_overrides(scenario_or_load(scenario), overrides)
-    path, low, high = _range(vary, base)
-    parts = _CONDITION.fullmatch(such_that)
-    if parts is None:
-        raise StudyError(
-            f"'{one_line(such_that)}' is not of the form METRIC <= LIMIT or METRIC >= LIMIT, "
-            "for example 'final_error <= 0.3 N m'"
-        )
-    check_metrics([parts[1]], base)
-    limit = level_of(parts[3], parts[1], f"'{one_line(such_that)}'", atmosphere_of(base, [path.path]))
-    condition = Limit(parts[1], limit, parts[2] == "<=", f"{parts[1]} {parts[2]} {parts[3]}")
-    if not FEWEST <= grid <= MOST:
-        raise StudyError(f"grid = {grid}: must be at least {FEWEST} and at most {MOST:,}")
-    # The same streams for all values, so that neighbours differ by the value alone.
-    seeds = seeds_of_noise([base], [path.path], 0, STREAMS, _SEED)
-    tally = Tally(grid * max(1, seeds.size), progress)
-    search = _Search(
-        base, path.path, condition, Runs(base, with_companions([condition.metric], base), tally, (), threads), seeds
-    )
-    search.run(np.linspace(low, high, grid))
-    if not np.isfinite(search.metrics).any():
-        if search.oscillating:
-            raise StudyError(
-                f"scenario '{base.name}': in every run from {path.quote(low)} to {path.quote(high)} the torque loop "
-                "oscillates: leave its gains out, so that they follow the device"
-            )
-        reason = search.runs.reason
-        raise StudyError(
-            f"scenario '{base.name}': no run from {path.quote(low)} to {path.quote(high)} has a "
-            f"'{condition.metric}'{reason and '; the first: '}{reason}"
-        )
-    # All parts of a bracket side by side: a bisection would wait for every one of its runs.
-    value, beyond = search.ends(highest)
-    while value is not None and beyond is not None and abs(value - beyond) > ACCURACY * (high - low):
-        search.run(np.linspace(value, beyond, PARTS + 1)[1:-1])
-        value, beyond = search.ends(highest)
-    return _finding(base.name, path, search, highest, grid)
-
-
-class _Search:
+class Search:
     """What was tried so far: values, the metric of each and its standard deviation over the noise, in that order."""
 
     def __init__(self, base: Scenario, path: str, condition: Limit, runs: Runs, seeds: Floats) -> None:
@@ -169,7 +110,8 @@ class _Search:
         return float(values[met[0]]), float(values[met[0] - 1]) if met[0] else None
 
 
-def _range(text: str, base: Scenario) -> tuple[VariedPath, float, float]:
+def range_of(text: str, base: Scenario) -> tuple[VariedPath, float, float]:
+    """Return path, low and high end [SI] of a text ``PATH=LOW..HIGH``; StudyError for any other text."""
     parts = _RANGE.fullmatch(text)
     if parts is None:
         raise StudyError(
@@ -194,7 +136,7 @@ def stretches(values: Floats, is_met: NDArray[np.bool_]) -> list[list[float]]:
     return [[float(values[low]), float(values[high - 1])] for low, high in zip(first, after, strict=True)]
 
 
-def _finding(scenario: str, path: VariedPath, search: _Search, highest: bool, grid: int) -> Finding[Threshold]:
+def finding_of(scenario: str, path: VariedPath, search: Search, highest: bool, grid: int) -> Finding[Threshold]:
     """Return the search in words, a table of where the condition is met, and the metric over the value."""
     condition, order = search.condition, np.argsort(search.values)
     values, metrics, spread, of_grid = search.values[order], search.metrics[order], search.spread[order], order < grid

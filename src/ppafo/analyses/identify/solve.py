@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ppafo.analyses.identify.answer import Identification, finding_of
+from ppafo.analyses.identify.answer import Identification
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.result import BenchResult
 from ppafo.identification.new_set import with_estimates
@@ -12,7 +12,6 @@ from ppafo.identification.problem import (
     ProblemFile,
     ProcedureProblem,
     Setting,
-    load_problem,
     run_procedure,
     window_of,
 )
@@ -30,15 +29,8 @@ from ppafo.parameters.parameter_set import (
     number_in_si,
 )
 from ppafo.progress import Report, report_nothing
-from ppafo.report.finding import Finding
 from ppafo.storage.foreign import read_foreign
 from ppafo.storage.result_folder import read_recording
-
-
-def identify(problem: str | Path, progress: Report = report_nothing) -> Finding[Identification]:
-    """Return what the procedures of a problem file make of its recordings; see ``ppafo.cli.verbs.bench.identify``."""
-    path = Path(problem)
-    return finding_of(solve_problem(load_problem(path), path.parent, path.name, progress))
 
 
 def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Report = report_nothing) -> Identification:
@@ -112,7 +104,7 @@ def _base_set(problem: ProblemFile, folder: Path) -> ParameterSet:
     beside = folder / name
     base = load_parameter_set(beside if beside.suffix == ".toml" else name)
     check_valve(problem.device.overrides, problem.device.valve, f"device.valve = '{problem.device.valve}'")
-    return apply_overrides(base, problem.device.overrides, problem.device.valve)
+    return apply_overrides(base, problem.device.overrides, valve=problem.device.valve)
 
 
 def _source(
@@ -127,7 +119,7 @@ def _source(
         gas = "" if molar_mass is None else f"{molar_mass!r} kg/mol"
         recording = read_foreign(path, problem.columns[columns], None, atmosphere, f"{file}:{columns}", gas)
     else:
-        recording = read_recording(path, atmosphere)
+        recording = read_recording(path, atmosphere=atmosphere)
     return source_of(path, recording)
 
 

@@ -3,6 +3,7 @@
 import io
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
@@ -342,7 +343,7 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
         Part(
             "Poles",
             _poles(model),
-            panels=lambda: frequency_panels(model),
+            panels=partial(frequency_panels, model),
             name="frequency-response" if responds else "",
             caption=_FREQUENCY_CAPTION,
             size=(7.0, 2.4),
@@ -364,7 +365,7 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
     is_locked = isinstance(motion, PrescribedMotion) and motion.profile.kind == "constant"
     is_gas_alone = all(item.name.startswith("pressure") for item in model.states)
     if model.is_steady and is_locked and is_gas_alone and 0.0 < abs(_value(model, "command")) < 0.7:
-        steps = Part("How far it holds", panels=lambda: steps_panels(model), name="steps", caption=_STEPS_CAPTION)
+        steps = Part("How far it holds", panels=partial(steps_panels, model), name="steps", caption=_STEPS_CAPTION)
         parts.append(replace(steps, across=2, size=(4.4, 3.4)))
     size = f"{len(model.states)} states, {len(model.inputs)} inputs, {len(model.outputs)} outputs"
     said = [f"the plant without controller and sensors: {size}; differences from the point, SI units"]
@@ -387,7 +388,7 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
         said=(*said, f"not in the model: {left_out}, noise, resolution and bandwidth of sensors"),
         parts=parts,
         found=model,
-        files={"linearise.npz": lambda: _arrays(model)},
+        files={"linearise.npz": partial(_arrays, model)},
     )
 
 

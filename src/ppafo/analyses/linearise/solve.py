@@ -2,23 +2,21 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from importlib.util import find_spec
-from numbers import Real
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ppafo.analyses.linearise.answer import ON_THE_EDGE, Delays, Edge, LinearModel, Variable, finding_of
+from ppafo.analyses.linearise.answer import ON_THE_EDGE, Delays, Edge, LinearModel, Variable
 from ppafo.control.kind import OPEN_LOOP
 from ppafo.control.profiles import CONSTANT
 from ppafo.engine.continuous_time import mode_at_rest, torque_on_vane
 from ppafo.engine.lanes import Floats, run_batch
 from ppafo.engine.led_leg import LedLeg, shank_at, torque_of_leg
-from ppafo.engine.program import Program, python_place
+from ppafo.engine.linking import python_place
+from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, leaves, numbers, rebuilt
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of, state_row_numbers
-from ppafo.errors import ScenarioError, SimulationError, UnitError, refused_as
+from ppafo.errors import ScenarioError, SimulationError
 from ppafo.model.elementary import TURN, sine_and_cosine_of_turns
 from ppafo.model.leg import FootLoad, ShankNow, torque_on_foot
 from ppafo.model.orifice import FlowCurve
@@ -32,8 +30,6 @@ from ppafo.model.plant import (
 )
 from ppafo.model.ports import at_valve, friction_at_rest
 from ppafo.model.valves.proportional import NO_SLEW_LIMIT
-from ppafo.report.finding import Finding
-from ppafo.simulation.loading import scenario_or_load
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.profiles import profile_values
 from ppafo.simulation.sampled import run_sampled
@@ -44,7 +40,6 @@ from ppafo.translation.plant_rates import (
     vane_acceleration,
 )
 from ppafo.translation.symbolic import Compare, both_sides, symbolic
-from ppafo.units import parse_quantity
 
 VALVE = "valve_"
 """Begins the names of the states of a valve."""
@@ -114,7 +109,7 @@ def plant_of(run: Run, way: float | None, compare: Compare = both_sides, time: f
     at = {name: casadi.SX.sym(name) for name in names}
     given: dict[str, Any] = {name: at[name] for name in driven[1:]}
     plant = run.plant._replace(**given)
-    openings, moves = _valve(run, [at[name] for name in valve_names], at["command"], compare)
+    openings, moves = valve_equations(run, [at[name] for name in valve_names], at["command"], compare)
     acting = dict(zip(program.effects, run.effects, strict=True))
     turn: tuple[Any, Any] = (at["angle"], at["angular_velocity"])
     pressures: tuple[Any, Any] = (at["pressure_1"], at["pressure_2"])
@@ -153,7 +148,7 @@ def _torque_of_leg(program: Program, leg: LedLeg, time: float, angle: Any) -> An
     return torque(leg.load, shank_at(program.shank, leg.shank, time), angle)
 
 
-def _valve(run: Run, state: list[Any], command: Any, compare: Compare) -> tuple[Any, list[Any]]:
+def valve_equations(run: Run, state: list[Any], command: Any, compare: Compare) -> tuple[Any, list[Any]]:
     """Openings of the valve [-] and the rates of its states, after the changes that it makes at once."""
     valve, acting = run.program.valve, dict(zip(run.program.effects, run.effects, strict=True))
     types = (valve.parameters, valve.state, float)
@@ -369,39 +364,6 @@ EQUAL = 1.0e-12
 DEAF = "no small change of the command changes it (dead band, slew limit, beyond full): the command's column is 0"
 
 
-def linearise(
-    scenario: Scenario | str | Path, at: float | str = EQUILIBRIUM, overrides: Sequence[str] = ()
-) -> Finding[LinearModel]:
-    """Return the linear model of a scenario's plant, as ``ppafo.linearise`` describes it.
-
-    A time is a number [s] or a text such as ``0.5 s``.
-    """
-    if find_spec("casadi") is None:
-        raise ScenarioError(MISSING_CASADI)
-    chosen = scenario_or_load(scenario, overrides)
-    run = plan_run(chosen)
-    if chosen.supply_lines is not None:
-        raise ScenarioError(f"{chosen.name}: linear models are for constant supplies; omit [supply_line]")
-    chosen.device.check_vane("a linear model")
-    # Of a valve that is on or off no small change of the command changes the openings or their movement.
-    import casadi
-
-    command = casadi.SX.sym("command")
-    start = leaves(run.program.valve.initial())
-    openings, moves = _valve(without_slew_limit(run), start, command, both_sides)
-    slopes = casadi.Function("slopes", [command], [casadi.jacobian(casadi.vertcat(*openings, *moves), command)])
-    if not any(abs(slope) > 0.0 for value in (-0.5, 0.5) for slope in slopes(value).nonzeros()):
-        raise ScenarioError(
-            f"{chosen.name}: valve '{chosen.device.valve_name}' is on or off, or moves at one speed: its flow "
-            "has no derivative by the command; set device.valve to one that opens in proportion"
-        )
-    if at != EQUILIBRIUM and not isinstance(at, Real):
-        with refused_as(ScenarioError, f"{chosen.name}: --at '{at}' is neither a time nor '{EQUILIBRIUM}'", UnitError):
-            at = parse_quantity(str(at), "s")
-    point = equilibrium(chosen) if isinstance(at, str) else point_at(chosen, at)
-    return finding_of(_model(chosen, run, point))
-
-
 class _Sides:
     """Decides every comparison at a point, one of them on its ``other_side``, and keeps those that lie on an edge.
 
@@ -444,7 +406,7 @@ def _direction(name: str, values: Mapping[str, float]) -> float:
     return 1.0e-6 * max(1.0, abs(values[name])) * (1.0 if name in first else -0.5)
 
 
-def _model(scenario: Scenario, run: Run, point: Point) -> LinearModel:
+def model_at(scenario: Scenario, run: Run, point: Point) -> LinearModel:
     """The linear model at a point, from the smooth piece that the point lies on."""
     values = dict(point.values)
     decided = _Sides(values)

@@ -5,8 +5,9 @@ import textwrap
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+from ppafo.arguments import Word, checked
 from ppafo.errors import ParameterError, nearest_name
 from ppafo.parameters.parts import Catalogue, Part, load_catalogue
 from ppafo.parameters.parts.catalogue import DEFAULT
@@ -49,10 +50,16 @@ _WIDTH = 110
 _HEAD = ("part", "maker and model", ("mass", Kind(quantity="part mass")), "figures to check", "not known")
 
 
-def parts(part: str | None = None, catalogue: str | Path = DEFAULT) -> Finding[Parts]:
-    """Return one part by name, or all parts, of a catalogue: one of the package by name, or a TOML file.
+@checked("part", "catalogue")
+def parts(
+    part: Annotated[str, Word("PART")] | None = None, *, catalogue: Annotated[str | Path, Word("FILE")] = DEFAULT
+) -> Finding[Parts]:
+    """List real parts with the origin of every figure.
 
     ParameterError for bad input.
+
+    part: name of a part, for all its figures and their sources
+    catalogue: a .toml file; default: the catalogue of the package
     """
     loaded = load_catalogue(catalogue)
     named = {item.name: item for item in loaded.parts}

@@ -355,8 +355,12 @@ def finding_of(reproduction: Reproduction) -> Finding[Reproduction]:
         passed=not missed or bool(reproduction.overrides),
         files={f"{run.scenario.name}.csv": partial(marked_csv_bytes, run.recording) for run in runs},
         command="reproduce",
-        page=lambda drawn: reproduction_page(reproduction, drawn).encode(),
+        page=partial(_page_bytes, reproduction),
     )
+
+
+def _page_bytes(reproduction: Reproduction, drawn: Mapping[str, bytes]) -> bytes:
+    return reproduction_page(reproduction, drawn).encode()
 
 
 def _figures(reproduction: Reproduction) -> list[Part]:

@@ -51,8 +51,8 @@ def assumed_values(scenarios: Mapping[str, Scenario]) -> tuple[AssumedValue, ...
         origin = scenario.origin
         changed = apply_overrides(origin.content, origin.overrides, scenario.name)
         written = origin.content["device"].get("overrides", ())
-        of_file = apply_to_set(load_parameter_set(origin.parameter_set), written, origin.valve)
-        in_force = with_followers(apply_to_set(of_file, changed.device, origin.valve))
+        of_file = apply_to_set(load_parameter_set(origin.parameter_set), written, valve=origin.valve)
+        in_force = with_followers(apply_to_set(of_file, changed.device, valve=origin.valve))
         summaries = {path: quantity.summary for path, quantity in quantities(changed.document).items()}
         summaries |= {path: quantity.summary for path, quantity in in_force.declarations().items()}
         own = [

@@ -47,7 +47,7 @@ class Computation:
 @lru_cache(maxsize=16)
 def _walked(name: str, overrides: tuple[str, ...]) -> WalkResult:
     """Return a shipped walk; SimulationError where it does not reach its end with help."""
-    result = walk(load_walk(name, overrides), MINUTES)
+    result = walk(load_walk(name, overrides), minutes=MINUTES)
     if not (result.status.is_completed and result.is_helped):
         raise SimulationError(f"{name}: {result.status.message}; the claims need a walk with help in most strides")
     return result

@@ -7,13 +7,9 @@ from ppafo.analyses.reproduce.answer import (
     SOLENOID,
     STEP,
     Reproduction,
-    Studies,
-    finding_of,
-    finding_of_studies,
 )
 from ppafo.analyses.reproduce.bench import assumed_values, synthetic_evidence
 from ppafo.analyses.reproduce.claim import arithmetic_claims, load_reported, not_published_claim, told_claim
-from ppafo.analyses.reproduce.publication import ALL, SEED, check_study, run_studies
 from ppafo.analyses.reproduce.step_response import Levels, step_events, step_observations
 from ppafo.analyses.reproduce.torque_task import (
     control_claims,
@@ -27,7 +23,6 @@ from ppafo.parameters import load_parameter_set
 from ppafo.parameters.audit import audit
 from ppafo.parameters.overrides import override_set
 from ppafo.progress import Progress, Report, report_nothing
-from ppafo.report.finding import Finding
 from ppafo.simulation.declaration import OF_A_VANE, value_at
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.overrides import apply_overrides, chosen_by, is_of_device, unknown_value
@@ -55,27 +50,6 @@ ORDER = (
     "not_published",
 )
 """Every claim: what the reported numbers decide, what is simulated, what is left."""
-
-
-def reproduce(
-    overrides: Sequence[str] = (),
-    progress: Report | None = None,
-    study: str = SEED,
-) -> Finding[Reproduction] | Finding[Studies]:
-    """Run the paper's experiments with the shipped scenarios and judge its claims, or other publications' claims.
-
-    ``overrides`` change the experiments (not the paper's reported numbers): a path of a scenario reaches those that
-    have it, a path of the device all of them. The figures have synthetic measurements where the bench can make them.
-    ``progress`` hears what is being done; ``study`` is a publication, by name or by its file, or ``all``.
-    SimulationError where a run diverges, ScenarioError for a study that is none.
-    """
-    report = progress or report_nothing
-    # Before anything runs, which takes long.
-    check_study(study, overrides)
-    if study == SEED:
-        return finding_of(reproduce_paper(overrides, report))
-    seed = reproduce_paper((), report) if study == ALL else None
-    return finding_of_studies(Studies(run_studies(study, report), seed))
 
 
 def reproduce_paper(overrides: Sequence[str] = (), report: Report = report_nothing) -> Reproduction:

@@ -6,27 +6,25 @@ since the formulas need whole blocks, and counted; the indices then hold for val
 """
 
 import math
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ppafo.analyses.sensitivity.methods import METHODS, Evaluated, Indices, Method, changes
-from ppafo.errors import StudyError, nearest_name
-from ppafo.progress import Report
+from ppafo.errors import StudyError
+from ppafo.linear_algebra import on_one_thread
 from ppafo.report.finding import Column, Finding, Part
 from ppafo.report.kind import Kind, of_metric
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.setting_names import label_of
 from ppafo.report.style import BLUE, COLOURS, ORANGE
 from ppafo.studies.distributions import Floats
-from ppafo.studies.draws import CONFIDENCE, Uncertainty, check_fraction, drawn_in
+from ppafo.studies.draws import CONFIDENCE, Uncertainty, check_fraction
 from ppafo.studies.sampling import NOISE
-from ppafo.studies.study import Study
-from ppafo.study.runs import Runs, Tally
+from ppafo.study.runs import Runs
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -121,6 +119,7 @@ def overlapping_pairs(found: Influences, metric: OfMetric) -> list[tuple[str, st
     ]
 
 
+@on_one_thread
 def analyse(runs: Runs, uncertainty: Uncertainty, method: Method, settings: Settings, study: str = "") -> Influences:
     """Return the indices of the metrics; StudyError for bad settings, dependent values or too many failures."""
     if uncertainty.scores is not None and not method.takes_dependent:
@@ -197,42 +196,6 @@ def _of_metric(name: str, values: Floats, design: Evaluated, method: Method, set
 DEFAULT_SAMPLES = {"sobol": 8192, "shapley": 2048}
 
 
-def sensitivity(
-    study: Study | str | Path | Mapping[str, Any],
-    method: str | None = None,
-    metrics: Sequence[str] = (),
-    samples: int | None = None,
-    configuration: str | None = None,
-    overrides: Sequence[str] = (),
-    independent: bool = False,
-    seed: int | None = None,
-    confidence: float = 0.95,
-    maximum_failed: float = 0.02,
-    threads: int | None = None,
-    progress: Report | None = None,
-) -> Finding[Influences]:
-    """Return the sensitivity of metrics with regard to everything that has a distribution in a study.
-
-    ``method`` is a name in ``METHODS``; by default Shapley effects where values are correlated, else Sobol indices.
-    ``samples`` are base points or orders. The rest is as ``ppafo.sensitivity`` describes it.
-    """
-    if method is not None and method not in METHODS:
-        raise StudyError(
-            f"there is no method '{method}'{nearest_name(method, METHODS)}; available: {', '.join(METHODS)}"
-        )
-    chosen, base, used = drawn_in(study, overrides, configuration, independent)
-    # Sobol indices of correlated values mean nothing; Shapley effects take more runs for the same bands.
-    by = METHODS[method or ("sobol" if used.scores is None else "shapley")]
-    requested = tuple(metrics) or chosen.outputs.metrics
-    if not requested:
-        raise StudyError(f"study '{chosen.name}' keeps no metrics; name the metric to analyse")
-    count = DEFAULT_SAMPLES[by.name] if samples is None else samples
-    settings = Settings(count, chosen.sample.seed if seed is None else seed, confidence, maximum_failed)
-    tally = Tally(count * by.block_rows(len(used.drawn)), progress)
-    runs = Runs(base.scenario, requested, tally, used.gauge, threads)
-    return finding_of(analyse(runs, used, by, settings, f"{chosen.name}, {base.name}"))
-
-
 _LINE = 0.27
 _MAXIMUM_LINES = 5
 _TITLES = {"total": "total", "first": "first order", "shapley": "Shapley effect"}
@@ -253,7 +216,7 @@ def finding_of(found: Influences) -> Finding[Influences]:
     )
     figure = Part(
         "Indices and their convergence",
-        panels=lambda: [draw(found, metric) for metric in found.metrics for draw in (_bars, _course)],
+        panels=partial(_panels, found),
         name="sensitivity",
         caption=_CAPTION,
         across=2,
@@ -268,6 +231,10 @@ def finding_of(found: Influences) -> Finding[Influences]:
         parts=(*(_part(found, metric) for metric in found.metrics), figure),
         found=found,
     )
+
+
+def _panels(found: Influences) -> list[Panel]:
+    return [draw(found, metric) for metric in found.metrics for draw in (_bars, _course)]
 
 
 def _part(found: Influences, metric: OfMetric) -> Part:

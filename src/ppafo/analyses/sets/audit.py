@@ -30,7 +30,7 @@ def audited(
     for one in sets:
         with refused_as(ParameterError, "--parent" if parent else f"{one.file}: parent", ParameterError):
             parents.append(load_parameter_set(parent or one.parent) if parent or one.parent else None)
-    found = [(one, audit(one, other)) for one, other in zip(sets, parents, strict=True)]
+    found = [(one, audit(one, parent=other)) for one, other in zip(sets, parents, strict=True)]
     documents: list[dict[str, Any]] = [
         {
             "set": one.name,

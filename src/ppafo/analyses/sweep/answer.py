@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from ppafo.analyses.sweep.results import SUMMARY, StudyResults
+from ppafo.arguments import checked
 from ppafo.documents.models import validate
 from ppafo.errors import DataError
 from ppafo.report.finding import Finding, Part, columns_of, facts, files_of
@@ -119,6 +120,7 @@ def write_report(results: StudyResults) -> None:
         results.place.write(name, content)
 
 
+@checked()
 def load_study_results(folder: str | Path) -> Finding[StudyResults]:
     """Return the finished results of a study in a folder or at an address; DataError where there are none."""
     place = place_at(folder)
@@ -207,8 +209,7 @@ def _figure(results: StudyResults, said: Sequence[str], remarks: Sequence[str]) 
     # As many configurations as colours that can be told apart; a seed is no axis, since its size says nothing.
     names = results.configurations[:MOST_CONFIGURATIONS]
     device = [path for path in results.varied if path != NOISE]
-    grid = [item["path"] for item in results.document["study"].get("vary", ()) if item["kind"] in _GRIDDED]
-    is_mapped = len(grid) == 2 or len(device) == 2
+    is_mapped = len(_grid(results)) == 2 or len(device) == 2
     count = max(1, len(metrics) * (len(names) if is_mapped else 1) + len(bands))
     # Maps of several configurations: a row for each metric.
     is_compared = is_mapped and len(names) > 1
@@ -220,23 +221,10 @@ def _figure(results: StudyResults, said: Sequence[str], remarks: Sequence[str]) 
         more = f" and {len(device) - _NAMED} more" if len(device) > _NAMED else ""
         title += f" over {len(device)} values: {', '.join(labels)}{more}"
 
-    def panels() -> list[Panel]:
-        if is_mapped:
-            draw = partial(_map, results, grid) if len(grid) == 2 else partial(_points, results, device)
-            drawn = [draw(metric, name, is_compared) for metric in metrics for name in names]
-        elif len(device) == 1:
-            drawn = [_over(results, device[0], metric, names) for metric in metrics]
-        else:
-            drawn = [_histogram(results, metric) for metric in metrics]
-        drawn += [_band(results, channel, names) for channel in bands]
-        # The first panel with curves names the configurations for all.
-        named = next((panel for panel in drawn if len(names) > 1 and any(mark.label for mark in panel.marks)), None)
-        return [replace(panel, legend="inside" if panel is named else "") for panel in drawn]
-
     return Part(
         said=said,
         remarks=remarks,
-        panels=panels,
+        panels=partial(_panels, results),
         name=FIGURE,
         caption=_CAPTION,
         across=len(names) if is_compared else 2 if count == 4 else min(_COLUMNS, count),
@@ -244,6 +232,32 @@ def _figure(results: StudyResults, said: Sequence[str], remarks: Sequence[str]) 
         title=title,
         is_detail=True,
     )
+
+
+def _grid(results: StudyResults) -> list[str]:
+    """Return the paths that vary over a grid."""
+    return [item["path"] for item in results.document["study"].get("vary", ()) if item["kind"] in _GRIDDED]
+
+
+def _panels(results: StudyResults) -> list[Panel]:
+    """Return a panel for each metric, of each configuration where it is a map, and one for each band."""
+    metrics = list(results.document["metrics"])[:MOST_METRICS]
+    bands = list(results.document["study"]["outputs"].get("bands", ()))
+    names = results.configurations[:MOST_CONFIGURATIONS]
+    device, grid = [path for path in results.varied if path != NOISE], _grid(results)
+    is_mapped = len(grid) == 2 or len(device) == 2
+    is_compared = is_mapped and len(names) > 1
+    if is_mapped:
+        draw = partial(_map, results, grid) if len(grid) == 2 else partial(_points, results, device)
+        drawn = [draw(metric, name, is_compared) for metric in metrics for name in names]
+    elif len(device) == 1:
+        drawn = [_over(results, device[0], metric, names) for metric in metrics]
+    else:
+        drawn = [_histogram(results, metric) for metric in metrics]
+    drawn += [_band(results, channel, names) for channel in bands]
+    # The first panel with curves names the configurations for all.
+    named = next((panel for panel in drawn if len(names) > 1 and any(mark.label for mark in panel.marks)), None)
+    return [replace(panel, legend="inside" if panel is named else "") for panel in drawn]
 
 
 def _kind(results: StudyResults, path: str) -> Kind:

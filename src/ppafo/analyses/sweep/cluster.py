@@ -1,54 +1,97 @@
 """The chunks of a study computed on a cluster."""
 
 import asyncio
+import socket
 from collections.abc import Callable, Iterable
+from concurrent.futures import CancelledError
 from importlib import import_module
 from typing import Any
 from uuid import uuid4
 
-from ppafo.errors import PpafoError, StudyError, one_line
-from ppafo.study.store import Finished, Task, work_on_chunk
+from ppafo.errors import PpafoError, StudyError, one_line, reason
+from ppafo.storage.places import place_at
+from ppafo.study.blocks import chunk_count
+from ppafo.study.store import Finished, Task, note_file, work_on_chunk
 
 _TASKS_PER_THREAD = 3
 """Tasks that wait at the scheduler for every thread of the workers: enough to keep them busy, few for 10^9 runs."""
-_SECONDS_TO_CONNECT = 30
+_SECONDS_TO_ANSWER, _SECONDS_TO_CONNECT = 5, 30
+"""How long a computer has to say that something listens there, and how long a scheduler to greet a client."""
+_OVER_SOCKETS = ("tcp://", "tls://", "ws://", "wss://")
+
+
+def check_scheduler(address: str) -> None:
+    """Connect to the scheduler at an address once; StudyError where there is none, or no library for it."""
+    distributed = _library()
+    try:
+        # The library tries for half a minute, also where the other computer says at once that nothing listens.
+        if "://" not in address or address.startswith(_OVER_SOCKETS):
+            place = distributed.comm.get_address_host_port(address)
+            socket.create_connection(place, timeout=_SECONDS_TO_ANSWER).close()
+        asyncio.run(_reach(address, distributed))
+    except (OSError, ValueError, TimeoutError) as error:
+        raise _unreachable(address, error) from error
 
 
 def compute_on_cluster(address: str, task: Task, numbers: Iterable[int], finish: Callable[[Finished], None]) -> None:
     """Compute chunks on the workers of the scheduler at an address; ``finish`` hears of each one.
 
-    A chunk whose worker dies is given to another one by the scheduler.
+    A chunk whose worker dies is given to another one by the scheduler. StudyError where the scheduler itself is lost.
     """
+    # A client that did not connect complains once more when it is collected: whether one can is tried before.
+    check_scheduler(address)
+    distributed = _library()
     try:
-        distributed: Any = import_module("distributed")
-    except ModuleNotFoundError as error:
-        raise StudyError("--scheduler needs the extra 'cluster': pip install 'ppafo[cluster]'") from error
-    try:
-        # A client that did not connect complains once more when it is collected: whether one can is tried before.
-        asyncio.run(_reach(address, distributed))
         client = distributed.Client(address, timeout=_SECONDS_TO_CONNECT, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
-        raise StudyError(f"--scheduler {address}: cannot be reached: {one_line(error)}") from error
-    with client:
-        queue, left = distributed.as_completed(loop=client.loop), iter(numbers)
-        # Keys of this session alone: a scheduler answers an equal key with what an earlier task returned.
-        sweep = f"{task.study.name}-{uuid4().hex[:8]}"
+        raise _unreachable(address, error) from error
+    try:
+        with client:
+            _compute(client, distributed, task, numbers, finish)
+    except (CancelledError, OSError) as error:
+        names, chunks = place_at(task.address).names(), range(chunk_count(task.study))
+        kept = sum(note_file(number) in names for number in chunks)
+        raise StudyError(
+            f"--scheduler {address}: the connection was lost; {kept} of {len(chunks)} chunks are finished and kept in "
+            f"{task.address}: start a scheduler and run the same command again, which resumes the study"
+        ) from error
 
-        def submit(count: int) -> None:
-            for _, number in zip(range(count), left, strict=False):
-                queue.add(client.submit(work_on_chunk, task, number, key=f"{sweep}-{number}", pure=False))
 
-        submit(max(4, _TASKS_PER_THREAD * sum(client.nthreads().values())))
-        for future in queue:
-            try:
-                finished: Finished = future.result()
-            except PpafoError:
-                raise
-            except distributed.scheduler.KilledWorker as error:
-                raise StudyError(f"chunk {future.key}: its workers died repeatedly: {one_line(error)}") from error
-            future.release()
-            finish(finished)
-            submit(1)
+def _compute(
+    client: Any, distributed: Any, task: Task, numbers: Iterable[int], finish: Callable[[Finished], None]
+) -> None:
+    queue, left = distributed.as_completed(loop=client.loop), iter(numbers)
+    # Keys of this session alone: a scheduler answers an equal key with what an earlier task returned.
+    sweep = f"{task.study.name}-{uuid4().hex[:8]}"
+
+    def submit(count: int) -> None:
+        for _, number in zip(range(count), left, strict=False):
+            queue.add(client.submit(work_on_chunk, task, number, key=f"{sweep}-{number}", pure=False))
+
+    submit(max(4, _TASKS_PER_THREAD * sum(client.nthreads().values())))
+    for future in queue:
+        try:
+            finished: Finished = future.result()
+        except PpafoError:
+            raise
+        except distributed.scheduler.KilledWorker as error:
+            raise StudyError(f"chunk {future.key}: its workers died repeatedly: {one_line(error)}") from error
+        future.release()
+        finish(finished)
+        submit(1)
+
+
+def _library() -> Any:
+    try:
+        return import_module("distributed")
+    except ModuleNotFoundError as error:
+        raise StudyError("--scheduler needs the extra 'cluster': pip install 'ppafo[cluster]'") from error
+
+
+def _unreachable(address: str, error: Exception) -> StudyError:
+    return StudyError(
+        f"--scheduler {address}: cannot be reached: {one_line(reason(error) if isinstance(error, OSError) else error)}"
+    )
 
 
 async def _reach(address: str, distributed: Any) -> None:

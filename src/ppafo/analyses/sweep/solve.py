@@ -22,9 +22,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.analyses.sweep.answer import finding_of, write_report
+from ppafo.analyses.sweep.answer import finding_of
 from ppafo.analyses.sweep.results import BANDS, SUMMARY, Columns, StudyResults
-from ppafo.analyses.sweep.statistic import MOST_DRAWS, Estimate, estimate
+from ppafo.arguments import Address, Count, Overrides, Seed, Threads, checked
 from ppafo.documents.json_text import json_text
 from ppafo.errors import StudyError
 from ppafo.metrics import METRICS
@@ -34,7 +34,6 @@ from ppafo.report.finding import Finding
 from ppafo.signals.recording import CHANNELS
 from ppafo.storage.parquet import TableColumn, encode_texts, matrix_of, parquet_bytes, table_of
 from ppafo.storage.places import place_at
-from ppafo.storage.result_folder import check_owned_folder, marked_folder
 from ppafo.studies.distributions import Floats
 from ppafo.studies.draws import study_of
 from ppafo.studies.loading import list_studies, load_study
@@ -181,22 +180,23 @@ def describe(parts: Parts, fractions: Sequence[float]) -> dict[str, Any]:
 
 LOG = "log.jsonl"
 """The only file that says when, where and how fast; all others are the same wherever they are made."""
-_INTERRUPTED = "interrupted; finished chunks are kept, and the same command resumes the study"
-_INTERRUPTED_AT_ONCE = "interrupted; nothing was kept yet, and the same command begins anew"
+INTERRUPTED = "interrupted; finished chunks are kept, and the same command resumes the study"
+INTERRUPTED_AT_ONCE = "interrupted; nothing was kept yet, and the same command begins anew"
 
 
+@checked("study", "out", "overrides", "draws", "seed", "threads", "scheduler", "agreed", "progress")
 def sweep(
     study: Study | str | Path | Mapping[str, Any],
-    out: str | Path | None = None,
-    overrides: Sequence[str] = (),
-    draws: int | None = None,
-    seed: int | None = None,
-    threads: int | None = None,
-    scheduler: str | None = None,
-    agreed: bool = False,
-    progress: Report | None = None,
     *,
+    overrides: Overrides = (),
+    draws: Count | None = None,
+    seed: Seed | None = None,
+    threads: Threads | None = None,
+    out: str | Path | None = None,
+    scheduler: Address | None = None,
+    agreed: bool = False,
     plugins: Plugins = (),
+    progress: Report | None = None,
 ) -> Finding[StudyResults]:
     """Return the results of a study: a name, a TOML file, data laid out as one, or a Study.
 
@@ -213,6 +213,11 @@ def sweep(
     """
     name_plugins(plugins)
     chosen = study_of(study, overrides, draws, seed)
+    if scheduler is not None:
+        from ppafo.analyses.sweep.cluster import check_scheduler
+
+        # Before a folder is made: a wrong address must leave nothing.
+        check_scheduler(scheduler)
     kept = tempfile.TemporaryDirectory(prefix="ppafo-study-") if out is None else None
     place = place_at(kept.name if kept is not None else str(out))
     store = Store.claim(chosen, place, agreed, threads)
@@ -226,64 +231,7 @@ def sweep(
     return finding_of(replace(results, summary=summary))
 
 
-def sweep_into_folder(
-    study: Study | str | Path | Mapping[str, Any],
-    out: str | Path | None = None,
-    overrides: Sequence[str] = (),
-    draws: int | None = None,
-    seed: int | None = None,
-    threads: int | None = None,
-    scheduler: str | None = None,
-    agreed: bool = False,
-    statistic: str | None = None,
-    metric: str | None = None,
-    width: str | None = None,
-    also: Sequence[str] = (),
-    configuration: str | None = None,
-    first_draws: int | None = None,
-    confidence: float | None = None,
-    maximum_failed: float | None = None,
-    progress: Report | None = None,
-) -> Finding[StudyResults] | Finding[Estimate]:
-    """Return the rows of ``sweep``, or with a statistic the ``estimate``, written into ``out`` with figure and page.
-
-    The folder is ``out/NAME`` by default, of a statistic ``out/NAME-METRIC``.
-    """
-    of_statistic: dict[str, Any] = {
-        "width": width,
-        "also": tuple(also) or None,
-        "configuration": configuration,
-        "first_draws": first_draws,
-        "confidence": confidence,
-        "maximum_failed": maximum_failed,
-    }
-    given = {name: value for name, value in of_statistic.items() if value is not None}
-    if statistic is None:
-        unused = [*(["metric"] if metric is not None else []), *given]
-        if unused:
-            raise StudyError(f"{unused[0]}: needs a statistic, for example --statistic mean --metric rms_error")
-        chosen = study_of(study, overrides, draws, seed)
-        folder = out or Path("out") / chosen.name
-        try:
-            swept = sweep(chosen, folder, (), None, None, threads, scheduler, agreed, progress)
-            write_report(swept.found)
-        except KeyboardInterrupt:
-            raise KeyboardInterrupt(_INTERRUPTED if _is_begun(chosen, folder) else _INTERRUPTED_AT_ONCE) from None
-        return swept
-    if metric is None:
-        raise StudyError(f"statistic '{statistic}': needs the metric that it is of, for example --metric rms_error")
-    if scheduler is not None:
-        raise StudyError(f"--scheduler {scheduler}: a statistic is computed here; omit it")
-    chosen = study_of(study, overrides)
-    place = Path(out or Path("out") / f"{chosen.name}-{metric}")
-    check_owned_folder(place, marked_folder("sweep"))
-    most = MOST_DRAWS if draws is None else draws
-    found = estimate(chosen, metric, statistic, seed=seed, draws=most, threads=threads, progress=progress, **given)
-    found.save(place)
-    return replace(found, found=replace(found.found, folder=str(place)))
-
-
-def _is_begun(study: Study, folder: str | Path) -> bool:
+def is_begun(study: Study, folder: str | Path) -> bool:
     """Return whether a folder has a finished chunk of a study."""
     names = place_at(str(folder)).names()
     return any(note_file(number) in names for number in range(chunk_count(study)))

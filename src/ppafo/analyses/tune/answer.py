@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -172,7 +173,7 @@ def finding_of(
             Part(
                 "Before and after",
                 _metrics(problem, before, after),
-                panels=lambda: _task(before, after),
+                panels=partial(_task, before, after),
                 name="task",
                 caption="The nominal device.",
                 size=(6.9, 2.1),
@@ -180,7 +181,7 @@ def finding_of(
             Part(
                 "The search",
                 remarks=remarks,
-                panels=lambda: [_course(before, starts), _places(problem, after, starts)],
+                panels=partial(_search_panels, problem, before, after, starts),
                 name="search",
                 caption=_COURSE,
                 across=2,
@@ -347,6 +348,10 @@ def _task(before: Setting, after: Setting) -> list[Panel]:
             marks.append(reference)
         panels.append(Panel(TIME, kind, marks, legend="" if row else "above"))
     return panels
+
+
+def _search_panels(problem: Problem, before: Setting, after: Setting, starts: Sequence[Start]) -> list[Panel]:
+    return [_course(before, starts), _places(problem, after, starts)]
 
 
 def _course(before: Setting, starts: Sequence[Start]) -> Panel:

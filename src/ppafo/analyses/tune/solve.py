@@ -5,8 +5,7 @@ violation is better; a candidate with a run that fails is worse than all (Deb's 
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,25 +17,22 @@ from ppafo.analyses.tune.answer import (
     Ceiling,
     Setting,
     Start,
-    Tuned,
-    finding_of,
 )
-from ppafo.analyses.tune.problem import Effort, Gains, Problem, Spread, load_tuning
+from ppafo.analyses.tune.problem import Effort, Gains, Problem, Spread
 from ppafo.control.kind import OPEN_LOOP
 from ppafo.errors import StudyError
+from ppafo.linear_algebra import on_one_thread
 from ppafo.metrics import METRICS
 from ppafo.parameters.device import VANE
-from ppafo.progress import Report
-from ppafo.report.finding import Finding
 from ppafo.report.kind import Interval
 from ppafo.simulation.numbers import TIMES, absolute, with_numbers
 from ppafo.simulation.profiles import profile_bounds
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate
 from ppafo.studies.distributions import Floats, noise_interval
-from ppafo.studies.draws import NOISE_DRAWS, with_new_noise
+from ppafo.studies.draws import with_new_noise
 from ppafo.studies.study import with_overrides
-from ppafo.study.runs import FAILED, Runs, Tally, oscillating, settled, with_companions
+from ppafo.study.runs import FAILED, Runs, oscillating, settled
 
 UNUSABLE = 1.0e12
 """Where the costs of candidates begin of which a run fails; the fraction of such runs is added."""
@@ -114,6 +110,7 @@ _TOLERANCE = 1.0e-3
 """A start has ended where the costs of its candidates differ by no more than this fraction of their mean."""
 
 
+@on_one_thread
 def search(costs: Costs, before: Sequence[float], effort: Effort) -> list[Start]:
     """Return what came of each start, the best first; the same every time for a seed.
 
@@ -182,55 +179,12 @@ MINIMUM_ERRORS = ("peak_error", "rms_error_hold")
 _NOISE_CONFIDENCE = 0.95
 
 
-def tune(
-    tuning: Problem | str | Path | Mapping[str, Any] | None = None,
-    overrides: Sequence[str] = (),
-    seed: int | None = None,
-    threads: int | None = None,
-    progress: Report | None = None,
-) -> Finding[Tuned]:
-    """Search the best values of a tuning: a name, a TOML file, data laid out as one, or a Problem.
-
-    ``overrides`` change the scenario, ``seed`` is the seed of the search, the file's by default. The rest is as
-    ``ppafo.tune`` describes it.
-    """
-    if tuning is None:
-        raise StudyError("no tuning was given: name one or give a .toml file; 'ppafo tune --list' shows them")
-    if isinstance(tuning, Problem) and overrides:
-        raise StudyError("a loaded Problem takes no overrides; give them to load_tuning")
-    problem = tuning if isinstance(tuning, Problem) else load_tuning(tuning, overrides)
-    if seed is not None:
-        problem = replace(problem, effort=problem.effort.model_copy(update={"seed": seed}))
-        # Noise alone follows the seed of the search; draws of a study keep the seed of the study.
-        if problem.spread is not None and not problem.spread.study:
-            problem = replace(problem, spread=replace(problem.spread, seed=seed))
-    effort, spread = problem.effort, problem.spread
-    candidates = effort.candidates_per_gain * len(problem.searched) * (effort.generations + 1) * effort.starts
-    expected = candidates + 3
-    if spread is not None:
-        expected = spread.draws * expected + 2 * (FRESH_DRAWS + NOISE_DRAWS * spread.uncertainty.has_noise)
-    metrics = with_companions(problem.metrics, problem.scenario)
-    runs = Runs(problem.scenario, metrics, Tally(expected, progress), problem.gauge, threads)
-    draws = {} if spread is None else spread.uncertainty.random_columns(0, spread.draws, spread.seed)
-    scales = _scales(problem, _of_gains(runs, problem, problem.before, draws))
-
-    def costs(fractions: Floats) -> Floats:
-        values = {item.path: item.value(fractions[:, column]) for column, item in enumerate(problem.searched)}
-        return judge(_crossed(runs, problem, values, draws), problem, scales).cost
-
-    before = [item.fraction(item.before) for item in problem.searched]
-    starts = search(costs, before, effort)
-    first, last = (
-        _setting(runs, problem, scales, gains, draws) for gains in (problem.before, problem.gains(starts[0].fractions))
-    )
-    return finding_of(problem, scales, first, last, starts, runs.count)
+def rows_of_gains(runs: Runs, problem: Problem, gains: Gains, draws: Mapping[str, Floats]) -> Crossed:
+    """Run one setting of the gains over the draws."""
+    return crossed(runs, problem, {item.path: np.array([gains[item.path]]) for item in problem.searched}, draws)
 
 
-def _of_gains(runs: Runs, problem: Problem, gains: Gains, draws: Mapping[str, Floats]) -> Crossed:
-    return _crossed(runs, problem, {item.path: np.array([gains[item.path]]) for item in problem.searched}, draws)
-
-
-def _crossed(runs: Runs, problem: Problem, values: Mapping[str, Floats], draws: Mapping[str, Floats]) -> Crossed:
+def crossed(runs: Runs, problem: Problem, values: Mapping[str, Floats], draws: Mapping[str, Floats]) -> Crossed:
     """Run every candidate (values, each (candidates,)) with every draw (columns, each (draws,))."""
     candidates = len(next(iter(values.values())))
     count = len(next(iter(draws.values()))) if draws else 1
@@ -243,7 +197,7 @@ def _crossed(runs: Runs, problem: Problem, values: Mapping[str, Floats], draws: 
     return Crossed(metrics, unusable.reshape(candidates, count))
 
 
-def _scales(problem: Problem, before: Crossed) -> dict[str, float]:
+def scales_of(problem: Problem, before: Crossed) -> dict[str, float]:
     """Return the size of each goal: the given one, or its value before tuning."""
     # By default each goal is 1 before tuning: goals in different units then weigh as much as their weights say.
     scales = {}
@@ -260,19 +214,20 @@ def _scales(problem: Problem, before: Crossed) -> dict[str, float]:
     return scales
 
 
-def _setting(
+def setting_of(
     runs: Runs, problem: Problem, scales: Mapping[str, float], gains: Gains, draws: Mapping[str, Floats]
 ) -> Setting:
+    """Return gains with what they come to over the draws."""
     spread = problem.spread
-    again = seen = _of_gains(runs, problem, gains, draws)
+    again = seen = rows_of_gains(runs, problem, gains, draws)
     fresh: dict[str, Floats] = {}
     noise: dict[str, Interval] = {}
     if spread is not None:
         # Draws that follow those of the search: the gains were not chosen on them.
         fresh = spread.uncertainty.random_columns(spread.draws, FRESH_DRAWS, spread.seed)
-        again = _of_gains(runs, problem, gains, fresh)
+        again = rows_of_gains(runs, problem, gains, fresh)
         if spread.uncertainty.has_noise:
-            other = _of_gains(runs, problem, gains, with_new_noise(fresh)).metrics
+            other = rows_of_gains(runs, problem, gains, with_new_noise(fresh)).metrics
             shares = {name: noise_interval(again.metrics[name][0], other[name][0], _NOISE_CONFIDENCE) for name in other}
             noise = {name: share for name, share in shares.items() if share is not None}
     judged, rejudged = (judge(each, problem, scales) for each in (seen, again))

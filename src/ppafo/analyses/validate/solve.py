@@ -10,10 +10,7 @@ from typing import Any
 import numpy as np
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.errors import DataError, nearest_name, one_line
-from ppafo.parameters import load_device
 from ppafo.parameters.device import Device
-from ppafo.progress import Progress, Report, report_nothing
 from ppafo.report.display_units import display_value, quantity_of_unit
 from ppafo.report.finding import Finding, Part, columns_of, facts
 from ppafo.report.kind import TIME, Kind
@@ -24,26 +21,26 @@ from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.foreign import ColumnMap, load_column_map
 from ppafo.validation import ChannelAgreement
 from ppafo.validation.agreement import (
-    DEFAULT_LIMIT,
     RecordingAgreement,
     ReplaySettings,
-    compare_recording,
     measured_values,
 )
-from ppafo.validation.causes import Cause, Causes, causes_of
+from ppafo.validation.causes import Cause, Causes
 from ppafo.validation.measured import (
     COMPARED,
     PRESSURE_1,
     PRESSURE_2,
-    Measured,
-    parse_thresholds,
-    read_measured,
 )
-from ppafo.validation.replay import MOTIONS, parse_initial
 from ppafo.version import __version__
 
 LARGEST_DELAY = 1.0
 """Seconds; a recording that is later than this was not recorded with its command."""
+
+LITTLE = 0.03
+"""RMS error over the full range up to which a residual beside the noise, of which no cause is known, is a remark."""
+
+_EXPLAINS = 0.5
+"""Residual with the nearest cause over the residual without any, up to which that cause is worth naming."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,13 +57,15 @@ class Validation:
 
     @property
     def passes(self) -> bool:
-        """True where every error is within its limit and, without limits given, nothing but what any bench has is left.
+        """True where every error is within its limit and, without limits given, only what any bench has is left.
 
-        What no single cause explains is a disagreement as one that a cause explains is; of a recorded angle that is
-        followed causes are not searched.
+        A cause that is found and that not any bench has is a disagreement, however small. A residual that no single
+        cause explains is one only where it is more than ``LITTLE``, for no model has all that a device has. Of a
+        recorded angle that is followed causes are not searched.
         """
-        causes = self.causes
-        is_usual = causes.is_noise or (causes.tried == 0 if causes.found is None else causes.found.is_usual)
+        causes, channels = self.causes, [channel for item in self.recordings for channel in item.channels]
+        is_little = causes.tried == 0 or all(one.fraction <= LITTLE for one in channels)
+        is_usual = causes.is_noise or (is_little if causes.found is None else causes.found.is_usual)
         return (self.has_limits or is_usual) and all(recording.passes for recording in self.recordings)
 
     def json_document(self) -> dict[str, Any]:
@@ -91,69 +90,7 @@ class Validation:
         }
 
 
-def validate(
-    parameter_set: str | Path,
-    recordings: Sequence[str | Path],
-    valve: str | None = None,
-    overrides: Sequence[str] = (),
-    motion: str = "free",
-    volume: float | None = None,
-    initial: Sequence[str] = (),
-    thresholds: Sequence[str] = (),
-    longest_delay: float = DEFAULT_LIMIT,
-    columns: ColumnMap | str | Path | None = None,
-    progress: Report | None = None,
-) -> Finding[Validation]:
-    """Return the errors (model less measured) of the model with a parameter set against each recording.
-
-    Arguments, result and errors are those of the command, ``ppafo.cli.verbs.bench.validate``.
-    """
-    report = progress or report_nothing
-    device = load_device(parameter_set, valve, overrides)
-    if volume is not None and not volume > 0.0:
-        raise DataError(f"volume of {volume:g} m^3: must be above 0")
-    if not 0.0 <= longest_delay <= LARGEST_DELAY:
-        raise DataError(f"longest delay of {longest_delay:g} s: must be from 0 to {LARGEST_DELAY:g} s")
-    chosen = next((one for one in MOTIONS if one == motion), None)
-    if chosen is None:
-        near = nearest_name(motion, MOTIONS)
-        raise DataError(f"motion '{one_line(motion)}' is not one of {', '.join(MOTIONS)}{near}")
-    settings = ReplaySettings(
-        motion=chosen,
-        initial=parse_initial(initial, device.supply.atmospheric_pressure),
-        longest_delay=longest_delay,
-        thresholds=parse_thresholds(thresholds),
-        volume=volume,
-    )
-    if not recordings:
-        raise DataError("no recording was given; name at least one .csv or .nc file or result folder")
-    column_map = columns if columns is None or isinstance(columns, ColumnMap) else _column_map(str(columns))
-    map_name = "" if columns is column_map else str(columns)
-    read: list[Measured] = []
-    for path in recordings:
-        measured = read_measured(path, device, column_map, map_name)
-        # Given twice, under two names too, a recording would count twice as evidence.
-        same = next((one.file for one in read if one.sha256 == measured.sha256), None)
-        if same is not None:
-            raise DataError(f"{measured.file}: the same recording as {same}; give each once")
-        read.append(measured)
-    agreements = []
-    for measured in read:
-        report(Progress(f"replaying {measured.file}"))
-        agreements.append(compare_recording(measured, device, settings))
-    validation = Validation(
-        parameter_set=str(parameter_set),
-        device=device,
-        overrides=tuple(overrides),
-        settings=settings,
-        recordings=tuple(agreements),
-        causes=causes_of(read, agreements, device, settings, report),
-        has_limits=bool(thresholds),
-    )
-    return finding_of(validation)
-
-
-def _column_map(text: str) -> ColumnMap:
+def named_column_map(text: str) -> ColumnMap:
     """Return the map that is named as a file, and by name where the file has several."""
     path, separator, name = text.rpartition(".toml:")
     return load_column_map(f"{path}.toml", name) if separator and name else load_column_map(text)
@@ -178,7 +115,7 @@ def agreement_panels(agreement: RecordingAgreement, atmosphere: float) -> list[P
 
 
 def _channel_panels(agreement: RecordingAgreement, channel: ChannelAgreement, atmosphere: float) -> list[Panel]:
-    """Return samples and model over time, and below them model less measured."""
+    """Return samples and model over time, and below them their residual."""
     name, measured, model = channel.channel, agreement.measured, agreement.model
     given = measured_values(measured, name)
     assert given is not None, "a channel that is compared was measured"
@@ -189,7 +126,7 @@ def _channel_panels(agreement: RecordingAgreement, channel: ChannelAgreement, at
     course = Course(
         time=time,
         level=Kind(shown.title, "", "pressure" if is_chamber else shown.quantity),
-        change=Kind("Model less measured", "", shown.quantity),
+        change=Kind("Residual (measured - model)", "", shown.quantity),
         times=scale * measured.time,
         samples=given,
         # The measurement is late by the delay, so the model is read that much earlier.
@@ -227,7 +164,7 @@ def finding_of(validation: Validation) -> Finding[Validation]:
     hashes = [(item.file, f"sha256 {item.sha256}") for item in validation.recordings if item.sha256]
     method = (
         f"The model with the valve '{validation.device.valve_name}' was run with the inputs of each recording, from "
-        "the state of its first samples. An error is model less measured. Percentages are of the full range: the "
+        "the state of its first samples. A residual is measured - model. Percentages are of the full range: the "
         "angle between the stops, the gauge pressure of the supply, and twice that for the pressure difference. One "
         "common delay was removed before the errors were computed."
     )
@@ -264,15 +201,14 @@ def verdict(validation: Validation) -> str:
     count, name = len(validation.recordings), validation.device.name
     pairs = [(channel, agreement) for agreement in validation.recordings for channel in agreement.channels]
     worst = max((channel for channel, _ in pairs), key=lambda one: one.in_noise)
-    size = (
-        f"{worst.channel} is off by {worst.in_noise:.2g} times its noise ({100 * worst.fraction:.2g} % of full range)"
-    )
+    share = f"{100 * worst.fraction:.2g} % of full range"
+    size = f"{worst.channel} is off by {_times(worst.in_noise)} times its noise ({share})"
     failed = ", ".join(
         f"{channel.channel} in {agreement.file} ({100 * channel.fraction:.3g} %, limit {100 * channel.limit:.3g} %)"
         for channel, agreement in pairs
         if not channel.passes
     )
-    why = _why(validation.causes)
+    why = _why(validation.causes, worst.in_noise)
     if not validation.passes:
         # Where no channel is beyond its limit, an unusual cause alone is what fails the set.
         parts = (why, size, f"beyond the limit: {failed}") if why else (failed, size)
@@ -281,8 +217,12 @@ def verdict(validation: Validation) -> str:
     return f"{name} agrees with {count} recording{'s' * (count > 1)}: every RMS error is within its limit; {rest}"
 
 
-def _why(causes: Causes) -> str:
-    """Return what explains a disagreement, or what comes nearest; empty where nothing but noise is left."""
+def _why(causes: Causes, without: float) -> str:
+    """Return what explains a disagreement, or what comes nearest; empty where nothing but noise is left.
+
+    ``without`` is the largest error over noise [-] without any cause: a nearest one is named that takes half of it, or
+    wrong samples, which are seen whatever else is wrong.
+    """
     if causes.found is not None:
         others = f" (or, the same for these recordings: {', '.join(one.name for one in causes.found.same)})"
         usual = ", as on any bench" if causes.found.is_usual else ""
@@ -290,8 +230,16 @@ def _why(causes: Causes) -> str:
     if not causes.tried:
         return ""
     nearest = causes.nearest
-    near = "" if nearest is None else f"; nearest: {in_words(nearest)}, which leaves {nearest.left:.2g} times the noise"
-    return f"no single change explains it{near}"
+    explains = nearest is not None and (nearest.is_of_samples or nearest.left <= _EXPLAINS * without)
+    if nearest is None or not explains:
+        return "no single change explains it"
+    left = _times(nearest.left)
+    return f"no single change explains it; nearest: {in_words(nearest)}, which leaves {left} times the noise"
+
+
+def _times(size: float) -> str:
+    """Return how many times the noise, with two digits and without a power of ten."""
+    return f"{size:.2g}" if size < 100.0 else f"{size:.0f}"
 
 
 def in_words(one: Cause) -> str:
@@ -334,8 +282,8 @@ def _part(validation: Validation, name: str, agreement: RecordingAgreement) -> P
         remarks=[f"note: {remark}" for remark in agreement.remarks],
         panels=partial(agreement_panels, agreement, validation.device.supply.atmospheric_pressure),
         name=f"{name}-agreement",
-        caption=f"Dots: {kind}. Lines: the model on the recorded inputs. Below each: model less measured, the limit of "
-        "its RMS value dashed where it is in range.",
+        caption=f"Dots: {kind}. Lines: the model on the recorded inputs. Below each: the residual, measured - "
+        "model, the limit of its RMS value dashed where it is in range.",
         across=across,
         size=(7.6 / across, 2.1),
     )

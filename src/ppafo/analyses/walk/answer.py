@@ -1,6 +1,6 @@
 """A walk of one wearer with and without the device, or of many wearers, in words, tables and figures."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -33,19 +33,19 @@ from ppafo.documents.json_text import plain
 from ppafo.metrics import Metric
 from ppafo.metrics.strides import PER_STRIDE
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE
-from ppafo.progress import Progress, Report, report_nothing
+from ppafo.progress import Progress, Report
 from ppafo.report.finding import Column, Finding, Part, columns_of
 from ppafo.report.live_parts import live_part
 from ppafo.signals.recording import Floats
 from ppafo.simulation.oscillation import gains_of
-from ppafo.simulation.scenario import UNITS, Scenario
+from ppafo.simulation.scenario import UNITS
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.walking import task_sequence as task_sequences
 from ppafo.walking.figures.legs import animation, frames_figure, strip_figure
 from ppafo.walking.figures.mean_stride import walk_figure
 from ppafo.walking.figures.population import population_figure
-from ppafo.walking.loading import FILE, check_duration_once, load_walk
+from ppafo.walking.loading import FILE, load_walk
 from ppafo.walking.motion import person_remarks, walk_of
 from ppafo.walking.person import START_VARIATION, THRESHOLD_VARIATION
 from ppafo.walking.planning import law_of
@@ -58,8 +58,6 @@ from ppafo.walking.walk import (
     Comparison,
     Number,
     Population,
-    compare_walks,
-    walk_population,
 )
 from ppafo.walking.wearer import CORRELATION, MASS_VARIATION, MAXIMUM_DEVIATIONS, STATURE_VARIATION
 
@@ -139,7 +137,7 @@ def wearers_finding(population: Population) -> Finding[Wearers]:
         ),
         found=Wearers(population),
         passed=not population.diverged,
-        files={"wearers.csv": lambda: wearers_csv(population)},
+        files={"wearers.csv": partial(wearers_csv, population)},
         command="walk",
     )
 
@@ -292,16 +290,16 @@ def finding_of(comparison: Comparison) -> Finding[WalkPair]:
         found=WalkPair(comparison),
         passed=comparison.is_completed and worn.is_helped,
         files={
-            "recording.nc": lambda: netcdf_bytes(worn.recording, None),
-            "recording.csv": lambda: marked_csv_bytes(worn.recording),
-            "recording-off.nc": lambda: netcdf_bytes(bare.recording, None),
-            "strides.csv": lambda: strides_csv(worn),
-            "strides-off.csv": lambda: strides_csv(bare),
-            "mean-stride.csv": lambda: mean_stride_csv(worn),
-            "mean-stride-off.csv": lambda: mean_stride_csv(bare),
+            "recording.nc": partial(netcdf_bytes, worn.recording, None),
+            "recording.csv": partial(marked_csv_bytes, worn.recording),
+            "recording-off.nc": partial(netcdf_bytes, bare.recording, None),
+            "strides.csv": partial(strides_csv, worn),
+            "strides-off.csv": partial(strides_csv, bare),
+            "mean-stride.csv": partial(mean_stride_csv, worn),
+            "mean-stride-off.csv": partial(mean_stride_csv, bare),
             **task_sequence_files(comparison),
         },
-        live=lambda: live_part([configuration]),
+        live=partial(live_part, [configuration]),
     )
 
 
@@ -360,39 +358,8 @@ def mean_stride_csv(result: WalkResult) -> bytes:
     return csv_of(columns)
 
 
-_LONG = 12.0
+LONG = 12.0
 """Minutes above which a walk reports how far it is."""
-
-
-def walk_with_and_without(
-    configuration: Scenario | str | Path,
-    minutes: float | None = None,
-    gait: str | Path | None = None,
-    task_sequence: str | Path | None = None,
-    bottle: str | Path | None = None,
-    wearers: int | None = None,
-    seed: int = 1,
-    overrides: Sequence[str] = (),
-    progress: Report | None = None,
-) -> Finding[Any]:
-    """Walk with the device, without it, and beside the healthy gait; or let many wearers walk with it.
-
-    ``configuration`` is a walk file, its name or a loaded one; ``minutes`` the length of the walk [min], one or
-    its task sequence's unless given; ``gait``, ``task_sequence`` and ``bottle`` replace the configuration's;
-    ``wearers`` the number of different wearers, drawn with ``seed``. ScenarioError
-    for bad input; a walk that diverges is a finding that has not passed.
-    """
-    chosen = configuration
-    # The options of the command line belong to a file: a scenario that was built has all of it already.
-    if not isinstance(chosen, Scenario):
-        check_duration_once(overrides, minutes)
-        chosen = load_walk(chosen, overrides, gait, task_sequence, bottle)
-    report = progress or report_nothing
-    if wearers is not None:
-        advance = _reporter(report, "wearers", 0.0)
-        return wearers_finding(walk_population(chosen, minutes, wearers, seed, advance))
-    comparison = compare_walks(chosen, minutes, _reporter(report, "min", _LONG))
-    return finding_of(comparison)
 
 
 def list_files() -> list[dict[str, Any]]:
@@ -409,15 +376,16 @@ def list_files() -> list[dict[str, Any]]:
 
 def default_folder(values: Mapping[str, Any]) -> Path:
     """Return where the command writes by default: by the name of the configuration."""
-    configuration = load_walk(
-        values["configuration"], values["overrides"], values["gait"], values["task_sequence"], values["bottle"]
-    )
+    names = ("overrides", "gait", "task_sequence", "bottle")
+    configuration = load_walk(values["scenario"], **{name: values[name] for name in names})
     walked, bottled = walk_of(configuration).task_sequence, walk_of(configuration).bottle
     along = ("" if walked is None else f"-{walked.name}") + ("" if bottled is None else f"-{bottled.bottle.name}")
     return Path("out") / f"{'walk' if values['wearers'] is None else 'wearers'}-{configuration.name}{along}"
 
 
-def _reporter(report: Report, noun: str, above: float) -> Callable[[float, float], None]:
+def reporter(report: Report, noun: str, above: float) -> Callable[[float, float], None]:
+    """Return what hears of a walk and reports it, where there is more than ``above`` of the ``noun``."""
+
     def forward(done: float, total: float) -> None:
         if total > above:
             report(Progress("walking", round(done), round(total), noun=noun))

@@ -2,27 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from ppafo.cli.arguments import Count, File, Folder, Name, Overrides, Patience, Port, Time, Volume, Whole, Word
-from ppafo.progress import Report, report_nothing
+from ppafo.arguments import Count, File, Folder, Name, Overrides, Patience, Port, Time, Whole, Word
 
 if TYPE_CHECKING:
-    from ppafo.analyses.identify.answer import Identification
-    from ppafo.analyses.validate.solve import Validation
     from ppafo.cli.output import Said
-    from ppafo.report.finding import Finding
-    from ppafo.storage.foreign import ColumnMap
-
-Problem = Annotated["str | Path", Word("PROBLEM", Path)]
-Set = Annotated["str | Path", Word("PARAMETERS")]
-Recording = Annotated["str | Path", Word("RECORDING")]
-Motion = Annotated[str, Word("free|measured|locked|leg")]
-Initial = Annotated[str, Word("CHANNEL=VALUE")]
-Limits = Annotated[Sequence[str], Word("[CHANNEL=]LIMIT", option="--threshold")]
-Columns = Annotated["ColumnMap | str | Path", Word("FILE.toml[:NAME]")]
 
 
 def rig_simulate(
@@ -110,76 +96,3 @@ def list_rig() -> Said:
     from ppafo.rig.experiments import overview
 
     return Said(*overview())
-
-
-def identify(
-    problem: Problem,
-    *,
-    progress: Report = report_nothing,
-) -> Finding[Identification]:
-    """Identify a parameter set, with uncertainty, from bench recordings.
-
-    The procedures of the problem file run in the recommended order; the trajectory fit comes last and starts from what
-    they found. Estimates are in SI units. IdentificationError for a problem that makes no sense, ParameterError for a
-    set that does not, and DataError for a recording that cannot be read; each in one line that begins with the file.
-
-    problem: a problem file (.toml); see 'ppafo doctor --schema identification'
-    """
-    from ppafo.analyses.identify.solve import identify
-
-    return identify(problem, progress)
-
-
-def validate(
-    parameter_set: Set,
-    recordings: Sequence[Recording],
-    *,
-    valve: Name | None = None,
-    overrides: Overrides = (),
-    motion: Motion = "free",
-    volume: Volume | None = None,
-    initial: Sequence[Initial] = (),
-    thresholds: Limits = (),
-    longest_delay: Time = 0.02,
-    columns: Columns | None = None,
-    progress: Report | None = None,
-) -> Finding[Validation]:
-    """Compare a parameter set with recordings, channel by channel.
-
-    The model is run on the recorded command, supply pressure and external torque; errors are model less measured. With
-    no threshold it is 10 % of full range, at least half of the variance of a signal beside its noise is explained, and
-    no single change of record, set or model may explain the recordings better than noise of the sensors could. The
-    result's ``found`` has ``passes`` and, in ``recordings``, one ``RecordingAgreement`` each: ``measured`` and
-    ``model`` are recordings, their channels of shape (samples,) in SI; ``channels`` has RMS error, bias, largest error
-    and delay [s] of each channel in its SI unit (rad, Pa, N m). DataError, ParameterError or SimulationError for bad
-    input.
-
-    parameter_set: name of a parameter set, or a .toml file
-    recordings: a .csv or .nc file, or a result folder; several may be given
-    valve: valve of the parameter set; default: its default valve
-    motion: free: the model moves the vane; measured: the vane follows the recorded angle; locked: the vane stays at
-        its initial angle; leg: the model moves vane and foot on the fixture of step-response (default free)
-    volume: no vane: the valve fills and vents chamber 1 of this fixed volume, for example '60 cm^3'; pressure_1 is
-        compared
-    initial: initial value of a channel that was not recorded, for example 'pressure_2=0 psi_g'
-    thresholds: maximum RMS error, as a fraction of full range or with a unit: 5%, angle=10%, 'pressure_1=3.7 psi_d';
-        default: 10%, and half of the variance of the signal is explained
-    longest_delay: maximum delay of the measurement to estimate; default '20 ms', '0 s' for none
-    columns: file with a column map [columns.NAME], for recordings with other column names; a problem file may contain
-        it
-    """
-    from ppafo.analyses.validate.solve import validate
-
-    return validate(
-        parameter_set,
-        recordings,
-        valve,
-        overrides,
-        motion,
-        volume,
-        initial,
-        thresholds,
-        longest_delay,
-        columns,
-        progress,
-    )

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-from ppafo.cli.arguments import Overrides, SetName, Word
+from ppafo.arguments import Overrides, SetName
 
 if TYPE_CHECKING:
-    from ppafo.analyses.parts.solve import Parts
     from ppafo.cli.output import Said
     from ppafo.report.finding import Finding
 
@@ -45,17 +43,4 @@ def sets_audit(
     """
     from ppafo.analyses.sets.audit import audited
 
-    return audited(names, parent, all_, overrides)
-
-
-def sets_parts(
-    part: Annotated[str, Word("PART")] | None = None, *, catalogue: Annotated[str | Path, Word("FILE")] = "parts"
-) -> Finding[Parts]:
-    """List real parts with the origin of every figure.
-
-    part: name of a part, for all its figures and their sources
-    catalogue: a .toml file; default: the catalogue of the package
-    """
-    from ppafo.analyses.parts.solve import parts
-
-    return parts(part, catalogue)
+    return audited(names, parent, all_, tuple(overrides))

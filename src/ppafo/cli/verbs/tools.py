@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from ppafo.cli.arguments import Folder, Overrides, Scenario, Word
+from ppafo.arguments import Folder, Overrides, Scenario, Word
 
 if TYPE_CHECKING:
     from ppafo.cli.output import Said

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from ppafo.cli.arguments import (
+from ppafo.arguments import (
     Angle,
     Count,
     File,
@@ -14,54 +13,16 @@ from ppafo.cli.arguments import (
     Gait,
     Length,
     Mass,
-    Minutes,
     Name,
-    Overrides,
     Speed,
     Time,
-    Whole,
     Word,
 )
 
 if TYPE_CHECKING:
-    from typing import Any
-
     from ppafo.cli.output import Said
     from ppafo.gait.finding import GaitFound
-    from ppafo.progress import Report
     from ppafo.report.finding import Finding
-    from ppafo.simulation.scenario import Scenario
-
-Walk = Annotated["Scenario | str | Path", Word("WALK")]
-
-
-def walk(
-    configuration: Walk = "solenoid",
-    *,
-    gait: Gait | None = None,
-    task_sequence: Annotated[str | Path, Word("SEQUENCE")] | None = None,
-    bottle: Annotated[str | Path, Word("BOTTLE")] | None = None,
-    minutes: Minutes | None = None,
-    wearers: Count | None = None,
-    seed: Whole = 1,
-    overrides: Overrides = (),
-    progress: Report | None = None,
-) -> Finding[Any]:
-    """Simulate walking with the device, without it, and healthy.
-
-    configuration: name of a walk configuration, or a .toml file; default solenoid
-    gait: name of a gait, or a gait file; default: the gait of the configuration
-    task_sequence: what the wearer does one after the other: a name or a .toml file; 'ppafo walk --list' has the names
-    bottle: supply the device from a bottle: a name ('ppafo bottle --list') or a .toml file; the walk ends with it
-    minutes: time to walk; default 1, up to 10 on a bottle, or a whole task sequence
-    wearers: number of different wearers to simulate instead of one
-    seed: random seed of the wearers; default 1
-    """
-    from ppafo.analyses.walk.answer import walk_with_and_without
-
-    return walk_with_and_without(
-        configuration, minutes, gait, task_sequence, bottle, wearers, seed, overrides, progress
-    )
 
 
 def gait_list() -> Said:
@@ -101,7 +62,7 @@ def gait_import(
     name: Name = "imported-gait",
     title: str = "",
 ) -> Finding[GaitFound]:
-    """Make a gait from recorded files (.mot, .sto, .csv, .c3d, .trc).
+    """Make a gait from recorded files (.mot, .sto, .csv, .txt, .tsv, .c3d, .trc, .mat).
 
     files: files of one walk, on one clock
     body_mass: mass of the wearer, such as '62 kg'; default: what a C3D file states

@@ -4,9 +4,8 @@
 the true masses stand beside it. The ports ``gas_density`` and ``ideal_density`` give the equation of state.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from ppafo.engine.components import GasScheme, Second
 from ppafo.engine.scheme.pneumatics import (
     SHORTEST,
     Flows,
@@ -15,12 +14,9 @@ from ppafo.engine.scheme.pneumatics import (
     SlopedFlows,
     StillGas,
     added_flows,
-    gas_error,
     linearise,
     moving_change,
-    opening_error,
     response,
-    second_moving_stage,
     solve_stage,
 )
 from ppafo.model.plant import PlantParameters, PlantState, TrueMasses, chamber_volumes
@@ -132,32 +128,3 @@ def at_angle(plant: PlantParameters, state: PlantState, masses: TrueMasses, angl
     """State with the gas contents at the angle [rad] that the vane reached."""
     volume_1, volume_2 = chamber_volumes(plant, angle)
     return state._replace(mass_1=content_of(masses.mass_1, volume_1), mass_2=content_of(masses.mass_2, volume_2))
-
-
-def _second(rows: Any, gas: str) -> Second:
-    add, next_angle = rows.add, "state.angle" if rows.program.is_locked else "begun.next_angle"
-    still = f"{gas}.moving.still"
-    return Second(
-        stage=f"{add(second_moving_stage)}({gas}.moving, passing)",
-        change=f"{add(real_change)}(plant, state, masses, {gas}, second, length)",
-        error=f"{add(gas_error)}(plant, {still}, second, {next_angle}, length)",
-        shifted=f"{add(opening_error)}(plant, {still}, shift, {next_angle}, length)",
-    )
-
-
-REAL = GasScheme(
-    parameters={},
-    states={"masses": TrueMasses},
-    start=masses_at_start,
-    loads=("masses",),
-    stored={"masses": "filled"},
-    begun=lambda _program: RealGas,
-    change=RealChange,
-    begin=lambda rows: f"gas = {rows.add(begin_real_gas)}(plant, state, masses, next_angle, flowing, length)",
-    ends=lambda _rows, gas: f"{gas}.moving.still.end_1, {gas}.moving.still.end_2",
-    first=lambda _rows, gas: f"{gas}.moving.still.first",
-    second=_second,
-    add=lambda rows: f"fed, filled = {rows.add(with_real_gas)}(state, masses, change)",
-    move=lambda rows, state, _assumed, reached: [f"{state} = {rows.add(at_angle)}(plant, {state}, filled, {reached})"],
-    work=lambda _rows: [],
-)

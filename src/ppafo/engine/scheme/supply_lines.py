@@ -7,9 +7,8 @@ with an energy balance of the chambers too: what a warm chamber pushes back give
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from ppafo.engine.components import Feed
 from ppafo.engine.scheme.pneumatics import (
     ALLOWED_OF_PRESSURE,
     SHORTEST,
@@ -207,32 +206,3 @@ def end_thermal_lines(
     taken_2 = step * (1.5 * begun.taken_2 + 0.5 * second_2)
     supplied = step * (1.5 * gas.first.supplied + 0.5 * second.supplied)
     return lines_after(plant, lines, line_state, supplied - taken_2, taken_2, begun.lines.inlet_rise, step).after
-
-
-def _begin(rows: Any) -> str:
-    given = "next_angle, flowing, length"
-    if rows.program.is_thermal:
-        begun = f"plant, thermal, lines, line_state, state, masses, {given}"
-        return f"gas = {rows.add(begin_fed_thermal_gas)}({begun})"
-    return f"gas = {rows.add(begin_fed_gas)}(plant, lines, line_state, state, {given})"
-
-
-def _end(rows: Any) -> str:
-    end = end_thermal_lines if rows.program.is_thermal else end_lines
-    before, moved = ("plant, thermal", "second") if rows.program.is_thermal else ("plant", "change")
-    return f"{rows.add(end)}({before}, lines, line_state, gas, {moved}, passing.in_2.from_source, length)"
-
-
-LINES = Feed(
-    parameters={"lines": SupplyLines},
-    states={"line_state": LineState},
-    loads=("lines", "line_state"),
-    stored={"line_state": "next_lines"},
-    chambers="gas.chambers",
-    after_first="gas.lines.after",
-    begun=lambda program: FedThermalGas if program.is_thermal else FedGas,
-    source=lambda rows, state: f"{rows.add(plant_at_line_pressures)}(plant, lines, {state})",
-    begin=_begin,
-    end=_end,
-    error=lambda rows: f"{rows.add(line_error)}(plant, lines, gas.lines.after, next_lines)",
-)

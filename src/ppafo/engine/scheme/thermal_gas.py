@@ -8,9 +8,8 @@ which changes no faster than a chamber fills; the method keeps its order with an
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from ppafo.engine.components import GasScheme, Second
 from ppafo.engine.scheme.pneumatics import (
     ALLOWED_OF_PRESSURE,
     GAMMA,
@@ -526,38 +525,3 @@ def masses_at_start(_plant: PlantParameters, initial: PlantState) -> ThermalStat
         heat_content=0.0,
         gas_work=0.0,
     )
-
-
-def _second(rows: Any, gas: str) -> Second:
-    add = rows.add
-    return Second(
-        stage=f"{add(second_thermal_stage)}(thermal, {gas}, passing)",
-        change=f"{add(thermal_change)}(plant, thermal, {gas}, second, length)",
-        error=f"{add(thermal_error)}(plant, {gas}, second, length)",
-        shifted=f"{add(thermal_opening_error)}(plant, {gas}, shift, length)",
-    )
-
-
-ENERGY_BALANCE = GasScheme(
-    parameters={"thermal": ThermalParameters},
-    states={"masses": ThermalState},
-    start=masses_at_start,
-    loads=("thermal", "masses"),
-    stored={"masses": "warmed"},
-    begun=lambda _program: ThermalGas,
-    change=ThermalFlows,
-    begin=lambda rows: (
-        f"gas = {rows.add(begin_thermal_gas)}(plant, thermal, state, masses, next_angle, flowing, length)"
-    ),
-    ends=lambda rows, gas: f"{rows.add(end_pressures)}(plant, {gas})",
-    first=lambda _rows, gas: f"{gas}.first",
-    second=_second,
-    add=lambda rows: f"fed, warmed = {rows.add(with_thermal_gas)}(state, masses, change)",
-    move=lambda rows, state, assumed, reached: [
-        f"{state} = {rows.add(after_motion)}(plant, thermal, {state}, {assumed}, {reached})"
-    ],
-    # A locked vane takes no work.
-    work=lambda rows: (
-        [] if rows.program.is_locked else [f"warmed = {rows.add(with_work)}(plant, warmed, state, after)"]
-    ),
-)

@@ -3,9 +3,8 @@
 First the torques on the ankle beside actuator, friction and damping: wearer, ground, foot and foot plate.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from ppafo.engine.components import LegScheme, Phases, RarePhase
 from ppafo.engine.scheme.motion import (
     FreeEnd,
     FreeStep,
@@ -19,25 +18,12 @@ from ppafo.engine.scheme.pneumatics import HeldChambers, held_chambers, held_pre
 from ppafo.model import contact as ground
 from ppafo.model.elementary import TURNS_OF_RADIAN, sine_and_cosine_of_turns
 from ppafo.model.gait import (
-    GaitMeasured,
     GaitNow,
-    GaitPlace,
-    GaitSeries,
     GaitTiming,
-    Marks,
-    TimedSequence,
-    gait_in_task_sequence,
-    gait_of,
-    measured_at,
-    place_at,
-    shown_toe_force,
-    stands_on_toes,
 )
 from ppafo.model.leg import LegParameters, foot_inertia_about_ankle, passive_torque, torque_of_shank_on
 from ppafo.model.plant import PlantParameters, PlantState, actuator_torque
-from ppafo.model.plant_faults import PlantFaults, ShutOff, Unpowered
 from ppafo.model.ports import friction_in_motion
-from ppafo.model.sensors import GaitSeen, GaitSensors
 
 
 class DeviceShare(NamedTuple):
@@ -344,7 +330,6 @@ def advance_walk(
     # Trapezoidal rule over the angle that the ankle turned in this step.
     work = 0.5 * (given + walk.external_torque) * turned if on_toes else 0.0
     positive_work = max(work, 0.0)
-    # Numba takes more than 15 keywords only where no choice stands among them.
     return WalkState(
         contact=landed.contact,
         offset=landed.offset,
@@ -361,126 +346,3 @@ def advance_walk(
         positive_push_off_work=walk.positive_push_off_work + positive_work,
         net_push_off_work=walk.net_push_off_work + work,
     )
-
-
-def find(rows: Any) -> list[str]:
-    """Lines that make what a step is handed by the one before, where there was none."""
-    carried = f"carried = {rows.add(carried_foot)}(leg, share, walk.now, walk.foot)"
-    return [*[rows.load(name) for name in ("leg", "share", "walk")], carried, *rows.keep("carried")]
-
-
-def lead(rows: Any) -> Phases:
-    """Phases before the gas: the gait at the end of the step, with the marks of a stride, and where the foot would be.
-
-    The gait goes stride after stride, or in a task sequence.
-    """
-    add = rows.add
-    given = "plant, leg, gait_timing, state, held, walk, carried, next_gait, length"
-    begun = f"begun = {add(begin_walk)}({given})"
-    if rows.program.leg.takes_task_sequence:
-        made = f"{add(gait_in_task_sequence)}(gait, task_sequence, gait_timing, leg, time + length)"
-        kept = rows.keep("next_gait", "marks")
-        phases: Phases = [[rows.load("gait"), rows.load("task_sequence"), f"next_gait, marks = {made}", *kept]]
-    else:
-        cells = {name: rows.cells[f"next_gait.{name}"] for name in GaitNow._fields}
-        measured = [cells[name] for name in GaitMeasured._fields]
-        rest = [name for name in GaitNow._fields if name not in GaitMeasured._fields]
-        phases = [
-            [f"place = {add(place_at)}(gait_timing, time + length)", *rows.keep("place")],
-            [
-                rows.load("gait"),
-                rows.load("place"),
-                f"measured = {add(measured_at)}(gait, gait_timing, leg, place)",
-                *[f"{cells[name]} = measured.{name}" for name in GaitMeasured._fields],
-            ],
-            [
-                f"next_gait = {add(gait_of)}(leg, {add(GaitMeasured)}({', '.join(measured)}))",
-                *[f"{cells[name]} = next_gait.{name}" for name in rest],
-            ],
-        ]
-    return [*phases, [rows.load("next_gait"), rows.load("carried"), begun, *rows.keep("begun")]]
-
-
-def assume(rows: Any) -> list[str]:
-    """Lines that find where the gas takes the vane to be at the end of the step, and the chambers there."""
-    return [
-        rows.load("begun"),
-        f"next_angle = {rows.add(next_angle)}(plant, leg, walk, begun)",
-        f"ahead = {rows.add(held_chambers)}(plant, next_angle)",
-        *rows.keep("ahead"),
-    ]
-
-
-def reach(rows: Any, fed: str) -> Phases:
-    """Phases that find where the step ends, from the line that adds its gas; few feet depart from where they slide."""
-    loads = [rows.load(name) for name in ("begun", "change", "ahead")]
-    given = "plant, leg, share, gait_timing, fed, walk, begun, next_gait, ahead, length"
-    reached = f"ended, carried = {rows.add(reach_end)}({given})"
-    departs = f"ended, ahead = {rows.add(depart_in_walk)}(plant, fed, begun, ended, ahead, length)"
-    return [
-        [*loads, rows.load("next_gait"), fed, reached, *rows.keep("ended", "carried")],
-        RarePhase(
-            [*loads, rows.load("ended"), fed, departs, *rows.keep("ended", "ahead")],
-            rows.cells["ended.motion.departs"],
-        ),
-    ]
-
-
-def end(rows: Any) -> list[str]:
-    """Lines that lead to the state ``after`` the step."""
-    follow = rows.cells["gait_sensors.follow_rate"]
-    given = f"plant, leg, share, gait_timing, {follow}, fed, walk, begun, ended, held, carried, next_gait, length"
-    assumed = f"{rows.add(next_angle)}(plant, leg, walk, begun)"
-    return [
-        *[rows.load(name) for name in ("ended", "ahead", "carried", "next_gait")],
-        "held = ahead",
-        *rows.keep("held"),
-        f"after, walk_after = {rows.add(end_walk)}({given})",
-        *mark_stride(rows),
-        *rows.program.gas.move(rows, "after", assumed, "after.angle"),
-    ]
-
-
-def mark_stride(rows: Any) -> list[str]:
-    """Lines that add a stride's marks in a task sequence: a scuff on the toe sensor, a forefoot on a stair's edge."""
-    if not rows.program.leg.takes_task_sequence:
-        return []
-    add, follow = rows.add, rows.cells["gait_sensors.follow_rate"]
-    marked = {
-        "toe_force": f"{add(shown_toe_force)}(walk_after.toe_force, marks, {follow}, length)",
-        "toes_first": f"{add(stands_on_toes)}(walk_after.toes_first, marks)",
-    }
-    fields = ", ".join(marked.get(name, f"walk_after.{name}") for name in WalkState._fields)
-    return [rows.load("marks"), f"walk_after = {add(WalkState)}({fields})"]
-
-
-def _scheme(takes_task_sequence: bool, fails: bool) -> LegScheme:
-    gait = {"leg": LegParameters, "share": DeviceShare, "gait": GaitSeries}
-    timing = {"gait_timing": GaitTiming, "gait_sensors": GaitSensors}
-    place = {} if takes_task_sequence else {"place": GaitPlace}
-    faults = {"plant_faults": PlantFaults, "shut_off": ShutOff} if fails else {}
-    return LegScheme(
-        takes_task_sequence=takes_task_sequence,
-        parameters={**gait, **timing, **({"task_sequence": TimedSequence} if takes_task_sequence else {}), **faults},
-        states={"walk": WalkState, "gait_seen": GaitSeen, **({"unpowered": Unpowered} if fails else {})},
-        loads=("leg", "share", "gait_timing", "walk", *faults, *(["unpowered"] if fails else [])),
-        stored={"walk": "walk_after"},
-        begun=WalkStep,
-        led={**place, "next_gait": GaitNow, **({"marks": Marks} if takes_task_sequence else {})},
-        handed={"carried": CarriedFoot},
-        ended={"ahead": HeldChambers, "ended": WalkEnd},
-        find=find,
-        lead=lead,
-        assume=assume,
-        reach=reach,
-        end=end,
-        fails=fails,
-    )
-
-
-STRIDES = _scheme(takes_task_sequence=False, fails=False)
-TASK_SEQUENCE = _scheme(takes_task_sequence=True, fails=False)
-"""A leg that walks stride after equal stride, and one that stands, starts, changes its speed and stops."""
-FAILING_STRIDES = _scheme(takes_task_sequence=False, fails=True)
-FAILING_TASK_SEQUENCE = _scheme(takes_task_sequence=True, fails=True)
-"""The same with a plant that may fail, or whose line has a shut-off valve."""

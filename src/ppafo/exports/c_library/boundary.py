@@ -36,7 +36,7 @@ class Arrays:
 
     def head(self, name: str, parameters: Mapping[str, str]) -> str:
         """The first lines of a function; ``parameters`` by name, with their types."""
-        return f'@njit("void({", ".join(parameters.values())})")\ndef {name}({", ".join(parameters)}):'
+        return f'@entry("void({", ".join(parameters.values())})")\ndef {name}({", ".join(parameters)}):'
 
 
 class Structs:

@@ -9,9 +9,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from ppafo.engine.lane_source import SAME_MOMENT
 from ppafo.engine.lanes import SIGNAL_ROWS
 from ppafo.engine.run import NEVER_FAILED
+from ppafo.engine.step.lane import SAME_MOMENT
 from ppafo.exports import filled, in_comment, in_markdown, template
 from ppafo.exports.c_library.program import ExportedProgram, Further, c_text_of_run
 from ppafo.metrics import METRICS

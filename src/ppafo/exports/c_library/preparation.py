@@ -6,13 +6,14 @@ from typing import Any, final
 
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
 from ppafo.control.catalog import CONTROLLERS, PROFILES
-from ppafo.engine.lane_rows import indent
 from ppafo.engine.lanes import RECORDED_ANGLE, Segment
-from ppafo.engine.program import LaneResult, LaneTiming, Program
+from ppafo.engine.loop_text import indent
+from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, leaves, numbers, row_expression
 from ppafo.engine.run import NEVER_FAILED, moment_at_start, whole_and_rest
 from ppafo.engine.scheme.motion import Pace
 from ppafo.engine.source_text import Collector, composed_lines
+from ppafo.engine.step.lane import LaneResult, LaneTiming
 from ppafo.exports.c_library.boundary import Boundary
 from ppafo.exports.c_library.files import Relation, Setting, c_identifier
 from ppafo.exports.c_library.program import COUNTS
@@ -278,8 +279,8 @@ class Writing:
         program, add = self.program, self.add
         yield f"result = {add(LaneResult)}(0.0, {NEVER_FAILED!r}, 0.0)"
         yield f"pace = {add(Pace)}(step)"
-        if program.gas.start is not None:
-            yield f"masses = {add(program.gas.start)}(plant, state)"
+        if program.gas.START is not None:
+            yield f"masses = {add(program.gas.START)}(plant, state)"
         yield f"valve_state = {self.constant(program.valve.initial(), 'valve_state')}"
         if program.controller is not None:
             yield f"controller_state = {self.constant(program.controller.initial, 'controller_state')}"

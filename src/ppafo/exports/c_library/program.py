@@ -16,13 +16,15 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.engine.lane_rows import HANDED, indent
-from ppafo.engine.lane_samples import REQUEST, TRACED, walk_traces
-from ppafo.engine.lane_source import HEADER, INLINE, lane_loop
-from ppafo.engine.outline import Outline
-from ppafo.engine.program import Program, link_program
+from ppafo.engine.channels import REQUEST, TRACED, walk_traces
+from ppafo.engine.entries import HEADER, INLINE
+from ppafo.engine.generator import StepText
+from ppafo.engine.lane_rows import HANDED
+from ppafo.engine.lane_source import ARGUMENTS, COMPILED
+from ppafo.engine.linking import link_program
+from ppafo.engine.loop_text import LOOP_ARRAYS, LOOP_NUMBERS, indent, lane_loop, run_loop
+from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths
-from ppafo.engine.run_source import LOOP_ARRAYS, LOOP_NUMBERS, run_loop
 from ppafo.engine.source_text import Collector, SourceCollector, composed_lines
 from ppafo.exports.c_library.boundary import Arrays, Boundary, Structs, struct_of, struct_of_numbers
 from ppafo.metrics import METRICS
@@ -108,6 +110,7 @@ WHOLE, IN_PARTS = "advance", "advance_in_parts"
 TOGETHER = "_together"
 """Stands behind the name of a lane loop of several runs at once."""
 _STEPS = {WHOLE: "AT_STEP", IN_PARTS: "AT_PARTED"}
+_ENDINGS = {WHOLE: "", IN_PARTS: "_in_parts"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,7 +151,10 @@ def exported(program: Program) -> ExportedProgram:
     metrics = tuple(kind for kind in offered if program.walks == (WALK in kind.needs))
     # By name: the same metrics in another order are the same program.
     meters = dict(sorted({meter.name: meter for kind in metrics for meter in kind.meters}.items()))
-    outputs = (*(name for name in TRACED if name not in missing), *walk_traces(program))
+    outputs = (
+        *(name for name in TRACED if name not in missing),
+        *(walk_traces(program.state_rows()) if program.walks else ()),
+    )
     return ExportedProgram(replace(program, meters=tuple(meters.values()), traced=outputs), metrics)
 
 
@@ -179,7 +185,8 @@ def c_text_of_run(
     link_program(program, collector)
     entries = [metrics_entry(item, collector, structs)] if item.metrics else []
     entries += [add(collector, structs) for add in further]
-    loop = run_loop(item.loops[WHOLE], collector, f"{name}_outputs", item.loops.get(IN_PARTS))
+    steps = _steps_of(item, collector)
+    loop = run_loop(steps[WHOLE], f"{name}_outputs", steps.get(IN_PARTS))
     composed = "\n\n".join([HEADER, collector.text(), loop, *entries, ""])
     states = struct_of("run_states", program.state_rows(), collector.add)
     parameters = struct_of("run_parameters", program.parameter_rows(), collector.add)
@@ -196,6 +203,9 @@ def c_text_of_run(
     documents = documents_of(collector) | _DOCUMENTS
     # A short name is taken only where it is unambiguous and C leaves it free; all others keep their module's path.
     own = {name: re.sub(r"\W", "_", item.__qualname__).strip("_") for name, item in collector.owners.items()}
+    # Functions of the step that divide it have their ending beside those that do not.
+    ending = _ENDINGS[IN_PARTS]
+    own |= {name: f"{word.removesuffix(ending)}{ending}" for name, word in own.items() if name.endswith(ending)}
     counts, taken = Counter(own.values()), _names_around()
     short = {name: word for name, word in own.items() if counts[word] == 1 and word not in taken and is_free(word)}
     return c_source(
@@ -288,31 +298,36 @@ def c_text(item: ExportedProgram, title: str, settings: Sequence[str], further: 
 
 def outline_of(item: ExportedProgram, settings: Sequence[str], further: Further | None, together: int) -> str:
     """All that ``c_text`` makes the same functions from but its title: the same outline, the same code."""
-    composed = _composed_text(item, Outline(INLINE, for_one_run), further, together)
+    composed = _composed_text(item, SourceCollector(INLINE, for_one_run), further, together)
     places = [places_of(item.program.state_rows()), places_of(item.program.parameter_rows())]
     names = [*places, [kind.name for kind in item.metrics], list(settings)]
     return f"{names!r}\n{composed}"
 
 
-def _composed_text(item: ExportedProgram, collector: Collector, further: Further | None, together: int) -> str:
+def _composed_text(item: ExportedProgram, collector: SourceCollector, further: Further | None, together: int) -> str:
     link_program(item.program, collector)
     arrays = Arrays()
     entries = [metrics_entry(item, collector, arrays), *([] if further is None else [further(collector, arrays)])]
-    loops = [lane_loop(program, collector, name, lanes=1) for name, program in item.loops.items()]
-    loops += [lane_loop(program, collector, name + TOGETHER, together) for name, program in item.loops.items()]
+    steps = _steps_of(item, collector)
+    loops = [lane_loop(step, COMPILED, name, ARGUMENTS, lanes=1) for name, step in steps.items()]
+    loops += [lane_loop(step, COMPILED, name + TOGETHER, ARGUMENTS, together) for name, step in steps.items()]
     return "\n\n".join([HEADER, collector.text(), *loops, *entries, ""])
 
 
 def _stepping(program: Program, prefix: str) -> list[str]:
-    """Names of the places of what a step hands on, of its parts, and of what lies aside while lanes wait."""
+    """Names of the places of what a step hands on, and of what lies aside while lanes wait."""
     handed = [name.removeprefix("AT_") for name in places_of(program.step_rows()).values()]
     states = [name.removeprefix("AT_") for name in places_of(program.state_rows()).values()]
     kept = [
         name.removeprefix("AT_") for path, name in places_of(program.step_rows()).items() if path.startswith(HANDED)
     ]
-    aside = [f"ASIDE_{name}" for name in (*states, "PART_REMAINING", *kept)] if program.parts_are_rare else []
-    parts = ("PART_LENGTH", "PART_BEFORE", "PART_REMAINING", "PART_ERROR")
-    return [f"{prefix}_{name}" for name in (*handed, *parts, *aside)]
+    aside = [f"ASIDE_{name}" for name in (*states, "REMAINING", *kept)] if program.parts_are_rare else []
+    return [f"{prefix}_{name}" for name in (*handed, *aside)]
+
+
+def _steps_of(item: ExportedProgram, collector: SourceCollector) -> dict[str, StepText]:
+    """The steps of its lane loops, by their names in C; functions that both have alike are there once."""
+    return {name: StepText(program, collector, _ENDINGS[name]) for name, program in item.loops.items()}
 
 
 def _enumeration(said: str, names: Sequence[str], first: int = 0) -> str:
@@ -339,7 +354,7 @@ def metrics_entry(item: ExportedProgram, collector: Collector, boundary: Boundar
         make = real_totals
     further = ", plant, thermal" if program.is_thermal else ""
     parameters = program.parameter_rows()
-    given = ("plant", *program.gas.parameters, *(effect.name for effect in program.effects))
+    given = ("plant", *program.gas.PARAMETERS, *(effect.name for effect in program.effects))
     lines = [f"{name} = {boundary.taken('parameters', name, parameters, collector.add)}" for name in given]
     lines += [f"{name} = {boundary.taken('states', name, groups, collector.add)}" for name in program.effect_states]
     add = collector.add

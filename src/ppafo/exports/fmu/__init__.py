@@ -76,13 +76,13 @@ def build(name: str, sources: Mapping[str, bytes], main: str) -> bytes:
     """The library of a unit for a platform. ProgramError where no compiler is there for it, or it refuses."""
     # No -march: a unit runs on processors that nobody here has seen.
     command = [*compiler_for(name), *FLAGS, *HIDDEN]
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory(prefix="ppafo-", ignore_cleanup_errors=True) as folder:
         for file, content in sources.items():
             (Path(folder) / file).write_bytes(content)
         library = Path(folder) / f"unit{PLATFORMS[name].suffix}"
         # Windows has the mathematics in its C library.
         mathematics = [] if name == "win64" else ["-lm"]
-        done = asked([*command, main, "-o", library.name, *mathematics], _ANOTHER, folder)
+        done = asked([*command, main, "-o", library.name, *mathematics], _ANOTHER, folder, Path(folder))
         if done.returncode != 0:
             raise ProgramError(f"{command[0]} does not build the library for {name}: {complaint(done)}")
         if not library.is_file():

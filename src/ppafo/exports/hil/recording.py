@@ -73,14 +73,18 @@ class Recorded:
 
 @final
 class Collector:
-    """Samples of one run of a bench, by number; the first one says which run, and which channels."""
+    """Samples of one run of a bench, by number; the first one says which run, and which channels.
+
+    A sample that does not go on from the others, in number, time, run or channels, waits until the next one shows
+    which of them is the stray: what a wire or an earlier run left over may come first, and says nothing of the bench.
+    """
 
     def __init__(self) -> None:
         self.ignored: Counter[str] = Counter()
         self.is_over = False
-        self._first: wire.Sample | None = None
-        self._newest = 0
-        self._newest_stamp = 0
+        self._newest: wire.Sample | None = None
+        self._stray: wire.Sample | None = None
+        self._number = 0
         self._elapsed = 0
         self._names: list[str] = []
         self._kind: RecordingKind = "measured"
@@ -98,40 +102,75 @@ class Collector:
         if not isinstance(packet, wire.Sample):
             self.ignored["no sample"] += 1
             return False
-        first = self._first
-        if first is None:
-            if not packet.counts:
-                self.ignored["without a channel"] += 1
-                return False
-            self._first = first = packet
-            self._names = list(packet.counts)
-            self._newest, self._newest_stamp = packet.sequence, packet.time
-        if packet.run != first.run:
-            self.ignored["of another run"] += 1
+        if self._newest is None and not packet.counts:
+            self.ignored["without a channel"] += 1
             return False
-        self.is_over = self.is_over or bool(packet.flags & wire.OVER)
-        # Columns of a file are fixed by its first sample.
-        if packet.counts.keys() != first.counts.keys():
-            self.ignored["with other channels"] += 1
+        why = "" if self._newest is None else _why_not(self._newest, packet)
+        if not why:
+            self._drop_stray()
+            return self._keep(packet)
+        if why == _DOUBLED:
+            self.ignored[why] += 1
             return False
+        return self._decide(packet)
+
+    def _decide(self, packet: wire.Sample) -> bool:
+        """Keep a sample that goes on from the stray alone, with that one; any other is the next stray."""
+        stray, newest = self._stray, self._newest
+        if stray is None or newest is None or _why_not(stray, packet):
+            self._drop_stray()
+            self._stray = packet
+            return False
+        if len(self) == 1:
+            # Two go on from each other and not from the first: that one was the stray.
+            self.ignored["before all others"] += 1
+            self._forget()
+        elif _why_not(newest, stray) in _OF_OTHERS:
+            self._drop_stray()
+            self._stray = packet
+            return False
+        self._stray = None
+        self._keep(stray)
+        return self._keep(packet)
+
+    def _keep(self, packet: wire.Sample) -> bool:
+        """Add a sample of the run, unless its number came before."""
+        if self._newest is None:
+            self._newest = packet
+            self._number, self._names = packet.sequence, list(packet.counts)
         # Numbers of 32 bits wrap after 50 days at 1 kHz, time stamps after 71 minutes: both are taken as steps from the
         # newest.
-        number = self._newest + _difference(packet.sequence, self._newest)
+        number = self._number + _difference(packet.sequence, self._newest.sequence)
         # UDP may double a packet, and a repeated sample would be a step of 0 s.
         if number in self._seen:
-            self.ignored["doubled"] += 1
+            self.ignored[_DOUBLED] += 1
             return False
-        if number > self._newest:
+        if number > self._number:
             # From sample to sample: half of what a time stamp holds is 36 minutes, and a recording may be longer.
-            self._elapsed += _difference(packet.time, self._newest_stamp)
-            self._newest, self._newest_stamp = number, packet.time
+            self._elapsed += _difference(packet.time, self._newest.time)
+            self._number, self._newest = number, packet
+        # The first sample ends nothing: it may be what is left of an earlier run.
+        self.is_over = self.is_over or bool(self._numbers and packet.flags & wire.OVER)
         if packet.flags & wire.COMPUTED:
             self._kind = "simulated"
         self._seen.add(number)
         self._numbers.append(number)
         self._stamps.append(packet.time)
-        self._counts.extend(packet.counts.values())
+        self._counts.extend(packet.counts[name] for name in self._names)
         return True
+
+    def _forget(self) -> None:
+        """Begin anew, without the only sample so far."""
+        self._newest = None
+        self._elapsed, self._kept, self._last_kept = 0, 0, None
+        self._kind = "measured"
+        self._numbers, self._stamps, self._counts = array("q"), array("Q"), array("i")
+        self._seen = set()
+
+    def _drop_stray(self) -> None:
+        if self._stray is not None and self._newest is not None:
+            self.ignored[_why_not(self._newest, self._stray) or _DOUBLED] += 1
+        self._stray = None
 
     @property
     def duration(self) -> float:
@@ -143,6 +182,7 @@ class Collector:
 
         A sample whose time does not go on from the one before is left out and counted.
         """
+        self._drop_stray()
         kept: list[int] = []
         times: list[int] = []
         for place in np.argsort(np.array(self._numbers), kind="stable").tolist():
@@ -167,7 +207,7 @@ class Collector:
         A sample that was overtaken by lines of an earlier call is not among them.
         """
         lines = []
-        if self._first is not None and self._last_kept is None:
+        if self._newest is not None and self._last_kept is None:
             headings = ["time [s]", *(f"{name} [{KNOWN[name].unit}]" for name in self._names)]
             lines.append(f"{mark_of(self._kind)}{','.join(headings)}\n")
         fresh = sorted(range(self._kept, len(self)), key=self._numbers.__getitem__)
@@ -185,6 +225,27 @@ class Collector:
             values = map(wire.value_of, self._names, counts)
             lines.append(",".join([repr(elapsed / wire.MICROSECONDS), *map(repr, values)]) + "\n")
         return "".join(lines)
+
+
+_DOUBLED = "doubled"
+_OF_OTHERS = ("of another run", "with other channels")
+_FURTHEST = 10_000
+"""Samples that may be lost in a row before the next one waits for another that goes on from it: ten seconds."""
+
+
+def _why_not(before: wire.Sample, packet: wire.Sample) -> str:
+    """Return why a sample does not go on from another one, or comes a little before it; empty where it does."""
+    if packet.run != before.run:
+        return _OF_OTHERS[0]
+    # Columns of a file are fixed by its first sample.
+    if packet.counts.keys() != before.counts.keys():
+        return _OF_OTHERS[1]
+    steps, elapsed = _difference(packet.sequence, before.sequence), _difference(packet.time, before.time)
+    if not steps:
+        return _DOUBLED
+    if abs(steps) > _FURTHEST:
+        return "of another sequence"
+    return "" if elapsed * steps > 0 else "of a clock that went back"
 
 
 def _difference(later: int, earlier: int) -> int:

@@ -13,14 +13,13 @@ import statistics
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import ModuleType
 from typing import TYPE_CHECKING, Any, NamedTuple, final
 
 import numpy as np
 
 from ppafo.documents.json_text import json_text, plain
-from ppafo.engine.lanes import load_program
-from ppafo.engine.loading import chosen_compiler
+from ppafo.engine.lanes import Advancing, load_program
+from ppafo.engine.loading import backend_described
 from ppafo.engine.run import Run, batch_of
 from ppafo.errors import ScenarioError
 from ppafo.exports.hil import wire
@@ -49,7 +48,7 @@ class Plant:
 
     scenario: Scenario
     run: Run
-    module: ModuleType
+    module: Advancing
     compiled_by: str
     period: float
 
@@ -70,7 +69,7 @@ def plant_of(scenario: Scenario, rate: int = wire.RATE) -> Plant:
     if valve.kind == "proportional":
         run = replace(run, program=replace(run.program, valve=vent_valve.choose(valve_settings(valve))))
     module = load_program(batch_of(run).program)
-    return Plant(chosen, run, module, chosen_compiler().described(), period)
+    return Plant(chosen, run, module, backend_described(), period)
 
 
 def check_baud(baud: int, rate: int) -> None:

@@ -15,6 +15,7 @@ import time
 import zlib
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
 from typing import Any, NamedTuple, Protocol, final
 
 from ppafo.errors import ScenarioError, one_line, reason
@@ -388,13 +389,37 @@ def open_port(text: str, baud: int = DEFAULT_BAUD, listens: bool = False) -> Por
         try:
             device = serial.Serial(place, baud, timeout=0.0, write_timeout=_WRITE_TIMEOUT, exclusive=True)
             device.reset_input_buffer()
-        except (OSError, ValueError) as error:
-            # pyserial writes the number and the words of the system twice.
+        except _errors_of_ports() as error:
+            # pyserial writes the number and the words of the system twice, and names an ioctl that no user knows.
             number = error.errno if isinstance(error, OSError) else None
             why = one_line(error) if number is None else reason(OSError(number, os.strerror(number)))
+            if place and Path(place).exists() and not _is_terminal(place):
+                why = "it is no serial port"
             raise ScenarioError(f"--port {one_line(text)}: cannot be opened: {why}") from error
         return SerialPort(device)
     raise ScenarioError(f"--port {one_line(text)}: must be {FORMS}")
+
+
+def _errors_of_ports() -> tuple[type[Exception], ...]:
+    """What opening a port raises: a terminal has an error of its own, where the system has terminals."""
+    try:
+        import termios
+    except ImportError:
+        return (OSError, ValueError, OverflowError)
+    return (OSError, ValueError, OverflowError, termios.error)
+
+
+def _is_terminal(place: str) -> bool:
+    """Tell whether a path is a serial port, or may be one as far as this user can see."""
+    if os.name != "posix" or not os.access(place, os.R_OK | os.W_OK):
+        return True
+    if not Path(place).is_char_device():
+        return False
+    file = os.open(place, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+    try:
+        return os.isatty(file)
+    finally:
+        os.close(file)
 
 
 def _open_udp(text: str, place: str, listens: bool) -> UdpPort:

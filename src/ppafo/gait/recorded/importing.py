@@ -25,6 +25,7 @@ from ppafo.gait.plausible import (
     moment_remarks,
     sign_remarks,
     standing_tilt,
+    turning_remarks,
     zero_remarks,
 )
 from ppafo.gait.recorded.footfalls import (
@@ -40,7 +41,7 @@ from ppafo.gait.recorded.footfalls import (
     usable_strides,
 )
 from ppafo.gait.recorded.form import Convention
-from ppafo.gait.recorded.mapping import GaitMap, ImportSettings, check_settings, column_names
+from ppafo.gait.recorded.mapping import GaitMap, ImportSettings, KneeMap, check_settings, column_names, unsaid_axes
 from ppafo.gait.recorded.reading import FORMS, find_convention, read_table
 from ppafo.gait.recorded.table import MotionTable, fill_gaps
 from ppafo.gait.recorded.walk import (
@@ -358,6 +359,7 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: li
             said += more
     mended = [f"{Path(table.file).name}: {remark}" for table in tables for remark in table.remarks]
     mended += _ends(walk, tables)
+    said += [] if settings.columns is None else unsaid_axes(settings.columns)
     signs_from: SignSource = "columns" if settings.columns is None else "map"
     return Source(tables, columns, walk, settings, signs_from, (*said, *convention.remarks, *mended))
 
@@ -444,7 +446,9 @@ class ImportedGait:
 
 
 def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> ImportedGait:
-    """Return the mean stride in recorded files (.mot, .sto, .csv, .c3d, .trc) of one walk of one person on one clock.
+    """Return the mean stride in recorded files of one walk of one person on one clock.
+
+    They are of any form of ``reading.FORMS``: .mot, .sto, .csv, .txt, .tsv, .c3d, .trc, .mat.
 
     Strides come from the vertical force where there is one, else from events of the file or from the shank. DataError
     names all that is wrong with file, column and row, and what to do: what is wrong with one curve is noted, and the
@@ -527,7 +531,8 @@ def _finish(
     means = {name: item.mean for name, item in curves.items()}
     fitted = {name: fit_curve(item.mean, HARMONICS[name], item.spread) for name, item in curves.items()}
     errors = {name: error for name, (_, error) in fitted.items()}
-    mean_stride = MeanStride({name: signal.file for name, signal in walk.items()}, means, share, time, signs_from)
+    files = {name: signal.file for name, signal in walk.items()}
+    mean_stride = MeanStride(files, means, share, time, signs_from, _is_one_marker(source.columns.knee))
     with noted_in(wrong):
         check_scatter(curves, errors, walk)
     with noted_in(wrong):
@@ -542,6 +547,7 @@ def _finish(
     said += knee_remarks(source.columns.knee, walk, settings.stature)
     said += sign_remarks(means["shank_angle"], means["ankle_angle"])
     said += moment_remarks(means["ankle_moment"]) if "ankle_moment" in means else []
+    said += turning_remarks(mean_stride)
     said += delay_remarks(mean_stride) + size_remarks(mean_stride)
     said += _sampling_remarks(walk, taken)
     tilt = standing_tilt(means["shank_angle"], means["ankle_angle"])
@@ -566,6 +572,14 @@ def _finish(
         names,
         tuple(dict.fromkeys(said)),
     )
+
+
+def _is_one_marker(knee: KneeMap | None) -> bool:
+    """Tell whether a map takes both coordinates of the knee from one marker, whose unit is one."""
+    if knee is None or knee.thigh is not None or len(knee.forward) != 1 or len(knee.up) != 1:
+        return False
+    forward, up = (terms[0].removeprefix("-").rpartition(".")[0] for terms in (knee.forward, knee.up))
+    return forward == up != ""
 
 
 def _check_enough(strides: Strides, found: list[Stride], walk: Mapping[str, Signal]) -> None:

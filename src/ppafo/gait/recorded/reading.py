@@ -23,6 +23,7 @@ FORMS: Kinds[GaitForm] = Kinds(
         "csv": "ppafo.gait.recorded.forms.comma_separated:FORM",
         "c3d": "ppafo.gait.recorded.forms.c3d:FORM",
         "trc": "ppafo.gait.recorded.forms.markers:TRC",
+        "matlab": "ppafo.gait.recorded.forms.matlab:FORM",
     },
 )
 

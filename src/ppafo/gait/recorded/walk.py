@@ -5,6 +5,7 @@ that turns against it), or, for the knee, from hip and thigh.
 """
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -17,7 +18,6 @@ from ppafo.errors import (
     DataError,
     PpafoError,
     UnitError,
-    nearest_name,
     noted_in,
     one_line,
     raise_noted,
@@ -32,6 +32,7 @@ from ppafo.gait.recorded.mapping import (
     ShankMap,
     column_names,
 )
+from ppafo.gait.recorded.near_columns import nearest_column
 from ppafo.gait.recorded.table import LONGEST_FILLED, MotionTable
 from ppafo.signals.recording import Floats
 from ppafo.units import parse_quantity, to_si
@@ -190,13 +191,25 @@ def find_columns(
         ", ..." if len(known) > _LONGEST_SHOWN else ""
     )
     files = ", ".join(table.file for table in tables)
-    hint = nearest_name(missing, known)
+    twins = [name for name in known if re.fullmatch(re.escape(_whole(missing)) + r"#\d+(\.[xyz])?", name)]
+    hint = nearest_column(missing, known)
     why = f"there is no column {missing!r}{hint}" if missing not in known else "no file has all of its columns"
+    if twins:
+        either = " or ".join(repr(_whole(name)) for name in twins if name[-2:] not in (".y", ".z"))
+        raise DataError(
+            f"{curve}: {files} has {_whole(missing)!r} more than once, and they differ: name the one that is meant, "
+            f"{either}, in a gait map (--map)"
+        )
     said = "".join(f"; {remark}" for table in tables for remark in table.remarks)
     raise DataError(
         f"{curve}: {why} ({files}: {shown}{said}); name the columns in a gait map (--map), "
         "'ppafo doctor --schema gait-map'"
     )
+
+
+def _whole(name: str) -> str:
+    """Return the marker of a coordinate, or a column as it is."""
+    return name[:-2] if name[-2:] in (".x", ".y", ".z") else name
 
 
 _SLOW = np.radians(25.0)

@@ -323,7 +323,7 @@ def _replay(
     first = quantity_in(item, "start", "s", said)
     first = float(recording.time[0]) if first is None else first
     used = recording.between(first, float(recording.time[-1]))
-    device = build_device(apply_overrides(setting.parameter_set, item.overrides, setting.valve), setting.valve)
+    device = build_device(apply_overrides(setting.parameter_set, item.overrides, valve=setting.valve), setting.valve)
     angle, volume = quantity_in(item, "locked", "rad", said), positive_in(item, "volume", "m^3", said)
     known = {} if angle is None else {ANGLE: angle}
     if volume is not None:

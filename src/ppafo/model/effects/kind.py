@@ -54,6 +54,12 @@ class State:
     tolerances: tuple[float, ...] = ()
     settle: Callable[..., Any] | None = None
 
+    @property
+    def fields(self) -> tuple[str, ...]:
+        """Names of the numbers of ``row``."""
+        row: Any = self.row
+        return tuple(row._fields)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Effect:

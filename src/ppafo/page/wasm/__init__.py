@@ -286,8 +286,8 @@ def _parameter_set(scenario: Scenario) -> ParameterSet | None:
     own = [text for text in origin.overrides if is_of_device(split_override(text).typed)]
     try:
         found = load_parameter_set(set_name(section.get("set", device.name), folder))
-        of_file = apply_overrides(found, section.get("overrides", ()), device.valve_name)
-        return apply_overrides(of_file, own, device.valve_name)
+        of_file = apply_overrides(found, section.get("overrides", ()), valve=device.valve_name)
+        return apply_overrides(of_file, own, valve=device.valve_name)
     except PpafoError:
         return None
 
@@ -410,11 +410,11 @@ def check_can_build() -> None:
 def build(text: str) -> bytes:
     """A module of a translation unit. ProgramError where ziglang is not there, or refuses."""
     check_can_build()
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory(prefix="ppafo-", ignore_cleanup_errors=True) as folder:
         for name, content in {"module.c": text, "math.h": template(__name__, "math.h")}.items():
             (Path(folder) / name).write_text(content, encoding="utf-8")
         line = [sys.executable, "-m", "ziglang", "cc", *FLAGS, "module.c", "-o", "module.wasm"]
-        done, made = asked(line, _HOW_TO_INSTALL, folder), Path(folder) / "module.wasm"
+        done, made = asked(line, _HOW_TO_INSTALL, folder, Path(folder)), Path(folder) / "module.wasm"
         if done.returncode != 0:
             raise ProgramError(f"ziglang does not build the module: {complaint(done)}")
         if not made.is_file():

@@ -6,7 +6,9 @@ To add one: a function in the module of its subject and one line here.
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from pathlib import Path
 
+from ppafo.arguments import checked
 from ppafo.parameters.audit.chambers import check_filling, check_rotation, check_virtual_work, check_volumes
 from ppafo.parameters.audit.changes import changes
 from ppafo.parameters.audit.evidence import Evidence, Finding, NamedValue, Severity, Side
@@ -20,8 +22,9 @@ from ppafo.parameters.audit.values import (
     check_ranges,
     check_statements,
 )
-from ppafo.parameters.loading import load_parameter_set
+from ppafo.parameters.loading import load_parameter_set, set_or_load
 from ppafo.parameters.parameter_set import ParameterSet, overridden_paths, with_followers
+from ppafo.plugins import Plugins, name_plugins
 
 __all__ = ["Finding", "NamedValue", "Severity", "Side", "audit", "changed_paths"]
 
@@ -48,21 +51,27 @@ CHECKS: dict[str, Callable[[Evidence], Iterator[Finding]]] = {
 _ORDER = {"error": 0, "warning": 1, "note": 2}
 
 
-def audit(parameter_set: ParameterSet, parent: ParameterSet | None = None) -> list[Finding]:
+@checked("parameter_set", "parent")
+def audit(
+    parameter_set: ParameterSet | str | Path, *, parent: ParameterSet | str | Path | None = None, plugins: Plugins = ()
+) -> list[Finding]:
     """Return what contradicts, or deserves attention in, any parameter set; errors first.
 
     An error that the set accepts with a reason becomes a warning that shows the reason. A reason that stands in its
     ``parent`` too, the set that the file names unless given, lapses where the set changes a value of the finding. A
     reason for something that is not found is a warning, so that it does not outlive what it excuses.
+
+    ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
     """
-    if parent is None and parameter_set.parent:
-        parent = load_parameter_set(parameter_set.parent)
-    evidence = Evidence(with_followers(parameter_set), parameter_set.declarations())
+    name_plugins(plugins)
+    audited = parameter_set if isinstance(parameter_set, ParameterSet) else load_parameter_set(parameter_set)
+    of_parent = set_or_load(audited.parent or None if parent is None else parent)
+    evidence = Evidence(with_followers(audited), audited.declarations())
     found = [finding for check in CHECKS.values() for finding in check(evidence)]
-    changed, ids = overridden_paths(parameter_set), {finding.id for finding in found}
-    judged = [_judge(finding, parameter_set, changed, parent) for finding in found]
+    changed, ids = overridden_paths(audited), {finding.id for finding in found}
+    judged = [_judge(finding, audited, changed, of_parent) for finding in found]
     # With overrides a finding may be gone for that reason alone: its acceptance is not idle.
-    idle = {} if changed else {name: why for name, why in parameter_set.accepted.items() if name not in ids}
+    idle = {} if changed else {name: why for name, why in audited.accepted.items() if name not in ids}
     judged += [
         Finding(
             id="idle-acceptance",

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field
 
+from ppafo.arguments import checked
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.models import NAME, StrictTable, make_schema, one_of, optional, table, validate
 from ppafo.documents.toml_text import TomlKind, label
@@ -224,9 +225,10 @@ class Catalogue:
         return tuple(part for parts in self.groups.values() for part in parts.values())
 
 
-def load_catalogue(name_or_path: str | Path = DEFAULT) -> Catalogue:
+@checked(name_or_path="catalogue")
+def load_catalogue(catalogue: str | Path = DEFAULT) -> Catalogue:
     """Return a catalogue of parts by its name in the package or by the path of a TOML file."""
-    return parse_catalogue(_FILE.read(name_or_path), label(str(name_or_path)))
+    return parse_catalogue(_FILE.read(catalogue), label(str(catalogue)))
 
 
 def parse_catalogue(content: bytes, file: str) -> Catalogue:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.control.kind import OPEN_LOOP
-from ppafo.engine.lane_samples import TRACED
+from ppafo.engine.channels import TRACED
 from ppafo.engine.lanes import Floats
 from ppafo.engine.run import TOO_MANY_PARTS
 from ppafo.errors import ScenarioError, nearest_name

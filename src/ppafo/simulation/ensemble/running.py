@@ -7,12 +7,12 @@ from typing import NamedTuple, final
 import numpy as np
 
 from ppafo.control.kind import PythonController
-from ppafo.engine.lane_samples import REQUEST as REQUEST_ROW
-from ppafo.engine.lane_source import SAME_MOMENT
+from ppafo.engine.channels import REQUEST as REQUEST_ROW
 from ppafo.engine.lanes import Batch, BatchResult, Floats, add_meters, group_of, load_programs, meters_of, run_blocks
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, row_numbers
 from ppafo.engine.run import NEVER_FAILED, Members
+from ppafo.engine.step.lane import SAME_MOMENT
 from ppafo.errors import ScenarioError
 from ppafo.metrics import METRICS
 from ppafo.metrics.gas import ENERGIES
@@ -299,7 +299,7 @@ def _late_totals(plain: Batch, metrics: Mapping[str, MetricKind]) -> tuple[str, 
     needed = {channel for kind in metrics.values() for channel in kind.channels}
     if ends_there or needed.isdisjoint(ThermalTotals._fields):
         return ()
-    of_gas = (path for name, row in program.gas.states.items() for path in leaf_paths(row, name))
+    of_gas = (path for name, row in program.gas.STATES.items() for path in leaf_paths(row, name))
     return (*_OF_STATE, *of_gas)
 
 

@@ -8,7 +8,7 @@ import pytest
 
 import ppafo
 from ppafo.analyses.compare.pairs import best_probabilities, compare_pairs, pareto_front
-from ppafo.analyses.compare.solve import compare
+from ppafo.analyses.compare.question import compare
 from ppafo.errors import StudyError
 from ppafo.studies.distributions import NormalAround
 from ppafo.studies.draws import Uncertainty
@@ -111,7 +111,7 @@ def test_the_paper_comes_out_and_holds_over_the_uncertainty_of_the_device() -> N
 
 def test_all_configurations_see_the_same_draws() -> None:
     scenario = ppafo.load_scenario("torque-task-proportional", ["run.duration=0.3 s"])
-    comparison = compare({"one": scenario, "same": scenario}, STUDY, draws=64).found
+    comparison = compare({"one": scenario, "same": scenario}, study=STUDY, draws=64).found
     one, same = (case.rows for case in comparison.tasks[0].cases)
     assert one is not None
     assert same is not None
@@ -198,4 +198,4 @@ def test_a_value_that_is_drawn_for_all_and_set_in_one_is_refused(
         for name, own in (("one", []), ("other", [override]))
     }
     with pytest.raises(StudyError, match=f"the study draws '{path}' for every configuration, so the different values"):
-        compare(pair, study, draws=32)
+        compare(pair, study=study, draws=32)

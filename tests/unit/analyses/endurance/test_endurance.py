@@ -7,7 +7,8 @@ import pytest
 
 from ppafo.analyses.endurance.answer import Endurance, Endurances
 from ppafo.analyses.endurance.draw import draw_of_numbers, draw_of_recording
-from ppafo.analyses.endurance.solve import endurance, follow_bottle
+from ppafo.analyses.endurance.question import bottle as endurance
+from ppafo.analyses.endurance.solve import follow_bottle
 from ppafo.errors import DataError, ParameterError
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
 from ppafo.signals import Channel, Recording

@@ -17,7 +17,8 @@ from ppafo.analyses.endurance.draw import (
     read_walk_gas,
     walk_gas,
 )
-from ppafo.analyses.endurance.solve import endurance, endurance_of_walk
+from ppafo.analyses.endurance.question import bottle as endurance
+from ppafo.analyses.endurance.solve import endurance_of_walk
 from ppafo.cli.main import main
 from ppafo.errors import DataError, ParameterError, ScenarioError
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE
@@ -38,7 +39,7 @@ STRIDE = 1.0
 
 @cache
 def solenoid() -> WalkResult:
-    return walk("solenoid", 0.1)
+    return walk("solenoid", minutes=0.1)
 
 
 def pulses(strides: float) -> WalkGas:
@@ -185,7 +186,7 @@ def test_a_walk_without_gas_lasts_for_ever() -> None:
 
 
 def test_the_largest_flow_is_that_of_the_bottles_regulator_where_there_are_lines() -> None:
-    recording = walk("solenoid-regulators", 0.1).recording
+    recording = walk("solenoid-regulators", minutes=0.1).recording
     channels = {name: Channel(recording[name], recording.unit(name)) for name in ("supplied_mass", "regulated_mass")}
     both = Recording("both", recording.time, channels)
     alone = Recording("alone", recording.time, {"supplied_mass": channels["regulated_mass"]})
@@ -212,7 +213,7 @@ def test_every_door_says_how_long_a_device_lasts_in_the_same_words(
         out = capsys.readouterr().out
         assert f"{said[1]} of walking" in out
         assert said[2] in out
-    made = endurance_of_walk(walk("solenoid-regulators", 0.1))
+    made = endurance_of_walk(walk("solenoid-regulators", minutes=0.1))
     assert made is not None
     assert f"{made.discharge.walking_time / 60.0:.3g} min" == said[1]
 
@@ -237,15 +238,15 @@ def test_rests_warm_the_bottle_that_is_walked_on() -> None:
 
 
 def test_a_device_that_a_fault_stops_is_asked_about_without_the_fault() -> None:
-    stopped = walk("solenoid", 0.2, overrides=["faults.toe.kind=stuck", "faults.toe.time=4 s"])
-    made, sound = (endurance(one, overrides=SMALL).found for one in (stopped, walk("solenoid", 0.2)))
+    stopped = walk("solenoid", minutes=0.2, overrides=["faults.toe.kind=stuck", "faults.toe.time=4 s"])
+    made, sound = (endurance(one, overrides=SMALL).found for one in (stopped, walk("solenoid", minutes=0.2)))
     assert isinstance(made, Endurance)
     assert isinstance(sound, Endurance)
     assert made.discharge.walking_time == sound.discharge.walking_time
 
 
 def test_a_walk_whose_numbers_were_changed_in_python_is_not_taken_for_that_of_its_file() -> None:
-    changed = walk(with_numbers(load_walk("solenoid"), {"valve.area": 1.0e-6}), 0.1)
+    changed = walk(with_numbers(load_walk("solenoid"), {"valve.area": 1.0e-6}), minutes=0.1)
     with pytest.raises(ScenarioError, match="give the bottle where the walk is loaded"):
         endurance_of_walk(changed)
 

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 import ppafo
 from ppafo.analyses.find import solve
-from ppafo.analyses.find.solve import ACCURACY, Threshold, find
+from ppafo.analyses.find.question import find
+from ppafo.analyses.find.solve import ACCURACY, Threshold
 from ppafo.cli.main import main
 from ppafo.errors import StudyError
 from ppafo.progress import Progress
@@ -34,8 +35,8 @@ def of_curve(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Finding[Threshold
         def model(columns: Mapping[str, Floats]) -> dict[str, Floats]:
             return {metric: curve(columns["supply.pressure"] / BAR)}
 
-        monkeypatch.setattr(solve, "Runs", lambda *_: Runs.of_model(model, [metric]))
-        return find(TASK, RANGE, condition, **options)
+        monkeypatch.setattr("ppafo.study.runs.Runs", lambda *_: Runs.of_model(model, [metric]))
+        return find(TASK, vary=RANGE, such_that=condition, **options)
 
     return search
 
@@ -121,16 +122,18 @@ def test_runs_that_fail_count_as_not_met_and_are_said(of_curve: Callable[..., Fi
 def test_the_lower_end_takes_the_unit_of_the_upper_one() -> None:
     base = ppafo.load_scenario(TASK)
     for text in ("supply.pressure=20..90 psi_g", "supply.pressure = 20 psi_g .. 90 psi_g", RANGE):
-        path, low, high = solve._range(text, base)
+        path, low, high = solve.range_of(text, base)
         assert path.path == "supply.pressure"
         assert low < high
-    assert solve._range("valve.discharge_coefficient=0.1..0.25", base)[1:] == (0.1, 0.25)
-    assert solve._range("valve.area=1.5..2 mm^2", base)[1:] == pytest.approx((1.5e-6, 2e-6))
+    assert solve.range_of("valve.discharge_coefficient=0.1..0.25", base)[1:] == (0.1, 0.25)
+    assert solve.range_of("valve.area=1.5..2 mm^2", base)[1:] == pytest.approx((1.5e-6, 2e-6))
 
 
 def test_the_value_meets_the_condition_in_a_run_of_its_own_and_its_neighbour_does_not(tmp_path: Path) -> None:
     heard: list[Progress] = []
-    answer = find(TASK, "supply.pressure=40..80 psi_g", "final_error <= 0.3 N m", grid=16, progress=heard.append)
+    answer = find(
+        TASK, vary="supply.pressure=40..80 psi_g", such_that="final_error <= 0.3 N m", grid=16, progress=heard.append
+    )
     found = answer.found
     assert found.value is not None
     for value, meets in ((found.value, True), (found.not_met_at, False)):
@@ -177,9 +180,11 @@ def test_the_value_rests_on_many_noise_streams_and_not_on_the_seed_of_the_scenar
         seen.append(seeds)
         return {"final_error": 6.3 - pressure + noise(seeds)}
 
-    monkeypatch.setattr(solve, "Runs", lambda *_: Runs.of_model(model, ["final_error"]))
+    monkeypatch.setattr("ppafo.study.runs.Runs", lambda *_: Runs.of_model(model, ["final_error"]))
     found = [
-        find(TASK, RANGE, LIMIT, overrides=["sensors.pressure_noise=1 kPa_d", f"sensors.seed={seed}"]).found
+        find(
+            TASK, vary=RANGE, such_that=LIMIT, overrides=["sensors.pressure_noise=1 kPa_d", f"sensors.seed={seed}"]
+        ).found
         for seed in (1, 2)
     ]
     streams = np.unique(np.concatenate(seen))
@@ -198,7 +203,9 @@ def test_ideal_sensors_need_one_run_of_each_value(of_curve: Callable[..., Findin
 
 
 def test_one_instant_of_a_loop_that_oscillates_is_not_met_however_small_its_error_is_there() -> None:
-    found = find("torque-task-solenoid", "supply.pressure=62..90 psi_g", "final_error <= 0.5 N m", grid=15).found
+    found = find(
+        "torque-task-solenoid", vary="supply.pressure=62..90 psi_g", such_that="final_error <= 0.5 N m", grid=15
+    ).found
     alone = ppafo.simulate("torque-task-solenoid", ["supply.pressure=84 psi_g"]).metrics
     assert alone["final_error"].value < 0.5
     assert alone["rms_error_hold"].value > 1.0
@@ -208,7 +215,7 @@ def test_one_instant_of_a_loop_that_oscillates_is_not_met_however_small_its_erro
 
 
 def test_one_instant_of_a_loop_that_settles_is_its_error() -> None:
-    found = find(TASK, "supply.pressure=60..80 psi_g", "final_error <= 0.1 N m", grid=5).found
+    found = find(TASK, vary="supply.pressure=60..80 psi_g", such_that="final_error <= 0.1 N m", grid=5).found
     alone = ppafo.simulate(TASK, ["supply.pressure=60 psi_g"]).metrics
     assert found.unsettled == 0
     assert found.tried[0].metric == pytest.approx(alone["final_error"].value)

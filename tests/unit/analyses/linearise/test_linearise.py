@@ -12,7 +12,7 @@ import pytest
 
 import ppafo
 from ppafo.analyses.linearise.answer import LinearModel, finding_of, steps_of
-from ppafo.analyses.linearise.solve import linearise
+from ppafo.analyses.linearise.question import linearise
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.engine.lanes import Floats
 from ppafo.engine.run import Run
@@ -46,7 +46,7 @@ POINTS: dict[str, tuple[str, str | float, tuple[str, ...]]] = {
 
 def linear(scenario: str | Scenario, at: float | str = "equilibrium", overrides: Sequence[str] = ()) -> LinearModel:
     """A linear model, without what is said of it."""
-    return linearise(scenario, at, overrides).found
+    return linearise(scenario, at=at, overrides=overrides).found
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from ppafo.analyses.sensitivity.methods import METHODS
-from ppafo.analyses.sensitivity.solve import Influences, Settings, analyse, overlapping_pairs, remarks, sensitivity
+from ppafo.analyses.sensitivity.question import sensitivity
+from ppafo.analyses.sensitivity.solve import Influences, Settings, analyse, overlapping_pairs, remarks
 from ppafo.errors import StudyError
 from ppafo.studies.distributions import Floats, LogNormalAround, NormalAround, OneOf, UniformBetween
 from ppafo.studies.draws import Uncertainty
@@ -182,6 +183,19 @@ def test_the_change_of_ishigami_is_the_known_one_and_its_band_holds(method: str)
     assert np.mean(away, axis=0) == pytest.approx([0.0, 0.0, 0.0], abs=0.1)
 
 
+def test_the_band_of_the_change_holds_where_the_metric_bends() -> None:
+    """exp(2 x) of a value between -1 and 1 bends by as much as it grows at its upper end; the other is a line."""
+
+    def bent(columns: Mapping[str, Floats]) -> dict[str, Floats]:
+        return {METRIC: np.exp(2.0 * columns["x1"] / math.pi) + 0.5 * columns["x2"]}
+
+    known = np.array([math.exp(1.8) - math.exp(-1.8), 0.9 * math.pi, 0.0])
+    found = [analysed(bent, ANGLES, "sobol", Settings(256, seed)) for seed in range(1, 31)]
+    away = np.array([np.array(item.metrics[0].change_from_5_to_95_percent) - known for item in found])
+    bands = np.array([item.metrics[0].band_of_change for item in found])
+    assert np.all(np.mean(np.abs(away) <= bands, axis=0) >= 0.85)
+
+
 def test_the_change_of_a_linear_function_is_slope_times_distance_of_the_ends_whatever_the_distribution() -> None:
     mixed = Uncertainty(
         (
@@ -286,7 +300,14 @@ def test_the_study_of_the_package_with_its_correlation_gets_shapley_effects() ->
 def test_noise_of_the_sensors_is_one_of_the_values_and_has_no_ends() -> None:
     noisy = ["run.duration=0.3 s", "sensors.pressure_noise=5 kPa_d"]
     finding = sensitivity(
-        STUDY, "sobol", ["rms_error"], 64, "proportional", overrides=noisy, independent=True, maximum_failed=0.0
+        STUDY,
+        method="sobol",
+        metrics=["rms_error"],
+        samples=64,
+        configuration="proportional",
+        overrides=noisy,
+        independent=True,
+        maximum_failed=0.0,
     )
     found = finding.found
     (metric,) = found.metrics
@@ -304,10 +325,10 @@ def test_noise_of_the_sensors_is_one_of_the_values_and_has_no_ends() -> None:
 
 def test_mistakes_are_one_line() -> None:
     with pytest.raises(StudyError, match="no method 'sobl', did you mean 'sobol'"):
-        sensitivity(STUDY, "sobl")
+        sensitivity(STUDY, method="sobl")
     with pytest.raises(StudyError, match="choose one: proportional, solenoid"):
         sensitivity(STUDY)
     with pytest.raises(StudyError, match=r"--method shapley.*--independent"):
-        sensitivity(STUDY, "sobol", configuration="solenoid", samples=64)
+        sensitivity(STUDY, method="sobol", configuration="solenoid", samples=64)
     with pytest.raises(StudyError, match="has no 'gas': it needs a walk"):
         sensitivity(STUDY, metrics=["gas"], configuration="solenoid")

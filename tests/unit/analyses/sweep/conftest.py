@@ -12,4 +12,4 @@ from ppafo.analyses.sweep.solve import sweep
 @pytest.fixture(scope="session")
 def small_results(small_study: dict[str, Any], tmp_path_factory: pytest.TempPathFactory) -> StudyResults:
     """The results of the study, made in one go and not to be changed."""
-    return sweep(copy.deepcopy(small_study), tmp_path_factory.mktemp("small") / "out").found
+    return sweep(copy.deepcopy(small_study), out=tmp_path_factory.mktemp("small") / "out").found

@@ -74,18 +74,18 @@ def test_a_study_goes_on_with_the_same_law_and_is_refused_with_any_other(
     written: Callable[[str], ModuleType], tmp_path: Path
 ) -> None:
     out, law = tmp_path / "out", written(LAW).Law()
-    first = ppafo.sweep(controlled_by(law), out).found.table()["rms_error"]
+    first = ppafo.sweep(controlled_by(law), out=out).found.table()["rms_error"]
     assert law.sum != 0.0
     for note in (out / "finished").iterdir():
         note.unlink()
     for same in (law, written(LAW).Law()):
-        assert np.array_equal(ppafo.sweep(controlled_by(same), out).found.table()["rms_error"], first)
+        assert np.array_equal(ppafo.sweep(controlled_by(same), out=out).found.table()["rms_error"], first)
     with pytest.raises(
         StudyError, match=r"controller\.custom\.settings\.gain was 0\.2 and is now 0\.3; undo the change"
     ):
-        ppafo.sweep(controlled_by(written(LAW).Law(0.3)), out)
+        ppafo.sweep(controlled_by(written(LAW).Law(0.3)), out=out)
     with pytest.raises(StudyError, match=r"controller\.custom\.source was '.*' and is now '.*'; undo the change"):
-        ppafo.sweep(controlled_by(written(LAW.replace("0.5 *", "0.6 *")).Law()), out)
+        ppafo.sweep(controlled_by(written(LAW.replace("0.5 *", "0.6 *")).Law()), out=out)
 
 
 class Table:

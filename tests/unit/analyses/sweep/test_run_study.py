@@ -177,12 +177,12 @@ def test_a_stopped_study_goes_on_to_the_same_bytes(
 ) -> None:
     out = tmp_path / "out"
     with pytest.raises(StoppedError):
-        sweep(small, out, progress=stopped_after(chunks))
+        sweep(small, out=out, progress=stopped_after(chunks))
     before = {path: path.stat().st_mtime_ns for path in (out / "finished").iterdir()}
     assert chunks <= len(before) <= chunks + 1
     with pytest.raises(DataError, match="the study is not finished"):
         load_study_results(out)
-    sweep(small, out)
+    sweep(small, out=out)
     assert contents(out) == contents(small_results.place.address)
     assert {path: path.stat().st_mtime_ns for path in before} == before
 
@@ -196,7 +196,7 @@ def test_what_a_killed_process_left_half_written_goes_away(
     (out / "runs" / ".chunk-0000001.parquet.writing-0badcafe").write_bytes(b"PAR1")
     for path in out.rglob("*.writing-*"):
         os.utime(path, (0.0, 0.0))
-    sweep(small, out)
+    sweep(small, out=out)
     assert contents(out) == contents(small_results.place.address)
 
 
@@ -224,7 +224,7 @@ def test_damaged_chunks_are_found_and_computed_again(
     path = next((out / folder).glob("chunk-0000003.*"))
     path.write_bytes(damage(path.read_bytes()))
     told: list[Progress] = []
-    sweep(small, out, progress=told.append)
+    sweep(small, out=out, progress=told.append)
     assert len(told) == 1
     assert contents(out) == contents(small_results.place.address)
 
@@ -232,7 +232,7 @@ def test_damaged_chunks_are_found_and_computed_again(
 def test_a_chunk_in_the_place_of_another_is_found(small_results: StudyResults, small: Any, tmp_path: Path) -> None:
     out = copied(small_results, tmp_path)
     (out / "runs" / "chunk-0000002.parquet").write_bytes((out / "runs" / "chunk-0000001.parquet").read_bytes())
-    sweep(small, out)
+    sweep(small, out=out)
     assert contents(out) == contents(small_results.place.address)
 
 
@@ -275,7 +275,7 @@ def test_a_changed_study_is_refused_with_what_changed(
     before = contents(small_results.place.address)
     change(small)
     with pytest.raises(StudyError, match=expected) as caught:
-        sweep(small, small_results.place.address)
+        sweep(small, out=small_results.place.address)
     assert "\n" not in str(caught.value)
     assert contents(small_results.place.address) == before
 
@@ -283,30 +283,30 @@ def test_a_changed_study_is_refused_with_what_changed(
 def test_the_folder_of_another_study_is_refused(small_results: StudyResults, small: Any) -> None:
     small["name"] = "other"
     with pytest.raises(StudyError, match="contains the results of the study 'small', not of 'other'"):
-        sweep(small, small_results.place.address)
+        sweep(small, out=small_results.place.address)
 
 
 def test_a_study_whose_draws_were_changed_in_python_is_refused(small_results: StudyResults, small: Any) -> None:
     study = load_study(small)
     other = dataclasses.replace(study, sample=dataclasses.replace(study.sample, seed=study.sample.seed + 1))
     with pytest.raises(StudyError, match=r"drawn\.sample\.seed was 3 and is now 4"):
-        sweep(other, small_results.place.address)
+        sweep(other, out=small_results.place.address)
 
 
 def test_a_folder_of_something_else_is_refused_and_left_alone(small: Any, tmp_path: Path) -> None:
     (tmp_path / "thesis.txt").write_text("mine", encoding="utf-8")
     with pytest.raises(StudyError, match="is not empty and contains no study results"):
-        sweep(small, tmp_path)
+        sweep(small, out=tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.txt"]
     with pytest.raises(DataError, match="is a file; the results need a folder"):
-        sweep(small, tmp_path / "thesis.txt")
+        sweep(small, out=tmp_path / "thesis.txt")
 
 
 def test_a_foreign_or_newer_manifest_is_refused(small: Any, tmp_path: Path) -> None:
     for text, expected in (("{}", "is not a manifest of study results"), ("{", "cannot be read")):
         (tmp_path / "study.json").write_text(text, encoding="utf-8")
         with pytest.raises(DataError, match=expected):
-            sweep(small, tmp_path)
+            sweep(small, out=tmp_path)
 
 
 def test_more_disk_than_there_is_is_refused_before_anything_is_written(
@@ -314,22 +314,22 @@ def test_more_disk_than_there_is_is_refused_before_anything_is_written(
 ) -> None:
     monkeypatch.setattr(DiskFolder, "free_bytes", lambda _: 1000)
     with pytest.raises(StudyError, match=r"32 runs of 'small' need about .* kB, but only 1 kB are free"):
-        sweep(small, tmp_path / "out", agreed=True)
+        sweep(small, out=tmp_path / "out", agreed=True)
     assert not (tmp_path / "out").exists()
 
 
 def test_a_large_study_asks_for_consent(small: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(store, "ASKED_ABOVE", 1000)
     with pytest.raises(StudyError, match="give --yes to start it anyway"):
-        sweep(small, tmp_path / "out")
-    assert sweep(small, tmp_path / "out", agreed=True).found.summary["completed"] == 32
+        sweep(small, out=tmp_path / "out")
+    assert sweep(small, out=tmp_path / "out", agreed=True).found.summary["completed"] == 32
 
 
 def test_the_estimate_of_the_disk_is_near_and_above_what_is_written(
     varying: Callable[..., Any], tmp_path: Path
 ) -> None:
     study = load_study(varying(AREA, AREA | {"path": "actuator.leak.area"}, runs=600))
-    study_results = sweep(study, tmp_path / "out").found
+    study_results = sweep(study, out=tmp_path / "out").found
     written = sum(len(content) for name, content in contents(tmp_path / "out").items() if name.startswith("runs/"))
     assert written <= estimate_bytes(study) <= 4 * written + 10_000 * study_results.document["chunks"]
 
@@ -338,7 +338,7 @@ def test_runs_that_fail_are_rows_with_status_and_reason(varying: Callable[..., A
     stops = {"path": "actuator.angle_min", "kind": "list", "values": ["20 deg", "140 deg"]}
     document = varying(stops)
     del document["sample"]
-    results = sweep(document, tmp_path / "out").found
+    results = sweep(document, out=tmp_path / "out").found
     table = results.table()
     assert table["status"].tolist() == ["completed", "refused"] * 2
     assert np.isnan(table["rms_error"][[1, 3]]).all()
@@ -355,7 +355,7 @@ def test_a_path_that_varies_in_one_configuration_has_no_value_in_the_others(
 ) -> None:
     gain = {"path": "controller.proportional_gain", "kind": "uniform", "minimum": "0.05 1/(N m)"}
     document = varying(gain | {"maximum": "0.2 1/(N m)", "only": ["proportional"]}, runs=3)
-    values = sweep(document, tmp_path / "out").found.by_configuration("controller.proportional_gain")
+    values = sweep(document, out=tmp_path / "out").found.by_configuration("controller.proportional_gain")
     assert np.isfinite(values["proportional"]).all()
     assert np.isnan(values["solenoid"]).all()
 
@@ -372,9 +372,9 @@ def test_without_a_folder_the_results_live_as_long_as_their_object(varying: Call
 def test_the_log_has_a_line_for_every_session_and_nothing_else_tells_the_time(small: Any, tmp_path: Path) -> None:
     out = tmp_path / "out"
     with pytest.raises(StoppedError):
-        sweep(small, out, progress=stopped_after(2))
-    sweep(small, out)
-    sweep(small, out)
+        sweep(small, out=out, progress=stopped_after(2))
+    sweep(small, out=out)
+    sweep(small, out=out)
     lines = [json.loads(line) for line in (out / LOG).read_text(encoding="utf-8").splitlines()]
     assert [line["runs"] for line in lines][-1] == 0
     assert all(line["seconds"] >= 0.0 for line in lines)
@@ -383,7 +383,7 @@ def test_the_log_has_a_line_for_every_session_and_nothing_else_tells_the_time(sm
 def test_results_go_to_any_address_of_fsspec(small_results: StudyResults, small: Any) -> None:
     fsspec = pytest.importorskip("fsspec")
     address = "memory://ppafo-test/study"
-    results = sweep(small, address).found
+    results = sweep(small, out=address).found
     try:
         system = fsspec.filesystem("memory")
         names = [name for name in system.find("/ppafo-test/study") if not name.endswith(LOG)]

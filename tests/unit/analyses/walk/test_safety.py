@@ -13,18 +13,18 @@ from ppafo.walking import compare_walks, load_walk, walk
 
 def test_a_peak_torque_above_the_limit_of_the_controller_is_said() -> None:
     peak = "controller.peak_torque=9 N m"
-    (said,) = safety_remarks(walk(load_walk("proportional", [peak]), 0.1))
+    (said,) = safety_remarks(walk(load_walk("proportional", [peak]), minutes=0.1))
     assert said.startswith(
         "controller.peak_torque = 9 N m: no more than controller.largest_torque = 5 N m is requested"
     )
-    assert safety_remarks(walk(load_walk("proportional", [peak, "controller.largest_torque=9 N m"]), 0.1)) == []
+    assert safety_remarks(walk(load_walk("proportional", [peak, "controller.largest_torque=9 N m"]), minutes=0.1)) == []
 
 
 @pytest.mark.long
 def test_a_pressure_far_above_the_supply_is_said_with_its_chamber() -> None:
     """Of a healthy wearer none is; gauge pressure counts from the atmosphere of the device."""
     overrides = ["supply.atmospheric_pressure=80 kPa_a", "supply.dorsiflexion_pressure=30 psi_g"]
-    worn = compare_walks(load_walk("proportional", overrides=overrides), 0.1).with_device
+    worn = compare_walks(load_walk("proportional", overrides=overrides), minutes=0.1).with_device
     assert safety_remarks(worn) == []
     pressed = Channel(np.full(worn.recording.time.size, 80.0e3 + 100.0 * PASCALS_PER_PSI), "Pa")
     channels = {**worn.recording.channels, "pressure_2": pressed}

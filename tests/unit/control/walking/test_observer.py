@@ -167,7 +167,7 @@ def test_who_climbs_stairs_at_the_speed_of_the_gait_is_not_stopped(name: str, tm
 def test_a_supply_that_is_higher_than_the_controller_believes_stops_within_two_strides() -> None:
     given = ["supply.pressure=120 psi_g", "controller.nominal_supply_pressure=50 psi_g"]
     scenario = load_walk("solenoid", [*given, "controller.nominal_dorsiflexion_pressure=50 psi_g"])
-    found = walk(scenario, 0.1)
+    found = walk(scenario, minutes=0.1)
     (event,) = found.events
     assert event.fault_flag is not None
     assert event.fault_flag.name == "supply_high"

@@ -4,6 +4,7 @@ import csv
 import io
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
@@ -251,7 +252,7 @@ def finding_of(design: Design) -> Finding[Design]:
             finding.Part(remarks=_remarks(design)),
             finding.Part(
                 "Error, gas and mass",
-                panels=lambda: design_panels(design),
+                panels=partial(design_panels, design),
                 name="front",
                 caption=_CAPTION,
                 across=2,
@@ -264,8 +265,12 @@ def finding_of(design: Design) -> Finding[Design]:
             part_titles(part for point in points for part in (point.valve, point.actuator)),
         ),
         found=design,
-        files={"front.csv": lambda: front_table(design).encode()},
+        files={"front.csv": partial(_table_bytes, design)},
     )
+
+
+def _table_bytes(design: Design) -> bytes:
+    return front_table(design).encode()
 
 
 def _suggestion(design: Design) -> Iterator[finding.Part]:

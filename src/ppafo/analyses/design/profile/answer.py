@@ -3,6 +3,7 @@
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -297,7 +298,7 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
             ),
             finding.Part(
                 "Error and gas over pressure",
-                panels=lambda: pressure_panels(sizing),
+                panels=partial(pressure_panels, sizing),
                 name="profile",
                 caption=_CAPTION,
                 across=2,
@@ -306,7 +307,7 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
             ),
             finding.Part(
                 "The torque",
-                panels=lambda: [torque_panel(sizing)],
+                panels=partial(_torque_panels, sizing),
                 name="torque",
                 caption="The prescribed torque and the suggestion's.",
                 size=(9.0, 3.0),
@@ -318,8 +319,12 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
         ),
         found=sizing,
         passed=sizing.choice is not None,
-        files={} if recording is None else {"suggested.csv": lambda: marked_csv_bytes(recording)},
+        files={} if recording is None else {"suggested.csv": partial(marked_csv_bytes, recording)},
     )
+
+
+def _torque_panels(sizing: Sizing) -> list[Panel]:
+    return [torque_panel(sizing)]
 
 
 def _tables(sizing: Sizing) -> tuple[finding.Part, finding.Part]:

@@ -12,6 +12,7 @@ from ppafo.gait.recorded.form import GaitForm
 from ppafo.gait.recorded.forms.markers import PLATE, marker_convention
 from ppafo.gait.recorded.table import Events, MotionTable, Trial
 from ppafo.signals.recording import Floats
+from ppafo.storage.doubled_names import doubled, said_of_doubled, told_apart
 from ppafo.storage.files import read_bytes
 from ppafo.storage.trial_reading import check_can_be_read
 
@@ -61,14 +62,14 @@ def read_c3d(path: str | Path) -> MotionTable:
     # The labels, without the subject's name before a colon.
     group = parameters["POINT"]
     number = points.shape[1]
-    labels = [_bare(label) for label in _texts(group, "LABELS")][:number]
-    # Nobody can name a point whose label is not its own; all others can be used.
-    shared = sorted({label for label in labels if labels.count(label) > 1})
+    written = [_bare(label) for label in _texts(group, "LABELS")][:number]
+    # A point whose label is not its own has its description for a name, or its number.
+    labels = told_apart(written, [_bare(text) for text in _texts(group, "DESCRIPTIONS")])
+    twins = doubled(written, labels)
     frames = points.shape[2]
     columns = {
         f"{label}.{axis}": points[row, number, :]
         for number, label in enumerate(labels)
-        if label not in shared
         for row, axis in enumerate(_AXES)
     }
     units = {name: unit for name, unit in _units(parameters["POINT"], labels).items() if name in columns}
@@ -84,7 +85,7 @@ def read_c3d(path: str | Path) -> MotionTable:
     first = max(0, int(content["header"]["points"].get("first_frame", 0)))
     trial = _trial(parameters)
     time = (first + np.arange(frames)) / rate
-    said = [f"points not read, for they share a label: {', '.join(map(repr, shared))}"] if shared else []
+    said = said_of_doubled(twins, dict.fromkeys(labels), "points")
     said += [f"points not read, for they have no label: {number - len(labels)}"] if len(labels) < number else []
     return MotionTable(str(path), time, columns, units, remarks=(*trial.remarks, *said), trial=trial)
 

@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import Literal
 
 from ppafo.documents.regular_file import decoded
-from ppafo.errors import DataError, first_twice, one_line, refused_as
+from ppafo.errors import DataError, one_line, refused_as
 from ppafo.gait.recorded.form import Convention, GaitForm
 from ppafo.gait.recorded.mapping import Side, package_map
 from ppafo.gait.recorded.table import MotionTable
 from ppafo.storage.comma_separated import kind_of_comments, read_csv
+from ppafo.storage.doubled_names import doubled, said_of_doubled, told_apart, without_copies
 from ppafo.storage.files import read_bytes
 from ppafo.storage.foreign import ColumnMap, MappedChannel, read_foreign
 
@@ -23,6 +24,11 @@ _NAME = re.compile(r"(.*?)\s*(?:[\[(]\s*([^\])]*?)\s*[\])])?")
 _TIMES = {"time": "s", "t": "s", "time_s": "s", "time_ms": "ms"}
 
 _LONGEST_SHOWN = 40
+
+
+def _recognises(path: str | Path) -> bool:
+    """Recognise a table by its suffix; a .txt file may be one of markers, which says so in its first line."""
+    return Path(path).suffix.lower() != ".txt" or not _text(path).startswith("PathFileType")
 
 
 def _read(path: str | Path) -> MotionTable:
@@ -73,10 +79,9 @@ def read_plain_csv(path: str | Path) -> MotionTable:
     delimiter, pairs = _delimiter(header), _named_columns(header)
     names, units = [name for name, _ in pairs], [unit for _, unit in pairs]
     _check_first_name(path, names[0])
-    twice = first_twice(names)
-    if twice is not None or "" in names:
-        what = "a column has no name" if twice is None else f"there are two columns {one_line(twice)!r}"
-        raise DataError(f"{path}: {what}; every column needs a name of its own")
+    if "" in names:
+        raise DataError(f"{path}: a column has no name; every column needs a name of its own")
+    written, names = names, told_apart(names)
     channels = {f"c{number}": MappedChannel(column=number + 1) for number in range(1, len(names))}
     channels["time"] = MappedChannel(column=1, unit=units[0] or _TIMES[names[0].lower()])
     mapped = ColumnMap(
@@ -86,11 +91,16 @@ def read_plain_csv(path: str | Path) -> MotionTable:
         channels=channels,
     )
     recording = read_foreign(path, mapped)
-    columns = {name: recording[f"c{number}"] for number, name in enumerate(names) if number > 0}
-    stated = dict(zip(names, units, strict=True))
+    twins = doubled(written[1:], names[1:])
+    named = {name: recording[f"c{number}"] for number, name in enumerate(names) if number > 0}
+    columns = without_copies(named, twins)
+    stated = dict(zip((*names, *written), (*units, *units), strict=True))
     with refused_as(DataError, str(path), DataError):
         kind = kind_of_comments(line for line in _text(path).splitlines() if line.startswith("#"))
-    return MotionTable(str(path), recording.time, columns, {name: stated[name] for name in columns}, kind=kind)
+    remarks = tuple(said_of_doubled(twins, columns, "columns"))
+    return MotionTable(
+        str(path), recording.time, columns, {name: stated[name] for name in columns}, kind=kind, remarks=remarks
+    )
 
 
 def _check_first_name(path: str | Path, name: str) -> None:
@@ -117,8 +127,9 @@ def _text(path: str | Path) -> str:
 FORM = GaitForm(
     name="csv",
     summary="CSV files with the names and signs of this package, or others with a gait map",
-    suffixes=(".csv",),
+    suffixes=(".csv", ".txt", ".tsv"),
     read=_read,
+    recognises=_recognises,
     convention=_convention,
     is_whole=True,
 )

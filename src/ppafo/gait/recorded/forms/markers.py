@@ -12,6 +12,7 @@ from ppafo.gait.recorded.form import Convention, GaitForm
 from ppafo.gait.recorded.mapping import AngleMap, Axis, ForceMap, GaitMap, KneeMap, MomentMap, ShankMap, Side, Vertical
 from ppafo.gait.recorded.table import MotionTable
 from ppafo.signals.recording import Floats
+from ppafo.storage.files import read_bytes
 from ppafo.storage.opensim import read_trc
 
 PLATE = "force plate "
@@ -215,17 +216,23 @@ def load_unit(table: MotionTable, name: str, kind: str, body_mass: float) -> tup
     return fitting[0], [f"column '{name}' was read in {fitting[0] or 'body weights'} by its size: {was}"]
 
 
+def is_trc(path: str | Path) -> bool:
+    """Recognise a file of markers by its suffix, or another by how it begins."""
+    return Path(path).suffix.lower() == ".trc" or read_bytes(path).startswith(b"PathFileType")
+
+
 def _read_trc(path: str | Path) -> MotionTable:
     """Return the markers of a TRC file as columns ``LABEL.x``, ``.y``, ``.z``."""
     trc = read_trc(path)
     columns = {f"{name}.{axis}": xyz[row] for name, xyz in trc.markers.items() for row, axis in enumerate("xyz")}
-    return MotionTable(str(path), trc.time, columns, dict.fromkeys(columns, trc.unit))
+    return MotionTable(str(path), trc.time, columns, dict.fromkeys(columns, trc.unit), remarks=trc.remarks)
 
 
 TRC = GaitForm(
     name="trc",
     summary="TRC files with markers",
-    suffixes=(".trc",),
+    suffixes=(".trc", ".txt"),
     read=_read_trc,
     convention=marker_convention,
+    recognises=is_trc,
 )

@@ -11,6 +11,7 @@ from ppafo.gait.recorded.form import Convention, GaitForm
 from ppafo.gait.recorded.forms.comma_separated import is_plain, plain_names, read_plain_csv
 from ppafo.gait.recorded.mapping import ForceMap, KneeMap, PressureMap, ShankMap, Side, opensim_map
 from ppafo.gait.recorded.table import MotionTable
+from ppafo.storage.files import read_bytes
 from ppafo.storage.opensim import GAPS, read_opensim
 
 _CSV = ".csv"
@@ -18,9 +19,17 @@ _STATE = re.compile(r".*/([^/]+)/value")
 """A coordinate among OpenSim's states, such as ``/jointset/ankle_r/ankle_angle_r/value``; its speed is beside it."""
 
 
+def _is_table(path: str | Path) -> bool:
+    """Tell whether a file is a table with a header line alone, by its suffix, or of a .txt file by its content."""
+    suffix = Path(path).suffix.lower()
+    if suffix == ".txt":
+        return re.search(rb"(?mi)^\s*endheader\s*$", read_bytes(path)) is None
+    return suffix in (_CSV, ".tsv")
+
+
 def _recognises(path: str | Path) -> bool:
     """Recognise OpenSim's own files, and a plain CSV file by an ankle that OpenSim names."""
-    if Path(path).suffix.lower() != _CSV:
+    if not _is_table(path):
         return True
     return is_plain(path) and any(name.startswith("ankle_angle_") for name in plain_names(path))
 
@@ -30,22 +39,23 @@ def _read(path: str | Path) -> MotionTable:
 
     A coordinate that is named by its path among the states is there by its own name too.
     """
-    if Path(path).suffix.lower() == _CSV:
+    if _is_table(path):
         plain = read_plain_csv(path)
-        return replace(plain, units={name: unit or _unit(name, name, "") for name, unit in plain.units.items()})
+        return replace(plain, units={name: unit or unit_of_label(name, name, "") for name, unit in plain.units.items()})
     table = read_opensim(path, GAPS)
     is_unstated = table.in_degrees is None and table.is_old
     angle = "deg" if is_unstated else {True: "deg", False: "rad", None: ""}[table.in_degrees]
     paths = {match[1]: name for name in table.columns if (match := _STATE.fullmatch(name))}
     columns = {**table.columns, **{name: table.columns[path] for name, path in paths.items()}}
-    units = {name: _unit(paths.get(name, name), name, angle) for name in columns}
+    units = {name: unit_of_label(paths.get(name, name), name, angle) for name in columns}
     remarks = table.remarks
     if is_unstated and any(unit == "deg" for unit in units.values()):
         remarks = (*remarks, "the header does not state the unit of angles: degrees, as in files of its older style")
     return MotionTable(str(path), table.time, columns, units, kind=table.kind, remarks=remarks)
 
 
-def _unit(path: str, label: str, angle: str) -> str:
+def unit_of_label(path: str, label: str, angle: str) -> str:
+    """Return the unit that a label implies, ``angle`` for a coordinate; ``path`` is its path where it is a state."""
     if path != label:
         # States are in radians and metres whatever the header says of other columns.
         angle = angle or "rad"
@@ -63,7 +73,7 @@ _SIDES = {"right": {"r", "right"}, "left": {"l", "left"}}
 _KNEE = "knee_angle_"
 
 
-def _convention(table: MotionTable, side: Side, _body_mass: float) -> Convention:
+def opensim_convention(table: MotionTable, side: Side, _body_mass: float) -> Convention:
     """Return the map of OpenSim's labels; a force plate with a number only is of the foot that moves with it."""
     usual = opensim_map(side)
     terms = []
@@ -154,9 +164,9 @@ def _turned_forward(table: MotionTable) -> MotionTable:
 FORM = GaitForm(
     name="opensim",
     summary="OpenSim's .mot and .sto, and CSV files with OpenSim's names of columns",
-    suffixes=(".mot", ".sto", _CSV),
+    suffixes=(".mot", ".sto", _CSV, ".txt", ".tsv"),
     read=_read,
-    convention=_convention,
+    convention=opensim_convention,
     recognises=_recognises,
     arrange=_turned_forward,
 )

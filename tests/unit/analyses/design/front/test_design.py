@@ -12,7 +12,7 @@ from ppafo.analyses.design.front.answer import Design, finding_of, front_table
 from ppafo.analyses.design.front.search import Candidates
 from ppafo.analyses.design.front.solve import Evaluation, design_columns, noise_streams
 from ppafo.analyses.design.loading import json_schema, load_design
-from ppafo.analyses.design.solve import design
+from ppafo.analyses.design.question import design
 from ppafo.errors import PpafoError, StudyError
 from ppafo.report.finding import text_of
 from ppafo.running import simulate

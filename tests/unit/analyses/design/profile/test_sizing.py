@@ -21,7 +21,7 @@ from ppafo.analyses.design.profile.answer import (
 )
 from ppafo.analyses.design.profile.problem import choose_knots
 from ppafo.analyses.design.profile.search import Trials, ceiling, ceiling_pressure, cut_error
-from ppafo.analyses.design.solve import design
+from ppafo.analyses.design.question import design
 from ppafo.control.profiles import KNOTS
 from ppafo.errors import PpafoError
 from ppafo.parameters.parts import load_catalogue

@@ -1,0 +1,41 @@
+"""The question which parameters recordings show: its arguments."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from ppafo.arguments import Word, checked
+from ppafo.plugins import Plugins, name_plugins
+from ppafo.progress import Report, report_nothing
+
+if TYPE_CHECKING:
+    from ppafo.analyses.identify.answer import Identification
+    from ppafo.report.finding import Finding
+
+Problem = Annotated[str | Path, Word("PROBLEM", Path)]
+
+
+@checked("problem", "progress")
+def identify(
+    problem: Problem,
+    *,
+    plugins: Plugins = (),
+    progress: Report = report_nothing,
+) -> Finding[Identification]:
+    """Identify a parameter set, with uncertainty, from bench recordings.
+
+    The procedures of the problem file run in the recommended order; the trajectory fit comes last and starts from what
+    they found. Estimates are in SI units. IdentificationError for a problem that makes no sense, ParameterError for a
+    set that does not, and DataError for a recording that cannot be read; each in one line that begins with the file.
+
+    problem: a problem file (.toml); see 'ppafo doctor --schema identification'
+    plugins: modules of your own, files or names, whose objects files may name
+    """
+    name_plugins(plugins)
+    from ppafo.analyses.identify.answer import finding_of
+    from ppafo.analyses.identify.solve import solve_problem
+    from ppafo.identification.problem import load_problem
+
+    path = Path(problem)
+    return finding_of(solve_problem(load_problem(path), path.parent, path.name, progress))

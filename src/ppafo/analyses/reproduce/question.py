@@ -1,0 +1,49 @@
+"""The question whether the paper's experiments come out again: its arguments."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from ppafo.arguments import Overrides, Word, checked
+from ppafo.plugins import Plugins, name_plugins
+from ppafo.progress import Report, report_nothing
+
+if TYPE_CHECKING:
+    from ppafo.analyses.reproduce.answer import Reproduction, Studies
+    from ppafo.report.finding import Finding
+
+PublicationName = Annotated[str | Path, Word("NAME", option="--study")]
+
+
+@checked("study", "overrides", "progress")
+def reproduce(
+    study: PublicationName = "ppafo-2011",
+    *,
+    overrides: Overrides = (),
+    plugins: Plugins = (),
+    progress: Report | None = None,
+) -> Finding[Reproduction] | Finding[Studies]:
+    """Reproduce the paper's experiments and check its claims.
+
+    ``overrides`` change the experiments (not the paper's reported numbers): a path of a scenario reaches those that
+    have it, a path of the device all of them. SimulationError where a run diverges, ScenarioError for a study that is
+    none.
+
+    study: publication to run again: a name, a .toml file of claims, or 'all'; default ppafo-2011, the paper
+    plugins: modules of your own, files or names, whose objects files may name
+    """
+    name_plugins(plugins)
+    from ppafo.analyses.reproduce.answer import Studies, finding_of, finding_of_studies
+    from ppafo.analyses.reproduce.publication import ALL, SEED, check_study, run_studies
+    from ppafo.analyses.reproduce.solve import reproduce_paper
+
+    report = progress or report_nothing
+    study = str(study)
+    # Before anything runs, which takes long.
+    changes = tuple(overrides)
+    check_study(study, changes)
+    if study == SEED:
+        return finding_of(reproduce_paper(changes, report))
+    seed = reproduce_paper((), report) if study == ALL else None
+    return finding_of_studies(Studies(run_studies(study, report), seed))

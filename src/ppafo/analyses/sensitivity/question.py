@@ -1,0 +1,75 @@
+"""The question which uncertain value matters: its arguments."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from ppafo.arguments import Confidence, MaximumFailed, Metrics, Name, Overrides, Seed, Threads, Whole, Word, checked
+from ppafo.plugins import Plugins, name_plugins
+from ppafo.progress import Report
+
+if TYPE_CHECKING:
+    from ppafo.analyses.sensitivity.solve import Influences
+    from ppafo.report.finding import Finding
+    from ppafo.studies.study import Study
+
+DistributedStudy = Annotated[
+    "Study | str | Path | Mapping[str, Any]",
+    Word("STUDY", help="a study with distributions: a name, or a .toml file"),
+]
+MethodName = Annotated[str, Word("sobol|shapley")]
+
+
+@checked("study", "method", "metrics", "samples")
+def sensitivity(
+    study: DistributedStudy,
+    *,
+    method: MethodName | None = None,
+    metrics: Metrics = (),
+    samples: Whole | None = None,
+    configuration: Name | None = None,
+    independent: bool = False,
+    overrides: Overrides = (),
+    seed: Seed | None = None,
+    confidence: Confidence = 0.95,
+    maximum_failed: MaximumFailed = 0.02,
+    threads: Threads | None = None,
+    plugins: Plugins = (),
+    progress: Report | None = None,
+) -> Finding[Influences]:
+    """Rank uncertain values by their influence: Sobol or Shapley indices, signed changes.
+
+    Noise of the sensors is one of the values. StudyError for bad input, and where more than the fraction
+    ``maximum_failed`` of the runs fails; of fewer, whole blocks are left out and counted.
+
+    method: default: sobol, or shapley if values are correlated
+    metrics: metric to analyse, may be repeated; default: the metrics of the study
+    samples: number of base points (sobol, default 8192) or orders (shapley, 2048)
+    configuration: configuration of the study, needed if it has several
+    independent: ignore the correlations of the study
+    plugins: modules of your own, files or names, whose objects files may name
+    """
+    name_plugins(plugins)
+    from ppafo.analyses.sensitivity.methods import METHODS
+    from ppafo.analyses.sensitivity.solve import DEFAULT_SAMPLES, Settings, analyse, finding_of
+    from ppafo.errors import StudyError, nearest_name
+    from ppafo.studies.draws import drawn_in
+    from ppafo.study.runs import Runs, Tally
+
+    if method is not None and method not in METHODS:
+        raise StudyError(
+            f"there is no method '{method}'{nearest_name(method, METHODS)}; available: {', '.join(METHODS)}"
+        )
+    chosen, base, used = drawn_in(study, overrides, configuration, independent)
+    # Sobol indices of correlated values mean nothing; Shapley effects take more runs for the same bands.
+    by = METHODS[method or ("sobol" if used.scores is None else "shapley")]
+    requested = tuple(metrics) or chosen.outputs.metrics
+    if not requested:
+        raise StudyError(f"study '{chosen.name}' keeps no metrics; name the metric to analyse")
+    count = DEFAULT_SAMPLES[by.name] if samples is None else samples
+    settings = Settings(count, chosen.sample.seed if seed is None else seed, confidence, maximum_failed)
+    tally = Tally(count * by.block_rows(len(used.drawn)), progress)
+    runs = Runs(base.scenario, requested, tally, used.gauge, threads)
+    return finding_of(analyse(runs, used, by, settings, f"{chosen.name}, {base.name}"))

@@ -1,0 +1,109 @@
+"""The questions what many runs come to, and what a statistic of them is: the arguments."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from ppafo.arguments import Address, Count, Fraction, Name, Overrides, Seed, Threads, Word, checked
+from ppafo.progress import Report
+
+if TYPE_CHECKING:
+    from ppafo.analyses.sweep.results import StudyResults
+    from ppafo.analyses.sweep.statistic import Estimate
+    from ppafo.report.finding import Finding
+    from ppafo.studies.study import Study
+
+StudyLike = Annotated["Study | str | Path | Mapping[str, Any]", Word("STUDY")]
+Folder = Annotated[str | Path, Word("DIR")]
+Agreed = Annotated[bool, Word(option="--yes")]
+StatisticWords = Annotated[str, Word("WORDS", option="--statistic")]
+MetricName = Annotated[str, Word("NAME", option="--metric")]
+Width = Annotated[str, Word("WIDTH")]
+
+
+@checked()
+def sweep_into_folder(
+    study: StudyLike,
+    *,
+    out: Folder | None = None,
+    overrides: Overrides = (),
+    draws: Count | None = None,
+    seed: Seed | None = None,
+    threads: Threads | None = None,
+    scheduler: Address | None = None,
+    agreed: Agreed = False,
+    statistic: StatisticWords | None = None,
+    metric: MetricName | None = None,
+    width: Width | None = None,
+    also: Sequence[Name] = (),
+    configuration: Name | None = None,
+    first_draws: Count | None = None,
+    confidence: Fraction | None = None,
+    maximum_failed: Fraction | None = None,
+    progress: Report | None = None,
+) -> Finding[StudyResults] | Finding[Estimate]:
+    """Run a study: many runs, one row each, resumable; or a statistic to a wanted precision.
+
+    study: name of a study, or a .toml file
+    out: folder or address for the results; default out/NAME with the name of the study
+    draws: number of draws, instead of the number in the file; of a statistic the maximum, default 1,048,576
+    scheduler: address of a Dask scheduler whose workers compute the chunks
+    agreed: start even if the results will fill much of the disk
+    statistic: draw until the interval of a statistic is narrow enough, and keep no rows: mean, 'quantile 0.95',
+        'probability above 1.2 N m', 'probability below 0.5 g'
+    metric: with --statistic: name of a metric, such as rms_error
+    width: target width of the interval: '1 %' of the value (default), or '0.01 N m'; of a probability, 0.02
+    also: a further metric, whose mean over the same draws is given; may be repeated
+    configuration: configuration of the study, needed if it has several
+    first_draws: draws before the first estimate; default 256
+    confidence: confidence of the interval; default 95%
+    maximum_failed: fraction of the runs that may fail before the statistic is refused; default 1%
+    """
+    from dataclasses import replace
+
+    from ppafo.analyses.sweep.answer import write_report
+    from ppafo.analyses.sweep.solve import INTERRUPTED, INTERRUPTED_AT_ONCE, is_begun, sweep
+    from ppafo.analyses.sweep.statistic import MOST_DRAWS, estimate
+    from ppafo.errors import StudyError
+    from ppafo.report.drawing import load_drawing
+    from ppafo.storage.result_folder import check_owned_folder, marked_folder
+    from ppafo.studies.draws import study_of
+
+    # Before anything else imports Matplotlib, so that it comes without what it does for others.
+    load_drawing()
+    of_statistic: dict[str, Any] = {
+        "width": width,
+        "also": tuple(also) or None,
+        "configuration": configuration,
+        "first_draws": first_draws,
+        "confidence": confidence,
+        "maximum_failed": maximum_failed,
+    }
+    given = {name: value for name, value in of_statistic.items() if value is not None}
+    if statistic is None:
+        unused = [*(["metric"] if metric is not None else []), *given]
+        if unused:
+            raise StudyError(f"{unused[0]}: needs a statistic, for example --statistic mean --metric rms_error")
+        chosen = study_of(study, overrides, draws, seed)
+        folder = out or Path("out") / chosen.name
+        try:
+            swept = sweep(chosen, threads=threads, out=folder, scheduler=scheduler, agreed=agreed, progress=progress)
+            write_report(swept.found)
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt(INTERRUPTED if is_begun(chosen, folder) else INTERRUPTED_AT_ONCE) from None
+        return swept
+    if metric is None:
+        raise StudyError(f"statistic '{statistic}': needs the metric that it is of, for example --metric rms_error")
+    if scheduler is not None:
+        raise StudyError(f"--scheduler {scheduler}: a statistic is computed here; omit it")
+    chosen = study_of(study, overrides)
+    place = Path(out or Path("out") / f"{chosen.name}-{metric}")
+    check_owned_folder(place, marked_folder("sweep"))
+    most = MOST_DRAWS if draws is None else draws
+    found = estimate(
+        chosen, metric=metric, statistic=statistic, seed=seed, draws=most, threads=threads, progress=progress, **given
+    )
+    found.save(place)
+    return replace(found, found=replace(found.found, folder=str(place)))

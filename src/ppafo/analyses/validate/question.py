@@ -1,0 +1,119 @@
+"""The question whether a parameter set agrees with recordings: its arguments."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from ppafo.arguments import Duration, Name, Overrides, Volume, Word, checked
+from ppafo.plugins import Plugins, name_plugins
+from ppafo.progress import Progress, Report, report_nothing
+
+if TYPE_CHECKING:
+    from ppafo.analyses.validate.solve import Validation
+    from ppafo.report.finding import Finding
+    from ppafo.signals import Recording
+    from ppafo.storage.foreign import ColumnMap
+
+SetLike = Annotated[str | Path, Word("PARAMETERS")]
+Recorded = Annotated["Recording | str | Path", Word("RECORDING")]
+Motion = Annotated[str, Word("free|measured|locked|leg")]
+Initial = Annotated[str, Word("CHANNEL=VALUE")]
+Limits = Annotated[Sequence[str], Word("[CHANNEL=]LIMIT", option="--threshold")]
+ColumnsLike = Annotated["ColumnMap | str | Path", Word("FILE.toml[:NAME]")]
+
+
+@checked("parameter_set", "recordings", "valve", "overrides")
+def validate(
+    parameter_set: SetLike,
+    recordings: Sequence[Recorded],
+    *,
+    valve: Name | None = None,
+    overrides: Overrides = (),
+    motion: Motion = "free",
+    volume: Volume | None = None,
+    initial: Sequence[Initial] = (),
+    thresholds: Limits = (),
+    longest_delay: Duration = 0.02,
+    columns: ColumnsLike | None = None,
+    plugins: Plugins = (),
+    progress: Report | None = None,
+) -> Finding[Validation]:
+    """Compare a parameter set with recordings, channel by channel.
+
+    The model is run on the recorded command, supply pressure and external torque; residuals are measured - model. With
+    no threshold it is 10 % of full range, at least half of the variance of a signal beside its noise is explained, and
+    no single change of record, set or model may explain the recordings; what none explains may be 3 %. The result's
+    ``found`` has ``passes`` and, in ``recordings``, one ``RecordingAgreement`` each: ``measured`` and ``model`` are
+    recordings, their channels of shape (samples,) in SI; ``channels`` has RMS error, bias, largest error and delay [s]
+    of each channel in its SI unit (rad, Pa, N m). DataError, ParameterError or SimulationError for bad input.
+
+    parameter_set: name of a parameter set, or a .toml file
+    recordings: a .csv or .nc file, or a result folder; several may be given
+    valve: valve of the parameter set; default: its default valve
+    motion: free: the model moves the vane; measured: the vane follows the recorded angle; locked: the vane stays at
+        its initial angle; leg: the model moves vane and foot on the fixture of step-response (default free)
+    volume: no vane: the valve fills and vents chamber 1 of this fixed volume, for example '60 cm^3'; pressure_1 is
+        compared
+    initial: initial value of a channel that was not recorded, for example 'pressure_2=0 psi_g'
+    thresholds: maximum RMS error, as a fraction of full range or with a unit: 5%, angle=10%, 'pressure_1=3.7 psi_d';
+        default: 10%, and half of the variance of the signal is explained
+    longest_delay: maximum delay of the measurement to estimate; default '20 ms', '0 s' for none
+    columns: file with a column map [columns.NAME], for recordings with other column names; a problem file may contain
+        it
+    plugins: modules of your own, files or names, whose objects files may name
+    """
+    name_plugins(plugins)
+    from ppafo.analyses.validate.solve import LARGEST_DELAY, Validation, finding_of, named_column_map
+    from ppafo.errors import DataError, nearest_name, one_line
+    from ppafo.parameters import load_device
+    from ppafo.storage.foreign import ColumnMap
+    from ppafo.validation.agreement import ReplaySettings, compare_recording
+    from ppafo.validation.causes import causes_of
+    from ppafo.validation.measured import Measured, parse_thresholds, read_measured
+    from ppafo.validation.replay import MOTIONS, parse_initial
+
+    report = progress or report_nothing
+    device = load_device(parameter_set, overrides=overrides, valve=valve)
+    if volume is not None and not volume > 0.0:
+        raise DataError(f"volume of {volume:g} m^3: must be above 0")
+    if not 0.0 <= longest_delay <= LARGEST_DELAY:
+        raise DataError(f"longest delay of {longest_delay:g} s: must be from 0 to {LARGEST_DELAY:g} s")
+    chosen = next((one for one in MOTIONS if one == motion), None)
+    if chosen is None:
+        near = nearest_name(motion, MOTIONS)
+        raise DataError(f"motion '{one_line(motion)}' is not one of {', '.join(MOTIONS)}{near}")
+    settings = ReplaySettings(
+        motion=chosen,
+        initial=parse_initial(initial, device.supply.atmospheric_pressure),
+        longest_delay=longest_delay,
+        thresholds=parse_thresholds(thresholds),
+        volume=volume,
+    )
+    if not recordings:
+        raise DataError("no recording was given; name at least one .csv or .nc file or result folder")
+    column_map = columns if columns is None or isinstance(columns, ColumnMap) else named_column_map(str(columns))
+    map_name = "" if columns is column_map else str(columns)
+    read: list[Measured] = []
+    for path in recordings:
+        measured = read_measured(path, device, column_map, map_name)
+        # Given twice, under two names too, a recording would count twice as evidence.
+        same = next((one.file for one in read if one.sha256 == measured.sha256), None)
+        if same is not None:
+            raise DataError(f"{measured.file}: the same recording as {same}; give each once")
+        read.append(measured)
+    agreements = []
+    for measured in read:
+        report(Progress(f"replaying {measured.file}"))
+        agreements.append(compare_recording(measured, device, settings))
+    validation = Validation(
+        parameter_set=str(parameter_set),
+        device=device,
+        overrides=tuple(overrides),
+        settings=settings,
+        recordings=tuple(agreements),
+        causes=causes_of(read, agreements, device, settings, report),
+        has_limits=bool(thresholds),
+    )
+    return finding_of(validation)

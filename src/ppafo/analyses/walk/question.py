@@ -1,0 +1,56 @@
+"""The question what a device does on a walk: its arguments."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from ppafo.arguments import Count, Gait, Minutes, Overrides, Whole, Word, checked
+from ppafo.progress import Report, report_nothing
+
+if TYPE_CHECKING:
+    from ppafo.report.finding import Finding
+    from ppafo.simulation.scenario import Scenario
+
+
+@checked()
+def walk_with_and_without(
+    scenario: Annotated[Scenario | str | Path, Word("WALK")] = "solenoid",
+    *,
+    gait: Gait | None = None,
+    task_sequence: Annotated[str | Path, Word("SEQUENCE")] | None = None,
+    bottle: Annotated[str | Path, Word("BOTTLE")] | None = None,
+    minutes: Minutes | None = None,
+    wearers: Count | None = None,
+    seed: Whole = 1,
+    overrides: Overrides = (),
+    progress: Report | None = None,
+) -> Finding[Any]:
+    """Simulate walking with the device, without it, and healthy.
+
+    ScenarioError for bad input; a walk that diverges is a finding that has not passed.
+
+    scenario: name of a walk configuration, or a .toml file; default solenoid
+    gait: name of a gait, or a gait file; default: the gait of the configuration
+    task_sequence: what the wearer does one after the other: a name or a .toml file; 'ppafo walk --list' has the names
+    bottle: supply the device from a bottle: a name ('ppafo bottle --list') or a .toml file; the walk ends with it
+    minutes: time to walk; default 1, up to 10 on a bottle, or a whole task sequence
+    wearers: number of different wearers to simulate instead of one
+    seed: random seed of the wearers; default 1
+    """
+    from ppafo.analyses.walk.answer import LONG, finding_of, reporter, wearers_finding
+    from ppafo.simulation.scenario import Scenario
+    from ppafo.walking.loading import check_duration_once, load_walk
+    from ppafo.walking.walk import compare_walks, walk_population
+
+    chosen = scenario
+    # The options of the command line belong to a file: a scenario that was built has all of it already.
+    if not isinstance(chosen, Scenario):
+        check_duration_once(overrides, minutes)
+        chosen = load_walk(chosen, overrides, gait=gait, task_sequence=task_sequence, bottle=bottle)
+    report = progress or report_nothing
+    if wearers is not None:
+        advance = reporter(report, "wearers", 0.0)
+        return wearers_finding(walk_population(chosen, minutes=minutes, wearers=wearers, seed=seed, progress=advance))
+    comparison = compare_walks(chosen, minutes=minutes, progress=reporter(report, "min", LONG))
+    return finding_of(comparison)

@@ -1,0 +1,143 @@
+"""The door of every public function: what a call gives is checked by the signature that makes the command line too.
+
+``@checked()`` reads the annotations at the first call. A value that does not fit is an ArgumentError that names the
+argument, says what it takes and quotes the value; so are words that Python itself would answer with a TypeError.
+"""
+
+import contextlib
+import functools
+import inspect
+import re
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextvars import ContextVar
+from pathlib import Path
+from typing import Any, NamedTuple, ParamSpec, TypeVar
+
+from ppafo.arguments.values import Names, Taken, shown, taken
+from ppafo.errors import ArgumentError, PpafoError, nearest_name
+
+P = ParamSpec("P")
+R = TypeVar("R")
+_EMPTY = inspect.Parameter.empty
+
+
+class _Parameter(NamedTuple):
+    """A parameter: its default, ``inspect.Parameter.empty`` without one, and what it takes."""
+
+    default: Any
+    taken: Taken
+
+
+class _Signature(NamedTuple):
+    """The parameters of a function by name, and the ones that a call may give by position."""
+
+    parameters: Mapping[str, _Parameter]
+    positional: tuple[str, ...]
+
+
+_says_arguments: ContextVar[bool] = ContextVar("_says_arguments", default=True)
+
+
+@contextlib.contextmanager
+def without_names() -> Iterator[None]:
+    """Leave errors inside as they are, without the name of an argument: a command line has words in its place."""
+    token = _says_arguments.set(False)
+    try:
+        yield
+    finally:
+        _says_arguments.reset(token)
+
+
+def _named(function: Callable[..., R], values: Mapping[str, Any]) -> R:
+    """Call a function; an error that quotes an argument and does not name it begins with its name."""
+    try:
+        return function(**values)
+    except PpafoError as error:
+        message = str(error)
+        quoted = [(text, name) for name, value in values.items() for text in _texts(value) if text in message]
+        # A text in quotation marks before one that stands among others, and of two within each other the longer one.
+        rank = {name: (f"'{text}'" in message, len(text)) for text, name in quoted}
+        name = max(rank, key=lambda each: rank[each], default="")
+        if name and not re.search(rf"\b{name.removesuffix('s').replace('_', '[_ -]')}", message, re.IGNORECASE):
+            error.args = (f"{name}: {message}",)
+        raise
+
+
+def _texts(value: Any) -> Iterator[str]:
+    """Yield the texts and paths of an argument."""
+    if isinstance(value, str | Path):
+        yield str(value)
+    elif isinstance(value, tuple):
+        yield from (str(each) for each in value if isinstance(each, str | Path))
+
+
+def checked(*formerly: str, **renamed: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Return what puts the door before a function.
+
+    ``formerly`` are the arguments that calls gave by position in an earlier version, in that order, and ``renamed`` the
+    new names of arguments by their old ones: a call of that form is answered with how it is written now.
+    """
+
+    def decorate(function: Callable[P, R]) -> Callable[P, R]:
+        @functools.cache
+        def signature() -> _Signature:
+            names, found = Names(vars(sys.modules[function.__module__])), inspect.signature(function).parameters
+            return _Signature(
+                {name: _Parameter(each.default, taken(each.annotation, names)) for name, each in found.items()},
+                tuple(name for name, each in found.items() if each.kind is each.POSITIONAL_OR_KEYWORD),
+            )
+
+        @functools.wraps(function)
+        def call(*args: P.args, **kwargs: P.kwargs) -> R:
+            values = _values(function.__name__, signature(), args, kwargs, formerly, renamed)
+            if _says_arguments.get():
+                # Only the function that was called says which argument: those that it calls have others.
+                with without_names():
+                    return _named(function, values)
+            return function(**values)  # type: ignore[call-arg]  # names and types are those of the signature
+
+        return call
+
+    return decorate
+
+
+def _values(
+    function: str,
+    signature: _Signature,
+    positional: tuple[Any, ...],
+    by_name: Mapping[str, Any],
+    formerly: tuple[str, ...],
+    renamed: Mapping[str, str],
+) -> dict[str, Any]:
+    """Return the arguments of a call by name, each as the function takes it."""
+    parameters, places = signature
+    if len(positional) > len(places):
+        order = [*places, *formerly[len(places) :], *(name for name in parameters if name not in formerly)]
+        pairs = zip([renamed.get(name, name) for name in order], positional, strict=False)
+        now = ", ".join([*map(shown, positional[:1]), *(f"{name}={shown(value)}" for name, value in [*pairs][1:])])
+        count = {1: "one argument"}.get(len(places), f"{len(places)} arguments")
+        raise ArgumentError(f"{function}() takes {count} by position: write {function}({now})")
+    given = dict(zip(places, positional, strict=False))
+    for name, value in by_name.items():
+        if name in renamed:
+            raise ArgumentError(
+                f"{function}(): {name} is now called {renamed[name]}: write {renamed[name]}={shown(value)}"
+            )
+        if name not in parameters:
+            hint = nearest_name(name, parameters)
+            raise ArgumentError(f"{function}() has no argument '{name}'{hint}; it has {', '.join(parameters)}")
+        if name in given:
+            raise ArgumentError(f"{function}(): {name} is given twice, by position and by name")
+        given[name] = value
+    missing = [name for name, each in parameters.items() if each.default is _EMPTY and name not in given]
+    if missing:
+        takes = "; ".join(f"{name} is {parameters[name].taken.what}" for name in missing)
+        raise ArgumentError(f"{function}() needs {' and '.join(missing)}: {takes}")
+    return {name: _value(name, parameters[name], value) for name, value in given.items()}
+
+
+def _value(name: str, parameter: _Parameter, value: Any) -> Any:
+    if value is parameter.default or (value is None and parameter.taken.allows_none):
+        return value
+    return parameter.taken.take(name, value)

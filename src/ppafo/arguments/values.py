@@ -1,0 +1,189 @@
+"""What a parameter takes of a call in Python, by the annotation that makes it an argument of a command as well."""
+
+import builtins
+import os
+import reprlib
+import types
+import typing
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal, NamedTuple
+
+from ppafo.arguments.words import Word, taken_flag, taken_number, taken_text, taken_whole
+from ppafo.errors import ArgumentError, one_line
+
+_LONGEST = 60
+
+
+class NotLoaded:
+    """A class that an annotation names and its module does not load: its objects are known by the name of theirs.
+
+    Help of a command loads no such module; who passes an object of the class has loaded it.
+    """
+
+
+class Names(dict[str, Any]):
+    """The names of an annotation: those of its module, of Python, and classes that are not loaded."""
+
+    def __missing__(self, name: str) -> Any:
+        """Return a name of Python, or a class in the place of one that is not loaded."""
+        return getattr(builtins, name) if hasattr(builtins, name) else type(name, (NotLoaded,), {})
+
+
+class Taken(NamedTuple):
+    """Values that a parameter takes: what a message calls them, and what turns one into the value of the function.
+
+    ``take`` gets the name that the value has in a message, and the value; ArgumentError for one that does not fit.
+    """
+
+    what: str
+    take: Callable[[str, Any], Any]
+    allows_none: bool = False
+
+
+def shown(value: Any) -> str:
+    """Return a value as a message has it: short, on one line."""
+    if isinstance(value, str | bytes | int | float | complex | Path | list | tuple | dict | set | None):
+        text = one_line(repr(value) if isinstance(value, str | Path) else reprlib.repr(value))
+        return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3]}..."
+    return f"<{type(value).__name__}>"
+
+
+def taken(annotation: Any, names: Names) -> Taken:
+    """Return what a parameter with an annotation takes, whose text has these names."""
+    annotation = evaluated(annotation, names)
+    origin, inner = typing.get_origin(annotation), typing.get_args(annotation)
+    if origin is Annotated:
+        # Python flattens nested annotations with the outermost last: that one has the last word.
+        word = next((item for item in reversed(inner[1:]) if isinstance(item, Word) and item.take), None)
+        if word is None or word.take is None:
+            return taken(inner[0], names)
+        own = _one(word.what, word.take)
+        return own if word.takes_all or not _is_repeated(inner[0]) else _several(own)
+    if origin in (typing.Union, types.UnionType):
+        return _either([taken(item, names) for item in inner if item is not types.NoneType], types.NoneType in inner)
+    if origin is Literal:
+        return _one(" or ".join(map(repr, inner)), lambda value: _among(inner, value))
+    if annotation is Any:
+        return Taken("anything", lambda _, value: value)
+    return _one(*_PLAIN[annotation]) if annotation in _PLAIN else _of_class(origin or annotation, inner, names)
+
+
+def evaluated(annotation: Any, names: Names) -> Any:
+    """Return what the text of an annotation stands for; anything but a text as it is."""
+    text = annotation.__forward_arg__ if isinstance(annotation, typing.ForwardRef) else annotation
+    return eval(text, {}, names) if isinstance(text, str) else text
+
+
+def _of_class(kind: type, inner: tuple[Any, ...], names: Names) -> Taken:
+    if issubclass(kind, Mapping):
+        return _mapping(taken(inner[1], names))
+    if inner and _is_iterable(kind):
+        return _several(taken(inner[0], names))
+    if kind is typing.get_origin(Callable[..., Any]):
+        return _one("a function", _taken_function)
+    return _one(f"a {kind.__name__}", lambda value: _instance(kind, value))
+
+
+def _is_iterable(kind: type) -> bool:
+    return issubclass(kind, Iterable) and not issubclass(kind, str | bytes)
+
+
+def _is_repeated(annotation: Any) -> bool:
+    origin = typing.get_origin(annotation)
+    return isinstance(origin, type) and _is_iterable(origin)
+
+
+def _one(what: str, take: Callable[[Any], Any]) -> Taken:
+    def named(name: str, value: Any) -> Any:
+        try:
+            return take(value)
+        except ArgumentError as error:
+            raise ArgumentError(f"{name}: {error}") from None
+        except (ValueError, TypeError, OverflowError):
+            raise ArgumentError(f"{name}={shown(value)}: must be {what}") from None
+
+    return Taken(what, named)
+
+
+def _several(element: Taken) -> Taken:
+    """Return what takes one or several: one alone stands for a list of one, an iterator is gone through once."""
+
+    def take(name: str, value: Any) -> Any:
+        if isinstance(value, str | bytes | os.PathLike | Mapping) or not isinstance(value, Iterable):
+            return (element.take(name, value),)
+        return tuple(element.take(f"{name}[{index}]", each) for index, each in enumerate(value))
+
+    return Taken(f"{element.what}, or several", take)
+
+
+def _mapping(element: Taken) -> Taken:
+    """Return what takes a dictionary by names; a copy, in which each value is as it is taken."""
+
+    def take(name: str, value: Any) -> dict[str, Any]:
+        if not isinstance(value, Mapping) or not all(isinstance(key, str) for key in value):
+            raise ArgumentError(f"{name}={shown(value)}: must be a dictionary with texts as its keys")
+        return {key: element.take(f"{name}[{key!r}]", each) for key, each in value.items()}
+
+    return Taken("a dictionary", take)
+
+
+def _either(kinds: list[Taken], allows_none: bool) -> Taken:
+    """Return what takes the first of several kinds that fits."""
+    if len(kinds) == 1:
+        return kinds[0]._replace(allows_none=allows_none)
+    what = ", ".join(dict.fromkeys(kind.what for kind in kinds))
+    head, comma, last = what.rpartition(", ")
+    what = f"{head} or {last}" if comma else last
+    # A text and a path are one way to name something.
+    what = what.replace("a text, a path", "a name, a path").replace("a text or a path", "a name or a path")
+
+    def take(name: str, value: Any) -> Any:
+        refused: list[ArgumentError] = []
+        for kind in kinds:
+            try:
+                return kind.take(name, value)
+            except ArgumentError as error:
+                refused.append(error)
+        # What is wrong inside one of several is said of that one.
+        inside = [error for error in refused if str(error).startswith(f"{name}[")]
+        raise inside[-1] if inside else ArgumentError(f"{name}={shown(value)}: must be {what}")
+
+    return Taken(what, take, allows_none)
+
+
+def _among(allowed: tuple[Any, ...], value: Any) -> Any:
+    if not isinstance(value, str) or value not in allowed:
+        raise ValueError
+    return value
+
+
+def _instance(kind: type, value: Any) -> Any:
+    is_named = issubclass(kind, NotLoaded) and any(base.__name__ == kind.__name__ for base in type(value).__mro__)
+    if not is_named and not isinstance(value, kind):
+        raise ValueError
+    return value
+
+
+def _taken_path(value: Any) -> Path:
+    """Return a path; a text is left to what takes names, which stands before it wherever both are taken."""
+    path = Path(taken_text(os.fspath(value)))
+    if "\0" in str(path):
+        raise ValueError
+    return path
+
+
+def _taken_function(value: Any) -> Callable[..., Any]:
+    if not callable(value):
+        raise ValueError
+    return value  # type: ignore[no-any-return]
+
+
+_PLAIN: Mapping[Any, tuple[str, Callable[[Any], Any]]] = {
+    str: ("a text", taken_text),
+    bool: ("True or False", taken_flag),
+    int: ("a whole number", taken_whole(-(2**63))),
+    float: ("a finite number", taken_number()),
+    Path: ("a path", _taken_path),
+}
+"""What a type without a ``Word`` takes."""

@@ -1,0 +1,399 @@
+"""Types of arguments: what each is called in the help, how its text is read, and which Python values it takes.
+
+A function annotates its parameters with them: ``mass: Mass | None = None`` is the option ``--mass MASS``, whose text is
+read with its unit, and in Python a number in SI or such a text. ``Word`` says the rest; the help of a parameter is its
+line in the docstring. Nothing heavy is loaded for them.
+"""
+
+import math
+import numbers
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from ppafo.errors import ArgumentError, UnitError
+from ppafo.units import SI, number_text, parse_quantity
+
+_NUMBER = re.compile(r"[+-]?((\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|nan|inf)", re.ASCII)
+_EXAMPLES = {
+    "kg": ("a mass", ("g", "kg")),
+    "m": ("a length", ("cm", "m")),
+    "s": ("a time", ("ms", "s", "min")),
+    "N m": ("a torque", ("N m",)),
+    "Pa_a": ("a pressure", ("psi_g", "kPa_a")),
+    "kg/s": ("a flow", ("g/s",)),
+    "m^3": ("a volume", ("cm^3",)),
+    "m/s": ("a speed", ("m/s", "km/h")),
+    "Hz": ("a frequency", ("Hz",)),
+    "rad": ("an angle", ("deg", "rad")),
+}
+"""What a quantity is called, and the units in which people write it."""
+_MAXIMUM_DIGITS, _ABOVE_ALL = 40, 10**40
+"""A seed of 128 bits has 39; Python refuses thousands of them by an error of its own."""
+
+
+@dataclass(frozen=True, slots=True)
+class Word:
+    """How the text of a parameter is written and read, and what it takes of a call in Python.
+
+    ``metavar`` is its name in the help, ``read`` turns the text into the value. ``take`` turns a Python value into the
+    one that the function gets, with a ValueError for any other, and ``what`` names the values that it takes; without it
+    the type of the annotation decides. ``option`` is its name where that is not the name of the parameter, and makes an
+    option of a parameter that Python takes by position. ``help`` is that of every function which says nothing else.
+    ``const`` is what an option without its value stands for, ``off`` the option that switches a flag off.
+    ``is_repeated`` is said of several values whose type is not a sequence alone; ``takes_all`` where ``take`` gets all
+    of them at once.
+    """
+
+    metavar: str = ""
+    read: Callable[[str], Any] = str
+    take: Callable[[Any], Any] | None = None
+    what: str = ""
+    option: str = ""
+    help: str = ""
+    const: Any = None
+    off: str = ""
+    is_repeated: bool = False
+    takes_all: bool = False
+
+
+def whole_number(text: str) -> int:
+    """Return a whole number from 0 on; ArgumentError for any other text."""
+    return _number_from(text, 0)
+
+
+def counting_number(text: str) -> int:
+    """Return a whole number from 1 on; ArgumentError for any other text."""
+    return _number_from(text, 1)
+
+
+def _number_from(text: str, least: int) -> int:
+    # As people group digits; isdecimal alone would take the digits of any script.
+    digits = text.replace("_", "").replace(",", "")
+    is_usable = digits.isascii() and digits.isdecimal() and len(digits) <= _MAXIMUM_DIGITS
+    if not is_usable or int(digits) < least:
+        raise ArgumentError(f"{text}: must be a whole number, {least} or more, of at most {_MAXIMUM_DIGITS} digits")
+    return int(digits)
+
+
+def number(text: str) -> float:
+    """Return a number without a unit; ArgumentError for any other text."""
+    try:
+        return float(number_text(text))
+    except ValueError as error:
+        raise ArgumentError(f"{text}: must be a number") from error
+
+
+def fraction(text: str) -> float:
+    """Return a number from 0 to 1 from a text such as ``0.02`` or ``2%``; ArgumentError for any other text."""
+    try:
+        value = float(number_text(text.removesuffix("%"))) / (100.0 if text.endswith("%") else 1.0)
+    except ValueError:
+        # Refused below, as a number that is out of range.
+        value = math.nan
+    if not 0.0 <= value <= 1.0:
+        raise ArgumentError(f"{text}: must be a number from 0 to 1, or a percentage")
+    return value
+
+
+@dataclass(frozen=True, slots=True)
+class Range:
+    """Numbers from ``lowest`` or ``above`` to ``highest``, in a unit."""
+
+    lowest: float = -math.inf
+    above: float = -math.inf
+    highest: float = math.inf
+
+    def __contains__(self, value: float) -> bool:
+        """Tell whether a number is in the range; nan never is."""
+        return self.lowest <= value <= self.highest and value > self.above
+
+    def words(self, unit: str) -> str:
+        """Return the range in words, such as ``above 0 s, at most 3600 s``; an empty text where there is no end."""
+        of = f" {unit}".rstrip()
+        ends = (
+            (f"above {self.above:g}{of}", self.above > -math.inf),
+            (f"at least {self.lowest:g}{of}", self.lowest > -math.inf),
+            (f"at most {self.highest:g}{of}", self.highest < math.inf),
+        )
+        return ", ".join(end for end, is_there in ends if is_there)
+
+
+ANY = Range()
+ABOVE_ZERO = Range(above=0.0)
+FROM_ZERO = Range(lowest=0.0)
+
+
+def quantity(si_unit: str, allowed: Range = ANY) -> Callable[[str], float]:
+    """Return what turns a text with a unit, such as ``10 min``, into a number in SI; ArgumentError for others.
+
+    A number alone is refused with examples, and one outside the range.
+    """
+
+    def value_of(text: str) -> float:
+
+        # A number alone is answered with what may be meant: the same number, in units that people write.
+        if si_unit in _EXAMPLES and _NUMBER.fullmatch(text.strip()):
+            what, units = _EXAMPLES[si_unit]
+            either = " or ".join(f"'{text.strip()} {unit}'" for unit in units)
+            raise ArgumentError(f"{text}: {what} needs its unit: {either}")
+        try:
+            value = parse_quantity(text, si_unit)
+        except UnitError as error:
+            raise ArgumentError(f"{text}: {error}") from error
+        if value not in allowed:
+            raise ArgumentError(f"{text}: must be {allowed.words(si_unit)}")
+        return value
+
+    return value_of
+
+
+def minutes(text: str) -> float:
+    """Return minutes from a number or a time with its unit; ArgumentError for any other text."""
+    try:
+        value = float(text) if _NUMBER.fullmatch(text) else parse_quantity(text, "s") / 60.0
+    except UnitError as error:
+        raise ArgumentError(f"{text!r}: must be a number of minutes, or a time such as '90 s': {error}") from error
+    if not 0.0 < value < math.inf:
+        raise ArgumentError(f"{text}: must be above 0 min, and finite")
+    return value
+
+
+def times(text: str) -> tuple[float, ...]:
+    """Return times [s] that are separated by commas; ArgumentError for any other text."""
+    try:
+        found = tuple(float(number_text(part)) for part in text.split(","))
+    except ValueError:
+        found = (math.nan,)
+    if not all(map(math.isfinite, found)):
+        raise ArgumentError(f"{text!r}: must be times in seconds, separated by commas, such as 0.63,1.86")
+    return found
+
+
+def task(text: str) -> tuple[str, list[str]]:
+    """Return a name and overrides from ``NAME:PATH=VALUE,...``; ArgumentError for any other text."""
+    name, colon, overrides = (part.strip() for part in text.partition(":"))
+    if not name or not colon or not overrides:
+        raise ArgumentError(f"{text}: is not of the form NAME:PATH=VALUE, for example 'slow:reference.ramp_time=2 s'")
+    return name, [item.strip() for item in overrides.split(",")]
+
+
+def point(text: str) -> float | str:
+    """Return a time [s], or ``equilibrium``; ArgumentError for any other text."""
+    if text.strip() == "equilibrium":
+        return "equilibrium"
+    try:
+        return quantity("s")(text)
+    except ArgumentError as error:
+        raise ArgumentError(f"{text!r}: must be a time such as '1.5 s', or 'equilibrium'") from error
+
+
+def taken_address(value: Any) -> str:
+    """Return the address of a scheduler, which has a port or a protocol; ValueError for anything else."""
+    text = taken_text(value)
+    if ":" not in text:
+        raise ValueError
+    return text
+
+
+def taken_text(value: Any) -> str:
+    """Return a text with something in it; ValueError for anything else."""
+    if not isinstance(value, str) or not value.strip() or "\0" in value:
+        raise ValueError
+    return value
+
+
+def _single(value: Any) -> Any:
+    """Return the Python number of an array without axes, and anything else as it is."""
+    return value.item() if getattr(value, "ndim", None) == 0 and hasattr(value, "item") else value
+
+
+def taken_flag(value: Any) -> bool:
+    """Return True or False, also of NumPy; ValueError for anything else."""
+    flag = _single(value)
+    if not isinstance(flag, bool):
+        raise ValueError
+    return flag
+
+
+def taken_whole(least: int) -> Callable[[Any], int]:
+    """Return what takes a whole number from ``least`` on, also of NumPy; ValueError for anything else."""
+
+    def take(value: Any) -> int:
+        whole = _single(value)
+        if isinstance(whole, bool) or not isinstance(whole, numbers.Integral) or not least <= int(whole) < _ABOVE_ALL:
+            raise ValueError
+        return int(whole)
+
+    return take
+
+
+def taken_number(allowed: Range = ANY, read: Callable[[str], float] | None = None) -> Callable[[Any], float]:
+    """Return what takes a finite number in a range, also of NumPy, or a text that ``read`` reads."""
+
+    def take(value: Any) -> float:
+        if isinstance(value, str) and read is not None and not _NUMBER.fullmatch(value.strip()):
+            return read(value)
+        single = _single(value)
+        if isinstance(single, bool) or not isinstance(single, numbers.Real) or not math.isfinite(single):
+            raise ValueError
+        if float(single) not in allowed:
+            raise ValueError
+        return float(single)
+
+    return take
+
+
+def taken_overrides(value: Any) -> tuple[str, ...]:
+    """Return overrides as texts ``PATH=VALUE``, from one, several, or a dictionary; ValueError for anything else.
+
+    A dictionary has paths, or tables of them, and texts, flags or numbers, which are in SI units.
+    """
+    if isinstance(value, Mapping):
+        return tuple(_overrides_of(value, ""))
+    texts = (value,) if isinstance(value, str) else value
+    if isinstance(texts, bytes) or not isinstance(texts, Iterable):
+        raise ValueError
+    return tuple(taken_text(text) for text in texts)
+
+
+def _overrides_of(table: Mapping[Any, Any], section: str) -> Iterator[str]:
+    for name, value in table.items():
+        path, single = f"{section}{taken_text(name)}", _single(value)
+        if isinstance(single, Mapping):
+            yield from _overrides_of(single, f"{path}.")
+        elif isinstance(single, bool):
+            yield f"{path}={str(single).lower()}"
+        elif isinstance(single, numbers.Integral):
+            yield f"{path}={int(single)} {SI}"
+        elif isinstance(single, numbers.Real) and math.isfinite(single):
+            yield f"{path}={float(single)!r} {SI}"
+        elif isinstance(single, str) and single.strip():
+            yield f"{path}={single}"
+        else:
+            raise ArgumentError(
+                f"{path} = {single!r}: must be a finite number in SI units, a flag or a text such as '12.6 mm^2'"
+            )
+
+
+def taken_tasks(value: Any) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    """Return pairs of a name and overrides, from a dictionary, pairs or texts; ValueError for anything else."""
+    if isinstance(value, Mapping):
+        pairs: Iterable[Any] = value.items()
+    else:
+        pairs = [
+            task(each) if isinstance(each, str) else each for each in ((value,) if isinstance(value, str) else value)
+        ]
+    return tuple((taken_text(name), taken_overrides(overrides)) for name, overrides in pairs)
+
+
+def taken_point(value: Any) -> float | str:
+    """Return a time [s] from a number or a text with its unit, or ``equilibrium``; ValueError for anything else."""
+    if isinstance(value, str) and not _NUMBER.fullmatch(value.strip()):
+        return point(value)
+    return taken_number()(value)
+
+
+def _quantity_word(metavar: str, si_unit: str, allowed: Range = ANY) -> Word:
+    """Return the word of a quantity: a text with its unit, and in Python a number in SI as well."""
+    read = quantity(si_unit, allowed)
+    shown = {"Pa_a": "Pa (absolute)"}.get(si_unit, si_unit)
+    ends = f", {allowed.words(shown)}," if allowed.words(shown) else ""
+    example = f"'1 {_EXAMPLES[si_unit][1][0]}'"
+    return Word(
+        metavar,
+        read,
+        taken_number(allowed, read),
+        f"a number in {shown}{ends} or a text with its unit such as {example}",
+    )
+
+
+def _minutes_word() -> Word:
+    return Word(
+        "N",
+        minutes,
+        taken_number(ABOVE_ZERO, minutes),
+        "a number of minutes above 0, or a text with its unit such as '90 s'",
+    )
+
+
+def fraction_word(help_text: str = "") -> Word:
+    """Return the word of a fraction from 0 to 1."""
+    return Word(
+        "FRACTION",
+        fraction,
+        taken_number(Range(0.0, highest=1.0), fraction),
+        "a number from 0 to 1, or a percentage such as '95%'",
+        help=help_text,
+    )
+
+
+def whole_word(least: int, help_text: str = "") -> Word:
+    """Return the word of a whole number from ``least`` on."""
+    read = whole_number if least == 0 else counting_number
+    what = f"a whole number, {least} or more, of at most {_MAXIMUM_DIGITS} digits"
+    return Word("N", read, taken_whole(least), what, help=help_text)
+
+
+Whole = Annotated[int, whole_word(0)]
+Count = Annotated[int, whole_word(1)]
+Minutes = Annotated[float, _minutes_word()]
+Mass = Annotated[float, _quantity_word("MASS", "kg", ABOVE_ZERO)]
+Length = Annotated[float, _quantity_word("LENGTH", "m", ABOVE_ZERO)]
+Time = Annotated[float, _quantity_word("TIME", "s")]
+Duration = Annotated[float, _quantity_word("TIME", "s", FROM_ZERO)]
+Patience = Annotated[float, _quantity_word("TIME", "s", Range(above=0.0, highest=3600.0))]
+Torque = Annotated[float, _quantity_word("TORQUE", "N m", ABOVE_ZERO)]
+Pressure = Annotated[float, _quantity_word("PRESSURE", "Pa_a", ABOVE_ZERO)]
+Flow = Annotated[float, _quantity_word("FLOW", "kg/s", ABOVE_ZERO)]
+Volume = Annotated[float, _quantity_word("VOLUME", "m^3", ABOVE_ZERO)]
+Speed = Annotated[float, _quantity_word("SPEED", "m/s", ABOVE_ZERO)]
+Frequency = Annotated[float, _quantity_word("FREQUENCY", "Hz", ABOVE_ZERO)]
+Angle = Annotated[float, _quantity_word("ANGLE", "rad")]
+Name = Annotated[str, Word("NAME")]
+Port = Annotated[str, Word("PORT")]
+Folder = Annotated[Path, Word("DIR", Path)]
+File = Annotated[Path, Word("FILE", Path)]
+FileOrName = Annotated[str | Path, Word("FILE")]
+Scenario = Annotated[str, Word("SCENARIO", help="name of a scenario or of a walk, or a .toml file")]
+SetName = Annotated[str, Word("SET", help="name of a parameter set, or a .toml file")]
+Gait = Annotated[str | Path, Word("GAIT", help="name of a gait, or a gait file (.toml)")]
+Overrides = Annotated[
+    Mapping[str, Any] | Iterable[str],
+    Word(
+        "PATH=VALUE",
+        take=taken_overrides,
+        what="texts such as 'valve.area=12.6 mm^2', or a dictionary such as {'valve.area': '12.6 mm^2'}, "
+        "where a number is in SI units",
+        option="--set",
+        help="override one value, for example valve.area=12.6mm^2; may be repeated",
+        takes_all=True,
+    ),
+]
+Seed = Annotated[int, whole_word(0, "random seed; default: the file's")]
+Threads = Annotated[int, whole_word(1, "number of threads; default: all cores")]
+Confidence = Annotated[float, fraction_word("confidence of all intervals; default 95%")]
+MaximumFailed = Annotated[
+    float, fraction_word("fraction of the runs that may fail before the study is refused; default {default}")
+]
+Address = Annotated[str, Word("ADDRESS", take=taken_address, what="an address such as 'tcp://10.0.0.1:8786'")]
+Fraction = Annotated[float, fraction_word()]
+Side = Annotated[str, Word("right|left", help="which foot; default right")]
+Metrics = Annotated[Sequence[str], Word("NAME", option="--metric")]
+Point = Annotated[
+    float | str, Word("TIME", point, taken_point, "a number of seconds, a time such as '1.5 s', or 'equilibrium'")
+]
+Tasks = Annotated[
+    Mapping[str, Mapping[str, Any] | Sequence[str]] | Sequence[tuple[str, Sequence[str]]],
+    Word(
+        "NAME:PATH=VALUE[,PATH=VALUE]",
+        task,
+        taken_tasks,
+        "overrides by the name of a task, such as {'slow': {'reference.ramp_time': '2 s'}}",
+        option="--task",
+        is_repeated=True,
+        takes_all=True,
+    ),
+]

@@ -1,0 +1,46 @@
+"""Channels that can be traced at a sample, and where a lane has their numbers."""
+
+from collections.abc import Mapping
+
+from ppafo.engine.rows import leaf_paths
+from ppafo.signals.meter import Sample
+
+TRACED: dict[str, str] = {
+    **{name: f"sample.{name}" for name in Sample._fields if name not in ("number", "foot", "stride")},
+    **{name: f"state.{name}" for name in ("mass_1", "mass_2", "supplied_mass", "vented_mass", "leaked_mass")},
+}
+"""Channels that can be traced, and where a lane has them."""
+TRACED_IN_WALKS: dict[str, str] = {
+    "strides": "walk.strides",
+    "phase": "walk.now.phase",
+    "contact": "walk.contact",
+    "shank_angle": "walk.now.shank",
+    "healthy_angle": "walk.now.ankle",
+    "external_torque": "walk.external_torque",
+    "heel_force": "walk.heel_force",
+    "toe_force": "walk.toe_force",
+    "positive_push_off_work": "walk.positive_push_off_work",
+    "net_push_off_work": "walk.net_push_off_work",
+    "controller_phase": "controller_state.phase.phase",
+    "safe_state": "controller_state.safety.level",
+    "gait_fraction": "clock.fraction",
+}
+"""Further ones of a walk: how the path of a number of its state ends, which not every controller has."""
+REQUEST = "controller_state.request.torque"
+"""Where a controller of walking keeps the torque that it wants, if it wants one."""
+TRUE_MASSES = {name: f"masses.{name}" for name in ("mass_1", "mass_2")}
+"""Paths of the true masses, which a recording shows for gas with an energy balance or that is not ideal."""
+
+
+def walk_traces(states: Mapping[str, type]) -> dict[str, str]:
+    """Channels of ``TRACED_IN_WALKS`` that groups of states of a walk have, and the paths of their numbers."""
+    paths = [path for name, row in states.items() for path in leaf_paths(row, name)]
+    found = {
+        name: next((path for path in paths if path.endswith(ending)), "") for name, ending in TRACED_IN_WALKS.items()
+    }
+    return {name: path for name, path in found.items() if path}
+
+
+def paths_of_traces(states: Mapping[str, type], walks: bool, has_true_masses: bool) -> dict[str, str]:
+    """Where a lane has each channel that is no number of the state by its own path."""
+    return TRACED | (walk_traces(states) if walks else {}) | (TRUE_MASSES if has_true_masses else {})

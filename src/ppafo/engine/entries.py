@@ -1,0 +1,83 @@
+"""Entries of composed texts: functions that Python calls, with arrays and numbers, and that return nothing.
+
+A text is Python with two marks: ``@entry`` states the types of the parameters of a function, ``@inline`` stands before
+what the entries call. Every compiler reads them there; Python itself runs the text with marks that do nothing.
+"""
+
+import ast
+import inspect
+import re
+import textwrap
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
+from typing import Annotated, Any, Protocol, TypeAlias, get_type_hints, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+FLOAT, INT = "float64", "int64"
+ARRAY, ARRAY_2D, ARRAY_3D = "float64[::1]", "float64[:, ::1]", "float64[:, :, ::1]"
+
+Vector: TypeAlias = Annotated[NDArray[np.float64], ARRAY]
+"""Numbers in a row, as a parameter of a function for ``array_module``."""
+Table: TypeAlias = Annotated[NDArray[np.float64], ARRAY_2D]
+"""Numbers in rows, the last index running quickest."""
+
+HEADER = '''"""Generated from the functions of ppafo; their hash is in the file name. Not to be edited."""
+
+import math
+from collections import namedtuple
+'''
+"""What a text begins with."""
+INLINE = "@inline"
+"""The mark of functions that its entries call."""
+ENTRY = '@entry("void({})")'
+"""The mark of an entry, for the types of its parameters."""
+
+_ENTRY = re.compile(r"""^@entry\((["'])void\(([^"'\n]*)\)\1\)\ndef (\w+)\(""", re.MULTILINE)
+_TYPE = re.compile(r"float64\[.*?\]|float64|int64")
+
+
+@runtime_checkable
+class Packing(Protocol):
+    """An entry that is quicker where its arrays are handed over once."""
+
+    def with_arrays(self, *arrays: NDArray[np.float64]) -> Callable[..., None]:
+        """The entry as a function of what follows its arrays."""
+
+
+def with_arrays(entry: Callable[..., None], *arrays: NDArray[np.float64]) -> Callable[..., None]:
+    """An entry of a loaded module as a function of its numbers alone; the arrays, its first arguments, stay the same.
+
+    A call then costs what one with a few numbers costs.
+    """
+    return entry.with_arrays(*arrays) if isinstance(entry, Packing) else partial(entry, *arrays)
+
+
+def entry_text(name: str, parameters: Mapping[str, str], lines: Iterable[str]) -> str:
+    """Text of an entry, from the types of its parameters in order and the lines of its body."""
+    head = ENTRY.format(", ".join(parameters.values()))
+    return "\n".join([head, f"def {name}({', '.join(parameters)}):", *(f"    {line}" for line in lines), ""])
+
+
+def entry_types(source: str) -> dict[str, list[str]]:
+    """Types of the parameters of all entries of a text, in order, by the name of the entry."""
+    return {found[3]: _TYPE.findall(found[2]) for found in _ENTRY.finditer(source)}
+
+
+def array_module(functions: Iterable[Callable[..., None]]) -> str:
+    """Text of a module with these functions as its entries: each goes through its arrays and calls only ``math``.
+
+    Their parameters are annotated as ``Vector``, ``Table``, ``float`` or ``int``.
+    """
+    plain: dict[Any, str] = {float: FLOAT, int: INT}
+    entries = []
+    for function in functions:
+        hints = get_type_hints(function, include_extras=True)
+        types = {name: plain.get(hint) or hint.__metadata__[0] for name, hint in hints.items() if name != "return"}
+        (tree,) = ast.parse(textwrap.dedent(inspect.getsource(function))).body
+        assert isinstance(tree, ast.FunctionDef)
+        body = tree.body[1:] if ast.get_docstring(tree) is not None else tree.body
+        lines = [line for item in body for line in ast.unparse(item).split("\n")]
+        entries.append(entry_text(function.__name__, types, lines))
+    return "\n\n".join([HEADER, *entries])

@@ -1,0 +1,195 @@
+"""Functions of the step in the text of a module, for one program."""
+
+import ast
+from collections import namedtuple
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from types import FunctionType
+from typing import Any
+
+from ppafo.engine.linking import link_program
+from ppafo.engine.plain_python import check_flow, check_grammar
+from ppafo.engine.program import Program
+from ppafo.engine.reduction import NUMBER, Effects, Reduction
+from ppafo.engine.source_text import (
+    Composer,
+    Names,
+    SourceCollector,
+    emitted_name,
+    is_step_function,
+)
+from ppafo.errors import ProgramError
+
+
+@dataclass(slots=True)
+class Composed:
+    """A function of the step in the module: its name, what it reads and sets, what is known of its arguments."""
+
+    function: FunctionType
+    name: str
+    effects: Effects
+    handed: tuple[str, ...]
+    known: Mapping[str, Any]
+    row: Any
+    """The NamedTuple class of what it returns, None where that is one value."""
+    is_phase: bool
+    ending: str
+
+    @property
+    def own(self) -> str:
+        """Name of what it returns, where that is a row."""
+        return f"after_{self.function.__name__}{self.ending if self.name.endswith(self.ending) else ''}"
+
+
+@dataclass(slots=True)
+class StepText:
+    """Gathers the functions of the step of one program in a collector, which has those of the model.
+
+    A collector may have the steps of two programs: what both have alike is there once.
+    """
+
+    parts: Program
+    collector: SourceCollector
+    ending: str = ""
+    """What the names of functions end with that another program has otherwise."""
+    further: Mapping[str, Any] = field(default_factory=dict)
+    """Classes of groups that are not the program's own."""
+    states: dict[str, Any] = field(init=False)
+    parameters: dict[str, Any] = field(init=False)
+    of_step: dict[str, Any] = field(init=False)
+    composed: dict[FunctionType, Composed] = field(default_factory=dict)
+    kept: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Look up the groups of the program, and let its components stand for what they stand for."""
+        self.states, self.parameters = self.parts.state_rows(), self.parts.parameter_rows()
+        self.of_step = self.parts.step_rows()
+        link_program(self.parts, self.collector)
+
+    @property
+    def rows(self) -> Mapping[str, Any]:
+        """Classes of the groups that have rows."""
+        return {**self.parameters, **self.states, **self.of_step, **self.further}
+
+    def phase(self, function: Callable[..., Any], known: Mapping[str, Any] | None = None) -> Composed:
+        """A function that the loop over steps calls: of what it sets it returns what later phases may read."""
+        assert isinstance(function, FunctionType), "it is no other callable"
+        return self._composed(function, known or {}, is_phase=True)
+
+    def add_called(self, inside: FunctionType, called: FunctionType, known: Mapping[str, Any]) -> str:
+        """Add a function that another calls, with what is known of its arguments; return its name in the module."""
+        if is_step_function(called):
+            return self._composed(called, known, is_phase=False).name
+        return self.collector.add_inside(inside, called)
+
+    def effects_of(self, name: str) -> Effects:
+        """What a function of the step reads and sets."""
+        return next(item.effects for item in self.composed.values() if item.name == name)
+
+    def handed_to(self, name: str) -> tuple[str, ...]:
+        """Names that a function of the module is handed before its own arguments."""
+        return self.collector.needs.get(name, ())
+
+    def keep(self, value: Any) -> str:
+        """A name that stands for a value in a reduced function."""
+        name = f"kept_{id(value)}"
+        self.kept[name] = value
+        return name
+
+    def value_kept(self, name: str) -> Any:
+        """The value that such a name stands for; KeyError for any other name."""
+        return self.kept[name]
+
+    def note_read(self, scope: Mapping[str, Any], name: str) -> None:
+        """Keep that a name was looked up."""
+        self.collector.note_read(scope, name, scope[name])
+
+    def composer(self, function: FunctionType, names: Names) -> Composer:
+        """What replaces names from outside a function of the step that was reduced."""
+        return Composer(
+            function,
+            lambda item: self._name_inside(function, item),
+            self.collector.note_read,
+            self.handed_to,
+            self.collector.stands_for,
+            names,
+        )
+
+    def _name_inside(self, function: FunctionType, item: Any) -> str:
+        """The name in the module of what a function of the step calls."""
+        return self.composed[item].name if item in self.composed else self.collector.add_inside(function, item)
+
+    def _composed(self, function: FunctionType, known: Mapping[str, Any], is_phase: bool) -> Composed:
+        done = self.composed.get(function)
+        if done is None:
+            done = self.composed[function] = self._compose(function, known, is_phase)
+        if done.known != known or done.is_phase != is_phase:
+            raise ProgramError(f"{function.__name__} stands in one step for two different functions")
+        return done
+
+    def _compose(self, function: FunctionType, known: Mapping[str, Any], is_phase: bool) -> Composed:
+        reduction = Reduction(self, function, known)
+        tree = reduction.reduced()
+        effects = reduction.effects
+        if is_phase:
+            # What nothing has rows for lives in this phase.
+            effects.groups = {name: fields for name, fields in effects.groups.items() if name in self.rows}
+        returns = any(isinstance(node, ast.Return) for node in ast.walk(tree))
+        if returns and effects.results:
+            raise reduction.refuse(tree, f"'{function.__name__}' gives a value and sets groups of its lane")
+        row = None
+        if not returns and len(effects.results) > 1:
+            row = self._result_row(function, tuple(effects.results))
+        if not returns:
+            given: list[ast.expr] = [ast.Name(name, ast.Load()) for name in effects.results]
+            value = given[0] if len(given) == 1 else ast.Tuple(given, ast.Load())
+            whole = value if row is None else ast.Call(ast.Name(self.keep(row), ast.Load()), given, [])
+            tree.body = [*tree.body, ast.copy_location(ast.Return(whole), tree)]
+        handed = tuple(item.arg for item in tree.args.args)
+        handed = handed[: len([name for name in handed if name in effects.reads or name == NUMBER])]
+        name = self._written(function, tree, handed)
+        return Composed(
+            function=function,
+            name=name,
+            effects=effects,
+            handed=handed,
+            known=known,
+            row=row,
+            is_phase=is_phase,
+            ending=self.ending,
+        )
+
+    def _written(self, function: FunctionType, tree: ast.FunctionDef, handed: tuple[str, ...]) -> str:
+        """Put the text of a reduced function into the module; return its name there."""
+        file = function.__code__.co_filename
+        ast.fix_missing_locations(tree)
+        check_grammar(tree, file)
+        local = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
+        local |= {item.arg for item in tree.args.args}
+        check_flow(tree, file, local)
+        rows = {name: kind for name, kind in self.rows.items() if name in local}
+        composer = self.composer(function, Names(frozenset(local), self.kept, rows))
+        tree.returns, tree.decorator_list = None, []
+        tree.body = [composer.visit(item) for item in tree.body]
+        ast.fix_missing_locations(tree)
+        tree.name = emitted_name(function)
+        text = self.collector.decorated(tree, file)
+        if self.ending and text != self.collector.definitions.get(tree.name, ""):
+            tree.name += self.ending
+            text = self.collector.decorated(tree, file)
+        self.collector.define(tree.name, function, text)
+        if handed:
+            self.collector.needs[tree.name] = handed
+        return tree.name
+
+    def _result_row(self, function: FunctionType, names: tuple[str, ...]) -> Any:
+        """The NamedTuple class of what a function of the step sets."""
+        make: Any = namedtuple
+        own = f"{function.__name__}_result"
+        row = make(own, names)
+        row.__module__, row.__qualname__, row.__doc__ = function.__module__, own, f"What ``{function.__name__}`` sets."
+        known = self.collector.owners.get(emitted_name(row))
+        if known is None or known._fields == names:
+            return row if known is None else known
+        row.__qualname__ += self.ending
+        return row

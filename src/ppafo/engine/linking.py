@@ -1,0 +1,123 @@
+"""What a program calls in the place of functions of the model; single functions with the laws of effects in them."""
+
+import math
+from collections import namedtuple
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+from ppafo.engine.over_samples import called_over_samples, in_columns
+from ppafo.engine.program import Program
+from ppafo.engine.scheme.actuators import links_of
+from ppafo.engine.source_text import Collector, SourceCollector
+from ppafo.errors import ProgramError
+from ppafo.model.effects.kind import Effect, effect_problem, laws_in_order
+
+
+def link_program(program: Program, collector: Collector) -> None:
+    """Let a collector call what the components of a program have in the place of functions of the model.
+
+    ProgramError for an effect that cannot act, or whose name other rows of the program have.
+    """
+    own = links_of(program.actuator)
+    collector.links.update(own)
+    if not program.effects:
+        return
+    # Names of rows without any effect: two effects that share a name are refused by the catalogue.
+    bare = replace(program, effects=())
+    taken = {*bare.parameter_rows(), *bare.state_rows(), *bare.step_rows()}
+    for effect in program.effects:
+        if taken & set(effect.rows):
+            raise ProgramError(f"effect '{effect.name}': other rows of a program have this name; it needs another")
+    link_effects(program.effects, collector, own)
+
+
+def link_effects(effects: Sequence[Effect], collector: Collector, own: Mapping[Any, Any] | None = None) -> None:
+    """Let a collector call the laws of effects at their ports, of which an actuator may have its ``own``.
+
+    ProgramError for an effect that cannot act.
+    """
+    for effect in effects:
+        problem = effect_problem(effect)
+        if problem:
+            raise ProgramError(f"effect '{effect.name}': {problem}")
+    for key, stands in laws_in_order(effects).items():
+        collector.links[key] = (own or {}).get(stands, stands)
+    for effect in effects:
+        for law in effect.laws.values():
+            # By the names of its parameters: a law says itself which structs it needs.
+            asked = law.__code__.co_varnames[: law.__code__.co_argcount]
+            collector.effects[law] = tuple(row for row in effect.rows if row in asked)
+
+
+class Composed(NamedTuple):
+    """A function of the model as Python calls it with effects: before its own arguments it takes ``needed`` rows.
+
+    ``of_columns`` is the same over columns of samples, None where it has no such form.
+    """
+
+    function: Callable[..., Any]
+    needed: tuple[str, ...]
+    of_columns: Callable[..., Any] | None
+
+
+def composed_with(function: Callable[..., Any], effects: Sequence[Effect]) -> Composed | None:
+    """Return a function of the model with the laws of effects in it; None where no effect acts in it."""
+    if not effects:
+        return None
+    collector, composed = _composed_with(function, tuple(effects))
+    if collector.made_from.is_current():
+        return composed
+    _composed_with.cache_clear()
+    return _composed_with(function, tuple(effects))[1]
+
+
+@lru_cache(maxsize=64)
+def _composed_with(
+    function: Callable[..., Any], effects: tuple[Effect, ...]
+) -> tuple[SourceCollector, Composed | None]:
+    collector = SourceCollector("")
+    link_effects(effects, collector)
+    name = collector.add(function)
+    if name not in collector.needs:
+        return collector, None
+    scope: dict[str, Any] = {"math": math, "namedtuple": namedtuple}
+    text = collector.text()
+    # The composed text runs as plain Python: solvers and recordings call single functions, not programs.
+    exec(text, scope)
+    return collector, Composed(scope[name], tuple(collector.needs[name]), in_columns(text, name))
+
+
+def python_place(
+    place: Callable[..., Any], effects: Sequence[Effect], rows: Sequence[Any]
+) -> Callable[..., Any] | None:
+    """Return a port as Python calls it with effects and their parameters; None where no effect acts there.
+
+    Before its own arguments it takes the states of effects by name. Any other function of the model will do too.
+    """
+    composed = composed_with(place, effects)
+    if composed is None:
+        return None
+    given = {effect.name: row for effect, row in zip(effects, rows, strict=True)}
+
+    def called(states: Mapping[str, Any], *own: float) -> Any:
+        return composed.function(*((given | dict(states))[row] for row in composed.needed), *own)
+
+    return called
+
+
+def place_over_samples(
+    place: Callable[..., Any], effects: Sequence[Effect], rows: Sequence[Any]
+) -> Callable[..., Any] | None:
+    """Return what ``python_place`` does, for states and arguments whose numbers are columns (samples,)."""
+    composed = composed_with(place, effects)
+    if composed is None:
+        return None
+    given = {effect.name: row for effect, row in zip(effects, rows, strict=True)}
+
+    def called(states: Mapping[str, Any], *own: Any) -> Any:
+        of_effects = ((given | dict(states))[row] for row in composed.needed)
+        return called_over_samples(composed.function, composed.of_columns, *of_effects, *own)
+
+    return called

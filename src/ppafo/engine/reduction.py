@@ -1,0 +1,613 @@
+"""A function of the step for one program: what asks the parts alone is worked out, groups become arguments and results.
+
+Three things tell a function of ``engine.step`` from one of the model. ``parts`` is known while it is composed, and with
+it each name that gets its value from nothing else: what asks them alone is worked out here, by Python, so that branches
+and loops over them fall away. ``lane.GROUP`` is a name, which whoever calls the function hands over, as rows of effects
+are. And a group that the function sets is what it returns.
+"""
+
+import ast
+import builtins
+import sys
+import types
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from copy import copy, deepcopy
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+from types import CodeType, FunctionType
+from typing import Any, NamedTuple, Protocol
+
+from ppafo.engine.plain_python import parse_module, refusal
+from ppafo.engine.rows import is_number, members
+from ppafo.engine.source_text import is_row, is_step_function
+from ppafo.errors import ProgramError
+
+HISTORIES = frozenset({"signal_history", "command_history", "trace"})
+"""Arrays that a lane has a column of; the last of their places is the lane's number."""
+NUMBER = "lane_number"
+"""Name of the number of a lane in a composed function."""
+_GROUP = "@"
+"""Before the name of a group in a reduced function, until names are told apart."""
+_UNKNOWN = object()
+
+
+def is_known_part(value: Any) -> bool:
+    """True for what is known while composing and no number, so that a function that is called knows it, too."""
+    return value is not _UNKNOWN and type(value) not in (bool, int, float)
+
+
+class Slot(NamedTuple):
+    """Where in a history a function sets a number: its places but the last, in terms of the function's parameters."""
+
+    history: str
+    places: tuple[ast.expr, ...]
+
+
+Fields = frozenset[str] | None
+"""Fields of a group that change; None for all of them."""
+
+
+@dataclass(slots=True)
+class Effects:
+    """What a function reads of its lane, and what it sets, in the order in which it does.
+
+    What it sets are groups, with the fields that change, and numbers of histories.
+    """
+
+    reads: dict[str, None] = field(default_factory=dict)
+    takes: tuple[str, ...] = ()
+    """Those of its own parameters that it asks."""
+    groups: dict[str, Fields] = field(default_factory=dict)
+    slots: dict[str, Slot] = field(default_factory=dict)
+
+    @property
+    def results(self) -> list[str]:
+        """Names of what the function returns."""
+        return [*self.groups, *self.slots]
+
+
+class Gathering(Protocol):
+    """What a reduction asks of the collector that it works for."""
+
+    @property
+    def parts(self) -> Any:
+        """What the device is made of."""
+
+    @property
+    def rows(self) -> Mapping[str, Any]:
+        """Classes of the groups that have rows."""
+
+    def add_called(self, inside: FunctionType, called: FunctionType, known: Mapping[str, Any]) -> str:
+        """Add a function that another calls, with what is known of its arguments; return its name in the module."""
+
+    def effects_of(self, name: str) -> Effects:
+        """What a function of the module reads and sets."""
+
+    def handed_to(self, name: str) -> tuple[str, ...]:
+        """Names that a function of the module is handed before its own arguments."""
+
+    def keep(self, value: Any) -> str:
+        """A name that stands for a value in a reduced function."""
+
+    def value_kept(self, name: str) -> Any:
+        """The value that such a name stands for; KeyError for any other name."""
+
+    def note_read(self, scope: Mapping[str, Any], name: str) -> None:
+        """Keep that a name was looked up."""
+
+
+@dataclass(slots=True)
+class Definition:
+    """The syntax tree of a function, names that its nodes read, and expressions compiled so far."""
+
+    tree: ast.FunctionDef
+    names: dict[int, frozenset[str]] = field(default_factory=dict)
+    codes: dict[int, tuple[CodeType, bool]] = field(default_factory=dict)
+
+    def read_in(self, node: ast.AST) -> frozenset[str]:
+        """Names that an expression reads and does not set itself."""
+        known = self.names.get(id(node))
+        if known is None:
+            if isinstance(node, ast.Name):
+                known = frozenset({node.id})
+            else:
+                known = frozenset().union(*map(self.read_in, ast.iter_child_nodes(node)))
+                if isinstance(node, ast.GeneratorExp):
+                    known -= {item.id for loop in node.generators for item in names_in(loop.target)}
+            self.names[id(node)] = known
+        return known
+
+    def value(self, node: ast.expr, scope: dict[str, Any], known: dict[str, Any]) -> Any:
+        """The value of an expression."""
+        if id(node) not in self.codes:
+            whole = ast.fix_missing_locations(ast.Expression(node))
+            is_nested = any(isinstance(item, ast.GeneratorExp) for item in ast.walk(node))
+            self.codes[id(node)] = compile(whole, "<parts>", "eval"), is_nested
+        code, is_nested = self.codes[id(node)]
+        # What stands in a generator sees no local names.
+        return eval(code, {**scope, **known}) if is_nested else eval(code, scope, known)
+
+
+def names_in(node: ast.AST) -> list[ast.Name]:
+    """All names in a tree."""
+    return [item for item in ast.walk(node) if isinstance(item, ast.Name)]
+
+
+@lru_cache(maxsize=256)
+def definition_of(function: FunctionType) -> Definition:
+    """The definition of a function of the step. ProgramError where its source cannot be read."""
+    file = sys.modules[function.__module__].__file__ if function.__module__ in sys.modules else None
+    found = _definitions(file or "").get(function.__code__.co_firstlineno)
+    if found is None:
+        raise ProgramError(f"cannot compile {function.__qualname__}: its source text is not available")
+    return Definition(found)
+
+
+@lru_cache(maxsize=64)
+def _definitions(file: str) -> dict[int, ast.FunctionDef]:
+    """Functions of a file by their lines."""
+    try:
+        tree = parse_module(Path(file).read_text(encoding="utf-8"), file)
+    except (OSError, SyntaxError):
+        return {}
+    return {item.lineno: item for item in tree.body if isinstance(item, ast.FunctionDef)}
+
+
+class Reduction:
+    """Reduces one function; ``known`` are names whose values are known, ``parts`` among them."""
+
+    def __init__(self, collector: Gathering, function: FunctionType, known: Mapping[str, Any]) -> None:
+        self.collector, self.function = collector, function
+        self.definition = definition_of(function)
+        self.scope: dict[str, Any] = function.__globals__
+        self.known: dict[str, Any] = {"parts": collector.parts, **known}
+        # A name that a generator asks is no plain local one.
+        self.running = {*function.__code__.co_varnames, *function.__code__.co_cellvars} - self.known.keys()
+        stored = [item.id for item in names_in(self.definition.tree) if isinstance(item.ctx, ast.Store)]
+        self.times_set = {name: stored.count(name) for name in stored}
+        self.effects = Effects()
+        self.assigned: set[str] = set()
+        self.parameters = [item.arg for item in self.definition.tree.args.args]
+        self.renamed: dict[str, str] = {}
+
+    def refuse(self, where: ast.AST, problem: str) -> ProgramError:
+        """The error for a place in the function."""
+        return refusal(self.function.__code__.co_filename, where, problem)
+
+    def reduced(self) -> ast.FunctionDef:
+        """The function, with the groups that it reads as its first parameters, and without what it returns of them."""
+        tree = copy(self.definition.tree)
+        tree.body = self.block(tree.body)
+        taken = {*self.effects.reads, *self.effects.results}
+        asked = {item.id for line in tree.body for item in names_in(line)}
+        own = [name for name in self.parameters if name != "lane" and name not in self.known and name in asked]
+        self.effects.takes = tuple(own)
+        # A local name that is also a group's has another spelling.
+        names = _Names({name for name in _bound(tree.body) | set(own) if name in taken})
+        tree.body = [names.visit(item) for item in tree.body]
+        handed = [NUMBER, *self.effects.reads] if HISTORIES & self.effects.reads.keys() else [*self.effects.reads]
+        tree.args = ast.arguments(
+            [], [ast.arg(name) for name in [*dict.fromkeys(handed), *map(names.spelling, own)]], None, [], [], None, []
+        )
+        return tree
+
+    # What is known.
+
+    def value_of(self, node: ast.expr) -> Any:
+        """The value of an expression that asks known names alone, one of them at least; else ``_UNKNOWN``."""
+        read = self.definition.read_in(node)
+        if read & self.running or not read & self.known.keys():
+            return _UNKNOWN
+        for name in read - self.known.keys():
+            if name in self.scope:
+                self.collector.note_read(self.scope, name)
+        try:
+            return self.definition.value(node, self.scope, self.known)
+        except (NameError, AttributeError, TypeError) as error:
+            raise self.refuse(node, f"'{ast.unparse(node)}': {error}") from error
+
+    def outside(self, node: ast.expr) -> Any:
+        """What an expression stands for outside the function; ``_UNKNOWN`` where it has a value only inside."""
+        value = self.value_of(node)
+        if value is not _UNKNOWN:
+            return value
+        if isinstance(node, ast.Name) and node.id not in self.running:
+            return self.scope.get(node.id, getattr(builtins, node.id, _UNKNOWN))
+        if isinstance(node, ast.Attribute):
+            owner = self.outside(node.value)
+            return getattr(owner, node.attr, _UNKNOWN) if isinstance(owner, types.ModuleType) else _UNKNOWN
+        return _UNKNOWN
+
+    def written(self, value: Any) -> ast.expr:
+        """An expression for a value that is known."""
+        if value is None or type(value) in (bool, int, float):
+            return ast.Constant(value)
+        return ast.Name(self.collector.keep(value), ast.Load())
+
+    # Expressions.
+
+    def visit(self, node: ast.expr) -> ast.expr:
+        """An expression without what is known."""
+        value = self.value_of(node)
+        if value is not _UNKNOWN:
+            return ast.copy_location(self.written(value), node)
+        handler: Callable[[Any], ast.expr] = getattr(self, f"of_{type(node).__name__.lower()}", self.whole)
+        return ast.copy_location(handler(node), node)
+
+    def whole(self, node: ast.expr) -> ast.expr:
+        """An expression whose parts are reduced."""
+        made = copy(node)
+        for name, value in ast.iter_fields(node):
+            if isinstance(value, ast.expr):
+                setattr(made, name, self.visit(value))
+            elif isinstance(value, list):
+                setattr(made, name, [self.part(item) for item in value])
+        return made
+
+    def part(self, node: ast.AST) -> ast.AST:
+        """One of several parts of an expression."""
+        if isinstance(node, ast.keyword):
+            return ast.keyword(node.arg, self.visit(node.value))
+        return self.visit(node) if isinstance(node, ast.expr) else node
+
+    def asked(self, node: ast.expr) -> ast.expr:
+        """A test, which is a constant where it is known."""
+        value = self.value_of(node)
+        return self.visit(node) if value is _UNKNOWN else ast.Constant(bool(value))
+
+    def of_name(self, node: ast.Name) -> ast.expr:
+        """A name."""
+        return ast.Name(self.renamed.get(node.id, node.id), node.ctx)
+
+    def of_ifexp(self, node: ast.IfExp) -> ast.expr:
+        """A choice: the side that is decided on, else both."""
+        test = self.asked(node.test)
+        if isinstance(test, ast.Constant):
+            return self.visit(node.body if test.value else node.orelse)
+        return ast.IfExp(test, self.visit(node.body), self.visit(node.orelse))
+
+    def of_boolop(self, node: ast.BoolOp) -> ast.expr:
+        """What is left of a link of conditions."""
+        ends, made = isinstance(node.op, ast.Or), list[ast.expr]()
+        for item in node.values:
+            value = self.asked(item)
+            if not isinstance(value, ast.Constant):
+                made.append(value)
+            elif bool(value.value) is ends:
+                # What stands before it has no effect but its value.
+                return value
+        if not made:
+            return ast.Constant(not ends)
+        return made[0] if len(made) == 1 else ast.BoolOp(node.op, made)
+
+    def of_unaryop(self, node: ast.UnaryOp) -> ast.expr:
+        """A sign or a negation."""
+        inner = self.visit(node.operand)
+        if isinstance(node.op, ast.Not) and isinstance(inner, ast.Constant):
+            return ast.Constant(not inner.value)
+        return ast.UnaryOp(node.op, inner)
+
+    def of_attribute(self, node: ast.Attribute) -> ast.expr:
+        """A group, or a field."""
+        name = self.group(node)
+        return self.read(name) if name else self.whole(node)
+
+    def of_subscript(self, node: ast.Subscript) -> ast.expr:
+        """A group by its name, a number of a history, or an item."""
+        name = self.group(node)
+        if name:
+            group, *way = name.split(".")
+            found: ast.expr = self.read(group)
+            for item in way:
+                found = ast.Attribute(found, item, ast.Load())
+            return found
+        history = self.group(node.value)
+        if history in HISTORIES:
+            places = [self.visit(item) for item in _places(node)]
+            return ast.Subscript(
+                self.read(history), ast.Tuple([*places, ast.Name(NUMBER, ast.Load())], ast.Load()), ast.Load()
+            )
+        return self.whole(node)
+
+    def group(self, node: ast.expr) -> str:
+        """Name of the group, or path in one, that ``lane.GROUP`` or ``lane["GROUP"]`` stands for; else empty."""
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "lane":
+            return node.attr
+        if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Name) and node.value.id == "lane":
+            name = node.slice.value if isinstance(node.slice, ast.Constant) else self.value_of(node.slice)
+            if not isinstance(name, str):
+                raise self.refuse(node, f"'{ast.unparse(node)}' is no group that is known while this is composed")
+            return name
+        return ""
+
+    def read(self, name: str) -> ast.expr:
+        """The group of a name, handed over unless it was set before."""
+        if name not in self.assigned:
+            self.effects.reads[name] = None
+        return ast.Name(_GROUP + name, ast.Load())
+
+    def of_call(self, node: ast.Call) -> ast.expr:
+        """A call, with what the function is handed."""
+        called = self.outside(node.func)
+        called = getattr(called, "__wrapped__", called)
+        if called is getattr:
+            name = self.value_of(node.args[1])
+            return ast.Attribute(self.visit(node.args[0]), name, ast.Load())
+        if is_step_function(called):
+            name, given = self.called(called, node)
+            if self.collector.effects_of(name).results:
+                raise self.refuse(node, f"'{called.__name__}' sets groups of its lane, so that it gives no value")
+            return ast.Call(ast.Name(self.collector.keep(called), ast.Load()), given, [])
+        if isinstance(called, FunctionType):
+            for row in self.collector.handed_to(self.collector.add_called(self.function, called, {})):
+                self.read(row)
+        if called is _UNKNOWN:
+            return self.whole(node)
+        # Arguments that a generator makes are written out.
+        given = [part for item in node.args for part in self.arguments(item)]
+        named = [ast.keyword(item.arg, self.visit(item.value)) for item in node.keywords]
+        function = (
+            ast.Name(self.collector.keep(called), ast.Load())
+            if isinstance(called, FunctionType) or is_row(called)
+            else self.visit(node.func)
+        )
+        return ast.Call(function, given, named)
+
+    def called(self, called: FunctionType, node: ast.Call) -> tuple[str, list[ast.expr]]:
+        """Name in the module of a function of the step that is called, and its own arguments."""
+        names = called.__code__.co_varnames[: called.__code__.co_argcount]
+        if len(node.args) != len(names) or node.keywords:
+            raise self.refuse(node, f"{called.__name__}({', '.join(names)}): its arguments are given in their order")
+        own = list(zip(names, node.args, strict=True))[2:]
+        known = {name: self.value_of(item) for name, item in own}
+        known = {name: value for name, value in known.items() if is_known_part(value)}
+        name = self.collector.add_called(self.function, called, known)
+        effects = self.collector.effects_of(name)
+        for row in effects.reads:
+            self.read(row)
+        return name, [self.visit(item) for own_name, item in own if own_name in effects.takes]
+
+    def arguments(self, node: ast.expr) -> Iterator[ast.expr]:
+        """An argument, or those that ``*(... for ... in ...)`` stands for."""
+        if not isinstance(node, ast.Starred) or not isinstance(node.value, ast.GeneratorExp):
+            yield self.visit(node)
+            return
+        (loop,) = node.value.generators
+        assert isinstance(loop.target, ast.Name)
+        for item in self.items_of(loop.iter):
+            yield self.with_known({loop.target.id: item}, node.value.elt)
+
+    def with_known(self, more: Mapping[str, Any], node: ast.expr) -> ast.expr:
+        """An expression with some more names known."""
+        before, running = self.known, self.running
+        self.known, self.running = {**before, **more}, running - more.keys()
+        made = self.visit(node)
+        self.known, self.running = before, running
+        return made
+
+    def items_of(self, node: ast.expr) -> list[Any]:
+        """The items of what is gone through, which must be known."""
+        if self.definition.read_in(node) & self.running:
+            raise self.refuse(node, f"'{ast.unparse(node)}' is not known while this is composed")
+        return list(self.definition.value(node, self.scope, self.known))
+
+    # Statements.
+
+    def block(self, statements: Iterable[ast.stmt]) -> list[ast.stmt]:
+        """Some statements; what stands behind a ``return`` that is decided on is never reached."""
+        made: list[ast.stmt] = []
+        for item in statements:
+            made += [ast.copy_location(line, item) for line in self.statement(item)]
+            if made and isinstance(made[-1], ast.Return):
+                break
+        return made
+
+    def statement(self, node: ast.stmt) -> list[ast.stmt]:  # noqa: PLR0911 - one for each kind
+        """What a statement becomes."""
+        match node:
+            case ast.Expr(value=ast.Call() as call):
+                return self.call_that_sets(call)
+            case ast.Expr() | ast.Assert():
+                return []
+            case ast.Return(value=ast.expr() as value):
+                return [ast.Return(self.visit(value))]
+            case ast.If():
+                return self.branch(node)
+            case ast.For():
+                return self.unrolled(node)
+            case ast.Assign(targets=[target]):
+                return self.assignment(target, node.value)
+            case ast.AnnAssign(target=ast.Name() as target, value=ast.expr() as value):
+                return self.assignment(target, value)
+        raise self.refuse(node, f"'{ast.unparse(node).splitlines()[0]}' is no statement of a phase")
+
+    def branch(self, node: ast.If) -> list[ast.stmt]:
+        """A decision: of the parts one branch alone, else a group that only one of both sets is also read."""
+        test = self.asked(node.test)
+        if isinstance(test, ast.Constant):
+            return self.block(node.body if test.value else node.orelse)
+        before = set(self.assigned)
+        body, first = self.block(node.body), self.assigned
+        self.assigned = set(before)
+        otherwise = self.block(node.orelse)
+        for name in sorted((first ^ self.assigned) - before):
+            self.effects.reads[name] = None
+        self.assigned |= first
+        return [ast.If(test, body or [ast.Pass()], otherwise)]
+
+    def unrolled(self, node: ast.For) -> list[ast.stmt]:
+        """A loop over what is known, written out."""
+        made: list[ast.stmt] = []
+        # Names that live in one turn have another spelling in each: what they stand for may have another class.
+        begun = {item.id for item in names_in(self.definition.tree) if item.lineno < node.lineno}
+        own = [item for item in _bound(node.body) if item not in begun]
+        for number, item in enumerate(self.items_of(node.iter)):
+            targets = node.target.elts if isinstance(node.target, ast.Tuple) else [node.target]
+            values = item if isinstance(node.target, ast.Tuple) else (item,)
+            for target, value in zip(targets, values, strict=True):
+                assert isinstance(target, ast.Name)
+                self.known[target.id] = value
+                self.running.discard(target.id)
+            if number:
+                self.renamed |= {name: f"{name}_{number + 1}" for name in own}
+            made += self.block(node.body)
+        for name in own:
+            self.renamed.pop(name, None)
+        return made
+
+    def assignment(self, target: ast.expr, value: ast.expr) -> list[ast.stmt]:
+        """A value for names, groups, or a number of a history."""
+        if isinstance(target, ast.Name) and self.times_set[target.id] == 1:
+            known = self.value_of(value)
+            if known is not _UNKNOWN:
+                self.known[target.id] = known
+                self.running.discard(target.id)
+                return []
+        if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple) and not self.crosses(target, value):
+            pairs = zip(target.elts, value.elts, strict=True)
+            return [line for one, other in pairs for line in self.assignment(one, other)]
+        fields = self.fields_changed(target, value)
+        given = self.visit(value)
+        targets = target.elts if isinstance(target, ast.Tuple) else [target]
+        left = [self.set_target(item, fields) for item in targets]
+        row = self.collector.rows.get(left[0].id.removeprefix(_GROUP)) if left[0].id.startswith(_GROUP) else None
+        if len(left) == 1 and isinstance(given, ast.IfExp) and row is not None and not is_number(row):
+            given = self.number_by_number(row, given)
+        if len(left) == 1 and isinstance(given, ast.Name) and given.id == left[0].id:
+            return []
+        return [ast.Assign([ast.Tuple([*left], ast.Store()) if isinstance(target, ast.Tuple) else left[0]], given)]
+
+    def crosses(self, target: ast.Tuple, value: ast.Tuple) -> bool:
+        """True where one of several values reads what another sets."""
+        names = {ast.unparse(item) for item in target.elts}
+        return any(ast.unparse(item) in names for part in value.elts for item in ast.walk(part))
+
+    def set_target(self, item: ast.expr, fields: Fields) -> ast.Name:
+        """A name for what is set."""
+        name = self.group(item)
+        if name:
+            self.note_set(name, fields)
+            return ast.Name(_GROUP + name, ast.Store())
+        if isinstance(item, ast.Subscript) and self.group(item.value) in HISTORIES:
+            history, places = self.group(item.value), tuple(map(self.visit, _places(item)))
+            known = [place.value for place in places if isinstance(place, ast.Constant)]
+            # A trace has the names of its channels.
+            words = [self.collector.parts.traced[place] if history == "trace" else str(place) for place in known]
+            name = "_".join(["new", history.removesuffix("_history"), *words]).replace(".", "_")
+            self.note_slot(name, Slot(history, places), item)
+            return ast.Name(_GROUP + name, ast.Store())
+        if not isinstance(item, ast.Name):
+            raise self.refuse(item, f"'{ast.unparse(item)}' cannot be set in a phase")
+        return ast.Name(self.renamed.get(item.id, item.id), ast.Store())
+
+    def note_set(self, name: str, fields: Fields) -> None:
+        """Note a group that is set, and which of its fields change."""
+        known = self.effects.groups.get(name, frozenset())
+        self.effects.groups[name] = None if known is None or fields is None else known | fields
+        self.assigned.add(name)
+
+    def note_slot(self, name: str, slot: Slot, where: ast.AST) -> None:
+        """Note a number of a history that is set. ProgramError for a place that the loop over steps does not know."""
+        if any(item.id not in self.parameters for place in slot.places for item in names_in(place)):
+            raise self.refuse(where, "where a history is set must be a parameter, or a field of one")
+        self.effects.slots[name] = slot
+        self.assigned.add(name)
+
+    def fields_changed(self, target: ast.expr, value: ast.expr) -> Fields:
+        """Fields of a group that an assignment changes: those that ``_replace`` of the same group gives, else all."""
+        if not isinstance(value, ast.Call) or not isinstance(value.func, ast.Attribute):
+            return None
+        is_part = value.func.attr == "_replace" and self.group(target) == self.group(value.func.value) != ""
+        return frozenset(item.arg for item in value.keywords if item.arg is not None) if is_part else None
+
+    def number_by_number(self, row: Any, choice: ast.IfExp) -> ast.expr:
+        """A choice between two rows as the row of the choices between their numbers: no branch, by any compiler."""
+
+        def chosen(kind: Any, one: ast.expr, other: ast.expr) -> ast.expr:
+            if is_number(kind):
+                return ast.IfExp(choice.test, one, other)
+            inner = [chosen(inside, part_of(one, way), part_of(other, way)) for way, inside in members(kind)]
+            if not is_row(kind) or not inner:
+                return ast.Tuple([*inner], ast.Load())
+            return ast.Call(ast.Name(self.collector.keep(kind), ast.Load()), inner, [])
+
+        def part_of(item: ast.expr, way: str) -> ast.expr:
+            place = int(way[1:-1]) if way[0] == "[" else way[1:]
+            if isinstance(item, ast.Name):
+                try:
+                    value = self.collector.value_kept(item.id)
+                except KeyError:
+                    pass
+                else:
+                    return self.written(value[place] if isinstance(place, int) else getattr(value, place))
+            if isinstance(place, int):
+                return ast.Subscript(item, ast.Constant(place), ast.Load())
+            return ast.Attribute(item, place, ast.Load())
+
+        return chosen(row, choice.body, choice.orelse)
+
+    def call_that_sets(self, node: ast.Call) -> list[ast.stmt]:
+        """A call of a function that sets groups of its lane: these get what it returns."""
+        called = self.outside(node.func)
+        if not is_step_function(called):
+            raise self.refuse(node, f"'{ast.unparse(node)}' throws away what it returns")
+        name, given = self.called(called, node)
+        effects = self.collector.effects_of(name)
+        if not effects.results:
+            return []
+        for group, fields in effects.groups.items():
+            self.note_set(group, fields)
+        names = called.__code__.co_varnames[: called.__code__.co_argcount]
+        own = [(key, item) for key, item in zip(names, node.args, strict=True) if key not in ("parts", "lane")]
+        given_by_name = {key: self.visit(item) for key, item in own} if effects.slots else {}
+        for result, slot in effects.slots.items():
+            places = tuple(with_arguments(place, given_by_name) for place in slot.places)
+            self.note_slot(result, Slot(slot.history, places), node)
+        call = ast.Call(ast.Name(self.collector.keep(called), ast.Load()), given, [])
+        groups = [ast.Name(_GROUP + result, ast.Store()) for result in effects.results]
+        if len(groups) == 1:
+            return [ast.Assign([groups[0]], call)]
+        whole = f"{called.__name__}_result"
+        parts = [
+            ast.Assign([group], ast.Attribute(ast.Name(whole, ast.Load()), result, ast.Load()))
+            for group, result in zip(groups, effects.results, strict=True)
+        ]
+        return [ast.Assign([ast.Name(whole, ast.Store())], call), *parts]
+
+
+def _places(node: ast.Subscript) -> Sequence[ast.expr]:
+    """Places of an element."""
+    return node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
+
+
+def _bound(body: Iterable[ast.stmt]) -> set[str]:
+    """Names that some statements give values."""
+    return {item.id for statement in body for item in names_in(statement) if isinstance(item.ctx, ast.Store)}
+
+
+def with_arguments(place: ast.expr, arguments: Mapping[str, ast.expr]) -> ast.expr:
+    """A place in terms of a caller's arguments."""
+
+    class Replacing(ast.NodeTransformer):
+        def visit_Name(self, node: ast.Name) -> ast.expr:
+            return arguments.get(node.id, node)
+
+    found: ast.expr = Replacing().visit(deepcopy(place))
+    return found
+
+
+@dataclass(slots=True)
+class _Names(ast.NodeTransformer):
+    """Gives groups their names, and local names that some group has another one."""
+
+    hidden: set[str]
+
+    def spelling(self, name: str) -> str:
+        """The name in the module."""
+        return f"{name}_" if name in self.hidden else name
+
+    def visit_Name(self, node: ast.Name) -> ast.expr:
+        if node.id.startswith(_GROUP):
+            return ast.copy_location(ast.Name(node.id.removeprefix(_GROUP), node.ctx), node)
+        return ast.copy_location(ast.Name(self.spelling(node.id), node.ctx), node) if node.id in self.hidden else node

@@ -1,0 +1,75 @@
+"""Gas with an energy balance in a step."""
+
+from collections.abc import Mapping
+
+from ppafo.engine.program import Program
+from ppafo.engine.scheme import thermal_gas
+from ppafo.engine.scheme.thermal_gas import ThermalFlows, ThermalGas
+from ppafo.engine.step.lane import Lane
+from ppafo.model.plant import PlantState, ThermalParameters, ThermalState
+
+PARAMETERS: Mapping[str, type] = {"thermal": ThermalParameters}
+STATES: Mapping[str, type] = {"masses": ThermalState}
+CHANGE: Mapping[str, type] = {"thermal_change": ThermalFlows}
+START = thermal_gas.masses_at_start
+
+
+def stage(parts: Program) -> Mapping[str, type]:
+    """What the first stage leaves for later phases."""
+    return {"thermal_gas": ThermalGas}
+
+
+def begin(parts: Program, lane: Lane, next_angle: float, length: float) -> None:
+    """The first stage."""
+    lane.thermal_gas = thermal_gas.begin_thermal_gas(
+        lane.plant, lane.thermal, lane.state, lane.masses, next_angle, lane.flowing, length
+    )
+
+
+def chambers(parts: Program, lane: Lane) -> ThermalGas:
+    """What the first stage found of both chambers; lines have more around it."""
+    return lane.thermal_gas if parts.feed is None else lane.fed_thermal_gas.chambers
+
+
+def ends(parts: Program, lane: Lane) -> tuple[float, float]:
+    """Pressures [Pa] to which the first stage leads."""
+    return thermal_gas.end_pressures(lane.plant, chambers(parts, lane))
+
+
+def first_flows(parts: Program, lane: Lane) -> tuple[float, float, float]:
+    """Flows of the first stage [kg/s]: from the supplies, and into both chambers."""
+    begun = chambers(parts, lane)
+    return begun.first.supplied, begun.first.mass_1, begun.first.mass_2
+
+
+def change(parts: Program, lane: Lane, length: float) -> None:
+    """The second stage, and what both change."""
+    begun = chambers(parts, lane)
+    lane.thermal_second = thermal_gas.second_thermal_stage(lane.thermal, begun, lane.passing)
+    lane.thermal_change = thermal_gas.thermal_change(lane.plant, lane.thermal, begun, lane.thermal_second, length)
+
+
+def error(parts: Program, lane: Lane, ahead: float, length: float) -> float:
+    """Error of the pressures over what is allowed [-]."""
+    return thermal_gas.thermal_error(lane.plant, chambers(parts, lane), lane.thermal_second, length)
+
+
+def shift_error(parts: Program, lane: Lane, shift: float, ahead: float, length: float) -> float:
+    """Error of a valve that moves, over what is allowed [-]."""
+    return thermal_gas.thermal_opening_error(lane.plant, chambers(parts, lane), shift, length)
+
+
+def add(parts: Program, lane: Lane) -> None:
+    """``lane.fed`` and ``lane.warmed``, state and true masses with the gas of the step."""
+    lane.fed, lane.warmed = thermal_gas.with_thermal_gas(lane.state, lane.masses, lane.thermal_change)
+
+
+def move(parts: Program, lane: Lane, state: PlantState, assumed: float, reached: float) -> PlantState:
+    """The gas does its work up to where the vane came [rad], not to where the stages assumed it."""
+    return thermal_gas.after_motion(lane.plant, lane.thermal, state, assumed, reached)
+
+
+def work(parts: Program, lane: Lane) -> None:
+    """Count what the gas did on the vane; a locked one takes no work."""
+    if not parts.is_locked:
+        lane.warmed = thermal_gas.with_work(lane.plant, lane.warmed, lane.state, lane.after)

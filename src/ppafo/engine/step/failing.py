@@ -1,0 +1,52 @@
+"""A plant that may fail in a walk, or whose line has a shut-off valve, in a step and at a sample of the controller."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from ppafo.engine.program import Program
+from ppafo.engine.step.lane import Lane, Now
+from ppafo.model import plant_faults
+from ppafo.model.helping import STOPPED
+from ppafo.model.plant import PlantParameters
+from ppafo.model.plant_faults import PlantFaults, ShutOff, Unpowered
+from ppafo.model.valves.kind import VENT
+
+PARAMETERS: Mapping[str, type] = {"plant_faults": PlantFaults, "shut_off": ShutOff}
+STATES: Mapping[str, type] = {"unpowered": Unpowered}
+
+
+def failed_plant(parts: Program, lane: Lane, time: float) -> PlantParameters:
+    """The plant with the leak that faults give it at a time [s]."""
+    return plant_faults.failed_plant(lane.plant, lane.plant_faults, time)
+
+
+def failed_ports(
+    parts: Program, lane: Lane, source: PlantParameters, port_1: Any, port_2: Any, time: float
+) -> tuple[Any, Any]:
+    """The ports of both chambers as faults leave them at a time [s]: one open path for each chamber, or a blend."""
+    if parts.has_single_ports:
+        return plant_faults.failed_single_ports(
+            source, lane.plant_faults, lane.shut_off, lane.unpowered, port_1, port_2, time
+        )
+    return plant_faults.failed_blended_ports(
+        source, lane.plant_faults, lane.shut_off, lane.unpowered, port_1, port_2, time
+    )
+
+
+def decide(parts: Program, lane: Lane, now: Now, ordered: float, after: Any) -> None:
+    """Take a decision of the controller, the command ``ordered`` and the state ``after`` it.
+
+    The controller may miss a sample or have no power, and a valve may take its command late. Without power the
+    controller is in its initial state.
+    """
+    time, period = now.step * lane.timing.step, lane.timing.period
+    brown_out = plant_faults.is_in_brown_out(lane.plant_faults, time)
+    runs = plant_faults.runs_at(lane.plant_faults, time, period, int(lane.sensors.seed), now.sample)
+    takes = plant_faults.is_due(lane.plant_faults.slow_time, lane.plant_faults.slow_delay, time, period)
+    stopped = (after.safety.level if parts.has_level_of_help else 0.0) >= STOPPED
+    lane.unpowered = plant_faults.next_unpowered(lane.shut_off, lane.unpowered, runs, stopped, brown_out, period)
+    vents = brown_out | plant_faults.is_silenced(lane.shut_off, lane.unpowered)
+    command = VENT if vents else (ordered if runs & takes else lane.result.command)
+    lane.result = lane.result._replace(command=command)
+    lane.controller_state = after if runs else lane.controller_state
+    lane.controller_state = parts.initial_controller_state if brown_out else lane.controller_state

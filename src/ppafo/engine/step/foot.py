@@ -1,0 +1,31 @@
+"""A foot on a prescribed shank in a step, without ground: the torque that it adds to an unconstrained vane."""
+
+from ppafo.engine.program import Program
+from ppafo.engine.step.lane import Lane
+from ppafo.model.gait import foot_in_gait
+from ppafo.model.leg import ShankNow, torque_on_foot, torque_on_resting_foot
+from ppafo.signals.meter import FootSample
+
+
+def shank(parts: Program, lane: Lane, time: float) -> ShankNow:
+    """The shank at a time [s]; the knee of one that no gait leads rests."""
+    assert parts.shank is not None, "a foot has a shank"
+    if parts.is_on_gait:
+        now: ShankNow = parts.shank.value(lane.shank, time)
+        return now
+    angle, rate, acceleration = parts.shank.value(lane.shank, time)
+    return ShankNow(angle=angle, rate=rate, acceleration=acceleration, knee_forward=0.0, knee_up=0.0)
+
+
+def torque(parts: Program, lane: Lane, time: float, angle: float) -> float:
+    """Torque on the vane [N m] at a time [s] and an angle [rad], positive in plantarflexion."""
+    if parts.shank_rests:
+        # A shank that rests needs one sine instead of two in each part of a step.
+        return torque_on_resting_foot(lane.load, lane.shank.level, angle)
+    return torque_on_foot(lane.load, shank(parts, lane, time), angle)
+
+
+def sample(parts: Program, lane: Lane, time: float) -> FootSample:
+    """The foot beside the one that was measured, at a time [s] of a gait."""
+    found = foot_in_gait(lane.shank, time, lane.state.angle)
+    return FootSample(found.angle, found.measured_angle, found.toe_difference)

@@ -1,0 +1,87 @@
+"""Gas that keeps its temperature in a step: of a vane at rest or in motion, and of other actuators."""
+
+from collections.abc import Mapping
+
+from ppafo.engine.program import Program
+from ppafo.engine.scheme import actuators, pneumatics
+from ppafo.engine.scheme.motion import with_gas
+from ppafo.engine.scheme.pneumatics import GasChange, MovingGas, StillGas
+from ppafo.engine.step.lane import Lane
+from ppafo.model.plant import PlantState
+
+PARAMETERS: Mapping[str, type] = {}
+STATES: Mapping[str, type] = {}
+CHANGE: Mapping[str, type] = {"change": GasChange}
+START = None
+
+
+def stage(parts: Program) -> Mapping[str, type]:
+    """What the first stage leaves for later phases."""
+    return {"still_gas": StillGas} if parts.keeps_volumes else {"moving_gas": MovingGas}
+
+
+def begin(parts: Program, lane: Lane, next_angle: float, length: float) -> None:
+    """The first stage, of chambers that stand still, move, or are no vane's."""
+    if parts.keeps_volumes:
+        lane.still_gas = pneumatics.begin_still_gas(lane.state, lane.held, lane.flowing, length)
+    elif parts.has_shape:
+        lane.moving_gas = actuators.begin_shaped_gas(lane.plant, lane.state, next_angle, lane.flowing, length)
+    else:
+        held = lane.held if parts.hands_chambers_on else pneumatics.held_chambers(lane.plant, lane.state.angle)
+        lane.moving_gas = pneumatics.begin_moving_gas(lane.plant, lane.state, held, next_angle, lane.flowing, length)
+
+
+def moving(parts: Program, lane: Lane) -> MovingGas:
+    """The first stage of chambers that move."""
+    return lane.moving_gas if parts.feed is None else lane.fed_gas.chambers
+
+
+def still(parts: Program, lane: Lane) -> StillGas:
+    """The part of the first stage that still and moving gas share."""
+    return lane.still_gas if parts.keeps_volumes else moving(parts, lane).still
+
+
+def ends(parts: Program, lane: Lane) -> tuple[float, float]:
+    """Pressures [Pa] to which the first stage leads."""
+    begun = still(parts, lane)
+    return begun.end_1, begun.end_2
+
+
+def first_flows(parts: Program, lane: Lane) -> tuple[float, float, float]:
+    """Flows of the first stage [kg/s]: from the supplies, and into both chambers."""
+    begun = still(parts, lane)
+    return begun.first.supplied, begun.first.mass_1, begun.first.mass_2
+
+
+def change(parts: Program, lane: Lane, length: float) -> None:
+    """The second stage, and what both change."""
+    if parts.keeps_volumes:
+        lane.second = pneumatics.second_still_stage(lane.still_gas, lane.passing)
+        lane.change = pneumatics.still_change(lane.plant, lane.still_gas, lane.second, length)
+    else:
+        lane.second = pneumatics.second_moving_stage(moving(parts, lane), lane.passing)
+        lane.change = pneumatics.moving_change(lane.plant, still(parts, lane), lane.second, length)
+
+
+def error(parts: Program, lane: Lane, ahead: float, length: float) -> float:
+    """Error of the pressures over what is allowed [-]; ``ahead`` is the angle [rad] to which the volumes run."""
+    return pneumatics.gas_error(lane.plant, still(parts, lane), lane.second, ahead, length)
+
+
+def shift_error(parts: Program, lane: Lane, shift: float, ahead: float, length: float) -> float:
+    """Error of a valve that moves, over what is allowed [-]."""
+    return pneumatics.opening_error(lane.plant, still(parts, lane), shift, ahead, length)
+
+
+def add(parts: Program, lane: Lane) -> None:
+    """``lane.fed``, the state with the gas of the step."""
+    lane.fed = with_gas(lane.state, lane.change)
+
+
+def move(parts: Program, lane: Lane, state: PlantState, assumed: float, reached: float) -> PlantState:
+    """The vane's motion changes no energy."""
+    return state
+
+
+def work(parts: Program, lane: Lane) -> None:
+    """The gas takes no work."""

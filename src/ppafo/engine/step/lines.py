@@ -1,0 +1,84 @@
+"""Lines behind regulators in a step: what feeds the valve, with a state that the stages solve together with the gas."""
+
+from collections.abc import Mapping
+
+from ppafo.engine.program import Program
+from ppafo.engine.scheme import supply_lines
+from ppafo.engine.scheme.supply_lines import FedGas, FedThermalGas
+from ppafo.engine.step.lane import Lane
+from ppafo.model.plant import PlantParameters
+from ppafo.model.regulator import LineState, SupplyLines
+
+PARAMETERS: Mapping[str, type] = {"lines": SupplyLines}
+STATES: Mapping[str, type] = {"line_state": LineState}
+NEXT: Mapping[str, type] = {"next_lines": LineState}
+
+
+def stage(parts: Program) -> Mapping[str, type]:
+    """What the first stage leaves for later phases, chambers and lines."""
+    return {"fed_thermal_gas": FedThermalGas} if parts.is_thermal else {"fed_gas": FedGas}
+
+
+def after_first(parts: Program, lane: Lane) -> LineState:
+    """The lines after the first stage."""
+    return lane.fed_thermal_gas.lines.after if parts.is_thermal else lane.fed_gas.lines.after
+
+
+def source(parts: Program, lane: Lane) -> PlantParameters:
+    """The plant at the pressures of its lines."""
+    return supply_lines.plant_at_line_pressures(lane.plant, lane.lines, lane.line_state)
+
+
+def source_ahead(parts: Program, lane: Lane) -> PlantParameters:
+    """The same after the first stage."""
+    return supply_lines.plant_at_line_pressures(lane.plant, lane.lines, after_first(parts, lane))
+
+
+def begin(parts: Program, lane: Lane, next_angle: float, length: float) -> None:
+    """The first stage of chambers and lines."""
+    if parts.is_thermal:
+        lane.fed_thermal_gas = supply_lines.begin_fed_thermal_gas(
+            lane.plant,
+            lane.thermal,
+            lane.lines,
+            lane.line_state,
+            lane.state,
+            lane.masses,
+            next_angle,
+            lane.flowing,
+            length,
+        )
+    else:
+        lane.fed_gas = supply_lines.begin_fed_gas(
+            lane.plant, lane.lines, lane.line_state, lane.state, next_angle, lane.flowing, length
+        )
+
+
+def ended(parts: Program, lane: Lane, length: float) -> LineState:
+    """The lines at the end of the step."""
+    from_2 = lane.passing.in_2.from_source
+    if parts.is_thermal:
+        return supply_lines.end_thermal_lines(
+            lane.plant,
+            lane.thermal,
+            lane.lines,
+            lane.line_state,
+            lane.fed_thermal_gas,
+            lane.thermal_second,
+            from_2,
+            length,
+        )
+    return supply_lines.end_lines(lane.plant, lane.lines, lane.line_state, lane.fed_gas, lane.change, from_2, length)
+
+
+def end(parts: Program, lane: Lane, length: float) -> None:
+    """Keep the lines of the end; those of a part that may be refused become the state only once it is taken."""
+    if parts.is_parted:
+        lane.next_lines = ended(parts, lane, length)
+    else:
+        lane.line_state = ended(parts, lane, length)
+
+
+def error(parts: Program, lane: Lane) -> float:
+    """Error of both line pressures over what is allowed [-]."""
+    return supply_lines.line_error(lane.plant, lane.lines, after_first(parts, lane), lane.next_lines)

@@ -1,0 +1,230 @@
+"""The loop over steps: many devices at once, of which none sees another."""
+
+from collections.abc import Iterator
+from typing import Any, Protocol
+
+from ppafo.engine.program import Program
+from ppafo.engine.step import meters, phases, sample
+from ppafo.engine.step.lane import MAXIMUM_PARTS, SAME_MOMENT, Lane, Now
+
+
+class Lanes(Protocol):
+    """The runs of a block, and their arrays beside the lanes: what was recorded, and rings of what comes late."""
+
+    records: Any
+    signal_history: Any
+    command_history: Any
+    trace: Any
+
+    def __iter__(self) -> Iterator[Lane]:
+        """Each run."""
+
+    def record(self, index: int) -> None:
+        """Keep the state of all runs as a sample."""
+
+    def set_aside(self) -> None:
+        """Keep what lanes that wait get again: their state, and what the step was handed."""
+
+    def put_back(self) -> None:
+        """Give it to those that had nothing left of their step."""
+
+    def traces(self, index: int, trace_every: int) -> bool:
+        """Whether a sample is traced."""
+
+    def slot(self, index: int, trace_every: int) -> int:
+        """Where its trace is kept: one with less room than samples keeps the last."""
+
+
+def advance(
+    parts: Program,
+    lanes: Lanes,
+    first_step: int,
+    step_count: int,
+    steps_in_all: int,
+    steps_per_sample: int,
+    interval: float,
+    last_record: int,
+    next_record: int,
+    trace_every: int,
+    signal_delay: int,
+    command_delay: int,
+) -> None:
+    """Take all runs of a block some steps further, with the samples that are due."""
+    if parts.hands_chambers_on:
+        for lane in lanes:
+            phases.hold_chambers(parts, lane)
+    if parts.leg is not None:
+        for lane in lanes:
+            parts.leg.carry(parts, lane)
+    # Nothing is kept of samples for which there is no room, and where neither meters nor traces look at them.
+    last = last_record if parts.takes_samples else lanes.records.shape[0] - 1
+    due = next_record * interval
+    beyond = first_step + step_count
+    # The sample at the end of the run is a step that is not done.
+    for step in range(first_step, beyond + 1 if beyond == steps_in_all else beyond):
+        now = Now(
+            step=step,
+            sample=step // steps_per_sample,
+            goal=1.0,
+            early_command=(step - command_delay - 1) % lanes.command_history.shape[0] if parts.late_commands else 0,
+            late_command=(step - command_delay) % lanes.command_history.shape[0] if parts.late_commands else 0,
+            late_signal=(step - signal_delay) % lanes.signal_history.shape[1] if parts.late_signals else 0,
+            next_signal=(step + 1) % lanes.signal_history.shape[1] if parts.late_signals else 0,
+            reading=step // steps_per_sample % lanes.signal_history.shape[1] if parts.late_readings else 0,
+            readings=lanes.signal_history.shape[1] if parts.late_readings else 0,
+        )
+        if step < beyond:
+            begin_step(parts, lanes, now, steps_per_sample)
+        reached = 0.0
+        while reached < 1.0:
+            if next_record <= last and due <= step + reached + SAME_MOMENT:
+                take_sample(parts, lanes, step + reached, next_record, interval, last_record, trace_every)
+                next_record += 1
+                due = next_record * interval
+            if step == beyond:
+                break
+            if parts.samples_inside:
+                is_inside = next_record <= last and due < step + (1.0 - SAME_MOMENT)
+                now = now._replace(goal=due - step if is_inside else 1.0)
+            if parts.is_parted:
+                do_parts(parts, lanes, now)
+            else:
+                do_step(parts, lanes, now)
+            reached = now.goal
+
+
+def begin_step(parts: Program, lanes: Lanes, now: Now, steps_per_sample: int) -> None:
+    """Sense and decide, where a sample of the controller is due, and keep what comes late."""
+    if parts.late_signals and now.step == 0:
+        for slot in range(lanes.signal_history.shape[1]):
+            for lane in lanes:
+                sample.fill_signals(parts, lane, slot)
+    if parts.controller is not None and now.step % steps_per_sample == 0:
+        if parts.late_readings:
+            for lane in lanes:
+                sample.remember_readings(parts, lane, now)
+        for lane in lanes:
+            sample.control(parts, lane, now)
+    if parts.late_commands:
+        slot = now.step % lanes.command_history.shape[0]
+        for lane in lanes:
+            sample.remember_command(parts, lane, slot)
+    if parts.is_parted:
+        for lane in lanes:
+            phases.begin_step(parts, lane)
+
+
+def take_sample(
+    parts: Program,
+    lanes: Lanes,
+    moment: float,
+    index: int,
+    interval: float,
+    last_record: int,
+    trace_every: int,
+) -> None:
+    """A sample is recorded; or metered and traced, where nothing is."""
+    if not parts.takes_samples:
+        lanes.record(index)
+    if parts.follows_reference and index == 0:
+        look_at_reference(parts, lanes, interval, last_record)
+    if parts.meters:
+        if index == 0:
+            for lane in lanes:
+                meters.start(parts, lane, moment, index, interval)
+        else:
+            for lane in lanes:
+                meters.update(parts, lane, moment, index, interval)
+    if parts.traced and lanes.traces(index, trace_every):
+        kept = lanes.slot(index, trace_every)
+        for lane in lanes:
+            meters.trace(parts, lane, moment, index, interval, kept)
+
+
+def look_at_reference(parts: Program, lanes: Lanes, interval: float, last_record: int) -> None:
+    """The whole reference before the first sample: its last value, its largest, and where it holds."""
+    for lane in lanes:
+        meters.begin_course(parts, lane, interval, last_record)
+    # A monotone one is largest at one of its ends, and where its hold starts shows on the way.
+    if not parts.reference.is_monotone:
+        for place in range(last_record):
+            for lane in lanes:
+                meters.raise_largest(parts, lane, interval, place)
+        for place in range(last_record - 1, -1, -1):
+            for lane in lanes:
+                meters.look_for_hold(parts, lane, interval, place)
+            # The search ends as soon as every lane has found its hold.
+            if not any(lane.course.hold_start == 0.0 for lane in lanes):
+                break
+
+
+def do_parts(parts: Program, lanes: Lanes, now: Now) -> None:
+    """A step in parts, as many as it needs.
+
+    A block of lanes has as many as the lane with the most of them.
+    """
+    for part in range(MAXIMUM_PARTS):
+        for lane in lanes:
+            phases.measure_part(parts, lane, now)
+        # Never in the first part: a select for each row takes longer.
+        if parts.parts_are_rare and part > 0:
+            lanes.set_aside()
+        do_step(parts, lanes, now)
+        if parts.parts_are_rare and part > 0:
+            lanes.put_back()
+        if not any(lane.remaining > 0.0 for lane in lanes):
+            break
+    else:
+        for lane in lanes:
+            phases.give_up(parts, lane, now)
+
+
+def do_step(parts: Program, lanes: Lanes, now: Now) -> None:
+    """The phases of a step or part.
+
+    Each for all lanes: loops this short let the processor work on several at once. It looks some hundred instructions
+    ahead, and one lane's division or root waits for the one before.
+    """
+    if parts.leg is not None:
+        lead_walk(parts, lanes, now)
+    for lane in lanes:
+        phases.open_valve(parts, lane, now)
+    for lane in lanes:
+        phases.begin_gas(parts, lane, now)
+    for lane in lanes:
+        phases.pass_gas(parts, lane, now)
+    if parts.angle is None:
+        for lane in lanes:
+            phases.feed_gas(parts, lane)
+    if parts.leg is not None:
+        for lane in lanes:
+            parts.leg.reach(parts, lane)
+        # Most steps need this in no lane.
+        if any(lane.ended.motion.departs > 0.0 for lane in lanes):
+            for lane in lanes:
+                parts.leg.depart(parts, lane)
+    elif parts.angle is None:
+        for lane in lanes:
+            phases.slide(parts, lane, now)
+        if any(lane.slid.departs > 0.0 for lane in lanes):
+            for lane in lanes:
+                phases.depart(parts, lane)
+    for lane in lanes:
+        phases.finish(parts, lane, now)
+
+
+def lead_walk(parts: Program, lanes: Lanes, now: Now) -> None:
+    """The gait at the end of the step, and where the foot would be."""
+    assert parts.leg is not None, "a leg walks"
+    if parts.takes_task_sequence:
+        for lane in lanes:
+            parts.leg.find_gait_of_task(parts, lane, now)
+    else:
+        for lane in lanes:
+            parts.leg.find_place(parts, lane, now)
+        for lane in lanes:
+            parts.leg.find_measured(parts, lane)
+        for lane in lanes:
+            parts.leg.find_gait(parts, lane)
+    for lane in lanes:
+        parts.leg.begin(parts, lane)

@@ -1,0 +1,124 @@
+"""What a recording would have at a sample, for meters and traces, which stand where nothing is recorded."""
+
+from ppafo.engine.program import Program
+from ppafo.engine.step.lane import Lane
+from ppafo.engine.step.phases import present_pressures
+from ppafo.engine.step.sample import reference_at, torque_of
+from ppafo.model.plant import ThermalParameters
+from ppafo.signals.meter import SAME_LEVEL, Course, FootSample, Sample, StrideSample, advance_course, is_away
+
+NO_FOOT = FootSample(**dict.fromkeys(FootSample._fields, 0.0))
+NO_STRIDE = StrideSample(**dict.fromkeys(StrideSample._fields, 0.0))
+"""What a sample has where there is no foot on the shank of a gait, or nothing walks."""
+
+
+def make_sample(parts: Program, lane: Lane, moment: float, number: int, interval: float) -> None:
+    """``lane.sample``, number ``number`` at a ``moment`` counted in steps."""
+    pressure_1, pressure_2 = present_pressures(parts, lane)
+    time = moment * lane.timing.step
+    lane.sample = Sample(
+        number=float(number),
+        angle=lane.state.angle,
+        angular_velocity=lane.state.angular_velocity,
+        pressure_1=pressure_1,
+        pressure_2=pressure_2,
+        torque=torque_of(parts, lane, lane.state.angle, pressure_1, pressure_2),
+        command=lane.result.command,
+        reference=wanted_at(parts, lane, time),
+        temperature_1=temperature(lane.thermal, lane.state.mass_1, lane.masses.mass_1) if parts.is_thermal else 0.0,
+        temperature_2=temperature(lane.thermal, lane.state.mass_2, lane.masses.mass_2) if parts.is_thermal else 0.0,
+        foot=foot_of(parts, lane, time),
+        stride=stride_of(parts, lane, number, interval),
+    )
+
+
+def temperature(thermal: ThermalParameters, content: float, mass: float) -> float:
+    """Temperature [K] of a chamber."""
+    return thermal.temperature * (content / mass)
+
+
+def wanted_at(parts: Program, lane: Lane, time: float) -> float:
+    """The reference at a time [s], in a walk the torque [N m] that the controller requests; 0 where there is none."""
+    if parts.leg is not None:
+        return float(lane.controller_state.request.torque) if parts.requests_torque else 0.0
+    return reference_at(parts, lane, time) if parts.has_reference else 0.0
+
+
+def foot_of(parts: Program, lane: Lane, time: float) -> FootSample:
+    """The foot on the shank of a gait at a time [s]; zeros where there is none."""
+    if parts.foot is not None and parts.is_on_gait:
+        return parts.foot.sample(parts, lane, time)
+    return FootSample(*(0.0 for _ in FootSample._fields))
+
+
+def stride_of(parts: Program, lane: Lane, number: int, interval: float) -> StrideSample:
+    """Where a walk is in its stride; zeros where nothing walks."""
+    if parts.leg is None:
+        return NO_STRIDE
+    return StrideSample(
+        supplied_mass=lane.state.supplied_mass,
+        strides=lane.walk.strides,
+        positive_push_off_work=lane.walk.positive_push_off_work,
+        net_push_off_work=lane.walk.net_push_off_work,
+        clearances=lane.walk.clearances,
+        toe_landings=lane.walk.toe_landings,
+        phase=lane.controller_state.phase.phase if parts.has_phase else 0.0,
+        level=lane.controller_state.safety.level if parts.has_level_of_help else 0.0,
+        time=number * (lane.timing.step * interval),
+    )
+
+
+# The whole reference, before the first sample.
+
+
+def begin_course(parts: Program, lane: Lane, interval: float, last: int) -> None:
+    """The last value of the reference, its largest as far as its ends say, and no hold yet."""
+    value = reference_at(parts, lane, last * interval * lane.timing.step)
+    largest = max(abs(reference_at(parts, lane, 0 * interval * lane.timing.step)), abs(value))
+    lane.course = Course(last=value, largest=largest, tolerance=SAME_LEVEL * largest, hold_start=0.0)
+
+
+def raise_largest(parts: Program, lane: Lane, interval: float, index: int) -> None:
+    """The largest value so far."""
+    largest = max(lane.course.largest, abs(reference_at(parts, lane, index * interval * lane.timing.step)))
+    lane.course = lane.course._replace(largest=largest, tolerance=SAME_LEVEL * largest)
+
+
+def look_for_hold(parts: Program, lane: Lane, interval: float, index: int) -> None:
+    """Where the hold begins, looked for from the end."""
+    value = reference_at(parts, lane, index * interval * lane.timing.step)
+    is_last_away = lane.course.hold_start == 0.0 and is_away(value, lane.course.last, lane.course.tolerance)
+    hold_start = index + 1.0 if is_last_away else lane.course.hold_start
+    lane.course = lane.course._replace(hold_start=hold_start)
+
+
+# At each sample.
+
+
+def follow_course(parts: Program, lane: Lane) -> None:
+    """A monotone reference shows on the way where it rests."""
+    if parts.follows_reference and parts.reference.is_monotone:
+        lane.course = advance_course(lane.course, lane.sample)
+
+
+def start(parts: Program, lane: Lane, moment: float, number: int, interval: float) -> None:
+    """Meters begin with the first sample."""
+    make_sample(parts, lane, moment, number, interval)
+    follow_course(parts, lane)
+    for group, kind in parts.meter_groups.items():
+        lane[group] = kind.start(lane.course, lane.sample)
+
+
+def update(parts: Program, lane: Lane, moment: float, number: int, interval: float) -> None:
+    """And take a further one. A locked vane never moves: its meters of motion keep what they have."""
+    make_sample(parts, lane, moment, number, interval)
+    follow_course(parts, lane)
+    for group, kind in parts.moving_meters.items():
+        lane[group] = kind.update(lane[group], lane.course, lane.sample)
+
+
+def trace(parts: Program, lane: Lane, moment: float, number: int, interval: float, slot: int) -> None:
+    """Keep the channels that are traced."""
+    make_sample(parts, lane, moment, number, interval)
+    for row, path in parts.traced_paths.items():
+        lane.trace[slot, row] = lane[path]

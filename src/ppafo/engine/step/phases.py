@@ -1,0 +1,358 @@
+"""The way of one device through a step, from the valve to the state that is stored: read it downwards.
+
+A step is whole where nothing changes abruptly inside it and its error is known to be small: the gas of a locked vane
+behind a valve that follows at once. Otherwise each lane goes through it in parts of its own. A part ends where a coil
+switches, a late command arrives, the vane meets a stop, a sample is due, or its error would become too large. Lanes
+that are through wait, and no lane sees another.
+"""
+
+from typing import Any
+
+from ppafo.engine.program import Program
+from ppafo.engine.scheme import motion, pneumatics
+from ppafo.engine.step import stated
+from ppafo.engine.step.lane import Lane, Now
+from ppafo.model.plant import PlantParameters, chamber_pressures
+from ppafo.model.ports import at_valve, shown_signals
+
+# Beyond 1e6 rad/s or 1 t of gas a run is lost.
+IMPOSSIBLE_RATE = 1.0e6
+IMPOSSIBLE_MASS = 1.0e3
+
+
+# When it is, and what the valve is told.
+
+
+def time_of(parts: Program, lane: Lane, now: Now) -> float:
+    """Time [s] from the start of the run, at the begin of a step or part."""
+    time = (now.step - lane.start.step if parts.starts_apart else now.step) * lane.timing.step
+    return time + lane.before if parts.is_parted else time
+
+
+def length_of(parts: Program, lane: Lane) -> float:
+    """Length [s] of the step, or of the part of it."""
+    return lane.length if parts.is_parted else lane.timing.step
+
+
+def until_command(parts: Program, lane: Lane) -> float:
+    """Time [s] from now at which a late command arrives inside this step."""
+    return lane.timing.command_lag * lane.timing.step - lane.before - motion.SAME_INSTANT
+
+
+def command_of(parts: Program, lane: Lane, now: Now) -> float:
+    """The command that the valve has in a step or part."""
+    if parts.late_commands:
+        # The dead time in whole steps and a rest: the command of one step or the next acts, by the time within it.
+        early = lane.command_history[now.early_command]
+        late = lane.command_history[now.late_command]
+        command = early if until_command(parts, lane) > 0.0 else late
+    else:
+        command = lane.result.command
+    return at_valve(command) if "at_valve" in parts.ports_with_laws else command
+
+
+# Before the gas.
+
+
+def hold_chambers(parts: Program, lane: Lane) -> None:
+    """What a step is handed by the one before, where there was none; for a locked vane it lasts for all steps."""
+    lane.held = pneumatics.held_chambers(lane.plant, lane.state.angle)
+
+
+def begin_step(parts: Program, lane: Lane) -> None:
+    """Nothing of the step is done yet."""
+    lane.before = 0.0
+
+
+def measure_part(parts: Program, lane: Lane, now: Now) -> None:
+    """The length of a part; where the vane is unconstrained, until it meets a stop."""
+    remaining = max(now.goal * lane.timing.step - lane.before, 0.0)
+    until = remaining
+    time = time_of(parts, lane, now)
+    if parts.late_commands:
+        wait = until_command(parts, lane)
+        until = min(until, wait + motion.SAME_INSTANT) if wait > 0.0 else until
+    if parts.late_signals:
+        look = (1.0 - lane.timing.signal_lag) * lane.timing.step - lane.before
+        until = min(until, look) if look > motion.SAME_INSTANT else until
+    if parts.valve.jumps:
+        command = command_of(parts, lane, now)
+        settled = parts.valve.settle(lane.valve, lane.valve_state, command, time)
+        jump = parts.valve.next_event(lane.valve, settled, command, time)
+        until = motion.until_jump(jump - time, until)
+    # A failed run takes its steps whole, so that it ends without holding up its block.
+    hurries = lane.result.failure_time <= time
+    if parts.is_adaptive:
+        until = remaining if remaining == 0.0 or hurries else motion.part_length(lane.pace, until)
+    else:
+        until = remaining if hurries else until
+    if parts.is_adaptive and parts.angle is None:
+        added = torque_of_leg(parts, lane, time, lane.state.angle)
+        lane.begun, until = motion.begin_part(lane.plant, lane.state, added, until)
+    lane.length = until
+    lane.remaining = remaining
+
+
+# The gas.
+
+
+def open_valve(parts: Program, lane: Lane, now: Now) -> None:
+    """The valve, and the flows with which the step begins."""
+    command = command_of(parts, lane, now)
+    time, length = time_of(parts, lane, now), length_of(parts, lane)
+    if parts.is_parted:
+        # A part may be refused: its valve becomes the state only once it is taken.
+        lane.shown, lane.next_valve = parts.valve.advance(lane.valve, lane.valve_state, command, time, length)
+    else:
+        lane.shown, lane.valve_state = parts.valve.advance(lane.valve, lane.valve_state, command, time, length)
+    source = lane.plant if parts.feed is None else parts.feed.source(parts, lane)
+    port_1, port_2 = ports_behind(parts, lane, now, source)
+    pressure_1, pressure_2 = present_pressures(parts, lane)
+    leaky = with_leak(parts, lane, plant_now(parts, lane, now), pressure_1, pressure_2)
+    slopes = parts.valve.port_flow_slopes
+    lane.flowing = pneumatics.sloped_flows(leaky, pressure_1, pressure_2, port_1, port_2, slopes)
+
+
+def ports_behind(parts: Program, lane: Lane, now: Now, source: PlantParameters) -> tuple[Any, Any]:
+    """The ports of both chambers behind a source, as the valve and faults leave them."""
+    port_1, port_2 = parts.valve.connect(source, lane.shown)
+    if parts.faults is not None:
+        return parts.faults.failed_ports(parts, lane, source, port_1, port_2, time_of(parts, lane, now))
+    return port_1, port_2
+
+
+def plant_now(parts: Program, lane: Lane, now: Now) -> PlantParameters:
+    """The plant, with the leak that a fault gives it."""
+    plant: PlantParameters = lane.plant
+    if parts.faults is not None:
+        plant = parts.faults.failed_plant(parts, lane, time_of(parts, lane, now))
+    return plant
+
+
+def present_pressures(parts: Program, lane: Lane) -> tuple[float, float]:
+    """Both pressures [Pa absolute] of the state."""
+    if parts.hands_chambers_on:
+        return pneumatics.held_pressures(lane.held, lane.state)
+    return chamber_pressures(lane.plant, lane.state.angle, lane.state.mass_1, lane.state.mass_2)
+
+
+def with_leak(
+    parts: Program, lane: Lane, leaky: PlantParameters, pressure_1: float, pressure_2: float
+) -> PlantParameters:
+    """The plant with the leak that it has at the pressures of a stage, where that is not always the same."""
+    if "leakage_path" in parts.ports_with_laws:
+        leaky = pneumatics.plant_with_leak_at(leaky, pressure_1, pressure_2)
+    if parts.valve.joint is not None:
+        # A valve that joins the chambers makes the leak between them as wide as it stands open.
+        leaky = pneumatics.plant_with_joined_chambers(leaky, parts.valve.joint.opening(lane.shown))
+    return leaky
+
+
+def begin_gas(parts: Program, lane: Lane, now: Now) -> None:
+    """The first stage of the gas, with volumes that run to where the vane would be at the end."""
+    length = length_of(parts, lane)
+    if parts.angle is not None and not parts.is_locked:
+        angle, rate, _ = parts.angle.value(lane.path, time_of(parts, lane, now) + length)
+        lane.prescribed = motion.PrescribedStep(angle, rate)
+    if parts.leg is not None:
+        parts.leg.hold_ahead(parts, lane)
+    next_angle = angle_ahead(parts, lane)
+    if parts.feed is None:
+        parts.gas.begin(parts, lane, next_angle, length)
+    else:
+        parts.feed.begin(parts, lane, next_angle, length)
+
+
+def angle_ahead(parts: Program, lane: Lane) -> float:
+    """Angle [rad] to which the volumes run."""
+    if parts.leg is not None:
+        return parts.leg.assumed_angle(parts, lane)
+    if parts.angle is None:
+        return lane.begun.next_angle
+    return lane.state.angle if parts.is_locked else lane.prescribed.next_angle
+
+
+def pass_gas(parts: Program, lane: Lane, now: Now) -> None:
+    """The flows of the second stage, at the pressures to which the first one leads."""
+    if parts.stated_at_ports:
+        stated.predict(parts, lane, command_of(parts, lane, now), length_of(parts, lane))
+    source = lane.plant if parts.feed is None else parts.feed.source_ahead(parts, lane)
+    port_1, port_2 = ports_behind(parts, lane, now, source)
+    pressure_1, pressure_2 = parts.gas.ends(parts, lane)
+    leaky = with_leak(parts, lane, plant_now(parts, lane, now), pressure_1, pressure_2)
+    flow = parts.valve.port_flow
+    lane.passing = pneumatics.stage_flows(leaky, pressure_1, pressure_2, port_1, port_2, flow)
+    if parts.stated_at_ports:
+        stated.restore(parts, lane)
+
+
+def feed_gas(parts: Program, lane: Lane) -> None:
+    """The second stage: the gas of the step, what feeds the chambers, and in parts that may be refused its error."""
+    length = length_of(parts, lane)
+    parts.gas.change(parts, lane, length)
+    if parts.feed is not None:
+        parts.feed.end(parts, lane, length)
+    if parts.is_adaptive:
+        ahead = angle_ahead(parts, lane)
+        error = parts.gas.error(parts, lane, ahead, length)
+        if parts.feed is not None:
+            # The larger of both errors, not their sum: each has its own limit.
+            error = max(error, parts.feed.error(parts, lane))
+        if parts.valve.shift is not None:
+            shift = parts.valve.shift(lane.valve_state, lane.next_valve)
+            error = error + parts.gas.shift_error(parts, lane, shift, ahead, length)
+        lane.gas_error = error
+
+
+# The motion of a vane without ground.
+
+
+def torque_of_leg(parts: Program, lane: Lane, time: float, angle: float) -> float:
+    """Torque of a leg on the vane [N m] at a time [s] and an angle [rad]."""
+    if parts.foot is None:
+        return 0.0
+    return parts.foot.torque(parts, lane, time, angle)
+
+
+def slide(parts: Program, lane: Lane, now: Now) -> None:
+    """Where the vane comes if it slides on or stays at rest."""
+    length = length_of(parts, lane)
+    parts.gas.add(parts, lane)
+    added = torque_of_leg(parts, lane, time_of(parts, lane, now) + length, lane.begun.next_angle)
+    lane.slid, lane.moved = motion.slide_part(lane.plant, lane.fed, lane.begun, added, length)
+
+
+def depart(parts: Program, lane: Lane) -> None:
+    """Where it comes if it turns or begins to move: few do."""
+    parts.gas.add(parts, lane)
+    length = length_of(parts, lane)
+    lane.moved = motion.depart_part(lane.plant, lane.fed, lane.begun, lane.slid, lane.moved, length)
+
+
+# The end.
+
+
+def finish(parts: Program, lane: Lane, now: Now) -> None:
+    """The state at the end of a step or part, unless the part is refused; and the first time at which a run failed."""
+    time, length = time_of(parts, lane, now), length_of(parts, lane)
+    if parts.angle is not None:
+        feed_gas(parts, lane)
+    # Gas before motion: the vane ends under the pressures of the new gas.
+    parts.gas.add(parts, lane)
+    end_motion(parts, lane)
+    parts.gas.work(parts, lane)
+    if parts.stated:
+        stated.advance(parts, lane, command_of(parts, lane, now), length)
+    taken, follows = True, True
+    if parts.is_adaptive:
+        missed = error_of(parts, lane, now)
+        # A part with a mass below 0 or NaN counts as the worst error, and is done again, shorter.
+        error = missed / lane.timing.tolerance if has_gas(parts, lane) else motion.MAXIMUM_ERROR
+        # A run that has failed is carried to its end without more parts, so that its lane holds nobody up.
+        refused = motion.is_refused(error, length) and not lane.result.failure_time <= time
+        longest = motion.next_pace(lane.pace, error, length, refused, lane.timing.step)
+        active = lane.remaining > 0.0
+        lane.pace = longest if active else lane.pace
+        taken = active and not refused
+        follows = not missed > motion.LOST
+    elif parts.is_parted:
+        taken = lane.remaining > 0.0
+    # Where parts are rare, lanes that wait get all of their state again.
+    waits = False if parts.parts_are_rare or not parts.is_parted else not taken
+    keep_state(parts, lane, waits)
+    possible = waits or (is_possible(parts, lane) and follows)
+    failed = lane.result.failure_time if possible else min(lane.result.failure_time, time + length)
+    lane.result = lane.result._replace(failure_time=failed)
+    if parts.late_signals and parts.leg is None:
+        sense_end(parts, lane, now, length, taken)
+    if parts.is_parted:
+        # Sums of part lengths miss the goal by rounding: the last part sets it.
+        arrives = (length >= lane.remaining and taken) or lane.remaining == 0.0
+        lane.before = now.goal * lane.timing.step if arrives else lane.before + (length if taken else 0.0)
+        lane.remaining = 0.0 if arrives else lane.remaining
+
+
+def end_motion(parts: Program, lane: Lane) -> None:
+    """``lane.after``, the state at the end of the step."""
+    if parts.leg is not None:
+        # The chambers that the next step finds are those where this one ends.
+        parts.leg.end(parts, lane, length_of(parts, lane))
+        assumed = parts.leg.assumed_angle(parts, lane)
+        lane.after = parts.gas.move(parts, lane, lane.after, assumed, lane.after.angle)
+    elif parts.angle is None:
+        moved = parts.gas.move(parts, lane, lane.fed, lane.begun.next_angle, lane.moved.angle)
+        lane.after = motion.with_motion(moved, lane.moved.angle, lane.moved.rate)
+    elif parts.is_locked:
+        lane.after = lane.fed
+    else:
+        lane.after = motion.with_motion(lane.fed, lane.prescribed.next_angle, lane.prescribed.next_rate)
+
+
+def error_of(parts: Program, lane: Lane, now: Now) -> float:
+    """The largest error of a part over what is allowed [-]: of motion, gas, and states of effects."""
+    missed = max(lane.moved.error if parts.angle is None else 0.0, lane.gas_error)
+    if parts.stated_with_errors:
+        missed = max(missed, stated.error(parts, lane, command_of(parts, lane, now), length_of(parts, lane)))
+    return missed
+
+
+def has_gas(parts: Program, lane: Lane) -> bool:
+    """True where all masses at the end of the step are above 0."""
+    found = lane.after.mass_1 > 0.0 and lane.after.mass_2 > 0.0
+    if parts.has_true_masses:
+        found = found and lane.warmed.mass_1 > 0.0 and lane.warmed.mass_2 > 0.0
+    if parts.feed is not None:
+        found = found and lane.next_lines.mass_1 > 0.0 and lane.next_lines.mass_2 > 0.0
+    return found
+
+
+def is_possible(parts: Program, lane: Lane) -> bool:
+    """True where the state at the end of the step is one that a device can have."""
+    least = min(lane.after.mass_1, lane.after.mass_2)
+    most = max(lane.after.mass_1, lane.after.mass_2)
+    if parts.has_true_masses:
+        least = min(lane.after.mass_1, lane.after.mass_2, lane.warmed.mass_1, lane.warmed.mass_2)
+        most = max(lane.after.mass_1, lane.after.mass_2, lane.warmed.mass_1, lane.warmed.mass_2)
+    possible = abs(lane.after.angular_velocity) < IMPOSSIBLE_RATE and least > 0.0 and most < IMPOSSIBLE_MASS
+    return possible and stated.are_bounded(parts, lane) if parts.stated else possible
+
+
+def keep_state(parts: Program, lane: Lane, waits: bool) -> None:
+    """The state after the step becomes the state, unless the lane waits."""
+    lane.state = lane.state if waits else lane.after
+    if parts.has_true_masses:
+        lane.masses = lane.masses if waits else lane.warmed
+    if parts.leg is not None:
+        lane.walk = lane.walk if waits else lane.walk_after
+    for name in parts.stated:
+        lane[f"{name}_state"] = lane[f"{name}_state"] if waits else lane[f"{name}_state_after"]
+    if parts.is_parted:
+        lane.valve_state = lane.valve_state if waits else lane.next_valve
+    if parts.is_parted and parts.feed is not None:
+        lane.line_state = lane.line_state if waits else lane.next_lines
+
+
+def sense_end(parts: Program, lane: Lane, now: Now, length: float, taken: bool) -> None:
+    """What late sensors look at in a step or part, at its end, with the states that effects have then.
+
+    A signal that is late by a fraction of a step is looked at by that much before its end.
+    """
+    angle = lane.after.angle
+    pressure_1, pressure_2 = chamber_pressures(lane.plant, angle, lane.after.mass_1, lane.after.mass_2)
+    if "shown_signals" in parts.ports_with_laws:
+        angle, pressure_1, pressure_2 = shown_signals(angle, pressure_1, pressure_2)
+    look_at = (1.0 - lane.timing.signal_lag) * lane.timing.step
+    looks = taken and abs(lane.before + length - look_at) <= motion.SAME_INSTANT
+    lane.signal_history[0, now.next_signal] = angle if looks else lane.signal_history[0, now.next_signal]
+    lane.signal_history[1, now.next_signal] = pressure_1 if looks else lane.signal_history[1, now.next_signal]
+    lane.signal_history[2, now.next_signal] = pressure_2 if looks else lane.signal_history[2, now.next_signal]
+
+
+def give_up(parts: Program, lane: Lane, now: Now) -> None:
+    """A run whose step is not done after so many parts failed where it is, and hurries on."""
+    time = time_of(parts, lane, now)
+    gives_up = lane.remaining > 0.0 and lane.result.failure_time > time
+    lane.result = lane.result._replace(
+        failure_time=time if gives_up else lane.result.failure_time,
+        too_many_parts=1.0 if gives_up else lane.result.too_many_parts,
+    )

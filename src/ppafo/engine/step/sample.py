@@ -1,0 +1,159 @@
+"""What is done at a sample of the controller: sense, decide, and keep what comes late."""
+
+from ppafo.engine.program import Program
+from ppafo.engine.scheme.actuators import seen_with_torque, torque_at
+from ppafo.engine.step.lane import Lane, Now
+from ppafo.engine.step.phases import present_pressures
+from ppafo.model.plant import actuator_torque
+from ppafo.model.ports import shown_signals
+from ppafo.model.sensors import (
+    Fault,
+    GaitMeasurement,
+    Measurement,
+    late_measurement,
+    measure,
+    measure_gait,
+    samples_late,
+)
+
+
+def control(parts: Program, lane: Lane, now: Now) -> None:
+    """Sense and decide."""
+    assert parts.controller is not None, "a controller decides"
+    sense(parts, lane, now)
+    wanted = reference_at(parts, lane, now.step * lane.timing.step)
+    command, after = parts.controller.update(
+        lane.controller, lane.controller_state, wanted, lane.seen, lane.timing.period
+    )
+    if parts.faults is not None:
+        parts.faults.decide(parts, lane, now, command, after)
+    else:
+        lane.controller_state = after
+        lane.result = lane.result._replace(command=command)
+
+
+def reference_at(parts: Program, lane: Lane, time: float) -> float:
+    """The reference at a time [s]."""
+    value, _, _ = parts.reference.value(lane.reference, time)
+    return float(value)
+
+
+def sense(parts: Program, lane: Lane, now: Now) -> None:
+    """``lane.seen``, what the sensors show."""
+    if parts.late_readings:
+        lane.seen = late_gait(parts, lane, now)
+    elif parts.leg is not None and not parts.ideal_sensors:
+        measure_walk(parts, lane, now)
+    elif parts.leg is not None:
+        lane.seen = gait(parts, lane)
+    else:
+        lane.seen = vane(parts, lane, now)
+
+
+# Of a vane.
+
+
+def vane(parts: Program, lane: Lane, now: Now) -> Measurement:
+    """What the sensors of a vane show."""
+    if parts.late_signals:
+        angle = lane.signal_history[0, now.late_signal]
+        pressure_1, pressure_2 = lane.signal_history[1, now.late_signal], lane.signal_history[2, now.late_signal]
+    else:
+        angle, pressure_1, pressure_2 = present_signals(parts, lane)
+    if parts.ideal_sensors:
+        torque = torque_of(parts, lane, angle, pressure_1, pressure_2)
+        return Measurement(angle=angle, pressure_1=pressure_1, pressure_2=pressure_2, torque=torque)
+    seen = measure(lane.sensors, angle, pressure_1, pressure_2, lane.plant.torque_constant, now.sample)
+    # The sensors' torque follows from pressures by a constant, which another actuator does not have.
+    return seen_with_torque(lane.plant, seen) if parts.has_shape else seen
+
+
+def torque_of(parts: Program, lane: Lane, angle: float, pressure_1: float, pressure_2: float) -> float:
+    """Torque [N m] of both pressures, at an angle [rad] where the actuator is no vane."""
+    if parts.has_shape:
+        return torque_at(lane.plant, angle, pressure_1, pressure_2)
+    return actuator_torque(pressure_1, pressure_2, lane.plant.torque_constant)
+
+
+def present_signals(parts: Program, lane: Lane) -> tuple[float, float, float]:
+    """Angle [rad] and pressures [Pa] as the sensors show them now."""
+    pressure_1, pressure_2 = present_pressures(parts, lane)
+    if "shown_signals" in parts.ports_with_laws:
+        return shown_signals(lane.state.angle, pressure_1, pressure_2)
+    return lane.state.angle, pressure_1, pressure_2
+
+
+def fill_signals(parts: Program, lane: Lane, slot: int) -> None:
+    """Late signals have their values at the start until the first have come."""
+    angle, pressure_1, pressure_2 = present_signals(parts, lane)
+    lane.signal_history[0, slot] = angle
+    lane.signal_history[1, slot] = pressure_1
+    lane.signal_history[2, slot] = pressure_2
+
+
+def remember_command(parts: Program, lane: Lane, slot: int) -> None:
+    """Keep the command of a step, where the valve gets it late."""
+    lane.command_history[slot] = lane.result.command
+
+
+# Of a walk.
+
+
+def gait(parts: Program, lane: Lane) -> GaitMeasurement:
+    """What perfect sensors of a walk show."""
+    pressure_1, pressure_2 = present_pressures(parts, lane)
+    return GaitMeasurement(
+        angle=lane.state.angle,
+        pressure_1=pressure_1,
+        pressure_2=pressure_2,
+        torque=actuator_torque(pressure_1, pressure_2, lane.plant.torque_constant),
+        heel_force=lane.walk.heel_force,
+        toe_force=lane.walk.toe_force,
+    )
+
+
+def measure_walk(parts: Program, lane: Lane, now: Now) -> None:
+    """``lane.seen`` and ``lane.gait_seen``, what the sensors of a walk show, and what they remember."""
+    pressure_1, pressure_2 = present_pressures(parts, lane)
+    lane.seen, lane.gait_seen = measure_gait(
+        lane.sensors,
+        lane.gait_sensors,
+        lane.gait_seen,
+        lane.state.angle,
+        pressure_1,
+        pressure_2,
+        lane.walk.heel_force,
+        lane.walk.toe_force,
+        lane.plant.torque_constant,
+        now.step * lane.timing.step,
+        now.sample,
+    )
+
+
+def remember_readings(parts: Program, lane: Lane, now: Now) -> None:
+    """Keep the readings of a walk before any is looked up: a sensor without a delay shows its present one."""
+    measure_walk(parts, lane, now)
+    lane.signal_history[0, now.reading] = lane.seen.heel_force
+    lane.signal_history[1, now.reading] = lane.seen.toe_force
+    lane.signal_history[2, now.reading] = lane.seen.angle
+    lane.signal_history[3, now.reading] = lane.seen.pressure_1
+    lane.signal_history[4, now.reading] = lane.seen.pressure_2
+
+
+def late_gait(parts: Program, lane: Lane, now: Now) -> GaitMeasurement:
+    """The readings of a walk, each sensor's as late as its fault says."""
+    sensors = lane.gait_sensors
+    return late_measurement(
+        lane.signal_history[0, place_of_late(parts, lane, now, sensors.heel_fault)],
+        lane.signal_history[1, place_of_late(parts, lane, now, sensors.toe_fault)],
+        lane.signal_history[2, place_of_late(parts, lane, now, sensors.angle_fault)],
+        lane.signal_history[3, place_of_late(parts, lane, now, sensors.pressure_1_fault)],
+        lane.signal_history[4, place_of_late(parts, lane, now, sensors.pressure_2_fault)],
+        lane.plant.torque_constant,
+    )
+
+
+def place_of_late(parts: Program, lane: Lane, now: Now, fault: Fault) -> int:
+    """Where in its ring the reading is that arrives now."""
+    place = now.reading - samples_late(fault, now.step * lane.timing.step, now.sample)
+    return place + now.readings if place < 0 else place

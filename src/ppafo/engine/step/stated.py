@@ -1,0 +1,86 @@
+"""States of effects in a step: ahead for the second stage, at the end, and how far off they are."""
+
+from ppafo.engine.program import Program
+from ppafo.engine.scheme.pneumatics import SHORTEST
+from ppafo.engine.step.lane import Lane
+from ppafo.model.effects.kind import Moment
+from ppafo.model.plant import PlantState, chamber_pressures
+
+LARGEST = 1.0e300
+"""A state beyond this, or one that is no number, is a failure."""
+
+
+def moment(parts: Program, lane: Lane, state: PlantState, supplied: float, vented: float, command: float) -> Moment:
+    """What effects see of the plant in some state, with mean flows [kg/s]."""
+    pressure_1, pressure_2 = chamber_pressures(lane.plant, state.angle, state.mass_1, state.mass_2)
+    return Moment(
+        angle=state.angle,
+        angular_velocity=state.angular_velocity,
+        pressure_1=pressure_1,
+        pressure_2=pressure_2,
+        supplied_flow=supplied,
+        vented_flow=vented,
+        command=command,
+    )
+
+
+def begun_moment(parts: Program, lane: Lane, command: float) -> Moment:
+    """The begin of a step, with the flows of its first stage."""
+    supplied, mass_1, mass_2 = parts.gas.first_flows(parts, lane)
+    return moment(parts, lane, lane.state, supplied, supplied - mass_1 - mass_2, command)
+
+
+def straight_on(value: float, rate: float, length: float) -> float:
+    """A number after a time [s] at its rate."""
+    return value + length * rate
+
+
+def predict(parts: Program, lane: Lane, command: float, length: float) -> None:
+    """States as they will be at the end of the first stage; the order would fall to one without."""
+    begun = begun_moment(parts, lane, command)
+    for name, kind in parts.stated_at_ports.items():
+        state = lane[f"{name}_state"]
+        rates = kind.slopes(lane[name], state, begun)
+        lane[f"{name}_state_kept"] = state
+        lane[f"{name}_state"] = kind.row(
+            *(straight_on(getattr(state, field), getattr(rates, field), length) for field in kind.fields)
+        )
+
+
+def restore(parts: Program, lane: Lane) -> None:
+    """The states at the begin of the step again."""
+    for name in parts.stated_at_ports:
+        lane[f"{name}_state"] = lane[f"{name}_state_kept"]
+
+
+def advance(parts: Program, lane: Lane, command: float, length: float) -> None:
+    """States at the end of a step or part."""
+    # Means over the step: a part without length must not divide by 0.
+    span = max(length, SHORTEST)
+    supplied = (lane.after.supplied_mass - lane.state.supplied_mass) / span
+    vented = (lane.after.vented_mass - lane.state.vented_mass) / span
+    before = moment(parts, lane, lane.state, supplied, vented, command)
+    after = moment(parts, lane, lane.after, supplied, vented, command)
+    for name, kind in parts.stated.items():
+        lane[f"{name}_state_after"] = kind.advance(lane[name], lane[f"{name}_state"], before, after, length)
+
+
+def error(parts: Program, lane: Lane, command: float, length: float) -> float:
+    """The largest error over what is allowed [-]: what exact steps and straight extrapolations differ by."""
+    begun, worst = begun_moment(parts, lane, command), 0.0
+    for name, kind in parts.stated_with_errors.items():
+        state, after = lane[f"{name}_state"], lane[f"{name}_state_after"]
+        rates = kind.slopes(lane[name], state, begun)
+        for field, allowed in zip(kind.fields, kind.tolerances, strict=True):
+            straight = straight_on(getattr(state, field), getattr(rates, field), length)
+            worst = max(worst, abs(getattr(after, field) - straight) / allowed)
+    return worst
+
+
+def are_bounded(parts: Program, lane: Lane) -> bool:
+    """True where all states at the end of a step are numbers."""
+    bounded = True
+    for name, kind in parts.stated.items():
+        for field in kind.fields:
+            bounded = bounded and abs(getattr(lane[f"{name}_state_after"], field)) < LARGEST
+    return bounded

@@ -1,0 +1,161 @@
+"""A leg that walks with the device, in a step: the gait leads its shank, the foot is free or on the ground."""
+
+from collections.abc import Mapping
+
+from ppafo.engine.program import Program
+from ppafo.engine.scheme import walking
+from ppafo.engine.scheme.pneumatics import HeldChambers, held_chambers
+from ppafo.engine.scheme.walking import CarriedFoot, DeviceShare, WalkEnd, WalkState, WalkStep
+from ppafo.engine.step.lane import Lane, Now
+from ppafo.engine.step.phases import length_of, time_of
+from ppafo.model.gait import (
+    GaitMeasured,
+    GaitNow,
+    GaitPlace,
+    GaitSeries,
+    GaitTiming,
+    Marks,
+    TimedSequence,
+    gait_in_task_sequence,
+    gait_of,
+    measured_at,
+    place_at,
+    shown_toe_force,
+    stands_on_toes,
+)
+from ppafo.model.leg import LegParameters
+from ppafo.model.sensors import GaitSeen, GaitSensors
+
+
+def parameters(parts: Program) -> Mapping[str, type]:
+    """What a leg is made of, and what leads it."""
+    return {
+        "leg": LegParameters,
+        "share": DeviceShare,
+        "gait": GaitSeries,
+        "gait_timing": GaitTiming,
+        "gait_sensors": GaitSensors,
+        **({"task_sequence": TimedSequence} if parts.takes_task_sequence else {}),
+    }
+
+
+STATES: Mapping[str, type] = {"walk": WalkState, "gait_seen": GaitSeen}
+CARRIED: Mapping[str, type] = {"carried": CarriedFoot}
+"""What a step is handed by the one before."""
+ENDED: Mapping[str, type] = {"walk_begun": WalkStep, "ahead": HeldChambers, "ended": WalkEnd}
+
+
+def led(parts: Program) -> Mapping[str, type]:
+    """What says where the gait is at the end of a step."""
+    if parts.takes_task_sequence:
+        return {"next_gait": GaitNow, "marks": Marks}
+    return {"place": GaitPlace, "measured": GaitMeasured, "next_gait": GaitNow}
+
+
+# Before the gas.
+
+
+def carry(parts: Program, lane: Lane) -> None:
+    """What a step is handed by the one before, where there was none."""
+    lane.carried = walking.carried_foot(lane.leg, lane.share, lane.walk.now, lane.walk.foot)
+
+
+def find_place(parts: Program, lane: Lane, now: Now) -> None:
+    """Where the gait is at the end of the step, stride after equal stride."""
+    lane.place = place_at(lane.gait_timing, time_of(parts, lane, now) + length_of(parts, lane))
+
+
+def find_measured(parts: Program, lane: Lane) -> None:
+    """What was measured there."""
+    lane.measured = measured_at(lane.gait, lane.gait_timing, lane.leg, lane.place)
+
+
+def find_gait(parts: Program, lane: Lane) -> None:
+    """The gait at the end of the step."""
+    lane.next_gait = gait_of(lane.leg, lane.measured)
+
+
+def find_gait_of_task(parts: Program, lane: Lane, now: Now) -> None:
+    """The gait at the end of the step in a task sequence, with the marks of a stride."""
+    end = time_of(parts, lane, now) + length_of(parts, lane)
+    lane.next_gait, lane.marks = gait_in_task_sequence(lane.gait, lane.task_sequence, lane.gait_timing, lane.leg, end)
+
+
+def begin(parts: Program, lane: Lane) -> None:
+    """Where the step would lead the foot, free and on the ground."""
+    lane.walk_begun = walking.begin_walk(
+        lane.plant,
+        lane.leg,
+        lane.gait_timing,
+        lane.state,
+        lane.held,
+        lane.walk,
+        lane.carried,
+        lane.next_gait,
+        length_of(parts, lane),
+    )
+
+
+def assumed_angle(parts: Program, lane: Lane) -> float:
+    """Angle [rad] to which the volumes run."""
+    return walking.next_angle(lane.plant, lane.leg, lane.walk, lane.walk_begun)
+
+
+def hold_ahead(parts: Program, lane: Lane) -> None:
+    """The chambers there."""
+    lane.ahead = held_chambers(lane.plant, assumed_angle(parts, lane))
+
+
+# Behind it.
+
+
+def reach(parts: Program, lane: Lane) -> None:
+    """Where the step ends, unless an event leads elsewhere."""
+    parts.gas.add(parts, lane)
+    lane.ended, lane.carried = walking.reach_end(
+        lane.plant,
+        lane.leg,
+        lane.share,
+        lane.gait_timing,
+        lane.fed,
+        lane.walk,
+        lane.walk_begun,
+        lane.next_gait,
+        lane.ahead,
+        length_of(parts, lane),
+    )
+
+
+def depart(parts: Program, lane: Lane) -> None:
+    """Where it ends then: few feet depart from where they slide."""
+    parts.gas.add(parts, lane)
+    lane.ended, lane.ahead = walking.depart_in_walk(
+        lane.plant, lane.fed, lane.walk_begun, lane.ended, lane.ahead, length_of(parts, lane)
+    )
+
+
+def end(parts: Program, lane: Lane, length: float) -> None:
+    """``lane.after`` and ``lane.walk_after``, state and walk after the step."""
+    lane.held = lane.ahead
+    lane.after, lane.walk_after = walking.end_walk(
+        lane.plant,
+        lane.leg,
+        lane.share,
+        lane.gait_timing,
+        lane.gait_sensors.follow_rate,
+        lane.fed,
+        lane.walk,
+        lane.walk_begun,
+        lane.ended,
+        lane.held,
+        lane.carried,
+        lane.next_gait,
+        length,
+    )
+    if parts.takes_task_sequence:
+        # A stride's marks: a scuff on the toe sensor, a forefoot on a stair's edge.
+        follow_rate = lane.gait_sensors.follow_rate
+        lane.walk_after = lane.walk_after._replace(
+            toe_force=shown_toe_force(lane.walk_after.toe_force, lane.marks, follow_rate, length),
+            toes_first=stands_on_toes(lane.walk_after.toes_first, lane.marks),
+        )

@@ -1,0 +1,29 @@
+"""An interrupt while Python still loads what the command line begins with: one line, where there would be a traceback.
+
+Only what every Python has loaded already is imported here, so that little comes before it.
+"""
+
+import _signal  # type: ignore[import-not-found]
+import os
+import sys
+
+_LINE = b"ppafo: interrupted; nothing is half written\n"
+_EXIT_CODE = 130
+_COMMANDS = ("ppafo", "ppafo.exe", "ppafo-script.py")
+
+
+def end(_number: int, _frame: object) -> None:
+    """End the process by an interrupt, at once: nothing was begun."""
+    os.write(2, _LINE)
+    os._exit(_EXIT_CODE)
+
+
+def is_command_line() -> bool:
+    """Tell whether this process was started as ``ppafo`` or ``python -m ppafo``, and not by a program that imports."""
+    started = sys.orig_argv
+    by_module = any(started[place : place + 2] == ["-m", "ppafo"] for place in range(1, len(started) - 1))
+    return by_module or os.path.basename(sys.argv[0] if sys.argv else "") in _COMMANDS  # noqa: PTH119
+
+
+if is_command_line() and _signal.getsignal(_signal.SIGINT) is _signal.default_int_handler:
+    _signal.signal(_signal.SIGINT, end)

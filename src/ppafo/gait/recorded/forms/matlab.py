@@ -1,0 +1,76 @@
+"""MATLAB files whose variables are curves over a time: by their names, or by the labels beside a matrix."""
+
+import re
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+
+from ppafo.errors import DataError
+from ppafo.gait.recorded.form import Convention, GaitForm
+from ppafo.gait.recorded.forms.opensim import opensim_convention, unit_of_label
+from ppafo.gait.recorded.mapping import Side, package_map
+from ppafo.gait.recorded.table import MotionTable
+from ppafo.storage.matlab import MATLAB_SUFFIX, MatlabFile, read_matlab
+
+_TIMES = ("time", "t", "tout")
+_OPENSIM = re.compile(r"ankle_angle_[rl].*|.*_force_v[xyz]|.*_moment|pelvis_.*")
+"""Labels that are OpenSim's."""
+_DEGREES = re.compile(r"inDegrees\s*=\s*(yes|no)", re.IGNORECASE)
+_THREE = re.compile(r"(?P<name>.*)\(:,(?P<number>[123])\)")
+
+
+def _read(path: str | Path) -> MotionTable:
+    """Return the variables that are as long as the time; a matrix of three columns is a marker, ``RKNE.x`` too.
+
+    DataError where nothing is called time.
+    """
+    file = read_matlab(path)
+    name = next((name for name in file.columns if _last(name) in _TIMES), None)
+    if name is None:
+        names = ", ".join(list(file.columns)[:12])
+        raise DataError(f"{path}: no variable is called 'time' or 't'; it has {names}{file.said_of_objects()}")
+    time = file.columns[name]
+    columns = {other: values for other, values in file.columns.items() if other != name and values.size == time.size}
+    columns |= {
+        f"{match['name']}.{'xyz'[int(match['number']) - 1]}": values
+        for other, values in columns.items()
+        if (match := _THREE.fullmatch(other)) and f"{match['name']}(:,4)" not in file.columns
+    }
+    stalled = np.flatnonzero(np.diff(time) <= 0.0)
+    if stalled.size:
+        raise DataError(f"{path}: {name} does not increase after its sample {stalled[0] + 1}")
+    angle = _angle(file)
+    is_opensim = _has_opensim(columns)
+    units = {other: unit_of_label(other, other, angle) if is_opensim else "" for other in columns}
+    return MotionTable(str(path), time, columns, units)
+
+
+def _has_opensim(names: Iterable[str]) -> bool:
+    return any(map(_OPENSIM.fullmatch, names))
+
+
+def _last(name: str) -> str:
+    return name.rpartition(".")[2].lower()
+
+
+def _angle(file: MatlabFile) -> str:
+    """Return the unit of angles that the kept header of an OpenSim table states, empty where it is not there."""
+    said = [match[1].lower() for word in file.words if (match := _DEGREES.search(word))]
+    return {"yes": "deg", "no": "rad"}[said[0]] if said else ""
+
+
+def _convention(table: MotionTable, side: Side, body_mass: float) -> Convention:
+    """Return the map of OpenSim's labels where they are there, else of the names of the package."""
+    if _has_opensim(table.columns):
+        return opensim_convention(table, side, body_mass)
+    return Convention(package_map(side))
+
+
+FORM = GaitForm(
+    name="matlab",
+    summary="MATLAB files with OpenSim's labels or the names of this package, or others with a gait map",
+    suffixes=(MATLAB_SUFFIX,),
+    read=_read,
+    convention=_convention,
+)

@@ -1,0 +1,18 @@
+"""Measures a recording, or the file or the result folder of one: its metrics by name."""
+
+from pathlib import Path
+
+from ppafo.arguments import checked
+from ppafo.metrics import Metric
+from ppafo.metrics import evaluate as of_recording
+from ppafo.signals import Recording
+from ppafo.storage import read_recording
+
+
+@checked()
+def evaluate(recording: Recording | str | Path) -> dict[str, Metric]:
+    """Return every metric [SI] that the channels of a recording allow, by name; one sample alone allows none.
+
+    A file or a result folder stands for its recording. DataError for one that cannot be used.
+    """
+    return of_recording(recording if isinstance(recording, Recording) else read_recording(recording))

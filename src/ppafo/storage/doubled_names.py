@@ -1,0 +1,57 @@
+"""Columns and markers of one name: each gets one of its own, by its description or by its number in the file."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from ppafo.errors import one_line
+from ppafo.signals.recording import Floats
+
+_LONGEST_SHOWN = 40
+
+
+def told_apart(names: Sequence[str], descriptions: Sequence[str] = ()) -> list[str]:
+    """Return names of which none is there twice: those of a doubled name are its descriptions, or ``NAME#2``.
+
+    A description is taken where all of that name have one, and nothing else is called so.
+    """
+    counts = Counter(names)
+    twins = {name: [place for place, other in enumerate(names) if other == name] for name in counts if counts[name] > 1}
+    apart = list(names)
+    for name, places in twins.items():
+        said = [descriptions[place].strip() if place < len(descriptions) else "" for place in places]
+        are_names = all(said) and len(set(said)) == len(said) and not set(said) & {*apart, *counts}
+        for number, place in enumerate(places):
+            apart[place] = said[number] if are_names else f"{name}#{number + 1}"
+    return apart
+
+
+def doubled(names: Sequence[str], apart: Sequence[str]) -> dict[str, list[str]]:
+    """Return by each doubled name those that stand for it."""
+    found: dict[str, list[str]] = {}
+    for name, own in zip(names, apart, strict=True):
+        if name != own:
+            found.setdefault(name, []).append(own)
+    return found
+
+
+def without_copies(columns: Mapping[str, Floats], twins: Mapping[str, Sequence[str]]) -> dict[str, Floats]:
+    """Return columns in which one stands by the doubled name for all of that name, where these are the same."""
+    same = {
+        name: own
+        for name, own in twins.items()
+        if all(np.array_equal(columns[own[0]], columns[other], equal_nan=True) for other in own[1:])
+    }
+    copies = {other for own in same.values() for other in own}
+    first = {own[0]: name for name, own in same.items()}
+    return {first.get(name, name): values for name, values in columns.items() if name in first or name not in copies}
+
+
+def said_of_doubled(twins: Mapping[str, Sequence[str]], left: Mapping[str, object], noun: str) -> list[str]:
+    """Return a remark on each doubled name of which more than one is left."""
+    return [
+        f"{noun} of one name, {one_line(name)[:_LONGEST_SHOWN]!r}: they are {', '.join(map(repr, own))} here"
+        for name, own in twins.items()
+        if all(other in left for other in own)
+    ]

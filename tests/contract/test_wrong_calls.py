@@ -1,0 +1,66 @@
+"""Calls with a value that no argument takes: refused, by an error that names the argument; part of the table."""
+
+import pytest
+
+import ppafo
+from scripts.wrong_calls import calls, drawn, functions, tried, workplace
+
+CALLS, SEED = 250, 7
+WITHOUT_ARGUMENTS = {"list_gaits", "list_scenarios", "list_sets", "list_studies", "list_tunings", "list_walks"}
+
+
+def test_no_wrong_call_is_accepted_and_each_error_names_the_argument() -> None:
+    with workplace() as recording:
+        known = functions(recording)
+        outcomes = {call: tried(call, known) for call in drawn(known, CALLS, SEED)}
+    assert {call: found for call, found in outcomes.items() if found.kind != "named"} == {}
+
+
+def test_the_table_has_every_public_function_and_each_of_its_arguments() -> None:
+    from inspect import isclass, signature
+
+    public = {name: getattr(ppafo, name) for name in ppafo.__all__ if not isclass(getattr(ppafo, name))}
+    with workplace() as recording:
+        known = functions(recording)
+    assert set(known) == set(public) - WITHOUT_ARGUMENTS
+    assert {name: set(function.kinds) for name, function in known.items()} == {
+        name: set(signature(public[name]).parameters) for name in known
+    }
+    assert len(calls(known)) > 3075
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (
+            lambda: ppafo.sweep("s", ["valve.area=3 mm^2"]),
+            "sweep() takes one argument by position: write sweep('s', out=",
+        ),
+        (lambda: ppafo.walk("solenoid", 5), "walk() takes one argument by position: write walk('solenoid', minutes=5)"),
+        (
+            lambda: ppafo.load_device("ppafo2011", "proportional"),
+            "write load_device('ppafo2011', valve='proportional')",
+        ),
+        (lambda: ppafo.load_gait(name_or_path="x"), "load_gait(): name_or_path is now called gait: write gait='x'"),
+        (lambda: ppafo.find("s", vary="a", such_that="b", higest=True), "did you mean 'highest'?"),
+        (lambda: ppafo.find("s"), "find() needs vary and such_that: "),
+        (
+            lambda: ppafo.simulate("torque-task-proportional", overrides=["a=1"], scenario="x"),
+            "scenario is given twice",
+        ),
+    ],
+)
+def test_an_old_or_mistyped_call_is_answered_with_what_to_write(call, said) -> None:  # type: ignore[no-untyped-def]
+    with pytest.raises(ppafo.ArgumentError) as caught:
+        call()
+    assert said in str(caught.value)
+
+
+def test_common_arguments_stand_in_one_order() -> None:
+    from inspect import isclass, signature
+
+    order = ["overrides", "draws", "seed", "confidence", "maximum_failed", "threads", "progress"]
+    for name in ppafo.__all__:
+        if not isclass(getattr(ppafo, name)):
+            found = [argument for argument in signature(getattr(ppafo, name)).parameters if argument in order]
+            assert found == [argument for argument in order if argument in found], name

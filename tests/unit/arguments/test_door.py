@@ -1,0 +1,111 @@
+"""What the door makes of values that people have: dictionaries, generators, NumPy numbers, one text, a path."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import pytest
+
+import ppafo
+from ppafo.arguments import Count, Fraction, Mass, Overrides, Threads, Word, checked
+from ppafo.errors import ArgumentError, StudyError
+
+TASK = "torque-task-proportional"
+
+
+@checked("mass", "overrides")
+def walked(
+    mass: Mass,
+    *,
+    overrides: Overrides = (),
+    draws: Count = 10,
+    share: Fraction = 0.5,
+    threads: Threads | None = None,
+    names: Annotated[Sequence[str], Word("NAME")] = (),
+    is_whole: bool = False,
+    file: str | Path = "x",
+) -> dict[str, Any]:
+    """Return what arrived."""
+    return locals()
+
+
+@pytest.mark.parametrize(
+    ("given", "arrived"),
+    [
+        ({"mass": "72.5 kg"}, {"mass": 72.5}),
+        ({"mass": np.float32(72.5)}, {"mass": 72.5}),
+        ({"mass": np.array(72.5)}, {"mass": 72.5}),
+        ({"mass": 1, "draws": np.int64(3)}, {"draws": 3}),
+        ({"mass": 1, "is_whole": np.bool_(True)}, {"is_whole": True}),
+        ({"mass": 1, "share": "95%"}, {"share": 0.95}),
+        ({"mass": 1, "names": "rms_error"}, {"names": ("rms_error",)}),
+        ({"mass": 1, "names": iter(["a", "b"])}, {"names": ("a", "b")}),
+        ({"mass": 1, "file": Path("a.toml")}, {"file": Path("a.toml")}),
+        ({"mass": 1, "overrides": "a.b=2 mm"}, {"overrides": ("a.b=2 mm",)}),
+        ({"mass": 1, "overrides": (text for text in ["a=1", "b=2"])}, {"overrides": ("a=1", "b=2")}),
+        (
+            {"mass": 1, "overrides": {"a.b": "2 mm", "c": {"d": 4.0, "e": True}, "n": np.int64(3)}},
+            {"overrides": ("a.b=2 mm", "c.d=4.0 SI", "c.e=true", "n=3 SI")},
+        ),
+        ({"mass": 1, "threads": None}, {"threads": None}),
+    ],
+)
+def test_a_value_arrives_as_the_function_takes_it(given: dict[str, Any], arrived: dict[str, Any]) -> None:
+    found = walked(**given)
+    assert {name: found[name] for name in arrived} == arrived
+    assert {name: type(found[name]) for name in arrived} == {name: type(value) for name, value in arrived.items()}
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"mass": -1}, "mass=-1: must be a number in kg, above 0 kg, or a text with its unit such as '1 g'"),
+        ({"mass": "-3 kg"}, "mass: -3 kg: must be above 0 kg"),
+        ({"mass": 1, "threads": -1}, "threads=-1: must be a whole number, 1 or more"),
+        ({"mass": 1, "is_whole": "False"}, "is_whole='False': must be True or False"),
+        ({"mass": 1, "names": ["a", 2]}, "names[1]=2: must be a text"),
+        ({"mass": 1, "overrides": {"a": float("nan")}}, "overrides: a = nan: must be a finite number in SI units"),
+        ({"mass": 1, "file": ""}, "file='': must be a name or a path"),
+    ],
+)
+def test_another_value_is_refused_by_name(given: dict[str, Any], said: str) -> None:
+    with pytest.raises(ArgumentError) as caught:
+        walked(**given)
+    assert str(caught.value).startswith(said)
+
+
+def test_a_number_among_overrides_is_in_si_units_and_a_text_has_its_own() -> None:
+    by_texts = ppafo.simulate(TASK, ["supply.pressure=70 psi_g", "reference.level=4 N m"])
+    by_dictionary = ppafo.simulate(TASK, {"supply.pressure": "70 psi_g", "reference.level": 4.0})
+    assert by_dictionary.metrics["rms_error"].value == by_texts.metrics["rms_error"].value
+    supply = ppafo.load_device("ppafo2011", overrides={"supply": {"pressure": 4.0e5}}).supply
+    assert supply.pressure == 4.0e5
+    assert ppafo.load_scenario(TASK, {"sensors.seed": 3}).sensors.seed == 3
+
+
+def test_overrides_that_can_be_gone_through_once_are_not_lost() -> None:
+    def level(overrides: Any) -> float | None:
+        arguments = {"vary": "supply.pressure=20..90 psi_g", "such_that": "rms_error <= 0.8 N m", "grid": 3}
+        return ppafo.find(TASK, overrides=overrides, **arguments).found.value
+
+    assert level(text for text in ["reference.level=3 N m"]) == level(["reference.level=3 N m"])
+    assert level(()) != level(["reference.level=3 N m"])
+
+
+def test_a_name_is_taken_wherever_an_object_is() -> None:
+    assert ppafo.audit("ppafo2011") == ppafo.audit(ppafo.load_parameter_set("ppafo2011"))
+    assert [run.scenario.name for run in ppafo.simulate_many([TASK, ppafo.load_scenario("step-response")])] == [
+        TASK,
+        "step-response",
+    ]
+    assert [run.scenario.name for run in ppafo.simulate_many(TASK)] == [TASK]
+
+
+def test_an_error_about_the_content_of_an_argument_begins_with_its_name_and_keeps_its_class() -> None:
+    with pytest.raises(StudyError, match=r"^vary: 'nonsense' is not of the form"):
+        ppafo.find(TASK, vary="nonsense", such_that="rms_error <= 1 N m")
+    with pytest.raises(ppafo.ScenarioError, match=r"^scenario: nowhere\.toml: cannot be read"):
+        ppafo.simulate(Path("nowhere.toml"))
+    with pytest.raises(ppafo.ParameterError, match=r"^there is no parameter set 'nowhere'"):
+        ppafo.audit("nowhere")

@@ -1,0 +1,116 @@
+"""Gaits in .txt and .mat files, doubled columns, and maps that do not say everything."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.io
+
+from ppafo.errors import DataError
+from ppafo.gait.recorded import ImportSettings, import_gait
+from ppafo.gait.recorded.mapping import load_map
+from ppafo.signals.recording import Floats
+from tests.unit.gait.laboratory import MASS, markers
+
+TIME = np.arange(0.0, 5.2, 0.01)
+
+
+def labelled(columns: dict[str, Floats]) -> dict[str, Floats]:
+    return {header.partition(" ")[0]: values for header, values in columns.items()}
+
+
+@pytest.mark.parametrize("layout", ["variables", "structure", "labels"])
+def test_a_walk_in_a_matlab_file_is_the_walk(
+    columns: dict[str, Floats], csv_of: Callable[..., Path], tmp_path: Path, layout: str
+) -> None:
+    wanted = import_gait([csv_of(columns)], ImportSettings(62.0)).gait
+    named = labelled(columns)
+    time = np.loadtxt(tmp_path / "walk.csv", delimiter=",", skiprows=1)[:, 0]
+    path = tmp_path / "walk.mat"
+    if layout == "variables":
+        scipy.io.savemat(path, {"time": time[:, None], **{name: values[None, :] for name, values in named.items()}})
+    elif layout == "structure":
+        scipy.io.savemat(path, {"walk": {"t": time, **named}})
+    else:
+        labels = np.array(["time", *named], dtype=object)
+        scipy.io.savemat(path, {"walk": {"data": np.column_stack([time, *named.values()]), "colheaders": labels}})
+    prefix = "walk." if layout == "structure" else ""
+    map_file = tmp_path / "map.toml"
+    map_file.write_text(
+        f"""
+schema_version = 1
+shank_angle = {{ terms = ["{prefix}shank_angle"], unit = "rad" }}
+ankle_angle = {{ terms = ["{prefix}ankle_angle"], unit = "rad", positive = "plantarflexion", neutral = "90 deg" }}
+vertical_force = {{ terms = ["{prefix}vertical_force"], unit = "-" }}
+"""
+    )
+    found = import_gait([path], ImportSettings(62.0, columns=load_map(map_file))).gait
+    for name in ("shank_angle", "ankle_angle", "vertical_force"):
+        assert np.allclose(found.curve(name).cosines, wanted.curve(name).cosines)
+
+
+def test_a_matlab_file_without_a_time_says_what_it_has(tmp_path: Path) -> None:
+    scipy.io.savemat(tmp_path / "walk.mat", {"angle": np.arange(50.0)})
+    with pytest.raises(DataError, match=r"walk\.mat: no variable is called 'time' or 't'; it has angle"):
+        import_gait([tmp_path / "walk.mat"], ImportSettings(62.0))
+
+
+def trc(folder: Path, names: dict[str, Floats], file: str = "walk.trc") -> Path:
+    """A file of markers as Cortex or Nexus writes it."""
+    head = "\t".join(f"{name}\t\t" for name in names)
+    axes = "\t".join(f"X{number}\tY{number}\tZ{number}" for number in range(1, len(names) + 1))
+    table = np.vstack([np.arange(1, TIME.size + 1), TIME, *names.values()]).T
+    rows = "\n".join("\t".join(map(repr, row)) for row in table.tolist())
+    path = folder / file
+    path.write_text(
+        "PathFileType\t4\t(X/Y/Z)\twalk.trc\nDataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\n"
+        f"100\t100\t{TIME.size}\t{len(names)}\tmm\nFrame#\tTime\t{head}\n\t\t{axes}\n\n{rows}\n"
+    )
+    return path
+
+
+def doubled_trc(folder: Path, name: str, file: str = "walk.trc") -> Path:
+    walk = markers(TIME)
+    path = trc(folder, {**walk, "STRAY": walk["RKNE"] + 100.0}, file)
+    path.write_text(path.read_text().replace("STRAY", name))
+    return path
+
+
+@pytest.mark.parametrize("file", ["walk.trc", "walk.txt"])
+def test_a_doubled_marker_that_is_not_needed_is_left_out(tmp_path: Path, file: str) -> None:
+    walk = markers(TIME)
+    wanted = import_gait([trc(tmp_path, walk)], ImportSettings(MASS)).gait
+    path = trc(tmp_path, {**walk, "HEAD": walk["RKNE"] + 100.0, "STRAY": walk["RKNE"] + 200.0}, file)
+    path.write_text(path.read_text().replace("STRAY", "HEAD"))
+    found = import_gait([path], ImportSettings(MASS))
+    assert found.gait.shank_angle == wanted.shank_angle
+    assert any("'HEAD#1', 'HEAD#2'" in remark for remark in found.remarks)
+
+
+def test_a_doubled_marker_that_is_needed_is_named_by_its_number(tmp_path: Path) -> None:
+    path = doubled_trc(tmp_path, "RKNE")
+    with pytest.raises(DataError, match=r"has 'RKNE' more than once, .* 'RKNE#1' or 'RKNE#2', in a gait map"):
+        import_gait([path], ImportSettings(MASS))
+    map_file = tmp_path / "map.toml"
+    map_file.write_text(
+        'schema_version = 1\nshank_angle = { knee = "RKNE#1", ankle = "RANK", forward = "x" }\n'
+        'ankle_angle = { heel = "RHEE", toe = "RTOE", positive = "plantarflexion" }\n'
+    )
+    found = import_gait([path], ImportSettings(MASS, columns=load_map(map_file)))
+    said = [remark for remark in found.remarks if "gait map does not say" in remark]
+    assert said == [
+        'the gait map does not say vertical of shank_angle: vertical = "z" is assumed',
+        'the gait map does not say forward and vertical of ankle_angle: forward = "x" and vertical = "z" are assumed',
+    ]
+
+
+def test_a_doubled_column_of_a_plain_table_is_left_out_where_it_is_not_needed(
+    columns: dict[str, Floats], csv_of: Callable[..., Path]
+) -> None:
+    wanted = import_gait([csv_of(columns)], ImportSettings(62.0)).gait
+    plain = {header.replace("[", "(").replace("]", ")"): values for header, values in columns.items()}
+    noise = columns[next(iter(columns))]
+    path = csv_of({**plain, "EMG": noise, "STRAY": 2.0 * noise})
+    path.write_text(path.read_text().replace("STRAY", "EMG"))
+    assert import_gait([path], ImportSettings(62.0)).gait.shank_angle == wanted.shank_angle
