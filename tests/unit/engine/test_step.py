@@ -127,15 +127,15 @@ def test_no_phase_divides_whole_numbers(name: str, function: Callable[..., Any])
     assert divisions == [], f"{name}: the loop over steps works it out, once for all lanes"
 
 
-VECTORISED = re.compile(r"loop vectorized using")
+VECTORISED = re.compile(r"^program\.c:(\d+):\d+: optimized: loop vectorized", re.MULTILINE)
 
 
 @pytest.mark.skipif(which("gcc") is None, reason="gcc says which loops it takes several lanes of at once")
 @pytest.mark.parametrize(
     ("name", "overrides", "least"),
     [
-        ("torque-task-proportional", (), 5),
-        ("torque-task-slow-valve", ("sensors.delay=2.3 ms",), 8),
+        ("torque-task-proportional", (), 6),
+        ("torque-task-slow-valve", ("sensors.delay=2.3 ms",), 9),
     ],
 )
 def test_loops_over_lanes_are_vectorised(name: str, overrides: tuple[str, ...], least: int, tmp_path: Path) -> None:
@@ -143,4 +143,4 @@ def test_loops_over_lanes_are_vectorised(name: str, overrides: tuple[str, ...], 
     (tmp_path / "program.c").write_text(text, encoding="utf-8")
     command = ["gcc", *FLAGS, "-march=x86-64-v3", "-fopenmp-simd", "-fopt-info-vec-optimized", "-c", "program.c"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
-    assert len(VECTORISED.findall(done.stderr)) >= least
+    assert len(set(VECTORISED.findall(done.stderr))) >= least
