@@ -28,6 +28,12 @@ def simulate(scenario: Scenario | str | Path, overrides: Overrides = (), *, plug
 
 
 @checked("scenarios", "threads")
-def simulate_many(scenarios: Sequence[Scenario | str | Path], *, threads: Threads | None = None) -> list[Result]:
-    """Run many scenarios side by side, objects, names or files, each exactly as if it ran alone."""
+def simulate_many(
+    scenarios: Sequence[Scenario | str | Path], *, threads: Threads | None = None, plugins: Plugins = ()
+) -> list[Result]:
+    """Run many scenarios side by side, objects, names or files, each exactly as if it ran alone.
+
+    ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
+    """
+    name_plugins(plugins)
     return of_loaded.simulate_many([scenario_or_load(scenario) for scenario in scenarios], threads)

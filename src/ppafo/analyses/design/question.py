@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from ppafo.arguments import Length, Mass, Minutes, Pressure, Seed, Threads, Torque, Word, checked
+from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report, report_nothing
 
 if TYPE_CHECKING:
@@ -30,6 +31,7 @@ def design(
     torque: Torque | None = None,
     pressure: Pressure | None = None,
     minutes: Minutes | None = None,
+    plugins: Plugins = (),
     progress: Report | None = None,
 ) -> Finding[Design] | Finding[Sizing] | Finding[WearerSizing]:
     """Find a device: for a wearer, for a torque profile, or Pareto-optimal in error, gas and mass.
@@ -43,7 +45,9 @@ def design(
     torque: peak torque of push-off, '2.5 N m'
     pressure: supply pressure, '50 psi_g'
     minutes: minutes of walking on one bottle
+    plugins: modules of your own, files or names, whose objects files may name
     """
+    name_plugins(plugins)
     from ppafo.analyses.design.front import answer as front
     from ppafo.analyses.design.front.problem import with_seed
     from ppafo.analyses.design.front.solve import find_front

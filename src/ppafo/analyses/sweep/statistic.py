@@ -22,6 +22,7 @@ from ppafo.arguments import Confidence, Count, MaximumFailed, Name, Overrides, S
 from ppafo.documents.json_text import plain
 from ppafo.errors import StudyError, UnitError, refused_as
 from ppafo.metrics import METRICS
+from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report
 from ppafo.report.finding import Finding, Part, columns_of
 from ppafo.report.kind import Interval, Kind, of_metric
@@ -326,6 +327,7 @@ def estimate(
     confidence: Confidence = 0.95,
     maximum_failed: MaximumFailed = 0.01,
     threads: Threads | None = None,
+    plugins: Plugins = (),
     progress: Report | None = None,
 ) -> Finding[Estimate]:
     """Return a statistic of a metric over the distributions of a study, drawn until its interval is ``width`` wide.
@@ -335,7 +337,10 @@ def estimate(
     those that the interval needs, whatever the study's sampling method: randomised Sobol replicates for a mean, else
     independent ones. ``seed`` is the study's by default. ``also`` names further metrics: means over the same draws.
     StudyError for bad input and where more than the fraction ``maximum_failed`` of the runs fails.
+
+    ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
     """
+    name_plugins(plugins)
     chosen, base, uncertainty = drawn_in(study, overrides, configuration)
     wanted = tuple(dict.fromkeys((metric, *also)))
     check_metrics(wanted, base.scenario)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from ppafo.arguments import Duration, Name, Overrides, Volume, Word, checked
+from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Progress, Report, report_nothing
 
 if TYPE_CHECKING:
@@ -36,6 +37,7 @@ def validate(
     thresholds: Limits = (),
     longest_delay: Duration = 0.02,
     columns: ColumnsLike | None = None,
+    plugins: Plugins = (),
     progress: Report | None = None,
 ) -> Finding[Validation]:
     """Compare a parameter set with recordings, channel by channel.
@@ -61,7 +63,9 @@ def validate(
     longest_delay: maximum delay of the measurement to estimate; default '20 ms', '0 s' for none
     columns: file with a column map [columns.NAME], for recordings with other column names; a problem file may contain
         it
+    plugins: modules of your own, files or names, whose objects files may name
     """
+    name_plugins(plugins)
     from ppafo.analyses.validate.solve import LARGEST_DELAY, Validation, finding_of, named_column_map
     from ppafo.errors import DataError, nearest_name, one_line
     from ppafo.parameters import load_device
