@@ -88,7 +88,7 @@ class Statistic:
         None of them, for a mean, while all are equal and few: one that comes later may lie anywhere.
         """
         known = values[np.isfinite(values)]
-        if self.is_of_replicates and 0 < known.size < FEWEST_EQUAL and float(np.ptp(known)) == 0.0:
+        if self.is_of_replicates and 0 < known.size < FEWEST_SEEN and float(np.ptp(known)) == 0.0:
             return 0.0
         return effective_sample_size(known) if self.is_of_replicates else float(known.size)
 
@@ -137,8 +137,8 @@ def parse_statistic(text: str, metric: str, atmosphere: float | None) -> Statist
     raise StudyError(f"statistic '{text}' is not known; give {GRAMMAR}, with a fraction above 0 and below 1")
 
 
-FEWEST_EQUAL = 3000
-"""Equal values from which they count as their mean: one in a thousand that differs would have come (95 %)."""
+FEWEST_SEEN = 3000
+"""Draws from which a mean is believed: one in a thousand that differs would have come (95 %)."""
 _RULE_OF_THREE = 3.0
 """Over the draws: probability of an event that 95 of 100 such sets of draws show."""
 
@@ -259,12 +259,15 @@ def draw_until(
 ) -> Finding[Estimate]:
     """Draw from one stream until the rule is met or there are no more looks.
 
-    An interval that few draws determine is not trusted, however narrow it is: drawing continues.
+    An interval that few draws determine is not trusted, however narrow it is: drawing continues. So does that of a mean
+    until what happens once in a thousand runs would have come, or there are no more draws: no interval from draws that
+    lack it could bound it.
     Runs that fail have no value: up to the fraction that the rule allows they are left out and counted, above it
     StudyError.
     """
     looks: list[Look] = []
     drawn: Columns = {}
+    is_met = False
     for size in rule.sizes:
         done = looks[-1].draws if looks else 0
         columns = statistic.columns(uncertainty, done, size - done, seed)
@@ -276,7 +279,10 @@ def draw_until(
         found = rows[metric]
         missing, interval = np.count_nonzero(~np.isfinite(found)), statistic.estimate(found, rule.confidence_of_look)
         looks.append(Look(found.size, int(missing), interval, statistic.effective_size(found)))
-        if rule.is_narrow(interval) and looks[-1].is_carried:
+        # A mean is moved by what happens seldom; quantiles and probabilities are not.
+        has_shown = not statistic.is_of_replicates or found.size >= min(FEWEST_SEEN, rule.maximum)
+        is_met = has_shown and rule.is_narrow(interval) and looks[-1].is_carried
+        if is_met:
             break
     # Failures are counted here: below, some of the same draws run again with other noise.
     failures, last, noise = runs.failures, looks[-1], None
@@ -291,7 +297,7 @@ def draw_until(
         metric=metric,
         statistic=statistic.label,
         unit=statistic.unit,
-        is_met=rule.is_narrow(last.interval) and last.is_carried,
+        is_met=is_met,
         draws=last.draws,
         failed=failures,
         interval=last.interval,
@@ -378,7 +384,7 @@ def _remarks(last: Look, values: Floats, statistic: Statistic, kind: Kind, noise
     if not last.is_carried and are_equal:
         said.append(
             f"do not trust this interval: all {known:,} values are equal, which do not show how far a rare one lies; "
-            f"draw at least {FEWEST_EQUAL:,}"
+            f"draw at least {FEWEST_SEEN:,}"
         )
     elif not last.is_carried:
         said.append(
