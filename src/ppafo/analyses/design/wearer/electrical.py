@@ -75,9 +75,14 @@ def electrical_of(
     return Electrical(powers, cell, max(1, math.ceil(needed)), is_whole)
 
 
+def _power_text(power: float) -> str:
+    """Return a power [W] with three digits, in milliwatts below one watt."""
+    return f"{power:.3g} W" if power >= 1.0 else f"{1000.0 * power:.3g} mW"
+
+
 def electrical_sentences(found: Electrical) -> list[str]:
     """Return powers, and mass and minutes of the battery."""
-    parts = ", ".join(f"{name} {1000.0 * power:.3g} mW" for name, power in found.powers.items())
+    parts = ", ".join(f"{name} {_power_text(power)}" for name, power in found.powers.items())
     valve = "" if found.is_whole else ", without the valve: the catalogue states no power of it"
     return [
         f"electrical power: {found.power:.3g} W ({parts}){valve}",
