@@ -48,7 +48,7 @@ def truths(truth: Mapping[str, Any]) -> dict[str, float]:
         "friction.dynamic_torque": device["friction"]["dynamic_torque"],
         "valves.proportional.discharge_coefficient": valve["discharge_coefficient"],
         "valves.proportional.dead_band": preset["valve.dead_band"],
-        "valve_map.hysteresis": preset["valve.hysteresis"],
+        "effects.spool_play.width": preset["valve.hysteresis"],
         "actuator.leak.area": actuator["leak"]["area"],
     }
 

@@ -149,7 +149,7 @@ def functions(recording: Path) -> dict[str, Function]:
         ),
         "design": _function(
             {"mass": 72.5, "torque": 2.5, "pressure": 4.46e5, "minutes": 5.0},
-            "problem seed threads mass stature torque pressure minutes progress",
+            "problem seed threads mass stature torque pressure minutes toes catalogue progress",
             problem="object",
             seed="seed",
             threads="count",
@@ -158,6 +158,8 @@ def functions(recording: Path) -> dict[str, Function]:
             torque="positive",
             pressure="positive",
             minutes="positive",
+            toes="number",
+            catalogue="name",
             progress="function",
             alone="problem",
         ),

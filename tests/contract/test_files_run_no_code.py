@@ -311,3 +311,12 @@ def test_a_set_is_audited_with_the_module_that_the_person_names(folder: Path) ->
     with pytest.raises(PpafoError, match="is of type ControllerKind, not ValveKind"):
         ppafo.audit("given.toml", plugins=["evil.py"])
     assert is_run()
+
+
+def test_no_text_of_a_file_gives_the_terminal_an_order(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = text_of("parameters").replace('source = "', 'source = "\\u001b[31m\\u0007\\r\\u202e', 1)
+    (folder / "given.toml").write_text(text, encoding="utf-8")
+    assert main(["sets", "show", "given.toml"]) == 0
+    said = capsys.readouterr().out
+    assert not set("\x1b\x07\r\u202e") & set(said)
+    assert "\N{REPLACEMENT CHARACTER}[31m" in said

@@ -141,9 +141,22 @@ def _read_hdf5(path: str | Path, found: _Found) -> None:
     import h5py
 
     with h5py.File(path, "r") as file:
-        for name, item in file.items():
+        for name, item in _own_items(file):
             if not name.startswith("#"):
                 _add(name, _tree_of_hdf5(item, file, 0), 0, found)
+
+
+def _own_items(group: Any) -> Iterator[tuple[str, Any]]:
+    """Give name and content of each item; none is opened before it is known to lie in this file."""
+    import h5py
+
+    for name in group:
+        if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+            raise ValueError(f"'{one_line(name)}' is a link; a file must contain its numbers itself")
+        item = group[name]
+        if isinstance(item, h5py.Dataset) and (item.is_virtual or item.external):
+            raise ValueError(f"the numbers of '{one_line(name)}' are in another file")
+        yield name, item
 
 
 def _tree_of_hdf5(item: Any, file: Any, depth: int) -> Tree:
@@ -157,7 +170,7 @@ def _tree_of_hdf5(item: Any, file: Any, depth: int) -> Tree:
     if item.attrs.get("MATLAB_object_decode", 0):
         return _Object(kind)
     if isinstance(item, h5py.Group):
-        fields = {name: _tree_of_hdf5(field, file, depth + 1) for name, field in item.items()}
+        fields = {name: _tree_of_hdf5(field, file, depth + 1) for name, field in _own_items(item)}
         # Of an array of structures each field has the values of all.
         is_array = fields and all(
             isinstance(field, h5py.Dataset) and field.dtype == h5py.ref_dtype and not field.attrs.get("MATLAB_class")

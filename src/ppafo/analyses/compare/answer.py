@@ -14,7 +14,7 @@ from ppafo.report.finding import Column, Finding, Part
 from ppafo.report.kind import Interval, Kind, of_metric
 from ppafo.report.live_parts import live_part
 from ppafo.report.panels import Mark, Panel
-from ppafo.report.style import BLACK, COLOURS, GREY
+from ppafo.report.style import BLACK, COLOURS, GREY, look_of_valve
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Status
 from ppafo.studies.distributions import Floats, fraction_text, is_carried
@@ -281,8 +281,11 @@ def _pareto(found: Compared, task: OnTask) -> Panel:
     """Return error over gas, a mark for each configuration that completed and a dot for each draw."""
     cases = [case for case in task.cases if case.status.is_completed]
     front, marks, on_front = front_of(cases), [], []
+    # As everywhere: the colour of a valve, where that tells the configurations apart.
+    of_valves = [look_of_valve(case.scenario.device.valve.kind).colour for case in cases]
+    is_told = len(set(of_valves)) == len(cases)
     for number, case in enumerate(cases):
-        colour = COLOURS[number % len(COLOURS)]
+        colour = of_valves[number] if is_told else COLOURS[number % len(COLOURS)]
         if case.rows is not None:
             dots = {"linestyle": "", "marker": ".", "alpha": 0.35, "markersize": 4, "markeredgewidth": 0}
             gas, error = (case.rows[name][:_MAXIMUM_DOTS] for name in (_GAS, _ERROR))

@@ -21,6 +21,7 @@ from ppafo.analyses.tune.answer import (
 from ppafo.analyses.tune.problem import Effort, Gains, Problem, Spread
 from ppafo.control.kind import OPEN_LOOP
 from ppafo.errors import StudyError
+from ppafo.linear_algebra import on_one_thread
 from ppafo.metrics import METRICS
 from ppafo.parameters.device import VANE
 from ppafo.report.kind import Interval
@@ -109,6 +110,7 @@ _TOLERANCE = 1.0e-3
 """A start has ended where the costs of its candidates differ by no more than this fraction of their mean."""
 
 
+@on_one_thread
 def search(costs: Costs, before: Sequence[float], effort: Effort) -> list[Start]:
     """Return what came of each start, the best first; the same every time for a seed.
 

@@ -42,13 +42,12 @@ def validate(
 ) -> Finding[Validation]:
     """Compare a parameter set with recordings, channel by channel.
 
-    The model is run on the recorded command, supply pressure and external torque; errors are model less measured. With
+    The model is run on the recorded command, supply pressure and external torque; residuals are measured - model. With
     no threshold it is 10 % of full range, at least half of the variance of a signal beside its noise is explained, and
-    no single change of record, set or model may explain the recordings better than noise of the sensors could. The
-    result's ``found`` has ``passes`` and, in ``recordings``, one ``RecordingAgreement`` each: ``measured`` and
-    ``model`` are recordings, their channels of shape (samples,) in SI; ``channels`` has RMS error, bias, largest error
-    and delay [s] of each channel in its SI unit (rad, Pa, N m). DataError, ParameterError or SimulationError for bad
-    input.
+    no single change of record, set or model may explain the recordings; what none explains may be 3 %. The result's
+    ``found`` has ``passes`` and, in ``recordings``, one ``RecordingAgreement`` each: ``measured`` and ``model`` are
+    recordings, their channels of shape (samples,) in SI; ``channels`` has RMS error, bias, largest error and delay [s]
+    of each channel in its SI unit (rad, Pa, N m). DataError, ParameterError or SimulationError for bad input.
 
     parameter_set: name of a parameter set, or a .toml file
     recordings: a .csv or .nc file, or a result folder; several may be given
