@@ -16,6 +16,7 @@ from ppafo.metrics.metric import LED_SHANK, REQUEST, STEADY, MetricKind, Metrics
 from ppafo.model.contact import SWING
 from ppafo.model.leg import centrifugal_torques, gravity_torques, mass_matrix, passive_torque
 from ppafo.signals import Channel, Recording
+from ppafo.simulation.oscillation import Oscillation, oscillation_of
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario, scenario_document
 from ppafo.simulation.simulate import Status
 from ppafo.simulation.vane_recording import gas_channels
@@ -195,6 +196,16 @@ class WalkResult:
     def is_helped(self) -> bool:
         """True where at least half of the whole strides had help."""
         return 2 * int(self.helped.sum()) >= self.helped.size
+
+    @property
+    def oscillation(self) -> Oscillation | None:
+        """The verdict where the torque loop oscillates, None where it does not."""
+        metrics = {name: metric.value for name, metric in self.metrics.items()}
+        strides, time = metrics.get("strides", 0.0), self.recording.time
+        if strides == 0.0 or self.scenario.controller.kind == PYTHON_CONTROLLER:
+            return None
+        of_stride = float(time[-1] - time[0]) / strides
+        return oscillation_of(self.scenario, law_of(self.scenario), self.recording, metrics, of_stride)
 
     def __repr__(self) -> str:
         """Return name, status, duration and one line a metric, in SI units."""
