@@ -67,10 +67,10 @@ def _named(function: Callable[..., R], values: Mapping[str, Any]) -> R:
 
 
 def _texts(value: Any) -> Iterator[str]:
-    """Yield the texts and paths of an argument."""
+    """Yield the texts and paths of an argument, of a dictionary its keys."""
     if isinstance(value, str | Path):
         yield str(value)
-    elif isinstance(value, tuple):
+    elif isinstance(value, tuple | Mapping):
         yield from (str(each) for each in value if isinstance(each, str | Path))
 
 

@@ -84,10 +84,15 @@ def find(
     seeds = seeds_of_noise([base], [path.path], 0, STREAMS, SEED)
     tally = Tally(grid * max(1, seeds.size), progress)
     search = Search(
-        path.path, condition, Runs(base, with_companions([condition.metric], base), tally, (), threads), seeds
+        base, path.path, condition, Runs(base, with_companions([condition.metric], base), tally, (), threads), seeds
     )
     search.run(np.linspace(low, high, grid))
     if not np.isfinite(search.metrics).any():
+        if search.oscillating:
+            raise StudyError(
+                f"scenario '{base.name}': in every run from {path.quote(low)} to {path.quote(high)} the torque loop "
+                "oscillates: leave its gains out, so that they follow the device"
+            )
         reason = search.runs.reason
         raise StudyError(
             f"scenario '{base.name}': no run from {path.quote(low)} to {path.quote(high)} has a "

@@ -13,6 +13,7 @@ import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -95,28 +96,33 @@ class Statistic:
 
 def mean_of(unit: str) -> Statistic:
     """Return the mean of a metric in a unit."""
-    return Statistic("mean", unit, lambda values, level: floored_interval(values, REPLICATES, level), True)
+    return Statistic("mean", unit, _mean_interval, True)
 
 
 def quantile_of(unit: str, fraction: float) -> Statistic:
     """Return the value of a metric below which a fraction of the runs lies."""
-    return Statistic(
-        f"quantile {fraction:g}",
-        unit,
-        lambda values, level: quantile_interval(values[np.isfinite(values)], fraction, level),
-    )
+    return Statistic(f"quantile {fraction:g}", unit, partial(_quantile, fraction))
+
+
+def _mean_interval(values: Floats, level: float) -> Interval:
+    return floored_interval(values, REPLICATES, level)
+
+
+def _quantile(fraction: float, values: Floats, level: float) -> Interval:
+    return quantile_interval(values[np.isfinite(values)], fraction, level)
+
+
+def _probability(threshold: float, is_above: bool, values: Floats, level: float) -> Interval:
+    # Strictly beyond: a metric that counts may be exactly at the threshold in many runs.
+    known = values[np.isfinite(values)]
+    hits = known > threshold if is_above else known < threshold
+    return fraction_interval(int(np.count_nonzero(hits)), known.size, level)
 
 
 def probability_of(threshold: float, is_above: bool, text: str) -> Statistic:
     """Return the probability that a metric is above (or else below) a value [SI], written as ``text``."""
-
-    def estimate(values: Floats, level: float) -> Interval:
-        # Strictly beyond: a metric that counts may be exactly at the threshold in many runs.
-        known = values[np.isfinite(values)]
-        hits = known > threshold if is_above else known < threshold
-        return fraction_interval(int(np.count_nonzero(hits)), known.size, level)
-
-    return Statistic(f"probability {'above' if is_above else 'below'} {text}", "-", estimate, threshold=threshold)
+    words = f"probability {'above' if is_above else 'below'} {text}"
+    return Statistic(words, "-", partial(_probability, threshold, is_above), threshold=threshold)
 
 
 def parse_statistic(text: str, metric: str, atmosphere: float | None) -> Statistic:
@@ -457,7 +463,7 @@ def _finding(found: Estimate, statistic: Statistic, rule: StoppingRule) -> Findi
                 "Trace",
                 columns_of(("draws", "without value", *_ENDS, "width", ""), rows),
                 said=[policy],
-                panels=lambda: [_trace(found, kind, rule), _histogram(found, statistic, of_values)],
+                panels=partial(_panels, found, kind, rule, statistic, of_values),
                 name="trace",
                 caption=_CAPTION,
                 across=2,
@@ -467,6 +473,10 @@ def _finding(found: Estimate, statistic: Statistic, rule: StoppingRule) -> Findi
         found=found,
         passed=found.is_met,
     )
+
+
+def _panels(found: Estimate, kind: Kind, rule: StoppingRule, statistic: Statistic, of_values: Kind) -> list[Panel]:
+    return [_trace(found, kind, rule), _histogram(found, statistic, of_values)]
 
 
 def _trace(found: Estimate, kind: Kind, rule: StoppingRule) -> Panel:

@@ -32,7 +32,7 @@ from ppafo.simulation.simulate import simulate
 from ppafo.studies.distributions import Floats, noise_interval
 from ppafo.studies.draws import with_new_noise
 from ppafo.studies.study import with_overrides
-from ppafo.study.runs import FAILED, Runs, settled
+from ppafo.study.runs import FAILED, Runs, oscillating, settled
 
 UNUSABLE = 1.0e12
 """Where the costs of candidates begin of which a run fails; the fraction of such runs is added."""
@@ -192,7 +192,9 @@ def crossed(runs: Runs, problem: Problem, values: Mapping[str, Floats], draws: M
     columns |= {path: np.tile(column, candidates) for path, column in draws.items()}
     rows = runs.run(columns)
     metrics = {name: settled(rows, name).reshape(candidates, count) for name in problem.metrics}
-    return Crossed(metrics, rows[FAILED].reshape(candidates, count))
+    # Gains with which the loop oscillates are no better than ones with which the run fails.
+    unusable = rows[FAILED] | oscillating(rows, problem.scenario)
+    return Crossed(metrics, unusable.reshape(candidates, count))
 
 
 def scales_of(problem: Problem, before: Crossed) -> dict[str, float]:
