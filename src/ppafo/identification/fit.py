@@ -145,8 +145,11 @@ _LARGEST_REFLECTION = 1.0 - 1.0e-9
 _GAINS = tuple(2.0**-power for power in range(1, 9))
 """Gains of a level that are tried; with less it would not move within some hundred samples."""
 
-_SMOOTHEST = 0.2
-"""Innovation [-] below which residuals are no noise: that of a sensor with a first order lag of 50 samples."""
+_SMOOTHEST = 0.15
+"""Innovation [-] below which residuals are no noise: that of a sensor with a first order lag of 90 samples.
+
+Noise with a lag of 33 samples, 0.24, is estimated down to 0.19 in two recordings of 500.
+"""
 
 _LEFT_OUT = 0.01
 """Largest fraction of the samples that are left out because an event, such as an impact, passes them."""

@@ -235,9 +235,10 @@ def channel_agreement(curve: Curve, delay: float) -> ChannelAgreement:
 
 
 def noise_in(values: Floats, full_range: float) -> float:
-    """Return the noise of samples [their unit], with what a converter rounds: its resolution / sqrt(12)."""
-    # At rest a coarse converter repeats one value, and third differences see no noise at all.
-    return max(math.hypot(noise_of(values), resolution_of(values) / math.sqrt(12.0)), LEAST_NOISE * full_range)
+    """Return the noise of samples [their unit], with what a converter rounds: its resolution / sqrt(8)."""
+    # At rest a coarse converter repeats one value, and third differences see no noise at all. It is then off by up to
+    # half a step throughout, whose square is twice this one's, and not by what rounding leaves on average.
+    return max(math.hypot(noise_of(values), resolution_of(values) / math.sqrt(8.0)), LEAST_NOISE * full_range)
 
 
 def replay_of(measured: Measured, device: Device, settings: ReplaySettings) -> Replay:
