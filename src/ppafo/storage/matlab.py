@@ -23,6 +23,18 @@ _HDF5 = b"\x89HDF\r\n\x1a\n"
 _HDF5_AT = 512
 """Byte at which HDF5 begins, behind the header of MATLAB."""
 _MOST_COLUMNS, _DEEPEST, _MOST_ELEMENTS = 300, 8, 300
+_OF_DAMAGE = (
+    OSError,
+    ValueError,
+    TypeError,
+    LookupError,
+    RuntimeError,
+    ArithmeticError,
+    AttributeError,
+    NameError,
+    EOFError,
+)
+"""What the libraries raise on damaged files."""
 _LABELS = ("colheaders", "labels", "names")
 
 
@@ -70,16 +82,7 @@ def open_matlab(path: str | Path) -> MatlabFile:
             _read_hdf5(path, found)
         else:
             _read_older(path, found)
-    except (
-        OSError,
-        ValueError,
-        TypeError,
-        KeyError,
-        IndexError,
-        ArithmeticError,
-        AttributeError,
-        RuntimeError,
-    ) as error:
+    except _OF_DAMAGE as error:
         raise DataError(f"{path}: cannot be read as a .mat file: {one_line(error)}") from error
     if not found.columns and not found.texts:
         file = MatlabFile({}, {}, objects=tuple(found.objects))

