@@ -32,7 +32,7 @@ def test_every_fitted_channel_has_a_panel_and_one_for_what_is_left() -> None:
         "Residual (measured - model) (psi)",
     ]
     left = figure.axes[1].lines[0].get_ydata()
-    assert np.asarray(left) == pytest.approx(np.full(101, 0.5))
+    assert np.asarray(left) == pytest.approx(np.full(101, -0.5))
 
 
 def test_all_panels_have_one_time_axis() -> None:
