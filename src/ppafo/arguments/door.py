@@ -50,7 +50,7 @@ def without_names() -> Iterator[None]:
 
 
 def _named(function: Callable[..., R], values: Mapping[str, Any]) -> R:
-    """Call a function; an error that quotes an argument and neither names it nor begins with it begins with its name."""
+    """Call a function; an error that quotes an argument, and does not name it or begin with it, gets its name."""
     try:
         return function(**values)
     except PpafoError as error:
