@@ -110,8 +110,7 @@ def _bits() -> Said:
 
 def models_document(folder: Path | None, why_not: str) -> dict[str, Any]:
     """Return compilers and kept models of a cache folder; ``why_not`` says why that one is not used, if so."""
-    from ppafo.engine.cache.texts import kept_sizes
-    from ppafo.engine.cache.tidying import LONGEST_UNUSED, MAXIMUM_BYTES, list_left_out, list_programs
+    from ppafo.engine.cache.tidying import LONGEST_UNUSED, MAXIMUM_BYTES, kept_sizes, list_left_out, list_programs
     from ppafo.engine.loading import compilers_to_try
 
     programs = [] if folder is None else list_programs(folder)

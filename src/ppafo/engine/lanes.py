@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 
 from ppafo import interrupts
 from ppafo.control.kind import ProfileKind
-from ppafo.engine.cache.programs import load_all
 from ppafo.engine.cache.texts import kept_bytes
 from ppafo.engine.entries import INLINE
 from ppafo.engine.lane_rows import VECTOR, lanes_of
@@ -124,6 +123,8 @@ def load_programs(programs: Iterable[Program]) -> None:
     chosen = dict.fromkeys(programs)
     compilers = compilers_to_try()
     if len(chosen) > 1 and compilers:
+        from ppafo.engine.cache.making import load_all  # most runs have one program
+
         load_all([_current_source(program) for program in chosen], compilers[0], compiled)
 
 

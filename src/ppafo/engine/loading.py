@@ -16,9 +16,8 @@ from functools import cache, lru_cache
 from pathlib import Path
 from types import ModuleType
 
-from ppafo.engine.cache.folder import cache_folder, refusal
+from ppafo.engine.cache.folder import LEFT_OUT_FOR, cache_folder, refusal
 from ppafo.engine.cache.programs import load_generated, note_name
-from ppafo.engine.cache.tidying import LEFT_OUT_FOR
 from ppafo.engine.compilers import OFFERED, Compiler, CompilerError, UntranslatableError
 from ppafo.errors import ProgramError, SimulationError, nearest_name, one_line
 

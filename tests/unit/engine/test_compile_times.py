@@ -9,7 +9,8 @@ import pytest
 
 from ppafo.engine.cache import announcing
 from ppafo.engine.cache.announcing import announce, compile_side_by_side, estimate_seconds
-from ppafo.engine.cache.programs import load_all, load_generated
+from ppafo.engine.cache.making import load_all
+from ppafo.engine.cache.programs import load_generated
 from ppafo.engine.cache.tidying import list_programs
 from ppafo.errors import ProgramError
 from tests.compilers_here import ScriptCompiler

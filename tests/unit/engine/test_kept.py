@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from ppafo.engine.cache.texts import kept_bytes, kept_sizes
-from ppafo.engine.cache.tidying import TEXTS, clear
+from ppafo.engine.cache.folder import TEXTS
+from ppafo.engine.cache.texts import kept_bytes
+from ppafo.engine.cache.tidying import clear, kept_sizes
 
 Make = Callable[[], bytes]
 

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from ppafo.engine.cache import folder as private
-from ppafo.engine.cache import programs, tidying
+from ppafo.engine.cache import making, tidying
 from ppafo.engine.cache.folder import cache_folder, refusal
-from ppafo.engine.cache.programs import is_whole, load_generated
+from ppafo.engine.cache.kept import is_whole
+from ppafo.engine.cache.programs import load_generated
 from ppafo.engine.cache.tidying import clear, evict, list_programs
 from ppafo.translation import native
 from tests.compilers_here import first_compiler
@@ -117,7 +118,7 @@ def test_compiled_code_in_a_folder_that_is_not_private_is_not_run(
     compiled: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str
 ) -> None:
     set_trap(compiled / LIBRARY, tmp_path / "sprung")
-    (compiled / "checksums.json").write_text(str(programs._checksums(compiled)).replace("'", '"'))
+    (compiled / "checksums.json").write_text(str(making._checksums(compiled)).replace("'", '"'))
     folder = compiled.parent
     if kind == "others can write":
         folder.chmod(0o777)
@@ -210,7 +211,7 @@ def test_a_program_that_is_being_removed_is_not_there_half(compiled: Path, monke
     def killed(place: Path) -> None:
         raise PermissionError(place)
 
-    monkeypatch.setattr("ppafo.engine.cache.tidying.shutil.rmtree", killed)
+    monkeypatch.setattr("ppafo.engine.cache.kept.shutil.rmtree", killed)
     clear(compiled.parent)
     assert all(place.name.startswith(".writing-") for place in compiled.parent.iterdir())
 
@@ -230,7 +231,7 @@ def test_clearing_leaves_what_is_not_a_program(compiled: Path) -> None:
 def test_program_that_another_user_left_in_the_folder_is_not_run(compiled: Path, tmp_path: Path) -> None:
     set_trap(compiled / LIBRARY, tmp_path / "sprung")
     sums = compiled / "checksums.json"
-    sums.write_text(json.dumps(programs._checksums(compiled)))
+    sums.write_text(json.dumps(making._checksums(compiled)))
     for place in (compiled, *compiled.rglob("*")):
         os.chown(place, 65534, 65534)
     assert loaded() == 42.0

@@ -10,6 +10,14 @@ from pathlib import Path
 from ppafo.errors import reason
 
 CACHE_VARIABLE = "PPAFO_CACHE_DIR"
+TEXTS = "made"
+"""Folder of texts inside the folder of the programs."""
+LOCK = ".lock-"
+"""Beginning of the name of a lock file; the rest is the program's."""
+NOTE = "not-working-"
+"""Beginning of the name of a file that says why a compiler does not work on this computer."""
+LEFT_OUT_FOR = 86400.0
+"""Seconds after which a compiler that did not work is tried again: headers may have been installed."""
 _WRITTEN_BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 
 

@@ -6,6 +6,8 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+from ppafo.engine.cache.folder import LOCK
+
 try:
     import fcntl
 except ImportError:  # not on this system: each process compiles for itself
@@ -15,8 +17,6 @@ LONGEST_WAIT = 300.0
 """Seconds after which a process compiles for itself, whoever holds the lock; one that has died holds none."""
 # Between two tries to get the lock [s]: short beside the seconds of a compilation.
 _PAUSE = 0.05
-LOCK = ".lock-"
-"""Beginning of the name of a lock file; the rest is the program's."""
 
 
 @contextlib.contextmanager

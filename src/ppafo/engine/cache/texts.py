@@ -8,8 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ppafo.documents.regular_file import read_regular_file
-from ppafo.engine.cache.folder import cache_folder, is_own_file, refusal
-from ppafo.engine.cache.tidying import TEXTS, evict_beyond, measured, texts
+from ppafo.engine.cache.folder import TEXTS, cache_folder, is_own_file, refusal
 
 MAXIMUM_BYTES = 50_000_000
 """Size of all texts above which those that were not used for longest are removed."""
@@ -30,13 +29,10 @@ def kept_bytes(kind: str, made_from: str, make: Callable[[], bytes]) -> bytes:
         content = make()
         with contextlib.suppress(OSError):
             _write(place, content)
+            from ppafo.engine.cache.tidying import evict_beyond, measured, texts  # most texts are there
+
             evict_beyond(measured(texts(folder)), MAXIMUM_BYTES)
     return content
-
-
-def kept_sizes(folder: Path) -> list[int]:
-    """Return the sizes [bytes] of what is kept in the folder of the programs."""
-    return [made.size for made in measured(texts(folder))]
 
 
 def _read(place: Path) -> bytes | None:

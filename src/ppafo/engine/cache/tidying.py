@@ -3,15 +3,14 @@
 import contextlib
 import os
 import re
-import secrets
-import shutil
 import time
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 from ppafo.documents.regular_file import read_regular_file
-from ppafo.engine.cache.lock import LOCK
+from ppafo.engine.cache.folder import LEFT_OUT_FOR, LOCK, NOTE, TEXTS
+from ppafo.engine.cache.kept import remove
 from ppafo.errors import one_line
 
 LONGEST_UNUSED = 90.0 * 86400.0
@@ -19,14 +18,6 @@ LONGEST_UNUSED = 90.0 * 86400.0
 
 MAXIMUM_BYTES = 500_000_000
 """Size of all programs above which those that were not used for longest are removed."""
-
-NOTE = "not-working-"
-"""Beginning of the name of a file that says why a compiler does not work on this computer."""
-LEFT_OUT_FOR = 86400.0
-"""Seconds after which a compiler that did not work is tried again: headers may have been installed."""
-
-TEXTS = "made"
-"""Folder of texts inside the folder of the programs."""
 
 PROGRAM = re.compile(r"ppafo_[a-z]+_[0-9a-f]{24}(-[0-9a-f]{12}|\..+)?")
 """Names of programs; also of an earlier release, whose programs lay in several files."""
@@ -114,20 +105,11 @@ def measured(places: Iterable[Path]) -> list[CachedProgram]:
     return sorted(found, key=lambda item: -item.used)
 
 
-def remove(place: Path) -> None:
-    """Remove a program, a file or a link; what cannot be removed stays.
-
-    A folder is moved aside first: to another process a program is there and whole, or not there.
-    """
-    with contextlib.suppress(OSError):
-        if place.is_dir() and not place.is_symlink():
-            aside = place.with_name(f".writing-{secrets.token_hex(8)}")
-            place.rename(aside)
-            shutil.rmtree(aside)
-        else:
-            place.unlink()
-
-
 def texts(folder: Path) -> list[Path]:
     """Return the texts in the folder of the programs, where theirs is no link; what others put beside them stays."""
     return [] if (folder / TEXTS).is_symlink() else entries_named(folder / TEXTS, _TEXT)
+
+
+def kept_sizes(folder: Path) -> list[int]:
+    """Return the sizes [bytes] of the texts that are kept in the folder of the programs."""
+    return [made.size for made in measured(texts(folder))]
