@@ -2,7 +2,8 @@
 
     python scripts/bench_coverage.py --first 5101 --count 40 --preset paper-bench --processes 4
 
-Each seed is one recording for each procedure, with sensors of its own; all are synthetic. The problem is that of the
+Each seed is one recording for each procedure, with sensors of its own; all are synthetic. ``--noise`` adds a kind of
+noise of ``scripts/interval_coverage.py``, of 0.2 % of the range of each channel. The problem is that of the
 how-to page: no tolerance is stated, so the defaults count. For each number: how many intervals hold the truth of
 rig.json, how many of the others are flagged ("holds for this model only"), and the median half width.
 """
@@ -16,6 +17,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 if not __package__:
     # The first place is this folder, in which this file would pass for the package of the same name.
     sys.path[0] = str(Path(__file__).parents[1])
@@ -26,6 +29,8 @@ from ppafo.identification.problem import PROCEDURES, Setting, parse_problem, run
 from ppafo.identification.source import Source
 from ppafo.parameters import load_parameter_set
 from ppafo.rig import record
+from ppafo.signals import Recording
+from scripts.interval_coverage import KINDS, disturbed
 from scripts.processes import add_processes, results_of
 
 DEVICE = "ppafo2011"
@@ -48,7 +53,7 @@ def truths(truth: Mapping[str, Any]) -> dict[str, float]:
         "friction.dynamic_torque": device["friction"]["dynamic_torque"],
         "valves.proportional.discharge_coefficient": valve["discharge_coefficient"],
         "valves.proportional.dead_band": preset["valve.dead_band"],
-        "valve_map.hysteresis": preset["valve.hysteresis"],
+        "effects.spool_play.width": preset["valve.hysteresis"],
         "actuator.leak.area": actuator["leak"]["area"],
     }
 
@@ -74,7 +79,23 @@ class Identified:
     refused: str = ""
 
 
-def identified(experiment: str, preset: str, seed: int) -> Identified:
+_NO_SENSORS = ("command", "direction", "repetition")
+_SIZE = 0.002
+"""Noise that is added over the range of a channel."""
+
+
+def with_noise(recording: Recording, kind: str, seed: int) -> Recording:
+    """Return a recording with more noise of a kind in each channel of a sensor."""
+    random = np.random.default_rng([seed, len(kind)])
+    for name in (name for name in recording.names if kind and name not in _NO_SENSORS):
+        values = recording[name]
+        recording = recording.with_channel(
+            name, disturbed(values, _SIZE * float(np.ptp(values)) or 1.0, kind, random), recording.unit(name)
+        )
+    return recording
+
+
+def identified(experiment: str, preset: str, seed: int, noise: str = "") -> Identified:
     """Return what the procedure makes of a recording, and the truth."""
     begun = time.process_time()
     kind = EXPERIMENTS[experiment]
@@ -83,7 +104,10 @@ def identified(experiment: str, preset: str, seed: int) -> Identified:
     problem = parse_problem(text.encode(), "bench").procedure[0]
     setting = Setting(load_parameter_set(DEVICE), "proportional", experiment)
     try:
-        found, refused = run_procedure((Source(made.recording),), problem, setting).estimates, ""
+        found, refused = (
+            run_procedure((Source(with_noise(made.recording, noise, seed)),), problem, setting).estimates,
+            "",
+        )
     except PpafoError as error:
         found, refused = (), str(error)
     return Identified(found, truths(made.truth), time.process_time() - begun, refused)
@@ -96,6 +120,7 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=40, help="seeds in a row")
     parser.add_argument("--preset", default="paper-bench")
     parser.add_argument("--only", choices=tuple(EXPERIMENTS), nargs="*", default=tuple(EXPERIMENTS))
+    parser.add_argument("--noise", choices=tuple(KINDS), default="", help="kind of noise that is added")
     add_processes(parser)
     words = parser.parse_args()
     seeds = range(words.first, words.first + words.count)
@@ -103,7 +128,7 @@ def main() -> None:
     print("| experiment | number | hold | miss, flagged | miss, not flagged | flagged | half width | CPU ms a fit |")
     print("|---|---|---|---|---|---|---|---|")
     results = results_of(
-        identified, [(one, words.preset, seed) for one in words.only for seed in seeds], words.processes
+        identified, [(one, words.preset, seed, words.noise) for one in words.only for seed in seeds], words.processes
     )
     for experiment in words.only:
         counts: dict[str, Count] = {}

@@ -71,12 +71,28 @@ def white(random: np.random.Generator, count: int) -> Floats:
     return random.standard_normal(count)
 
 
-def autoregression(random: np.random.Generator, count: int) -> Floats:
-    """AR(1) of 0.9."""
+def autoregression(random: np.random.Generator, count: int, memory: float = 0.9) -> Floats:
+    """AR(1) whose neighbours are correlated by ``memory``."""
     values = random.standard_normal(count)
     for place in range(1, count):
-        values[place] = 0.9 * values[place - 1] + math.sqrt(0.19) * values[place]
+        values[place] = memory * values[place - 1] + math.sqrt(1.0 - memory**2) * values[place]
     return values
+
+
+def slow(random: np.random.Generator, count: int) -> Floats:
+    """AR(1) of 0.97, whose memory is thirty samples."""
+    return autoregression(random, count, 0.97)
+
+
+def outliers(random: np.random.Generator, count: int) -> Floats:
+    """White noise, of which one sample in two hundred is off by thirty sizes."""
+    is_out = random.random(count) < 0.005
+    return np.asarray(random.standard_normal(count) + 30.0 * is_out * random.choice([-1.0, 1.0], count))
+
+
+def little(random: np.random.Generator, count: int) -> Floats:
+    """A tenth of white noise, as before a coarse converter."""
+    return 0.1 * random.standard_normal(count)
 
 
 def walk(random: np.random.Generator, count: int) -> Floats:
@@ -103,7 +119,19 @@ def hum(random: np.random.Generator, count: int) -> Floats:
 
 KINDS: dict[str, Callable[[np.random.Generator, int], Floats]] = {
     "white": white, "AR(1)": autoregression, "random walk": walk, "Student t": heavy, "hum": hum, "drift": drift,
+    "AR(0.97)": slow, "outliers": outliers, "quantised": little,
 }  # fmt: skip
+STEP_OF_CONVERTER = 3.0
+"""Resolution of a quantised channel over the size of the noise that others have."""
+
+
+def disturbed(values: Floats, size: float, kind: str, random: np.random.Generator) -> Floats:
+    """Values with noise of a kind and a size, rounded where a coarse converter follows."""
+    found = values + size * KINDS[kind](random, len(values))
+    step = STEP_OF_CONVERTER * size
+    return np.asarray(step * np.round(found / step) if kind == "quantised" else found)
+
+
 CELLS = (*PRESETS, *KINDS, *DEPARTURES)
 
 
@@ -138,7 +166,7 @@ def truth_in_words() -> list[str]:
 
 def of_model(kind: str, random: np.random.Generator) -> tuple[Recording, ...]:
     """Return recordings of the model with noise of a kind, whose tolerances are drawn from their priors."""
-    clean = [noisy(simulate(one).recording, white, random) for one in scenarios(truth_in_words())]
+    clean = [noisy(simulate(one).recording, "white", random) for one in scenarios(truth_in_words())]
     problem = problem_of(clean, random)
     numbers = numbers_of(problem)
     truth = np.array([item.free.start for item in numbers])
@@ -151,18 +179,15 @@ def of_model(kind: str, random: np.random.Generator) -> tuple[Recording, ...]:
     prepared = [prepare(one, numbers_in(one.label, numbers, truth)) for one in problem.experiments]
     return tuple(
         noisy(Recording(one.label, one.time, {name: Channel(column[:, 0], clean[0].unit(name))
-                                             for name, column in signals.items()}, "synthetic"), KINDS[kind], random)
+                                             for name, column in signals.items()}, "synthetic"), kind, random)
         for one, signals in zip(prepared, signals_of(prepared, numbers, truth[:, None]), strict=True)
     )  # fmt: skip
 
 
-def noisy(
-    clean: Recording, kind: Callable[[np.random.Generator, int], Floats], random: np.random.Generator
-) -> Recording:
-    """Return a recording with noise."""
+def noisy(clean: Recording, kind: str, random: np.random.Generator) -> Recording:
+    """Return a recording with noise of a kind."""
     channels = {
-        name: Channel(clean[name] + NOISE[name] * kind(random, len(clean)), clean.unit(name))
-        for name in FITTED_CHANNELS
+        name: Channel(disturbed(clean[name], NOISE[name], kind, random), clean.unit(name)) for name in FITTED_CHANNELS
     }
     return Recording(clean.label, clean.time, channels, "synthetic")
 
@@ -173,7 +198,7 @@ def recordings_of(cell: str, random: np.random.Generator) -> tuple[Recording, ..
         return of_model(cell, random)
     if cell in DEPARTURES:
         found = (simulate(one).recording for one in scenarios([*truth_in_words(), *DEPARTURES[cell]]))
-        return tuple(noisy(one, white, random) for one in found)
+        return tuple(noisy(one, "white", random) for one in found)
     seeds = random.integers(2**31, size=2).tolist()
     return tuple(
         record("step-response", PRESETS[cell], seed, overrides=[*COMMON, *more, *truth_in_words()]).recording

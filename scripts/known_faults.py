@@ -6,7 +6,8 @@ Recordings are step responses of the simulated bench (ideal-laboratory), which s
 no integrator with the model: 1 kHz, free vane, its own noise. Each fault is one of the record or one number of the
 device. `right`: the fault is named first, or among those that the recordings cannot tell from the first; `wrong`:
 another is named; `none`: none is. ``--pairs`` has two different faults at once, drawn with the first seed: no single
-change explains them. ``--right`` has no fault, with seeds from the first on.
+change explains them. ``--right`` has no fault, with seeds from the first on. ``--noise`` adds a kind of noise of
+``scripts/interval_coverage.py`` to angle and pressures.
 """
 
 import argparse
@@ -32,6 +33,7 @@ from ppafo.errors import PpafoError
 from ppafo.rig.experiments import record
 from ppafo.signals.recording import Recording
 from ppafo.storage import write_csv
+from scripts.interval_coverage import KINDS, NOISE, disturbed
 from scripts.processes import add_processes, results_of
 
 ROOM = 101325.0
@@ -126,18 +128,22 @@ NOTHING = Fault("", ())
 VERDICTS = ("right", "wrong", "none", "refused")
 
 
-def recorded(fault: Fault, seed: int) -> Recording:
-    """A recording of the rig with a fault."""
+def recorded(fault: Fault, seed: int, noise: str = "") -> Recording:
+    """A recording of the rig with a fault, and more noise of a kind."""
     words = ("motion.kind=free", *SUPPLY, *fault.device)
     made = record("step-response", preset="ideal-laboratory", seed=seed, overrides=words).recording
-    return fault.record(replace(made, channels={name: made.channels[name] for name in KEPT if name in made}))
+    made = replace(made, channels={name: made.channels[name] for name in KEPT if name in made})
+    if noise:
+        random = np.random.default_rng([seed, len(noise)])
+        made = changed(made, **{name: disturbed(made[name], size, noise, random) for name, size in NOISE.items()})
+    return fault.record(made)
 
 
-def validated(fault: Fault, seed: int) -> Validation:
+def validated(fault: Fault, seed: int, noise: str = "") -> Validation:
     """What `ppafo validate` says of a recording with a fault."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "recorded.csv"
-        write_csv(file, recorded(fault, seed))
+        write_csv(file, recorded(fault, seed, noise))
         return ppafo.validate("ppafo2011", [file], overrides=SUPPLY).found
 
 
@@ -168,14 +174,14 @@ class Verdict(NamedTuple):
     seconds: float
 
 
-def verdict_of(places: tuple[int, ...], seed: int) -> Verdict:
+def verdict_of(places: tuple[int, ...], seed: int, noise: str = "") -> Verdict:
     """What is said of the faults at places of ``FAULTS`` at once; of none, a right recording."""
     fault = NOTHING
     for place in places:
         fault = together(fault, FAULTS[place]) if fault.title else FAULTS[place]
     begun = time.process_time()
     try:
-        found = validated(fault, seed)
+        found = validated(fault, seed, noise)
     except PpafoError:
         return Verdict("refused", (), False, time.process_time() - begun)
     best = found.causes.found
@@ -189,6 +195,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, nargs="+", required=True)
     parser.add_argument("--right", type=int, default=0, metavar="COUNT", help="COUNT right recordings")
     parser.add_argument("--pairs", type=int, default=0, metavar="COUNT", help="COUNT recordings with two faults")
+    parser.add_argument("--noise", choices=tuple(KINDS), default="", help="kind of noise that is added")
     add_processes(parser)
     words = parser.parse_args()
     first, random = words.seeds[0], np.random.default_rng(words.seeds[0])
@@ -196,7 +203,7 @@ def main() -> None:
     work: list[tuple[tuple[int, ...], int]] = [((place,), seed) for place in range(len(FAULTS)) for seed in words.seeds]
     work += [(pair, first + number) for number, pair in enumerate(drawn)]
     work += [((), first + number) for number in range(words.right)]
-    results = results_of(verdict_of, work, words.processes)
+    results = results_of(verdict_of, [(*one, words.noise) for one in work], words.processes)
     total: Counter[str] = Counter()
     spent = 0.0
     for fault in FAULTS:

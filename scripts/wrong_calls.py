@@ -93,6 +93,36 @@ RIGHT: Mapping[str, tuple[str, ...]] = {
 """The values above that are right, by the kind of an argument; None besides where it is the default."""
 
 
+PLUGINS = (
+    "audit",
+    "bottle",
+    "compare",
+    "design",
+    "estimate",
+    "find",
+    "identify",
+    "linearise",
+    "load_design",
+    "load_device",
+    "load_parameter_set",
+    "load_scenario",
+    "load_study",
+    "load_tuning",
+    "load_walk",
+    "reproduce",
+    "scenario_from_dict",
+    "sensitivity",
+    "simulate",
+    "simulate_many",
+    "sweep",
+    "tune",
+    "validate",
+    "walk",
+    "workbench",
+)
+"""The functions that take modules of the person's own."""
+
+
 class Function(NamedTuple):
     """A public function: arguments that are right, and the kind of each argument; optional ones take None."""
 
@@ -112,7 +142,7 @@ def functions(recording: Path) -> dict[str, Function]:
     study = {"overrides": "overrides", "seed": "seed", "threads": "count", "progress": "function"}
     drawn = {**study, "confidence": "fraction", "maximum_failed": "fraction"}
     none = "seed threads progress"
-    return {
+    known = {
         "apply_overrides": _function(
             {"parameter_set": ppafo.load_parameter_set(SET), "overrides": ()},
             "valve",
@@ -149,7 +179,7 @@ def functions(recording: Path) -> dict[str, Function]:
         ),
         "design": _function(
             {"mass": 72.5, "torque": 2.5, "pressure": 4.46e5, "minutes": 5.0},
-            "problem seed threads mass stature torque pressure minutes progress",
+            "problem seed threads mass stature torque pressure minutes toes catalogue progress",
             problem="object",
             seed="seed",
             threads="count",
@@ -158,6 +188,8 @@ def functions(recording: Path) -> dict[str, Function]:
             torque="positive",
             pressure="positive",
             minutes="positive",
+            toes="number",
+            catalogue="name",
             progress="function",
             alone="problem",
         ),
@@ -198,23 +230,12 @@ def functions(recording: Path) -> dict[str, Function]:
             {"parameter_set": SET}, "valve", parameter_set="object", overrides="overrides", valve="name"
         ),
         "load_gait": _function({}, "", gait="name"),
-        "load_parameter_set": _function({"parameter_set": SET}, "", parameter_set="name", plugins="names"),
+        "load_parameter_set": _function({"parameter_set": SET}, "", parameter_set="name"),
         "load_scenario": _function(
-            {"scenario": TASK},
-            "parameter_set",
-            scenario="name",
-            overrides="overrides",
-            parameter_set="object",
-            plugins="names",
+            {"scenario": TASK}, "parameter_set", scenario="name", overrides="overrides", parameter_set="object"
         ),
         "load_study": _function(
-            {"study": STUDY},
-            "draws seed",
-            study="object",
-            overrides="overrides",
-            draws="count",
-            seed="seed",
-            plugins="names",
+            {"study": STUDY}, "draws seed", study="object", overrides="overrides", draws="count", seed="seed"
         ),
         "load_study_results": _function({"folder": "no-such-folder"}, "", folder="name"),
         "load_tuning": _function({"tuning": "pid-gains"}, "", tuning="object", overrides="overrides"),
@@ -227,7 +248,6 @@ def functions(recording: Path) -> dict[str, Function]:
             task_sequence="name",
             bottle="name",
             parameter_set="object",
-            plugins="names",
         ),
         "parts": _function({}, "part", part="name", catalogue="name"),
         "read_recording": _function({"path": recording}, "", path="name", atmosphere="positive"),
@@ -245,7 +265,7 @@ def functions(recording: Path) -> dict[str, Function]:
             configuration="name",
             independent="flag",
         ),
-        "simulate": _function({"scenario": TASK}, "", scenario="object", overrides="overrides", plugins="names"),
+        "simulate": _function({"scenario": TASK}, "", scenario="object", overrides="overrides"),
         "simulate_many": _function({"scenarios": [TASK]}, "threads", scenarios="names", threads="count"),
         "sweep": _function(
             {"study": STUDY, "draws": 8},
@@ -256,7 +276,6 @@ def functions(recording: Path) -> dict[str, Function]:
             out="path",
             scheduler="address",
             agreed="flag",
-            plugins="names",
         ),
         "tune": _function({"tuning": "pid-gains"}, none, **study, tuning="object"),
         "validate": _function(
@@ -296,6 +315,10 @@ def functions(recording: Path) -> dict[str, Function]:
         ),
         "workbench": _function({}, "", scenarios="names", overrides="overrides"),
     }
+    for name in PLUGINS:
+        function = known[name]
+        known[name] = function._replace(kinds={**function.kinds, "plugins": "names"})
+    return known
 
 
 class Call(NamedTuple):

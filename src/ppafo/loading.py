@@ -74,12 +74,15 @@ def load_scenario(
 
 
 @checked()
-def scenario_from_dict(content: Mapping[str, Any], overrides: Overrides = ()) -> Scenario:
+def scenario_from_dict(content: Mapping[str, Any], overrides: Overrides = (), *, plugins: Plugins = ()) -> Scenario:
     """Return a scenario, walks among them, from nested dictionaries that are laid out as a scenario file is.
 
     Quantities are texts with their unit, ``{"angle": "75 deg"}``; relative paths begin in the working folder.
     ScenarioError, ParameterError or DataError for anything that cannot be used.
+
+    ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
     """
+    name_plugins(plugins)
     request = of_vanes.request_of_dict(content, overrides)
     return of_vanes.scenario_of(request, _layout(request.content))
 

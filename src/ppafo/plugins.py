@@ -43,7 +43,8 @@ _named: dict[str, Plugin] = {}
 def name_plugins(plugins: Plugins | str | Path) -> None:
     """Let words in files find objects of these modules; KindError where one is not there. Nothing is imported yet."""
     for plugin in (plugins,) if isinstance(plugins, str | Path) else plugins:
-        add_plugin(_found(plugin))
+        for found in _found(plugin):
+            add_plugin(found)
 
 
 def name_modules_in(text: str) -> None:
@@ -70,21 +71,25 @@ def named_plugins() -> tuple[Plugin, ...]:
     return tuple(_named.values())
 
 
-def _found(plugin: str | Path) -> Plugin:
-    """Return the plug-in of a path or a name; KindError where there is none."""
+def _found(plugin: str | Path) -> tuple[Plugin, ...]:
+    """Return the module of a path or a name, under each name that it has; KindError where there is none."""
     text = str(plugin)
     path = Path(text).absolute()
-    if path.suffix == _SUFFIX and path.is_file():
-        return _of_path(path)
     if (path / _PACKAGE).is_file():
-        return _of_path(path)
+        return (_of_path(path),)
+    if path.suffix == _SUFFIX and path.is_file():
+        found = _of_path(path)
+        # From here it has the names of its folders before its own, though none of them says that it is a package.
+        dotted = ".".join(Path(text).with_suffix("").parts)
+        is_another = dotted != found.module and _MODULE.fullmatch(dotted) is not None
+        return (found, Plugin(dotted, str(Path.cwd()))) if is_another else (found,)
     module = text.partition(":")[0]
     if path.suffix == _SUFFIX or not _MODULE.fullmatch(module):
         raise KindError(f"plugin '{one_line(text)}': there is no such file; give a .py file, or the name of a module")
     named = _of_module(module)
     if not named.folder and not _is_installed(module.partition(".")[0]):
         raise KindError(f"plugin '{one_line(text)}': there is no such module here; give the path of its .py file")
-    return named
+    return (named,)
 
 
 def _of_path(path: Path) -> Plugin:

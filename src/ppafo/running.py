@@ -1,14 +1,21 @@
 """Runs scenarios by name, by file or as they are, a vane alone or a leg that walks."""
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ppafo.arguments import Overrides, Threads, checked
 from ppafo.loading import scenario_or_load
+from ppafo.model.columns import first
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation import simulate as of_loaded
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Result
+
+if TYPE_CHECKING:
+    from ppafo.control.kind import ControllerKind
+    from ppafo.simulation.oscillation import Gains, Oscillation
 
 
 @checked()
@@ -27,7 +34,64 @@ def simulate(scenario: Scenario | str | Path, overrides: Overrides = (), *, plug
     return of_loaded.simulate(scenario_or_load(scenario, overrides))
 
 
+def gains(scenario: Scenario) -> "Gains | None":
+    """Return the gains in force of a scenario's torque law; None for a law that has none."""
+    from ppafo.simulation.oscillation import gains_of
+
+    law = _law(scenario)
+    return None if law is None else gains_of(scenario, law)
+
+
+def oscillation(result: Result) -> "Oscillation | None":
+    """Return the verdict on a run whose torque loop oscillates; None where it does not."""
+    from ppafo.simulation.oscillation import oscillation_of
+
+    law, metrics = _law(result.scenario), {name: metric.value for name, metric in result.metrics.items()}
+    if law is None:
+        return None
+    time = result.recording.time
+    strides = metrics.get("strides", 0.0) if result.scenario.walks else 0.0
+    stride_time = float(time[-1] - time[0]) / strides if strides > 0.0 else 0.0
+    return oscillation_of(result.scenario, law, result.recording, metrics, stride_time)
+
+
+def most_reversals(scenario: Scenario) -> float:
+    """Return the ``command_reversals`` of a run above which its loop oscillates; infinite for a law that may turn."""
+    from ppafo.simulation import oscillation as rules
+
+    law = _law(scenario)
+    if law is None:
+        return math.inf
+    stride_time = 0.0
+    if scenario.walks:
+        from ppafo.walking.motion import walk_of
+
+        stride_time = float(walk_of(scenario).gait.stride_time)
+    return rules.most_reversals(scenario, law, first(scenario.run.duration), stride_time)
+
+
+def _law(scenario: Scenario) -> "ControllerKind | None":
+    """Return the controller of a scenario; None for a Python object."""
+    from ppafo.simulation.scenario import PYTHON_CONTROLLER
+
+    if scenario.controller.kind == PYTHON_CONTROLLER:
+        return None
+    if scenario.walks:
+        from ppafo.walking.planning import law_of
+
+        return law_of(scenario)
+    from ppafo.control.catalog import CONTROLLERS
+
+    return CONTROLLERS[scenario.controller.kind]
+
+
 @checked("scenarios", "threads")
-def simulate_many(scenarios: Sequence[Scenario | str | Path], *, threads: Threads | None = None) -> list[Result]:
-    """Run many scenarios side by side, objects, names or files, each exactly as if it ran alone."""
+def simulate_many(
+    scenarios: Sequence[Scenario | str | Path], *, threads: Threads | None = None, plugins: Plugins = ()
+) -> list[Result]:
+    """Run many scenarios side by side, objects, names or files, each exactly as if it ran alone.
+
+    ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
+    """
+    name_plugins(plugins)
     return of_loaded.simulate_many([scenario_or_load(scenario) for scenario in scenarios], threads)

@@ -43,7 +43,7 @@ def test_every_value_lies_inside_its_interval_or_is_flagged(bench: Path, found: 
         "friction.dynamic_torque": device["friction"]["dynamic_torque"],
         "valves.proportional.discharge_coefficient": device["valve"]["discharge_coefficient"],
         "valves.proportional.dead_band": preset["valve.dead_band"],
-        "valve_map.hysteresis": preset["valve.hysteresis"],
+        "effects.spool_play.width": preset["valve.hysteresis"],
         "actuator.leak.area": device["actuator"]["leak"]["area"],
     }
     estimates = {item.path: item for item in found.estimates}

@@ -18,6 +18,7 @@ from typing import Any
 import pytest
 
 import ppafo
+from ppafo import plugins
 from ppafo.cli.main import main
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
@@ -223,9 +224,16 @@ def test_the_message_on_the_controller_page_is_the_real_one(tmp_path: Path, monk
     (tmp_path / "my_laws").mkdir()
     (tmp_path / "my_laws" / "hysteresis.py").write_text(law, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
+    # Named for this test alone.
+    monkeypatch.setattr(plugins, "_named", {})
+    monkeypatch.setenv(plugins.VARIABLE, "")
+    overrides = ["controller.kind=my_laws.hysteresis:KIND", "run.duration=20 ms"]
     with pytest.raises(ProgramError) as refused:
-        ppafo.simulate("torque-task-solenoid", ["controller.kind=my_laws.hysteresis:KIND", "run.duration=20 ms"])
+        ppafo.simulate("torque-task-solenoid", overrides, plugins=["my_laws/hysteresis.py"])
     assert str(refused.value) == shown.strip()
+    del CONTROLLERS["my_laws.hysteresis:KIND"]
+    for name in ("my_laws.hysteresis", "my_laws"):
+        del sys.modules[name]
 
 
 def test_the_controller_of_the_page_is_compiled_and_named_in_a_scenario(hysteresis: ModuleType) -> None:

@@ -56,7 +56,7 @@ def test_recordings_that_do_not_agree_hold_for_this_model_only_and_nothing_of_ne
 ) -> None:
     result = cylinder.results[0]
     assert {item.verdict for item in result.estimates} == {"holds for this model only"}
-    assert "alone wants other numbers" in result.conflict
+    assert "fitted alone, " in result.conflict
     assert cylinder.new_set.written == ()
     assert cylinder.new_set.fitted == (), "a set has no place for newtons"
 

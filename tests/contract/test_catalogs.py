@@ -26,7 +26,9 @@ CATALOGS = [*CONTROLLERS.items(), *WALKING_CONTROLLERS.items(), *PROFILES.items(
 
 def defaults(kind: ControllerKind | ProfileKind | ValveKind) -> dict[str, float]:
     """A setting for every quantity."""
-    return {item.name: 1.0 if item.default is None else item.default for item in kind.quantities}
+    return {
+        item.name: min(1.0, 0.9 * item.maximum) if item.default is None else item.default for item in kind.quantities
+    }
 
 
 def valve_models() -> list[tuple[str, ValveModel, Any]]:

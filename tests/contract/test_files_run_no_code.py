@@ -1,5 +1,6 @@
 """Files of others run no code: whatever they say, the module that lies beside them is not imported."""
 
+import inspect
 import json
 import os
 import sys
@@ -288,3 +289,34 @@ def test_results_never_import_and_need_no_module_of_their_own(folder: Path) -> N
         ppafo.load_study_results("out").plot()
     assert main(["export", "figure", "out"]) == 2
     assert "evil" not in sys.modules
+
+
+OPENS = {"scenario", "scenarios", "study", "parameter_set", "problem", "tuning", "configurations", "content"}
+OF_OBJECTS = {"apply_overrides", "compare_walks"}
+"""Functions that take what was loaded before."""
+
+
+def test_every_function_that_opens_such_a_file_takes_modules() -> None:
+    for name in set(ppafo.__all__) - OF_OBJECTS:
+        function = getattr(ppafo, name)
+        if inspect.isfunction(function) and OPENS & inspect.signature(function).parameters.keys():
+            assert "plugins" in inspect.signature(function).parameters or name == "walk_population", name
+
+
+def test_a_set_is_audited_with_the_module_that_the_person_names(folder: Path) -> None:
+    (folder / "given.toml").write_text(SET, encoding="utf-8")
+    with pytest.raises(PpafoError, match="you have not named the module 'evil'"):
+        ppafo.audit("given.toml")
+    # It holds a controller, which is no valve: it was asked.
+    with pytest.raises(PpafoError, match="is of type ControllerKind, not ValveKind"):
+        ppafo.audit("given.toml", plugins=["evil.py"])
+    assert is_run()
+
+
+def test_no_text_of_a_file_gives_the_terminal_an_order(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = text_of("parameters").replace('source = "', 'source = "\\u001b[31m\\u0007\\r\\u202e', 1)
+    (folder / "given.toml").write_text(text, encoding="utf-8")
+    assert main(["sets", "show", "given.toml"]) == 0
+    said = capsys.readouterr().out
+    assert not set("\x1b\x07\r\u202e") & set(said)
+    assert "\N{REPLACEMENT CHARACTER}[31m" in said

@@ -68,7 +68,7 @@ def test_it_can_be_named_by_its_module_without_an_entry_point(site: Path, capsys
     path = write_walk(site.parent / "walk.txt")
     words = ["gait", "import", str(path), "--body-mass", "62 kg"]
     assert main(words) == 2
-    assert "walk.txt: is not a .mot, .sto, .csv, .c3d or .trc file" in capsys.readouterr().err
+    assert "walk.txt: the first column must be 'time'" in capsys.readouterr().err
     assert main([*words, "--form", "my_forms.goniometer:FORM"]) == 0
 
 

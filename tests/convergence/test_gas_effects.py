@@ -5,10 +5,11 @@ import pytest
 
 from ppafo.analyses.linearise.question import linearise
 from ppafo.errors import ScenarioError, SimulationError
+from ppafo.model.effects.laminar_leak import LaminarLeak, with_gap
 from ppafo.model.effects.leak_opening import LeakOpening, lifted
 from ppafo.model.effects.line_resistance import LineSettings, fed_through_line, prepare
 from ppafo.model.effects.spool_play import SpoolPlace, SpoolPlay, behind_play, settle, spool_position
-from ppafo.model.orifice import area_conductance
+from ppafo.model.orifice import area_conductance, isentropic_curve, orifice_flow
 from ppafo.parameters.loading import load_device
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario
@@ -16,6 +17,7 @@ from ppafo.simulation.plan import plan_run
 from ppafo.simulation.simulate import simulate
 from tests.reference.reference_solver import compare_with_reference
 
+CURVE = isentropic_curve(1.4, 0.999)
 OPENING = ("effects.leak_opening.pressure=150 kPa_d",)
 THERMAL = (
     *("gas_model.kind=thermal", "gas_model.heat_transfer_coefficient=50 W/(m^2 K)"),
@@ -39,17 +41,17 @@ def test_a_leak_that_opens_in_the_lanes_is_that_of_the_reference_solver(name: st
 
 def test_a_leak_that_opens_at_a_pressure_is_tight_below_and_whole_far_above() -> None:
     row = LeakOpening(3.0e4, 1.0)
-    assert lifted(2.0e-9, 1.0e5, 1.29e5, row) == 0.0
-    assert lifted(2.0e-9, 1.0e5, 1.6e5, row) == lifted(2.0e-9, 1.6e5, 1.0e5, row) == pytest.approx(1.0e-9)
-    assert lifted(2.0e-9, 1.0e5, 3.1e6, row) == pytest.approx(2.0e-9, rel=0.011)
+    assert lifted(2.0e-9, 1.0e5, 1.29e5, CURVE, row) == 0.0
+    assert lifted(2.0e-9, 1.0e5, 1.6e5, CURVE, row) == lifted(2.0e-9, 1.6e5, 1.0e5, CURVE, row) == pytest.approx(1.0e-9)
+    assert lifted(2.0e-9, 1.0e5, 3.1e6, CURVE, row) == pytest.approx(2.0e-9, rel=0.011)
 
 
 @pytest.mark.parametrize("rise", [0.01, 0.3, 1.0, 7.0])
 def test_half_of_a_leak_is_open_where_its_rise_says(rise: float) -> None:
     row = LeakOpening(3.0e4, rise)
-    assert lifted(2.0e-9, 1.0e5, 1.3e5, row) == pytest.approx(0.0, abs=1e-22)
-    assert lifted(2.0e-9, 1.0e5, 1.3e5, row) >= 0.0
-    assert lifted(2.0e-9, 1.0e5, 1.3e5 + rise * 3.0e4, row) == pytest.approx(1.0e-9)
+    assert lifted(2.0e-9, 1.0e5, 1.3e5, CURVE, row) == pytest.approx(0.0, abs=1e-22)
+    assert lifted(2.0e-9, 1.0e5, 1.3e5, CURVE, row) >= 0.0
+    assert lifted(2.0e-9, 1.0e5, 1.3e5 + rise * 3.0e4, CURVE, row) == pytest.approx(1.0e-9)
 
 
 def test_a_leak_that_never_opens_loses_nothing() -> None:
@@ -225,3 +227,23 @@ def test_a_linear_model_of_gas_that_is_not_ideal_is_a_difference_of_two_runs() -
 def test_gas_that_is_not_ideal_is_refused_where_it_has_no_step(texts: tuple[str, ...], what: str) -> None:
     with pytest.raises(ScenarioError, match=f"effect 'second_virial'.*{what}.*effects.second_virial.share=0"):
         plan_run(load_scenario("step-response", (*texts, *REAL)))
+
+
+LAMINAR = ("actuator.leak.area=0.1 mm^2", "effects.laminar_leak.coefficient=1e-15 kg/(s Pa^2)")
+
+
+def test_a_laminar_gap_passes_its_coefficient_times_the_difference_of_the_squares_at_any_pressures() -> None:
+    gap = LaminarLeak(1.0e-15)
+    for first, second in ((6.0e5, 1.0e5), (2.0e5, 3.0e5), (3.0e5, 2.9995e5), (3.0e5, 3.0e5 - 1.0), (2.0e5, 2.0e5)):
+        through = orifice_flow(first, second, with_gap(1.0e-10, first, second, CURVE, gap), CURVE)
+        alone = orifice_flow(first, second, 1.0e-10, CURVE)
+        assert through - alone == pytest.approx(1.0e-15 * (first**2 - second**2), rel=1e-9, abs=1e-22)
+
+
+@pytest.mark.parametrize("name", ["step-response", "torque-task-solenoid"])
+def test_a_laminar_leak_in_the_lanes_is_that_of_the_reference_solver(name: str) -> None:
+    agreement = compare_with_reference(
+        plan_run(load_scenario(name, (*LAMINAR, "motion.kind=free", "run.duration=0.3 s")))
+    )
+    assert agreement.angle < 2e-4
+    assert agreement.worst_pressure < 1e-3

@@ -72,7 +72,7 @@ def gas_rates(
     source_2 = admitted_flow(source_2, plant.relieving)
     vent_1 = exact_flow(pressure_1, plant.atmospheric_pressure, exhaust_path(openings.vent_1 * full), valve_orifice)
     vent_2 = exact_flow(pressure_2, plant.atmospheric_pressure, exhaust_path(openings.vent_2 * full), valve_orifice)
-    leak_conductance = leakage_path(leak_orifice.conductance, pressure_1, pressure_2)
+    leak_conductance = leakage_path(leak_orifice.conductance, pressure_1, pressure_2, plant.leak_curve)
     leak = exact_flow(pressure_1, pressure_2, leak_conductance, leak_orifice)
     return GasRates(
         mass_1=source_1 - vent_1 - leak,
@@ -117,7 +117,7 @@ def thermal_gas_rates(
     supply_1, supply_2 = admitted_flow(supply_1, plant.relieving), admitted_flow(supply_2, plant.relieving)
     outlet_1 = exact_flow(pressure_1, room, exhaust_path(openings.vent_1 * full), valve_orifice)
     outlet_2 = exact_flow(pressure_2, room, exhaust_path(openings.vent_2 * full), valve_orifice)
-    leak_conductance = leakage_path(leak_orifice.conductance, pressure_1, pressure_2)
+    leak_conductance = leakage_path(leak_orifice.conductance, pressure_1, pressure_2, plant.leak_curve)
     across = exact_flow(pressure_1, pressure_2, leak_conductance, leak_orifice)
     source_1 = transport(thermal, source_pressure_1, pressure_1, 1.0, warmth_1, supply_1)
     source_2 = transport(thermal, source_pressure_2, pressure_2, 1.0, warmth_2, supply_2)

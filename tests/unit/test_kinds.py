@@ -190,14 +190,20 @@ def test_a_kind_of_a_room_that_is_not_installed_is_not_listed_and_says_so() -> N
         laws["there"]
 
 
-@pytest.mark.parametrize("given", ["laws/inner.py", "laws", "laws.inner", "laws.inner:KIND"])
+@pytest.mark.parametrize(
+    ("given", "files"),
+    [
+        *((given, ("__init__.py", "inner.py")) for given in ("laws/inner.py", "laws", "laws.inner", "laws.inner:KIND")),
+        *((given, ("inner.py",)) for given in ("laws/inner.py", "laws.inner", "laws.inner:KIND")),
+    ],
+)
 def test_a_package_is_named_by_its_folder_a_file_or_a_module(
-    given: str, install: Install, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    given: str, files: tuple[str, ...], install: Install, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     package = tmp_path / "laws"
     package.mkdir()
-    (package / "__init__.py").write_text("")
-    (package / "inner.py").write_text(LAW.format(name="on_off", call="anything"))
+    for name in files:
+        (package / name).write_text(LAW.format(name="on_off", call="anything") if name == "inner.py" else "")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(plugins, "_named", {})
     monkeypatch.setenv(plugins.VARIABLE, "")

@@ -55,7 +55,9 @@ def _named(function: Callable[..., R], values: Mapping[str, Any]) -> R:
         return function(**values)
     except PpafoError as error:
         message = str(error)
-        quoted = [(text, name) for name, value in values.items() for text in _texts(value) if text in message]
+        # A module that was named is where other errors lie, and says itself where it is not there.
+        asked = {name: value for name, value in values.items() if name != "plugins"}
+        quoted = [(text, name) for name, value in asked.items() for text in _texts(value) if text in message]
         # A text in quotation marks before one that stands among others, and of two within each other the longer one.
         rank = {name: (f"'{text}'" in message, len(text)) for text, name in quoted}
         name = max(rank, key=lambda each: rank[each], default="")
@@ -65,10 +67,10 @@ def _named(function: Callable[..., R], values: Mapping[str, Any]) -> R:
 
 
 def _texts(value: Any) -> Iterator[str]:
-    """Yield the texts and paths of an argument."""
+    """Yield the texts and paths of an argument, of a dictionary its keys."""
     if isinstance(value, str | Path):
         yield str(value)
-    elif isinstance(value, tuple):
+    elif isinstance(value, tuple | Mapping):
         yield from (str(each) for each in value if isinstance(each, str | Path))
 
 

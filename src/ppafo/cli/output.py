@@ -4,6 +4,7 @@ import argparse
 import contextlib
 import logging
 import os
+import re
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -124,11 +125,15 @@ def said_files(said: Said) -> dict[str, bytes]:
     }
 
 
+_UNPRINTABLE = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u202a-\u202e\u2066-\u2069]")
+"""What a terminal takes for an order, or for another direction of writing: texts come from files of others."""
+
+
 def print_result(text: str, document: Mapping[str, Any], as_json: bool) -> None:
     """Print the text, or the document as JSON; ends quietly where the reader has gone, as in ``... | head``."""
     with printing():
         # A terminal without a character shows its number, where Python would end with an error.
-        shown = json_text(document) if as_json else text
+        shown = json_text(document) if as_json else _UNPRINTABLE.sub("\N{REPLACEMENT CHARACTER}", text)
         encoding = sys.stdout.encoding or "utf-8"
         print(shown.encode(encoding, "backslashreplace").decode(encoding), flush=True)
 

@@ -1,5 +1,6 @@
 """``ppafo simulate SCENARIO``: runs a scenario and writes a result folder, with a report that simulates."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +22,7 @@ FIGURE = "figure"
 def simulate(scenario: Scenario, *, check: bool = False, overrides: Overrides = (), out: Folder | None = None) -> Said:
     """Run a scenario and write its recording, metrics and figure.
 
-    Exit code 1 where it diverged, or a check finds it numerically sensitive.
+    Exit code 1 where it diverged, or a check finds it numerically sensitive or its torque loop oscillating.
 
     check: run again with finer steps and from a start moved by 1e-7, and report which metrics can be repeated
     out: result folder with the report; default out/NAME of the scenario
@@ -34,9 +35,11 @@ def simulate(scenario: Scenario, *, check: bool = False, overrides: Overrides = 
     # Before the run, which a folder that is refused must not cost.
     with output.blame_out_option():
         check_result_folder(folder)
+    from ppafo.running import gains, oscillation
     from ppafo.simulation.simulate import simulate
 
     result = simulate(chosen)
+    in_force, verdict = gains(chosen), oscillation(result)
     # A run that diverged has no result to repeat; its exit code says so already.
     checked = result.check() if check and result.status.is_completed else None
     error = None if checked is None else checked.error
@@ -51,7 +54,8 @@ def simulate(scenario: Scenario, *, check: bool = False, overrides: Overrides = 
     from ppafo.report.recording_figure import figure_files
 
     figures = figure_files(result.plot())
-    report = page_of(_finding(result, checked), {FIGURE: figures[f"{FIGURE}.svg"]})
+    first = [item.sentence for item in (verdict, in_force) if item is not None]
+    report = page_of(_finding(result, checked, first), {FIGURE: figures[f"{FIGURE}.svg"]})
     files = {} if checked is None else {CHECK_FILE: f"{json_text(checked.document())}\n".encode()}
     result.save(folder, {**figures, REPORT: report, **files})
     from ppafo.documents.json_text import plain
@@ -60,21 +64,24 @@ def simulate(scenario: Scenario, *, check: bool = False, overrides: Overrides = 
     document = {
         "scenario": result.scenario.name,
         "status": plain(result.status),
+        "oscillation": None if verdict is None else {**plain(verdict), "sentence": verdict.sentence},
+        "gains": plain(in_force),
         "metrics": metrics,
         **({} if error is None else {"error": plain(error)}),
         **({} if checked is None else {"check": checked.document()}),
         "folder": str(folder),
     }
-    is_good = result.status.is_completed and (checked is None or checked.is_determined)
+    # A loop that oscillates is a result that nobody should use, and says so where a check is asked for.
+    is_good = result.status.is_completed and (checked is None or (checked.is_determined and verdict is None))
     return Said(
-        _text(result, error, checked, folder),
+        _text(result, error, checked, folder, first),
         document,
         exit_code=EXIT_GOOD if is_good else EXIT_CHECK_FAILED,
         aside="" if result.status.is_completed else f"{chosen.name}: {result.status.message}",
     )
 
 
-def _finding(result: "Result", check: "Check | None") -> "Finding[None]":
+def _finding(result: "Result", check: "Check | None", first: Sequence[str]) -> "Finding[None]":
     """Return what the page of a result says: the metrics, the figure, and the run again, to be dragged."""
     from ppafo.report.display_units import metric_level, metric_words
     from ppafo.report.finding import Finding, Part, columns_of
@@ -96,7 +103,7 @@ def _finding(result: "Result", check: "Check | None") -> "Finding[None]":
         title=scenario.name,
         said=(" ".join(scenario.description.split()), f"{device}{changed if scenario.origin.overrides else ''}"),
         parts=(
-            Part(remarks=() if status.is_completed else (f"The run {status.message}",)),
+            Part(remarks=(*first, *(() if status.is_completed else (f"The run {status.message}",)))),
             Part("Metrics", columns_of(("Metric", "Value", "What it is"), rows), left=3),
             Part("Over time", name=FIGURE, caption=caption, draw=result.plot),
             Part() if check is None else Part("What can be repeated", code=repr(check)),
@@ -113,10 +120,13 @@ def list_descriptions() -> list[dict[str, Any]]:
     return [{"name": name, "description": load_scenario(name).description} for name in list_all_scenarios()]
 
 
-def _text(result: "Result", error: "ErrorEstimate | None", check: "Check | None", folder: Path) -> str:
+def _text(
+    result: "Result", error: "ErrorEstimate | None", check: "Check | None", folder: Path, first: Sequence[str]
+) -> str:
     checked = [repr(check), ""] if check is not None else [] if error is None else [error.sentence, ""]
     files = ["recording.nc", "recording.csv", "run.json", "figure.png", "figure.svg", "report.html"]
     written = ", ".join(files if check is None else [*files, CHECK_FILE])
     walked = f"'ppafo walk {result.scenario.origin.file}' compares it with no device and with a healthy ankle"
     beside = [] if not result.scenario.walks else [walked]
-    return "\n".join([str(result), "", *checked, *beside, f"written: {folder} ({written})"])
+    head, *rest = str(result).split("\n")
+    return "\n".join([head, *first, *rest, "", *checked, *beside, f"written: {folder} ({written})"])

@@ -6,6 +6,7 @@ any parameter that changed meanwhile, goes on its own between two changes, so th
 costs only a few calls.
 """
 
+import copy
 import logging
 import math
 import os
@@ -253,6 +254,15 @@ class LaneBlock:
         # Two slots more than the delay: the present step, and the one that is being written.
         self._signals = np.zeros((SIGNAL_ROWS, clock.signal_delay + 2, self.states.shape[1]))
         self._commands = np.zeros((clock.command_delay + 2, self.states.shape[1]))
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> "LaneBlock":
+        """Return a block that goes on from here by itself; the compiled program is the same."""
+        other = copy.copy(self)
+        for name, value in vars(self).items():
+            if isinstance(value, np.ndarray):
+                setattr(other, name, value.copy())
+        memo[id(self)] = other
+        return other
 
     def advance(self, step_count: int) -> None:
         """Go ``step_count`` steps on."""

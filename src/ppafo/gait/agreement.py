@@ -45,8 +45,8 @@ USUAL_SHANK = (48.0, 105.0)
 """Degrees over which the shank turns in a stride (72 to 81)."""
 USUAL_ANKLE = (18.0, 45.0)
 """Degrees over which the ankle turns in a stride (25 to 33)."""
-USUAL_FOLLOWING = (0.65, 1.4)
-"""Turn of the ankle over the turn of the shank while the foot stands (0.78 to 1.07)."""
+USUAL_FOLLOWING = (0.35, 1.4)
+"""Turn of the ankle over the turn of the shank while the foot stands (0.38 to 1.07)."""
 _RESTS = 0.2
 """Turn of the ankle over the shank's below which it hardly turns there and says nothing of its size."""
 

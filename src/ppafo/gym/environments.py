@@ -1,5 +1,6 @@
 """The environments as Gymnasium has them: one, or many side by side."""
 
+import copy
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -96,6 +97,20 @@ class World:
         frame_skip: int,
         observations: str,
     ) -> None:
+        self._arguments = (
+            task,
+            scenario,
+            overrides,
+            actions,
+            randomise,
+            vary,
+            targets,
+            duration,
+            error_weight,
+            gas_weight,
+            frame_skip,
+            observations,
+        )
         self.task = TASKS[task]
         for name, given, allowed in (
             ("actions", actions, (CONTINUOUS, ON_OFF)),
@@ -139,6 +154,24 @@ class World:
         self.action_space: Any = gymnasium.spaces.Discrete(COMMANDS)
         if self.is_continuous:
             self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (1 + self.task.walks,), np.float32)
+
+    def __reduce__(self) -> "tuple[type[World], tuple[Any, ...]]":
+        """Pickle by what it was made of: programs and what they are compiled to are found again."""
+        return World, self._arguments
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> "World":
+        """Return the same: nothing in it changes from step to step but the generators of its spaces."""
+        other = copy.copy(self)
+        vars(other).update(
+            {name: copy.deepcopy(vars(self)[name], memo) for name in ("observation_space", "action_space")}
+        )
+        memo[id(self)] = other
+        return other
+
+    def __copy__(self) -> "World":
+        other = object.__new__(World)
+        vars(other).update(vars(self))
+        return other
 
     def lanes(self, count: int) -> Environments:
         """Return lanes for some environments."""
@@ -252,6 +285,17 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
         self._lanes = self.world.lanes(1)
         self._period = 0.0
         self._trail: list[tuple[float, float, float]] = []
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what a pickle keeps: the world as it was made, and the state of its lane."""
+        return {**vars(self), "_lanes": self._lanes.state()}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Go on from a state: with the lane itself in a copy, from what it held in a pickle."""
+        self.__dict__.update(state)
+        if isinstance(self._lanes, Mapping):
+            held, self._lanes = self._lanes, self.world.lanes(1)
+            self._lanes.resume(held)
 
     def reset(
         self,

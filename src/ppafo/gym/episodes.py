@@ -247,6 +247,7 @@ class Environments:
     def __init__(self, program: Program, clock: Clock, task: Task, count: int, judging: Judging) -> None:
         self.count = count
         self._clock, self._judging = clock, judging
+        self._program, self._task = program, task
         # Lanes in whole vectors: a few environments need no block of full width.
         width = min(lanes_of(program), -(-count // VECTOR) * VECTOR)
         blocks = -(-count // width)
@@ -263,12 +264,13 @@ class Environments:
         self._chosen = np.zeros(count)
         self._observations = np.zeros((count, len(task.observed_paths)))
         self._outcomes = np.zeros((OUTCOMES, count))
+        self._signals = np.zeros((blocks * SIGNAL_ROWS, clock.signal_delay + 2, width))
         self._now = 0
         self._go_on = with_arrays(
             load_source(kernel_source(program, task)).go_on,
             self._states.reshape(-1, width),
             self._parameters.reshape(-1, width),
-            np.zeros((blocks * SIGNAL_ROWS, clock.signal_delay + 2, width)),
+            self._signals,
             self._commands.reshape(-1, width),
             np.empty((0, len(state_rows), width)),
             np.empty((0, 0, width)),
@@ -279,6 +281,26 @@ class Environments:
             self._observations,
             self._outcomes,
         )
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> "Environments":
+        """Return environments that go on from here by themselves; the compiled program is the same."""
+        other = Environments(self._program, self._clock, self._task, self.count, self._judging)
+        other.resume(self.state())
+        memo[id(self)] = other
+        return other
+
+    def state(self) -> dict[str, Floats | int]:
+        """Return all that changes from step to step: copies of the arrays, and the number of the step."""
+        arrays = {name: value.copy() for name, value in vars(self).items() if isinstance(value, np.ndarray)}
+        return {**arrays, "_now": self._now}
+
+    def resume(self, state: Mapping[str, Floats | int]) -> None:
+        """Go on from a state; the compiled program keeps the places of the arrays, so that they are filled."""
+        for name, value in state.items():
+            if isinstance(value, np.ndarray):
+                getattr(self, name)[...] = value
+            else:
+                self._now = value
 
     def begin(self, places: Places, columns: Columns) -> Seen:
         """Begin episodes of some environments at once; what the others show is not to be used."""

@@ -1,5 +1,6 @@
 """The new parameter set: identified values in the place of the old ones, each with interval and origin."""
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
@@ -72,14 +73,15 @@ def _with_estimate(parameter_set: ParameterSet, estimate: Estimate, quantity: Qu
         else f"the set had {number_text(before)} ({before.origin}: {before.source})"
     )
     interval = f"{100.0 * estimate.confidence:g}% interval {low:.6g} to {high:.6g} {unit}".rstrip()
+    half_width = half_width_for(CONFIDENCE, max(high - value, value - low), estimate.confidence)
     entry = Entry(
-        value=value,
+        value=_in_digits_of(value, half_width),
         unit=unit,
         origin="identified" if estimate.is_identified else "fitted",
         source="; ".join(estimate.recordings),
         note=f"{estimate.verdict}, {interval}; {estimate.explanation.rstrip('.')}. Before, {was}.",
         # An interval that is cut at a bound is too narrow on that side.
-        uncertainty=half_width_for(CONFIDENCE, max(high - value, value - low), estimate.confidence),
+        uncertainty=_in_digits_of(half_width, half_width),
     )
     # An orifice that is given as an area has no sonic conductance any more, and the other way round.
     section, _, name = estimate.path.rpartition(".")
@@ -89,6 +91,16 @@ def _with_estimate(parameter_set: ParameterSet, estimate: Estimate, quantity: Qu
     links = acting(links_of_set(parameter_set), {estimate.path})
     found = {path: entry for path in (estimate.path, *(path for path, link in links.items() if link.when_set))}
     return replace(parameter_set, numbers={**kept, **found})
+
+
+_DIGITS = 3
+
+
+def _in_digits_of(value: float, half_width: float) -> float:
+    """Return a value with as many digits as three of its half interval, beyond which it says nothing."""
+    if not (math.isfinite(half_width) and half_width > 0.0):
+        return value
+    return round(value, _DIGITS - 1 - math.floor(math.log10(half_width)))
 
 
 def fitting_unit(unit: str, quantity: Quantity) -> str:

@@ -7,7 +7,7 @@ flow of the open valve before its map, and the leak last, since its chambers mus
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -156,8 +156,9 @@ class OpenValveFlowProblem(StrictTable):
         """Return the settings of the procedure [SI]."""
         path = setting.valve_path(self.valve)
         area = number_in_si(setting.parameter_set, f"{path}.area")
+        ratio = number_in_si(setting.parameter_set, f"{path}.critical_ratio")
         gas = setting.gas(self)
-        return OpenValveFlowSettings(gas, self.law, area, path, self.confidence, setting.tolerances)
+        return OpenValveFlowSettings(gas, self.law, area, path, ratio, self.confidence, setting.tolerances)
 
 
 class VaneLeakProblem(StrictTable):
@@ -172,7 +173,9 @@ class VaneLeakProblem(StrictTable):
     start: _Start = None
     end: _End = None
     angle: Text | None = Field(None, description="vane angle, from which the set's volumes follow")
-    law: Literal["orifice", "laminar"] = Field("orifice", description="an orifice is written as the set has it")
+    law: Literal["orifice", "laminar", "both"] = Field(
+        "orifice", description="an orifice is written as the set has it; both: a laminar gap beside it"
+    )
     volume_1: Text | None = Field(None, description="volume of chamber 1 with its line, such as '40 cm^3'")
     volume_2: Text | None = Field(None, description="volume of chamber 2 with its line")
 
@@ -213,7 +216,7 @@ class VaneLeakProblem(StrictTable):
             end=end,
             confidence=self.confidence,
             critical_ratio=ratio,
-            is_laminar=self.law == "laminar",
+            law=self.law,
             tolerances=setting.tolerances,
             volume_deviation=deviation,
             **volumes,
@@ -266,12 +269,20 @@ def run_procedure(sources: tuple[Source, ...], problem: ProcedureProblem, settin
     """
     settings = problem.settings(setting)
     try:
-        return _PROCEDURES[problem.kind](sources, settings)
+        found = _PROCEDURES[problem.kind](sources, settings)
     except IdentificationError as error:
         # What is wrong with a file is told by its name, what is wrong with a procedure by its place in the problem.
         if any(str(error).startswith(source.name) for source in sources):
             raise
         raise IdentificationError(f"{setting.place}: {error}") from error
+    anew = setting.tolerances.each_recording
+    if not anew or len(sources) == 1:
+        return found
+    said = (
+        f"bench.each_recording = {list(anew)} acts in a [trajectory] only: here zeros and gains are those of all "
+        f"{len(sources)} recordings; give each mounting of the sensors its own [[procedure]]"
+    )
+    return replace(found, remarks=(*found.remarks, said))
 
 
 def window_of(problem: ProcedureProblem, setting: Setting) -> tuple[float, float]:

@@ -8,6 +8,8 @@ from ppafo.units import percentage
 _SHOWN_IN = {"Pa": ("kPa", 1.0e-3), "rad": ("deg", 180.0 / math.pi)}
 _SMALLEST, _LARGEST = 1.0e-2, 1.0e5
 """Sizes between which a number is written without a power of ten."""
+_SEVERAL = {"readings", "commands"}
+"""Words of groups that are more than one."""
 _SHARE, _MOST_NAMED = 0.05, 3
 """Smallest fraction of the variance for which a tolerance is named, and how many are."""
 
@@ -40,7 +42,7 @@ def widened_by(found: Fit, name: str) -> str:
 
 
 def conflict_in_words(found: Fit, remedy: str) -> str:
-    """Return which readings want other numbers than all together, and a remedy; empty where they agree."""
+    """Return which readings alone give other values than all together, and a remedy; empty where they agree."""
     one = found.conflict
     if one is None:
         return ""
@@ -50,7 +52,8 @@ def conflict_in_words(found: Fit, remedy: str) -> str:
         return (
             f"what is left of {one.group} is {one.standard_errors:.0f} times its noise, too smooth for noise; {remedy}"
         )
+    give = "give" if _SEVERAL & set(one.group.split()) else "gives"
     return (
-        f"{one.group} alone wants other numbers than all readings together, {one.number} by {one.standard_errors:.1f} "
-        f"standard errors; {remedy}"
+        f"fitted alone, {one.group} {give} different values, {one.number} by {one.standard_errors:.1f} standard "
+        f"errors; {remedy}"
     )

@@ -4,7 +4,7 @@ To add a metric: a function and its MetricKind in a module of this folder, liste
 """
 
 from ppafo.kinds import Kinds
-from ppafo.metrics import gas, motion, strides, switching, tracking
+from ppafo.metrics import command, gas, motion, strides, switching, tracking
 from ppafo.metrics.metric import Metric, MetricKind
 from ppafo.signals import Recording
 
@@ -21,6 +21,7 @@ METRICS: Kinds[MetricKind] = Kinds(
             *tracking.METRICS,
             *gas.METRICS,
             *switching.METRICS,
+            *command.METRICS,
             *motion.METRICS,
             *strides.METRICS,
         )

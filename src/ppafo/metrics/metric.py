@@ -29,6 +29,14 @@ class Metric:
     unit: str
     summary: str
 
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
+        """Return the value in SI as an array without axes, for NumPy; ``copy`` means nothing, it is always new."""
+        return np.array(self.value, dtype)
+
+    def __float__(self) -> float:
+        """Return the value in SI, as arithmetic asks for it."""
+        return float(self.value)
+
 
 class Metrics(dict[str, Metric]):
     """Metrics by name; a name that is not there is answered with the nearest one."""

@@ -47,6 +47,7 @@ EFFECTS: Kinds[Effect] = Kinds(
         "silencer": "ppafo.model.effects.silencer:EFFECT",
         "ice": "ppafo.model.effects.ice:EFFECT",
         "leak_opening": "ppafo.model.effects.leak_opening:EFFECT",
+        "laminar_leak": "ppafo.model.effects.laminar_leak:EFFECT",
         "spool_play": "ppafo.model.effects.spool_play:EFFECT",
         "coil_heating": "ppafo.model.effects.coil_heating:EFFECT",
         "seal_friction": "ppafo.model.effects.seal_friction:EFFECT",

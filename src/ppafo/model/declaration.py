@@ -18,11 +18,15 @@ NOMINAL = {
     name: f"nominal {name.replace('_', ' ')}"
     for name in (
         "flow",
+        "gas_product",
+        "valve_conductance",
+        "leak_conductance",
         "critical_ratio",
         "supply_pressure",
         "dorsiflexion_pressure",
         "atmospheric_pressure",
         "relieving",
+        "torque_constant",
         "displacement_per_radian",
         "dead_volume_1",
         "dead_volume_2",
@@ -32,6 +36,7 @@ NOMINAL = {
         "opening_delay",
         "closing_delay",
         "switching_interval",
+        "delay",
         "lag",
         "dead_band",
         "joining_time",
@@ -51,7 +56,7 @@ NOMINAL = {
 class Quantity:
     """One parameter of a component: name, unit, meaning, default and range, in SI. ``default`` None: it must be given.
 
-    What the default ``follows`` is added to it, in a walk: some of those above.
+    What the default ``follows`` is added to it: some of those above, or of ``control.torque_loop``.
     """
 
     name: str

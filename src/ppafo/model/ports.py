@@ -4,6 +4,8 @@ The plant calls them where its equations have them. An effect gives a law for a 
 calls the law instead (``model/effects/kind.py``). A law takes what its port takes, and its own parameters.
 """
 
+from ppafo.model.orifice import FlowCurve
+
 
 def at_valve(command: float) -> float:
     """Command [-] that the valve follows, given the one that has reached it: -1 to 1, or the one that vents."""
@@ -25,8 +27,11 @@ def exhaust_path(conductance: float) -> float:
     return conductance
 
 
-def leakage_path(conductance: float, pressure_1: float, pressure_2: float) -> float:
-    """Conductance [kg/(s Pa)] of the leak between the chambers, given its orifice's; absolute pressures [Pa]."""
+def leakage_path(conductance: float, pressure_1: float, pressure_2: float, curve: FlowCurve) -> float:
+    """Conductance [kg/(s Pa)] of the leak between the chambers, given its orifice's; absolute pressures [Pa].
+
+    The leak then flows as an orifice of this conductance would, with the flow function of ``curve``.
+    """
     return conductance
 
 

@@ -19,6 +19,7 @@ from ppafo.page.wasm import WasmModule, module_of
 from ppafo.page.words import words
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.overrides import over
+from ppafo.plugins import Plugins, name_plugins
 from ppafo.report.finding import LivePart
 from ppafo.report.setting_names import label_of
 from ppafo.report.style import PAGE_LOOKS
@@ -337,13 +338,16 @@ _STEP = "Step response"
 
 
 @checked("scenarios", "overrides")
-def workbench(scenarios: Sequence[str | Path] = DEFAULT, *, overrides: Overrides = ()) -> bytes:
+def workbench(scenarios: Sequence[str | Path] = DEFAULT, *, overrides: Overrides = (), plugins: Plugins = ()) -> bytes:
     """Return a page, one file of HTML, in which scenarios are simulated again while their numbers are changed.
 
     ``scenarios`` are names or files of scenarios and walks; those with the same kind of motion share a tab.
     ``overrides`` change all of them. Each tab opens with its first two scenarios.
     ScenarioError for none, too many or two of one name; ProgramError where a program has to be built and cannot be.
+
+    ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
     """
+    name_plugins(plugins)
     content, modules, still = _content([str(scenario) for scenario in scenarios], tuple(overrides), "page")
     return page_of(TITLE, content, modules, still)
 

@@ -4,7 +4,7 @@ Every door takes its settings through here: overrides, columns of studies, tuned
 and units, episodes of agents. So a setting means the same at all of them.
 """
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +12,7 @@ import numpy as np
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.model.columns import over_runs
+from ppafo.model.declaration import quantities_of
 from ppafo.units import to_si
 
 ATMOSPHERE_PATH = "supply.atmospheric_pressure"
@@ -28,24 +29,39 @@ def itself(number: Any) -> Any:
     return number
 
 
+def fill(row: type, numbers: Sequence[Any]) -> Any:
+    """A NamedTuple of a class with these numbers."""
+    return row(*numbers)
+
+
 @dataclass(frozen=True, slots=True)
 class Term:
     """A function of other numbers, floats or arrays (runs,), which is one of floats that can be translated to C.
 
-    With ``settings`` it takes its sources as one NamedTuple of this class, else one by one.
+    The first sources fill ``rows``, NamedTuple classes that declare their numbers, one after the other, and are given
+    to it as these; the sources after them one by one.
     """
 
     sources: tuple[str, ...]
     function: Callable[..., Any] = itself
-    settings: type | None = None
+    rows: tuple[type, ...] = ()
 
     def number(self, present: Callable[[str], Any]) -> Any:
         """Return what the function makes of what the sources are at ``present``."""
         given = [present(source) for source in self.sources]
-        if self.settings is None:
-            return given[0] if self.function is itself else over_runs(self.function, *given)
-        settings = self.settings
-        return over_runs(lambda *numbers: self.function(settings(*numbers)), *given)
+        if self.function is itself:
+            return given[0]
+        return over_runs(lambda *numbers: self.function(*self.arguments(numbers)), *given)
+
+    def arguments(self, numbers: Sequence[Any], filled: Callable[[type, Sequence[Any]], Any] = fill) -> list[Any]:
+        """Return the function's arguments from a number for each source; ``filled`` makes a row of its numbers."""
+        found: list[Any] = []
+        rest = list(numbers)
+        for row in self.rows:
+            size = len(quantities_of(row))
+            found.append(filled(row, rest[:size]))
+            rest = rest[size:]
+        return found + rest
 
 
 @dataclass(frozen=True, slots=True)

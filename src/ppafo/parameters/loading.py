@@ -164,13 +164,20 @@ def list_sets() -> tuple[str, ...]:
 
 @checked("parameter_set", "valve", "overrides", name_or_path="parameter_set")
 def load_device(
-    parameter_set: ParameterSet | str | Path, *, overrides: Overrides = (), valve: Name | None = None
+    parameter_set: ParameterSet | str | Path,
+    *,
+    overrides: Overrides = (),
+    valve: Name | None = None,
+    plugins: Plugins = (),
 ) -> Device:
     """Return the device of a parameter set with one of its valves (default: the set's own choice), in SI units.
 
     ``overrides`` are texts such as ``valve.area=12.6mm^2`` or ``supply.pressure=55 psi_g``. ParameterError for one of
     another valve than the one that is named.
+
+    ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
     """
+    name_plugins(plugins)
     check_valve(overrides, valve, f"valve = '{valve}'")
     loaded = parameter_set if isinstance(parameter_set, ParameterSet) else load_parameter_set(parameter_set)
     return build_device(apply_overrides(loaded, overrides, valve=valve), valve)

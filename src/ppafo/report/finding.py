@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from ppafo.documents.json_text import json_text, plain
 from ppafo.report.kind import PLAIN, Interval, Kind
+from ppafo.report.notebook import shown
 from ppafo.report.panels import Panel, draw_panels
 from ppafo.report.style import render_figure
 from ppafo.report.writing import align_columns, inline_figure, render_page
@@ -189,7 +190,7 @@ class Finding(Generic[T_co]):
         drawn = None if chosen is None else chosen.drawn(self.kind)
         if drawn is None or isinstance(drawn, bytes):
             raise LookupError(f"there is no figure '{name or ''}'; available: {', '.join(figures) or 'none'}")
-        return drawn
+        return shown(drawn)
 
     def save(self, folder: str | Path) -> None:
         """Write text, JSON, page and figures into a folder: absent, empty or an earlier result, else DataError."""

@@ -55,6 +55,8 @@ _TOP = 0.28
 """Inches above the panels, in which the figure says that it is simulated."""
 _LINE = 0.17
 """Inches of a line of the note."""
+_LETTERS, _FEWEST_LETTERS, _KIND = 11.0, 24, 1.0
+"""Letters of a title on an inch, the fewest on a line, and inches that its kind of numbers takes beside it."""
 _AREA = {"alpha": 0.15, "linewidth": 0}
 
 
@@ -142,7 +144,9 @@ def draw_panels(
         _share_scales(figure, [(axes, panel, each) for axes, panel, each in zip(grid, panels, drawn, strict=False)])
         # Names and messages come from files: a dollar sign in them begins no formula.
         if title:
-            figure.suptitle(title, x=0.01, ha="left", fontsize=11, wrap=True, parse_math=False)
+            # Beside it stands what kind of numbers these are.
+            lines = textwrap.wrap(title, max(_FEWEST_LETTERS, round(_LETTERS * (width - _KIND))))
+            figure.suptitle("\n".join(lines), x=0.01, ha="left", fontsize=11, parse_math=False)
         if notes:
             figure.text(
                 0.012, 0.06 / height, "\n".join(notes), va="bottom", fontsize=9, color=VERMILION, parse_math=False
@@ -161,7 +165,7 @@ def _draw(axes: "Axes", panel: Panel) -> Any:
         shown = SHAPES[mark.shape](axes, mark, panel.x.values(mark.x), panel.y.values(mark.y))
         mapped = shown if mark.shape in ("map", "points") else mapped
     axes.set_xlabel(panel.x.axis)
-    axes.set_ylabel(panel.y.axis if not panel.shares_x else panel.y.axis_unit if panel.title else "")
+    axes.set_ylabel(panel.y.axis if panel.title or not panel.shares_x else "")
     axes.set_title(panel.title or (panel.y.axis if panel.shares_x else ""))
     # A text carries its words itself.
     if panel.legend and any(mark.label for mark in panel.marks if mark.shape != "text"):

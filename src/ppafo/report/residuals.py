@@ -45,7 +45,7 @@ def with_residuals(
     """Return a panel and the one of the residuals [SI] at places along its horizontal axis."""
     quantity = "pressure change" if y.quantity == "pressure" else y.quantity
     left = [readings_mark("", at, residuals), Mark("level", (), 0.0, colour=BLACK, style={"linewidth": 1.4})]
-    below = Panel(x, Kind("Measured minus fitted", y.unit, quantity), left, "Residuals", legend="")
+    below = Panel(x, Kind("Residual (measured - model)", y.unit, quantity), left, "Residuals", legend="")
     return Panel(x, y, marks, title, legend="inside"), below
 
 
@@ -68,13 +68,13 @@ class Course:
 
 
 def course_panels(one: Course, look: str, legend: str, title: str = "", limits: Sequence[float] = ()) -> list[Panel]:
-    """Return samples and model over time and, half as tall below them, model less sample, with ``limits`` dashed."""
+    """Return samples and model over time and, half as tall below them, their residual, with ``limits`` dashed."""
     upper = [
         readings_mark(one.names[0], one.times, one.samples - one.above, look),
         Mark("line", one.times, one.model - one.above, (), one.names[1], one.colour, {"linewidth": 1.3}),
     ]
     lower = [
-        Mark("line", one.times, one.model - one.samples, colour=one.colour, style={"linewidth": 0.9}),
+        Mark("line", one.times, one.samples - one.model, colour=one.colour, style={"linewidth": 0.9}),
         Mark("level", (), 0.0, colour=GREY, style={"linewidth": 0.8}),
     ]
     dashed = {"linewidth": 0.8, "linestyle": (0, (4, 3))}

@@ -135,6 +135,32 @@ def isolated_samples(values: Floats, noise: float) -> NDArray[np.bool_]:
     return np.asarray((away > 6.0 * noise) & (away > 3.0 * np.ptp(around[:, [0, 1, 3, 4]], axis=1)))
 
 
+_ROUNDING = 1.0e-9
+"""Fraction of a range [-] that is no step of a converter but how a file rounds."""
+_SHARE_THAT_DIFFERS = 0.5
+
+
+def resolution_of(values: Floats) -> float:
+    """Return the step of the converter that made the values [their unit], the least between two; 0 where none shows.
+
+    One shows where most values come again, as no noise and no motion makes them.
+    """
+    steps = np.diff(np.unique(values))
+    steps = steps[steps > _ROUNDING * steps.sum()]
+    return float(steps.min()) if 0 < steps.size < _SHARE_THAT_DIFFERS * values.size else 0.0
+
+
+def rounding_of(values: Floats, resolution: float) -> Floats:
+    """Return the standard deviation [their unit] with which each value speaks, for what its converter rounds.
+
+    It is the resolution over sqrt(12) (GUM, JCGM 100:2008, F.2.2.1). A sensor at rest repeats one value with one error,
+    so that a run of n equal values says no more than one: each of them speaks with sqrt(n) times that.
+    """
+    edges = np.flatnonzero(np.diff(values, prepend=np.nan, append=np.nan))
+    lengths = np.diff(edges)
+    return np.asarray(resolution / math.sqrt(12.0) * np.sqrt(np.repeat(lengths, lengths)))
+
+
 def noise_of(values: Floats) -> float:
     """Return the standard deviation of white noise [unit of the signal], from third differences that are not unusual.
 
@@ -142,8 +168,40 @@ def noise_of(values: Floats) -> float:
     """
     if values.size < MINIMUM_SAMPLES:
         return 0.0
-    # Third differences take away what a parabola through the neighbours explains.
-    differences = np.abs(np.diff(values, n=3))
+    differences = _third_differences(values, 1)
     most = _KEPT * _SPREAD_OF_MEDIAN * float(np.median(differences))
     inner = differences[differences <= most]
     return float(np.sqrt(np.mean(inner * inner)) / _SHARE_OF_KEPT / _GAIN_OF_DIFFERENCES)
+
+
+def _third_differences(values: Floats, lag: int) -> Floats:
+    """Return sizes of third differences of samples ``lag`` apart, without what a parabola through them explains."""
+    first, second, third, fourth = (values[place * lag : values.size - (3 - place) * lag] for place in range(4))
+    return np.asarray(np.abs(fourth - 3.0 * third + 3.0 * second - first))
+
+
+_SHARE_OF_LAGS = 0.1
+"""Share of a recording over which noise may remember at most: beyond it, what a model lacks looks like noise."""
+
+_BY_CHANCE = 8.0
+"""Four standard errors of a quarter's size among differences that share samples, times the root of their number."""
+
+_QUARTER = 0.31864
+"""Size below which a quarter of normal deviates lie."""
+
+
+def correlated_noise_of(values: Floats) -> float:
+    """Return the standard deviation of noise that may be correlated, in what a model leaves [its unit].
+
+    Third differences of samples further apart see the noise that neighbours share. A quarter of the recording, where
+    they are smallest, speaks for all of it, as a model that is wrong is so while something moves. The spread about the
+    median, which a constant error does not move, is never exceeded.
+    """
+    if values.size < MINIMUM_SAMPLES:
+        return 0.0
+    lags = [2**power for power in range(values.size.bit_length()) if 3 * 2**power <= _SHARE_OF_LAGS * values.size]
+    sizes = [float(np.quantile(_third_differences(values, lag), 0.25)) for lag in lags]
+    apart = max(sizes, default=0.0) / (_QUARTER * _GAIN_OF_DIFFERENCES)
+    spread = _SPREAD_OF_MEDIAN * float(np.median(np.abs(values - np.median(values))))
+    correlated, white = min(apart, spread), noise_of(values)
+    return correlated if correlated > (1.0 + _BY_CHANCE / math.sqrt(values.size)) * white else white

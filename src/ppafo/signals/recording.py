@@ -12,7 +12,9 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ppafo.errors import DataError, nearest_name
+from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.errors import DataError, UnitError, nearest_name, refused_as
+from ppafo.units import from_si
 
 TIME = "time"
 TIME_UNIT = "s"
@@ -214,6 +216,25 @@ class Recording:
     def __getitem__(self, name: str) -> Floats:
         """Return the values of a channel, read-only, in its SI unit."""
         return self._channel(name).values
+
+    def in_unit(self, name: str, unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> Floats:
+        """Return the values of a channel in a unit, such as ``psi_g``; gauge counts from ``atmosphere`` [Pa absolute].
+
+        DataError for a channel that is not there, UnitError for a unit that does not fit it.
+        """
+        channel = self._channel(name)
+        # Channels write Pa for a level and - for a plain number.
+        si_unit = {"Pa": "Pa_a", "-": ""}.get(channel.unit, channel.unit)
+        # Units are affine, so that two values decide all.
+        with refused_as(UnitError, f"channel '{name}' in '{unit}'", UnitError):
+            zero, one = (from_si(number, unit, si_unit, atmosphere) for number in (0.0, 1.0))
+        scale = one - zero
+        converted: Floats = channel.values if (zero, one) == (0.0, 1.0) else zero + scale * channel.values
+        return converted
+
+    def _ipython_key_completions_(self) -> list[str]:
+        """Return the channels, which a notebook completes between brackets."""
+        return list(self.names)
 
     def __contains__(self, name: object) -> bool:
         return name in self.channels

@@ -47,7 +47,9 @@ from ppafo.simulation.declaration import (
     quantity_text,
     value_at,
 )
+from ppafo.simulation.following import numbers_of_lines, numbers_of_sensors, read_followers
 from ppafo.simulation.motion_kind import MOTIONS
+from ppafo.simulation.nominal import nominal_terms
 from ppafo.simulation.overrides import OverriddenDocument, apply_overrides, device_paths
 from ppafo.simulation.profiles import read_profile
 from ppafo.simulation.scenario import (
@@ -64,6 +66,7 @@ from ppafo.simulation.scenario import (
     SupplyLine,
 )
 from ppafo.simulation.schema import scenario_file, whole_scenario_file
+from ppafo.simulation.torque_loop import PERIOD_PATH, loop_terms
 from ppafo.units import format_quantity, split_quantity
 
 _SECTION = "assumed"
@@ -107,7 +110,6 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
     hardware = read_hardware(reading, request, changed.device)
     device = read_device(reading, hardware)
     clock = read_clock(reading)
-    law = kind_at(document, "controller")
     section = MOTIONS[kind_at(document, "motion")].section
     assert section is not None, "walks are built from another layout"
     before = Reading(request.file, request.content)
@@ -116,6 +118,9 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
     )
     motion = section.read(reading, device, clock.duration, clock.step, request.folder)
     initial, links = _initial(reading, device.supply)
+    sensors = _sensors(reading, clock)
+    lines = read_supply_line(reading, device)
+    control, of_control = _control(reading, device, clock.period, sensors, lines)
     scenario = Scenario(
         name=document["name"],
         description=document.get("description", ""),
@@ -123,14 +128,14 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
         run=run,
         motion=motion,
         initial=initial,
-        controller=Control(law, reading.section("controller", controller_settings(law)), clock.period),
+        controller=control,
         reference=_reference(reading),
-        sensors=_sensors(reading, clock),
+        sensors=sensors,
         assumptions=(*read_assumptions(before, reading, hardware, request.overrides), *assumed_lines(reading)),
         origin=Origin(request.path, document["device"]["set"], hardware.valve, request.overrides, request.content),
         gas_model=read_gas_model(reading),
-        supply_line=read_supply_line(reading, device),
-        links=links,
+        supply_line=lines,
+        links={**links, **of_control},
     )
     # Refuse what only a vane has.
     try:
@@ -211,6 +216,22 @@ def _initial(reading: Reading, supply: Supply) -> tuple[Initial, Graph]:
     return Initial(*pressures), {path: links for path, links in found.items() if links}
 
 
+def _control(
+    reading: Reading, device: Device, period: float, sensors: Sensors, lines: SupplyLine | None
+) -> tuple[Control, Graph]:
+    """Return the controller with its sample period [s], and which of its settings [SI] follow other numbers."""
+    kind = kind_at(reading.document, "controller")
+    items = controller_settings(kind)
+    if not any(item.follows for item in items):
+        return Control(kind, reading.section("controller", items), period), {}
+    rows = None if lines is None else lines.row(device.supply)
+    terms = nominal_terms(device, rows) | loop_terms(device, CONTROLLERS[kind], walks=False)
+    of_sensors = {item.name: getattr(sensors, item.name) for item in SENSORS}
+    present = numbers_of_sensors(of_sensors) | numbers_of_lines(rows) | {PERIOD_PATH: period}
+    found, links = read_followers(reading, {"controller": items}, terms, device, present)
+    return Control(kind, {path.partition(".")[2]: number for path, number in found.items()}, period), links
+
+
 def _reference(reading: Reading) -> ProfileChoice:
     """Return the torque that the controller follows; ScenarioError where it needs one and none is given."""
     if "reference" in reading.document:
@@ -273,6 +294,8 @@ def _value(reading: Reading, hardware: Hardware, path: str) -> str | None:
         if path == RELIEVING_PATH:
             return "false"
         quantity = hardware.parameter_set.declarations().get(full)
+    if quantity is not None and quantity.default is None and quantity.follows:
+        return "what follows from the device"
     return None if quantity is None or quantity.default is None else quantity_text(quantity.default, quantity.unit)
 
 

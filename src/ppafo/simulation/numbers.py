@@ -41,6 +41,7 @@ _TEXTS = (
 )
 _HOLDERS = ("settings", "orifice", "leg")
 """Fields whose numbers are attributes of what has them."""
+_RATE, _PERIOD = "controller.rate", "controller.period"
 _UNIT_OF_TIMES = {"controller.rate": "Hz"}
 
 
@@ -101,7 +102,11 @@ def moving_together(scenario: Scenario, given: Mapping[str, Any]) -> dict[str, A
 
     What was changed since the scenario was loaded follows nothing any more.
     """
-    return resolved(links_that_hold(scenario), given, lambda path: _number(scenario, _place(path, scenario)))
+    links = links_that_hold(scenario)
+    # What follows the sample period follows a rate that is given for it.
+    period = {_PERIOD: 1.0 / given[_RATE]} if _RATE in given and _PERIOD not in given else {}
+    found = resolved(links, {**given, **period}, lambda path: _number(scenario, _place(path, scenario)))
+    return {path: number for path, number in found.items() if path not in period}
 
 
 def links_that_hold(scenario: Scenario) -> Graph:

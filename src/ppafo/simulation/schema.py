@@ -34,6 +34,7 @@ def number_type(quantity: Quantity, words: tuple[str, ...] = ()) -> Any:
 
 def _description(quantity: Quantity) -> str:
     default = "" if quantity.default is None else f"; {quantity.default:g} unless given"
+    default = "; the device's unless given" if quantity.default is None and quantity.follows else default
     return f"{quantity.summary} [{quantity.unit or '-'}]{default}".lstrip()
 
 
@@ -42,7 +43,7 @@ def quantity_fields(quantities: tuple[Quantity, ...], words: tuple[str, ...] = (
     fields: dict[str, Any] = {}
     for item in quantities:
         kind = number_type(item, words)
-        required = item.default is None and not words
+        required = item.default is None and not words and not item.follows
         text = _description(item)
         fields[item.name] = (kind, Field(description=text)) if required else optional(kind, text)
     return fields

@@ -19,6 +19,7 @@ from ppafo.simulation.scenario import Scenario, scenario_document
 from ppafo.version import __version__
 
 if TYPE_CHECKING:
+    import pandas  # type: ignore[import-untyped]
     import xarray
     from matplotlib.figure import Figure
 
@@ -98,12 +99,13 @@ class Result:
 
     def plot(self) -> "Figure":
         """Return a figure of angle, pressures, torque, command and gas; ``.savefig(...)`` writes it."""
+        from ppafo.report.notebook import shown
         from ppafo.report.recording_figure import recording_figure
 
         remark = "" if self.status.is_completed else self.status.message
         atmosphere = self.scenario.device.supply.atmospheric_pressure
         valve = self.scenario.device.valve.kind
-        return recording_figure(self.recording, self.scenario.name, remark, atmosphere, valve)
+        return shown(recording_figure(self.recording, self.scenario.name, remark, atmosphere, valve))
 
     def error(self) -> "ErrorEstimate":
         """Return the estimated error [SI] of this run from its steps: it runs again with a sixteenth of it.
@@ -138,11 +140,39 @@ class Result:
             "scenario": scenario_document(self.scenario),
         }
 
-    def dataset(self) -> "xarray.Dataset":
-        """Return the recording as an xarray Dataset; attributes hold units, long names and the scenario as JSON."""
+    def __getitem__(self, channel: str | tuple[str, str]) -> Floats:
+        """Return the values of a channel in SI, ``result["torque"]``, or in a unit, ``result["pressure_1", "psi_g"]``.
+
+        DataError for a channel that is not there, UnitError for a unit that does not fit it.
+        """
+        if isinstance(channel, str):
+            return self.recording[channel]
+        name, unit = channel
+        return self.recording.in_unit(name, unit, self.scenario.device.supply.atmospheric_pressure)
+
+    def _ipython_key_completions_(self) -> list[str]:
+        """Return the channels, which a notebook completes between brackets."""
+        return list(self.recording.names)
+
+    def _repr_html_(self) -> str:
+        """Return metrics and figure, which a notebook shows."""
+        from ppafo.report.notebook import result_html
+
+        return result_html(str(self).partition("\n")[0], self.metrics, self.scenario.device, self.plot())
+
+    def dataset(self, units: Mapping[str, str] | None = None) -> "xarray.Dataset":
+        """Return the recording as an xarray Dataset; attributes hold units, long names and the scenario as JSON.
+
+        Channels are in SI but for those with another unit in ``units``, ``{"pressure_1": "psi_g"}``.
+        """
         from ppafo.storage import dataset_of
 
-        return dataset_of(self.recording, scenario_document(self.scenario))
+        atmosphere = self.scenario.device.supply.atmospheric_pressure
+        return dataset_of(self.recording, scenario_document(self.scenario), units, atmosphere)
+
+    def to_dataframe(self, units: Mapping[str, str] | None = None) -> "pandas.DataFrame":
+        """Return the channels as columns over time [s]; ``units`` as of ``dataset``."""
+        return self.dataset(units).to_dataframe()
 
     def save(self, folder: str | Path, attachments: Mapping[str, bytes] | None = None) -> Path:
         """Write ``recording.nc``, ``recording.csv``, ``run.json`` and any attachments (contents by file name).

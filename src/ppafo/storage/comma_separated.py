@@ -33,7 +33,8 @@ _OTHERS = (
 _HEADER = re.compile(r"\s*(\w+)\s*\[\s*([^\[\]]+?)\s*\]\s*(\w*)\s*", re.ASCII)
 _LEVEL = "Pa_a"
 _OWN_COLUMNS = (
-    "; columns of your own need a column map, --columns FILE.toml:NAME, or columns = 'NAME' in a problem file"
+    "; other columns are read through a column map: validate --columns FILE.toml:NAME, or columns = 'NAME' in a "
+    "problem file of identify"
 )
 
 

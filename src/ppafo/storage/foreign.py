@@ -351,7 +351,9 @@ def _of_text(content: bytes, columns: ColumnMap, map_name: str) -> _Table:
         }
         date_place = _place(f"channels.{TIME}.date", time.date, names, first, lines)
     titles = {name: names[place] if names else str(place + 1) for name, place in places.items()}
-    clock: list[str] | None = [] if TIME in places and is_clock(first[places[TIME]]) else None
+    # A first row that is too short is refused with the others, below.
+    begins = first[places[TIME]] if TIME in places and places[TIME] < len(first) else ""
+    clock: list[str] | None = [] if is_clock(begins) else None
     dates: list[str] | None = [] if clock is not None and date_place >= 0 else None
     last = max((*places.values(), date_place), default=0)
     # Row by row, so that no cell of a large file is kept as a text.

@@ -23,6 +23,18 @@ _HDF5 = b"\x89HDF\r\n\x1a\n"
 _HDF5_AT = 512
 """Byte at which HDF5 begins, behind the header of MATLAB."""
 _MOST_COLUMNS, _DEEPEST, _MOST_ELEMENTS = 300, 8, 300
+_OF_DAMAGE = (
+    OSError,
+    ValueError,
+    TypeError,
+    LookupError,
+    RuntimeError,
+    ArithmeticError,
+    AttributeError,
+    NameError,
+    EOFError,
+)
+"""What the libraries raise on damaged files."""
 _LABELS = ("colheaders", "labels", "names")
 
 
@@ -70,7 +82,7 @@ def open_matlab(path: str | Path) -> MatlabFile:
             _read_hdf5(path, found)
         else:
             _read_older(path, found)
-    except (OSError, ValueError, TypeError, KeyError, IndexError, NotImplementedError, RuntimeError) as error:
+    except _OF_DAMAGE as error:
         raise DataError(f"{path}: cannot be read as a .mat file: {one_line(error)}") from error
     if not found.columns and not found.texts:
         file = MatlabFile({}, {}, objects=tuple(found.objects))
@@ -129,9 +141,22 @@ def _read_hdf5(path: str | Path, found: _Found) -> None:
     import h5py
 
     with h5py.File(path, "r") as file:
-        for name, item in file.items():
+        for name, item in _own_items(file):
             if not name.startswith("#"):
                 _add(name, _tree_of_hdf5(item, file, 0), 0, found)
+
+
+def _own_items(group: Any) -> Iterator[tuple[str, Any]]:
+    """Give name and content of each item; none is opened before it is known to lie in this file."""
+    import h5py
+
+    for name in group:
+        if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+            raise ValueError(f"'{one_line(name)}' is a link; a file must contain its numbers itself")
+        item = group[name]
+        if isinstance(item, h5py.Dataset) and (item.is_virtual or item.external):
+            raise ValueError(f"the numbers of '{one_line(name)}' are in another file")
+        yield name, item
 
 
 def _tree_of_hdf5(item: Any, file: Any, depth: int) -> Tree:
@@ -145,7 +170,7 @@ def _tree_of_hdf5(item: Any, file: Any, depth: int) -> Tree:
     if item.attrs.get("MATLAB_object_decode", 0):
         return _Object(kind)
     if isinstance(item, h5py.Group):
-        fields = {name: _tree_of_hdf5(field, file, depth + 1) for name, field in item.items()}
+        fields = {name: _tree_of_hdf5(field, file, depth + 1) for name, field in _own_items(item)}
         # Of an array of structures each field has the values of all.
         is_array = fields and all(
             isinstance(field, h5py.Dataset) and field.dtype == h5py.ref_dtype and not field.attrs.get("MATLAB_class")

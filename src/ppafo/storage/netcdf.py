@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import DataError, one_line
 from ppafo.signals import CHANNELS, Channel, Recording, recording_kind
 from ppafo.signals.recording import PLAIN_NUMBER, TIME, TIME_UNIT
@@ -25,11 +26,23 @@ _PLAIN_NUMBER_IN_NETCDF = "1"
 _BETWEEN = "between_samples"
 
 
-def dataset_of(recording: Recording, scenario: Mapping[str, Any] | None = None) -> "xarray.Dataset":
-    """Return the recording as a Dataset over time [s]; ``scenario`` goes into an attribute as JSON."""
+def dataset_of(
+    recording: Recording,
+    scenario: Mapping[str, Any] | None = None,
+    units: Mapping[str, str] | None = None,
+    atmosphere: float = STANDARD_ATMOSPHERE,
+) -> "xarray.Dataset":
+    """Return the recording as a Dataset over time [s]; ``scenario`` goes into an attribute as JSON.
+
+    ``units`` are other units than those of SI by the name of a channel, in which gauge pressure counts from
+    ``atmosphere`` [Pa absolute]. DataError for a channel that is not there, UnitError for a unit that does not fit it.
+    """
     import xarray
 
     variables = {name: (TIME, recording[name], channel_attributes(recording, name)) for name in recording.names}
+    for name, unit in (units or {}).items():
+        values = recording.in_unit(name, unit, atmosphere)
+        variables[name] = (TIME, values, channel_attributes(recording, name) | {"units": unit})
     coordinates = {TIME: (TIME, recording.time, _TIME_ATTRIBUTES)}
     return xarray.Dataset(variables, coordinates, global_attributes(recording, scenario))
 

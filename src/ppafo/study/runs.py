@@ -1,5 +1,6 @@
 """Runs of a scenario over columns of values: numbers in, metrics out, one table that grows."""
 
+import math
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, final
@@ -11,8 +12,10 @@ from ppafo.errors import ScenarioError, StudyError, refused_as
 from ppafo.metrics import METRICS
 from ppafo.metrics.tracking import ONE_INSTANT, settled_error
 from ppafo.progress import Progress, Report
+from ppafo.running import most_reversals
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.ensemble.running import lacking
+from ppafo.simulation.oscillation import REVERSALS
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import Floats
 from ppafo.studies.draws import check_metrics
@@ -152,10 +155,26 @@ def failures_of(rows: Rows) -> int:
 
 
 def with_companions(metrics: Sequence[str], scenario: Scenario) -> tuple[str, ...]:
-    """Return metrics with those that a metric at one instant needs beside it, where the scenario offers them."""
+    """Return metrics with those that a judgement needs beside them, where the scenario offers them.
+
+    A metric at one instant needs oscillations of the torque, and each of them how often the command turns.
+    """
+    found = (*metrics, REVERSALS) if judges_loop(scenario) else tuple(metrics)
     if ONE_INSTANT not in metrics or any(lacking(scenario, METRICS[name]) for name in OSCILLATES):
-        return tuple(metrics)
-    return tuple(dict.fromkeys((*metrics, *OSCILLATES)))
+        return tuple(dict.fromkeys(found))
+    return tuple(dict.fromkeys((*found, *OSCILLATES)))
+
+
+def judges_loop(scenario: Scenario) -> bool:
+    """Return whether it is known of a scenario's runs that their torque loop oscillates."""
+    return math.isfinite(most_reversals(scenario)) and not lacking(scenario, METRICS[REVERSALS])
+
+
+def oscillating(rows: Mapping[str, Floats], scenario: Scenario) -> NDArray[np.bool_]:
+    """Return in which runs the torque loop oscillates, from ``command_reversals`` of metered runs; none without it."""
+    if REVERSALS not in rows:
+        return np.zeros(next(iter(rows.values())).size, dtype=np.bool_)
+    return np.asarray(rows[REVERSALS] > most_reversals(scenario))
 
 
 def settled(rows: Rows, metric: str) -> Floats:

@@ -14,9 +14,11 @@ import numpy as np
 from ppafo.documents.json_text import json_text
 from ppafo.errors import DataError, ScenarioError, StudyError, one_line, refused_as
 from ppafo.metrics import METRICS
+from ppafo.running import most_reversals
 from ppafo.signals.recording import CHANNELS
 from ppafo.simulation.ensemble import EnsembleResult, run_ensemble
 from ppafo.simulation.numbers import absolute
+from ppafo.simulation.oscillation import REVERSALS
 from ppafo.storage.parquet import (
     TableColumn,
     encode_texts,
@@ -28,10 +30,10 @@ from ppafo.storage.parquet import (
 )
 from ppafo.storage.places import Place, place_at, read_document
 from ppafo.studies.distributions import Floats
-from ppafo.studies.study import Study
+from ppafo.studies.study import Configuration, Study
 from ppafo.study.blocks import Chunk, chunk, chunk_count, drawn_values, samples_of, varied_columns
 from ppafo.study.manifest import MANIFEST, STUDY_COPY, check_same_study, manifest, read_manifest
-from ppafo.study.runs import unvaried
+from ppafo.study.runs import unvaried, with_companions
 from ppafo.study.sent_plugins import SentPlugin, take_plugins
 
 if TYPE_CHECKING:
@@ -142,6 +144,8 @@ def stored_rows(place: Place, numbers: Sequence[int], columns: Sequence[str] | N
             ) from error
 
 
+OSCILLATES = "oscillates"
+"""Column of the flag of runs whose torque loop oscillates."""
 _TEXTS = ("configuration", "status", "reason", "channel")
 
 
@@ -188,6 +192,9 @@ def compute_chunk(task: Task, number: int) -> tuple[Finished, bytes]:
     columns["status"] = TableColumn(encode_texts(result.status, STATUSES), _PLAIN, "how the run ended")
     columns["failure_time"] = TableColumn(result.failure_time, "s", "time at which the run diverged")
     columns["reason"] = TableColumn(texts_of_some(result.reasons, part.runs), _PLAIN, "why the run has no metrics")
+    columns[OSCILLATES] = TableColumn(
+        _flags(configuration, result), _PLAIN, "1 where the torque loop oscillates, empty where that is not known"
+    )
     for metric in study.outputs.metrics:
         computed = result.metrics.get(metric, np.full(part.runs, np.nan))
         columns[metric] = TableColumn(computed, stored_unit(METRICS[metric].unit), METRICS[metric].summary)
@@ -235,13 +242,20 @@ def _result(study: Study, part: Chunk, values: dict[str, Floats], threads: int |
         return run_ensemble(
             configuration.scenario,
             columns,
-            outputs.metrics,
+            with_companions(outputs.metrics, configuration.scenario),
             outputs.traces,
             every,
             threads,
             study.gauge,
             outputs.errors,
         )
+
+
+def _flags(configuration: Configuration, result: EnsembleResult) -> Floats:
+    """Return for each run whether its torque loop oscillates: 1 or 0, nan where it failed or nobody can say."""
+    counted = result.metrics.get(REVERSALS, np.full(result.status.size, np.nan))
+    most = most_reversals(configuration.scenario)
+    return np.where(np.isfinite(counted) & np.isfinite(most), (counted > most).astype(np.float64), np.nan)
 
 
 def stored_unit(unit: str) -> str:

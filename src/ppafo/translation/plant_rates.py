@@ -56,7 +56,7 @@ def port_flows(
     port_1, port_2 = blended_ports(plant, openings)
     in_1 = blended_port_flow(pressure_1, port_1, plant.valve_curve)
     in_2 = blended_port_flow(pressure_2, port_2, plant.valve_curve)
-    leak_conductance = leakage_path(plant.leak_conductance, pressure_1, pressure_2)
+    leak_conductance = leakage_path(plant.leak_conductance, pressure_1, pressure_2, plant.leak_curve)
     return in_1, in_2, orifice_flow(pressure_1, pressure_2, leak_conductance, plant.leak_curve)
 
 

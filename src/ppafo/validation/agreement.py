@@ -13,7 +13,7 @@ from scipy.optimize import minimize_scalar
 from ppafo.errors import DataError
 from ppafo.parameters.device import Device
 from ppafo.signals import Recording
-from ppafo.signals.faults import noise_of
+from ppafo.signals.faults import correlated_noise_of, noise_of, resolution_of
 from ppafo.signals.recording import Floats
 from ppafo.simulation.recorded import DORSIFLEXION_SUPPLY, SUPPLY, regular_interval, start_of, with_fixed_volume
 from ppafo.simulation.scenario import Leg
@@ -39,8 +39,6 @@ DEFAULT_LIMIT = 0.02
 
 ENGINE_ERROR, LEAST_NOISE = 3.0e-5, 1.0e-4
 """Over the full range: what the engine is off (tests/convergence), and the noise of samples that is taken at least."""
-_ROUNDING = 1.0e-9
-"""Fraction of a range [-] that is no step of a converter but how a file rounds."""
 _UNMOVED = 1.0e-3
 """Error over the full range that is accepted of a signal that does not move: the zero of its sensor."""
 _WITHIN_NOISE = 1.5
@@ -146,11 +144,11 @@ class ReplaySettings:
 
 @dataclass(frozen=True, slots=True)
 class ChannelAgreement:
-    """Errors (model less measured) in one channel, in its SI unit, after the common delay was taken out.
+    """Residuals (measured - model) of one channel, in its SI unit, after the common delay was taken out.
 
     ``rms``, ``bias`` and ``largest`` (with its sign, at ``largest_time`` [s]); ``rms_unaligned`` is the RMS error
-    without any shift; ``noise`` is the noise of its samples; ``variation`` is the standard deviation of the signal
-    without its noise. ``limit`` is the largest fraction of ``full_range`` that passes.
+    without any shift; ``noise`` is the noise of its samples, correlated or not; ``variation`` is the standard deviation
+    of the signal without its noise. ``limit`` is the largest fraction of ``full_range`` that passes.
     """
 
     channel: str
@@ -212,9 +210,10 @@ def channel_agreement(curve: Curve, delay: float) -> ChannelAgreement:
     intervals = np.minimum(intervals, _LONGEST_WEIGHT * np.median(intervals))
     weights = 0.5 * (np.append(intervals, 0.0) + np.insert(intervals, 0, 0.0))
     weights = np.asarray(weights / weights.sum())
-    error = curve.shift(delay, curve.times) - curve.values
-    unaligned = curve.shift(0.0, curve.times) - curve.values
-    worst, noise = int(np.argmax(np.abs(error))), noise_in(curve.values, curve.full_range)
+    error = curve.values - curve.shift(delay, curve.times)
+    unaligned = curve.values - curve.shift(0.0, curve.times)
+    worst = int(np.argmax(np.abs(error)))
+    noise = max(noise_in(curve.values, curve.full_range), correlated_noise_of(error))
     # White noise is no part of what the signal goes through, and no model explains it.
     away = curve.values - weights @ curve.values
     variation = math.sqrt(max(float(weights @ away**2) - noise * noise, 0.0))
@@ -236,11 +235,10 @@ def channel_agreement(curve: Curve, delay: float) -> ChannelAgreement:
 
 
 def noise_in(values: Floats, full_range: float) -> float:
-    """Return the noise of samples [their unit], with what a converter rounds: its resolution / sqrt(12)."""
-    # At rest a coarse converter repeats one value, and third differences see no noise at all.
-    steps = np.diff(np.unique(values))
-    resolution = float(np.min(steps, where=steps > _ROUNDING * steps.sum(), initial=full_range)) if steps.size else 0.0
-    return max(math.hypot(noise_of(values), resolution / math.sqrt(12.0)), LEAST_NOISE * full_range)
+    """Return the noise of samples [their unit], with what a converter rounds: its resolution / sqrt(8)."""
+    # At rest a coarse converter repeats one value, and third differences see no noise at all. It is then off by up to
+    # half a step throughout, whose square is twice this one's, and not by what rounding leaves on average.
+    return max(math.hypot(noise_of(values), resolution_of(values) / math.sqrt(8.0)), LEAST_NOISE * full_range)
 
 
 def replay_of(measured: Measured, device: Device, settings: ReplaySettings) -> Replay:

@@ -75,7 +75,8 @@ class Candidate:
     """A cause before its size is known: what a size changes, its words with the place of ``shown`` times the size.
 
     ``sizes`` are tried first; a cause with one has nothing to fit. A size that ``is_ratio`` is sought as a logarithm.
-    ``usual`` is the largest size, or logarithm, that any bench has; ``unit`` is the unit of the number of the set.
+    ``usual`` is the largest size, or logarithm, that any bench has, ``is_usual`` says so of one without a size;
+    ``unit`` is the unit of the number of the set.
     """
 
     name: str
@@ -85,6 +86,7 @@ class Candidate:
     is_ratio: bool = False
     shown: float = 1.0
     usual: float = 0.0
+    is_usual: bool = False
     unit: str = ""
 
     @property

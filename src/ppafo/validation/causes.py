@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from ppafo.errors import PpafoError
+from ppafo.linear_algebra import on_one_thread
 from ppafo.parameters.device import Device
 from ppafo.progress import Progress, Report, report_nothing
-from ppafo.signals.faults import isolated_samples
+from ppafo.signals.faults import correlated_noise_of, isolated_samples
 from ppafo.signals.recording import Floats, Recording
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.recorded import COMMAND, samples_at_rest, usual_interval
@@ -73,6 +74,9 @@ _AT_REST = 2.0
 
 _SWAPPED = {PRESSURE_1: PRESSURE_2, PRESSURE_2: PRESSURE_1}
 _SAMPLES = "samples of "
+_FEW_OUTLIERS = 0.01
+"""Share of the samples of a channel up to which isolated outliers are what any logger has."""
+
 _STARTS = (-0.05, 0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.05)
 """Start of a channel whose first samples are wrong, over its range; the ends, which are refused, lie beyond it."""
 
@@ -94,6 +98,11 @@ class Cause:
     is_usual: bool = False
     same: "tuple[Cause, ...]" = ()
 
+    @property
+    def is_of_samples(self) -> bool:
+        """True where samples are wrong that no sensor made, which they show whatever else is wrong."""
+        return self.name.startswith(_SAMPLES)
+
 
 @dataclass(frozen=True, slots=True)
 class Causes:
@@ -112,8 +121,9 @@ class _Record(NamedTuple):
     """A recording that is compared: channels and values (channels, samples) over their noise.
 
     ``engine`` is the error of the engine over the noise, ``good`` is 1 for a sample that a sensor made and 0 for
-    others, which ``words`` describe. ``delay`` [s] was found with the model of the set; ``starts`` are how readings
-    change with the standard error of each start that was read.
+    others, which ``words`` describe; ``has_few`` where these are isolated and so few that any bench has them.
+    ``delay`` [s] was found with the model of the set; ``starts`` are how readings change with the standard error of
+    each start that was read.
     """
 
     measured: Measured
@@ -123,6 +133,7 @@ class _Record(NamedTuple):
     engine: Floats
     good: Floats
     words: tuple[str, ...]
+    has_few: bool
     delay: float
     starts: tuple[Floats, ...] = ()
 
@@ -150,7 +161,7 @@ class _Tried(NamedTuple):
     @property
     def is_usual(self) -> bool:
         """True for an error that sensors of any bench have."""
-        return 0.0 < abs(self.size) <= self.candidate.usual
+        return self.candidate.is_usual or 0.0 < abs(self.size) <= self.candidate.usual
 
     @property
     def explains(self) -> bool:
@@ -158,6 +169,7 @@ class _Tried(NamedTuple):
         return float(self.left.squares.max()) < ONLY_NOISE and self.gain > 0.0
 
 
+@on_one_thread
 def causes_of(
     read: Sequence[Measured],
     agreements: Sequence[RecordingAgreement],
@@ -407,8 +419,10 @@ class _Search:
             beside = [pair for pair in usual if pair[0] is not one]
             (_, size, _), *others = fitted = _bounded([(replace(one, usual=math.inf), column), *beside], none.errors)
             left = none.errors + sum(step * slope for _, step, slope in fitted)
-            # A straight line leaves some more; what leaves far more is no small change.
-            if float(left @ left) < 2.0 * ONLY_NOISE * len(left) and abs(size) > one.usual:
+            # A straight line leaves some more; what leaves far more is no small change, nor is what its grid does not
+            # reach: of a logarithm such a size would be no number any more.
+            is_inside = min(one.grid) < size < max(one.grid)
+            if is_inside and float(left @ left) < 2.0 * ONLY_NOISE * len(left) and abs(size) > one.usual:
                 change = reduce(joined, [other.at(step) for other, step, _ in others], one.at(size))
                 found.append((one, size, change))
         runs = self.evaluated([change for _, _, change in found])
@@ -469,17 +483,25 @@ def _record_of(measured: Measured, agreement: RecordingAgreement, device: Device
     """Return a recording with its samples that no sensor made, and how readings change with each start."""
     recording = measured.recording
     chosen = [one for one in agreement.channels if one.channel in SENSORS] or list(agreement.channels[:1])
-    series, noise, good, words = [], [], [], []
+    series, noise, good, words, has_few = list[Floats](), list[float](), list[Flags](), list[str](), True
     for one in chosen:
         values = measured_values(recording, one.channel)
         assert values is not None
+        model = np.interp(
+            recording.time - agreement.delay.correction, agreement.model.time, agreement.model[one.channel]
+        )
+        residuals = values - model
         # Samples in a channel that the model explains are right, however they look.
-        fault, is_wrong = ("", np.zeros(0)) if one.in_noise**2 < ONLY_NOISE else _fault_of(values, one, recording.time)
-        is_good = np.logical_not(is_wrong) if fault else np.ones(len(values), dtype=bool)
+        wrong = None if one.in_noise**2 < ONLY_NOISE else _wrong_samples(values, residuals, one, recording.time)
+        is_good = np.ones(len(values), dtype=bool) if wrong is None else np.logical_not(wrong.samples)
         series.append(values)
         good.append(is_good)
-        noise.append(noise_in(values[is_good], one.full_range) if fault else one.noise)
-        words += [f"{one.channel} {fault}"] if fault else []
+        if wrong is None:
+            noise.append(one.noise)
+        else:
+            noise.append(max(noise_in(values[is_good], one.full_range), correlated_noise_of(residuals[is_good])))
+            words.append(f"{one.channel} {wrong.words}")
+            has_few = has_few and wrong.is_isolated and float(wrong.samples.mean()) < _FEW_OUTLIERS
     names, sizes = tuple(one.channel for one in chosen), np.array(noise)
     ranges = np.array([one.full_range for one in chosen])
     record = _Record(
@@ -490,6 +512,7 @@ def _record_of(measured: Measured, agreement: RecordingAgreement, device: Device
         engine=ENGINE_ERROR * ranges / sizes,
         good=np.stack(good).astype(np.float64),
         words=tuple(words),
+        has_few=has_few,
         delay=agreement.delay.correction,
     )
     own, count = replay_of(measured, device, settings), samples_at_rest(recording)
@@ -558,13 +581,22 @@ def _left(record: _Record, replayed: Replayed, change: Change, longest_delay: fl
     return _Left(squares, left)
 
 
-def _fault_of(values: Floats, one: ChannelAgreement, time: Floats) -> tuple[str, Flags]:
-    """Return what is wrong with samples of a channel, and with which: constant, clipped, isolated; else no words."""
+class _Wrong(NamedTuple):
+    """What is wrong with samples of a channel in words, with which, and whether each stands by itself."""
+
+    words: str
+    samples: Flags
+    is_isolated: bool = False
+
+
+def _wrong_samples(values: Floats, residuals: Floats, one: ChannelAgreement, time: Floats) -> _Wrong | None:
+    """Return samples of a channel that no sensor made: constant, clipped, or isolated among samples or residuals."""
     edges = np.flatnonzero(np.diff(values))
     lengths, levels = np.diff(np.concatenate([[-1], edges, [len(values) - 1]])), values[[*edges, -1]]
     if len(levels) == 1:
         held = "the vane was locked (--motion locked), or " if one.channel == ANGLE else ""
-        return f"never changes: {held}its sensor is dead or not connected", np.ones(len(values), dtype=bool)
+        words = f"never changes: {held}its sensor is dead or not connected"
+        return _Wrong(words, np.ones(len(values), dtype=bool))
     # A coarse converter repeats other values too. That all else agrees tells a stop of the vane from a sensor's.
     low, high, count = levels.min(), levels.max(), len(values)
     inner = lengths[(levels > low) & (levels < high)]
@@ -573,11 +605,16 @@ def _fault_of(values: Floats, one: ChannelAgreement, time: Floats) -> tuple[str,
     ends = [(end, word) for end, word, longest in runs if count * repeated ** (longest - 1) < _BY_CHANCE]
     if ends:
         said = " and ".join(f"{int((values == end).sum())} samples are exactly its {word} value" for end, word in ends)
-        return f"is clipped: {said}", np.isin(values, [end for end, _ in ends])
-    is_out = isolated_samples(values, one.noise)
+        return _Wrong(f"is clipped: {said}", np.isin(values, [end for end, _ in ends]))
+    is_out, on_flank = isolated_samples(values, one.noise), isolated_samples(residuals, one.noise)
+    # On a flank an outlier shows only beside a model that follows it; at the ends a delay makes one of a step.
+    is_out[1:-1] |= on_flank[1:-1]
     count = int(is_out.sum())
+    if not count:
+        return None
     first = f"{float(time[int(np.argmax(is_out))]):.6g} s"
-    return (f"has {count} isolated outlier{'s' * (count > 1)}, the first at {first}" if count else ""), is_out
+    words = f"has {count} isolated outlier{'s' * (count > 1)}, the first at {first}"
+    return _Wrong(words, is_out, is_isolated=True)
 
 
 def _samples(records: Sequence[_Record]) -> Iterator[Candidate]:
@@ -590,7 +627,13 @@ def _samples(records: Sequence[_Record]) -> Iterator[Candidate]:
         at_start = min(one.good[:, : samples_at_rest(one.measured.recording)].max(axis=1).min() for one in faulty)
         sizes = (0.0,) if at_start else _STARTS
         words = words.replace("{", "{{").replace("}", "}}")
-        yield Candidate(f"{_SAMPLES}{' and '.join(names)}", words, lambda share: Change(start=share), sizes)
+        yield Candidate(
+            f"{_SAMPLES}{' and '.join(names)}",
+            words,
+            lambda share: Change(start=share),
+            sizes,
+            is_usual=all(one.has_few for one in faulty),
+        )
 
 
 def _motions(search: _Search) -> Iterator[Candidate]:

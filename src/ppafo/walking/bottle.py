@@ -34,7 +34,7 @@ from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import Effect
 from ppafo.model.plant import PlantParameters
 from ppafo.model.source import bottle_content, content_energy, densest_gas, has_liquid, liquid_density
-from ppafo.parameters.bottles.bottle import PATHS, Bottle, load_bottle
+from ppafo.parameters.bottles.bottle import PATHS, Bottle, is_of_catalogue, load_bottle
 from ppafo.parameters.device import Device
 from ppafo.parameters.parameter_set import Entry
 from ppafo.parameters.plant import effect_row
@@ -200,7 +200,8 @@ def read_bottle(reading: Reading, device: Device, folder: Path) -> BottleSupply 
     with refused_as(ParameterError, f"{reading.file}: [{BOTTLE}]", ParameterError):
         name = section["name"]
         path = Path(name)
-        bottle = load_bottle(folder / path if path.suffix == ".toml" and not path.is_absolute() else name, own)
+        is_file = path.suffix == ".toml" or is_of_catalogue(path)
+        bottle = load_bottle(folder / path if is_file and not path.is_absolute() else name, own)
     pressure, stated = device.supply.pressure, bottle.entries[_SET_PRESSURE]
     # Gauge is the same at both: a bottle's file knows no atmosphere, and stands in that of the device.
     own_pressure = to_si(stated.value, stated.unit, "Pa_a", device.supply.atmospheric_pressure)

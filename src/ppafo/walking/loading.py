@@ -19,11 +19,12 @@ from ppafo.model.plant_faults import PLANT_FAULTS, SHUT_OFF
 from ppafo.model.regulator import SupplyLines
 from ppafo.parameters import ParameterSet
 from ppafo.parameters.device import Device, Valve
-from ppafo.parameters.graph import Follows, Graph, Term
+from ppafo.parameters.graph import Graph, Term
 from ppafo.parameters.loading import set_or_load
 from ppafo.parameters.overrides import split_override
 from ppafo.plugins import Plugins, name_plugins
-from ppafo.simulation.declaration import PERIOD, RATE, SUPPLY_LINE, SUPPLY_LINES, Reading, kind_at, line_paths, value_at
+from ppafo.simulation.declaration import PERIOD, RATE, SUPPLY_LINE, Reading, kind_at, value_at
+from ppafo.simulation.following import numbers_of_lines, numbers_of_sensors, read_followers
 from ppafo.simulation.loading import (
     Layout,
     ScenarioRequest,
@@ -35,7 +36,7 @@ from ppafo.simulation.loading import (
     scenario_of,
 )
 from ppafo.simulation.motion_kind import MOTIONS, WALK
-from ppafo.simulation.numbers import device_number_at
+from ppafo.simulation.nominal import nominal_terms
 from ppafo.simulation.overrides import OverriddenDocument, over_layer
 from ppafo.simulation.scenario import (
     Assumption,
@@ -47,6 +48,7 @@ from ppafo.simulation.scenario import (
     Sensors,
     SupplyLine,
 )
+from ppafo.simulation.torque_loop import PERIOD_PATH, loop_terms
 from ppafo.walking.bottle import BOTTLE, BOTTLE_NAME, BottleSupply, read_bottle
 from ppafo.walking.contradictions import check_walk
 from ppafo.walking.declaration import (
@@ -69,7 +71,6 @@ from ppafo.walking.motion import (
     walk_of,
     with_duration,
 )
-from ppafo.walking.nominal import nominal_terms
 from ppafo.walking.planning import NO_REFERENCE, planned_task_sequence, walking_valve
 from ppafo.walking.preparation import FaultSettings
 from ppafo.walking.task_sequence import load_task_sequence
@@ -273,35 +274,16 @@ def _control(
     with refused_as(ScenarioError, f"{reading.file}", ScenarioError):
         # A timing of a controller that uses no gait phase is refused.
         with_timing(law, timing)
-    sections = {"controller": law.quantities, "timing": timing.quantities}
-    terms = _terms(device.valve) | nominal_terms(device, lines)
-    links: dict[str, tuple[Follows, ...]] = {
-        f"{section}.{item.name}": (Follows(tuple(terms[name] for name in item.follows), item.default or 0.0),)
-        for section, items in sections.items()
-        for item in items
-        if item.follows and value_at(reading.document, f"{section}.{item.name}") is None
-    }
-    present: dict[str, Any] = {f"valve.{name}": number for name, number in device.valve.settings.items()}
-    present |= {f"sensors.{name}": number for name, number in sensors.items()}
-    if lines is not None:
-        numbered = {line: number for number, line in enumerate(SUPPLY_LINES, start=1)}
-        for path in line_paths():
-            _, line, name = path.split(".")
-            present[path] = getattr(lines, f"{name}_{numbered[line]}")
-    followed = {source for own in links.values() for link in own for source in link.sources}
-    present |= {path: device_number_at(device, path) for path in followed - set(present)}
-    settings: dict[str, float] = {}
-    for section, items in sections.items():
-        known = []
-        for item in items:
-            link = links.get(f"{section}.{item.name}")
-            known.append(item if link is None else replace(item, default=float(link[0].number(present.__getitem__))))
-        settings |= reading.section(section, tuple(known))
     rate, period = (value_at(reading.document, f"controller.{name}") for name in ("rate", "period"))
     seconds = DEFAULT_PERIOD if period is None else reading.number("controller.period", PERIOD)
     if rate is not None:
         seconds = 1.0 / reading.number("controller.rate", RATE)
-    # A law named by its module is found by that name alone; one of the catalogue by its name with gains for walking.
+    terms = _terms(device.valve) | nominal_terms(device, lines) | loop_terms(device, law, walks=True)
+    present = numbers_of_sensors(sensors) | numbers_of_lines(lines) | {PERIOD_PATH: seconds}
+    sections = {"controller": law.quantities, "timing": timing.quantities}
+    found, links = read_followers(reading, sections, terms, device, present)
+    settings = {path.partition(".")[2]: number for path, number in found.items()}
+    # A law named by its module is found by that name alone; one of the catalogue by its name in walking.
     return Control(kind if ":" in kind else law.name, settings, seconds), links
 
 
@@ -374,8 +356,8 @@ def _terms(valve: Valve) -> dict[str, Term]:
     names = tuple(item.name for item in kind.quantities)
     paths, delay = tuple(f"valve.{name}" for name in names), walking_valve(valve).command_delay
     return {
-        VALVE_LAG: Term(paths, kind.lag or delay, kind.settings),
-        VALVE_DELAY: Term(paths, delay, kind.settings),
+        VALVE_LAG: Term(paths, kind.lag or delay, (kind.settings,)),
+        VALVE_DELAY: Term(paths, delay, (kind.settings,)),
         PRESSURE_LAG: Term(("sensors.pressure_bandwidth",), lag_of_bandwidth),
         FORCE_LAG: Term(("sensors.force_bandwidth",), lag_of_bandwidth),
     }

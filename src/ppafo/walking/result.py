@@ -16,7 +16,8 @@ from ppafo.metrics.metric import LED_SHANK, REQUEST, STEADY, MetricKind, Metrics
 from ppafo.model.contact import SWING
 from ppafo.model.leg import centrifugal_torques, gravity_torques, mass_matrix, passive_torque
 from ppafo.signals import Channel, Recording
-from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario
+from ppafo.simulation.oscillation import Oscillation, oscillation_of
+from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario, scenario_document
 from ppafo.simulation.simulate import Status
 from ppafo.simulation.vane_recording import gas_channels
 from ppafo.storage.opensim import opensim_recording, write_opensim
@@ -45,6 +46,8 @@ from ppafo.walking.strides import (
 from ppafo.walking.task_sequence import PlannedSequence, pace_in_time
 
 if TYPE_CHECKING:
+    import pandas  # type: ignore[import-untyped]
+    import xarray
     from matplotlib.figure import Figure
 
 REMEDY = "the step may be too long, or a value unrealistic: try a smaller run.step, and check the wearer"
@@ -194,6 +197,16 @@ class WalkResult:
         """True where at least half of the whole strides had help."""
         return 2 * int(self.helped.sum()) >= self.helped.size
 
+    @property
+    def oscillation(self) -> Oscillation | None:
+        """The verdict where the torque loop oscillates, None where it does not."""
+        metrics = {name: metric.value for name, metric in self.metrics.items()}
+        strides, time = metrics.get("strides", 0.0), self.recording.time
+        if strides == 0.0 or self.scenario.controller.kind == PYTHON_CONTROLLER:
+            return None
+        of_stride = float(time[-1] - time[0]) / strides
+        return oscillation_of(self.scenario, law_of(self.scenario), self.recording, metrics, of_stride)
+
     def __repr__(self) -> str:
         """Return name, status, duration and one line a metric, in SI units."""
         width = max((len(name) for name in self.metrics), default=0)
@@ -210,9 +223,41 @@ class WalkResult:
 
     def plot(self) -> "Figure":
         """Return a figure of the mean stride with the healthy gait beside it; ``.savefig(...)`` writes it."""
+        from ppafo.report.notebook import shown
         from ppafo.walking.figures.mean_stride import walk_figure
 
-        return walk_figure({self.scenario.name: self})
+        return shown(walk_figure({self.scenario.name: self}))
+
+    def __getitem__(self, channel: str | tuple[str, str]) -> Floats:
+        """Return the values of a channel in SI, ``result["torque"]``, or in a unit, ``result["pressure_1", "psi_g"]``.
+
+        DataError for a channel that is not there, UnitError for a unit that does not fit it.
+        """
+        if isinstance(channel, str):
+            return self.recording[channel]
+        name, unit = channel
+        return self.recording.in_unit(name, unit, self.scenario.device.supply.atmospheric_pressure)
+
+    def _ipython_key_completions_(self) -> list[str]:
+        """Return the channels, which a notebook completes between brackets."""
+        return list(self.recording.names)
+
+    def _repr_html_(self) -> str:
+        """Return metrics and figure, which a notebook shows."""
+        from ppafo.report.notebook import result_html
+
+        return result_html(str(self).partition("\n")[0], self.metrics, self.scenario.device, self.plot())
+
+    def dataset(self, units: Mapping[str, str] | None = None) -> "xarray.Dataset":
+        """Return the recording as an xarray Dataset; ``units`` are other units than those of SI by channel."""
+        from ppafo.storage import dataset_of
+
+        atmosphere = self.scenario.device.supply.atmospheric_pressure
+        return dataset_of(self.recording, scenario_document(self.scenario), units, atmosphere)
+
+    def to_dataframe(self, units: Mapping[str, str] | None = None) -> "pandas.DataFrame":
+        """Return the channels as columns over time [s]; ``units`` as of ``dataset``."""
+        return self.dataset(units).to_dataframe()
 
     def save_opensim(self, path: str | Path) -> Path:
         """Write the recording as a ``.sto`` file in OpenSim's names, zero and signs, right leg; returns the path."""

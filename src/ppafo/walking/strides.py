@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.constants import STANDARD_GRAVITY
-from ppafo.metrics import Metric
+from ppafo.metrics import METRICS, Metric
+from ppafo.metrics.command import command_reversals, peak_torque, torque_error
 from ppafo.metrics.strides import PER_STRIDE, SETTLING
 from ppafo.model.contact import FLAT, SWING
 from ppafo.model.helping import HELPS, PUSH_OFF
@@ -113,7 +114,21 @@ def walk_metrics(
             rms = float(np.sqrt(np.mean(error**2)))
             summary = "RMS of requested torque less actuator torque in push-off"
             found["push_off_error"] = Metric(rms, "N m", summary)
-    return found | first_less_help(recording)
+    return found | torque_metrics(recording) | first_less_help(recording)
+
+
+def torque_metrics(recording: Recording) -> dict[str, Metric]:
+    """How well the torque follows what is requested, how high it gets, and how often the command turns."""
+    found: dict[str, float | None] = {
+        "torque_error": torque_error(recording) if "reference" in recording else None,
+        "peak_torque": peak_torque(recording),
+        "command_reversals": command_reversals(recording),
+    }
+    return {
+        name: Metric(value, METRICS[name].unit, METRICS[name].summary)
+        for name, value in found.items()
+        if value is not None
+    }
 
 
 def counts_of_strides(recording: Recording, helped: NDArray[np.bool_]) -> dict[str, Metric]:

@@ -22,6 +22,7 @@ from ppafo.metrics.strides import PER_STRIDE
 from ppafo.model.helping import STOPPED
 from ppafo.model.leg import passive_torque
 from ppafo.parameters.device import Actuator, FootPlate, Friction
+from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation.plan import MAXIMUM_STEPS
 from ppafo.simulation.sampled import run_sampled
 from ppafo.simulation.scenario import Control, Scenario
@@ -57,6 +58,7 @@ def walk(
     task_sequence: str | Path | None = None,
     bottle: str | Path | None = None,
     minutes: Minutes | None = None,
+    plugins: Plugins = (),
     progress: Progress = silent,
 ) -> WalkResult:
     """Walk for ``minutes`` [min]: a scenario that is a walk, the name of a shipped one, or a file.
@@ -66,7 +68,10 @@ def walk(
     and a ``gait``, ``task_sequence`` or ``bottle`` in place of its own. A walk that diverges is a result with that
     status, up to the time of failure. ScenarioError or ParameterError for bad input. ``progress`` gets the minutes done
     and those in all, part by part.
+
+    ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
     """
+    name_plugins(plugins)
     if isinstance(scenario, Scenario):
         if any(item is not None for item in (gait, task_sequence, bottle)) or tuple(overrides):
             raise ScenarioError(

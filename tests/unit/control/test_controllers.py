@@ -1,5 +1,6 @@
 """Torque laws and profiles: commands in closed form, what model-based laws believe, a profile that follows a table."""
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -38,10 +39,16 @@ def seen(torque: float) -> Measurement:
     return Measurement(1.309, 1.01325e5 + max(torque, 0.0) / 1.451e-5, 1.01325e5 + max(-torque, 0.0) / 1.451e-5, torque)
 
 
+@cache
+def on_the_paper_device(kind: str) -> dict[str, float]:
+    """Settings [SI] of a controller on the paper's device, with the gains of its torque task where it has such."""
+    return dict(load_scenario("torque-task-proportional", [f"controller.kind={kind}"]).controller.settings)
+
+
 def parameters(kind: str, **changed: float) -> Any:
-    """Parameters of a controller at their defaults, some of them changed."""
+    """Parameters of a controller on the paper's device, some of them changed."""
     chosen = CONTROLLERS[kind]
-    settings = {item.name: item.default for item in chosen.quantities} | changed
+    settings = on_the_paper_device(kind) | changed
     return rebuilt(chosen.parameters, settings.values())
 
 
@@ -139,8 +146,11 @@ def test_an_inverted_chamber_lets_the_error_decay_at_the_chosen_rate(rate: float
 def test_a_wrong_belief_costs_accuracy_but_not_stability() -> None:
     task = [*WITHIN_REACH, "controller.kind=feedback_linearisation"]
     right = ppafo.simulate("torque-task-proportional", task).metrics["rms_error"].value
-    wrong = ppafo.simulate("torque-task-proportional", [*task, "valve.area=15 mm^2"]).metrics["rms_error"].value
-    assert right < 0.001 < wrong < 0.1
+    # Without the belief the law would follow the device; it keeps that of the paper's valve here.
+    conductance = f"controller.valve_conductance={NOMINAL.valve_conductance!r} kg/(s Pa)"
+    changed = [*task, "valve.area=9 mm^2", conductance]
+    wrong = ppafo.simulate("torque-task-proportional", changed).metrics["rms_error"].value
+    assert 2.0 * right < wrong < 0.1
 
 
 def test_anti_windup_brings_the_torque_down_in_time() -> None:
@@ -158,14 +168,20 @@ def test_on_off_laws_run_on_the_solenoid_pair(kind: str) -> None:
     assert run.recording["torque"].max() > 0.5
 
 
-NOMINAL = NominalChambers(*(item.default for item in NOMINAL_QUANTITIES))
+NOMINAL = NominalChambers(*(on_the_paper_device("pid_feedforward")[item.name] for item in NOMINAL_QUANTITIES))
 PRESSURES = st.floats(1.02e5, 4.4e5)
 """Between the atmosphere and the supply."""
 
 
-def test_the_defaults_are_those_of_the_completed_set() -> None:
-    plant = plant_parameters(ppafo.load_device("ppafo2011"))
-    believed = NOMINAL._asdict()
+@pytest.mark.parametrize(
+    "changes",
+    [[], ["gas.species=air", "gas.temperature=40 degC", "valve.area=3 mm^2", "actuator.dead_volume_2=9 cm^3"]],
+    ids=["paper", "another"],
+)
+def test_a_law_with_a_model_believes_the_device_that_it_runs_on(changes: list[str]) -> None:
+    task = load_scenario("torque-task-proportional", ["controller.kind=feedback_linearisation", *changes])
+    plant = plant_parameters(task.device)
+    believed = {item.name: task.controller.settings[item.name] for item in NOMINAL_QUANTITIES}
     assert believed.pop("critical_ratio") == pytest.approx(plant.valve_curve.critical_ratio)
     assert believed == pytest.approx({name: getattr(plant, name) for name in believed})
 
@@ -210,8 +226,10 @@ def test_the_believed_rate_is_that_of_the_engine(command: float) -> None:
 
 def test_a_vane_that_turns_changes_the_torque_of_closed_chambers_against_the_motion() -> None:
     turning = torque_rates(NOMINAL, 1.3, 1.0, 2.0e5, 2.0e5)
-    volume_1, volume_2 = 2.65e-5 + 2.35e-5 * (1.3 - 0.34906585), 2.65e-5 + 2.35e-5 * (2.26892803 - 1.3)
-    expected = -1.451e-5 * 2.35e-5 * 2.0e5 * (1.0 / volume_1 + 1.0 / volume_2)
+    constant, growth = NOMINAL.torque_constant, NOMINAL.displacement_per_radian
+    volume_1 = NOMINAL.dead_volume_1 + growth * (1.3 - 0.34906585)
+    volume_2 = NOMINAL.dead_volume_2 + growth * (2.26892803 - 1.3)
+    expected = -constant * growth * 2.0e5 * (1.0 / volume_1 + 1.0 / volume_2)
     assert turning.closed == pytest.approx(expected, rel=1e-6)
 
 

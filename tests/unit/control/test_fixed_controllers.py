@@ -35,9 +35,14 @@ BITS, RANGE = 12.0, 1.0e6
 CONVERTER = converter_of(BITS, RANGE, TORQUE_CONSTANT)
 
 
-def parameters(law: FixedLaw, **settings: float) -> Any:
-    """Parameters of a law for the lanes, its defaults where nothing else is given."""
-    every = {item.name: float(item.default or 0.0) for item in law.kind.quantities} | settings
+PAPER = {"proportional_gain": 0.095, "integral_gain": 0.25, "derivative_gain": 0.006, "opening": 0.12}
+"""Gains of the paper's torque task, and an opening."""
+
+
+def parameters(law: FixedLaw, **changed: float) -> Any:
+    """Parameters of a law for the lanes: the paper's gains, and defaults, where nothing else is given."""
+    known = {item.name: float(item.default or 0.0) for item in law.kind.quantities}
+    every = {name: PAPER.get(name, number) for name, number in known.items()} | changed
     assert law.kind.plan is not None
     numbers, problems = law.kind.plan(every, PERIOD, TORQUE_CONSTANT, (0.0, 0.0))
     assert not any(is_bad for is_bad, _ in problems)
@@ -102,7 +107,7 @@ def test_what_defaults_come_to_lies_within_what_is_declared(law: FixedLaw) -> No
 def test_pid_on_whole_numbers_follows_the_float_form(settings: dict[str, float]) -> None:
     law, float_law = PID, CONTROLLERS["pid"]
     fixed, fixed_state = parameters(law, **settings), law.kind.initial
-    values = {item.name: float(item.default or 0.0) for item in float_law.quantities} | settings
+    values = {item.name: PAPER.get(item.name, item.default or 0.0) for item in float_law.quantities} | settings
     floats, state = rebuilt(float_law.parameters, values.values()), float_law.initial
     torque, largest, clipped = 0.0, 0.0, 0
     draw = random.Random(4)
@@ -153,7 +158,7 @@ def test_a_reading_at_an_end_of_its_range_commands_nothing_for_good(law: FixedLa
 
 
 def test_a_gain_beyond_its_number_is_told_from_one_within() -> None:
-    settings = {item.name: float(item.default or 0.0) for item in CONTROLLERS["pid"].quantities}
+    settings = {item.name: PAPER.get(item.name, item.default or 0.0) for item in CONTROLLERS["pid"].quantities}
     assert largest_pid(settings, PERIOD, CONVERTER.torque_step) < 1.0
     assert largest_pid(settings | {"derivative_gain": 10.0}, PERIOD, CONVERTER.torque_step) > 1.0
     assert largest_pid(settings | {"anti_windup": 1001.0}, PERIOD, CONVERTER.torque_step) > 1.0

@@ -15,13 +15,15 @@ COORDINATES = ["ankle_angle_l", "knee_angle_r", "hip_flexion_r", "subtalar_angle
         ("RKNE.x", ["RTOE.x", "RANK.x"], ""),
         ("RKNE.x", MARKERS, "LKNE.x"),
         ("RANK.y", MARKERS, ""),
-        ("ankle_angle_r", COORDINATES, ""),
+        ("ankle_angle_r", COORDINATES, "ankle_angle_l"),
+        ("elbow_flex_r", COORDINATES, ""),
         ("ankel_angle_l", COORDINATES, "ankle_angle_l"),
         ("knee_angel_r", COORDINATES, "knee_angle_r"),
-        ("hip_flexion_l", COORDINATES, ""),
+        ("hip_flexion_l", COORDINATES, "hip_flexion_r"),
         ("pelvistilt", COORDINATES, "pelvis_tilt"),
         ("R.Kneee.x", COORDINATES, "R.Knee.x"),
-        ("L.Knee.x", COORDINATES, ""),
+        ("L.Knee.x", COORDINATES, "R.Knee.x"),
+        ("L.Toe.x", COORDINATES, ""),
     ],
 )
 def test_only_a_column_of_the_same_kind_is_suggested(missing: str, known: list[str], meant: str) -> None:

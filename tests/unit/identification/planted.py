@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ppafo.identification.bench.flow import GasAt, Opening, orifice_shape
+from ppafo.identification.bench.flow import GasAt, Opening, Sizes, orifice_shape
 from ppafo.identification.bench.valve_map import area_of_command, spool_of
 from ppafo.identification.bench.vane_leak import pressures_of_fall
 from ppafo.identification.source import Source
@@ -87,7 +87,7 @@ def leak(law: str, size: float, ratio: float = 1.3, seed: int = 1, lost: float =
     time = np.arange(0.0, 20.0, 0.05)
     opening = Opening(CO2, "laminar" if law == "laminar" else "orifice")
     rate = CO2.specific_gas_constant * CO2.temperature / volume
-    first, second = pressures_of_fall(opening, size, SUPPLY, ROOM, ratio, rate, time)
+    first, second = pressures_of_fall(opening, Sizes(size), SUPPLY, ROOM, ratio, rate, time)
     draw = np.random.default_rng(seed)
     first, second = (values + draw.normal(0.0, 300.0, time.size) - lost * time for values in (first, second))
     return source("leak", time, pressure_1=(first, "Pa"), pressure_2=(second, "Pa"))
@@ -96,7 +96,7 @@ def leak(law: str, size: float, ratio: float = 1.3, seed: int = 1, lost: float =
 def steady(law: str, size: float, zero: float = 0.0, seed: int = 1) -> Source:
     """Twenty-four readings of the flow that keeps up a pressure; Cd A or c is planted, and the zero of the meter."""
     first, second = np.linspace(1.3e5, 6.0e5, 24), np.full(24, ROOM)
-    flow = Opening(CO2, "laminar" if law == "laminar" else "orifice").flow(size, 0.0, first, second)
+    flow = Opening(CO2, "laminar" if law == "laminar" else "orifice").flow(Sizes(size), first, second)
     flow = flow * (1.0 + np.random.default_rng(seed).normal(0.0, 0.003, 24)) + zero
     channels = {"pressure_1": (first, "Pa"), "pressure_2": (second, "Pa"), "mass_flow": (flow, "kg/s")}
     return source("steady", np.arange(24.0), **channels)

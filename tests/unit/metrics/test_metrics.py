@@ -36,7 +36,27 @@ def test_every_metric_needs_channels_that_exist_and_says_what_it_is() -> None:
 
 
 def test_metrics_whose_channels_are_missing_are_left_out() -> None:
-    assert set(evaluate(recording(command=np.ones(3001)))) == {"switchings"}
+    assert set(evaluate(recording(command=np.ones(3001)))) == {"switchings", "command_reversals"}
+
+
+def test_a_reversal_goes_from_beyond_half_open_one_way_to_beyond_half_open_the_other() -> None:
+    command = np.zeros(3001)
+    for first, level in ((0, 1.0), (100, 0.3), (200, -0.6), (300, 0.4), (400, -1.0), (500, 0.51), (600, 0.0)):
+        command[first:] = level
+    assert value("command_reversals", command=command) == 2.0
+
+
+def test_a_task_that_begins_and_a_valve_that_vents_begin_anew() -> None:
+    command, phase = np.ones(3001), np.full(3001, 3.0)
+    command[1000:] = -1.0
+    assert value("command_reversals", command=command, controller_phase=phase) == 1.0
+    assert value("command_reversals", command=command, controller_phase=np.where(command > 0.0, 3.0, 4.0)) == 0.0
+    command[990:1000] = VENT
+    assert value("command_reversals", command=command, controller_phase=phase) == 0.0
+
+
+def test_the_peak_torque_is_the_largest_in_either_direction() -> None:
+    assert value("peak_torque", torque=np.linspace(-3.0, 2.0, 3001)) == 3.0
 
 
 def test_one_sample_has_no_metrics() -> None:

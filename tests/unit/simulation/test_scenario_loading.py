@@ -91,7 +91,7 @@ def test_every_value_arrives_in_si_units() -> None:
 def test_what_is_left_out_has_its_declared_value() -> None:
     scenario = small()
     assert scenario.device == load_device("ppafo2011")
-    assert scenario.controller.proportional_gain == 0.095
+    assert scenario.controller.derivative_gain == 0.0
     assert scenario.sensors == Sensors()
     assert scenario.reference == ProfileChoice("constant", {"level": 0.0})
     assert (scenario.run.step, scenario.run.output_interval) == (0.001, 0.001)

@@ -154,3 +154,8 @@ def test_a_log_of_the_serial_monitor(tmp_path: Path) -> None:
     found = read(tmp_path, text, {"column": "us", "unit": "us"})
     assert np.allclose(np.diff(found.time), 0.005)
     assert read(tmp_path, text, {"column": "timestamp"}).time.tolist() == [0.0, 1.0, 2.0]
+
+
+def test_a_first_row_that_is_too_short_is_named_with_its_line(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match="line 2 has 1 values for 3 columns"):
+        read(tmp_path, "a,M,t\n1\n1,2,08:00:00\n", {"column": "t"})

@@ -177,8 +177,10 @@ def test_a_torque_without_any_sensor_of_the_device_is_searched(bench: Recording)
     channels = {"command": Channel(run["command"], "-"), "torque": Channel(1.1 * run["torque"], "N m")}
     start = {"angle": float(run["angle"][0]), "pressure_1": ROOM, "pressure_2": float(run["pressure_2"][0])}
     found = causes(Recording("torque", run.time, channels, "synthetic"), initial=start)
+    # The displacement follows the torque constant, so that no single number makes a torque 10 % larger.
+    assert found.found is None
+    assert found.tried > 0
     assert found.nearest is not None
-    assert found.nearest.name == "actuator.torque_constant"
 
 
 def test_two_mistakes_that_look_like_a_third_are_not_named_as_that(bench: Recording) -> None:
@@ -201,7 +203,9 @@ def test_a_small_number_of_the_set_is_not_named_alone_for_a_clock_beside_a_usual
     wrong = with_channel(seen, "pressure_2", ROOM + 1.0035 * (seen["pressure_2"] - ROOM))
     found = causes(replace(wrong, time=1.0025 * wrong.time)).found
     assert found is not None
-    assert "rate of the clock" in {one.name for one in (found, *found.same)}
+    # What sensors of any bench are off by explains as much at this size; a number of the set is named by neither.
+    assert found.name in ("rate of the clock", "several sensors")
+    assert not found.numbers
 
 
 def test_two_mistakes_at_once_have_no_single_cause_and_the_nearest_is_said(bench: Recording) -> None:
@@ -257,3 +261,42 @@ def test_a_real_cylinder_that_is_led_at_constant_pressure_is_replayed(shared_dat
     agreement = compare_recording(measured, device, settings)
     assert [one.channel for one in agreement.channels] == ["pressure_1"]
     assert agreement.channels[0].fraction < 0.05
+
+
+@pytest.mark.parametrize("torque", ["0.9 N m", "1.1 N m"])
+def test_a_number_far_from_the_set_is_named_beside_straight_lines_that_leave_their_grids(torque: str) -> None:
+    """A straight line may ask for a size whose exponential is no number; what its grid does not reach is not run."""
+    words = ["motion.kind=free", f"friction.static_torque={torque}"]
+    run = simulate(load_scenario("step-response", words)).recording
+    found = causes(run).found
+    assert found is not None
+    assert found.name == "friction.static_torque"
+    assert found.numbers["friction.static_torque"][0] == pytest.approx(float(torque.removesuffix(" N m")), rel=0.01)
+
+
+def test_an_outlier_on_a_flank_is_found_beside_the_model(bench: Recording) -> None:
+    values = bench["pressure_1"].copy()
+    place = int(np.argmax(np.abs(np.diff(values[:100])))) + 1
+    values[place] += 1.5e4
+    found = causes(with_channel(bench, "pressure_1", values)).found
+    assert found is not None
+    assert found.in_words.startswith(f"pressure_1 has 1 isolated outlier, the first at {bench.time[place]:.6g} s")
+    # Fewer than one sample of a hundred is what any logger has.
+    assert found.is_usual
+
+
+def coloured(random: np.random.Generator, count: int) -> np.ndarray:
+    """Noise of size 1 whose neighbours are correlated by 0.9."""
+    values = random.standard_normal(count)
+    for place in range(1, count):
+        values[place] = 0.9 * values[place - 1] + np.sqrt(1.0 - 0.9**2) * values[place]
+    return values
+
+
+def test_correlated_noise_is_noise() -> None:
+    run = simulate(load_scenario("step-response", ["motion.kind=free"])).recording
+    random = np.random.default_rng(77)
+    for name, size in (("angle", 2e-3), ("pressure_1", 1500.0), ("pressure_2", 1500.0)):
+        run = with_channel(run, name, run[name] + size * coloured(random, len(run)))
+    found = causes(run)
+    assert found.is_noise

@@ -26,18 +26,18 @@ def test_every_torque_law_is_named_in_a_walk_file_by_its_own_name(law: str) -> N
 
 
 @pytest.mark.parametrize("name", ["event_pid", "event_feedback_linearisation", "event_on_off_dead_zone"])
-def test_a_law_with_gains_for_walking_has_them_under_both_names(name: str) -> None:
+def test_a_law_of_walking_is_the_same_under_both_names(name: str) -> None:
     old = load_walk("proportional", [f"controller.kind={name}"])
     new = load_walk("proportional", [f"controller.kind={name.removeprefix('event_')}"])
     assert law_of(new) is law_of(old)
     assert new.controller.settings == old.controller.settings
 
 
-def test_a_law_without_gains_for_walking_keeps_its_own() -> None:
+def test_a_law_that_no_line_names_walks_with_gains_of_the_device_too() -> None:
     assert NEW == ["damped_proportional", "on_off"]
     walked = load_walk("proportional", ["controller.kind=damped_proportional"])
-    own = {item.name: item.default for item in CONTROLLERS["damped_proportional"].quantities}
-    assert {name: walked.controller.settings[name] for name in own} == own
+    listed = load_walk("proportional", ["controller.kind=pid"])
+    assert walked.controller.proportional_gain == listed.controller.proportional_gain
 
 
 def test_a_constant_command_does_not_walk_and_the_answer_names_what_does() -> None:

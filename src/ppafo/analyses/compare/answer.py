@@ -14,7 +14,8 @@ from ppafo.report.finding import Column, Finding, Part
 from ppafo.report.kind import Interval, Kind, of_metric
 from ppafo.report.live_parts import live_part
 from ppafo.report.panels import Mark, Panel
-from ppafo.report.style import BLACK, COLOURS, GREY
+from ppafo.report.style import BLACK, COLOURS, GREY, look_of_valve
+from ppafo.simulation.oscillation import Oscillation
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Status
 from ppafo.studies.distributions import Floats, fraction_text, is_carried
@@ -30,6 +31,8 @@ _ERROR, _GAS = "rms_error", "gas_supplied"
 class Case:
     """A configuration on a task: how the nominal run ended, its metrics, and how many draws failed and first why.
 
+    ``oscillation`` is the verdict on a nominal run whose torque loop oscillates.
+
     ``rows`` are its runs over the draws, ``renoised`` the first of them again with other noise; None where there are
     none.
     """
@@ -37,11 +40,17 @@ class Case:
     configuration: str
     status: Status
     metrics: Mapping[str, Metric]
+    oscillation: Oscillation | None
     failed_draws: int
     reason: str = field(compare=False)
     scenario: Scenario = field(compare=False, repr=False)
     rows: Rows | None = field(compare=False, repr=False)
     renoised: Rows | None = field(compare=False, repr=False)
+
+    @property
+    def word(self) -> str:
+        """How the nominal run ended, in a word: one whose torque loop oscillates is not recommended."""
+        return "oscillates" if self.status.is_completed and self.oscillation is not None else self.status.kind
 
     def value(self, metric: str) -> float:
         """Return a metric [SI] of the nominal run, nan where it has none."""
@@ -175,7 +184,7 @@ def _parts(found: Compared, task: OnTask) -> list[Part]:
             [
                 Column("configuration", [case.configuration for case in task.cases]),
                 *(Column(kind.words, [case.value(name) for case in task.cases], kind) for name, kind in kinds),
-                Column("status", [case.status.kind for case in task.cases]),
+                Column("status", [case.word for case in task.cases]),
             ],
         ),
         *(
@@ -240,6 +249,8 @@ def remarks_of(found: Compared) -> list[str]:
         for case in task.cases:
             where = f"{case.configuration}, {task.task}"
             failed += [] if case.status.is_completed else [f"{where}: {case.status.message}"]
+            if case.oscillation is not None:
+                said.append(f"{where}: {case.oscillation.sentence}; it is not among the best")
             if case.failed_draws:
                 failed.append(
                     f"{where}: {case.failed_draws:,} of {found.draws:,} draws failed and are left out of every pair; "
@@ -257,9 +268,10 @@ def remarks_of(found: Compared) -> list[str]:
 
 
 def front_of(cases: Sequence[Case]) -> list[str]:
-    """Return the configurations that no other beats in both error and gas."""
-    points = np.array([[case.value(name) for name in (_ERROR, _GAS)] for case in cases])
-    return [case.configuration for case, is_front in zip(cases, pareto_front(points), strict=True) if is_front]
+    """Return the configurations that no other beats in both error and gas; none whose torque loop oscillates."""
+    judged = [case for case in cases if case.oscillation is None]
+    points = np.array([[case.value(name) for name in (_ERROR, _GAS)] for case in judged]).reshape(-1, 2)
+    return [case.configuration for case, is_front in zip(judged, pareto_front(points), strict=True) if is_front]
 
 
 _MARKS = "osD^vP"
@@ -281,8 +293,11 @@ def _pareto(found: Compared, task: OnTask) -> Panel:
     """Return error over gas, a mark for each configuration that completed and a dot for each draw."""
     cases = [case for case in task.cases if case.status.is_completed]
     front, marks, on_front = front_of(cases), [], []
+    # As everywhere: the colour of a valve, where that tells the configurations apart.
+    of_valves = [look_of_valve(case.scenario.device.valve.kind).colour for case in cases]
+    is_told = len(set(of_valves)) == len(cases)
     for number, case in enumerate(cases):
-        colour = COLOURS[number % len(COLOURS)]
+        colour = of_valves[number] if is_told else COLOURS[number % len(COLOURS)]
         if case.rows is not None:
             dots = {"linestyle": "", "marker": ".", "alpha": 0.35, "markersize": 4, "markeredgewidth": 0}
             gas, error = (case.rows[name][:_MAXIMUM_DOTS] for name in (_GAS, _ERROR))

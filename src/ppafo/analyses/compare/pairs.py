@@ -31,10 +31,13 @@ COMPARED: dict[str, int] = {
     "mechanical_work": 0,
     "gas_per_work": -1,
     "switchings": -1,
+    "peak_torque": 0,
+    "command_reversals": 0,
     "gas": -1,
     "positive_push_off_work": 1,
     "net_push_off_work": 1,
     "push_off_error": -1,
+    "torque_error": -1,
     "toe_clearance": 1,
 }
 """Metrics of the table: -1 where less is better, 1 where more is, 0 where neither is better as such."""

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from ppafo.arguments import Confidence, MaximumFailed, Name, Overrides, Seed, Tasks, Threads, Whole, Word, checked
+from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report
 
 if TYPE_CHECKING:
@@ -34,6 +35,7 @@ def compare(
     confidence: Confidence = 0.95,
     maximum_failed: MaximumFailed = 0.01,
     threads: Threads | None = None,
+    plugins: Plugins = (),
     progress: Report | None = None,
 ) -> Finding[Compared]:
     """Compare configurations, also over an uncertain device.
@@ -50,7 +52,9 @@ def compare(
         written
     baseline: configuration that all others are compared with; default: the first
     draws: draws of the uncertain values; default 4096
+    plugins: modules of your own, files or names, whose objects files may name
     """
+    name_plugins(plugins)
     from dataclasses import replace
 
     from ppafo.analyses.compare.answer import Case, Compared, finding_of, remarks_of
@@ -58,6 +62,7 @@ def compare(
     from ppafo.analyses.compare.solve import DEFAULT_SEED, drawn_runs, on_task, overrides_by_task
     from ppafo.arguments.words import taken_tasks
     from ppafo.errors import StudyError, nearest_name
+    from ppafo.running import oscillation
     from ppafo.simulation.simulate import simulate_many
     from ppafo.studies.draws import (
         CONFIDENCE,
@@ -103,6 +108,7 @@ def compare(
                 configuration=name,
                 status=result.status,
                 metrics={name: metric for name, metric in result.metrics.items() if name in COMPARED},
+                oscillation=oscillation(result) if result.status.is_completed else None,
                 failed_draws=0 if rows_of_case is None else failures_of(rows_of_case),
                 reason=reason,
                 scenario=scenario,

@@ -100,10 +100,11 @@ def on_task(
             found = compare_pairs(name, first.rows[name], other.rows[name], COMPARED[name], confidence, again)
             pairs[other.configuration] += [] if found is None else [found]
     best: dict[str, dict[str, Interval]] = {}
-    rows = [case.rows for case in cases if case.rows is not None]
+    judged = [case for case in cases if case.oscillation is None]
+    rows = [case.rows for case in judged if case.rows is not None]
     for name in metrics if rows else ():
         if COMPARED[name]:
             # All at once: no pair says which of three is the best.
             shares = best_probabilities([each[name] for each in rows], COMPARED[name], confidence)
-            best[name] = dict(zip([case.configuration for case in cases], shares, strict=False))
+            best[name] = dict(zip([case.configuration for case in judged], shares, strict=False))
     return OnTask(task, list(overrides), cases, front_of(cases), pairs, best)

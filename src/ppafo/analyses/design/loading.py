@@ -12,6 +12,7 @@ from ppafo.arguments import Seed, checked
 from ppafo.documents.models import SCHEMA, validate
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import StudyError
+from ppafo.plugins import Plugins, name_plugins
 
 FILE = TomlKind("design", "design", resources.files("ppafo.analyses.design") / "library", StudyError)
 
@@ -33,11 +34,16 @@ def read_design_file(name_or_path: str | Path) -> tuple[DesignFile | SizingFile,
 
 
 @checked("problem", "seed", name_or_path="problem")
-def load_design(problem: str | Path, *, seed: Seed | None = None) -> DesignProblem | SizingProblem:
+def load_design(
+    problem: str | Path, *, seed: Seed | None = None, plugins: Plugins = ()
+) -> DesignProblem | SizingProblem:
     """Return the problem of a design file, by its name in the package or by its path; paths in it begin in its folder.
 
     ``seed`` replaces the seed of a file with tasks. StudyError or ParameterError for what is not usable, in one line.
+
+    ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
     """
+    name_plugins(plugins)
     document, file = read_design_file(problem)
     folder = Path(problem).parent
     if isinstance(document, DesignFile):

@@ -9,6 +9,7 @@ from ppafo.signals.recording import Floats
 from ppafo.simulation.ensemble import COMPLETED, run_ensemble
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.sampling import NOISE
+from ppafo.study.runs import oscillating, with_companions
 
 STREAMS = 16
 """Noise streams in each of which a limit must be kept, the same for all trials, where sensors are noisy."""
@@ -16,8 +17,11 @@ _AT_ONCE = 16_384
 """Runs handed over at once: enough to fill the batches of all threads, little enough memory."""
 
 
+OSCILLATES = "the torque loop oscillates"
+
+
 class Outcome(NamedTuple):
-    """Metrics (streams, trials) by name, nan where a run failed; runs, how many failed, and a reason for each."""
+    """Metrics (streams, trials) by name, nan where a run failed or its torque loop oscillates; runs, failures, why."""
 
     metrics: dict[str, Floats]
     runs: int
@@ -44,9 +48,13 @@ def run_trials(
         if seeds.size:
             part = {path: np.tile(values, streams) for path, values in part.items()}
             part[NOISE] = np.repeat(seeds, size)
-        result = run_ensemble(scenario, part, metrics, threads=threads)
-        failed += int(np.count_nonzero(result.status != COMPLETED))
-        reasons += result.reasons.values()
-        parts.append({name: result.metrics[name].reshape(streams, size) for name in metrics})
+        result = run_ensemble(scenario, part, with_companions(metrics, scenario), threads=threads)
+        # A loop that oscillates is no design, whatever its error is.
+        unusable = oscillating(result.metrics, scenario)
+        failed += int(np.count_nonzero((result.status != COMPLETED) | unusable))
+        reasons += [*result.reasons.values(), *([OSCILLATES] if unusable.any() else [])]
+        parts.append(
+            {name: np.where(unusable, np.nan, result.metrics[name]).reshape(streams, size) for name in metrics}
+        )
     found = {name: np.concatenate([part[name] for part in parts], axis=1) for name in metrics}
     return Outcome(metrics=found, runs=streams * count, failed=failed, reasons=reasons)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -26,7 +26,7 @@ from ppafo.model.source import (
 from ppafo.parameters.bottles.bottle import Bottle
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import Floats
-from ppafo.walking.bottle import WALKED, BottleLife, Schedule, SupplyBalance
+from ppafo.walking.bottle import WALKED, BottleLife, Schedule, SupplyBalance, SupplyCourse
 
 TIME_IS_UP = "time is up"
 Stop = Literal["supply", "frozen", "time"]
@@ -213,7 +213,7 @@ def discharge(bottle: Bottle, draw: Draw, schedule: Schedule) -> Discharge:
         strides=walked / draw.stride_time,
         ending=ending(bottle, draw, float(last[0]), content_of(bottle, float(last[0]), float(last[1])), reason),
         balance=balance,
-        record=lambda: _recording(bottle, stretches),
+        record=partial(_recording, bottle, stretches),
     )
 
 
@@ -228,8 +228,16 @@ def discharge_of_life(life: BottleLife, draw: Draw) -> Discharge:
         strides=life.repeats,
         ending=Ending(TIME_IS_UP if ended.kind == WALKED else ended.kind, ended.message, course.last.mass, usable),
         balance=course.balance,
-        record=lambda: course.recording,
+        record=partial(_recording_of_course, course),
     )
+
+
+def _recording_of_course(course: SupplyCourse) -> Recording:
+    return course.recording
+
+
+def _unchanged(values: Floats, _times: Floats) -> Floats:
+    return values
 
 
 def _recording(bottle: Bottle, stretches: Sequence[Stretch]) -> Recording:
@@ -289,7 +297,7 @@ def solve_stretch(bottle: Bottle, draw: Draw, start: float, end: float, values: 
 
     # A stretch may begin without a reserve, and the solver finds crossings only.
     if walking and to_spare(start, values) <= 0.0:
-        return Stretch(start, start, flow, lambda _times: values, values, "supply")
+        return Stretch(start, start, flow, partial(_unchanged, values), values, "supply")
     events: list[Any] = [kelvins_above_freezing, *([to_spare] if walking else [])]
     for event in events:
         # It ends the stretch where it falls through 0.

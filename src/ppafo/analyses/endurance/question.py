@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from ppafo.arguments import Duration, Flow, Mass, Overrides, Word, checked
+from ppafo.plugins import Plugins, name_plugins
 
 if TYPE_CHECKING:
     from ppafo.analyses.endurance.answer import Endurance, Endurances
@@ -33,6 +34,7 @@ def bottle(
     rest: Duration | None = None,
     longest: Duration = 86400.0,
     overrides: Overrides = (),
+    plugins: Plugins = (),
 ) -> Finding[Endurance] | Finding[Endurances]:
     """Compute how long a bottle of gas lasts, and why it ends.
 
@@ -50,7 +52,9 @@ def bottle(
     walk: time of walking between two rests, with --rest; default '10 min'
     rest: time of each rest; default '0 s' (no rest)
     longest: maximum simulated time; default '1440 min'
+    plugins: modules of your own, files or names, whose objects files may name
     """
+    name_plugins(plugins)
     from dataclasses import replace
 
     from ppafo.analyses.endurance.answer import Endurances, finding_of, finding_of_several

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from ppafo.arguments import Count, Overrides, Threads, Word, checked
+from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report
 
 if TYPE_CHECKING:
@@ -29,6 +30,7 @@ def find(
     grid: Count = 64,
     overrides: Overrides = (),
     threads: Threads | None = None,
+    plugins: Plugins = (),
     progress: Report | None = None,
 ) -> Finding[Threshold]:
     """Find the lowest or highest value that meets a condition on a metric.
@@ -42,7 +44,9 @@ def find(
     such_that: a metric, <= or >=, and a limit, for example 'final_error <= 0.3 N m'
     highest: find the highest value
     grid: number of evenly spaced values to try first; default 64
+    plugins: modules of your own, files or names, whose objects files may name
     """
+    name_plugins(plugins)
     import numpy as np
 
     from ppafo.analyses.find.solve import (
@@ -80,10 +84,15 @@ def find(
     seeds = seeds_of_noise([base], [path.path], 0, STREAMS, SEED)
     tally = Tally(grid * max(1, seeds.size), progress)
     search = Search(
-        path.path, condition, Runs(base, with_companions([condition.metric], base), tally, (), threads), seeds
+        base, path.path, condition, Runs(base, with_companions([condition.metric], base), tally, (), threads), seeds
     )
     search.run(np.linspace(low, high, grid))
     if not np.isfinite(search.metrics).any():
+        if search.oscillating:
+            raise StudyError(
+                f"scenario '{base.name}': in every run from {path.quote(low)} to {path.quote(high)} the torque loop "
+                "oscillates: leave its gains out, so that they follow the device"
+            )
         reason = search.runs.reason
         raise StudyError(
             f"scenario '{base.name}': no run from {path.quote(low)} to {path.quote(high)} has a "

@@ -16,7 +16,7 @@ from ppafo.studies.distributions import Floats
 from ppafo.studies.draws import Limit
 from ppafo.studies.sampling import NOISE
 from ppafo.studies.varying import VariedPath, varied_path
-from ppafo.study.runs import Runs, settled
+from ppafo.study.runs import Runs, oscillating, settled
 from ppafo.units import split_quantity
 
 DEFAULT_GRID, FEWEST, MOST = 64, 3, 100_000
@@ -73,12 +73,13 @@ class Threshold:
 class Search:
     """What was tried so far: values, the metric of each and its standard deviation over the noise, in that order."""
 
-    def __init__(self, path: str, condition: Limit, runs: Runs, seeds: Floats) -> None:
-        self._path, self.condition, self.runs, self.seeds = path, condition, runs, seeds
+    def __init__(self, base: Scenario, path: str, condition: Limit, runs: Runs, seeds: Floats) -> None:
+        self._base, self._path, self.condition, self.runs, self.seeds = base, path, condition, runs, seeds
         self.values: Floats = np.empty(0)
         self.metrics: Floats = np.empty(0)
         self.spread: Floats = np.empty(0)
         self.unsettled = 0
+        self.oscillating = 0
 
     def run(self, values: Floats) -> None:
         """Try values, each over all streams of noise."""
@@ -90,6 +91,10 @@ class Search:
         # One instant of a loop that oscillates may meet the condition by chance.
         judged = settled(rows, self.condition.metric)
         self.unsettled += int(np.count_nonzero(judged > rows[self.condition.metric]))
+        # A loop whose command turns all the time meets no condition that anybody would build on.
+        turns = oscillating(rows, self._base)
+        self.oscillating += int(np.count_nonzero(turns))
+        judged = np.where(turns, np.nan, judged)
         found = judged.reshape(streams, values.size)
         self.values = np.concatenate([self.values, values])
         self.metrics = np.concatenate([self.metrics, found.mean(axis=0)])
@@ -185,6 +190,10 @@ def finding_of(scenario: str, path: VariedPath, search: Search, highest: bool, g
         remarks.append(
             f"in {search.unsettled} runs the loop oscillates on the hold, and {condition.metric} is one instant of "
             "that: their rms_error_hold was taken in its place"
+        )
+    if search.oscillating:
+        remarks.append(
+            f"in {search.oscillating} of {search.runs.count} runs the torque loop oscillates: they count as not met"
         )
     if search.runs.failures:
         remarks.append(

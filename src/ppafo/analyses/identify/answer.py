@@ -108,7 +108,7 @@ def trajectory_panels(measurement: Recording, model: Recording, atmosphere: floa
         course = Course(
             time=TIME,
             level=kind,
-            change=Kind("model minus sample", quantity="angle" if is_angle else "pressure change"),
+            change=Kind("Residual (measured - model)", quantity="angle" if is_angle else "pressure change"),
             times=measurement.time,
             samples=measurement[name],
             model=model[name],
@@ -235,7 +235,11 @@ def _tolerances(known: Sequence[Known], before: ParameterSet) -> list[str]:
             f"{text}; {percentage(one.share, 2)} of the variance of {one.widens}" if one.share >= _SHOWN else text
         )
     rest = len(known) - len(shown)
-    return [*found, f"tolerances that widen no interval: {rest}"] if rest else found
+    return (
+        [*found, f"{count_of(rest, 'other tolerance')} {'does' if rest == 1 else 'do'} not affect the intervals"]
+        if rest
+        else found
+    )
 
 
 def _shown(number: float, path: str, unit: str, before: ParameterSet) -> tuple[float, str]:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from ppafo.arguments import Word, checked
+from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report, report_nothing
 
 if TYPE_CHECKING:
@@ -19,6 +20,7 @@ Problem = Annotated[str | Path, Word("PROBLEM", Path)]
 def identify(
     problem: Problem,
     *,
+    plugins: Plugins = (),
     progress: Report = report_nothing,
 ) -> Finding[Identification]:
     """Identify a parameter set, with uncertainty, from bench recordings.
@@ -28,7 +30,9 @@ def identify(
     set that does not, and DataError for a recording that cannot be read; each in one line that begins with the file.
 
     problem: a problem file (.toml); see 'ppafo doctor --schema identification'
+    plugins: modules of your own, files or names, whose objects files may name
     """
+    name_plugins(plugins)
     from ppafo.analyses.identify.answer import finding_of
     from ppafo.analyses.identify.solve import solve_problem
     from ppafo.identification.problem import load_problem

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from ppafo.arguments import Overrides, Word, checked, words
+from ppafo.plugins import Plugins, name_plugins
 
 if TYPE_CHECKING:
     from ppafo.analyses.linearise.answer import LinearModel
@@ -17,10 +18,7 @@ ScenarioLike = Annotated["Scenario | str | Path", Word("SCENARIO", help="name of
 
 @checked("scenario", "at", "overrides")
 def linearise(
-    scenario: ScenarioLike,
-    *,
-    at: words.Point = "equilibrium",
-    overrides: Overrides = (),
+    scenario: ScenarioLike, *, at: words.Point = "equilibrium", overrides: Overrides = (), plugins: Plugins = ()
 ) -> Finding[LinearModel]:
     """Make a linear model of the plant near one point, for control design.
 
@@ -30,7 +28,9 @@ def linearise(
 
     at: a time of the run, such as '1.5 s', or 'equilibrium' (default): the steady state that holds the last value of
         the reference
+    plugins: modules of your own, files or names, whose objects files may name
     """
+    name_plugins(plugins)
     from importlib.util import find_spec
     from numbers import Real
 

@@ -1,5 +1,6 @@
 """Figures 7 and 8 of the paper: the step response and the torque task, simulated, beside synthetic measurements."""
 
+from dataclasses import replace
 from functools import partial
 from operator import methodcaller
 from typing import TYPE_CHECKING, Any
@@ -40,12 +41,12 @@ _ENLARGED = 40.0
 _BIN = 3.0
 """Milliseconds over which the band of a measurement reaches from its least to its largest reading."""
 _CURVES = (
-    ("Vane angle", "deg", ACTUAL.colour, (0.66, 0.26, 0.31, 0.34)),
-    ("Pressure difference, $P_1 - P_2$", "psi", ACTUAL.colour, (0.69, 0.14, 0.29, 0.34)),
-    ("Chamber 1 (plantarflexion), $P_1$", "psig", CHAMBER_1.colour, (0.3, 0.12, 0.34, 0.34)),
-    ("Chamber 2 (dorsiflexion), $P_2$", "psig", CHAMBER_2.colour, (0.69, 0.3, 0.29, 0.4)),
+    ("Vane angle", "Angle", "deg", ACTUAL.colour, (0.66, 0.26, 0.31, 0.34)),
+    ("Pressure difference, $P_1 - P_2$", "Difference", "psi", ACTUAL.colour, (0.69, 0.14, 0.29, 0.34)),
+    ("Chamber 1 (plantarflexion), $P_1$", "Pressure", "psig", CHAMBER_1.colour, (0.3, 0.12, 0.34, 0.34)),
+    ("Chamber 2 (dorsiflexion), $P_2$", "Pressure", "psig", CHAMBER_2.colour, (0.69, 0.3, 0.29, 0.4)),
 )
-"""Panels of figure 7: name, unit, colour, and the room for the first milliseconds (x, y, width, height of the axes)."""
+"""Panels of figure 7: name, quantity, unit, colour, and the room for the first milliseconds (x, y, width, height)."""
 _EVENT: dict[str, Any] = {"linewidth": 0.8, "linestyle": (0, (4, 3)), "alpha": 0.7, "zorder": 0.5}
 _LEVEL: dict[str, Any] = {"linewidth": 0.9, "linestyle": (0, (1, 2)), "zorder": 0.9}
 _WORDS: dict[str, Any] = {"fontsize": 8.5, "va": "center"}
@@ -70,7 +71,7 @@ def step_response_figure(
     ends = -_SHOWN_BEFORE_STEP * end, end
     upper: list[Panel] = []
     lower: list[Panel] = []
-    for letter, (name, unit, colour, place), values, measured in zip(
+    for letter, (name, quantity, unit, colour, place), values, measured in zip(
         "ABCD",
         _CURVES,
         _curves(recording, levels),
@@ -88,11 +89,11 @@ def step_response_figure(
                 Mark("level", y=0.0, colour=colour, style={"linewidth": 1.0}),
                 *marked,
             ]
-            kind, title = Kind(unit=f"Δ {unit.replace('psig', 'psi')}"), "Measurement less model"
+            kind, title = Kind("Error", unit.replace("psig", "psi")), "Measurement less model"
             limit = methodcaller("set_xlim", *ends)
             lower.append(Panel(_AFTER_STEP, kind, differences, title, then=limit, tall=0.85, shares_x=True))
         legend, title = "" if upper else "figure", f"$\\bf{{{letter}}}$   {name}"
-        upper.append(Panel(_AFTER_STEP, Kind(unit=unit), marks, title, None, legend, then, 2.3, shares_x=True))
+        upper.append(Panel(_AFTER_STEP, Kind(quantity, unit), marks, title, None, legend, then, 2.3, shares_x=True))
         named = []
     panels = [*upper[:2], *lower[:2], *upper[2:], *lower[2:]]
     return draw_panels(panels, 2, (3.65, 1.0), kind=(synthetic or recording).kind)
@@ -136,7 +137,7 @@ def _enlarge(place: tuple[float, float, float, float], ends: tuple[float, float]
     inset.set_title(f"first {_ENLARGED:.0f} ms", fontsize=7.5, color=GREY, loc="center", pad=2.0)
 
 
-_TORQUE, _GAS = Kind(unit="N m"), Kind("CO$_2$", "kg", "gas mass")
+_TORQUE, _GAS = Kind("Torque", "N m", "torque"), Kind("CO$_2$", "kg", "gas mass")
 
 
 def torque_task_figure(
@@ -188,7 +189,7 @@ def torque_task_figure(
             (Kind(), _filling_marks(solenoid), "Chamber that the solenoid valves fill", "", 0.7, chambers),
             (_TORQUE, torques[1], "Torque with the proportional valve", "inside", 2.3, torque_limits),
             (Kind(), [opening], "Opening of the proportional valve", "", 0.7, {"ylim": (least, 1.08)}),
-            (_TORQUE, errors, "Error: reference less torque, both valves", "", 1.3, {}),
+            (replace(_TORQUE, words="Error"), errors, "Error: reference less torque, both valves", "", 1.3, {}),
             (_GAS, gas, "CO$_2$ taken from the supply", "inside", 1.7, gas_limits),
         )
     ]
@@ -210,7 +211,8 @@ def _torque_marks(recording: Recording, look: Look, ceiling: float, synthetic: R
     ]
     if synthetic is not None:
         named: dict[str, Any] = {"label": "torque, synthetic experiment", "colour": EXPERIMENT.colour}
-        broad = {"linewidth": 2.6, "alpha": 0.45}
+        # Broader than what is simulated and darker than the grid: seen where both agree, too.
+        broad = {"linewidth": 4.5, "alpha": 0.75}
         marks.insert(2, Mark("line", synthetic.time, synthetic["torque"], style=broad, **named))
     return marks
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from ppafo.arguments import Overrides, Word, checked
+from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report, report_nothing
 
 if TYPE_CHECKING:
@@ -17,7 +18,11 @@ PublicationName = Annotated[str | Path, Word("NAME", option="--study")]
 
 @checked("study", "overrides", "progress")
 def reproduce(
-    study: PublicationName = "ppafo-2011", *, overrides: Overrides = (), progress: Report | None = None
+    study: PublicationName = "ppafo-2011",
+    *,
+    overrides: Overrides = (),
+    plugins: Plugins = (),
+    progress: Report | None = None,
 ) -> Finding[Reproduction] | Finding[Studies]:
     """Reproduce the paper's experiments and check its claims.
 
@@ -26,7 +31,9 @@ def reproduce(
     none.
 
     study: publication to run again: a name, a .toml file of claims, or 'all'; default ppafo-2011, the paper
+    plugins: modules of your own, files or names, whose objects files may name
     """
+    name_plugins(plugins)
     from ppafo.analyses.reproduce.answer import Studies, finding_of, finding_of_studies
     from ppafo.analyses.reproduce.publication import ALL, SEED, check_study, run_studies
     from ppafo.analyses.reproduce.solve import reproduce_paper

@@ -221,8 +221,9 @@ def changes(found: Evaluated, confidence: float) -> tuple[Floats, Floats]:
 
     In the unit of the metric, above 0 where the metric grows with the value; nan for the noise. It is the difference of
     two means of the metric, given that the value is at one or the other end and with all others as drawn, so that
-    correlated ones go along. Each mean is read from a straight line through the runs nearest to the end (Cleveland,
-    1979, without weights). The bands come from the spread between as many parts of the blocks as there are scrambles.
+    correlated ones go along. Each mean is read from a parabola through the runs nearest to the end (Cleveland, 1979,
+    without weights): a straight line is off by what the metric bends there, which no band from a spread shows. The
+    bands come from the spread between as many parts of the blocks as there are scrambles.
     """
     own = np.unique(found.blocks % SCRAMBLES, return_inverse=True)[1]
     part = np.repeat(own, found.values.size // found.blocks.size)
@@ -246,12 +247,15 @@ def _levels(values: Floats, given: Floats, end: float, part: NDArray[np.intp]) -
     away = np.abs(given - end)
     near = away <= np.partition(away, int(_NEAREST * away.size))[int(_NEAREST * away.size)]
     along = (given[near] - end) / (np.max(away[near]) or 1.0)
-    products = (np.ones(along.size), along, values[near], along * along, along * values[near])
-    sums = np.stack([np.bincount(part[near], product, count) for product in products])
-    whole = np.sum(sums, axis=1, keepdims=True)
-    size, first, level, square, mixed = np.concatenate([whole, whole - sums], axis=1)
-    spread = size * square - first**2
-    # A value that takes few levels may be the same in all of them: its mean needs no line.
-    slope_free = spread <= 1.0e-9 * size**2
-    line = (square * level - first * mixed) / np.where(slope_free, 1.0, spread)
-    return np.asarray(np.where(slope_free, level / size, line))
+    powers = np.stack([along**power for power in range(5)])
+    moments = np.stack([np.bincount(part[near], power, count) for power in powers])
+    mixed = np.stack([np.bincount(part[near], power * values[near], count) for power in powers[:3]])
+    moments, mixed = (
+        np.concatenate([whole, whole - sums], axis=1)
+        for sums in (moments, mixed)
+        for whole in (np.sum(sums, axis=1, keepdims=True),)
+    )
+    # A value of one or two levels needs no parabola: the pseudo-inverse leaves at 0 what they do not tell.
+    normal = np.stack([moments[row : row + 3] for row in range(3)]).transpose(2, 0, 1)
+    solved = np.linalg.pinv(normal, rcond=1.0e-9, hermitian=True) @ mixed.T[:, :, None]
+    return np.asarray(solved[:, 0, 0])

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from ppafo.arguments import Confidence, MaximumFailed, Metrics, Name, Overrides, Seed, Threads, Whole, Word, checked
+from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report
 
 if TYPE_CHECKING:
@@ -35,6 +36,7 @@ def sensitivity(
     confidence: Confidence = 0.95,
     maximum_failed: MaximumFailed = 0.02,
     threads: Threads | None = None,
+    plugins: Plugins = (),
     progress: Report | None = None,
 ) -> Finding[Influences]:
     """Rank uncertain values by their influence: Sobol or Shapley indices, signed changes.
@@ -47,7 +49,9 @@ def sensitivity(
     samples: number of base points (sobol, default 8192) or orders (shapley, 2048)
     configuration: configuration of the study, needed if it has several
     independent: ignore the correlations of the study
+    plugins: modules of your own, files or names, whose objects files may name
     """
+    name_plugins(plugins)
     from ppafo.analyses.sensitivity.methods import METHODS
     from ppafo.analyses.sensitivity.solve import DEFAULT_SAMPLES, Settings, analyse, finding_of
     from ppafo.errors import StudyError, nearest_name

@@ -15,6 +15,7 @@ import numpy as np
 
 from ppafo.analyses.sensitivity.methods import METHODS, Evaluated, Indices, Method, changes
 from ppafo.errors import StudyError
+from ppafo.linear_algebra import on_one_thread
 from ppafo.report.finding import Column, Finding, Part
 from ppafo.report.kind import Kind, of_metric
 from ppafo.report.panels import Mark, Panel
@@ -118,6 +119,7 @@ def overlapping_pairs(found: Influences, metric: OfMetric) -> list[tuple[str, st
     ]
 
 
+@on_one_thread
 def analyse(runs: Runs, uncertainty: Uncertainty, method: Method, settings: Settings, study: str = "") -> Influences:
     """Return the indices of the metrics; StudyError for bad settings, dependent values or too many failures."""
     if uncertainty.scores is not None and not method.takes_dependent:

@@ -56,6 +56,11 @@ def finding_of(results: StudyResults) -> Finding[StudyResults]:
         f"{item['reason']}"
         for item in first
     ]
+    remarks += [
+        f"{name}: in {count:,} runs the torque loop oscillates (column 'oscillates')"
+        for name, count in summary.get("oscillating", {}).items()
+        if count
+    ]
     said = [
         f"Correlation of {item['between'][0]} with {item['between'][1]}: {item['coefficient']}, of their normal scores."
         for item in study.get("correlations", ())

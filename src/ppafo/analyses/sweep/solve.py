@@ -43,6 +43,7 @@ from ppafo.study.manifest import read_manifest
 from ppafo.study.runs import Tally, joined
 from ppafo.study.sent_plugins import plugins_to_send
 from ppafo.study.store import (
+    OSCILLATES,
     STATUSES,
     Finished,
     Store,
@@ -84,6 +85,9 @@ def _summary(study: Study, results: StudyResults) -> dict[str, Any]:
         "diverged": diverged,
         "refused": failed - diverged,
         "completed_by_configuration": completed,
+        "oscillating": {
+            name: int(sum(np.count_nonzero(part) for part in results.parts(name, OSCILLATES))) for name in completed
+        },
         "failures": failures,
         "quantile_definition": QUANTILE_DEFINITION,
         "configurations": {

@@ -13,6 +13,7 @@ import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ from ppafo.arguments import Confidence, Count, MaximumFailed, Name, Overrides, S
 from ppafo.documents.json_text import plain
 from ppafo.errors import StudyError, UnitError, refused_as
 from ppafo.metrics import METRICS
+from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report
 from ppafo.report.finding import Finding, Part, columns_of
 from ppafo.report.kind import Interval, Kind, of_metric
@@ -87,35 +89,40 @@ class Statistic:
         None of them, for a mean, while all are equal and few: one that comes later may lie anywhere.
         """
         known = values[np.isfinite(values)]
-        if self.is_of_replicates and 0 < known.size < FEWEST_EQUAL and float(np.ptp(known)) == 0.0:
+        if self.is_of_replicates and 0 < known.size < FEWEST_SEEN and float(np.ptp(known)) == 0.0:
             return 0.0
         return effective_sample_size(known) if self.is_of_replicates else float(known.size)
 
 
 def mean_of(unit: str) -> Statistic:
     """Return the mean of a metric in a unit."""
-    return Statistic("mean", unit, lambda values, level: floored_interval(values, REPLICATES, level), True)
+    return Statistic("mean", unit, _mean_interval, True)
 
 
 def quantile_of(unit: str, fraction: float) -> Statistic:
     """Return the value of a metric below which a fraction of the runs lies."""
-    return Statistic(
-        f"quantile {fraction:g}",
-        unit,
-        lambda values, level: quantile_interval(values[np.isfinite(values)], fraction, level),
-    )
+    return Statistic(f"quantile {fraction:g}", unit, partial(_quantile, fraction))
+
+
+def _mean_interval(values: Floats, level: float) -> Interval:
+    return floored_interval(values, REPLICATES, level)
+
+
+def _quantile(fraction: float, values: Floats, level: float) -> Interval:
+    return quantile_interval(values[np.isfinite(values)], fraction, level)
+
+
+def _probability(threshold: float, is_above: bool, values: Floats, level: float) -> Interval:
+    # Strictly beyond: a metric that counts may be exactly at the threshold in many runs.
+    known = values[np.isfinite(values)]
+    hits = known > threshold if is_above else known < threshold
+    return fraction_interval(int(np.count_nonzero(hits)), known.size, level)
 
 
 def probability_of(threshold: float, is_above: bool, text: str) -> Statistic:
     """Return the probability that a metric is above (or else below) a value [SI], written as ``text``."""
-
-    def estimate(values: Floats, level: float) -> Interval:
-        # Strictly beyond: a metric that counts may be exactly at the threshold in many runs.
-        known = values[np.isfinite(values)]
-        hits = known > threshold if is_above else known < threshold
-        return fraction_interval(int(np.count_nonzero(hits)), known.size, level)
-
-    return Statistic(f"probability {'above' if is_above else 'below'} {text}", "-", estimate, threshold=threshold)
+    words = f"probability {'above' if is_above else 'below'} {text}"
+    return Statistic(words, "-", partial(_probability, threshold, is_above), threshold=threshold)
 
 
 def parse_statistic(text: str, metric: str, atmosphere: float | None) -> Statistic:
@@ -136,8 +143,8 @@ def parse_statistic(text: str, metric: str, atmosphere: float | None) -> Statist
     raise StudyError(f"statistic '{text}' is not known; give {GRAMMAR}, with a fraction above 0 and below 1")
 
 
-FEWEST_EQUAL = 3000
-"""Equal values from which they count as their mean: one in a thousand that differs would have come (95 %)."""
+FEWEST_SEEN = 3000
+"""Draws from which a mean is believed: one in a thousand that differs would have come (95 %)."""
 _RULE_OF_THREE = 3.0
 """Over the draws: probability of an event that 95 of 100 such sets of draws show."""
 
@@ -258,12 +265,15 @@ def draw_until(
 ) -> Finding[Estimate]:
     """Draw from one stream until the rule is met or there are no more looks.
 
-    An interval that few draws determine is not trusted, however narrow it is: drawing continues.
+    An interval that few draws determine is not trusted, however narrow it is: drawing continues. So does that of a mean
+    until what happens once in a thousand runs would have come, or there are no more draws: no interval from draws that
+    lack it could bound it.
     Runs that fail have no value: up to the fraction that the rule allows they are left out and counted, above it
     StudyError.
     """
     looks: list[Look] = []
     drawn: Columns = {}
+    is_met = False
     for size in rule.sizes:
         done = looks[-1].draws if looks else 0
         columns = statistic.columns(uncertainty, done, size - done, seed)
@@ -275,7 +285,10 @@ def draw_until(
         found = rows[metric]
         missing, interval = np.count_nonzero(~np.isfinite(found)), statistic.estimate(found, rule.confidence_of_look)
         looks.append(Look(found.size, int(missing), interval, statistic.effective_size(found)))
-        if rule.is_narrow(interval) and looks[-1].is_carried:
+        # A mean is moved by what happens seldom; quantiles and probabilities are not.
+        has_shown = not statistic.is_of_replicates or found.size >= min(FEWEST_SEEN, rule.maximum)
+        is_met = has_shown and rule.is_narrow(interval) and looks[-1].is_carried
+        if is_met:
             break
     # Failures are counted here: below, some of the same draws run again with other noise.
     failures, last, noise = runs.failures, looks[-1], None
@@ -290,7 +303,7 @@ def draw_until(
         metric=metric,
         statistic=statistic.label,
         unit=statistic.unit,
-        is_met=rule.is_narrow(last.interval) and last.is_carried,
+        is_met=is_met,
         draws=last.draws,
         failed=failures,
         interval=last.interval,
@@ -326,6 +339,7 @@ def estimate(
     confidence: Confidence = 0.95,
     maximum_failed: MaximumFailed = 0.01,
     threads: Threads | None = None,
+    plugins: Plugins = (),
     progress: Report | None = None,
 ) -> Finding[Estimate]:
     """Return a statistic of a metric over the distributions of a study, drawn until its interval is ``width`` wide.
@@ -335,7 +349,10 @@ def estimate(
     those that the interval needs, whatever the study's sampling method: randomised Sobol replicates for a mean, else
     independent ones. ``seed`` is the study's by default. ``also`` names further metrics: means over the same draws.
     StudyError for bad input and where more than the fraction ``maximum_failed`` of the runs fails.
+
+    ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
     """
+    name_plugins(plugins)
     chosen, base, uncertainty = drawn_in(study, overrides, configuration)
     wanted = tuple(dict.fromkeys((metric, *also)))
     check_metrics(wanted, base.scenario)
@@ -373,7 +390,7 @@ def _remarks(last: Look, values: Floats, statistic: Statistic, kind: Kind, noise
     if not last.is_carried and are_equal:
         said.append(
             f"do not trust this interval: all {known:,} values are equal, which do not show how far a rare one lies; "
-            f"draw at least {FEWEST_EQUAL:,}"
+            f"draw at least {FEWEST_SEEN:,}"
         )
     elif not last.is_carried:
         said.append(
@@ -446,7 +463,7 @@ def _finding(found: Estimate, statistic: Statistic, rule: StoppingRule) -> Findi
                 "Trace",
                 columns_of(("draws", "without value", *_ENDS, "width", ""), rows),
                 said=[policy],
-                panels=lambda: [_trace(found, kind, rule), _histogram(found, statistic, of_values)],
+                panels=partial(_panels, found, kind, rule, statistic, of_values),
                 name="trace",
                 caption=_CAPTION,
                 across=2,
@@ -456,6 +473,10 @@ def _finding(found: Estimate, statistic: Statistic, rule: StoppingRule) -> Findi
         found=found,
         passed=found.is_met,
     )
+
+
+def _panels(found: Estimate, kind: Kind, rule: StoppingRule, statistic: Statistic, of_values: Kind) -> list[Panel]:
+    return [_trace(found, kind, rule), _histogram(found, statistic, of_values)]
 
 
 def _trace(found: Estimate, kind: Kind, rule: StoppingRule) -> Panel:

@@ -220,7 +220,9 @@ def verdict(problem: Problem, before: Setting, after: Setting) -> str:
     name = problem.name
     if after.share_without_value:
         failing = percentage(after.share_without_value, 3)
-        return f"{name}: with the best gains found, {failing} of the runs fail or lack a goal or a constraint"
+        return (
+            f"{name}: with the best gains found, {failing} of the runs fail, oscillate, or lack a goal or a constraint"
+        )
     if not after.is_feasible_in_search:
         broken = f"the best found exceed the limits by {percentage(after.violation, 3)}"
         return f"{name}: no gains within the bounds satisfy all constraints; {broken}{_by_ceiling(problem, after)}"
@@ -315,7 +317,7 @@ def _remarks(
         if item.metric in after.fresh and not item.is_kept(after.fresh[item.metric])
     ]
     if after.fresh and after.fresh_share_without_value:
-        broken.append(f"{percentage(after.fresh_share_without_value, 2)} of the runs fail or lack a metric")
+        broken.append(f"{percentage(after.fresh_share_without_value, 2)} of the runs fail, oscillate or lack a metric")
     return [*said, *(f"violated on fresh draws: {text}" for text in broken)]
 
 

@@ -16,6 +16,7 @@ from ppafo.documents.toml_text import TomlKind, beside
 from ppafo.errors import ParameterError, ScenarioError, StudyError, UnitError, first_twice, refused_as
 from ppafo.loading import load_scenario, placed, reloaded
 from ppafo.parameters.graph import ATMOSPHERE_PATH
+from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import Floats, LogUniformBetween, UniformBetween
 from ppafo.studies.draws import (
@@ -248,11 +249,14 @@ def list_tunings() -> tuple[str, ...]:
 
 
 @checked()
-def load_tuning(tuning: str | Path | Mapping[str, Any], overrides: Overrides = ()) -> Problem:
+def load_tuning(tuning: str | Path | Mapping[str, Any], overrides: Overrides = (), *, plugins: Plugins = ()) -> Problem:
     """Return a tuning by its name in the package, by the path of a TOML file, or from data laid out as such a file.
 
     ``overrides`` change the scenario. StudyError for anything that is not usable.
+
+    ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
     """
+    name_plugins(plugins)
     document, source = read_source(TUNING, tuning)
     parsed = validate(TuningFile, document, source.file, StudyError)
     with refused_as(StudyError, source.file, ScenarioError, ParameterError, StudyError):

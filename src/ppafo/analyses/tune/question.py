@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from ppafo.arguments import Overrides, Seed, Threads, Word, checked
+from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ def tune(
     overrides: Overrides = (),
     seed: Seed | None = None,
     threads: Threads | None = None,
+    plugins: Plugins = (),
     progress: Report | None = None,
 ) -> Finding[Tuned]:
     """Tune gains for an objective under constraints, optionally robust.
@@ -32,7 +34,9 @@ def tune(
     goal has no scale because the scenario as it is gives 0 or nothing.
 
     tuning: name of a tuning, or a .toml file
+    plugins: modules of your own, files or names, whose objects files may name
     """
+    name_plugins(plugins)
     from dataclasses import replace
 
     from ppafo.analyses.tune.answer import FRESH_DRAWS, finding_of

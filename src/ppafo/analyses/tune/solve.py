@@ -21,6 +21,7 @@ from ppafo.analyses.tune.answer import (
 from ppafo.analyses.tune.problem import Effort, Gains, Problem, Spread
 from ppafo.control.kind import OPEN_LOOP
 from ppafo.errors import StudyError
+from ppafo.linear_algebra import on_one_thread
 from ppafo.metrics import METRICS
 from ppafo.parameters.device import VANE
 from ppafo.report.kind import Interval
@@ -31,7 +32,7 @@ from ppafo.simulation.simulate import simulate
 from ppafo.studies.distributions import Floats, noise_interval
 from ppafo.studies.draws import with_new_noise
 from ppafo.studies.study import with_overrides
-from ppafo.study.runs import FAILED, Runs, settled
+from ppafo.study.runs import FAILED, Runs, oscillating, settled
 
 UNUSABLE = 1.0e12
 """Where the costs of candidates begin of which a run fails; the fraction of such runs is added."""
@@ -109,6 +110,7 @@ _TOLERANCE = 1.0e-3
 """A start has ended where the costs of its candidates differ by no more than this fraction of their mean."""
 
 
+@on_one_thread
 def search(costs: Costs, before: Sequence[float], effort: Effort) -> list[Start]:
     """Return what came of each start, the best first; the same every time for a seed.
 
@@ -190,7 +192,9 @@ def crossed(runs: Runs, problem: Problem, values: Mapping[str, Floats], draws: M
     columns |= {path: np.tile(column, candidates) for path, column in draws.items()}
     rows = runs.run(columns)
     metrics = {name: settled(rows, name).reshape(candidates, count) for name in problem.metrics}
-    return Crossed(metrics, rows[FAILED].reshape(candidates, count))
+    # Gains with which the loop oscillates are no better than ones with which the run fails.
+    unusable = rows[FAILED] | oscillating(rows, problem.scenario)
+    return Crossed(metrics, unusable.reshape(candidates, count))
 
 
 def scales_of(problem: Problem, before: Crossed) -> dict[str, float]:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from ppafo.arguments import Duration, Name, Overrides, Volume, Word, checked
+from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Progress, Report, report_nothing
 
 if TYPE_CHECKING:
@@ -36,17 +37,17 @@ def validate(
     thresholds: Limits = (),
     longest_delay: Duration = 0.02,
     columns: ColumnsLike | None = None,
+    plugins: Plugins = (),
     progress: Report | None = None,
 ) -> Finding[Validation]:
     """Compare a parameter set with recordings, channel by channel.
 
-    The model is run on the recorded command, supply pressure and external torque; errors are model less measured. With
+    The model is run on the recorded command, supply pressure and external torque; residuals are measured - model. With
     no threshold it is 10 % of full range, at least half of the variance of a signal beside its noise is explained, and
-    no single change of record, set or model may explain the recordings better than noise of the sensors could. The
-    result's ``found`` has ``passes`` and, in ``recordings``, one ``RecordingAgreement`` each: ``measured`` and
-    ``model`` are recordings, their channels of shape (samples,) in SI; ``channels`` has RMS error, bias, largest error
-    and delay [s] of each channel in its SI unit (rad, Pa, N m). DataError, ParameterError or SimulationError for bad
-    input.
+    no single change of record, set or model may explain the recordings; what none explains may be 3 %. The result's
+    ``found`` has ``passes`` and, in ``recordings``, one ``RecordingAgreement`` each: ``measured`` and ``model`` are
+    recordings, their channels of shape (samples,) in SI; ``channels`` has RMS error, bias, largest error and delay [s]
+    of each channel in its SI unit (rad, Pa, N m). DataError, ParameterError or SimulationError for bad input.
 
     parameter_set: name of a parameter set, or a .toml file
     recordings: a .csv or .nc file, or a result folder; several may be given
@@ -61,7 +62,9 @@ def validate(
     longest_delay: maximum delay of the measurement to estimate; default '20 ms', '0 s' for none
     columns: file with a column map [columns.NAME], for recordings with other column names; a problem file may contain
         it
+    plugins: modules of your own, files or names, whose objects files may name
     """
+    name_plugins(plugins)
     from ppafo.analyses.validate.solve import LARGEST_DELAY, Validation, finding_of, named_column_map
     from ppafo.errors import DataError, nearest_name, one_line
     from ppafo.parameters import load_device

@@ -36,6 +36,12 @@ from ppafo.version import __version__
 LARGEST_DELAY = 1.0
 """Seconds; a recording that is later than this was not recorded with its command."""
 
+LITTLE = 0.03
+"""RMS error over the full range up to which a residual beside the noise, of which no cause is known, is a remark."""
+
+_EXPLAINS = 0.5
+"""Residual with the nearest cause over the residual without any, up to which that cause is worth naming."""
+
 
 @dataclass(frozen=True, slots=True)
 class Validation:
@@ -51,13 +57,15 @@ class Validation:
 
     @property
     def passes(self) -> bool:
-        """True where every error is within its limit and, without limits given, nothing but what any bench has is left.
+        """True where every error is within its limit and, without limits given, only what any bench has is left.
 
-        What no single cause explains is a disagreement as one that a cause explains is; of a recorded angle that is
-        followed causes are not searched.
+        A cause that is found and that not any bench has is a disagreement, however small. A residual that no single
+        cause explains is one only where it is more than ``LITTLE``, for no model has all that a device has. Of a
+        recorded angle that is followed causes are not searched.
         """
-        causes = self.causes
-        is_usual = causes.is_noise or (causes.tried == 0 if causes.found is None else causes.found.is_usual)
+        causes, channels = self.causes, [channel for item in self.recordings for channel in item.channels]
+        is_little = causes.tried == 0 or all(one.fraction <= LITTLE for one in channels)
+        is_usual = causes.is_noise or (is_little if causes.found is None else causes.found.is_usual)
         return (self.has_limits or is_usual) and all(recording.passes for recording in self.recordings)
 
     def json_document(self) -> dict[str, Any]:
@@ -107,7 +115,7 @@ def agreement_panels(agreement: RecordingAgreement, atmosphere: float) -> list[P
 
 
 def _channel_panels(agreement: RecordingAgreement, channel: ChannelAgreement, atmosphere: float) -> list[Panel]:
-    """Return samples and model over time, and below them model less measured."""
+    """Return samples and model over time, and below them their residual."""
     name, measured, model = channel.channel, agreement.measured, agreement.model
     given = measured_values(measured, name)
     assert given is not None, "a channel that is compared was measured"
@@ -118,7 +126,7 @@ def _channel_panels(agreement: RecordingAgreement, channel: ChannelAgreement, at
     course = Course(
         time=time,
         level=Kind(shown.title, "", "pressure" if is_chamber else shown.quantity),
-        change=Kind("Model less measured", "", shown.quantity),
+        change=Kind("Residual (measured - model)", "", shown.quantity),
         times=scale * measured.time,
         samples=given,
         # The measurement is late by the delay, so the model is read that much earlier.
@@ -156,7 +164,7 @@ def finding_of(validation: Validation) -> Finding[Validation]:
     hashes = [(item.file, f"sha256 {item.sha256}") for item in validation.recordings if item.sha256]
     method = (
         f"The model with the valve '{validation.device.valve_name}' was run with the inputs of each recording, from "
-        "the state of its first samples. An error is model less measured. Percentages are of the full range: the "
+        "the state of its first samples. A residual is measured - model. Percentages are of the full range: the "
         "angle between the stops, the gauge pressure of the supply, and twice that for the pressure difference. One "
         "common delay was removed before the errors were computed."
     )
@@ -193,15 +201,14 @@ def verdict(validation: Validation) -> str:
     count, name = len(validation.recordings), validation.device.name
     pairs = [(channel, agreement) for agreement in validation.recordings for channel in agreement.channels]
     worst = max((channel for channel, _ in pairs), key=lambda one: one.in_noise)
-    size = (
-        f"{worst.channel} is off by {worst.in_noise:.2g} times its noise ({100 * worst.fraction:.2g} % of full range)"
-    )
+    share = f"{100 * worst.fraction:.2g} % of full range"
+    size = f"{worst.channel} is off by {_times(worst.in_noise)} times its noise ({share})"
     failed = ", ".join(
         f"{channel.channel} in {agreement.file} ({100 * channel.fraction:.3g} %, limit {100 * channel.limit:.3g} %)"
         for channel, agreement in pairs
         if not channel.passes
     )
-    why = _why(validation.causes)
+    why = _why(validation.causes, worst.in_noise)
     if not validation.passes:
         # Where no channel is beyond its limit, an unusual cause alone is what fails the set.
         parts = (why, size, f"beyond the limit: {failed}") if why else (failed, size)
@@ -210,8 +217,12 @@ def verdict(validation: Validation) -> str:
     return f"{name} agrees with {count} recording{'s' * (count > 1)}: every RMS error is within its limit; {rest}"
 
 
-def _why(causes: Causes) -> str:
-    """Return what explains a disagreement, or what comes nearest; empty where nothing but noise is left."""
+def _why(causes: Causes, without: float) -> str:
+    """Return what explains a disagreement, or what comes nearest; empty where nothing but noise is left.
+
+    ``without`` is the largest error over noise [-] without any cause: a nearest one is named that takes half of it, or
+    wrong samples, which are seen whatever else is wrong.
+    """
     if causes.found is not None:
         others = f" (or, the same for these recordings: {', '.join(one.name for one in causes.found.same)})"
         usual = ", as on any bench" if causes.found.is_usual else ""
@@ -219,8 +230,16 @@ def _why(causes: Causes) -> str:
     if not causes.tried:
         return ""
     nearest = causes.nearest
-    near = "" if nearest is None else f"; nearest: {in_words(nearest)}, which leaves {nearest.left:.2g} times the noise"
-    return f"no single change explains it{near}"
+    explains = nearest is not None and (nearest.is_of_samples or nearest.left <= _EXPLAINS * without)
+    if nearest is None or not explains:
+        return "no single change explains it"
+    left = _times(nearest.left)
+    return f"no single change explains it; nearest: {in_words(nearest)}, which leaves {left} times the noise"
+
+
+def _times(size: float) -> str:
+    """Return how many times the noise, with two digits and without a power of ten."""
+    return f"{size:.2g}" if size < 100.0 else f"{size:.0f}"
 
 
 def in_words(one: Cause) -> str:
@@ -263,8 +282,8 @@ def _part(validation: Validation, name: str, agreement: RecordingAgreement) -> P
         remarks=[f"note: {remark}" for remark in agreement.remarks],
         panels=partial(agreement_panels, agreement, validation.device.supply.atmospheric_pressure),
         name=f"{name}-agreement",
-        caption=f"Dots: {kind}. Lines: the model on the recorded inputs. Below each: model less measured, the limit of "
-        "its RMS value dashed where it is in range.",
+        caption=f"Dots: {kind}. Lines: the model on the recorded inputs. Below each: the residual, measured - "
+        "model, the limit of its RMS value dashed where it is in range.",
         across=across,
         size=(7.6 / across, 2.1),
     )

@@ -30,12 +30,14 @@ from ppafo.analyses.walk.task_sequence import (
     trust_remark,
 )
 from ppafo.documents.json_text import plain
+from ppafo.metrics import Metric
 from ppafo.metrics.strides import PER_STRIDE
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE
 from ppafo.progress import Progress, Report
 from ppafo.report.finding import Column, Finding, Part, columns_of
 from ppafo.report.live_parts import live_part
 from ppafo.signals.recording import Floats
+from ppafo.simulation.oscillation import gains_of
 from ppafo.simulation.scenario import UNITS
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
@@ -173,6 +175,7 @@ class WalkPair:
         worn = self.comparison.with_device
         return {
             **walk_data(WALK_FORMAT, SCHEMA_VERSION, self.comparison),
+            **torque_loop_data(worn),
             "minutes": float(worn.recording.time[-1]) / 60.0,
             **task_sequence_data(self.comparison),
             **bottle_data(worn),
@@ -181,7 +184,17 @@ class WalkPair:
         }
 
 
+def torque_loop_data(worn: WalkResult) -> dict[str, Any]:
+    """Return the gains in force, and the verdict where the torque loop oscillates, as plain data in SI."""
+    verdict = worn.oscillation
+    return {
+        "oscillation": None if verdict is None else {**plain(verdict), "sentence": verdict.sentence},
+        "gains": plain(gains_of(worn.scenario, law_of(worn.scenario))),
+    }
+
+
 SCHEMA_VERSION = 1
+REVERSALS_PER_STRIDE, LARGEST_TORQUE = "reversals_per_stride", "largest_torque"
 _ROWS: tuple[Row, ...] = (
     ("body_mass", "Body mass of the wearer", "mass", 1),
     ("gas", "Gas per stride", "gas mass", 3),
@@ -189,6 +202,10 @@ _ROWS: tuple[Row, ...] = (
     ("positive_push_off_work", "Positive work on the wearer in push-off", "energy", 2),
     ("push_off_share", "... of the healthy ankle's positive work", "fraction", 1),
     ("net_push_off_work", "Net work on the wearer in push-off", "energy", 2),
+    ("torque_error", "Torque error where one is requested, RMS", "torque", 2),
+    ("peak_torque", "Peak torque", "torque", 1),
+    (LARGEST_TORQUE, "... limit of the controller", "torque", 1),
+    (REVERSALS_PER_STRIDE, "Command reversals per stride", "", 1),
     ("lowest_toes", "Lowest toes over the ground in mid-swing", "body length", 1),
     ("toe_landing", "Strides that begin on the toes", "fraction", 0),
     ("dorsiflexor_moment", "Moment of the wearer's dorsiflexors, mean", "torque", 2),
@@ -260,7 +277,7 @@ def finding_of(comparison: Comparison) -> Finding[WalkPair]:
         name="walk",
         kicker=f"A walk of {float(worn.recording.time[-1]) / 60.0:.3g} min",
         title=f"Walking with {configuration.name}",
-        said=(f"{configuration.name}: {worn.status.kind}, {strides} of {gait.name}{along}",),
+        said=(f"{configuration.name}: {worn.status.kind}, {strides} of {gait.name}{along}", *first_lines(worn)),
         parts=(
             Part(said=[text for text in set_up if text], is_detail=True),
             *task_sequence_parts(comparison),
@@ -297,12 +314,28 @@ def comparison_table(comparison: Comparison) -> list[Column]:
     columns: list[tuple[str, dict[str, float | str | None]]] = []
     for head, metrics in (*walked, ("healthy", comparison.healthy)):
         values: dict[str, float | str | None] = {"body_mass": walk_of(worn.scenario).wearer.body_mass}
+        values |= per_stride_values(metrics)
         values |= {name: toes(one.value) if name == "lowest_toes" else one.value for name, one in metrics.items()}
         columns.append((head, values))
+    columns[0][1][LARGEST_TORQUE] = worn.scenario.controller.settings.get(LARGEST_TORQUE)
     # The positive work of a healthy ankle is what the device's is a share of.
     if "positive_push_off_work" in comparison.healthy:
         columns[-1][1]["push_off_share"] = 1.0
     return metrics_table(_ROWS, columns)
+
+
+def per_stride_values(metrics: Mapping[str, Metric]) -> dict[str, float | None]:
+    """Return the reversals of the command per stride of a walk that has whole strides."""
+    strides = metrics["strides"].value if "strides" in metrics else 0.0
+    if "command_reversals" not in metrics or strides == 0.0:
+        return {}
+    return {REVERSALS_PER_STRIDE: metrics["command_reversals"].value / strides}
+
+
+def first_lines(worn: WalkResult) -> list[str]:
+    """Return that the torque loop oscillates, where it does, and the gains in force with where they come from."""
+    in_force = gains_of(worn.scenario, law_of(worn.scenario))
+    return [item.sentence for item in (worn.oscillation, in_force) if item is not None]
 
 
 def strides_csv(result: WalkResult) -> bytes:

@@ -3,6 +3,7 @@
 from typing import Annotated, NamedTuple
 
 from ppafo.control.kind import ControllerKind
+from ppafo.control.torque_loop import BOUNDARY, INTEGRAL_GAIN, INTEGRAL_RATE, PROPORTIONAL_GAIN
 from ppafo.model.declaration import Number, Quantity, quantities_of
 from ppafo.model.sensors import Measurement
 
@@ -10,14 +11,22 @@ from ppafo.model.sensors import Measurement
 class PidParameters(NamedTuple):
     """Gains [1/(N m)], [1/(N m s)], [s/(N m)]; time constant of the derivative filter [s]; back-calculation [1/s]."""
 
-    proportional_gain: Annotated[float, Number("1/(N m)", "k_p", 0.095, 0.0, 1.0e3)]
-    integral_gain: Annotated[float, Number("1/(N m s)", "k_i", 0.25, 0.0, 1.0e4)]
-    derivative_gain: Annotated[float, Number("s/(N m)", "k_d", 0.006, 0.0, 1.0e3)]
+    proportional_gain: Annotated[float, Number("1/(N m)", "k_p", None, 0.0, 1.0e3, follows=(PROPORTIONAL_GAIN,))]
+    integral_gain: Annotated[float, Number("1/(N m s)", "k_i", None, 0.0, 1.0e6, follows=(INTEGRAL_GAIN,))]
+    derivative_gain: Annotated[float, Number("s/(N m)", "k_d", 0.0, 0.0, 1.0e3)]
     derivative_filter: Annotated[
         float, Number("s", "time constant of the derivative filter, 0 for none", 0.0, 0.0, 1.0)
     ]
     anti_windup: Annotated[
-        float, Number("1/s", "rate of back-calculation while the command is clipped, 0 for none", 0.0, 0.0, 1.0e3)
+        float,
+        Number(
+            "1/s",
+            "rate of back-calculation while the command is clipped, 0 for none",
+            None,
+            0.0,
+            1.0e5,
+            follows=(INTEGRAL_RATE,),
+        ),
     ]
 
 
@@ -70,7 +79,7 @@ def pid_restart(state: PidState, requested: float, continues: float) -> PidState
 PID = ControllerKind(
     name="pid",
     summary="Proportional, integral and derivative action on the torque error.",
-    source="the paper, equation (13); gains k_p 0.095, k_i 0.25, k_d 0.006",
+    source="the paper, equation (13); gains that are not given: Skogestad 2003, Simple analytic rules",
     quantities=quantities_of(PidParameters),
     parameters=PidParameters,
     initial=PidState(integral=0.0, error=0.0, slope=0.0, started=0.0),
@@ -82,9 +91,14 @@ PID = ControllerKind(
 class SlidingModeParameters(NamedTuple):
     """Slope of the surface [1/s], half width of the boundary layer [N m], command outside of it [-]."""
 
-    surface_slope: Annotated[float, Number("1/s", "weight of the error's integral in the surface", 14.0, 0.0, 1.0e3)]
-    boundary_layer: Annotated[float, Number("N m", "half width of the layer without switching", 0.13, 1.0e-6, 100.0)]
-    reaching_command: Annotated[float, Number("", "command outside the layer", 0.14, 0.0, 1.0)]
+    surface_slope: Annotated[
+        float,
+        Number("1/s", "weight of the error's integral in the surface", None, 0.0, 1.0e5, follows=(INTEGRAL_RATE,)),
+    ]
+    boundary_layer: Annotated[
+        float, Number("N m", "half width of the layer without switching", None, 1.0e-6, 1.0e4, follows=(BOUNDARY,))
+    ]
+    reaching_command: Annotated[float, Number("", "command outside the layer", 1.0, 0.0, 1.0)]
 
 
 class SlidingModeState(NamedTuple):
@@ -147,9 +161,11 @@ class DampedProportionalParameters(NamedTuple):
 class DampedGains(NamedTuple):
     """Gain [1/(N m)], damping [s/(N m)], time constant of its filter [s]."""
 
-    proportional_gain: Annotated[float, Number("1/(N m)", "command per torque error", 1.7, 0.0, 1.0e3)]
-    damping: Annotated[float, Number("s/(N m)", "command per rate of the torque, against it", 0.0067, 0.0, 1.0e3)]
-    damping_filter: Annotated[float, Number("s", "time constant of the filter on the torque's rate", 0.0011, 0.0, 10.0)]
+    proportional_gain: Annotated[
+        float, Number("1/(N m)", "command per torque error", None, 0.0, 1.0e3, follows=(PROPORTIONAL_GAIN,))
+    ]
+    damping: Annotated[float, Number("s/(N m)", "command per rate of the torque, against it", 0.0, 0.0, 1.0e3)]
+    damping_filter: Annotated[float, Number("s", "time constant of the filter on the torque's rate", 0.001, 0.0, 10.0)]
 
 
 class TorqueSlope(NamedTuple):

@@ -9,7 +9,8 @@ from typing import Annotated, NamedTuple
 
 from ppafo.control.controllers.feedback import PidParameters, PidState, pid_command, pid_restart
 from ppafo.control.kind import ControllerKind
-from ppafo.model.declaration import Number, Quantity, quantities_of
+from ppafo.control.torque_loop import CONVERGENCE
+from ppafo.model.declaration import NOMINAL, Number, Quantity, quantities_of
 from ppafo.model.plant import chamber_1_volume, chamber_2_volume
 from ppafo.model.sensors import Measurement
 
@@ -17,28 +18,31 @@ SMALLEST_GAIN = 1.0e-3
 """N m/s: where full opening changes the torque no faster, the valve opens fully and the result is clipped."""
 
 
+def _believed(name: str, unit: str, what: str, minimum: float, maximum: float) -> Quantity:
+    """A number of the device that a law believes, the device's own unless it is given."""
+    return Quantity("", unit, f"believed {what}", None, minimum, maximum, follows=(NOMINAL[name],))
+
+
 class NominalChambers(NamedTuple):
     """The believed device, SI units; conductances are Cd A C1 [kg/(s Pa)], ``gas_product`` is R T / M [J/kg]."""
 
-    torque_constant: Annotated[float, Number("m^3", "believed K_actuator", 1.451e-5, 1.0e-9, 1.0)]
-    displacement_per_radian: Annotated[float, Number("m^3/rad", "believed B_vane", 1.451e-5, 1.0e-9, 1.0)]
-    angle_min: Annotated[float, Number("rad", "believed lower stop", math.radians(20.0), -10.0, 10.0)]
-    angle_max: Annotated[float, Number("rad", "believed upper stop", math.radians(130.0), -10.0, 10.0)]
-    dead_volume_1: Annotated[float, Number("m^3", "believed dead volume of chamber 1", 3.6e-5, 1.0e-9, 1.0)]
-    dead_volume_2: Annotated[float, Number("m^3", "believed dead volume of chamber 2", 3.6e-5, 1.0e-9, 1.0)]
-    gas_product: Annotated[float, Number("J/kg", "believed R T / M, of CO2 at 298 K", 5.6308454545e4, 1.0e3, 1.0e7)]
+    torque_constant: Annotated[float, _believed("torque_constant", "m^3", "K_actuator", 1.0e-9, 1.0)]
+    displacement_per_radian: Annotated[float, _believed("displacement_per_radian", "m^3/rad", "B_vane", 1.0e-9, 1.0)]
+    angle_min: Annotated[float, _believed("angle_min", "rad", "lower stop", -10.0, 10.0)]
+    angle_max: Annotated[float, _believed("angle_max", "rad", "upper stop", -10.0, 10.0)]
+    dead_volume_1: Annotated[float, _believed("dead_volume_1", "m^3", "dead volume of chamber 1", 1.0e-9, 1.0)]
+    dead_volume_2: Annotated[float, _believed("dead_volume_2", "m^3", "dead volume of chamber 2", 1.0e-9, 1.0)]
+    gas_product: Annotated[float, _believed("gas_product", "J/kg", "R T / M", 1.0e3, 1.0e7)]
     valve_conductance: Annotated[
-        float, Number("kg/(s Pa)", "believed Cd A C1 of the valve", 1.0040962467e-8, 1.0e-15, 1.0)
+        float, _believed("valve_conductance", "kg/(s Pa)", "Cd A C1 of the valve", 1.0e-15, 1.0)
     ]
-    leak_conductance: Annotated[float, Number("kg/(s Pa)", "believed Cd A C1 of the leak", 9.532559304e-11, 0.0, 1.0)]
-    critical_ratio: Annotated[
-        float, Number("", "believed critical pressure ratio, ISO 6358", 0.545727733814, 0.01, 0.95)
-    ]
-    supply_pressure: Annotated[float, Number("Pa_a", "believed pressure to chamber 1", 446062.864658, 1.0e3, 1.0e8)]
+    leak_conductance: Annotated[float, _believed("leak_conductance", "kg/(s Pa)", "Cd A C1 of the leak", 0.0, 1.0)]
+    critical_ratio: Annotated[float, _believed("critical_ratio", "", "critical pressure ratio, ISO 6358", 0.01, 0.95)]
+    supply_pressure: Annotated[float, _believed("supply_pressure", "Pa_a", "pressure to chamber 1", 1.0e3, 1.0e8)]
     dorsiflexion_pressure: Annotated[
-        float, Number("Pa_a", "believed pressure to chamber 2", 446062.864658, 1.0e3, 1.0e8)
+        float, _believed("dorsiflexion_pressure", "Pa_a", "pressure to chamber 2", 1.0e3, 1.0e8)
     ]
-    atmospheric_pressure: Annotated[float, Number("Pa_a", "believed atmosphere", 101325.0, 1.0e3, 1.0e8)]
+    atmospheric_pressure: Annotated[float, _believed("atmospheric_pressure", "Pa_a", "atmosphere", 1.0e3, 1.0e8)]
 
 
 class TorqueRates(NamedTuple):
@@ -50,7 +54,7 @@ class TorqueRates(NamedTuple):
 
 
 NOMINAL_QUANTITIES = quantities_of(NominalChambers)
-"""Fields of ``NominalChambers`` in order; the defaults come from the set ppafo2011 with its proportional valve."""
+"""Fields of ``NominalChambers`` in order; each is the device's unless given."""
 
 
 def ellipse_flow(pressure_a: float, pressure_b: float, conductance: float, critical_ratio: float) -> float:
@@ -161,11 +165,7 @@ PID_FEEDFORWARD = ControllerKind(
     summary="PID on the torque error, with feed-forward from a valve model along the reference.",
     source="the paper, equation (13), with the inverse of equations (2) to (9); Åström and Hägglund 2006, Advanced PID",
     quantities=(
-        Quantity("proportional_gain", "1/(N m)", "k_p", 1.1, 0.0, 1.0e3),
-        Quantity("integral_gain", "1/(N m s)", "k_i", 3.3, 0.0, 1.0e5),
-        Quantity("derivative_gain", "s/(N m)", "k_d", 0.0061, 0.0, 1.0e3),
-        Quantity("derivative_filter", "s", "time constant of the filter on the slope of the error", 0.0025, 0.0, 10.0),
-        Quantity("anti_windup", "1/s", "rate at which the integral is pulled back, 0 for none", 0.33, 0.0, 1.0e4),
+        *quantities_of(PidParameters),
         Quantity("feedforward", "", "weight of the feed-forward, 0 for none", 1.0, 0.0, 2.0),
         *NOMINAL_QUANTITIES,
     ),
@@ -179,8 +179,10 @@ PID_FEEDFORWARD = ControllerKind(
 class FeedbackLinearisationParameters(NamedTuple):
     """Decay rate of the error [1/s], filter of the angle's rate [s], and the believed device."""
 
-    convergence_rate: Annotated[float, Number("1/s", "rate at which the torque error decays", 93.0, 0.0, 1.0e5)]
-    rate_filter: Annotated[float, Number("s", "time constant of the filter on the angle's rate", 0.0054, 0.0, 10.0)]
+    convergence_rate: Annotated[
+        float, Number("1/s", "rate at which the torque error decays", None, 0.0, 1.0e6, follows=(CONVERGENCE,))
+    ]
+    rate_filter: Annotated[float, Number("s", "time constant of the filter on the angle's rate", 0.0018, 0.0, 10.0)]
     nominal: NominalChambers
 
 

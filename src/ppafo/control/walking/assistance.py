@@ -7,8 +7,6 @@ The profile has the four parameters that the exoskeleton literature uses, of J. 
 zero, a smooth rise to the peak, a smooth fall, zero; cubic with level ends.
 """
 
-from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any, NamedTuple, Protocol
 
 from ppafo.control.walking import phases, safety
@@ -88,12 +86,6 @@ PEAKS = ("peak_torque", "landing_peak_torque", "swing_peak_torque")
 
 ASSISTING_QUANTITIES = (*ASSISTANCE_QUANTITIES, *PHASE_QUANTITIES, *SAFETY_QUANTITIES)
 """Settings that every law with ``assistance`` declares after its own."""
-
-
-def with_defaults(quantities: tuple[Quantity, ...], defaults: Mapping[str, float]) -> tuple[Quantity, ...]:
-    """The quantities of a law with other defaults [SI] for walking, by name; the others keep theirs."""
-    assert set(defaults) <= {item.name for item in quantities}, "a default belongs to a quantity"
-    return tuple(replace(item, default=defaults.get(item.name, item.default)) for item in quantities)
 
 
 class Hold(NamedTuple):

@@ -1,24 +1,24 @@
 """Every controller of walking by name, and the frame in which a torque law walks.
 
 The phases of the gait say which torque is requested, safety watches, the law follows the request. The frame is one for
-all laws. What differs is data: the law, its gains for walking, and what it remembers where another task of the gait
-begins. A torque law of ``control.catalog`` walks by its own name, with no line here; a line gives it gains for walking.
+all laws. What differs is data: the law, and what it remembers where another task of the gait begins. A torque law of
+``control.catalog`` walks by its own name, with no line here; a line says what it is in walking.
 A law with ideas of its own of the phases is a module of this folder with a ``ControllerKind``, listed here: its
 ``update`` watches the sensors with ``safety.monitor`` and passes its command through ``safety.safe_command``.
 """
 
 import collections
 import functools
-import types
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Annotated, Any, NamedTuple
 
+from ppafo.control.binding import bind
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.controllers import feedback, model_based, switching
 from ppafo.control.kind import ControllerKind
+from ppafo.control.torque_loop import INTEGRAL_GAIN, PROPORTIONAL_GAIN
 from ppafo.control.walking import assistance, event_on_off, learning, phases, safety
-from ppafo.control.walking.assistance import ASSISTING_QUANTITIES, Assistance, TorqueRequest, assess, with_defaults
+from ppafo.control.walking.assistance import ASSISTING_QUANTITIES, Assistance, TorqueRequest, assess
 from ppafo.control.walking.estimated_timing import ESTIMATED
 from ppafo.control.walking.fault_checks import SafetyRules
 from ppafo.control.walking.phases import PhaseRules, PhaseState
@@ -90,20 +90,6 @@ def law_that_walks_update(
     )
 
 
-def bind(frame: Callable[..., Any], name: str, components: Mapping[str, Any]) -> Callable[..., Any]:
-    """Return the function of a frame in which some names of this module stand for other components.
-
-    The code is the same and only those names differ, so that the engine compiles it as any other function.
-    """
-    assert isinstance(frame, types.FunctionType), "a frame is a plain function"
-    made = types.FunctionType(frame.__code__, {**frame.__globals__, **components}, name)
-    made.__qualname__ = name
-    # The name and module decide the name in the composed text, where two laws must not share one.
-    made.__module__ = frame.__module__
-    made.__annotations__ = frame.__annotations__
-    return made
-
-
 def row_with(name: str, row: Any, **classes: type) -> Any:
     """Return a NamedTuple class like ``row``, whose named fields have the given classes."""
     namedtuple: Any = collections.namedtuple
@@ -118,8 +104,8 @@ def shared_settings(law: ControllerKind) -> set[str]:
 
 
 @functools.cache
-def walking_law(law: ControllerKind, name: str, summary: str, gains: tuple[tuple[str, float], ...]) -> ControllerKind:
-    """Return a torque law as a controller of walking, with ``gains`` in place of its own defaults, in SI units.
+def walking_law(law: ControllerKind, name: str, summary: str) -> ControllerKind:
+    """Return a torque law as a controller of walking.
 
     ScenarioError where a setting of the law has the name of one of walking.
     """
@@ -142,7 +128,7 @@ def walking_law(law: ControllerKind, name: str, summary: str, gains: tuple[tuple
         name=name,
         summary=summary,
         source=f"the paper, figure 1A (phases); {law.source}",
-        quantities=(*with_defaults(law.quantities, dict(gains)), *ASSISTING_QUANTITIES),
+        quantities=(*law.quantities, *ASSISTING_QUANTITIES),
         parameters=parameters,
         initial=state(
             phase=phases.START,
@@ -159,9 +145,12 @@ def walking_law(law: ControllerKind, name: str, summary: str, gains: tuple[tuple
 class ProportionalParameters(NamedTuple):
     """Gains on the torque error [1/(N m)] and its integral [1/(N m s)]."""
 
-    torque_gain: Annotated[float, Number("1/(N m)", "opening per torque error", 1.3, 0.0, 1.0e3)]
+    torque_gain: Annotated[
+        float, Number("1/(N m)", "opening per torque error", None, 0.0, 1.0e3, follows=(PROPORTIONAL_GAIN,))
+    ]
     torque_integral_gain: Annotated[
-        float, Number("1/(N m s)", "opening per integral of the torque error", 0.2, 0.0, 1.0e3)
+        float,
+        Number("1/(N m s)", "opening per integral of the torque error", None, 0.0, 1.0e6, follows=(INTEGRAL_GAIN,)),
     ]
 
 
@@ -204,66 +193,22 @@ PROPORTIONAL = ControllerKind(
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Walking:
-    """A torque law with gains for walking, in SI units, and what follows the torque profiles, in words."""
-
-    law: ControllerKind
-    following: str
-    gains: tuple[tuple[str, float], ...] = ()
-
-
-LAWS = (
-    Walking(
-        switching.ON_OFF_DEAD_ZONE,
-        "on/off switching with a dead zone",
-        (("dead_zone", 0.21), ("release", 0.031), ("opening", 0.77)),
-    ),
-    Walking(PROPORTIONAL, "proportional and integral action"),
-    Walking(
-        feedback.PID,
-        "a PID with anti-windup",
-        (
-            ("proportional_gain", 1.5),
-            ("integral_gain", 100.0),
-            ("derivative_gain", 0.033),
-            ("derivative_filter", 0.0023),
-            ("anti_windup", 97.0),
-        ),
-    ),
-    Walking(
-        model_based.PID_FEEDFORWARD,
-        "a PID and the inverse of a valve model",
-        (
-            ("proportional_gain", 1.2),
-            ("integral_gain", 53.0),
-            ("derivative_gain", 0.02),
-            ("derivative_filter", 0.0012),
-            ("anti_windup", 34.0),
-        ),
-    ),
-    Walking(
-        feedback.SLIDING_MODE,
-        "a sliding mode law with a boundary layer",
-        (("surface_slope", 71.0), ("boundary_layer", 0.35), ("reaching_command", 0.78)),
-    ),
-    Walking(
-        model_based.FEEDBACK_LINEARISATION,
-        "inverting the chamber dynamics",
-        (("convergence_rate", 91.0), ("rate_filter", 0.0018)),
-    ),
+LAWS: tuple[tuple[ControllerKind, str], ...] = (
+    (switching.ON_OFF_DEAD_ZONE, "on/off switching with a dead zone"),
+    (PROPORTIONAL, "proportional and integral action"),
+    (feedback.PID, "a PID with anti-windup"),
+    (model_based.PID_FEEDFORWARD, "a PID and the inverse of a valve model"),
+    (feedback.SLIDING_MODE, "a sliding mode law with a boundary layer"),
+    (model_based.FEEDBACK_LINEARISATION, "inverting the chamber dynamics"),
 )
-"""Gains found by search, one law at a time."""
+"""Torque laws with what follows the torque profiles, in words."""
 
 
 _EVENT_BASED = {
-    item.law.name: walking_law(
-        item.law,
-        f"event_{item.law.name}",
-        f"Event-based torque profiles for each phase, tracked by {item.following}.",
-        item.gains,
+    law.name: walking_law(
+        law, f"event_{law.name}", f"Event-based torque profiles for each phase, tracked by {following}."
     )
-    for item in LAWS
+    for law, following in LAWS
 }
 _ORDER = (
     event_on_off.EVENT_ON_OFF,
@@ -276,13 +221,13 @@ _ORDER = (
 WALKING_CONTROLLERS: Kinds[ControllerKind] = Kinds(
     "ppafo.walking_controllers", "controller of walking", ControllerKind, {kind.name: kind for kind in _ORDER}
 )
-"""Controllers with gains for walking, which compete with each other."""
+"""Controllers that compete with each other in walking."""
 
 
 def walking_controllers() -> dict[str, ControllerKind]:
-    """Return all controllers that a walk file can name: with gains for walking, and every torque law by its own name.
+    """Return all controllers that a walk file can name: those of walking, and every torque law by its own name.
 
-    A law that has gains for walking has them under its own name too: ``pid`` is ``event_pid``. A constant command
+    A law that is one of walking is so under its own name too: ``pid`` is ``event_pid``. A constant command
     follows no torque and does not walk, nor does a fixed-point law or one whose settings have names that walking
     has taken.
     """
@@ -312,12 +257,12 @@ def reads_gait(kind: ControllerKind) -> bool:
 
 
 def law_that_walks(law: ControllerKind) -> ControllerKind:
-    """Return any torque law as a controller of walking, with its gains for walking where the catalogue has some."""
-    # A law of another package may have the name of one of ours, and must not get its gains.
+    """Return any torque law as a controller of walking."""
+    # A law of another package may have the name of one of ours.
     if law.name in _EVENT_BASED and CONTROLLERS.get(law.name) is law:
         return _EVENT_BASED[law.name]
-    summary = f"Torque profiles for each phase, tracked by the law {law.name} with its own gains."
-    return walking_law(law, law.name, summary, ())
+    summary = f"Torque profiles for each phase, tracked by the law {law.name}."
+    return walking_law(law, law.name, summary)
 
 
 TIMINGS: Kinds[TimingKind] = Kinds(

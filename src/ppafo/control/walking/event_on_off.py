@@ -22,7 +22,10 @@ from ppafo.model.valves.kind import VENT
 
 
 class EventOnOffParameters(NamedTuple):
-    """Angle of the lifted foot [rad], band about it [rad], end of push-off [turns], rules of phases, safety, timing."""
+    """Angle of the lifted foot [rad], band about it [rad], end of push-off [turns], largest torque [N m].
+
+    Then rules of phases, safety and timing.
+    """
 
     swing_angle: Annotated[float, Number("rad", "angle at which the foot is kept in the swing", 1.68, 0.5, 2.5)]
     band: Annotated[
@@ -31,18 +34,30 @@ class EventOnOffParameters(NamedTuple):
     push_off_end: Annotated[
         float, Number("1", "fraction of the stride time at which the push-off is over", 0.565, 0.1, 1.0)
     ]
+    largest_torque: Annotated[
+        float,
+        Number(
+            "N m", "torque, either direction, at which the chamber is vented until half of it is left", 5.0, 0.0, 1.0e3
+        ),
+    ]
     phases: PhaseRules
     safety: SafetyRules
     timing: ThresholdRules
 
 
 class EventOnOffState(NamedTuple):
-    """Phase, clock, safety, and whether the foot is to be lifted (1)."""
+    """Phase, clock, safety, whether the foot is to be lifted (1), and whether a torque too large is let go (1)."""
 
     phase: PhaseState
     clock: ThresholdClock
     safety: SafetyState
     lifting: float
+    resting: float
+
+
+def is_resting(largest_torque: float, before: float, torque: float) -> bool:
+    """Return whether a torque [N m] is let go: from the largest one on, until half of it is left."""
+    return abs(torque) > (0.5 * largest_torque if before > 0.5 else largest_torque)
 
 
 def update(
@@ -65,8 +80,13 @@ def update(
     # Vented before toe-off, so that the gas does not hold the foot down in the swing.
     in_time = time.since_strike < parameters.push_off_end * phase.stride_time
     command = 1.0 if phase.phase == PUSH_OFF and in_time else command
+    # Of what the valve feeds alone: a torque against it is the wearer's.
+    rests = is_resting(parameters.largest_torque, state.resting, measurement.torque)
+    command = VENT if rests and command * measurement.torque > 0.0 else command
     command, watch = safety.safe_command(watch, phase.phase, command, period)
-    return command, EventOnOffState(phase=phase, clock=clock, safety=watch, lifting=lifting if held else 0.0)
+    return command, EventOnOffState(
+        phase=phase, clock=clock, safety=watch, lifting=lifting if held else 0.0, resting=1.0 if rests else 0.0
+    )
 
 
 EVENT_ON_OFF = ControllerKind(
@@ -75,7 +95,7 @@ EVENT_ON_OFF = ControllerKind(
     source="the paper, figure 1A and section 'PPAFO Hardware': binary, event-based control",
     quantities=(*quantities_of(EventOnOffParameters), *NOMINAL_QUANTITIES),
     parameters=EventOnOffParameters,
-    initial=EventOnOffState(phase=phases.START, clock=ThresholdClock(), safety=safety.START, lifting=0.0),
+    initial=EventOnOffState(phase=phases.START, clock=ThresholdClock(), safety=safety.START, lifting=0.0, resting=0.0),
     update=update,
     only_switches=True,
 )

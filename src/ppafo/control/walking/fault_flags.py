@@ -82,7 +82,11 @@ FAULT_FLAGS = {
         SEEN,
     ),
     (VALVE_SHUT := 10.0): FaultFlag(
-        "valve_shut", STOPPED, "a vented chamber keeps its gas: a valve stuck shut, or a hose kinked", PRESSURES, SEEN
+        "valve_shut",
+        STOPPED,
+        "a vented chamber has too much gas: a valve stuck shut, a hose kinked, or a leak across the vane",
+        PRESSURES,
+        SEEN,
     ),
     (LEAK := 11.0): FaultFlag("leak", STOPPED, "a chamber loses gas that its valve keeps in: a leak", PRESSURES, SEEN),
     (PRESSURE_SENSOR := 12.0): FaultFlag(

@@ -15,6 +15,7 @@ from typing import Annotated, NamedTuple
 from ppafo.control.controllers import feedback
 from ppafo.control.controllers.feedback import DampedGains, TorqueSlope, damped_command
 from ppafo.control.kind import ControllerKind
+from ppafo.control.torque_loop import LEAD, LEARNING_GAIN
 from ppafo.control.walking import assistance, phases, safety
 from ppafo.control.walking.assistance import (
     ASSISTING_QUANTITIES,
@@ -22,7 +23,6 @@ from ppafo.control.walking.assistance import (
     TorqueProfile,
     TorqueRequest,
     assess,
-    with_defaults,
 )
 from ppafo.control.walking.fault_checks import SafetyRules
 from ppafo.control.walking.phases import PhaseRules, PhaseState
@@ -39,10 +39,21 @@ class LearningRules(NamedTuple):
     """Gain [1/(N m)], fraction of a knot that a stride forgets [-], lead [s]."""
 
     learning_gain: Annotated[
-        float, Number("1/(N m)", "command learnt per mean torque error of a stride", 0.67, 0.0, 1.0e3)
+        float,
+        Number(
+            "1/(N m)",
+            "command learnt per mean torque error of a stride",
+            None,
+            0.0,
+            1.0e3,
+            follows=(LEARNING_GAIN,),
+        ),
     ]
     forgetting: Annotated[float, Number("1", "fraction of what was learnt that a stride forgets", 0.005, 0.0, 1.0)]
-    lead: Annotated[float, Number("s", "time by which the table is read ahead of where it was learnt", 0.02, 0.0, 0.2)]
+    lead: Annotated[
+        float,
+        Number("s", "time by which the table is read ahead of where it was learnt", None, 0.0, 0.5, follows=(LEAD,)),
+    ]
 
 
 class LearntTable(NamedTuple):
@@ -200,19 +211,12 @@ def update(
     )
 
 
-TUNED = {
-    "proportional_gain": 1.4,
-    "damping": 0.0046,
-    "damping_filter": 0.001,
-}
-"""SI units; found by search."""
-
 KIND = ControllerKind(
     name="event_damped_learning",
     summary="Event-based torque profiles for each phase, tracked by damped control that learns the push-off.",
     source=f"the paper, figure 1A (phases); {feedback.DAMPED_PROPORTIONAL.source}",
     quantities=(
-        *with_defaults(feedback.GAIN_QUANTITIES, TUNED),
+        *feedback.GAIN_QUANTITIES,
         *quantities_of(LearningRules),
         *ASSISTING_QUANTITIES,
     ),

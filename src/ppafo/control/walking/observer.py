@@ -39,7 +39,8 @@ class NominalDevice(NamedTuple):
 
     ``nominal_flow`` is R T times the valve's conductance [m^3/s]: content that a choked flow moves in a second, over
     the pressure before it. ``nominal_pair`` is 1 for on/off valves that vent where they do not feed, else 0: a spool
-    with a vent valve, which follows its command with ``nominal_lag`` beyond ``nominal_dead_band``.
+    with a vent valve, which follows its command after ``nominal_delay`` with ``nominal_lag`` beyond
+    ``nominal_dead_band``.
     ``nominal_joining_time`` is how long both chambers are joined after chamber 1 was fed. ``nominal_lines`` count gas
     as its content p V [J]; a volume of 0 stands for a supply that needs none.
     """
@@ -59,6 +60,7 @@ class NominalDevice(NamedTuple):
     nominal_opening_delay: float
     nominal_closing_delay: float
     nominal_switching_interval: float
+    nominal_delay: float
     nominal_lag: float
     nominal_dead_band: float
     nominal_joining_time: float
@@ -98,6 +100,7 @@ NOMINAL_QUANTITIES = (
     _nominal("opening_delay", "s", "time from energising a coil to flow", 1.0),
     _nominal("closing_delay", "s", "time from de-energising it to venting", 1.0),
     _nominal("switching_interval", "s", "shortest time between two switchings of a coil", 1.0),
+    _nominal("delay", "s", "dead time of a spool", 1.0),
     _nominal("lag", "s", "time after which a spool has followed", 1.0),
     _nominal("dead_band", "", "smallest command that opens a spool", 0.99),
     _nominal("joining_time", "s", "time for which the chambers are joined after chamber 1 was fed", 10.0),
@@ -125,6 +128,14 @@ class Coil(NamedTuple):
     waits: float
 
 
+class OnTheWay(NamedTuple):
+    """A command on its way to a spool [-], a third of the dead time behind it each."""
+
+    first: float
+    second: float
+    third: float
+
+
 class Chamber(NamedTuple):
     """Content p V [J], pressure expected of its sensor [Pa], gas that passed lately [J], time of an alarm [s].
 
@@ -149,6 +160,7 @@ class Observer(NamedTuple):
     command: float
     coil_1: Coil
     coil_2: Coil
+    on_the_way: OnTheWay
     spool: float
     joined: float
     lines: LineState
@@ -158,7 +170,10 @@ LONG_AGO = 1.0e9
 _EMPTY = Chamber(content=0.0, pressure=0.0, passed=0.0, contrary=0.0, least=0.0)
 _OFF = Coil(position=0.0, target=0.0, since=LONG_AGO, waits=0.0)
 _FULL = LineState(mass_1=0.0, mass_2=0.0, regulated_mass=0.0)
-START = Observer(_EMPTY, _EMPTY, command=2.0, coil_1=_OFF, coil_2=_OFF, spool=0.0, joined=0.0, lines=_FULL)
+_AT_REST = OnTheWay(first=0.0, second=0.0, third=0.0)
+START = Observer(
+    _EMPTY, _EMPTY, command=2.0, coil_1=_OFF, coil_2=_OFF, on_the_way=_AT_REST, spool=0.0, joined=0.0, lines=_FULL
+)
 
 FORGETS = 0.128
 """Time [s] in which contents follow what is measured, and gas that has passed is forgotten."""
@@ -222,10 +237,25 @@ def next_coil(nominal: NominalDevice, coil: Coil, wanted: float, period: float) 
     ), before * coil.position + (1.0 - before) * target
 
 
-def next_spool(nominal: NominalDevice, spool: float, command: float, period: float) -> float:
-    """Opening of a spool [-], -1 to 1, after a sample [s] with a command; it rests in the middle while all vents."""
+def next_on_the_way(nominal: NominalDevice, on_the_way: OnTheWay, target: float, period: float) -> OnTheWay:
+    """A command on its way after a sample [s] with a ``target`` [-]: three lags, which together last the dead time.
+
+    So the gas that passes is right in the mean; a line of all samples of a dead time would have no end.
+    """
+    share = period / (period + nominal.nominal_delay / 3.0)
+    first = on_the_way.first + (target - on_the_way.first) * share
+    second = on_the_way.second + (first - on_the_way.second) * share
+    return OnTheWay(first=first, second=second, third=on_the_way.third + (second - on_the_way.third) * share)
+
+
+def opening_of(nominal: NominalDevice, command: float) -> float:
+    """Opening of a spool [-], -1 to 1, that a command asks for; it rests in the middle while all vents."""
     size = max(min(abs(command), 1.0) - nominal.nominal_dead_band, 0.0) / (1.0 - nominal.nominal_dead_band)
-    target = 0.0 if command > VENTS_ABOVE else (size if command >= 0.0 else -size)
+    return 0.0 if command > VENTS_ABOVE else (size if command >= 0.0 else -size)
+
+
+def next_spool(nominal: NominalDevice, spool: float, target: float, period: float) -> float:
+    """Opening of a spool [-], -1 to 1, after a sample [s] in which it is asked for a ``target``."""
     return spool + (target - spool) * period / (period + nominal.nominal_lag)
 
 
@@ -327,7 +357,8 @@ def next_observer(
     vents = command > VENTS_ABOVE
     coil_1, on_1 = next_coil(nominal, state.coil_1, 1.0 if (command > 0.0) & (not vents) else 0.0, period)
     coil_2, on_2 = next_coil(nominal, state.coil_2, 1.0 if command < 0.0 else 0.0, period)
-    spool, is_pair = next_spool(nominal, state.spool, command, period), nominal.nominal_pair > 0.5
+    on_the_way = next_on_the_way(nominal, state.on_the_way, opening_of(nominal, command), period)
+    spool, is_pair = next_spool(nominal, state.spool, on_the_way.third, period), nominal.nominal_pair > 0.5
     towards_1, towards_2 = max(spool, 0.0), max(-spool, 0.0)
     # A pair feeds by its coils' mean positions, a spool by its opening to either side.
     source_1, source_2 = on_1 if is_pair else towards_1, on_2 if is_pair else towards_2
@@ -366,6 +397,7 @@ def next_observer(
         command=command,
         coil_1=coil_1,
         coil_2=coil_2,
+        on_the_way=on_the_way,
         spool=spool,
         joined=joined,
         lines=next_lines(nominal, lines, taken_1, taken_2, period),

@@ -131,7 +131,7 @@ class Delays(NamedTuple):
     ]
     valve_delay: Annotated[
         float,
-        Number("s", "how late the valve follows; its dead time unless given", None, 0.0, 0.2, follows=(VALVE_DELAY,)),
+        Number("s", "how late the valve follows: its dead time", None, 0.0, 0.2, follows=(VALVE_DELAY,)),
     ]
 
 

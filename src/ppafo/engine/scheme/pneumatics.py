@@ -91,7 +91,8 @@ def plant_with_leak_at(plant: PlantParameters, pressure_1: float, pressure_2: fl
 
     The matrix of a step takes this leak as constant: the method keeps its order with any matrix.
     """
-    return plant._replace(leak_conductance=leakage_path(plant.leak_conductance, pressure_1, pressure_2))
+    conductance = leakage_path(plant.leak_conductance, pressure_1, pressure_2, plant.leak_curve)
+    return plant._replace(leak_conductance=conductance)
 
 
 def plant_with_joined_chambers(plant: PlantParameters, opening: float) -> PlantParameters:

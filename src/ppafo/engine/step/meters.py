@@ -48,7 +48,7 @@ def foot_of(parts: Program, lane: Lane, time: float) -> FootSample:
     """The foot on the shank of a gait at a time [s]; zeros where there is none."""
     if parts.foot is not None and parts.is_on_gait:
         return parts.foot.sample(parts, lane, time)
-    return FootSample(*(0.0 for _ in FootSample._fields))
+    return NO_FOOT
 
 
 def stride_of(parts: Program, lane: Lane, number: int, interval: float) -> StrideSample:

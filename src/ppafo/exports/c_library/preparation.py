@@ -87,12 +87,14 @@ def following_text(settings: Sequence[Setting], links: Graph, collector: SourceC
 
 def _term(term: Term, rows: list[str], collector: SourceCollector) -> str:
     """A term of what is followed; structs that only it has are added to ``rows``."""
-    given = ", ".join(map(c_identifier, term.sources))
-    if term.settings is not None:
-        row = f"Followed{len(rows)}"
-        rows.append(f"{row} = namedtuple({row!r}, {[item.name for item in quantities_of(term.settings)]!r})")
-        given = f"{row}({given})"
-    return f"{collector.add(term.function)}({given})"
+
+    def filled(row: type, numbers: Sequence[str]) -> str:
+        name = f"Followed{len(rows)}"
+        rows.append(f"{name} = namedtuple({name!r}, {[item.name for item in quantities_of(row)]!r})")
+        return f"{name}({', '.join(numbers)})"
+
+    given = term.arguments([c_identifier(source) for source in term.sources], filled)
+    return f"{collector.add(term.function)}({', '.join(given)})"
 
 
 def _written(sign: str, is_reflected: bool = False) -> "Callable[[Written, Written | float], Written]":

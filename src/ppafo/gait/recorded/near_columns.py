@@ -24,12 +24,10 @@ def _likeness(missing: str, name: str) -> float:
     (wanted, axis), (found, other_axis) = _parts(missing), _parts(name)
     if axis != other_axis:
         return 0.0
-    if _PLUG_IN.fullmatch(wanted) and _PLUG_IN.fullmatch(found):
-        # The same marker of the other foot says that only that one was recorded.
-        return float(wanted[1:].lower() == found[1:].lower())
-    if _side(wanted) != _side(found):
-        return 0.0
-    words, others = (re.findall(r"[a-z]+|\d+", text.lower()) for text in (wanted, found))
+    (words, side), (others, other_side) = _words(wanted), _words(found)
+    if side != other_side:
+        # The same of the other foot says that only that one was recorded.
+        return float(words == others)
     if len(words) == len(others) > 1:
         ratios = [_ratio(*pair) for pair in zip(words, others, strict=True)]
         return min(ratios) if min(ratios) >= _NEAR_WORD else 0.0
@@ -42,17 +40,19 @@ def _parts(name: str) -> tuple[str, str]:
     return (match[1], match[2]) if match else (name, "")
 
 
-def _side(name: str) -> str:
-    """Return r or l for a name that begins or ends with a side, else an empty text."""
-    words: list[str] = re.findall(r"[a-z]+", name.lower())
-    for word in words:
+def _words(name: str) -> tuple[list[str], str]:
+    """Return the words of a name without its side, and r or l where it says one."""
+    words: list[str] = re.findall(r"[a-z]+|\d+", name.lower())
+    for place, word in enumerate(words):
         if word in ("r", "right", "l", "left"):
-            return word[0]
-    return name[0].lower() if _PLUG_IN.match(name) else ""
+            return [*words[:place], *words[place + 1 :]], word[0]
+    if _PLUG_IN.fullmatch(name):
+        return [words[0][1:], *words[1:]], words[0][0]
+    return words, ""
 
 
 def _ratio(word: str, other: str) -> float:
-    # Short words have too few letters to be misspelt.
-    if min(len(word), len(other)) < 3:
+    # Of words of three or four letters, as RKNE and RANK without their side, none is near another.
+    if min(len(word), len(other)) < 4:
         return float(word == other)
     return difflib.SequenceMatcher(None, word, other).ratio()

@@ -6,13 +6,15 @@ With r the downstream over the upstream pressure and k the heat capacity ratio, 
                psi = 1 up to the critical ratio, then sqrt(2 k / (k - 1) r^(2/k) (1 - r^((k - 1)/k))) over C1 sqrt(R T)
     ISO 6358   C rho_0 sqrt(T_0 / T) P_up phi(r),   phi = 1 up to b, then sqrt(1 - ((r - b) / (1 - b))^2)
     laminar    c (P_a^2 - P_b^2)
+    both       an orifice, or ISO 6358 with a critical ratio that is known, and a laminar gap side by side
 """
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
+from scipy.optimize import nnls
 
 from ppafo.constants import STANDARD_ATMOSPHERE, UNIVERSAL_GAS_CONSTANT
 from ppafo.identification.bench.law import Readings, Values, solve, sought, tolerance, within
@@ -22,10 +24,13 @@ from ppafo.model.gas import choked_flow_constant, critical_pressure_ratio, speci
 from ppafo.model.orifice import sonic_conductance_mass
 from ppafo.signals.recording import Floats
 
-Law = Literal["orifice", "iso6358", "laminar"]
+Law = Literal["orifice", "iso6358", "laminar", "both"]
 
-LINEAR_RATIO = 0.999
-"""Pressure ratio from which flow falls on a straight line to zero."""
+LINEAR_RATIO = 0.99999
+"""Pressure ratio from which flow falls on a straight line to zero, a pascal at the atmosphere, which no bench resolves.
+
+The line of the engine, ``flow.linear_ratio`` of a set, is numerics of a step; what was read of an opening has none.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,12 +124,21 @@ def _shape(first: Floats, second: Floats, curve: Callable[[Floats], Floats]) -> 
     return np.asarray(np.sign(first - second) * flow * np.minimum((1.0 - ratio) / (1.0 - LINEAR_RATIO), 1.0))
 
 
+class Sizes(NamedTuple):
+    """What is sought of an opening: Cd, A or Cd A, C [m^3/(s Pa)], or c [kg/(s Pa^2)]; b [-]; c of a gap beside it."""
+
+    size: float
+    critical_ratio: float = 0.0
+    beside: float = 0.0
+
+
 @dataclass(frozen=True, slots=True)
 class Opening:
     """What flows through an opening: the law, and what is known of it.
 
     For an orifice the area [m^2] or the discharge coefficient [-] that ``known`` multiplies; for ISO 6358 ``known`` is
-    not used, and the critical ratio [-] is sought where it is not given.
+    not used, and the critical ratio [-] is sought where it is not given. ``both`` is ISO 6358 beside a laminar gap
+    where the critical ratio is given, an orifice beside one where it is not.
     """
 
     gas: GasAt
@@ -132,27 +146,61 @@ class Opening:
     known: float = 1.0
     critical_ratio: float | None = None
 
-    def flow(self, size: float, critical_ratio: float, first: Floats, second: Floats) -> Floats:
-        """Return the mass flow [kg/s], positive from first to second [Pa], for the size that is sought.
-
-        The size is Cd, A or Cd A, C [m^3/(s Pa)], or c [kg/(s Pa^2)].
-        """
+    def flow(self, sizes: Sizes, first: Floats, second: Floats) -> Floats:
+        """Return the mass flow [kg/s], positive from first to second [Pa]."""
+        laminar = np.asarray(first**2 - second**2)
         if self.law == "laminar":
-            return np.asarray(size * (first**2 - second**2))
-        if self.law == "iso6358":
-            ratio = critical_ratio if self.critical_ratio is None else self.critical_ratio
-            return size * self.gas.flow_per_sonic_conductance * iso6358_shape(first, second, ratio)
-        per_size = self.known * self.gas.choked_flow_constant
-        return size * per_size * orifice_shape(first, second, self.gas.heat_capacity_ratio)
+            return np.asarray(sizes.size * laminar)
+        if self.law == "iso6358" or (self.law == "both" and self.critical_ratio is not None):
+            ratio = sizes.critical_ratio if self.critical_ratio is None else self.critical_ratio
+            through = sizes.size * self.gas.flow_per_sonic_conductance * iso6358_shape(first, second, ratio)
+        else:
+            per_size = self.known * self.gas.choked_flow_constant
+            through = sizes.size * per_size * orifice_shape(first, second, self.gas.heat_capacity_ratio)
+        return through + sizes.beside * laminar if self.law == "both" else through
+
+    def rough_sizes(self, first: Floats, second: Floats, flow: Floats) -> tuple[Sizes, Sizes]:
+        """Return sizes that leave least of a flow [kg/s], none below 0, and those of each part if it were all of it.
+
+        The flow is linear in them, but for a critical ratio, which is taken as usual.
+        """
+        ratio = CRITICAL_RATIOS[0]
+        parts = [self.flow(Sizes(1.0, ratio), first, second)]
+        parts += [self.flow(Sizes(0.0, ratio, 1.0), first, second)] if self.law == "both" else []
+        columns = np.stack(parts, axis=1)
+        alone = np.linalg.norm(flow) / np.linalg.norm(columns, axis=0)
+        size, *beside = (nnls(columns * alone, flow)[0] * alone).tolist()
+        return Sizes(size, ratio, *beside), Sizes(float(alone[0]), ratio, *alone[1:].tolist())
 
 
 CRITICAL_RATIOS = 0.2, 0.01, 0.95
 """Critical ratio of ISO 6358 where it is sought [-]: start, lowest, highest."""
 
 
+class Paths(NamedTuple):
+    """Names of the numbers of an opening, which are not sought where they are empty."""
+
+    size: str
+    critical_ratio: str = ""
+    beside: str = ""
+
+    def sizes(self, at: Values) -> Sizes:
+        """Return the sizes among the numbers of a law."""
+        return Sizes(at[self.size], at[self.critical_ratio], at[self.beside])
+
+    def sought(self, start: Sizes, alone: Sizes) -> tuple[Free, ...]:
+        """Return the numbers that are sought; a part of which nothing may be seen has the scale of all of the flow."""
+        scale = alone.size if self.beside else 0.0
+        return (
+            sought(self.size, start.size, 0.0, scale=scale),
+            *((sought(self.critical_ratio, *CRITICAL_RATIOS),) if self.critical_ratio else ()),
+            *((sought(self.beside, start.beside, 0.0, scale=alone.beside),) if self.beside else ()),
+        )
+
+
 def solve_flow(
     opening: Opening,
-    paths: tuple[str, str],
+    paths: Paths,
     pressures: Mapping[str, Floats],
     readings: Readings,
     tolerances: Tolerances,
@@ -160,21 +208,26 @@ def solve_flow(
 ) -> tuple[Fit, Floats]:
     """Return the fit of an opening to the flow through it, and the flow that it gives [kg/s]; see ``law.solve``.
 
-    ``paths`` lead to its size and its critical ratio, which is not sought where it is empty. ``pressures`` are two
-    channels [Pa absolute], the one from which a positive flow [kg/s] comes first.
+    ``pressures`` are two channels [Pa absolute], the one from which a positive flow [kg/s] comes first.
     """
-    size, critical = paths
     names, flow = (*pressures,), readings.measured
+    shown_first, shown_second = pressures.values()
 
     def law(at: Values) -> Floats:
         first, second = (true_pressure(at, name, shown) for name, shown in pressures.items())
-        return read_flow(at, opening.gas, opening.flow(at[size], at[critical], first, second))
+        return read_flow(at, opening.gas, opening.flow(paths.sizes(at), first, second))
 
-    # The flow is linear in the size: its least squares are where the search begins.
-    unit = opening.flow(1.0, CRITICAL_RATIOS[0], *pressures.values())
     numbers = (
-        sought(size, float(unit @ flow / (unit @ unit)), 0.0),
-        *((sought(critical, *CRITICAL_RATIOS),) if critical else ()),
+        *paths.sought(*opening.rough_sizes(shown_first, shown_second, flow)),
         *flow_tolerances(opening.gas, tolerances, (names[0], names[1]), float(np.abs(flow).max())),
     )
     return solve(law, readings, numbers, confidence)
+
+
+NEXT_LAW: Mapping[Law, str] = {
+    "orifice": "try law = 'both', or for a valve 'iso6358'",
+    "laminar": "try law = 'both'",
+    "iso6358": "try law = 'both'",
+    "both": "neither an orifice nor a laminar gap nor both explain them",
+}
+"""What to do where readings do not agree on one opening; the sum of both laws has each of them in it."""

@@ -12,7 +12,7 @@ Without an inertia only beta/I [1/s] and T_c/I [rad/s^2] follow.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -26,6 +26,7 @@ from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.residuals import curve_mark, readings_mark
+from ppafo.report.style import GREY
 from ppafo.signals.faults import is_at_limit, noise_of, plateaus
 from ppafo.signals.recording import Floats
 
@@ -295,9 +296,13 @@ def _panels(
         fastest = max(fastest, float(velocity.max()))
         measured = fitted = ""  # the legend names the first decay only
     line = np.linspace(0.0, fastest, 200)
+    shown.append(curve_mark("$-\\beta\\omega/I - T_c/I$", line, -rates[0] * line - rates[1]))
     rise, velocity_of_rise = near_rest
-    more = rise / (1.0 + np.square(line / velocity_of_rise)) if velocity_of_rise > 0.0 else 0.0
-    shown.append(curve_mark("$-\\beta\\omega/I - T_c/I$", line, -rates[0] * line - rates[1] * (1.0 + more)))
+    if rise > 0.0 and velocity_of_rise > 0.0:
+        # The formula of the legend is a straight line; what was fitted near rest bends, and has a name of its own.
+        more = rise / (1.0 + np.square(line / velocity_of_rise))
+        fit = Mark("line", line, -rates[0] * line - rates[1] * (1.0 + more), label="fit, with more friction near rest")
+        shown.append(replace(fit, colour=GREY, style={"linestyle": "--", "linewidth": 1.2}))
     rate, acceleration_kind = Kind("Angular velocity", "rad/s"), Kind("Angular acceleration", "rad/s$^2$")
     return (
         Panel(TIME, Kind("Angle", "rad", "angle"), angles, "Free decay", legend="inside"),

@@ -10,6 +10,7 @@ import numpy as np
 from ppafo.identification.fit import SAMPLES_PER_COEFFICIENT, Block, Fit, Free, fit
 from ppafo.identification.source import Source
 from ppafo.identification.tolerances import deviation_of_limit
+from ppafo.signals.faults import resolution_of, rounding_of
 from ppafo.signals.recording import Floats
 
 Values = Mapping[str, float]
@@ -74,12 +75,14 @@ def solve(
     order = np.argsort([ranks[key] for key in keys], kind="stable")
     counts = np.bincount([ranks[key] for key in keys])
     ends = np.cumsum([0, *counts])
+    sensors = np.array(readings.sensors)
+    resolutions = {name: resolution_of(measured[sensors == name]) for name in dict.fromkeys(readings.sensors)}
     # A meter shows six digits at most: residuals below say nothing.
-    floor = 1.0e-6 * float(np.ptp(measured))
-    blocks = [
-        Block(recording, sensor, slice(int(ends[rank]), int(ends[rank + 1])), floor, tuple(groups))
-        for (recording, sensor, *groups), rank in ranks.items()
-    ]
+    least, blocks = 1.0e-6 * float(np.ptp(measured)), []
+    for (recording, sensor, *groups), rank in ranks.items():
+        rows = slice(int(ends[rank]), int(ends[rank + 1]))
+        floor = np.maximum(least, rounding_of(measured[order][rows], resolutions[sensor]))
+        blocks.append(Block(recording, sensor, rows, floor, tuple(groups)))
 
     def at(point: Floats) -> Values:
         return defaultdict(float, zip(names, point.tolist(), strict=True))

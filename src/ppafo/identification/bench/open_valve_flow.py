@@ -7,12 +7,12 @@ constants as in ``flow``. Temperature and law of the gas, gains of the sensors, 
 tolerances. Of ISO 6358, C is the choked flow, and b shows only where there is choked and subsonic flow.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.bench.flow import GasAt, Law, Opening, orifice_shape, solve_flow
+from ppafo.identification.bench.flow import NEXT_LAW, GasAt, Law, Opening, Paths, orifice_shape, solve_flow
 from ppafo.identification.bench.law import Readings, recordings_of
 from ppafo.identification.bench.result import BenchResult, Reported, result_of
 from ppafo.identification.source import (
@@ -44,13 +44,15 @@ _SPAN, _SUBSONIC = 0.15, 0.6
 class OpenValveFlowSettings:
     """The gas, the law, the valve's path in a set (``valves.main``) and its area [m^2] where it is known.
 
-    With an area the orifice law gives Cd; without one only the product Cd A is known.
+    With an area the orifice law gives Cd; without one only the product Cd A is known. With a ``critical_ratio`` [-]
+    the law ``both`` has ISO 6358 beside the laminar gap in place of an orifice.
     """
 
     gas: GasAt
     law: Law = "orifice"
     area: float | None = None
     path: str = "valve"
+    critical_ratio: float | None = None
     confidence: float = 0.95
     tolerances: Tolerances = DEFAULTS
 
@@ -58,23 +60,35 @@ class OpenValveFlowSettings:
 def open_valve_flow(sources: tuple[Source, ...], settings: OpenValveFlowSettings) -> BenchResult:
     """Return Cd [-] or Cd A [m^2], or C [m^3/(s Pa)] and b [-], or c [kg/(s Pa^2)], of the open valve; (6), (7).
 
+    The law ``both`` gives Cd, Cd A or C, and c of a laminar gap beside it.
+
     IdentificationError for recordings that cannot say it, with the file, the sample and the remedy.
     """
     upstream, downstream, flow, labels = open_readings(sources, settings.gas)
     size, ratio, largest = _size(settings), downstream / upstream, float(flow.max())
     is_standard = settings.law == "iso6358"
-    critical = f"{settings.path}.critical_ratio" if is_standard else ""
     if is_standard and (np.ptp(ratio) < _SPAN or ratio.max() < _SUBSONIC):
         raise IdentificationError(
             f"{sources[0].name}: {PROCEDURE}: C and b need choked and subsonic flow, pressure ratios that span "
             f"{_SPAN:g} or more and go beyond {_SUBSONIC:g}; these go from {ratio.min():.3g} to {ratio.max():.3g}"
         )
+    reported = [size]
+    if is_standard:
+        reported.append(Reported(f"{settings.path}.critical_ratio", "", "Critical ratio b of ISO 6358"))
+    known_ratio = settings.critical_ratio if settings.law == "both" else None
+    opening = Opening(settings.gas, settings.law, settings.area or 1.0, known_ratio)
+    paths = Paths(size.path, critical_ratio=reported[-1].path if is_standard else "")
+    if settings.law == "both":
+        paths = Paths(size.path, beside=_BESIDE.path)
+        _, alone = opening.rough_sizes(upstream, downstream, flow)
+        # Either part may be zero, which is an answer.
+        reported = [replace(size, size=alone.size), replace(_BESIDE, size=alone.beside)]
     choked = critical_pressure_ratio(settings.gas.heat_capacity_ratio)
     # The noise of the pressures tells the more in the flow the nearer they are to each other.
     levels = [_LEVELS[place] for place in np.digitize(ratio, (choked, _NEARLY_EQUAL)).tolist()]
     found, model = solve_flow(
-        Opening(settings.gas, settings.law, settings.area or 1.0),
-        (size.path, critical),
+        opening,
+        paths,
         dict(zip(CHANNELS, (upstream, downstream), strict=False)),
         Readings(flow, levels, labels),
         settings.tolerances,
@@ -83,24 +97,26 @@ def open_valve_flow(sources: tuple[Source, ...], settings: OpenValveFlowSettings
     shown, fitted = (1.0e8 * one / upstream for one in (flow, model))
     marks = readings_mark("measured", ratio, shown), curve_mark(settings.law, ratio, fitted)
     axes = Kind("Downstream over upstream pressure"), Kind("Flow over upstream pressure", "g/s per bar")
-    others = " or ".join(f"'{item}'" for item in ("orifice", "iso6358", "laminar") if item != settings.law)
     return result_of(
         PROCEDURE,
         sources,
         found,
-        (size, *((Reported(critical, "", "Critical ratio b of ISO 6358"),) if is_standard else ())),
+        reported,
         f"{flow.size} readings at pressure ratios from {ratio.min():.2f} to {ratio.max():.2f}; "
         f"scatter {np.std(flow - model) / largest:.2%} of the largest flow",
         with_residuals("Open-valve flow", *axes, marks, ratio, shown - fitted),
-        f"try law = {others}, or leave those readings out",
+        f"{NEXT_LAW[settings.law]}, or leave those readings out",
     )
+
+
+_BESIDE = Reported("open_valve_flow.laminar_coefficient", "kg/(s Pa^2)", "Laminar coefficient of a gap beside it")
 
 
 def _size(settings: OpenValveFlowSettings) -> Reported:
     """Return the number that is sought: where a set has it, its unit, and what it is."""
     if settings.law == "laminar":
         return Reported("open_valve_flow.laminar_coefficient", "kg/(s Pa^2)", "Laminar coefficient of the open valve")
-    if settings.law == "iso6358":
+    if settings.law == "iso6358" or (settings.law == "both" and settings.critical_ratio is not None):
         return Reported(f"{settings.path}.sonic_conductance", "m^3/(s Pa)", "Sonic conductance C of ISO 6358")
     if settings.area:
         text = f"Discharge coefficient with the set's area of {settings.area * 1e6:.4g} mm^2; only Cd A sets the flow"

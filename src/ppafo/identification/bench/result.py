@@ -50,7 +50,7 @@ def count_of(number: int, noun: str) -> str:
 class Reported:
     """A number of a fit that is reported: its name there, which is its path, SI unit, and what it is in a sentence.
 
-    ``size`` stands in for the size of a value that may be zero, in that unit.
+    ``size`` stands in for the size of a value that may be zero, in that unit: zero is then an answer, and no bound.
     """
 
     path: str
@@ -87,7 +87,10 @@ def result_of(
         value = value if bound is None else bound
         verdict: Verdict = "identified"
         sentence = f"{item.text}; {widened_by(found, item.path)}."
-        if bound is not None:
+        if bound == 0.0 and item.size is not None and half < size:
+            sentence = f"{item.text}: none; {widened_by(found, item.path)}."
+            verdict = "identified" if found.conflict is None else "holds for this model only"
+        elif bound is not None:
             verdict = "at its bound"
             sentence = f"{sentence} The readings want a value at or beyond {value:.4g}; the interval ends there."
         # Then zero, or twice the value, is inside the interval as well.

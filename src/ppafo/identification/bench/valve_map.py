@@ -30,7 +30,7 @@ MINIMUM_SAMPLES = 12
 _MINIMUM_RANGE = 0.5
 _SEEN_BEYOND = 0.02
 _SMALL_COMMAND = 0.2
-_GAIN, _PLAY, _SATURATION = "valve_map.gain", "valve_map.hysteresis", "valve_map.saturation_command"
+_GAIN, _PLAY, _SATURATION = "valve_map.gain", "effects.spool_play.width", "valve_map.saturation_command"
 
 
 @dataclass(frozen=True, slots=True)

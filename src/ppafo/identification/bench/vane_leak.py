@@ -14,12 +14,23 @@ fast D falls.
 
 import math
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.bench.flow import GAS_LAW, TEMPERATURE, GasAt, Law, Opening, gas_tolerances, solve_flow
+from ppafo.identification.bench.flow import (
+    GAS_LAW,
+    NEXT_LAW,
+    TEMPERATURE,
+    GasAt,
+    Law,
+    Opening,
+    Paths,
+    Sizes,
+    gas_tolerances,
+    solve_flow,
+)
 from ppafo.identification.bench.law import Readings, Values, recordings_of, solve, sought, tolerance, within
 from ppafo.identification.bench.result import BenchResult, Reported, count_of, result_of
 from ppafo.identification.fit import Free
@@ -40,6 +51,7 @@ from ppafo.signals.faults import plateaus, stands_out
 from ppafo.signals.recording import Floats
 
 PROCEDURE = "vane-leak"
+LAMINAR = "effects.laminar_leak.coefficient"
 CHANNELS = ("pressure_1", "pressure_2")
 STEADY = (*CHANNELS, "mass_flow")
 MINIMUM_SAMPLES, _FEWEST_STEADY = 20, 8
@@ -52,7 +64,7 @@ _NEARLY_EQUAL = 0.01
 _RATIO, _VOLUME, _RELAXATION = "ratio of the volumes", "volume", "time of the relaxation"
 _RELAXED, _MOST_RELAXED = 5.0, 0.02
 """Times that a relaxation usually fits into a recording, and how far it moves a pressure at most."""
-_REMEDY = "try law = {}, or give start and end; gas may leak elsewhere, or relax with its walls"
+_REMEDY = "{}, or give start and end; gas may leak elsewhere, or relax with its walls"
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +73,8 @@ class VaneLeakSettings:
 
     Without the volume of the chamber that empties there is no area, only one over the volume. A
     ``discharge_coefficient`` [-] makes an area of the product, a ``critical_ratio`` [-] asks for a sonic conductance,
-    ``is_laminar`` for a laminar coefficient. ``volume_deviation`` [-] is the standard deviation of a volume over it.
+    the ``law`` laminar for a laminar coefficient, both for one beside what the set has. ``volume_deviation`` [-] is the
+    standard deviation of a volume over it.
     """
 
     gas: GasAt
@@ -72,20 +85,20 @@ class VaneLeakSettings:
     end: float | None = None
     confidence: float = 0.95
     critical_ratio: float | None = None
-    is_laminar: bool = False
+    law: Literal["orifice", "laminar", "both"] = "orifice"
     tolerances: Tolerances = DEFAULTS
     volume_deviation: float = deviation_of_limit(HELD["actuator.dead_volume_1"])
 
     @property
     def opening(self) -> Opening:
         """The leak in the form in which it is sought."""
-        law: Law = "laminar" if self.is_laminar else "orifice" if self.critical_ratio is None else "iso6358"
+        law: Law = self.law if self.law != "orifice" or self.critical_ratio is None else "iso6358"
         return Opening(self.gas, law, self.discharge_coefficient or 1.0, self.critical_ratio)
 
     @property
     def size(self) -> Reported:
         """The number that is sought: where a set has it, its unit, and what it is."""
-        if self.is_laminar:
+        if self.law == "laminar":
             return Reported("vane_leak.laminar_coefficient", "kg/(s Pa^2)", "Laminar coefficient of the leak")
         if self.critical_ratio is not None:
             text = f"Sonic conductance of the leak with the set's b = {self.critical_ratio:g}"
@@ -178,11 +191,11 @@ _LOWEST = 1.0e-3
 
 
 def pressures_of_fall(
-    opening: Opening, size: float, first: float, second: float, ratio: float, rate: float, times: Floats
+    opening: Opening, sizes: Sizes, first: float, second: float, ratio: float, rate: float, times: Floats
 ) -> tuple[Floats, Floats]:
     """Return both pressures [Pa] at times [s] as their difference falls; no gas is lost to the outside.
 
-    ``size`` is the size of the opening, ``first`` and ``second`` are the pressures [Pa] at the start, ``ratio`` is
+    ``sizes`` are those of the opening, ``first`` and ``second`` are the pressures [Pa] at the start, ``ratio`` is
     V1/V2 [-], 0 beside a room, ``rate`` R T / V1 [Pa/kg].
     """
     start, conserved = max(first - second, 1.0), ratio * first + second
@@ -190,7 +203,7 @@ def pressures_of_fall(
     logs = np.linspace(0.0, -math.log(_LOWEST), _POINTS)
     difference = start * np.exp(-logs)
     lower = (conserved - ratio * difference) / (1.0 + ratio)
-    flow = opening.flow(max(size, 1.0e-300), 0.0, lower + difference, lower)
+    flow = opening.flow(sizes, lower + difference, lower)
     slowness = difference / np.maximum((1.0 + ratio) * rate * flow, 1.0e-300)
     steps = 0.5 * (slowness[1:] + slowness[:-1]) * np.diff(logs)
     known = np.concatenate(([0.0], np.cumsum(steps)))
@@ -208,10 +221,12 @@ def _decaying_leak(
     if volumes[0] is None:
         what = size.text.partition(" with")[0]
         text = f"{what} over the volume of chamber {fuller}, which is not known"
-        path = "vane_leak.area_over_volume" if opening.law == "orifice" else f"{size.path}_over_volume"
-        size = Reported(path, "1/m" if opening.law == "orifice" else f"{size.unit[:-1]} m^3)", text)
+        is_area = size.unit == "m^2"
+        path = "vane_leak.area_over_volume" if is_area else f"vane_leak.{size.path.split('.')[-1]}_over_volume"
+        size = Reported(path, "1/m" if is_area else f"{size.unit[:-1]} m^3)", text)
         opening = Opening(gas, opening.law, 1.0, settings.critical_ratio)
     emptied, constant = volumes[0] or 1.0, gas.specific_gas_constant
+    paths, reported, start, alone = _sought(settings, size, volumes[0] is not None, closed, opening, emptied)
     names = [f"pressure_{item}" for item in (fuller, 3 - fuller)]
     longest = max(float(item.time[-1]) for item in closed)
 
@@ -223,7 +238,7 @@ def _decaying_leak(
         for number, item in enumerate(closed, start=1):
             first, second = (at[f"start of {name}, decay {number}"] for name in names)
             ratio = 0.0 if item.is_a_room else at[_RATIO]
-            falls = pressures_of_fall(opening, at[size.path], first, second, ratio, rate, item.time)
+            falls = pressures_of_fall(opening, paths.sizes(at), first, second, ratio, rate, item.time)
             faded = np.exp(-item.time / lasting)
             for name, true, _ in zip(names, falls, item.fitted, strict=False):
                 parts.append(true * (1.0 + at[f"relaxation of {name}, decay {number}"] * faded) + at[f"zero of {name}"])
@@ -238,7 +253,7 @@ def _decaying_leak(
     elif shut:
         ratio = (sought(_RATIO, max(float(np.mean([rise / fall for fall, rise in shut])), 1.0e-3), 1.0e-6),)
     numbers = (
-        sought(size.path, _rough_size(closed, opening, constant * gas.temperature / emptied), 0.0),
+        *paths.sought(start, alone),
         *ratio,
         *(one for number, item in enumerate(closed, start=1) for one in _of_decay(names, number, item)),
         # Of the logarithm of a time, for only its order of magnitude is known.
@@ -270,10 +285,10 @@ def _decaying_leak(
         PROCEDURE,
         sources,
         found,
-        (size,),
+        reported,
         f"{count_of(len(closed), 'decay')} of up to {longest:.3g} s; the pressure difference falls by {fall:.1%}",
         with_residuals("Closed chambers", TIME, Kind("Pressure", "Pa_a", "pressure"), marks, time, measured - model),
-        _REMEDY.format("'orifice'" if settings.is_laminar else "'laminar'"),
+        _REMEDY.format(NEXT_LAW[settings.law]),
         remark,
     )
 
@@ -294,11 +309,40 @@ def _of_decay(names: list[str], number: int, item: ClosedChambers) -> list[Free]
     return found
 
 
-def _rough_size(closed: tuple[ClosedChambers, ...], opening: Opening, rate: float) -> float:
-    """Return a first guess of the opening from how fast the first pressure falls on average; above 0."""
+def _sought(
+    settings: VaneLeakSettings,
+    size: Reported,
+    has_volume: bool,
+    closed: tuple[ClosedChambers, ...],
+    opening: Opening,
+    emptied: float,
+) -> tuple[Paths, tuple[Reported, ...], Sizes, Sizes]:
+    """Return the numbers of a leak from closed chambers: paths, what is reported, the start, and each part alone."""
+    gas = settings.gas
+    rate = gas.specific_gas_constant * gas.temperature / emptied
+    rough = _rough_size(closed, opening, Sizes(1.0), rate)
+    if settings.law != "both":
+        return Paths(size.path), (size,), Sizes(rough), Sizes(rough)
+    laminar = _rough_size(closed, opening, Sizes(0.0, beside=1.0), rate)
+    beside = replace(_beside(has_volume), size=laminar)
+    # Half of the fall each: the search finds how much of it is whose.
+    start, alone = Sizes(0.5 * rough, beside=0.5 * laminar), Sizes(rough, beside=laminar)
+    return Paths(size.path, beside=beside.path), (replace(size, size=rough), beside), start, alone
+
+
+def _beside(has_volume: bool) -> Reported:
+    """Return the laminar gap beside an orifice; without the volume of the chamber only its ratio is known."""
+    text = "Laminar coefficient of a gap beside the orifice"
+    if has_volume:
+        return Reported(LAMINAR, "kg/(s Pa^2)", text)
+    return Reported("vane_leak.coefficient_over_volume", "kg/(s Pa^2 m^3)", f"{text}, over the volume")
+
+
+def _rough_size(closed: tuple[ClosedChambers, ...], opening: Opening, unit: Sizes, rate: float) -> float:
+    """Return how many times a ``unit`` of the opening makes the first pressure fall as it does on average; above 0."""
     found = []
     for item in closed:
-        flow = float(np.mean(opening.flow(1.0, 0.0, item.first, item.second)))
+        flow = float(np.mean(opening.flow(unit, item.first, item.second)))
         scatter = float(np.std(np.diff(item.first)))
         # Of a chamber that holds, what its noise would hide.
         found.append(max(item.changes[0], 0.01 * scatter, 1.0e-9) / (rate * flow * float(item.time[-1])))
@@ -321,9 +365,14 @@ def _steady_leak(sources: tuple[Source, ...], settings: VaneLeakSettings) -> Ben
     # A leak of another law parts low from high pressures.
     is_high = difference > np.median(difference)
     halves = np.where(is_high, "flow at higher pressures", "flow at lower pressures").tolist()
+    paths, reported = Paths(size.path), [size]
+    if settings.law == "both":
+        _, alone = opening.rough_sizes(first, second, flow)
+        reported = [replace(size, size=alone.size), replace(_beside(has_volume=True), size=alone.beside)]
+        paths = Paths(size.path, beside=reported[1].path)
     found, model = solve_flow(
         opening,
-        (size.path, ""),
+        paths,
         {"pressure_1": first, "pressure_2": second},
         Readings(flow, ["mass_flow"] * flow.size, recordings_of(sources), (halves,)),
         settings.tolerances,
@@ -336,8 +385,8 @@ def _steady_leak(sources: tuple[Source, ...], settings: VaneLeakSettings) -> Ben
         PROCEDURE,
         sources,
         found,
-        (size,),
+        reported,
         f"{flow.size} steady readings; scatter {scatter:.2%} of the largest flow",
         with_residuals("Steady leak", *axes, marks, difference, flow - model),
-        _REMEDY.format("'orifice'" if settings.is_laminar else "'laminar'"),
+        _REMEDY.format(NEXT_LAW[settings.law]),
     )

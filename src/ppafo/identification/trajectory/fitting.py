@@ -80,7 +80,7 @@ class TrajectoryFit:
 
     ``covariance`` [SI] and ``correlation`` are in the order of ``estimates``. ``models`` are the fitted runs at the
     times of the samples, ``measurements`` the samples, both by experiment over the time of the run. ``conflict`` says
-    which recordings or channels want other numbers than all together, empty where they agree; ``remarks`` are
+    which recordings or channels alone give other values than all together, empty where they agree; ``remarks`` are
     sentences about the fit as a whole.
     """
 
@@ -180,7 +180,11 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
         channels += [_channel(found, experiment.label, item, values[item.name][:, 0]) for item in one.channels]
     remarks = [text for text in dict.fromkeys(broken_rule(item.device) for item in scenarios) if text]
     if not found.has_converged:
-        remarks.append(f"the search stopped after {found.evaluations} runs before it converged: give nearer starts")
+        starts = (f'start = "{one.value:.4g} {one.unit}"'.replace(' -"', '"') + f" of {one.path}" for one in estimates)
+        remarks.append(
+            f"the search stopped after {found.evaluations} runs before it converged; give the parameters "
+            f"{', '.join(starts)}, where it ended"
+        )
     return TrajectoryFit(
         problem=problem,
         numbers=numbers,
@@ -214,9 +218,11 @@ def _estimate(problem: TrajectoryProblem, found: Fit, item: Number, place: int, 
     verdict: Verdict = "identified"
     if combination is not None:
         verdict = "not identifiable"
+        # So far from where it was linearised the interval of a straight line means nothing.
+        low, high = min(low, item.free.low), max(high, item.free.high)
         others = [other for other in combination if other != name]
         text = f"trades off against {' and '.join(others)}" if others else "the recordings are hardly sensitive to it"
-        text += "; hold it, give it a prior, or record something else"
+        text += "; fix it, give a prior, or make another recording"
     elif bound is not None:
         end, unit = in_shown_unit(bound, item.unit)
         verdict, text = "at its bound", f"the recordings want a value at or beyond {end:.6g} {unit}".rstrip(" -")

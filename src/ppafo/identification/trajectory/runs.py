@@ -35,7 +35,7 @@ from ppafo.identification.trajectory.problem import (
 from ppafo.model.catalog import VALVES
 from ppafo.model.columns import at, over_runs
 from ppafo.parameters.plant import switches_of
-from ppafo.signals.faults import MINIMUM_SAMPLES, is_at_limit, noise_of, plateaus
+from ppafo.signals.faults import MINIMUM_SAMPLES, is_at_limit, noise_of, plateaus, resolution_of, rounding_of
 from ppafo.simulation.plan import plan_run, plan_runs
 from ppafo.simulation.recorded import (
     ANGLE,
@@ -54,6 +54,9 @@ FIT_TOLERANCE = 0.02
 """Error that a run of a fit is allowed over any other run's; columns of differences keep to 1e-3 with it."""
 _FINER = 0.25
 _FITS = 1.0e-6
+
+_ZERO_OF_ANGLE = math.radians(1.0)
+"""Angle [rad] from a stop within which a sensor shows the stop."""
 
 _READ_INTERVAL = 5.0e-5
 """Seconds between two records that samples lie in between: a chamber fills within milliseconds ..."""
@@ -110,9 +113,18 @@ def prepare(experiment: Experiment, numbers: Mapping[str, float], reach: float =
     channels = [
         Measured(name, recording[name][inside], experiment.noise.get(name, 0.0)) for name in experiment.channels
     ]
+    actuator = experiment.scenario.device.actuator
+    stops = actuator.angle_min, actuator.angle_max
     for channel in channels:
         clipped = max(plateaus(channel.values), key=lambda item: item.count)
-        if channel.floor == 0.0 and is_at_limit(channel.values, clipped) and not noise_of(channel.values) > 0.0:
+        # A vane that rests at its stop repeats one value on a coarse converter, and is at no limit of a sensor.
+        rests = channel.name == ANGLE and any(abs(clipped.value - stop) < _ZERO_OF_ANGLE for stop in stops)
+        if (
+            not rests
+            and channel.floor == 0.0
+            and is_at_limit(channel.values, clipped)
+            and not noise_of(channel.values) > 0.0
+        ):
             raise IdentificationError(
                 f"{said}: channel '{channel.name}' is exactly its {clipped.word} value for {clipped.count} of "
                 f"{channel.values.size} samples: its sensor is at its limit; end the recording before it, or give the "
@@ -220,7 +232,8 @@ def residuals_of(experiments: Sequence[PreparedExperiment], numbers: Sequence[Nu
 def blocks_of(experiments: Sequence[PreparedExperiment], numbers: Sequence[Number], point: Floats) -> tuple[Block, ...]:
     """Return the place of each channel of each recording among the residuals.
 
-    Its floor is the given noise or the error of the engine, which half as long steps with a quarter of the error show.
+    Its floor is the given noise, the error of the engine, which half as long steps with a quarter of the error show, or
+    what the converter of the sensor rounds.
     """
     blocks, first = [], 0
     coarse = signals_of(experiments, numbers, point[:, None])
@@ -234,7 +247,8 @@ def blocks_of(experiments: Sequence[PreparedExperiment], numbers: Sequence[Numbe
     for prepared, before, after in zip(experiments, coarse, fine, strict=True):
         for channel in prepared.channels:
             error = float(np.sqrt(np.mean(np.square(after[channel.name] - before[channel.name]))))
-            floor = max(channel.floor, error if math.isfinite(error) else 0.0)
+            rounded = rounding_of(channel.values, resolution_of(channel.values))
+            floor = np.maximum(max(channel.floor, error if math.isfinite(error) else 0.0), rounded)
             last = first + len(channel.values)
             blocks.append(Block(prepared.label, channel.name, slice(first, last), floor))
             first = last

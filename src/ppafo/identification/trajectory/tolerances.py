@@ -18,7 +18,8 @@ from ppafo.identification.trajectory.problem import (
 )
 from ppafo.parameters.parameter_set import ParameterSet
 from ppafo.parameters.plant import switches_of
-from ppafo.signals.faults import noise_of
+from ppafo.signals.faults import noise_of, resolution_of
+from ppafo.signals.recording import Recording
 from ppafo.simulation.recorded import ANGLE, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, FreeMotion, Scenario
 
@@ -122,13 +123,20 @@ def _of_run(tolerances: Tolerances, experiment: Experiment) -> dict[str, tuple[f
     # Where the vane lies at a stop, the stop says where it starts.
     if free is not None and ANGLE not in inputs and not any(math.isclose(free.angle, stop) for stop in stops):
         stated = tolerances.start_of_angle
-        usual = _START_OF_ANGLE if is_read else 0.0
+        usual = math.hypot(_START_OF_ANGLE, _read_error(recording, ANGLE)) if is_read else 0.0
         found["motion.angle"] = usual if stated is None else deviation_of_limit(stated)
     for name in ("pressure_1", "pressure_2"):
-        noise = noise_of(recording[name]) if is_read and name in recording else 0.0
+        noise = _read_error(recording, name) if is_read else 0.0
         stated = tolerances.start_of_pressure
         found[f"initial.{name}"] = noise if stated is None else deviation_of_limit(stated)
     return {path: (number_at(scenario, path), deviation) for path, deviation in found.items()}
+
+
+def _read_error(recording: Recording, name: str) -> float:
+    """Return the standard deviation [SI] of what one sample of a channel says: noise and resolution; 0 without any."""
+    if name not in recording:
+        return 0.0
+    return math.hypot(noise_of(recording[name]), resolution_of(recording[name]) / math.sqrt(12.0))
 
 
 def _of_set(

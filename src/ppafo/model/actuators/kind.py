@@ -7,19 +7,19 @@ that d tau/dp = dV/dangle: what the gas gives as p dV the shaft gets. A kind is 
 from collections import namedtuple
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol, get_type_hints
+from typing import Annotated, Any, NamedTuple, Protocol, get_type_hints
 
-from ppafo.model.declaration import Quantity, quantities_of
+from ppafo.model.declaration import Number, Quantity, quantities_of
 from ppafo.model.plant import PlantParameters
 
 
 class Range(NamedTuple):
     """Stops of an actuator [rad], dead volumes of its lines and chambers [m^3]."""
 
-    angle_min: float
-    angle_max: float
-    dead_volume_1: float
-    dead_volume_2: float
+    angle_min: Annotated[float, Number("rad", "lower stop")]
+    angle_max: Annotated[float, Number("rad", "upper stop")]
+    dead_volume_1: Annotated[float, Number("m^3", "line and clearance of chamber 1")]
+    dead_volume_2: Annotated[float, Number("m^3", "line and clearance of chamber 2")]
 
 
 class Chambers(NamedTuple):

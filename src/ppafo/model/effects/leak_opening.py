@@ -4,6 +4,7 @@ from typing import Annotated, NamedTuple
 
 from ppafo.model.declaration import Number
 from ppafo.model.effects.kind import Effect
+from ppafo.model.orifice import FlowCurve
 from ppafo.model.ports import leakage_path
 
 
@@ -23,7 +24,9 @@ class LeakSettings(NamedTuple):
     rise: Annotated[float, Number("", "excess at which half of the leak is open, over that pressure", 1.0, 0.01, 100.0)]
 
 
-def lifted(conductance: float, pressure_1: float, pressure_2: float, leak_opening: LeakOpening) -> float:
+def lifted(
+    conductance: float, pressure_1: float, pressure_2: float, curve: FlowCurve, leak_opening: LeakOpening
+) -> float:
     """Conductance [kg/(s Pa)] of the leak: ``C e / (e + w P_o)`` with ``e = |P_1 - P_2| - P_o``, and 0 below ``P_o``.
 
     The gas lifts the lip of a seal against its preload, in either direction. The flow begins without a jump, is half of
@@ -34,7 +37,7 @@ def lifted(conductance: float, pressure_1: float, pressure_2: float, leak_openin
     # P_o.
     above = max(abs(pressure_1 - pressure_2), opening) + (rise - 1.0) * opening
     share = max(1.0 - rise * opening / above, 0.0)
-    return leakage_path(conductance * share, pressure_1, pressure_2)
+    return leakage_path(conductance * share, pressure_1, pressure_2, curve)
 
 
 EFFECT = Effect(

@@ -24,6 +24,7 @@ from ppafo.parameters.audit.values import (
 )
 from ppafo.parameters.loading import load_parameter_set, set_or_load
 from ppafo.parameters.parameter_set import ParameterSet, overridden_paths, with_followers
+from ppafo.plugins import Plugins, name_plugins
 
 __all__ = ["Finding", "NamedValue", "Severity", "Side", "audit", "changed_paths"]
 
@@ -52,14 +53,17 @@ _ORDER = {"error": 0, "warning": 1, "note": 2}
 
 @checked("parameter_set", "parent")
 def audit(
-    parameter_set: ParameterSet | str | Path, *, parent: ParameterSet | str | Path | None = None
+    parameter_set: ParameterSet | str | Path, *, parent: ParameterSet | str | Path | None = None, plugins: Plugins = ()
 ) -> list[Finding]:
     """Return what contradicts, or deserves attention in, any parameter set; errors first.
 
     An error that the set accepts with a reason becomes a warning that shows the reason. A reason that stands in its
     ``parent`` too, the set that the file names unless given, lapses where the set changes a value of the finding. A
     reason for something that is not found is a warning, so that it does not outlive what it excuses.
+
+    ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
     """
+    name_plugins(plugins)
     audited = parameter_set if isinstance(parameter_set, ParameterSet) else load_parameter_set(parameter_set)
     of_parent = set_or_load(audited.parent or None if parent is None else parent)
     evidence = Evidence(with_followers(audited), audited.declarations())

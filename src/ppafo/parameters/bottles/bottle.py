@@ -255,6 +255,11 @@ class Bottle:
         )
 
 
+def is_of_catalogue(name_or_path: str | Path) -> bool:
+    """Tell whether this is a part of a catalogue file, ``CATALOGUE.toml/PART``."""
+    return Path(name_or_path).parent.suffix == ".toml"
+
+
 def list_bottles() -> tuple[str, ...]:
     """Return the names of the bottles that come with the package: bottle files, and bottles of the catalogue."""
     return tuple(dict.fromkeys((*FILE.names(), *bottle_parts())))
@@ -274,11 +279,15 @@ def described_bottles() -> list[dict[str, Any]]:
 def load_bottle(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Bottle:
     """Return a bottle by its name, a part's name, or the path of a TOML file, with values replaced.
 
-    ``overrides`` are texts such as ``bottle.gas_mass=567 g`` or ``room.temperature=5 degC``.
+    A part of a catalogue of one's own is ``CATALOGUE.toml/PART``. ``overrides`` are texts such as
+    ``bottle.gas_mass=567 g`` or ``room.temperature=5 degC``.
     """
-    # A bottle file has its own walls and regulator; a part of the same name has only a content and a mass.
-    part = None if str(name_or_path) in FILE.names() else bottle_parts().get(str(name_or_path))
     name, known = label(str(name_or_path)), list_bottles()
+    # A bottle file has its own walls and regulator; a part of the same name has only a content and a mass.
+    if is_of_catalogue(name_or_path):
+        part: Part | None = load_catalogue(Path(name_or_path).parent).part("bottles", Path(name_or_path).name)
+    else:
+        part = None if name in FILE.names() else bottle_parts().get(name)
     if not (name in known or Path(name_or_path).suffix == ".toml" or "/" in name):
         hint = nearest_name(name, known)
         raise ParameterError(f"there is no bottle '{name}'{hint}; available: {', '.join(known)}, or give a .toml file")

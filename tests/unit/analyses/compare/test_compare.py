@@ -139,7 +139,23 @@ def test_tasks_change_every_configuration() -> None:
 def test_without_a_reference_there_is_gas_and_no_error() -> None:
     slow = ppafo.load_scenario("step-response", ["valve.area=5 mm^2"])
     comparison = compare({"as it is": ppafo.load_scenario("step-response"), "small valve": slow}).found
-    assert comparison.metrics == ("gas_supplied", "mechanical_work", "gas_per_work", "switchings")
+    of_valve = ("switchings", "peak_torque", "command_reversals")
+    assert comparison.metrics == ("gas_supplied", "mechanical_work", "gas_per_work", *of_valve)
+
+
+FAST = ["controller.proportional_gain=60 1/(N m)", "controller.derivative_gain=0.05 s/(N m)", "valve.delay=5 ms"]
+
+
+def test_a_loop_that_oscillates_is_said_and_is_on_no_front() -> None:
+    fast = ppafo.load_scenario("torque-task-proportional", FAST)
+    finding = compare({"paper": ppafo.load_scenario("torque-task-proportional"), "fast": fast})
+    task = finding.found.tasks[0]
+    assert task.case("paper").word == "completed"
+    assert task.case("fast").word == "oscillates"
+    assert task.pareto_front == ["paper"]
+    said = [text for text in finding.found.remarks if "the torque loop oscillates" in text]
+    assert len(said) == 1
+    assert "for this device `proportional_gain" in said[0]
 
 
 def test_mistakes_are_one_line() -> None:

@@ -183,6 +183,19 @@ def test_the_change_of_ishigami_is_the_known_one_and_its_band_holds(method: str)
     assert np.mean(away, axis=0) == pytest.approx([0.0, 0.0, 0.0], abs=0.1)
 
 
+def test_the_band_of_the_change_holds_where_the_metric_bends() -> None:
+    """exp(2 x) of a value between -1 and 1 bends by as much as it grows at its upper end; the other is a line."""
+
+    def bent(columns: Mapping[str, Floats]) -> dict[str, Floats]:
+        return {METRIC: np.exp(2.0 * columns["x1"] / math.pi) + 0.5 * columns["x2"]}
+
+    known = np.array([math.exp(1.8) - math.exp(-1.8), 0.9 * math.pi, 0.0])
+    found = [analysed(bent, ANGLES, "sobol", Settings(256, seed)) for seed in range(1, 31)]
+    away = np.array([np.array(item.metrics[0].change_from_5_to_95_percent) - known for item in found])
+    bands = np.array([item.metrics[0].band_of_change for item in found])
+    assert np.all(np.mean(np.abs(away) <= bands, axis=0) >= 0.85)
+
+
 def test_the_change_of_a_linear_function_is_slope_times_distance_of_the_ends_whatever_the_distribution() -> None:
     mixed = Uncertainty(
         (

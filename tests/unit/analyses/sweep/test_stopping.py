@@ -151,6 +151,22 @@ def test_equal_values_are_no_known_mean_before_a_rare_one_could_have_come() -> N
     assert "would move the mean by up to 0.00073 times its distance" in unseen
 
 
+def test_a_mean_is_not_met_before_a_rare_jump_could_have_come() -> None:
+    """Of the smooth part 256 draws know the mean; a jump of probability 0.0019 is missing among most such sets."""
+    truth = 3.5 + 10.0 * 0.0019
+
+    def jumps(columns: Mapping[str, Floats]) -> dict[str, Floats]:
+        return {METRIC: 3.0 + columns["x0"] + 10.0 * (columns["x1"] < 0.0019)}
+
+    uncertain = Uncertainty(tuple(Drawn(f"x{place}", UniformBetween(0.0, 1.0)) for place in range(2)))
+    rule = StoppingRule(0.1, is_relative=False, first=256, maximum=2**16)
+    for seed in range(20):
+        found = drawn_until(jumps, uncertain, mean_of("N m"), rule, seed)
+        assert found.is_met
+        assert float(np.max(found.values)) > 10.0
+        assert found.interval.low <= truth <= found.interval.high
+
+
 def test_replicates_know_the_mean_of_a_smooth_function_far_better_than_independent_draws() -> None:
     def smooth(columns: Mapping[str, Floats]) -> Floats:
         return 3.0 + columns["x0"] + 2.0 * columns["x1"] + 3.0 * columns["x2"] + 0.1 * columns["x0"] * columns["x1"]

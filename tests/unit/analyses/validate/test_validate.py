@@ -187,3 +187,23 @@ def test_a_recording_given_twice_is_refused_under_another_name_too(
         assert main([*SET, str(bench / "step.csv"), str(second)]) == 2
         said = capsys.readouterr().err
         assert said == f"ppafo: {second}: the same recording as {bench / 'step.csv'}; give each once\n"
+
+
+def test_a_small_residual_of_which_no_cause_is_known_is_a_remark_and_a_large_one_is_not(tmp_path: Path) -> None:
+    """Two changes at once, which no single one explains: below 3 % of range the set agrees, and the rest is said."""
+    run = simulate(load_scenario("step-response", ["motion.kind=free", "run.duration=0.2 s"])).recording
+    random, room = np.random.default_rng(12), 101325.0
+    noise = {"angle": (4e-4, "rad"), "pressure_1": (100.0, "Pa"), "pressure_2": (100.0, "Pa")}
+    for size, agrees in ((1.0, True), (8.0, False)):
+        channels = {
+            name: Channel(run[name] + one * random.standard_normal(len(run)), unit)
+            for name, (one, unit) in noise.items()
+        }
+        wrong = room + (1.0 - 0.007 * size) * (channels["pressure_2"].values - room)
+        channels |= {"pressure_2": Channel(wrong, "Pa"), "command": Channel(run["command"], "-")}
+        write_csv(tmp_path / "two.csv", Recording("two", (1.0 + 0.005 * size) * run.time, channels, "synthetic"))
+        found = ppafo.validate("ppafo2011", [tmp_path / "two.csv"], overrides=SUPPLY[1::2])
+        said = str(found.to_dict()["summary"])
+        assert found.passed is agrees, said
+        assert "no single change explains it" in said
+        assert re.search(r"is off by [\d.]+ times its noise \([\d.]+ % of full range\)", said)

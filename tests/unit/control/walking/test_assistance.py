@@ -15,6 +15,7 @@ from ppafo.engine.rows import rebuild
 from ppafo.model.helping import LANDING, MID_STANCE, PUSH_OFF, SWING
 from ppafo.model.sensors import GaitMeasurement
 from ppafo.model.valves.kind import VENT
+from tests.settings_of_laws import settings_of_law
 
 PERIOD = 1.0e-3
 PROFILE = TorqueProfile(4.0, 0.5, 0.2, 0.1)
@@ -158,7 +159,7 @@ def test_nothing_is_done_once_safety_has_vented() -> None:
 def default_parameters(name: str) -> Any:
     """Parameters of a controller at their defaults, but patient with pressures that do not answer the valve."""
     kind = WALKING_CONTROLLERS[name]
-    parameters = rebuild(kind.parameters, [float(item.default or 0.0) for item in kind.quantities])
+    parameters = rebuild(kind.parameters, list(settings_of_law(kind).values()))
     return parameters._replace(safety=parameters.safety._replace(fill_time=10.0, vent_time=10.0))
 
 

@@ -31,6 +31,7 @@ PAIR = NominalDevice(
     nominal_opening_delay=0.0,
     nominal_closing_delay=0.0,
     nominal_switching_interval=0.0,
+    nominal_delay=0.0,
     nominal_lag=0.0,
     nominal_dead_band=0.0,
     nominal_joining_time=0.0,
@@ -48,7 +49,7 @@ def test_every_number_of_the_nominal_device_is_that_of_the_device_unless_given()
     assert settings["nominal_flow"] == pytest.approx(2.256e-4, rel=1.0e-3)
     changed = load_walk("proportional", ["valve.area=20 mm^2", "valve.delay=5 ms", "supply.pressure=60 psi_g"])
     assert changed.controller.nominal_supply_pressure == changed.device.supply.pressure
-    assert changed.controller.nominal_lag == pytest.approx(0.005)
+    assert (changed.controller.nominal_delay, changed.controller.nominal_lag) == (0.005, 0.0)
     given = load_walk("solenoid", ["supply.pressure=60 psi_g", "controller.nominal_supply_pressure=50 psi_g"])
     assert given.controller.nominal_supply_pressure == pytest.approx(SUPPLY)
 

@@ -17,6 +17,7 @@ from ppafo.errors import ScenarioError
 from ppafo.model.helping import LANDING, MID_STANCE, PUSH_OFF
 from ppafo.model.sensors import GaitMeasurement
 from ppafo.model.valves.kind import VENT
+from tests.settings_of_laws import settings_of_law
 
 Floats = NDArray[np.float64]
 PERIOD = 1.0e-3
@@ -246,7 +247,7 @@ def test_nothing_pushes_on_a_loaded_heel_and_a_stop_is_for_good_whatever_is_pred
     timing: TimingKind, name: str
 ) -> None:
     kind = with_timing(WALKING_CONTROLLERS[name], timing)
-    values = {item.name: item.default for item in kind.quantities} | GIVEN | {"fill_time": 10.0, "vent_time": 10.0}
+    values = settings_of_law(kind) | GIVEN | {"fill_time": 10.0, "vent_time": 10.0}
     parameters, state = rebuilt(kind.parameters, list(values.values())), kind.initial
     phase = np.concatenate([np.arange(0.5, 5.2, PERIOD), np.full(600, 5.2), np.arange(5.2, 7.3, 1.3 * PERIOD)])
     heel, toe = forces(phase % 1.0, 1.0)

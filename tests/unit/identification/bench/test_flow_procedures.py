@@ -16,7 +16,7 @@ from ppafo.identification.bench import (
     valve_map,
     vane_leak,
 )
-from ppafo.identification.bench.flow import GasAt, Opening, iso6358_shape, orifice_shape
+from ppafo.identification.bench.flow import GasAt, Opening, Sizes, iso6358_shape, orifice_shape
 from ppafo.identification.bench.vane_leak import pressures_of_fall
 from ppafo.identification.fit import burg
 from ppafo.identification.source import Source
@@ -78,14 +78,14 @@ def test_flow_of_the_standard_gives_back_its_two_numbers_and_an_orifice_law_hold
     assert result["valves.main.critical_ratio"].value == pytest.approx(0.2, abs=0.03)
     assert result.conflict == ""
     wrong = open_valve_flow((noisy,), OpenValveFlowSettings(planted.CO2))
-    assert "try law = 'iso6358'" in wrong.conflict
+    assert "try law = 'both', or for a valve 'iso6358'" in wrong.conflict
     assert wrong.estimates[0].verdict == "holds for this model only"
 
 
 def test_a_laminar_valve_gives_back_its_coefficient(planted: ModuleType) -> None:
     source = planted.flow()
     pressures = source.recording["upstream_pressure"], source.recording["downstream_pressure"]
-    flow = Opening(planted.CO2, "laminar").flow(3.0e-14, 0.0, *pressures)
+    flow = Opening(planted.CO2, "laminar").flow(Sizes(3.0e-14), *pressures)
     laminar = changed(source, "mass_flow", flow * (1.0 + np.random.default_rng(1).normal(0.0, 0.003, flow.size)))
     found = open_valve_flow((laminar,), OpenValveFlowSettings(planted.CO2, law="laminar"))
     assert found["open_valve_flow.laminar_coefficient"].value == pytest.approx(3.0e-14, rel=0.01)
@@ -122,7 +122,7 @@ def test_planted_dead_band_saturation_and_hysteresis_come_back(planted: ModuleTy
     result = valve_map((planted.sweep(),), ValveMapSettings(planted.CO2, "valves.main"))
     for path, truth, near in (
         ("valves.main.dead_band", 0.12, 0.003),
-        ("valve_map.hysteresis", 0.04, 0.003),
+        ("effects.spool_play.width", 0.04, 0.003),
         ("valve_map.saturation_command", 0.9, 0.01),
     ):
         assert result[path].value == pytest.approx(truth, abs=near)
@@ -150,7 +150,7 @@ def test_a_valve_that_opens_more_in_one_direction_holds_for_this_model_only(plan
 def test_a_command_that_only_rises_leaves_hysteresis_out(planted: ModuleType) -> None:
     up = Source(planted.sweep().recording.between(0.0, 10.0))
     result = valve_map((up,), ValveMapSettings(planted.CO2))
-    assert "valve_map.hysteresis" not in [item.path for item in result.estimates]
+    assert "effects.spool_play.width" not in [item.path for item in result.estimates]
 
 
 def test_flow_with_the_wrong_sign_is_told(planted: ModuleType) -> None:
@@ -205,12 +205,12 @@ def test_a_laminar_leak_gives_its_coefficient_and_an_orifice_holds_for_this_mode
     planted: ModuleType, kind: str
 ) -> None:
     source = getattr(planted, kind)("laminar", 2.0e-16)
-    found = vane_leak((source,), VaneLeakSettings(planted.CO2, VOLUME, VOLUME / 1.3, is_laminar=True))
+    found = vane_leak((source,), VaneLeakSettings(planted.CO2, VOLUME, VOLUME / 1.3, law="laminar"))
     coefficient = found["vane_leak.laminar_coefficient"]
     assert coefficient.low <= 2.0e-16 <= coefficient.high
     assert found.conflict == ""
     wrong = vane_leak((source,), VaneLeakSettings(planted.CO2, VOLUME, VOLUME / 1.3, 0.113))
-    assert "try law = 'laminar'" in wrong.conflict
+    assert "try law = 'both'" in wrong.conflict
 
 
 def test_a_tight_chamber_gives_an_upper_end_and_no_area(planted: ModuleType) -> None:
@@ -253,7 +253,7 @@ def test_steady_flow_with_the_wrong_sign_is_told(planted: ModuleType) -> None:
 
 def test_a_leak_in_the_form_of_the_standard_gives_its_conductance(planted: ModuleType) -> None:
     first, second = np.linspace(1.3e5, 6.0e5, 24), np.full(24, planted.ROOM)
-    flow = Opening(planted.CO2, "iso6358", 1.0, 0.25).flow(7.0e-11, 0.0, first, second)
+    flow = Opening(planted.CO2, "iso6358", 1.0, 0.25).flow(Sizes(7.0e-11), first, second)
     flow *= 1.0 + np.random.default_rng(3).normal(0.0, 0.003, 24)
     channels = {"pressure_1": (first, "Pa"), "pressure_2": (second, "Pa"), "mass_flow": (flow, "kg/s")}
     source = planted.source("steady", np.arange(24.0), **channels)
@@ -265,7 +265,7 @@ def test_a_leak_in_the_form_of_the_standard_gives_its_conductance(planted: Modul
 def test_choked_outflow_of_one_chamber_into_a_room_is_an_exponential_of_the_pressure(planted: ModuleType) -> None:
     opening = Opening(planted.CO2, "orifice", 1.0 / planted.CO2.choked_flow_constant)
     time = np.linspace(0.0, 3.0, 50)
-    first, _ = pressures_of_fall(opening, 0.2, 1e6, 1e5, 0.0, 1.0, time)
+    first, _ = pressures_of_fall(opening, Sizes(0.2), 1e6, 1e5, 0.0, 1.0, time)
     assert np.allclose(first, 1e6 * np.exp(-0.2 * time), rtol=1e-4)
 
 

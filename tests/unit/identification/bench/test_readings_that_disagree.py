@@ -69,7 +69,7 @@ def test_a_repetition_of_another_gain_or_zero_is_named_and_not_weighed_out(
     own = source.recording["repetition"] == 2.0
     torque[own] = 1.03 * torque[own] if fault == "gain" else torque[own] + 0.1
     result = solved["static"]((changed(source, "torque", torque),))
-    assert result.conflict.startswith("repetition 2 alone wants other numbers")
+    assert result.conflict.startswith("fitted alone, repetition 2 gives different values")
     assert not any(item.is_identified for item in result.estimates)
 
 
@@ -82,7 +82,9 @@ def test_a_recording_of_another_gain_is_named_with_its_file(
     values = right[2].recording[name]
     wrong = changed(right[2], name, values[0] + 1.1 * (values - values[0]), "third.csv")
     assert solved[kind](right).conflict == ""
-    assert solved[kind]((*right[:2], wrong)).conflict.startswith("recording 3 (third.csv) alone wants other numbers")
+    assert solved[kind]((*right[:2], wrong)).conflict.startswith(
+        "fitted alone, recording 3 (third.csv) gives different values"
+    )
 
 
 @pytest.mark.parametrize("kind", RESPONSES)

@@ -120,7 +120,7 @@ def test_a_model_that_lacks_something_holds_for_itself_only(experiment: Experime
     assert abs(poor.estimates[0].value - 0.113) > poor.estimates[0].half_width
     assert poor.estimates[0].verdict == "holds for this model only"
     assert not poor.estimates[0].is_identified
-    assert "alone wants other numbers" in poor.conflict
+    assert "fitted alone, " in poor.conflict
 
 
 def test_a_prior_decides_where_the_recordings_are_silent(experiment: Experiment) -> None:

@@ -31,6 +31,7 @@ from ppafo.analyses.design.front.search import (
 from ppafo.analyses.design.trials import STREAMS, run_trials
 from ppafo.analyses.parts.solve import rated_pressure
 from ppafo.errors import ScenarioError, StudyError
+from ppafo.linear_algebra import on_one_thread
 from ppafo.parameters.graph import ATMOSPHERE_PATH, PRESSURE_PATH, SECOND_PRESSURE_PATH
 from ppafo.parameters.overrides import over
 from ppafo.progress import Report, report_nothing
@@ -182,6 +183,7 @@ def design_columns(problem: DesignProblem, scenario: Scenario, candidates: Candi
     return columns
 
 
+@on_one_thread
 def find_front(problem: DesignProblem, threads: int | None = None, report: Report = report_nothing) -> Design:
     """Return the designs that no other design found beats in error, gas per task and mass.
 

@@ -16,11 +16,15 @@ USABLE = 0.8
 
 @dataclass(frozen=True, slots=True)
 class Electrical:
-    """Mean powers [W] by consumer, and the battery: how many cells, their mass [kg], how long they last [s]."""
+    """Mean powers [W] by consumer, and the battery: how many cells, their mass [kg], how long they last [s].
+
+    ``is_whole`` is False where the catalogue states no power of the valve, which is then not among them.
+    """
 
     powers: dict[str, float]
     cell: Part
     cells: int
+    is_whole: bool = True
 
     @property
     def power(self) -> float:
@@ -42,11 +46,12 @@ def valve_power(valve: Part, command: Floats) -> Floats:
     """Return the electrical power [W] of a valve, both of a pair, under a command (samples,) of -1 to 1, or to vent.
 
     One coil of a pair is energised while its chamber is filled, none while both vent. A spool takes the power of its
-    centre, and what its data sheet states at full stroke in proportion to the stroke beyond.
+    centre, and what its data sheet states at full stroke in proportion to the stroke beyond. Nothing where its
+    catalogue states no power.
     """
     # A command to vent is beyond 1 and no stroke.
     stroke = np.where(command > VENTS_ABOVE, 0.0, np.abs(command))
-    idle, full = valve.values.get("idle_power", 0.0), valve.values["power"]
+    idle, full = valve.values.get("idle_power", 0.0), valve.values.get("power", 0.0)
     if valve.kind == "solenoid":
         return np.where(stroke > 0.0, full, idle)
     return idle + (full - idle) * stroke
@@ -63,16 +68,24 @@ def electrical_of(
     # A controller without a safe state helps all the time.
     helps = recording["safe_state"] < 0.5 if "safe_state" in recording else np.ones(time.size)
     share = float(np.sum(helps[:-1] * np.diff(time)) / length)
-    powers = {"valve": mean, "shut-off valve": shut_off_power * share, "processor": processor.values["power"]}
+    is_whole = "power" in valve.values
+    powers = {"valve": mean} if is_whole else {}
+    powers |= {"shut-off valve": shut_off_power * share, "processor": processor.values["power"]}
     needed = sum(powers.values()) * seconds / (USABLE * cell.values["energy"])
-    return Electrical(powers, cell, max(1, math.ceil(needed)))
+    return Electrical(powers, cell, max(1, math.ceil(needed)), is_whole)
+
+
+def _power_text(power: float) -> str:
+    """Return a power [W] with three digits, in milliwatts below one watt."""
+    return f"{power:.3g} W" if power >= 1.0 else f"{1000.0 * power:.3g} mW"
 
 
 def electrical_sentences(found: Electrical) -> list[str]:
     """Return powers, and mass and minutes of the battery."""
-    parts = ", ".join(f"{name} {1000.0 * power:.3g} mW" for name, power in found.powers.items())
+    parts = ", ".join(f"{name} {_power_text(power)}" for name, power in found.powers.items())
+    valve = "" if found.is_whole else ", without the valve: the catalogue states no power of it"
     return [
-        f"electrical power: {found.power:.3g} W ({parts})",
+        f"electrical power: {found.power:.3g} W ({parts}){valve}",
         f"battery: {found.cells} x {found.cell.title}, {1000.0 * found.mass:.0f} g, "
         f"runs {found.lasts / 60.0:.0f} min; "
         f"{100.0 * USABLE:.0f} % of its energy is counted",

@@ -1,46 +1,42 @@
-"""From a wearer to a device: the lightest parts with which a walk on its bottle has the torque and lasts the minutes.
+"""From a wearer to a device: the lightest parts with which a walk on its bottle does what is wanted.
 
-Every pair of valve and actuator walks a few strides; those with the torque walk on bottles, lightest first, until one
-lasts. That walk, whole, is the suggestion; where none does, walks say what would have to be given up.
+Every pair of valve and actuator walks a few strides; those with the torque whose toes clear the ground walk on bottles,
+lightest first, until one lasts. That walk, whole, is the suggestion; where none does, walks say what would have to be
+given up.
 """
 
 import itertools
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import Any
+from pathlib import Path
 
 import numpy as np
 
-from ppafo.analyses.design.wearer.electrical import Electrical, electrical_of, electrical_sentences
-from ppafo.analyses.endurance.answer import Endurance
+from ppafo.analyses.design.wearer.electrical import electrical_of
+from ppafo.analyses.design.wearer.wish import TOES, WALKS, Device, Offer, Tried, WearerSizing, Wish
 from ppafo.analyses.endurance.solve import endurance_of_walk
-from ppafo.analyses.parts.solve import doubts_data, part_titles, parts_to_check, rated_pressure
-from ppafo.constants import PASCALS_PER_PSI, STANDARD_ATMOSPHERE
+from ppafo.analyses.parts.solve import rated_pressure
+from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.control.walking.assistance import ASSISTANCE_QUANTITIES
 from ppafo.errors import ScenarioError, StudyError
 from ppafo.model.catalog import VALVES
 from ppafo.model.plant_faults import SHUT_OFF
 from ppafo.parameters.declaration import ACTUATOR, ORIFICE
 from ppafo.parameters.parts import Part, load_catalogue
+from ppafo.parameters.parts.catalogue import DEFAULT
 from ppafo.progress import Progress, Report
-from ppafo.report import finding
-from ppafo.report.finding import Finding, columns_of, facts
-from ppafo.report.kind import Kind
-from ppafo.version import __version__
-from ppafo.walking.bottle import WALKED, minutes_text
-from ppafo.walking.figures.over_time import bottle_figure, peak_torques
+from ppafo.walking.bottle import WALKED
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import LONGEST_MINUTES, walk_of
 from ppafo.walking.result import WalkResult
-from ppafo.walking.walk import walk
-from ppafo.walking.wearer import SCALED_MASS, STATURES, WEARER, paper_subject, who_walks
+from ppafo.walking.walk import healthy_metrics, walk
+from ppafo.walking.wearer import STATURES, WEARER
 
-WALKS = {"solenoid": "solenoid-regulators", "proportional": "proportional-regulators"}
-"""The walk, with its controller, of each kind of valve."""
 _REQUESTS = (1.0, 1.3, 1.7)
 """Torque that a torque controller is told, over the torque that is wanted: it lags behind its reference."""
+_ABOVE = 1.1
+"""Limit of a pair over the torque that is wanted: it vents the chamber from its limit on."""
 _LIMIT = next(item.default or 0.0 for item in ASSISTANCE_QUANTITIES if item.name == "largest_torque")
 """Torque [N m] above which a controller of walking requests no more, unless it is told."""
 _SHORTEST = 6.0
@@ -52,6 +48,10 @@ _DORSIFLEXION = 0.9
 _SHUT_OFF = {item.name: item.default or 0.0 for item in SHUT_OFF} | {"area": 1.0e-5}
 _REGULATORS = ("pipeline-jacpac-regulator", "festo-lrma-qs-4")
 _PROCESSOR, _CELL = "msp430g2553", "ncr18650b"
+_HIGHEST_TOES = 0.2
+"""Clearance [m] above which a wish is a slip of the pen."""
+_EARLY_LIFT = ("controller.swing_peak_time=0.73", "controller.swing_rise_time=0.1", "controller.swing_fall_time=0.2")
+"""A lift that begins at toe-off, when the toes come down late with the walk's own; with all the torque there is."""
 _KEPT = 0.9
 """Torque in the walk on the bottle over the wanted one: that at which a walk on a bottle ends."""
 _MORE_PRESSURE = (1.1, 1.25, 1.5, 1.8, 2.2)
@@ -60,6 +60,8 @@ _LESS_PRESSURE = tuple(0.95 - 0.05 * place for place in range(12))
 """Times the gauge pressure that are tried where no bottle lasts."""
 _OFFERED = 5
 """Pairs of parts that are tried at less pressure: those with the most torque for their gas."""
+_FIRST = 4
+"""Pairs and pressures, from the least gas, that are walked on a bottle for an offer."""
 _USED = 0.8
 """Share of its gas above which no walk on a bottle is tried for an offer; the walk decides."""
 _ALLOWANCE = 1.15
@@ -67,141 +69,48 @@ _ALLOWANCE = 1.15
 
 
 @dataclass(frozen=True, slots=True)
-class Wish:
-    """What is wanted: body mass [kg], stature [m] or None, torque [N m], supply pressure [Pa absolute], time [s]."""
+class Shelf:
+    """What a device may be built of: parts by group, and the catalogue file they are from where it is one's own."""
 
-    mass: float
-    stature: float | None
-    torque: float
-    pressure: float
-    seconds: float
+    groups: Mapping[str, Mapping[str, Part]]
+    own_groups: frozenset[str]
+    file: str
 
-    @property
-    def height(self) -> float:
-        """Stature [m], the paper's subject's unless one is given."""
-        return paper_subject().stature if self.stature is None else self.stature
+    def part(self, group: str, usual: str) -> Part:
+        """Return the part of a group that is usual, else the lightest of one's own."""
+        parts = self.groups[group]
+        return parts[usual] if usual in parts else min(parts.values(), key=lambda part: part.full_mass)
 
-    def at_gauge(self, share: float) -> "Wish":
-        """Return this wish at a share of its gauge pressure, rounded to a tenth of a psi."""
-        gauge = round(share * (self.pressure - STANDARD_ATMOSPHERE) / PASCALS_PER_PSI, 1)
-        return replace(self, pressure=STANDARD_ATMOSPHERE + gauge * PASCALS_PER_PSI)
+    def bottle_name(self, bottle: Part) -> str:
+        """Return what ``--bottle`` takes for a bottle."""
+        return f"{self.file}/{bottle.name}" if "bottles" in self.own_groups else bottle.name
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Tried:
-    """Valve, actuator and overrides of a walk; peak torque of the mean stride [N m], mean flow of gas [kg/s]."""
+def shelf_of(catalogue: str | Path) -> Shelf:
+    """Return the parts of a catalogue, by name or file; what it has no group of is the package's.
 
-    valve: Part
-    actuator: Part
-    overrides: tuple[str, ...]
-    torque: float
-    flow: float
-
-    @property
-    def mass(self) -> float:
-        """Mass of both parts [kg]."""
-        return self.valve.full_mass + self.actuator.full_mass
+    ParameterError where it cannot be read, StudyError where its valves have no walk.
+    """
+    own, usual = load_catalogue(catalogue).groups, load_catalogue().groups
+    groups = {group: own[group] or parts for group, parts in usual.items()}
+    groups["valves"] = {name: part for name, part in groups["valves"].items() if part.kind in WALKS}
+    if not groups["valves"]:
+        raise StudyError(f"--catalogue {catalogue}: no valve is of a kind that walks: {', '.join(WALKS)}")
+    is_own = Path(catalogue).suffix == ".toml"
+    return Shelf(groups, frozenset(name for name in own if own[name] and is_own), str(catalogue))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Device:
-    """A device that was walked with on its bottle for the time that is wanted, how long it lasts, what it takes."""
-
-    tried: Tried
-    bottle: Part
-    walked: WalkResult
-    life: Endurance
-    electrical: Electrical
-    masses: Mapping[str, float]
-
-    @property
-    def torque(self) -> float:
-        """Peak torque of the mean stride on the bottle [N m]."""
-        return float(self.walked.averages["torque"].mean.max())
-
-    @property
-    def command(self) -> str:
-        """The command that walks with it."""
-        sets = " ".join(f"--set '{text}'" for text in self.tried.overrides)
-        minutes = float(self.walked.recording.time[-1]) / 60.0
-        return f"ppafo walk {WALKS[self.tried.valve.kind]} --bottle {self.bottle.name} --minutes {minutes:.4g} {sets}"
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class WearerSizing:
-    """What was wanted and all that was tried; ``device`` is None where none has it, and ``instead`` what would do."""
-
-    wish: Wish
-    tried: tuple[Tried, ...]
-    device: Device | None
-    instead: tuple[str, ...]
-
-    @property
-    def parts(self) -> list[Part]:
-        """The parts that the device is made of, of those with figures to check."""
-        device = self.device
-        if device is None:
-            return []
-        return [device.tried.valve, device.tried.actuator, device.bottle, device.electrical.cell]
-
-    @property
-    def doubtful(self) -> list[tuple[Part, str]]:
-        """Figures of these parts that are quoted or assumed."""
-        return [(part, name) for part in self.parts for name in part.doubtful]
-
-    def json_document(self) -> dict[str, Any]:
-        """Return the device and all that was tried as plain data in SI."""
-        wish, device = self.wish, self.device
-        return {
-            "format": "ppafo wearer sizing",
-            "schema_version": 1,
-            "kind": "simulated",
-            "ppafo": __version__,
-            "wish": {
-                "body_mass": wish.mass,
-                "stature": wish.stature,
-                "torque": wish.torque,
-                "pressure": wish.pressure,
-                "time": wish.seconds,
-            },
-            "device": None
-            if device is None
-            else {
-                "valve": device.tried.valve.name,
-                "actuator": device.tried.actuator.name,
-                "bottle": device.bottle.name,
-                "controller": device.walked.scenario.controller.kind,
-                "walk": WALKS[device.tried.valve.kind],
-                "overrides": list(device.tried.overrides),
-                "lasts": device.life.discharge.walking_time,
-                "torque": device.torque,
-                "masses": dict(device.masses),
-                "electrical_power": dict(device.electrical.powers),
-                "battery": {
-                    "cell": device.electrical.cell.name,
-                    "cells": device.electrical.cells,
-                    "mass": device.electrical.mass,
-                    "lasts": device.electrical.lasts,
-                },
-                "command": device.command,
-            },
-            "instead": list(self.instead),
-            "tried": [
-                {"valve": one.valve.name, "actuator": one.actuator.name, "torque": one.torque, "flow": one.flow}
-                for one in self.tried
-            ],
-            "check_before_buying": doubts_data(self.doubtful),
-        }
-
-
-def size_for_wearer(wish: Wish, report: Report) -> WearerSizing:
+def size_for_wearer(wish: Wish, report: Report, catalogue: str | Path = DEFAULT) -> WearerSizing:
     """Return the lightest device for a wish, or what to give up; StudyError for a wish that is none."""
     _check(wish)
-    catalogue = load_catalogue()
+    shelf = shelf_of(catalogue)
+    healthy = healthy_metrics(load_walk(next(iter(WALKS.values())), _of_wearer(wish)))["lowest_toes"].value
+    # What the healthy gait itself does not do is not asked of a device, unless somebody does.
+    wish = replace(wish, usual_toes=_rounded_down(min(TOES, healthy)))
     pairs = [
         (valve, actuator)
-        for valve in catalogue.groups["valves"].values()
-        for actuator in catalogue.groups["actuators"].values()
+        for valve in shelf.groups["valves"].values()
+        for actuator in shelf.groups["actuators"].values()
         # A part without a largest pressure in the catalogue is not left out.
         if rated_pressure(valve, actuator) >= wish.pressure
     ]
@@ -209,26 +118,46 @@ def size_for_wearer(wish: Wish, report: Report) -> WearerSizing:
     for place, (valve, actuator) in enumerate(pairs):
         report(Progress(f"walking with {valve.name}", place, len(pairs), noun="pairs"))
         tried += _few_strides(wish, valve, actuator)
-    bottles = sorted(catalogue.groups["bottles"].values(), key=lambda bottle: bottle.full_mass)
-    found = _lightest(wish, tried, bottles, report)
+    bottles = sorted(shelf.groups["bottles"].values(), key=lambda bottle: bottle.full_mass)
+    found = _lightest(wish, tried, bottles, shelf, report)
     if found is None:
-        return WearerSizing(wish, tuple(tried), None, tuple(_instead(wish, tried, bottles, report)))
+        instead = tuple(offer.text(wish) for offer in _instead(wish, tried, bottles, shelf, report))
+        if not tried:
+            instead = ("no pair of valve and actuator may have this pressure, or none helps: take another pressure",)
+        return WearerSizing(wish, healthy, tuple(tried), None, instead)
     one, bottle, walked = found
     life = endurance_of_walk(walked)
     assert life is not None, "a walk on a bottle that has a torque took gas"
-    processor, cell = catalogue.part("processors", _PROCESSOR), catalogue.part("batteries", _CELL)
+    processor, cell = shelf.part("processors", _PROCESSOR), shelf.part("batteries", _CELL)
     electrical = electrical_of(walked.recording, one.valve, _SHUT_OFF["power"], processor, cell, wish.seconds)
-    regulators = [catalogue.part("regulators", name) for name in _REGULATORS]
     masses = {
         f"actuator {one.actuator.name}": one.actuator.full_mass,
         f"valve {one.valve.name}": one.valve.full_mass,
         f"bottle {bottle.name}, full": bottle.full_mass,
-        **{f"regulator {part.name}": part.full_mass for part in regulators},
+        **_masses_of_regulators([shelf.part("regulators", name) for name in _REGULATORS]),
         "shut-off valve": _SHUT_OFF["mass"],
         f"processor {processor.name}": processor.full_mass,
         f"battery, {electrical.cells} x {cell.name}": electrical.mass,
     }
-    return WearerSizing(wish, tuple(tried), Device(one, bottle, walked, life, electrical, masses), ())
+    device = Device(one, bottle, shelf.bottle_name(bottle), walked, life, electrical, masses)
+    return WearerSizing(wish, healthy, tuple(tried), device, ())
+
+
+def _masses_of_regulators(regulators: list[Part]) -> dict[str, float]:
+    """Return the masses of both regulators, which may be two of one part."""
+    first, second = regulators
+    if first.name == second.name:
+        return {f"2 x regulator {first.name}": 2.0 * first.full_mass}
+    return {f"regulator {part.name}": part.full_mass for part in regulators}
+
+
+def _rounded_down(toes: float) -> float:
+    """Return a clearance [m] rounded down to the tenth of a millimetre that is shown, which a few strides then have."""
+    return math.floor(1.0e4 * toes) / 1.0e4
+
+
+def _of_wearer(wish: Wish) -> tuple[str, ...]:
+    return f"wearer.body_mass={wish.mass:.6g} kg", f"wearer.stature={wish.height:.6g} m"
 
 
 def _check(wish: Wish) -> None:
@@ -246,6 +175,10 @@ def _check(wish: Wish) -> None:
         raise StudyError(
             f"--minutes: {wish.seconds / 60.0:g} min: a walk on a bottle is followed for 0.1 to {LONGEST_MINUTES:g} min"
         )
+    if wish.toes is not None and not 0.0 <= wish.toes <= _HIGHEST_TOES:
+        raise StudyError(
+            f"--toes: {1000.0 * wish.toes:g} mm: must be at least 0 mm and at most {1000.0 * _HIGHEST_TOES:g} mm"
+        )
     if wish.stature is not None and not low <= wish.stature <= high:
         raise StudyError(
             f"--stature: {wish.stature:g} m: segments are known of adults of {low:g} to {high:g} m; take a gait and "
@@ -254,73 +187,105 @@ def _check(wish: Wish) -> None:
 
 
 def _few_strides(wish: Wish, valve: Part, actuator: Part) -> list[Tried]:
-    """Return a few strides with a pair of parts; with a torque controller the lowest request that gives the torque."""
+    """Return a few strides with a pair of parts that have the torque and the clearance, else those that come nearest.
+
+    A torque controller walks with the lowest request that gives the torque, and lifts the foot earlier and harder where
+    the toes would not clear the ground. Nearest are the most torque, and the highest toes with enough of it.
+    """
     gauge = wish.pressure - STANDARD_ATMOSPHERE
     units = {item.name: item.unit for item in (*ORIFICE, *VALVES[valve.kind].quantities, *ACTUATOR)}
     numbers = {**valve.model_numbers, **{f"actuator.{name}": actuator.values[name] for name in _OF_ACTUATOR}}
-    overrides = [
-        f"wearer.body_mass={wish.mass:.6g} kg",
-        f"wearer.stature={wish.height:.6g} m",
+    overrides = (
+        *_of_wearer(wish),
         f"supply.pressure={wish.pressure:.7g} Pa_a",
         f"supply.dorsiflexion_pressure={STANDARD_ATMOSPHERE + _DORSIFLEXION * gauge:.7g} Pa_a",
         *(f"{path}={number:.6g} {units[path.partition('.')[2]]}".strip() for path, number in numbers.items()),
         f"shut_off.area={_SHUT_OFF['area']:g} m^2",
-    ]
-    held = actuator.values["torque_constant"] * gauge
-    # No request above what the supply pressure can hold with this actuator.
-    requests = [min(factor * wish.torque, held) for factor in _REQUESTS] if valve.kind == "proportional" else [None]
-    best = None
-    # Requests that the limit made equal are walked with once.
-    for request in dict.fromkeys(requests):
-        chosen = tuple(overrides)
-        if request is not None:
-            chosen += (f"controller.peak_torque={request:.4g} N m",)
-        # A controller requests no more than its limit, which therefore has to follow.
-        if request is not None and request > _LIMIT:
-            chosen += (f"controller.largest_torque={request:.4g} N m",)
-        result = walk(load_walk(WALKS[valve.kind], chosen), minutes=_FEW)
-        if not result.status.is_completed or not result.is_helped or not result.averages:
-            continue
-        stride = walk_of(result.scenario).gait.stride_time
-        flow, torque = result.metrics["gas"].value / stride, float(result.averages["torque"].mean.max())
-        best = Tried(valve, actuator, chosen, torque, flow) if best is None or torque > best.torque else best
-        if torque >= wish.torque:
-            break
-    return [] if best is None else [best]
+    )
+    strides: list[Tried] = []
+    for request in _requests(wish, valve, actuator):
+        for lift in _lifts(request, valve, actuator, gauge):
+            tried = _strides_of(valve, actuator, (*overrides, *request, *lift))
+            strides += [] if tried is None else [tried]
+            if tried is not None and tried.has(wish):
+                return [tried]
+            # Another lift gives no more torque.
+            if tried is None or tried.torque < wish.torque:
+                break
+    if not strides:
+        return []
+    strongest = max(strides, key=lambda tried: tried.torque)
+    highest = max(strides, key=lambda tried: (min(tried.torque, wish.torque), tried.toes))
+    return [strongest] if highest is strongest else [strongest, highest]
+
+
+def _requests(wish: Wish, valve: Part, actuator: Part) -> list[tuple[str, ...]]:
+    """Return the settings of the torque that is requested, from the lowest; a pair of valves has a limit alone."""
+    if valve.kind != "proportional":
+        return [_limit(_ABOVE * wish.torque)]
+    # No request above what the supply pressure can hold with this actuator; those that are equal then are one.
+    held = actuator.values["torque_constant"] * (wish.pressure - STANDARD_ATMOSPHERE)
+    requests = dict.fromkeys(min(factor * wish.torque, held) for factor in _REQUESTS)
+    return [(f"controller.peak_torque={request:.4g} N m", *_limit(request)) for request in requests]
+
+
+def _limit(request: float) -> tuple[str, ...]:
+    """Return the limit that has to follow a request [N m]: a controller requests no more than its limit."""
+    return (f"controller.largest_torque={request:.4g} N m",) if request > _LIMIT else ()
+
+
+def _lifts(request: tuple[str, ...], valve: Part, actuator: Part, gauge: float) -> list[tuple[str, ...]]:
+    """Return settings of the lift in the swing: the walk's own, then one that begins at toe-off, with all torque."""
+    if valve.kind != "proportional":
+        return [()]
+    limit = next((text.partition("=")[2] for text in request if "largest_torque" in text), f"{_LIMIT:g} N m")
+    held = actuator.values["torque_constant"] * _DORSIFLEXION * gauge
+    torque = min(held, float(limit.partition(" ")[0]))
+    return [(), (f"controller.swing_peak_torque={torque:.4g} N m", *_EARLY_LIFT)]
+
+
+def _strides_of(valve: Part, actuator: Part, overrides: tuple[str, ...]) -> Tried | None:
+    """Return a few strides with some settings; None where they lack help, or the torque loop oscillates."""
+    result = walk(load_walk(WALKS[valve.kind], overrides), minutes=_FEW)
+    if not result.status.is_completed or not result.is_helped or not result.averages or result.oscillation:
+        return None
+    flow = result.metrics["gas"].value / walk_of(result.scenario).gait.stride_time
+    torque = float(result.averages["torque"].mean.max())
+    return Tried(valve, actuator, overrides, torque, flow, result.metrics["lowest_toes"].value)
 
 
 _OF_ACTUATOR = ("torque_constant", "displacement_per_radian")
 
 
 def _lightest(
-    wish: Wish, tried: list[Tried], bottles: list[Part], report: Report
+    wish: Wish, tried: list[Tried], bottles: list[Part], shelf: Shelf, report: Report
 ) -> tuple[Tried, Part, WalkResult] | None:
-    """Return the lightest pair and bottle that walk for the time with the torque, with that walk; None if none does.
+    """Return the lightest pair and bottle whose walk does what is wanted, with that walk; None if none does.
 
     No pair whose gas might do is left out, so that what is offered is found when it is asked for.
     """
     # Heaviest first: of pairs with the same overrides the lightest replaces the others.
-    strong = {one.overrides: one for one in sorted(tried, key=lambda one: -one.mass) if one.torque >= wish.torque}
-    pairs = [(one, bottle) for one in strong.values() for bottle in bottles]
+    able = {one.overrides: one for one in sorted(tried, key=lambda one: -one.mass) if one.has(wish)}
+    pairs = [(one, bottle) for one in able.values() for bottle in bottles]
     too_thirsty: dict[str, float] = {}
     for one, bottle in sorted(pairs, key=lambda pair: pair[0].mass + pair[1].full_mass):
         largest_flow = min(bottle.values["content"] / wish.seconds, too_thirsty.get(bottle.name, np.inf))
         if one.flow > largest_flow:
             continue
         report(Progress(f"walking on {bottle.name}", 0, 0, noun="bottles"))
-        walked = _walked(one, bottle, wish.seconds)
+        walked = _walked(one, shelf.bottle_name(bottle), wish.seconds)
         if _time(walked) < wish.seconds:
             too_thirsty[bottle.name] = _lasting_flow(one, _time(walked), wish.seconds)
-        elif _keeps(walked, wish.torque):
+        elif _keeps(walked, wish):
             assert walked is not None, "it lasts"
             return one, bottle, walked
     return None
 
 
-def _walked(one: Tried, bottle: Part, seconds: float) -> WalkResult | None:
+def _walked(one: Tried, bottle: str, seconds: float) -> WalkResult | None:
     """Walk for a time [s], or until the bottle ends it; None where it cannot feed the device at all."""
     try:
-        return walk(load_walk(WALKS[one.valve.kind], one.overrides, bottle=bottle.name), minutes=seconds / 60.0)
+        return walk(load_walk(WALKS[one.valve.kind], one.overrides, bottle=bottle), minutes=seconds / 60.0)
     except ScenarioError:
         return None
 
@@ -337,17 +302,17 @@ def _lasting_flow(one: Tried, lasted: float, seconds: float) -> float:
     return one.flow * min(0.99, max(0.5, _ALLOWANCE * lasted / seconds))
 
 
-def _keeps(walked: WalkResult | None, torque: float) -> bool:
-    """True where the mean stride of a walk on a bottle has most of a torque [N m]."""
-    return walked is not None and bool(walked.averages) and walked.averages["torque"].mean.max() >= _KEPT * torque
+def _keeps(walked: WalkResult | None, wish: Wish) -> bool:
+    """Tell whether the mean stride of a walk on a bottle has most of the torque, and the clearance."""
+    if walked is None or not walked.averages or walked.oscillation:
+        return False
+    torque = walked.averages["torque"].mean.max()
+    return bool(torque >= _KEPT * wish.torque and walked.metrics["lowest_toes"].value >= wish.clearance)
 
 
-def _instead(wish: Wish, tried: list[Tried], bottles: list[Part], report: Report) -> Iterator[str]:
+def _instead(wish: Wish, tried: list[Tried], bottles: list[Part], shelf: Shelf, report: Report) -> Iterator[Offer]:
     """Yield what would do instead, each as it walked on the largest bottle: who asks for exactly that gets it."""
     largest = max(bottles, key=lambda bottle: bottle.values["content"])
-    if not tried:
-        yield "no pair of valve and actuator may have this pressure, or none helps: take another pressure"
-        return
     lower = [(wish, one) for one in tried]
     # At less pressure the pairs that have the most torque for their gas.
     thrifty = sorted((one for one in tried if one.flow > 0.0), key=lambda one: -one.torque / one.flow)
@@ -358,150 +323,84 @@ def _instead(wish: Wish, tried: list[Tried], bottles: list[Part], report: Report
         asked = wish.at_gauge(share)
         if STANDARD_ATMOSPHERE < asked.pressure < wish.pressure:
             lower += [(asked, again) for one in pairs for again in _few_strides(asked, one.valve, one.actuator)]
-    strong = sorted((item for item in lower if item[1].torque >= wish.torque), key=lambda item: item[1].flow)
-    weak = sorted((item for item in lower if item[1].torque < wish.torque), key=lambda item: -item[1].torque)
+    able = sorted((item for item in lower if item[1].has(wish)), key=lambda item: item[1].flow)
+    # A device whose toes drag is no offer.
+    clear = [item for item in lower if item[1].toes >= wish.clearance and item[1].torque < wish.torque]
+    strong = [item for item in lower if item[1].torque >= wish.torque and 0.0 <= item[1].toes < wish.clearance]
+    weak = sorted(clear, key=lambda item: -item[1].torque)
+    low = sorted(strong, key=lambda item: -item[1].toes)
     report(Progress(f"walking on {largest.name}", 0, 0, noun="bottles"))
-    first = _offered(*(strong or weak)[0], largest)
-    if first is not None:
-        yield _offer_text(wish, *first, largest)
-    if not strong:
-        more = (_offered(*item, largest) for item in _at_more_pressure(wish, tried))
-        yield from itertools.islice((_offer_text(wish, *found, largest) for found in more if found is not None), 1)
+    nearest = [] if able else [_offered(*items[0], largest, shelf) for items in (weak, low) if items]
+    made = [offer for offer in (_thriftiest(able, largest, shelf), *nearest) if offer is not None]
+    yield from made
+    if not able:
+        more = (_offered(*item, largest, shelf) for item in _at_more_pressure(wish, tried))
+        yield from itertools.islice((offer for offer in more if offer is not None), 1)
     # A walk that ends early is no full answer: less torque for the whole time is offered beside it.
-    if first is None or first[0].seconds < wish.seconds:
-        found = _lasting(wish, weak, largest)
-        if found is not None:
-            yield _offer_text(wish, *found, largest)
+    if all(offer.wish.seconds < wish.seconds for offer in made):
+        lasting = _lasting(wish, weak, largest, shelf)
+        yield from [] if lasting is None else [lasting]
 
 
-def _lasting(wish: Wish, weak: list[tuple[Wish, Tried]], bottle: Part) -> tuple[Wish, Tried] | None:
+def _thriftiest(able: list[tuple[Wish, Tried]], bottle: Part, shelf: Shelf) -> Offer | None:
+    """Return what walks on a bottle with the least gas, of the first few the one whose toes stay as high as wanted."""
+    offers = []
+    for asked, one in able[:_FIRST]:
+        offer = _offered(asked, one, bottle, shelf)
+        if offer is not None and offer.wish.clearance >= asked.clearance:
+            return offer
+        offers += [] if offer is None else [offer]
+    return next(iter(offers), None)
+
+
+def _lasting(wish: Wish, weak: list[tuple[Wish, Tried]], bottle: Part, shelf: Shelf) -> Offer | None:
     """Return what walks on a bottle for all of the time, of pairs with the most torque first; None if none does."""
     largest_flow = _USED * bottle.values["content"] / wish.seconds
     for asked, one in weak:
         if one.flow > largest_flow:
             continue
-        found = _offered(asked, one, bottle)
-        if found is not None and found[0].seconds == wish.seconds:
-            return found
-        largest_flow = _lasting_flow(one, 0.0 if found is None else found[0].seconds, wish.seconds)
+        offer = _offered(asked, one, bottle, shelf)
+        if offer is not None and offer.wish.seconds == wish.seconds:
+            return offer
+        largest_flow = _lasting_flow(one, 0.0 if offer is None else offer.wish.seconds, wish.seconds)
     return None
 
 
-def _offered(asked: Wish, one: Tried, bottle: Part) -> tuple[Wish, Tried] | None:
+def _offered(asked: Wish, one: Tried, bottle: Part, shelf: Shelf) -> Offer | None:
     """Return what a pair has of a wish, rounded down, as it walked on a bottle; None where that is nothing."""
     if one.torque < asked.torque:
         asked = replace(asked, torque=math.floor(100.0 * one.torque) / 100.0)
-    for again in _few_strides(asked, one.valve, one.actuator):
-        walked = _walked(again, bottle, asked.seconds)
-        # Rounded down to what a command line can say, so that a run from that line still meets the offer.
-        hundredths = math.floor(min(_time(walked), asked.seconds) / 0.6)  # of a minute
-        lasts = asked.seconds if _time(walked) >= asked.seconds else 0.6 * hundredths
-        if again.torque >= asked.torque > 0.0 and lasts >= _SHORTEST and _keeps(walked, asked.torque):
-            return replace(asked, seconds=lasts), again
-    return None
-
-
-def _offer_text(wish: Wish, asked: Wish, one: Tried, bottle: Part) -> str:
-    """Return a wish that is offered for another, whole, with what it changes in front and the parts that walked."""
-    changes = [
-        *(["less torque"] if asked.torque < wish.torque else []),
-        *(["less pressure"] if asked.pressure < wish.pressure else []),
-        *(["more pressure"] if asked.pressure > wish.pressure else []),
-        *(["fewer minutes"] if asked.seconds < wish.seconds else []),
-    ]
-    return f"{', '.join(changes)}: {_wished(asked)} with {one.valve.name} and {one.actuator.name} on {bottle.name}"
-
-
-def _wished(wish: Wish) -> str:
-    pressure = Kind("", "Pa_a", "pressure").text(wish.pressure)
-    return f"{_TORQUE.text(wish.torque)} at {pressure} for {wish.seconds / 60.0:.4g} min"
+    if one.toes < asked.clearance:
+        asked = replace(asked, toes=_rounded_down(one.toes))
+    again = next((tried for tried in _few_strides(asked, one.valve, one.actuator) if tried.has(asked)), None)
+    walked = None if again is None else _walked(again, shelf.bottle_name(bottle), asked.seconds)
+    if again is None or walked is None or not walked.averages:
+        return None
+    toes = walked.metrics["lowest_toes"].value
+    if toes < asked.clearance:
+        # The toes come down a little as the pressure falls: what is offered is what they then have.
+        asked = replace(asked, toes=_rounded_down(toes))
+        if [tried.overrides for tried in _few_strides(asked, one.valve, one.actuator)] != [again.overrides]:
+            return None
+    # Rounded down to what a command line can say, so that a run from that line still meets the offer.
+    hundredths = math.floor(min(_time(walked), asked.seconds) / 0.6)  # of a minute
+    lasts = asked.seconds if _time(walked) >= asked.seconds else 0.6 * hundredths
+    is_one = asked.torque > 0.0 and asked.clearance >= 0.0 and lasts >= _SHORTEST and _keeps(walked, asked)
+    return Offer(replace(asked, seconds=lasts), again, bottle) if is_one else None
 
 
 def _at_more_pressure(wish: Wish, tried: list[Tried]) -> Iterator[tuple[Wish, Tried]]:
-    """Yield what has the torque at more pressure, of the strongest pair of each kind of valve, the lowest first."""
-    strongest = [
-        max((one for one in tried if one.valve.kind == kind), key=lambda one: one.torque)
-        for kind in dict.fromkeys(one.valve.kind for one in tried)
-    ]
+    """Yield what does it at more pressure, the lowest first: of each kind of valve the strongest and the highest."""
+    strongest: list[Tried] = []
+    for kind in dict.fromkeys(one.valve.kind for one in tried):
+        of_kind = [one for one in tried if one.valve.kind == kind]
+        both = (max(of_kind, key=lambda one: one.torque), max(of_kind, key=lambda one: one.toes))
+        strongest += {(one.valve.name, one.actuator.name): one for one in both}.values()
     for more in _MORE_PRESSURE:
         asked = wish.at_gauge(more)
         for one in strongest:
             if rated_pressure(one.valve, one.actuator) < asked.pressure:
                 continue
             for again in _few_strides(asked, one.valve, one.actuator):
-                if again.torque >= wish.torque:
+                if again.has(wish):
                     yield asked, again
-
-
-_TORQUE, _MASS = Kind("", "N m", "torque", ".3g"), Kind("", "kg", "part mass")
-_HEAD = (
-    "valve",
-    "actuator",
-    ("peak torque", _TORQUE),
-    ("gas", Kind("", "kg/s", "mass flow", ".3g")),
-    ("mass of both", _MASS),
-)
-_CAPTION = "The walk of the suggestion on its bottle for the requested {wished}; the bottle lasts {lasts}."
-_READING = (
-    "Every pair of valve and actuator of the catalogue walks a few strides at the pressure. Those whose mean stride "
-    "reaches the torque walk on bottles, lightest first, until one lasts; that walk is shown. Dead volumes, friction "
-    "and sensors are the walk's; dorsiflexion has nine tenths of the gauge pressure.",
-    "Power of the valve is what its coils, or its spool in proportion to the stroke, take over the walk; drivers lose "
-    "nothing. A shut-off valve is open as long as the device helps. Shell, straps and lines are not in the mass.",
-)
-
-
-def finding_of(sizing: WearerSizing) -> Finding[WearerSizing]:
-    """Return the device with its walk, or what to give up; it has not passed without a device."""
-    wish, device = sizing.wish, sizing.device
-    rows = [
-        (one.valve.name, one.actuator.name, one.torque, one.flow, one.mass)
-        for one in sorted(sizing.tried, key=lambda one: -one.torque)
-    ]
-    tried = finding.Part("What was walked with", columns_of(_HEAD, rows), left=2, is_detail=device is not None)
-    stature = f"{wish.height:.4g} m{' (assumed: give --stature)' if wish.stature is None else ''}"
-    sections = (
-        (finding.Part(remarks=("no device of the catalogue has this; give up one of:", *sizing.instead)), tried)
-        if device is None
-        else (*_sections(wish, device), tried, *parts_to_check(sizing.doubtful), part_titles(sizing.parts))
-    )
-    return Finding(
-        name="design",
-        kicker="From a wearer to a device",
-        title="The device",
-        said=(f"a wearer of {wish.mass:.4g} kg and {stature}; {_wished(wish)}",),
-        parts=(*sections, finding.Part("How to read it", said=_READING, is_detail=True)),
-        found=sizing,
-        passed=device is not None,
-    )
-
-
-def _sections(wish: Wish, device: Device) -> tuple[finding.Part, ...]:
-    walked = device.walked
-    share = device.torque / wish.torque
-    # A walk on a bottle may end at nine tenths of the request, so how far it fell short is said.
-    short = f" ({100.0 * share:.0f} % of the request: pressure falls with the bottle)" if share < 1.0 else ""
-    low, high = (share * walk_of(walked.scenario).gait.body_mass for share in SCALED_MASS)
-    wanted, lasts = f"{wish.seconds / 60.0:.4g} min", minutes_text(device.life.discharge.walking_time)
-    last = _TORQUE.text(float(peak_torques(walked)[-1]))
-    rows = (
-        ("controller", f"{walked.scenario.controller.kind}, walk '{WALKS[device.tried.valve.kind]}'"),
-        ("lasts", f"{lasts}, of {wanted}"),
-        ("then", device.life.discharge.ending.message),
-        ("peak torque", f"{_TORQUE.text(device.torque)} in the mean stride{short}, {last} in the last"),
-        ("gas", f"{Kind('', 'kg', 'gas mass', '.3g').text(walked.metrics['gas'].value)} a stride"),
-        ("mass", _MASS.text(sum(device.masses.values()), ".0f")),
-    )
-    remarks = [
-        *electrical_sentences(device.electrical),
-        who_walks(walk_of(walked.scenario).wearer, walk_of(walked.scenario).gait, "as requested"),
-    ]
-    if not low <= wish.mass <= high:
-        remarks.append(f"the gait is known of {low:.0f} to {high:.0f} kg: beyond, torque and gas are a guess")
-    caption, draw = _CAPTION.format(wished=wanted, lasts=lasts), partial(bottle_figure, walked)
-    masses = ((name, _MASS.text(mass, ".0f")) for name, mass in device.masses.items())
-    return (
-        finding.Part("The walk on its bottle", facts(rows), remarks=remarks, code=device.command),
-        finding.Part("What it weighs", facts(masses)),
-        finding.Part("The bottle over the walk", name="bottle", caption=caption, draw=draw, is_detail=True),
-    )

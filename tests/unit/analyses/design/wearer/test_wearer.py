@@ -1,7 +1,9 @@
 """From a wearer to a device: the parts that are chosen walk as they are printed, or the answer says what to give up."""
 
+import math
 import re
 import shlex
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -10,8 +12,9 @@ import pytest
 
 import ppafo
 from ppafo.analyses.design.wearer import solve as wearer
+from ppafo.analyses.design.wearer.answer import finding_of
 from ppafo.analyses.design.wearer.electrical import electrical_of, valve_power
-from ppafo.analyses.design.wearer.solve import WearerSizing, finding_of
+from ppafo.analyses.design.wearer.wish import Device, WearerSizing, Wish
 from ppafo.cli.main import main
 from ppafo.errors import StudyError
 from ppafo.parameters.parts import load_catalogue
@@ -19,16 +22,20 @@ from ppafo.parameters.parts.catalogue import Catalogue
 from ppafo.progress import report_nothing
 from ppafo.report.finding import text_of
 from ppafo.signals import Channel, Recording
+from ppafo.walking.motion import walk_of
 
 PSI = 6894.757
 
 
 @cache
 def few() -> Catalogue:
-    """Two valves and the paper's actuator, with a small and a large bottle, so that the search is short."""
+    """Two valves and the paper's actuator, with a small and a large bottle, so that the search is short.
+
+    The pair is lighter, and drags the toes.
+    """
     whole = load_catalogue()
     kept = {
-        "valves": ("festo-vovg-5v-pair", "festo-mpye-5-m5-010-b"),
+        "valves": ("festo-vovg-5v-pair", "festo-mpye-5-1-8-lf-010-b"),
         "actuators": ("smc-crb2bw40-90d",),
         "bottles": ("co2-3_5oz", "pipeline-jacpac-9oz"),
     }
@@ -41,26 +48,33 @@ def few() -> Catalogue:
 
 @pytest.fixture
 def little(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(wearer, "load_catalogue", few)
+    monkeypatch.setattr(wearer, "load_catalogue", lambda _catalogue="parts": few())
 
 
-def sized(torque: float, minutes: float, pressure: float = 50.0) -> WearerSizing:
+def sized(torque: float, minutes: float, pressure: float = 50.0, toes: float | None = None) -> WearerSizing:
     supply = 101325.0 + pressure * PSI
-    found = ppafo.design(mass=72.5, stature=1.75, torque=torque, pressure=supply, minutes=minutes).found
+    found = ppafo.design(mass=72.5, stature=1.75, torque=torque, pressure=supply, minutes=minutes, toes=toes).found
     assert isinstance(found, WearerSizing)
     return found
 
 
 @pytest.mark.usefixtures("little")
-def test_what_is_suggested_is_the_walk_that_is_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_is_suggested_is_the_walk_that_is_shown_and_its_toes_clear_the_ground(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     found = sized(2.5, 1.0)
     device = found.device
     assert device is not None
     assert device.torque >= 0.9 * 2.5
     assert device.life.discharge.walking_time >= 60.0
     assert device.bottle.name == "co2-3_5oz", "the lightest bottle that lasts"
+    assert device.tried.valve.name == "festo-mpye-5-1-8-lf-010-b", "the lighter pair drags the toes"
+    assert [one.toes < 0.0 for one in found.tried if one.valve.name == "festo-vovg-5v-pair"] == [True]
+    assert device.toes >= found.wish.clearance == pytest.approx(found.healthy_toes, abs=1e-4)
     said = text_of(finding_of(found))
     assert device.command in said.splitlines()
+    assert f"lowest toes  {1e3 * device.toes:.1f} mm over the ground" in said
+    assert "the toes of the healthy gait itself come down to 5.2 mm" in said
     # The printed command walks the same walk, with the same torque.
     words = shlex.split(device.command)[1:]
     assert main([*words, "--out", str(tmp_path / "again")]) == 0
@@ -76,6 +90,24 @@ def test_what_is_suggested_is_the_walk_that_is_shown(tmp_path: Path, capsys: pyt
 
 
 @pytest.mark.usefixtures("little")
+def test_toes_may_be_asked_to_drag_no_more_than_the_ground_and_no_device_lifts_them_by_five_centimetres() -> None:
+    wish = sized(2.5, 0.2, toes=0.004).wish
+    assert (wish.clearance, wish.toes) == (0.004, 0.004)
+    high = sized(2.5, 0.2, toes=0.05)
+    assert high.device is None
+    said = text_of(finding_of(high))
+    assert "No device in the catalogue can do this. Alternatives:" in said
+    (lower,) = (line for line in high.instead if line.startswith("lower toes: "))
+    offered = float(re.search(r"toes (\S+) mm", lower)[1])  # type: ignore[index]
+    again = sized(2.5, 0.2, toes=1e-3 * offered).device
+    assert again is not None
+    assert again.toes >= 1e-3 * offered
+
+
+OFFER = r": (\S+) N m at (\S+) psi_g for (\S+) min, toes (\S+) mm over the ground, with (\S+) and (\S+) on (\S+)$"
+
+
+@pytest.mark.usefixtures("little")
 def test_where_nothing_does_it_what_is_offered_is_granted_when_it_is_asked_for() -> None:
     too_strong, too_long = sized(5.0, 8.0), sized(2.5, 30.0)
     for found in (too_strong, too_long):
@@ -85,11 +117,10 @@ def test_where_nothing_does_it_what_is_offered_is_granted_when_it_is_asked_for()
     assert changes == [
         "less torque, fewer minutes",
         "more pressure, fewer minutes",
-        "less torque, less pressure",
         "less pressure, fewer minutes",
     ]
-    line = too_strong.instead[2]
-    words = re.search(r": (\S+) N m at (\S+) psi_g for (\S+) min with (\S+) and (\S+) on (\S+)$", line)
+    line = too_strong.instead[0]
+    words = re.search(OFFER, line)
     assert words is not None, line
     torque, pressure, minutes = (float(word) for word in words.groups()[:3])
     again = sized(torque, minutes, pressure=pressure).device
@@ -98,21 +129,22 @@ def test_where_nothing_does_it_what_is_offered_is_granted_when_it_is_asked_for()
 
 
 def test_a_pressure_that_wastes_gas_is_answered_with_less_pressure_and_that_is_granted() -> None:
-    parts = few().groups
+    shelf = wearer.shelf_of("parts")
     valve, actuator, bottle = (
-        parts["valves"]["festo-vovg-5v-pair"],
-        parts["actuators"]["smc-crb2bw40-90d"],
-        parts["bottles"]["co2-3_5oz"],
+        shelf.groups["valves"]["enfield-ls-v05s"],
+        shelf.groups["actuators"]["smc-crb2bw40-90d"],
+        shelf.groups["bottles"]["co2-3_5oz"],
     )
-    wish = wearer.Wish(72.5, 1.75, 1.2, 101325.0 + 80.0 * PSI, 150.0)
+    wish = Wish(72.5, 1.75, 1.2, 101325.0 + 80.0 * PSI, 144.0, 0.001)
     tried = wearer._few_strides(wish, valve, actuator)
-    assert tried[0].torque > 1.2
-    assert wearer._lightest(wish, tried, [bottle], report_nothing) is None
-    (offer,) = wearer._instead(wish, tried, [bottle], report_nothing)
-    words = re.fullmatch(r"less pressure: 1.2 N m at (\S+) psi_g for 2.5 min with .* on co2-3_5oz", offer)
-    assert words is not None, offer
-    asked = wearer.Wish(72.5, 1.75, 1.2, 101325.0 + float(words[1]) * PSI, 150.0)
-    assert wearer._lightest(asked, wearer._few_strides(asked, valve, actuator), [bottle], report_nothing) is not None
+    assert tried[0].has(wish)
+    assert wearer._lightest(wish, tried, [bottle], shelf, report_nothing) is None
+    (offer, *_) = wearer._instead(wish, tried, [bottle], shelf, report_nothing)
+    words = re.fullmatch(r"less pressure" + OFFER, offer.text(wish))
+    assert words is not None, offer.text(wish)
+    asked = replace(wish, pressure=101325.0 + float(words[2]) * PSI)
+    strides = wearer._few_strides(asked, valve, actuator)
+    assert wearer._lightest(asked, strides, [bottle], shelf, report_nothing) is not None
 
 
 def test_the_limit_of_the_controller_follows_the_wish_and_a_stature_that_is_assumed_is_said() -> None:
@@ -121,15 +153,105 @@ def test_the_limit_of_the_controller_follows_the_wish_and_a_stature_that_is_assu
         catalogue.part("valves", "enfield-ls-v05s"),
         catalogue.part("actuators", "smc-crb2bw40-90d"),
     )
-    wish = wearer.Wish(60.0, None, 5.0, 101325.0 + 60.0 * PSI, 60.0)
+    wish = Wish(60.0, None, 5.0, 101325.0 + 60.0 * PSI, 60.0)
     found = wearer._few_strides(wish, valve, actuator)
     assert found[0].torque >= 5.0
-    assert "(assumed: give --stature)" in text_of(finding_of(WearerSizing(wish, tuple(found), None, ())))
+    assert wish.height == pytest.approx(math.sqrt(60.0 / 22.0))
+    said = text_of(finding_of(WearerSizing(wish, 0.0052, tuple(found), None, ())))
+    assert "1.651 m (assumed: a body mass index of 22 kg/m^2; give --stature)" in said
+    assert Wish(40.0, None, 5.0, 4.0e5, 60.0).height == 1.45, "no adult is smaller"
+
+
+PARTS = """
+schema_version = 1
+name = "mine"
+title = "Parts of my bench"
+
+[valves.mine]
+kind = "proportional"
+maker = "me"
+model = "one"
+[valves.mine.area]
+value = 4.0
+unit = "mm^2"
+origin = "measured"
+source = "bench"
+[valves.mine.discharge_coefficient]
+value = 0.8
+unit = ""
+origin = "measured"
+source = "bench"
+[valves.mine.mass]
+value = 120.0
+unit = "g"
+origin = "measured"
+source = "scales"
+
+[bottles.small]
+maker = "me"
+model = "cartridge"
+[bottles.small.content]
+value = 120.0
+unit = "g"
+origin = "measured"
+source = "scales"
+[bottles.small.empty_mass]
+value = 250.0
+unit = "g"
+origin = "measured"
+source = "scales"
+
+[regulators.mine]
+maker = "me"
+model = "regulator"
+[regulators.mine.mass]
+value = 80.0
+unit = "g"
+origin = "measured"
+source = "scales"
+"""
+
+
+def test_a_device_of_parts_of_one_s_own_walks_on_a_bottle_of_one_s_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("mine.toml").write_text(PARTS)
+    supply = 101325.0 + 50.0 * PSI
+    found = ppafo.design(mass=72.5, stature=1.75, torque=2.5, pressure=supply, minutes=0.5, catalogue="mine.toml").found
+    assert isinstance(found, WearerSizing)
+    device = found.device
+    assert isinstance(device, Device)
+    assert (device.tried.valve.name, device.bottle.name) == ("mine", "small")
+    assert device.masses["2 x regulator mine"] == 0.16
+    assert "--bottle mine.toml/small " in device.command
+    supplied = walk_of(device.walked.scenario).bottle
+    assert supplied is not None
+    assert supplied.bottle.mass == pytest.approx(0.12)
+    assert "without the valve: the catalogue states no power of it" in text_of(finding_of(found))
+
+
+def test_a_catalogue_whose_valves_have_no_walk_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text(PARTS.replace('"proportional"', '"solenoid_recycling"'))
+    with pytest.raises(StudyError, match="no valve is of a kind that walks"):
+        ppafo.design(mass=72.5, torque=2.5, pressure=4.5e5, minutes=1.0, catalogue=str(file))
+    with pytest.raises(StudyError, match="--catalogue: the design file states"):
+        ppafo.design("push-off", catalogue=str(file))
 
 
 @pytest.mark.parametrize(
     "change",
-    [{"mass": 5.0}, {"mass": 400.0}, {"pressure": 9.0e4}, {"torque": 0.0}, {"minutes": 90.0}, {"stature": 0.9}],
+    [
+        {"mass": 5.0},
+        {"mass": 400.0},
+        {"pressure": 9.0e4},
+        {"torque": 0.0},
+        {"minutes": 90.0},
+        {"stature": 0.9},
+        {"toes": -0.001},
+        {"toes": 0.5},
+    ],
 )
 def test_what_no_walk_can_be_asked_is_refused(change: dict[str, float]) -> None:
     wanted = {"mass": 70.0, "stature": 1.7, "torque": 2.0, "pressure": 4.5e5, "minutes": 5.0}

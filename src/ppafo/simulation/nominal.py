@@ -1,15 +1,22 @@
-"""What the observer of the chambers believes of a device: which numbers of it each setting ``nominal_`` follows."""
+"""What a law with a model, and the observer of the chambers, believe of a device: which of its numbers they follow."""
+
+from collections.abc import Callable
+from typing import Any
 
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
+from ppafo.control.binding import bind
+from ppafo.model.actuators.kind import Range
 from ppafo.model.catalog import VALVES
 from ppafo.model.columns import first
 from ppafo.model.declaration import NOMINAL
 from ppafo.model.gas import critical_pressure_ratio, specific_gas_constant
 from ppafo.model.orifice import area_conductance, sonic_conductance_mass
 from ppafo.model.regulator import SupplyLines
-from ppafo.parameters.device import Device, SonicOrifice
+from ppafo.model.valves.proportional import spool_lag
+from ppafo.parameters.device import VANE, Device, Orifice, SonicOrifice
 from ppafo.parameters.graph import Term
 from ppafo.simulation.declaration import SUPPLY_LINE, SUPPLY_LINES
+from ppafo.simulation.mean_chambers import MeanChambers, Surroundings, chambers_of
 
 _GAS = ("gas.molar_mass", "gas.heat_capacity_ratio", "gas.temperature")
 _MASS = ("gas.molar_mass", "gas.temperature")
@@ -22,12 +29,11 @@ _SAME = {
     "supply_pressure": "supply.pressure",
     "dorsiflexion_pressure": "supply.dorsiflexion_pressure",
     "atmospheric_pressure": "supply.atmospheric_pressure",
-    "displacement_per_radian": "actuator.displacement_per_radian",
-    "dead_volume_1": "actuator.dead_volume_1",
-    "dead_volume_2": "actuator.dead_volume_2",
     "angle_min": "actuator.angle_min",
     "angle_max": "actuator.angle_max",
 }
+LEAST_SHARE = 0.05
+"""Part of a chamber's volume in the middle of its range that is dead volume at least."""
 _PAIRS = ("solenoid", "solenoid_recycling")
 _SPOOL = "proportional"
 
@@ -54,6 +60,22 @@ def flow_of_sonic(molar_mass: float, temperature: float, sonic: float) -> float:
     return constant * temperature * sonic_conductance_mass(sonic, constant, temperature)
 
 
+def product_of(molar_mass: float, temperature: float) -> float:
+    """R T / M [J/kg], from molar mass [kg/mol] and temperature [K]."""
+    return specific_gas_constant(UNIVERSAL_GAS_CONSTANT, molar_mass) * temperature
+
+
+def conductance_of_area(molar_mass: float, ratio: float, temperature: float, area: float, discharge: float) -> float:
+    """Conductance of an area [kg/(s Pa)], from molar mass [kg/mol], k [-], temperature [K]. Equation (6)."""
+    constant = specific_gas_constant(UNIVERSAL_GAS_CONSTANT, molar_mass)
+    return area_conductance(area, discharge, ratio, constant, temperature)
+
+
+def conductance_of_sonic(molar_mass: float, temperature: float, sonic: float) -> float:
+    """Conductance of a sonic conductance [kg/(s Pa)], from molar mass [kg/mol] and temperature [K]. ISO 6358-1."""
+    return sonic_conductance_mass(sonic, specific_gas_constant(UNIVERSAL_GAS_CONSTANT, molar_mass), temperature)
+
+
 def per_content(number: float, molar_mass: float, temperature: float) -> float:
     """A number per mass [1/kg] as one per content p V [1/J], from molar mass [kg/mol] and temperature [K]."""
     return number / (specific_gas_constant(UNIVERSAL_GAS_CONSTANT, molar_mass) * temperature)
@@ -69,6 +91,33 @@ def time_of_joint(joining: float, holding: float) -> float:
     return joining + holding
 
 
+def mean_chambers(settings: Any, stops: Range, around: Surroundings) -> MeanChambers:
+    """Stand for the chambers of the actuator."""
+    raise NotImplementedError
+
+
+def torque_per_pressure(settings: Any, stops: Range, around: Surroundings) -> float:
+    """Torque per pressure of chamber 1 [m^3] in the middle of the range."""
+    return mean_chambers(settings, stops, around).torque_per_pressure_1
+
+
+def dead_volume_1(settings: Any, stops: Range, around: Surroundings) -> float:
+    """Dead volume [m^3] of a vane whose chamber 1 is as large in the middle of the range."""
+    mean = mean_chambers(settings, stops, around)
+    return rest_of(mean.volume_1, mean.torque_per_pressure_1, stops)
+
+
+def dead_volume_2(settings: Any, stops: Range, around: Surroundings) -> float:
+    """The same of chamber 2."""
+    mean = mean_chambers(settings, stops, around)
+    return rest_of(mean.volume_2, mean.torque_per_pressure_1, stops)
+
+
+def rest_of(volume: float, growth: float, stops: Range) -> float:
+    """What of a volume [m^3] in the middle is left at a stop, a twentieth at least, for a growth [m^3/rad]."""
+    return max(volume - 0.5 * growth * (stops.angle_max - stops.angle_min), LEAST_SHARE * volume)
+
+
 def nominal_terms(device: Device, lines: SupplyLines | None) -> dict[str, Term]:
     """Return what each ``nominal_`` setting follows, by the names of ``NOMINAL``.
 
@@ -79,15 +128,20 @@ def nominal_terms(device: Device, lines: SupplyLines | None) -> dict[str, Term]:
     is_pair, is_known = valve.kind in _PAIRS, valve.kind in (*_PAIRS, _SPOOL)
     is_sonic = isinstance(valve.orifice, SonicOrifice)
     flow = Term((*_MASS, _SONIC[0]), flow_of_sonic) if is_sonic else Term((*_GAS, *_AREA), flow_of_area)
-    found = {name: Term((path,)) for name, path in _SAME.items()}
+    leak = device.actuator.leak
+    found = {name: Term((path,)) for name, path in _SAME.items()} | _chamber_terms(device)
     found |= {
+        "gas_product": Term(_MASS, product_of),
+        "valve_conductance": _conductance(valve.orifice, "valve"),
+        "leak_conductance": _conductance(leak, "actuator.leak"),
         "flow": flow if is_known else Term(_ANY, no),
         "critical_ratio": Term(_SONIC[1:]) if is_sonic else Term(_GAS[1:2], critical_pressure_ratio),
         # Not a number that varies: the source is there because a term needs one.
         "relieving": Term(_ANY, yes if device.supply.relieving else no),
         "pair": Term(_ANY, yes if is_pair else no),
-        "lag": Term(tuple(f"valve.{name}" for name in names), kind.lag, kind.settings)
-        if valve.kind == _SPOOL and kind.lag is not None
+        "delay": Term(("valve.delay",)) if valve.kind == _SPOOL else Term(_ANY, no),
+        "lag": Term(tuple(f"valve.{name}" for name in names), spool_lag, (kind.settings,))
+        if valve.kind == _SPOOL
         else Term(_ANY, no),
         "joining_time": Term(("valve.joining_time", "valve.holding_time"), time_of_joint)
         if "joining_time" in names
@@ -105,3 +159,30 @@ def nominal_terms(device: Device, lines: SupplyLines | None) -> dict[str, Term]:
         found |= {f"{name}_{number}": Term(_ANY, no) if lines is None else term for name, term in of_line.items()}
     found["line_relieving"] = Term(_ANY, yes if lines is not None and first(lines.relieving) else no)
     return {NOMINAL[name]: term for name, term in found.items()}
+
+
+def _conductance(orifice: Orifice | SonicOrifice, section: str) -> Term:
+    """Return what the conductance [kg/(s Pa)] of an orifice follows, in the form that it has."""
+    if isinstance(orifice, SonicOrifice):
+        return Term((*_MASS, f"{section}.sonic_conductance"), conductance_of_sonic)
+    return Term((*_GAS, f"{section}.area", f"{section}.discharge_coefficient"), conductance_of_area)
+
+
+def _chamber_terms(device: Device) -> dict[str, Term]:
+    """Return what torque constant, growth and dead volumes follow; of another kind, of a vane like it."""
+    if device.actuator.kind == VANE:
+        names = ("torque_constant", "displacement_per_radian", "dead_volume_1", "dead_volume_2")
+        return {name: Term((f"actuator.{name}",)) for name in names}
+    chambers = chambers_of(device)
+
+    def term(frame: Callable[..., float]) -> Term:
+        mean = {"mean_chambers": chambers.function}
+        return Term(chambers.sources, bind(frame, f"{frame.__name__}_of_device", mean), chambers.rows)
+
+    return {
+        "torque_constant": term(torque_per_pressure),
+        # By virtual work a chamber grows with the angle as its torque does with the pressure.
+        "displacement_per_radian": term(torque_per_pressure),
+        "dead_volume_1": term(dead_volume_1),
+        "dead_volume_2": term(dead_volume_2),
+    }

@@ -1,0 +1,110 @@
+"""The device for a wearer in words, tables and a figure, or what would have to be given up."""
+
+from functools import partial
+
+from ppafo.analyses.design.wearer.electrical import electrical_sentences
+from ppafo.analyses.design.wearer.wish import (
+    BODY_MASS_INDEX,
+    CLEARANCE,
+    MASS,
+    TOES,
+    TORQUE,
+    WALKS,
+    Device,
+    WearerSizing,
+    Wish,
+)
+from ppafo.analyses.parts.solve import part_titles, parts_to_check
+from ppafo.report import finding
+from ppafo.report.finding import Finding, columns_of, facts
+from ppafo.report.kind import Kind
+from ppafo.simulation.oscillation import gains_of
+from ppafo.walking.bottle import minutes_text
+from ppafo.walking.figures.over_time import bottle_figure, peak_torques
+from ppafo.walking.motion import walk_of
+from ppafo.walking.planning import law_of
+from ppafo.walking.wearer import SCALED_MASS, who_walks
+
+_HEAD = (
+    "valve",
+    "actuator",
+    ("peak torque", TORQUE),
+    ("lowest toes", CLEARANCE),
+    ("gas", Kind("", "kg/s", "mass flow", ".3g")),
+    ("mass of both", MASS),
+)
+_CAPTION = "The walk of the suggestion on its bottle for the requested {wished}; the bottle lasts {lasts}."
+_READING = (
+    "Every pair of valve and actuator of the catalogue walks a few strides at the pressure. Those whose mean stride "
+    "reaches the torque with the toes above the ground walk on bottles, lightest first, until one lasts; that walk is "
+    "shown. Dead volumes, friction and sensors are the walk's; dorsiflexion has nine tenths of the gauge pressure.",
+    "Power of the valve is what its coils, or its spool in proportion to the stroke, take over the walk; drivers lose "
+    "nothing. A shut-off valve is open as long as the device helps.",
+)
+
+
+def finding_of(sizing: WearerSizing) -> Finding[WearerSizing]:
+    """Return the device with its walk, or what to give up; it has not passed without a device."""
+    wish, device = sizing.wish, sizing.device
+    rows = [
+        (tried.valve.name, tried.actuator.name, tried.torque, tried.toes, tried.flow, tried.mass)
+        for tried in sorted(sizing.tried, key=lambda tried: -tried.torque)
+    ]
+    remarks = ["toes below 0 would drag"] if any(tried.toes < 0.0 for tried in sizing.tried) else []
+    table = finding.Part(
+        "What was walked with", columns_of(_HEAD, rows), remarks=remarks, left=2, is_detail=device is not None
+    )
+    stature = f"{wish.height:.4g} m"
+    if wish.stature is None:
+        stature += f" (assumed: a body mass index of {BODY_MASS_INDEX:g} kg/m^2; give --stature)"
+    said = [f"a wearer of {wish.mass:.4g} kg and {stature}; {wish.text()}"]
+    if wish.toes is None and wish.clearance < TOES:
+        said.append(f"the toes of the healthy gait itself come down to {CLEARANCE.text(sizing.healthy_toes)}")
+    sections = (
+        (finding.Part(remarks=("No device in the catalogue can do this. Alternatives:", *sizing.instead)), table)
+        if device is None
+        else (*_sections(wish, device), table, *parts_to_check(sizing.doubtful), part_titles(sizing.parts))
+    )
+    return Finding(
+        name="design",
+        kicker="From a wearer to a device",
+        title="The device",
+        said=said,
+        parts=(*sections, finding.Part("How to read it", said=_READING, is_detail=True)),
+        found=sizing,
+        passed=device is not None,
+    )
+
+
+def _sections(wish: Wish, device: Device) -> tuple[finding.Part, ...]:
+    walked = device.walked
+    share = device.torque / wish.torque
+    # A walk on a bottle may end at nine tenths of the request, so how far it fell short is said.
+    short = f" ({100.0 * share:.0f} % of the request: pressure falls with the bottle)" if share < 1.0 else ""
+    low, high = (share * walk_of(walked.scenario).gait.body_mass for share in SCALED_MASS)
+    wanted, lasts = f"{wish.seconds / 60.0:.4g} min", minutes_text(device.life.discharge.walking_time)
+    last = TORQUE.text(float(peak_torques(walked)[-1]))
+    rows = (
+        ("controller", f"{walked.scenario.controller.kind}, walk '{WALKS[device.tried.valve.kind]}'"),
+        ("lasts", f"{lasts}, of {wanted}"),
+        ("then", device.life.discharge.ending.message),
+        ("peak torque", f"{TORQUE.text(device.torque)} in the mean stride{short}, {last} in the last"),
+        ("lowest toes", f"{CLEARANCE.text(device.toes)} over the ground in mid-swing"),
+        ("gas", f"{Kind('', 'kg', 'gas mass', '.3g').text(walked.metrics['gas'].value)} a stride"),
+        ("mass", f"{MASS.text(sum(device.masses.values()), '.0f')}, without shell, straps and hoses"),
+    )
+    gains = gains_of(walked.scenario, law_of(walked.scenario))
+    remarks = [
+        *([] if gains is None else [gains.sentence]),
+        *electrical_sentences(device.electrical),
+        who_walks(walk_of(walked.scenario).wearer, walk_of(walked.scenario).gait, "as requested"),
+    ]
+    if not low <= wish.mass <= high:
+        remarks.append(f"the gait is known of {low:.0f} to {high:.0f} kg: beyond, torque and gas are a guess")
+    caption, draw = _CAPTION.format(wished=wanted, lasts=lasts), partial(bottle_figure, walked)
+    masses = ((name, MASS.text(mass, ".0f")) for name, mass in device.masses.items())
+    return (
+        finding.Part("The walk on its bottle", facts(rows), remarks=remarks, code=device.command),
+        finding.Part("What it weighs", facts(masses)),
+        finding.Part("The bottle over the walk", name="bottle", caption=caption, draw=draw, is_detail=True),
+    )

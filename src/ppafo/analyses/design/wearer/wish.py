@@ -1,0 +1,223 @@
+"""What is wanted of a device for a wearer, what was tried for it, and what came of it."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from ppafo.analyses.design.wearer.electrical import Electrical
+from ppafo.analyses.endurance.answer import Endurance
+from ppafo.analyses.parts.solve import doubts_data
+from ppafo.constants import PASCALS_PER_PSI, STANDARD_ATMOSPHERE
+from ppafo.parameters.parts import Part
+from ppafo.report.kind import Kind
+from ppafo.version import __version__
+from ppafo.walking.result import WalkResult
+from ppafo.walking.wearer import STATURES
+
+WALKS = {"solenoid": "solenoid-regulators", "proportional": "proportional-regulators"}
+"""The walk, with its controller, of each kind of valve."""
+BODY_MASS_INDEX = 22.0
+"""Body mass over the square of the stature [kg/m^2] of a wearer of whom the mass alone is known."""
+TOES = 0.01
+"""Clearance of the toes [m] that is wanted where none is given, unless the healthy gait itself has less."""
+TORQUE, MASS, CLEARANCE = Kind("", "N m", "torque", ".3g"), Kind("", "kg", "part mass"), Kind("", "m", "length", ".1f")
+
+
+@dataclass(frozen=True, slots=True)
+class Wish:
+    """What is wanted: body mass [kg], stature [m] or None, torque [N m], supply pressure [Pa absolute], time [s].
+
+    ``toes`` is how far the toes clear the ground in mid-swing [m]; where it is None, ``usual_toes`` are wanted.
+    """
+
+    mass: float
+    stature: float | None
+    torque: float
+    pressure: float
+    seconds: float
+    toes: float | None = None
+    usual_toes: float = TOES
+
+    @property
+    def height(self) -> float:
+        """Stature [m]; unless one is given, of a wearer with ``BODY_MASS_INDEX``, as far as adults have it."""
+        if self.stature is not None:
+            return self.stature
+        low, high = STATURES
+        return min(max(math.sqrt(self.mass / BODY_MASS_INDEX), low), high)
+
+    @property
+    def clearance(self) -> float:
+        """Clearance of the toes [m]."""
+        return self.usual_toes if self.toes is None else self.toes
+
+    def at_gauge(self, share: float) -> "Wish":
+        """Return this wish at a share of its gauge pressure, rounded to a tenth of a psi."""
+        gauge = round(share * (self.pressure - STANDARD_ATMOSPHERE) / PASCALS_PER_PSI, 1)
+        return replace(self, pressure=STANDARD_ATMOSPHERE + gauge * PASCALS_PER_PSI)
+
+    def text(self) -> str:
+        """Return torque, pressure, time and clearance in words."""
+        pressure = Kind("", "Pa_a", "pressure").text(self.pressure)
+        toes = f"toes {CLEARANCE.text(self.clearance)} over the ground"
+        return f"{TORQUE.text(self.torque)} at {pressure} for {self.seconds / 60.0:.4g} min, {toes}"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tried:
+    """Valve, actuator and overrides of a walk; peak torque of the mean stride [N m], mean flow of gas [kg/s].
+
+    ``toes`` is the lowest height of the toes over the ground in mid-swing [m]; below 0 they would drag.
+    """
+
+    valve: Part
+    actuator: Part
+    overrides: tuple[str, ...]
+    torque: float
+    flow: float
+    toes: float
+
+    @property
+    def mass(self) -> float:
+        """Mass of both parts [kg]."""
+        return self.valve.full_mass + self.actuator.full_mass
+
+    def has(self, wish: Wish) -> bool:
+        """Tell whether a few strides have the torque and the clearance of a wish."""
+        return self.torque >= wish.torque and self.toes >= wish.clearance
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Device:
+    """A device that was walked with on its bottle for the time that is wanted, how long it lasts, what it takes.
+
+    ``bottle_name`` is what ``--bottle`` takes for the bottle.
+    """
+
+    tried: Tried
+    bottle: Part
+    bottle_name: str
+    walked: WalkResult
+    life: Endurance
+    electrical: Electrical
+    masses: Mapping[str, float]
+
+    @property
+    def torque(self) -> float:
+        """Peak torque of the mean stride on the bottle [N m]."""
+        return float(self.walked.averages["torque"].mean.max())
+
+    @property
+    def toes(self) -> float:
+        """Lowest toes over the ground in mid-swing [m], of the mean stride on the bottle."""
+        return self.walked.metrics["lowest_toes"].value
+
+    @property
+    def command(self) -> str:
+        """The command that walks with it."""
+        sets = " ".join(f"--set '{text}'" for text in self.tried.overrides)
+        minutes = float(self.walked.recording.time[-1]) / 60.0
+        return f"ppafo walk {WALKS[self.tried.valve.kind]} --bottle {self.bottle_name} --minutes {minutes:.4g} {sets}"
+
+
+@dataclass(frozen=True, slots=True)
+class Offer:
+    """A wish that can be met in place of another, with the parts that walked."""
+
+    wish: Wish
+    tried: Tried
+    bottle: Part
+
+    def text(self, asked: Wish) -> str:
+        """Return the offer whole, with what it changes of the wish that was asked in front, and its parts."""
+        changes = [
+            *(["less torque"] if self.wish.torque < asked.torque else []),
+            *(["lower toes"] if self.wish.clearance < asked.clearance else []),
+            *(["less pressure"] if self.wish.pressure < asked.pressure else []),
+            *(["more pressure"] if self.wish.pressure > asked.pressure else []),
+            *(["fewer minutes"] if self.wish.seconds < asked.seconds else []),
+        ]
+        parts = f"{self.tried.valve.name} and {self.tried.actuator.name} on {self.bottle.name}"
+        return f"{', '.join(changes)}: {self.wish.text()}, with {parts}"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WearerSizing:
+    """What was wanted and all that was tried; ``device`` is None where none has it, and ``instead`` what would do.
+
+    ``healthy_toes`` is the clearance of the toes in the healthy gait [m].
+    """
+
+    wish: Wish
+    healthy_toes: float
+    tried: tuple[Tried, ...]
+    device: Device | None
+    instead: tuple[str, ...]
+
+    @property
+    def parts(self) -> list[Part]:
+        """The parts that the device is made of, of those with figures to check."""
+        device = self.device
+        if device is None:
+            return []
+        return [device.tried.valve, device.tried.actuator, device.bottle, device.electrical.cell]
+
+    @property
+    def doubtful(self) -> list[tuple[Part, str]]:
+        """Figures of these parts that are quoted or assumed."""
+        return [(part, name) for part in self.parts for name in part.doubtful]
+
+    def json_document(self) -> dict[str, Any]:
+        """Return the device and all that was tried as plain data in SI."""
+        wish, device = self.wish, self.device
+        return {
+            "format": "ppafo wearer sizing",
+            "schema_version": 1,
+            "kind": "simulated",
+            "ppafo": __version__,
+            "wish": {
+                "body_mass": wish.mass,
+                "stature": wish.height,
+                "stature_is_assumed": wish.stature is None,
+                "torque": wish.torque,
+                "pressure": wish.pressure,
+                "time": wish.seconds,
+                "toes": wish.clearance,
+            },
+            "healthy_toes": self.healthy_toes,
+            "device": None
+            if device is None
+            else {
+                "valve": device.tried.valve.name,
+                "actuator": device.tried.actuator.name,
+                "bottle": device.bottle.name,
+                "controller": device.walked.scenario.controller.kind,
+                "walk": WALKS[device.tried.valve.kind],
+                "overrides": list(device.tried.overrides),
+                "lasts": device.life.discharge.walking_time,
+                "torque": device.torque,
+                "toes": device.toes,
+                "masses": dict(device.masses),
+                "electrical_power": dict(device.electrical.powers),
+                "battery": {
+                    "cell": device.electrical.cell.name,
+                    "cells": device.electrical.cells,
+                    "mass": device.electrical.mass,
+                    "lasts": device.electrical.lasts,
+                },
+                "command": device.command,
+            },
+            "instead": list(self.instead),
+            "tried": [
+                {
+                    "valve": tried.valve.name,
+                    "actuator": tried.actuator.name,
+                    "torque": tried.torque,
+                    "toes": tried.toes,
+                    "flow": tried.flow,
+                }
+                for tried in self.tried
+            ],
+            "check_before_buying": doubts_data(self.doubtful),
+        }

@@ -1,0 +1,19 @@
+"""Frames: functions in which some names stand for components that are put in their place."""
+
+import types
+from collections.abc import Callable, Mapping
+from typing import Any
+
+
+def bind(frame: Callable[..., Any], name: str, components: Mapping[str, Any]) -> Callable[..., Any]:
+    """Return the function of a frame in which some names of its module stand for other components.
+
+    The code is the same and only those names differ, so that the engine compiles it as any other function.
+    """
+    assert isinstance(frame, types.FunctionType), "a frame is a plain function"
+    made = types.FunctionType(frame.__code__, {**frame.__globals__, **components}, name)
+    made.__qualname__ = name
+    # The name and module decide the name in the composed text, where two laws must not share one.
+    made.__module__ = frame.__module__
+    made.__annotations__ = frame.__annotations__
+    return made

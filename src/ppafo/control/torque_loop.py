@@ -1,0 +1,101 @@
+"""Gains of a torque law that follow the device: SIMC rules for an integrator with dead time (Skogestad 2003).
+
+A chamber whose volume stays integrates the flow of the valve, so that the torque of a device follows a command u as
+
+    dT/dt = R u(t - theta)
+
+R is the rate at full opening: K q max(P_1 / V_1, P_2 / V_2), with K the torque per pressure, q = R_gas T times the
+conductance of the valve, supply pressures P and volumes V. theta is what comes late: valve, sampling, sensors. With the
+closed loop's time constant theta the rules of S. Skogestad, Journal of Process Control 13 (2003) 291, ask for
+
+    k_p = 1 / (2 R theta),    T_i = 8 theta,    k_d = 0
+
+The other laws have the same bandwidth in their own words.
+"""
+
+from typing import NamedTuple
+
+
+class TorqueLoop(NamedTuple):
+    """Torque rate R at full opening [N m/s], and dead time theta [s]."""
+
+    rate: float
+    dead_time: float
+
+
+PROPORTIONAL_GAIN = "proportional gain of the torque loop"
+INTEGRAL_GAIN = "integral gain of the torque loop"
+INTEGRAL_RATE = "integral rate of the torque loop"
+BOUNDARY = "boundary layer of the torque loop"
+CONVERGENCE = "convergence rate of the torque loop"
+OPENING = "opening of the torque loop"
+LEARNING_GAIN = "learning gain of the torque loop"
+LEAD = "lead of the torque loop"
+"""What a default may follow: the numbers that the functions below give."""
+
+LEAST_TORQUE = 5.0e-4
+"""N m: a valve that moves the torque by less in the dead time leaves the gains at those of this."""
+
+LARGEST_OPENING = 0.77
+"""Opening of the law with a dead zone where a chamber is slow: the rest is left to the pressure that falls."""
+
+USUAL_LEAD = 0.0185
+"""s: how much earlier than the dead time the learnt table is read, for the way from an error to the next stride's."""
+
+SAMPLES_LATE = 1.5
+"""Sample periods by which a sampled command is late: one to compute it, half of one for which it is held."""
+
+
+def torque_in_dead_time(loop: TorqueLoop) -> float:
+    """R theta [N m]: what full opening adds before a law sees anything of it."""
+    return max(loop.rate * loop.dead_time, LEAST_TORQUE)
+
+
+def proportional_gain(loop: TorqueLoop) -> float:
+    """k_p = 1 / (2 R theta) [1/(N m)]."""
+    return 0.5 / torque_in_dead_time(loop)
+
+
+def integral_rate(loop: TorqueLoop) -> float:
+    """1 / T_i = 1 / (8 theta) [1/s]."""
+    return 0.125 / loop.dead_time
+
+
+def integral_gain(loop: TorqueLoop, proportional: float) -> float:
+    """k_i = k_p / T_i [1/(N m s)] for a proportional gain k_p [1/(N m)], given or computed."""
+    return proportional * integral_rate(loop)
+
+
+def boundary_layer(loop: TorqueLoop) -> float:
+    """Half width of a boundary layer [N m] with the slope k_p inside it: 2 R theta."""
+    return 2.0 * torque_in_dead_time(loop)
+
+
+def convergence_rate(loop: TorqueLoop) -> float:
+    """Rate at which an error decays [1/s]: 1 / (2 theta), which is k_p R."""
+    return 0.5 / loop.dead_time
+
+
+def dead_zone_opening(loop: TorqueLoop, dead_zone: float) -> float:
+    """Opening [-] of a law with a dead zone [N m]: with it the torque does not pass the zone in the dead time."""
+    return min(LARGEST_OPENING, dead_zone / torque_in_dead_time(loop))
+
+
+def learning_gain(proportional: float) -> float:
+    """Command learnt per mean torque error of a stride [1/(N m)]: half the proportional gain [1/(N m)]."""
+    return 0.5 * proportional
+
+
+def torque_rate(loop: TorqueLoop) -> float:
+    """R [N m/s]."""
+    return loop.rate
+
+
+def dead_time(loop: TorqueLoop) -> float:
+    """Theta [s]."""
+    return loop.dead_time
+
+
+def lead(loop: TorqueLoop) -> float:
+    """Time [s] by which a learnt table is read ahead: 18.5 ms and the dead time."""
+    return USUAL_LEAD + loop.dead_time

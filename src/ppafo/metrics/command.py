@@ -1,0 +1,171 @@
+"""How often a command turns from one way to the other, and how far the torque goes: does a loop oscillate?
+
+A loop that is too fast for the dead time of its valve opens it fully one way and then the other. A reversal is a
+command from beyond +0.5 to beyond -0.5 or back; in a walk both belong to one task, without venting in between.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ppafo.metrics.metric import REQUEST, WALK, Floats, MetricKind, ReadAt
+from ppafo.model.columns import choose, larger, root
+from ppafo.model.helping import MID_STANCE
+from ppafo.model.valves.kind import VENTS_ABOVE
+from ppafo.signals import Recording
+from ppafo.signals.meter import Course, MeterKind, Sample
+
+Masks = NDArray[np.bool_]
+
+HALF_OPEN = 0.5
+"""Command [-] beyond which a valve counts as open one way."""
+
+
+class Reversals(NamedTuple):
+    """The way that the command went last in this task, 1, -1 or 0 for neither; the task; reversals so far."""
+
+    way: float
+    task: float
+    turns: float
+
+
+def way_of(command: float) -> float:
+    """The way [-] that a command opens the valve: 1 or -1, 0 where it is at most half open or vents."""
+    return (1.0 if HALF_OPEN < command <= VENTS_ABOVE else 0.0) - (1.0 if command < -HALF_OPEN else 0.0)
+
+
+def start_reversals(_course: Course, sample: Sample) -> Reversals:
+    """No reversal at the first sample."""
+    return Reversals(way_of(sample.command), sample.stride.phase, 0.0)
+
+
+def update_reversals(state: Reversals, _course: Course, sample: Sample) -> Reversals:
+    """One more where the command goes the other way than last in this task."""
+    command, task = sample.command, sample.stride.phase
+    begins = task != state.task or command > VENTS_ABOVE
+    before, now = 0.0 if begins else state.way, way_of(command)
+    return Reversals(now if now != 0.0 else before, task, state.turns + (1.0 if before * now < 0.0 else 0.0))
+
+
+REVERSALS = MeterKind("reversals", Reversals, start_reversals, update_reversals)
+
+
+def reversals_of(command: Floats, task: Floats) -> int:
+    """Return how often a command [-] turns within a task; both (samples,)."""
+    ways = np.where((command > HALF_OPEN) & (command <= VENTS_ABOVE), 1, 0) - np.where(command < -HALF_OPEN, 1, 0)
+    # What begins anew has a number of its own: reversals count between two ways of one number.
+    begins = (np.diff(task, prepend=task[:1]) != 0.0) | (command > VENTS_ABOVE)
+    number = np.cumsum(begins)
+    open_at = np.flatnonzero(ways)
+    turns = np.diff(ways[open_at]) != 0
+    return int(np.count_nonzero(turns & (np.diff(number[open_at]) == 0)))
+
+
+def command_reversals(recording: Recording) -> float:
+    """Reversals of the command in a recording."""
+    command = recording["command"]
+    task = recording["controller_phase"] if "controller_phase" in recording else np.zeros(command.size)
+    return float(reversals_of(command, task))
+
+
+class Peak(NamedTuple):
+    """Largest absolute torque [N m] so far."""
+
+    torque: float
+
+
+def start_peak(_course: Course, sample: Sample) -> Peak:
+    """The torque of the first sample."""
+    return Peak(abs(sample.torque))
+
+
+def update_peak(state: Peak, _course: Course, sample: Sample) -> Peak:
+    """The larger one of the peak and the next sample's torque."""
+    return Peak(max(state.torque, abs(sample.torque)))
+
+
+PEAK = MeterKind("peak", Peak, start_peak, update_peak)
+
+
+def peak_torque(recording: Recording) -> float:
+    """Largest absolute torque of the actuator [N m]."""
+    return float(np.max(np.abs(recording["torque"])))
+
+
+class Asked(NamedTuple):
+    """Squared torque errors [N^2 m^2] of the samples in which a controller of walking asks for a torque; how many."""
+
+    squares: float
+    samples: float
+
+
+def is_asked(command: float, task: float) -> bool:
+    """Return whether a controller of walking asks for a torque: in mid-stance, and where it vents, it does not."""
+    return command <= VENTS_ABOVE and task != MID_STANCE
+
+
+def start_asked(_course: Course, _sample: Sample) -> Asked:
+    """Nothing is asked for before a walk."""
+    return Asked(0.0, 0.0)
+
+
+def update_asked(state: Asked, _course: Course, sample: Sample) -> Asked:
+    """One sample more, where a torque is asked for."""
+    error, counts = sample.reference - sample.torque, is_asked(sample.command, sample.stride.phase)
+    return Asked(state.squares + (error * error if counts else 0.0), state.samples + (1.0 if counts else 0.0))
+
+
+ASKED = MeterKind("asked", Asked, start_asked, update_asked)
+
+
+def asked_samples(recording: Recording) -> Masks:
+    """Return the samples of a walk in which its controller asks for a torque (samples,)."""
+    return np.asarray((recording["command"] <= VENTS_ABOVE) & (recording["controller_phase"] != MID_STANCE))
+
+
+def torque_error(recording: Recording) -> float | None:
+    """RMS error of the torque [N m] in a walk where one is asked for; None where none is."""
+    asked = asked_samples(recording)
+    if not asked.any():
+        return None
+    return float(np.sqrt(np.mean((recording["reference"] - recording["torque"])[asked] ** 2)))
+
+
+def root_mean(squares: Floats, samples: Floats) -> Floats:
+    """Root of a mean of squares; nan for none (runs,)."""
+    found: Floats = root(choose(samples > 0.0, squares / larger(samples, 1.0), math.nan))
+    return found
+
+
+METRICS = (
+    MetricKind(
+        "torque_error",
+        "N m",
+        "RMS of requested torque less actuator torque where the controller requests one",
+        (),
+        None,
+        ReadAt(("meters.asked.squares", "meters.asked.samples"), root_mean),
+        (ASKED,),
+        needs=(WALK, REQUEST),
+    ),
+    MetricKind(
+        "peak_torque",
+        "N m",
+        "largest absolute torque of the actuator",
+        ("torque",),
+        peak_torque,
+        ReadAt(("meters.peak.torque",)),
+        (PEAK,),
+    ),
+    MetricKind(
+        "command_reversals",
+        "-",
+        "times that the command turns from more than half open one way to more than half open the other",
+        ("command",),
+        command_reversals,
+        ReadAt(("meters.reversals.turns",)),
+        (REVERSALS,),
+    ),
+)

@@ -1,0 +1,42 @@
+"""What a notebook shows of a result, without a word of its own: numbers as a table, and the figure as a picture."""
+
+import base64
+import html
+from collections.abc import Mapping
+from functools import partial
+from typing import TYPE_CHECKING
+
+from ppafo.metrics import Metric
+from ppafo.parameters.device import Device
+from ppafo.report.display_units import metric_level, metric_words
+from ppafo.report.style import render_figure
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def result_html(head: str, metrics: Mapping[str, Metric], device: Device, figure: "Figure") -> str:
+    """Return how a run ended, its metrics in the units that people are shown, and its figure, as HTML."""
+    atmosphere = device.supply.atmospheric_pressure
+    rows = []
+    for name, metric in metrics.items():
+        value, unit = metric_level(metric.value, metric.unit, atmosphere)
+        cells = (metric_words(name), f"{value:.4g} {unit}".strip(), metric.summary)
+        rows.append("".join(f'<td style="text-align: left">{html.escape(cell)}</td>' for cell in cells))
+    table = "".join(f"<tr>{row}</tr>" for row in rows)
+    picture = base64.b64encode(png_of(figure)).decode()
+    return (
+        f"<p><b>{html.escape(head)}</b></p><table>{table}</table>"
+        f'<img alt="{html.escape(head)}" style="max-width: 100%" src="data:image/png;base64,{picture}">'
+    )
+
+
+def png_of(figure: "Figure") -> bytes:
+    """Return a figure as a picture."""
+    return render_figure(figure, ("png",))["png"]
+
+
+def shown(figure: "Figure") -> "Figure":
+    """Return a figure that a notebook shows, whether a backend of Matplotlib was chosen there or not."""
+    vars(figure)["_repr_png_"] = partial(png_of, figure)
+    return figure

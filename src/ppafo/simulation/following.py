@@ -1,0 +1,58 @@
+"""Settings of a controller that nobody gives and that follow numbers of the device, its lines and its sensors."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from ppafo.model.declaration import Quantity
+from ppafo.model.regulator import SupplyLines
+from ppafo.parameters.device import Device
+from ppafo.parameters.graph import Follows, Graph, Term
+from ppafo.simulation.declaration import SUPPLY_LINES, Reading, line_paths, value_at
+from ppafo.simulation.numbers import device_number_at
+
+
+def read_followers(
+    reading: Reading,
+    sections: Mapping[str, tuple[Quantity, ...]],
+    terms: Mapping[str, Term],
+    device: Device,
+    present: Mapping[str, float],
+) -> tuple[dict[str, float], Graph]:
+    """Return the settings of some sections [SI] by path, and the links of those that a file leaves to the device.
+
+    ``terms`` are what a default may follow, by name; ``present`` has numbers by path beside the device's.
+    """
+    settings: dict[str, float] = {}
+    links: dict[str, tuple[Follows, ...]] = {}
+
+    def number(path: str) -> float:
+        known = settings if path in settings else present
+        return known[path] if path in known else device_number_at(device, path)
+
+    for section, items in sections.items():
+        for item in items:
+            path, read = f"{section}.{item.name}", item
+            # A setting of this list may follow one before it.
+            if item.follows and value_at(reading.document, path) is None:
+                link = Follows(tuple(terms[name] for name in item.follows), item.default or 0.0)
+                links[path] = (link,)
+                read = replace(item, default=float(link.number(number)))
+            settings[path] = reading.number(path, read)
+    return settings, links
+
+
+def numbers_of_sensors(sensors: Mapping[str, Any]) -> dict[str, float]:
+    """Return settings of sensors by path."""
+    return {f"sensors.{name}": number for name, number in sensors.items()}
+
+
+def numbers_of_lines(lines: SupplyLines | None) -> dict[str, float]:
+    """Return the numbers of both supply lines by path, {} where there are none."""
+    if lines is None:
+        return {}
+    numbered = {line: number for number, line in enumerate(SUPPLY_LINES, start=1)}
+    return {
+        path: getattr(lines, f"{name}_{numbered[line]}")
+        for path, (_, line, name) in ((path, path.split(".")) for path in line_paths())
+    }

@@ -1,0 +1,150 @@
+"""What an actuator of any kind is like in the middle of its range: torque per pressure and volume of each chamber.
+
+A vane is taken with the foot at a right angle, or 0.2 rad inside a stop where that comes first.
+"""
+
+from typing import Annotated, Any, NamedTuple
+
+from ppafo.control.binding import bind
+from ppafo.model.actuators.kind import Range
+from ppafo.model.actuators.vane import VaneSettings
+from ppafo.model.catalog import ACTUATORS
+from ppafo.model.declaration import Number, quantities_of
+from ppafo.parameters.device import VANE, Device
+
+RIGHT_ANGLE = 1.5707963267948966
+INSIDE = 0.2
+"""rad from a stop."""
+LEAST_GAUGE = 1.0
+"""Pa: a supply at the atmosphere's pressure must not divide by 0."""
+
+
+class Surroundings(NamedTuple):
+    """Absolute pressures [Pa] that an actuator is fed with, and the atmosphere."""
+
+    supply_pressure: Annotated[float, Number("Pa_a", "")]
+    dorsiflexion_pressure: Annotated[float, Number("Pa_a", "")]
+    atmospheric_pressure: Annotated[float, Number("Pa_a", "")]
+
+
+class MeanChambers(NamedTuple):
+    """Torque per pressure [m^3], and gas content per pressure [m^3]: the volume, and what it gives under pressure."""
+
+    torque_per_pressure_1: float
+    torque_per_pressure_2: float
+    volume_1: float
+    volume_2: float
+
+
+class StillPlant(NamedTuple):
+    """What a kind may ask of its plant (``ShapedPlant``), for an actuator on its own that stands still."""
+
+    shape: Any
+    gas_product: float
+    supply_pressure: float
+    dorsiflexion_pressure: float
+    atmospheric_pressure: float
+    gravity_torque: float
+    external_torque: float
+
+
+def prepared_shape(settings: Any, stops: Range) -> Any:
+    """Stand for the function that makes the shape of a kind."""
+    raise NotImplementedError
+
+
+def both_chambers(plant: Any, angle: float, pressure_1: float, pressure_2: float) -> Any:
+    """Stand for the function of a kind that gives both chambers."""
+    raise NotImplementedError
+
+
+def shaft_torque(plant: Any, angle: float, pressure_1: float, pressure_2: float) -> float:
+    """Stand for the function of a kind that gives the torque [N m]."""
+    raise NotImplementedError
+
+
+TABLE = None
+"""Stands for what a kind has measured."""
+
+
+def shape_of(settings: Any, stops: Range) -> Any:
+    """The shape of an actuator from its settings and stops."""
+    return prepared_shape(settings, stops)
+
+
+def measured_shape_of(settings: Any, stops: Range) -> Any:
+    """The shape of an actuator that has a table."""
+    return prepared_shape(settings, stops, TABLE)  # type: ignore[call-arg]
+
+
+def vane_at_right_angle(settings: VaneSettings, stops: Range, _around: Surroundings) -> MeanChambers:
+    """Both chambers of a vane with the foot at a right angle. Equations (2), (4), (5)."""
+    middle = 0.5 * (stops.angle_min + stops.angle_max)
+    inside = min(max(RIGHT_ANGLE, stops.angle_min + INSIDE), stops.angle_max - INSIDE)
+    # A range of less than 0.4 rad has no such place.
+    angle = inside if stops.angle_max - stops.angle_min > 2.0 * INSIDE else middle
+    growth = settings.displacement_per_radian
+    return MeanChambers(
+        torque_per_pressure_1=settings.torque_constant,
+        torque_per_pressure_2=settings.torque_constant,
+        volume_1=stops.dead_volume_1 + growth * (angle - stops.angle_min),
+        volume_2=stops.dead_volume_2 + growth * (stops.angle_max - angle),
+    )
+
+
+def shaped_in_the_middle(settings: Any, stops: Range, around: Surroundings) -> MeanChambers:
+    """Both chambers of another kind in the middle of its range, half filled."""
+    angle, room = 0.5 * (stops.angle_min + stops.angle_max), around.atmospheric_pressure
+    plant = StillPlant(
+        shape=shape_of(settings, stops),
+        gas_product=1.0,
+        supply_pressure=around.supply_pressure,
+        dorsiflexion_pressure=around.dorsiflexion_pressure,
+        atmospheric_pressure=room,
+        gravity_torque=0.0,
+        external_torque=0.0,
+    )
+    gauge_1 = max(around.supply_pressure - room, LEAST_GAUGE)
+    gauge_2 = max(around.dorsiflexion_pressure - room, LEAST_GAUGE)
+    half_1, half_2 = room + 0.5 * gauge_1, room + 0.5 * gauge_2
+    filled = both_chambers(plant, angle, half_1, half_2)
+    vented = shaft_torque(plant, angle, room, room)
+    return MeanChambers(
+        torque_per_pressure_1=abs(shaft_torque(plant, angle, room + gauge_1, room) - vented) / gauge_1,
+        torque_per_pressure_2=abs(shaft_torque(plant, angle, room, room + gauge_2) - vented) / gauge_2,
+        volume_1=filled.volume_1 + half_1 * filled.compliance_1,
+        volume_2=filled.volume_2 + half_2 * filled.compliance_2,
+    )
+
+
+class ChambersOf(NamedTuple):
+    """The function of an actuator that gives its ``MeanChambers``, what it takes by path, and in which rows."""
+
+    function: Any
+    sources: tuple[str, ...]
+    rows: tuple[type, ...]
+
+
+def chambers_of(device: Device) -> ChambersOf:
+    """Return how the mean chambers of a device follow from its numbers."""
+    actuator = device.actuator
+    kind = ACTUATORS[actuator.kind]
+    rows = (kind.settings, Range, Surroundings)
+    sections = ("actuator", "actuator", "supply")
+    names = {"supply_pressure": "pressure"}
+    sources = tuple(
+        f"{section}.{names.get(item.name, item.name)}"
+        for section, row in zip(sections, rows, strict=True)
+        for item in quantities_of(row)
+    )
+    if actuator.kind == VANE:
+        return ChambersOf(vane_at_right_angle, sources, rows)
+    components = {
+        "prepared_shape": kind.model.prepare,
+        "both_chambers": kind.model.chambers,
+        "shaft_torque": kind.model.torque,
+        "TABLE": actuator.table,
+    }
+    prepared = shape_of if actuator.table is None else measured_shape_of
+    components["shape_of"] = bind(prepared, f"shape_of_{actuator.kind}", components)
+    return ChambersOf(bind(shaped_in_the_middle, f"middle_of_{actuator.kind}", components), sources, rows)

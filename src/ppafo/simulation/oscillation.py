@@ -1,0 +1,173 @@
+"""What a run says of its torque loop: the gains in force and where they come from, and whether the loop oscillates.
+
+A loop oscillates where its command turns too often from more than half open one way to the other within one task: in a
+walk above 12 times a stride, else above 10 times a second. A law that only switches does so by design.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ppafo.control import torque_loop
+from ppafo.control.kind import ControllerKind
+from ppafo.metrics.command import asked_samples
+from ppafo.signals import Recording
+from ppafo.simulation.numbers import number_at
+from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario
+from ppafo.simulation.torque_loop import DEAD_TIME, RATE, loop_terms
+
+MOST_PER_STRIDE, MOST_PER_SECOND = 12.0, 10.0
+"""Reversals of the command above which a loop oscillates."""
+
+REVERSALS = "command_reversals"
+"""The metric that counts them."""
+
+_OF_LOOP = frozenset(
+    (
+        torque_loop.PROPORTIONAL_GAIN,
+        torque_loop.INTEGRAL_GAIN,
+        torque_loop.INTEGRAL_RATE,
+        torque_loop.BOUNDARY,
+        torque_loop.CONVERGENCE,
+        torque_loop.OPENING,
+        torque_loop.LEARNING_GAIN,
+        torque_loop.LEAD,
+    )
+)
+_FIRST = (torque_loop.PROPORTIONAL_GAIN, torque_loop.BOUNDARY, torque_loop.CONVERGENCE)
+"""What sets how fast a loop is."""
+_SLOPES = ("derivative_gain", "damping")
+_NEAR = 0.02
+"""Fraction by which a gain may differ from another one that is called the same."""
+
+
+@dataclass(frozen=True, slots=True)
+class Gain:
+    """A gain in force [SI]: its name, unit and value, and whether it was computed from the device or given."""
+
+    name: str
+    unit: str
+    value: float
+    computed: bool
+
+    @property
+    def text(self) -> str:
+        """Name, value and unit."""
+        return f"{self.name} {self.value:.3g} {self.unit}".rstrip()
+
+
+@dataclass(frozen=True, slots=True)
+class Gains:
+    """The gains of a torque law, with the torque rate at full opening [N m/s] and the dead time [s] of the device."""
+
+    gains: tuple[Gain, ...]
+    torque_rate: float
+    dead_time: float
+
+    @property
+    def sentence(self) -> str:
+        """The gains in force and where they come from."""
+        loop = f"{self.torque_rate:.3g} N m/s at full opening, {1.0e3 * self.dead_time:.3g} ms late"
+        parts = [
+            f"{', '.join(item.text for item in self.gains if item.computed == computed)} {origin}"
+            for computed, origin in ((False, "(given)"), (True, f"(computed from the device: {loop})"))
+            if any(item.computed == computed for item in self.gains)
+        ]
+        return f"gains: {'; '.join(parts)}"
+
+
+@dataclass(frozen=True, slots=True)
+class Oscillation:
+    """A torque loop that oscillates: reversals ``per`` stride or second, RMS error and RMS of what is wanted [N m].
+
+    ``remedy`` says which gain would mend it.
+    """
+
+    reversals: float
+    per: str
+    error: float
+    wanted: float
+    remedy: str
+
+    @property
+    def sentence(self) -> str:
+        """The verdict in one line."""
+        return (
+            f"the torque loop oscillates: {self.reversals:.3g} reversals a {self.per}, RMS {self.error:.2g} of "
+            f"{self.wanted:.2g} N m wanted; {self.remedy}"
+        )
+
+
+def gains_of(scenario: Scenario, law: ControllerKind) -> Gains | None:
+    """Return the gains of a scenario's torque law in force; None for a law that has none."""
+    if scenario.controller.kind == PYTHON_CONTROLLER:
+        return None
+    items = [item for item in law.quantities if _OF_LOOP.intersection(item.follows)]
+    if not items:
+        return None
+    links, terms = scenario.links, loop_terms(scenario.device, law, scenario.walks)
+    found = tuple(
+        Gain(item.name, item.unit, float(scenario.controller.settings[item.name]), f"controller.{item.name}" in links)
+        for item in items
+    )
+    rate, late = (float(terms[name].number(lambda path: number_at(scenario, path))) for name in (RATE, DEAD_TIME))
+    return Gains(found, rate, late)
+
+
+def asks_gradually(scenario: Scenario, law: ControllerKind) -> bool:
+    """Return whether a law asks for openings between shut and open to follow a torque, so that it should not turn."""
+    is_outside = scenario.controller.kind == PYTHON_CONTROLLER
+    wants = hasattr(law.initial, "request") if scenario.walks else law.needs_reference
+    return not is_outside and wants and not law.only_switches
+
+
+def most_reversals(scenario: Scenario, law: ControllerKind, duration: float, stride_time: float = 0.0) -> float:
+    """Return the reversals of the command in a time [s] above which a loop oscillates; infinite for one that may.
+
+    ``stride_time`` [s] is how long a stride of a walk lasts.
+    """
+    if not asks_gradually(scenario, law):
+        return math.inf
+    return duration * (MOST_PER_STRIDE / stride_time if stride_time > 0.0 else MOST_PER_SECOND)
+
+
+def oscillation_of(
+    scenario: Scenario,
+    law: ControllerKind,
+    recording: Recording,
+    metrics: Mapping[str, float],
+    stride_time: float = 0.0,
+) -> Oscillation | None:
+    """Return the verdict on a run with these metrics [SI]; None where its loop does not oscillate."""
+    reversals, duration = metrics.get(REVERSALS, 0.0), float(np.ptp(recording.time[[0, -1]]))
+    if "reference" not in recording or reversals <= most_reversals(scenario, law, duration, stride_time):
+        return None
+    asked = asked_samples(recording) if scenario.walks else np.ones(len(recording), dtype=np.bool_)
+    reference, torque = recording["reference"][asked], recording["torque"][asked]
+    scale, per = (stride_time, "stride") if stride_time > 0.0 else (1.0, "second")
+    return Oscillation(
+        reversals=reversals * scale / duration,
+        per=per,
+        error=float(np.sqrt(np.mean((reference - torque) ** 2))),
+        wanted=float(np.sqrt(np.mean(reference**2))),
+        remedy=_remedy(scenario, law),
+    )
+
+
+def _remedy(scenario: Scenario, law: ControllerKind) -> str:
+    """Return which gain the device asks for, or what else to look at where it has that one."""
+    item = next((item for item in law.quantities if set(_FIRST).intersection(item.follows)), None)
+    if item is None:
+        return "give its law smaller gains, or a slower one"
+    name = next(name for name in _FIRST if name in item.follows)
+    term = loop_terms(scenario.device, law, scenario.walks)[name]
+    right = float(term.number(lambda path: number_at(scenario, path)))
+    now = float(scenario.controller.settings[item.name])
+    if abs(now - right) <= _NEAR * right:
+        return f"{item.name} is this device's: look for what delays it (sensors, lines), or give half of it"
+    # The rules leave the slope of the error alone.
+    slopes = [name for name in _SLOPES if scenario.controller.settings.get(name, 0.0) > 0.0]
+    rest = "".join(f" and `{name} = 0`" for name in slopes)
+    return f"for this device `{item.name} = {right:.3g} {item.unit}`{rest}"

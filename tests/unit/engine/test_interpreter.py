@@ -1,0 +1,113 @@
+"""Python runs the functions of the step as they are: the reference for the bits of every compiler."""
+
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from types import FrameType
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ppafo.engine.interpreter import going_on, quotient, whole_part
+from ppafo.engine.lanes import Batch, run_batch
+from ppafo.engine.loading import BACKEND_VARIABLE
+from ppafo.engine.rows import row_numbers
+from ppafo.engine.run import batch_of
+from ppafo.engine.step import phases
+from ppafo.golden_bits import digest
+from ppafo.simulation.loading import list_scenarios, load_scenario
+from ppafo.simulation.plan import plan_run
+from ppafo.walking.loading import load_walk
+from ppafo.walking.motion import with_duration
+from ppafo.walking.planning import plan_walk
+
+SETTINGS: dict[str, tuple[str, tuple[str, ...]]] = {
+    "late and noisy": ("torque-task-solenoid", ("sensors.delay=2.3 ms", "sensors.pressure_noise=0.1 psi_d")),
+    "lines and warm gas": (
+        "torque-task-proportional",
+        (
+            "gas_model.kind=thermal",
+            "gas_model.heat_transfer_coefficient=50 W/(m^2 K)",
+            "gas_model.wall_area_per_volume=100 1/m",
+            "supply_line.plantarflexion.droop=3e6 Pa s/kg",
+        ),
+    ),
+    "samples inside steps": ("torque-task-solenoid", ("run.output_interval=1.5 ms",)),
+}
+
+
+def short(batch: Batch, steps: int) -> Batch:
+    return replace(batch, clock=replace(batch.clock, step_count=min(steps, batch.clock.step_count)))
+
+
+def by_python(batch: Batch, monkeypatch: pytest.MonkeyPatch) -> Any:
+    with monkeypatch.context() as patch:
+        patch.setenv(BACKEND_VARIABLE, "python")
+        return run_batch(batch)
+
+
+def scenario_batch(name: str, overrides: Sequence[str] = ()) -> Batch:
+    return short(batch_of(plan_run(load_scenario(name, list(overrides)))), 600)
+
+
+@pytest.mark.parametrize("name", list_scenarios())
+def test_every_scenario_has_the_bits_of_compiled_code(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    batch = scenario_batch(name)
+    assert digest(by_python(batch, monkeypatch)) == digest(run_batch(batch))
+
+
+@pytest.mark.parametrize("case", SETTINGS)
+def test_whatever_a_step_has_beside_has_the_same_bits(case: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    batch = scenario_batch(*SETTINGS[case])
+    assert digest(by_python(batch, monkeypatch)) == digest(run_batch(batch))
+
+
+@pytest.mark.parametrize("name", ["solenoid", "proportional-learning"])
+def test_walks_have_the_same_bits(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    batch = short(batch_of(plan_walk(with_duration(load_walk(name), 6.0))), 600)
+    assert digest(by_python(batch, monkeypatch)) == digest(run_batch(batch))
+
+
+def test_a_run_in_which_python_raises_ends_as_the_compiled_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    batch = scenario_batch("step-response")
+    parameters = batch.parameters.copy()
+    parameters[row_numbers(batch.program.parameter_rows())["plant.inertia"]] = 0.0
+    lost = replace(batch, parameters=parameters)
+    python, compiled = by_python(lost, monkeypatch), run_batch(lost)
+    failed = compiled.states[1, 0]
+    assert failed < 1.0, "the run diverges"
+    assert python.states[1, 0] == failed
+    assert digest(python) == digest(compiled)
+
+
+def halved(value: float) -> float:
+    """A quotient by zero."""
+    return 1.0 / value
+
+
+def test_operations_that_go_on_give_what_processors_give() -> None:
+    code = going_on(halved)
+    assert code.co_firstlineno == halved.__code__.co_firstlineno
+    assert (quotient(1.0, 0.0), quotient(-1.0, 0.0), quotient(1.0, -0.0)) == (np.inf, -np.inf, -np.inf)
+    assert np.isnan(quotient(0.0, 0.0))
+    assert quotient(1.0, 3.0) == 1.0 / 3.0
+    assert (whole_part(2.9), whole_part(-2.9), whole_part(float("nan"))) == (2, -2, -(2**63))
+
+
+def test_a_debugger_stops_in_a_phase(monkeypatch: pytest.MonkeyPatch) -> None:
+    batch = short(scenario_batch("torque-task-proportional"), 1)
+    stopped: list[str] = []
+
+    def trace(frame: FrameType, event: str, _given: Any) -> Any:
+        if frame.f_code is phases.open_valve.__code__ and event == "call":
+            stopped.append(frame.f_code.co_filename)
+        return None
+
+    before = sys.gettrace()
+    sys.settrace(trace)
+    try:
+        by_python(batch, monkeypatch)
+    finally:
+        sys.settrace(before)
+    assert stopped == [phases.__file__]

@@ -1,0 +1,100 @@
+"""A run says which gains are in force, and first of all that its torque loop oscillates."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import ppafo
+from ppafo.cli.main import main
+from ppafo.loading import load_scenario
+from ppafo.running import gains, most_reversals, oscillation, simulate
+from ppafo.simulation.ensemble import run_ensemble
+from ppafo.walking import load_walk, walk
+
+FAST = ["controller.proportional_gain=60 1/(N m)", "controller.derivative_gain=0.05 s/(N m)", "valve.delay=5 ms"]
+TASK = "torque-task-proportional"
+
+
+def test_given_gains_and_computed_ones_are_told_apart() -> None:
+    found = gains(load_walk("proportional", ["controller.torque_gain=2 1/(N m)"]))
+    assert found is not None
+    assert [(item.name, item.computed) for item in found.gains] == [
+        ("torque_gain", False),
+        ("torque_integral_gain", True),
+    ]
+    assert found.dead_time == 1.5e-3
+    assert found.sentence.startswith("gains: torque_gain 2 1/(N m) (given); torque_integral_gain 167 ")
+    assert gains(load_scenario("step-response")) is None
+
+
+def test_a_verdict_names_the_gain_that_mends_the_loop_and_it_does() -> None:
+    result = simulate(TASK, FAST)
+    verdict = oscillation(result)
+    assert verdict is not None
+    assert verdict.reversals > 10.0
+    assert verdict.sentence.startswith("the torque loop oscillates: ")
+    assert "`derivative_gain = 0`" in verdict.remedy
+    mended = float(verdict.remedy.partition(" = ")[2].partition(" ")[0])
+    given = [f"controller.proportional_gain={mended}", "controller.derivative_gain=0", FAST[-1]]
+    again = simulate(TASK, given)
+    assert oscillation(again) is None
+    assert again.metrics["rms_error"].value < result.metrics["rms_error"].value
+
+
+@pytest.mark.parametrize("scenario", [TASK, "torque-task-anti-windup", "torque-task-solenoid"])
+def test_the_scenarios_of_the_package_do_not_oscillate_and_a_pair_that_only_switches_gives_no_alarm(
+    scenario: str,
+) -> None:
+    assert oscillation(simulate(scenario)) is None
+
+
+def test_a_law_that_only_switches_may_turn_as_often_as_it_likes() -> None:
+    result = simulate(TASK, ["controller.kind=on_off"])
+    assert result.metrics["command_reversals"].value > 100.0
+    assert oscillation(result) is None
+    assert most_reversals(result.scenario) == float("inf")
+
+
+def test_simulate_says_it_first_in_text_page_and_data_and_a_check_ends_with_1(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["simulate", TASK, *(word for text in FAST for word in ("--set", text)), "--out", str(tmp_path / "run")]
+    assert main(words) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[1].startswith("the torque loop oscillates: ")
+    assert lines[2].startswith("gains: ")
+    assert "oscillates: " in (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
+    assert main([*words, "--check", "--json"]) == 1
+    assert json.loads(capsys.readouterr().out)["oscillation"]["per"] == "second"
+
+
+def test_a_walk_says_it_and_meters_count_what_its_recording_shows() -> None:
+    gain = "controller.torque_gain"
+    base = load_walk("proportional", ["run.duration=8 s"])
+    together = run_ensemble(
+        base, {gain: np.array([4.0, 40.0])}, ["command_reversals", "torque_error", "peak_torque"]
+    ).metrics
+    for run, value in enumerate((4.0, 40.0)):
+        alone = walk(load_walk("proportional", ["run.duration=8 s", f"{gain}={value} 1/(N m)"]))
+        for name, metered in together.items():
+            assert metered[run] == pytest.approx(alone.metrics[name].value, rel=1e-9)
+        assert (alone.oscillation is not None) == (value > 10.0)
+    verdict = alone.oscillation
+    assert verdict is not None
+    assert verdict.per == "stride"
+    assert "for this device `torque_gain = " in verdict.remedy
+
+
+def test_find_counts_what_oscillates_as_not_met() -> None:
+    found = ppafo.find(
+        TASK,
+        vary="controller.proportional_gain=1..200 1/(N m)",
+        such_that="rms_error <= 2 N m",
+        highest=True,
+        grid=8,
+        overrides=["valve.delay=5 ms", "controller.derivative_gain=0 s/(N m)"],
+    ).found
+    assert found.value is not None
+    assert found.value < 60.0

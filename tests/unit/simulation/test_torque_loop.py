@@ -1,0 +1,138 @@
+"""Gains that nobody gives follow the device: the rule itself, and every door through which a setting comes."""
+
+import math
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ppafo.control.torque_loop import TorqueLoop, lead, proportional_gain
+from ppafo.loading import load_scenario
+from ppafo.parameters.plant import plant_parameters
+from ppafo.running import simulate
+from ppafo.simulation.ensemble import run_ensemble
+from ppafo.simulation.numbers import moving_together, with_numbers
+from ppafo.simulation.scenario import Scenario
+from ppafo.walking import load_walk
+
+SMALL_AIR = (
+    *("gas.species=air", "actuator.torque_constant=9 cm^3", "actuator.displacement_per_radian=9 cm^3/rad"),
+    *("actuator.dead_volume_1=4 cm^3", "actuator.dead_volume_2=6 cm^3", "supply.pressure=80 psi_g"),
+    *("supply.dorsiflexion_pressure=30 psi_g", "valve.delay=7 ms"),
+)
+LAWS = {
+    "event_proportional": "torque_gain",
+    "pid": "proportional_gain",
+    "pid_feedforward": "proportional_gain",
+    "damped_proportional": "proportional_gain",
+    "event_damped_learning": "proportional_gain",
+}
+
+
+def by_hand(scenario: Scenario) -> TorqueLoop:
+    """R [N m/s] and theta [s] of a vane with a proportional valve, from the words of the rule."""
+    actuator, plant = scenario.device.actuator, plant_parameters(scenario.device)
+    flow = plant.valve_conductance * plant.gas_product
+    volume_1 = actuator.dead_volume_1 + actuator.displacement_per_radian * (0.5 * math.pi - actuator.angle_min)
+    volume_2 = actuator.dead_volume_2 + actuator.displacement_per_radian * (actuator.angle_max - 0.5 * math.pi)
+    fastest = max(plant.supply_pressure / volume_1, plant.dorsiflexion_pressure / volume_2)
+    theta = scenario.device.valve.settings["delay"] + 1.5 * scenario.controller.period
+    return TorqueLoop(actuator.torque_constant * flow * fastest, theta)
+
+
+@pytest.mark.parametrize("changes", [(), SMALL_AIR], ids=["paper", "small, air"])
+@pytest.mark.parametrize("law", LAWS)
+def test_every_torque_law_has_half_the_gain_at_which_the_dead_time_moves_it_by_what_it_sees(
+    law: str, changes: tuple[str, ...]
+) -> None:
+    walked = load_walk("proportional", [f"controller.kind={law}", *changes])
+    loop = by_hand(walked)
+    assert getattr(walked.controller, LAWS[law]) == pytest.approx(0.5 / (loop.rate * loop.dead_time), rel=1e-9)
+
+
+def test_the_other_words_for_the_same_bandwidth() -> None:
+    sliding = load_walk("proportional", ["controller.kind=sliding_mode", *SMALL_AIR])
+    rate, theta = by_hand(sliding)
+    assert (sliding.controller.reaching_command, sliding.controller.boundary_layer) == pytest.approx(
+        (1.0, 2.0 * rate * theta)
+    )
+    assert sliding.controller.surface_slope == pytest.approx(0.125 / theta)
+    inverted = load_walk("proportional", ["controller.kind=feedback_linearisation", *SMALL_AIR])
+    assert inverted.controller.convergence_rate == pytest.approx(0.5 / theta)
+    learning = load_walk("proportional", ["controller.kind=event_damped_learning", *SMALL_AIR]).controller
+    assert learning.lead == pytest.approx(0.02 + theta - 0.0015)
+    assert (learning.learning_gain, learning.damping) == (0.5 * learning.proportional_gain, 0.0)
+    zone = load_walk("proportional", ["controller.kind=on_off_dead_zone", "valve.dead_band=0.1", *SMALL_AIR])
+    assert zone.controller.opening == pytest.approx(0.1 + 0.9 * min(0.77, 0.21 / (rate * theta)))
+    assert load_walk("proportional", ["controller.kind=on_off_dead_zone"]).controller.opening == 0.77
+
+
+def test_a_gain_is_the_same_through_every_door() -> None:
+    walk = load_walk("proportional", ["controller.kind=pid"])
+    small = load_walk("proportional", ["controller.kind=pid", "valve.delay=5 ms", "supply.pressure=70 psi_g"])
+    pressure, delay = small.device.supply.pressure, 5.0e-3
+    given = {"valve.delay": delay, "supply.pressure": pressure}
+    moved = with_numbers(walk, given)
+    assert moved.controller.proportional_gain == small.controller.proportional_gain
+    assert moved.controller.integral_gain == small.controller.integral_gain
+    columns = moving_together(walk, {"valve.delay": np.array([0.0, delay]), "supply.pressure": np.full(2, pressure)})
+    assert columns["controller.proportional_gain"][1] == small.controller.proportional_gain
+    assert columns["controller.proportional_gain"][0] > columns["controller.proportional_gain"][1]
+
+
+def test_a_gain_that_is_given_stays_and_its_integral_goes_with_it() -> None:
+    walk = load_walk("proportional", ["controller.kind=pid", "controller.proportional_gain=0.5"])
+    slow = with_numbers(walk, {"valve.delay": 5.0e-3})
+    assert slow.controller.proportional_gain == walk.controller.proportional_gain == 0.5
+    assert walk.controller.integral_gain == pytest.approx(0.5 / (8.0 * 1.5e-3))
+    assert slow.controller.integral_gain == pytest.approx(0.5 / (8.0 * 6.5e-3))
+
+
+def test_a_rate_that_varies_moves_the_gains_as_a_period_does() -> None:
+    walk = load_walk("proportional", ["controller.kind=pid"])
+    by_rate = moving_together(walk, {"controller.rate": np.array([250.0])})
+    by_period = moving_together(walk, {"controller.period": np.array([4.0e-3])})
+    assert by_rate["controller.proportional_gain"] == by_period["controller.proportional_gain"]
+    assert by_rate["controller.proportional_gain"][0] == pytest.approx(0.25 * walk.controller.proportional_gain)
+    assert "controller.period" not in by_rate
+
+
+def test_late_sensors_are_dead_time_too() -> None:
+    late = load_walk("proportional", ["controller.kind=pid", "sensors.pressure_bandwidth=100 Hz"])
+    at_once = load_walk("proportional", ["controller.kind=pid"])
+    lag = 1.0 / (2.0 * math.pi * 100.0)
+    ratio = at_once.controller.proportional_gain / late.controller.proportional_gain
+    assert ratio == pytest.approx((1.5e-3 + lag) / 1.5e-3)
+
+
+def test_the_gains_of_the_paper_are_stated_in_its_torque_task() -> None:
+    control = load_scenario("torque-task-proportional").controller
+    assert (control.proportional_gain, control.integral_gain, control.derivative_gain) == (0.095, 0.25, 0.006)
+    assert control.anti_windup == 0.0
+
+
+def test_no_flow_leaves_a_gain_that_is_finite() -> None:
+    assert proportional_gain(TorqueLoop(0.0, 1.5e-3)) == 1000.0
+    assert lead(TorqueLoop(85.0, 1.5e-3)) == pytest.approx(0.02)
+
+
+@pytest.mark.parametrize("file", ["torque-task-cylinder.toml", "torque-task-measured-bladder.toml"])
+def test_another_actuator_has_gains_of_its_own_and_follows_its_torque(file: str, tmp_path: Path) -> None:
+    path = Path(shutil.copytree("tests/actuators", tmp_path / "actuators")) / file
+    given = ("proportional_gain", "integral_gain", "derivative_gain", '"controller.')
+    lines = path.read_text(encoding="utf-8").splitlines()
+    path.write_text("\n".join(line for line in lines if not line.startswith(given)), encoding="utf-8")
+    task = load_scenario(str(path))
+    result = simulate(task)
+    assert result.metrics["final_error"].value < 0.02
+    assert np.abs(np.diff(result.recording["command"][-500:])).max() < 0.5
+
+
+def test_an_ensemble_has_the_gains_of_each_run() -> None:
+    base = load_scenario("torque-task-proportional", ["controller.kind=sliding_mode", "run.duration=0.3 s"])
+    areas = np.array([4.0e-6, 12.6e-6])
+    together = run_ensemble(base, {"valve.area": areas}, ("rms_error",))
+    for run, area in enumerate(areas.tolist()):
+        alone = simulate(with_numbers(base, {"valve.area": area}))
+        assert together.metrics["rms_error"][run] == pytest.approx(alone.metrics["rms_error"].value, rel=1e-12)
