@@ -18,9 +18,11 @@ from ppafo.analyses.parts.solve import part_titles, parts_to_check
 from ppafo.report import finding
 from ppafo.report.finding import Finding, columns_of, facts
 from ppafo.report.kind import Kind
+from ppafo.simulation.oscillation import gains_of
 from ppafo.walking.bottle import minutes_text
 from ppafo.walking.figures.over_time import bottle_figure, peak_torques
 from ppafo.walking.motion import walk_of
+from ppafo.walking.planning import law_of
 from ppafo.walking.wearer import SCALED_MASS, who_walks
 
 _HEAD = (
@@ -91,7 +93,9 @@ def _sections(wish: Wish, device: Device) -> tuple[finding.Part, ...]:
         ("gas", f"{Kind('', 'kg', 'gas mass', '.3g').text(walked.metrics['gas'].value)} a stride"),
         ("mass", f"{MASS.text(sum(device.masses.values()), '.0f')}, without shell, straps and hoses"),
     )
+    gains = gains_of(walked.scenario, law_of(walked.scenario))
     remarks = [
+        *([] if gains is None else [gains.sentence]),
         *electrical_sentences(device.electrical),
         who_walks(walk_of(walked.scenario).wearer, walk_of(walked.scenario).gait, "as requested"),
     ]

@@ -35,6 +35,8 @@ from ppafo.walking.wearer import STATURES, WEARER
 
 _REQUESTS = (1.0, 1.3, 1.7)
 """Torque that a torque controller is told, over the torque that is wanted: it lags behind its reference."""
+_ABOVE = 1.1
+"""Limit of a pair over the torque that is wanted: it vents the chamber from its limit on."""
 _LIMIT = next(item.default or 0.0 for item in ASSISTANCE_QUANTITIES if item.name == "largest_torque")
 """Torque [N m] above which a controller of walking requests no more, unless it is told."""
 _SHORTEST = 6.0
@@ -218,9 +220,9 @@ def _few_strides(wish: Wish, valve: Part, actuator: Part) -> list[Tried]:
 
 
 def _requests(wish: Wish, valve: Part, actuator: Part) -> list[tuple[str, ...]]:
-    """Return the settings of the torque that is requested, from the lowest; a pair of valves has no request."""
+    """Return the settings of the torque that is requested, from the lowest; a pair of valves has a limit alone."""
     if valve.kind != "proportional":
-        return [()]
+        return [_limit(_ABOVE * wish.torque)]
     # No request above what the supply pressure can hold with this actuator; those that are equal then are one.
     held = actuator.values["torque_constant"] * (wish.pressure - STANDARD_ATMOSPHERE)
     requests = dict.fromkeys(min(factor * wish.torque, held) for factor in _REQUESTS)
@@ -243,9 +245,9 @@ def _lifts(request: tuple[str, ...], valve: Part, actuator: Part, gauge: float) 
 
 
 def _strides_of(valve: Part, actuator: Part, overrides: tuple[str, ...]) -> Tried | None:
-    """Return a few strides with some settings; None where they are not walked with help."""
+    """Return a few strides with some settings; None where they lack help, or the torque loop oscillates."""
     result = walk(load_walk(WALKS[valve.kind], overrides), minutes=_FEW)
-    if not result.status.is_completed or not result.is_helped or not result.averages:
+    if not result.status.is_completed or not result.is_helped or not result.averages or result.oscillation:
         return None
     flow = result.metrics["gas"].value / walk_of(result.scenario).gait.stride_time
     torque = float(result.averages["torque"].mean.max())
@@ -302,7 +304,7 @@ def _lasting_flow(one: Tried, lasted: float, seconds: float) -> float:
 
 def _keeps(walked: WalkResult | None, wish: Wish) -> bool:
     """Tell whether the mean stride of a walk on a bottle has most of the torque, and the clearance."""
-    if walked is None or not walked.averages:
+    if walked is None or not walked.averages or walked.oscillation:
         return False
     torque = walked.averages["torque"].mean.max()
     return bool(torque >= _KEPT * wish.torque and walked.metrics["lowest_toes"].value >= wish.clearance)
