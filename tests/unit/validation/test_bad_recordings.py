@@ -206,7 +206,7 @@ def test_other_settings_are_checked() -> None:
     with pytest.raises(DataError, match="did you mean 'measured'"):
         validate("ppafo2011", ["r.csv"], motion="mesured")
     for volume in (0.0, float("nan")):
-        with pytest.raises(DataError, match="volume"):
+        with pytest.raises(ArgumentError, match=rf"^volume={volume}: must be a number in m\^3, above 0"):
             validate("ppafo2011", ["r.csv"], volume=volume)
     with pytest.raises(DataError, match="no recording was given"):
         validate("ppafo2011", [])

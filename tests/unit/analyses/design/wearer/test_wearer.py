@@ -74,7 +74,7 @@ def test_what_is_suggested_is_the_walk_that_is_shown_and_its_toes_clear_the_grou
     said = text_of(finding_of(found))
     assert device.command in said.splitlines()
     assert f"lowest toes  {1e3 * device.toes:.1f} mm over the ground" in said
-    assert "the toes of the healthy gait itself come down to 5.2 mm" in said
+    assert "the lowest height of the toes in the healthy gait itself is 5.2 mm" in said
     # The printed command walks the same walk, with the same torque.
     words = shlex.split(device.command)[1:]
     assert main([*words, "--out", str(tmp_path / "again")]) == 0
