@@ -65,6 +65,8 @@ def spoil(path: Path) -> None:
     """Change one bit in the middle of a file."""
     content = bytearray(path.read_bytes())
     content[len(content) // 2] ^= 1
+    # Another file of that name: this one is loaded, and its pages would change in the process.
+    path.unlink()
     path.write_bytes(bytes(content))
 
 
