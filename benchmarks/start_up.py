@@ -6,7 +6,7 @@ from pathlib import Path
 
 from benchmarks.report import Line, Target
 from benchmarks.timing import Timing, run_python, time_in_turn
-from ppafo.engine.cache import CACHE_VARIABLE
+from ppafo.engine.cache.folder import CACHE_VARIABLE
 from ppafo.errors import SimulationError
 
 GROUP = "Command line, from start to end of the process"

@@ -355,7 +355,8 @@ def tried(call: Call, known: Mapping[str, Function]) -> Outcome:
             given = {} if call.argument == function.alone else function.given
             getattr(ppafo, call.function)(**{**given, call.argument: value})
     except ppafo.PpafoError as error:
-        return Outcome("named" if names(str(error), call.argument) else "unnamed", str(error))
+        is_named = names(str(error), call.argument) or begins(str(error), value)
+        return Outcome("named" if is_named else "unnamed", str(error))
     except _TooLongError:
         return Outcome("accepted", "it runs on")
     except Exception as error:  # whatever else comes is what is counted here
@@ -367,6 +368,11 @@ def names(message: str, argument: str) -> bool:
     """Tell whether a message has an argument in it, as it is written or in words, one of several too."""
     words = argument.replace("_", "[_ -]")
     return re.search(rf"\b{words.removesuffix('s')}s?\b", message, re.IGNORECASE) is not None
+
+
+def begins(message: str, value: Any) -> bool:
+    """Tell whether a message begins with the path that was given, or with a file below that folder."""
+    return isinstance(value, str | Path) and re.match(rf"{re.escape(str(value))}[:/,]", message) is not None
 
 
 class _TooLongError(Exception):

@@ -4,7 +4,7 @@ import sys
 from dataclasses import dataclass
 from types import ModuleType
 
-from ppafo.engine.cache import load_generated
+from ppafo.engine.cache.programs import load_generated
 from ppafo.engine.compilers import OFFERED, Compiler
 from ppafo.errors import SimulationError
 

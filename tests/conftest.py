@@ -12,7 +12,7 @@ import pytest
 
 from ppafo.analyses.reproduce.answer import Reproduction
 from ppafo.analyses.reproduce.solve import reproduce_paper
-from ppafo.engine import cache
+from ppafo.engine.cache import kept
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
 
@@ -21,7 +21,7 @@ pytest_plugins = ("tests.costs", "tests.built_once", "tests.repeatable")
 
 def pytest_configure() -> None:
     """Let no model be watched by coverage while it is compiled."""
-    cache._execute = _unwatched(cache._execute)
+    kept.execute = _unwatched(kept.execute)
 
 
 def _unwatched(run: Callable[..., ModuleType]) -> Callable[..., ModuleType]:

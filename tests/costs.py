@@ -18,7 +18,7 @@ from typing import Any
 
 import pytest
 
-from ppafo.engine import cache
+from ppafo.engine.cache import kept
 
 RECORDED = Path(__file__).with_name("costs.toml")
 LONG = 2.0
@@ -89,7 +89,7 @@ def pytest_configure(config: pytest.Config) -> None:
         "markers", "thorough: `make test-all` and `make test-long` run it, continuous integration does not"
     )
     config.addinivalue_line("markers", "short: `make test` runs it too, whatever it costs")
-    cache._Wanted.compile = counted(cache._Wanted.compile)  # type: ignore[method-assign]
+    kept.Wanted.compile = counted(kept.Wanted.compile)  # type: ignore[method-assign]
     if not hasattr(config, "workerinput"):
         config.pluginmanager.register(Table(config), "table of costs")
 

@@ -14,13 +14,12 @@ from pathlib import Path
 
 import pytest
 
-from ppafo.analyses.reproduce import solve as study
-from ppafo.analyses.reproduce.answer import Reproduction, finding_of
+from ppafo.analyses.reproduce import solve
+from ppafo.analyses.reproduce.answer import Reproduction
 from ppafo.analyses.reproduce.bench import bench_figure
 from ppafo.cli.main import main
 from ppafo.errors import SimulationError
 from ppafo.progress import Report
-from ppafo.report.finding import Finding
 from ppafo.rig.solution import RigSolution
 from ppafo.storage import read_csv
 
@@ -155,11 +154,10 @@ def test_a_missed_window_is_named_and_fails_unless_values_were_changed(
         for claim in reproduction.claims
     )
 
-    def missing(overrides: Sequence[str], progress: Report, study: str) -> Finding[Reproduction]:
-        assert study == "ppafo-2011"
-        return finding_of(dataclasses.replace(reproduction, claims=claims, overrides=tuple(overrides)))
+    def missing(overrides: Sequence[str], _report: Report) -> Reproduction:
+        return dataclasses.replace(reproduction, claims=claims, overrides=tuple(overrides))
 
-    monkeypatch.setattr(study, "reproduce", missing)
+    monkeypatch.setattr(solve, "reproduce_paper", missing)
     assert main(["reproduce"]) == 1
     assert "missed: co2_solenoid is outside 1 to 1.2 g" in capsys.readouterr().out
     assert main(["reproduce", "--set", "valves.solenoid.area=31.6 mm^2"]) == 0
@@ -172,7 +170,7 @@ def test_a_folder_of_somebody_elses_is_refused_before_anything_runs(
     def never(*arguments: object) -> None:
         raise AssertionError("it ran")
 
-    monkeypatch.setattr(study, "reproduce", never)
+    monkeypatch.setattr(solve, "reproduce_paper", never)
     (tmp_path / "notes.txt").write_text("mine", encoding="utf-8")
     assert main(["reproduce", "--out", str(tmp_path)]) == 2
     complaint = (

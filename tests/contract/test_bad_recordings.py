@@ -173,7 +173,7 @@ def run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Run:
 
 BOTH = [False, True]
 UNIT = re.compile(r"UNIT (\w+) (.+)")
-UNIT_IN_MAP, UNIT_IN_HEADER = r"channel '\1', unit = '\2'", r"column '\1 [\2]'"
+UNIT_IN_MAP, UNIT_IN_HEADER = r"channels.\1.unit = '\2'", r"column '\1 [\2]'"
 REFUSED = {
     "missing column": ("identify", without("angle"), ["angle"]),
     "missing command": ("validate", without("pressure_2"), ["pressure_2"]),

@@ -12,7 +12,7 @@ import pytest
 
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
-from ppafo.engine.cache import load_generated
+from ppafo.engine.cache.programs import load_generated
 from ppafo.engine.entries import HEADER, INLINE
 from ppafo.engine.rows import leaf_paths, numbers, rebuild
 from ppafo.engine.source_text import SourceCollector

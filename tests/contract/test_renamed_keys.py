@@ -15,17 +15,31 @@ NOW = "which is now called 'actuator.displacement_per_radian'"
 
 
 @pytest.mark.parametrize(
-    ("shipped", "load", "now"),
+    ("shipped", "load", "key", "old_key", "now"),
     [
-        ("parameters/sets/ppafo2011.toml", ppafo.load_parameter_set, "which is now called 'displacement_per_radian'"),
-        ("studies/library/torque-task-uncertainty.toml", ppafo.load_study, NOW),
+        (
+            "parameters/sets/ppafo2011-printed.toml",
+            ppafo.load_parameter_set,
+            "displacement_per_radian",
+            "volume_per_angle",
+            "which is now called 'displacement_per_radian'",
+        ),
+        (
+            "studies/library/torque-task-uncertainty.toml",
+            ppafo.load_study,
+            "actuator.torque_constant",
+            "actuator.volume_per_angle",
+            NOW,
+        ),
     ],
 )
-def test_a_file_names_the_new_key(shipped: str, load: Callable[[Path], object], now: str, tmp_path: Path) -> None:
+def test_a_file_names_the_new_key(
+    shipped: str, load: Callable[[Path], object], key: str, old_key: str, now: str, tmp_path: Path
+) -> None:
     old = tmp_path / "old.toml"
     text = (PACKAGE / shipped).read_text(encoding="utf-8")
-    assert "displacement_per_radian" in text
-    old.write_text(text.replace("displacement_per_radian", "volume_per_angle"), encoding="utf-8")
+    assert key in text
+    old.write_text(text.replace(key, old_key), encoding="utf-8")
     with pytest.raises(PpafoError, match=now) as refused:
         load(old)
     assert "volume_per_angle'" in str(refused.value)

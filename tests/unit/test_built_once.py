@@ -19,9 +19,9 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
     """What compilers are asked."""
     lines: list[list[str]] = []
 
-    def ask(line: list[str], remedy: str, folder: str) -> built_once.Done:
+    def ask(line: list[str], remedy: str, folder: str, scratch: Path) -> built_once.Done:
         lines.append(line)
-        return native.asked(line, remedy, folder)
+        return native.asked(line, remedy, folder, scratch)
 
     monkeypatch.setattr(fmu, "asked", built_once._asked_once(ask))
     monkeypatch.setattr(fmu, "compiler_for", lambda _name: ["gcc", "-s"])

@@ -50,7 +50,7 @@ def without_names() -> Iterator[None]:
 
 
 def _named(function: Callable[..., R], values: Mapping[str, Any]) -> R:
-    """Call a function; an error that quotes an argument and does not name it begins with its name."""
+    """Call a function; an error that quotes an argument, and does not name it or begin with it, gets its name."""
     try:
         return function(**values)
     except PpafoError as error:
@@ -61,7 +61,9 @@ def _named(function: Callable[..., R], values: Mapping[str, Any]) -> R:
         # A text in quotation marks before one that stands among others, and of two within each other the longer one.
         rank = {name: (f"'{text}'" in message, len(text)) for text, name in quoted}
         name = max(rank, key=lambda each: rank[each], default="")
-        if name and not re.search(rf"\b{name.removesuffix('s').replace('_', '[_ -]')}", message, re.IGNORECASE):
+        # A message that begins with the path that was given, or with a file below that folder, says where it lies.
+        begins = any(re.match(rf"{re.escape(text)}[:/,]", message) for text, _ in quoted if text)
+        if name and not begins and not re.search(rf"\b{name.removesuffix('s').replace('_', '[_ -]')}", message, re.I):
             error.args = (f"{name}: {message}",)
         raise
 

@@ -64,7 +64,8 @@ def doctor(
     bits: run each scenario and walk of the package for a moment, and compare every bit with those it has elsewhere
     schema: print the JSON Schema of a file format instead, such as scenario
     """
-    from ppafo.engine import cache
+    from ppafo.engine.cache import tidying
+    from ppafo.engine.cache.folder import cache_folder, refusal
 
     asked = {"--warm": warm, "--clear": clear, "--bits": bits, "--schema": schema, "--programs": programs}
     given = [option for option, value in asked.items() if value]
@@ -75,9 +76,9 @@ def doctor(
         return _schema_of(schema)
     if bits:
         return _bits()
-    folder = cache.cache_folder()
-    cleared = cache.clear(folder) if clear and folder is not None else 0
-    why_not = "" if clear else cache.refusal(folder)
+    folder = cache_folder()
+    cleared = tidying.clear(folder) if clear and folder is not None else 0
+    why_not = "" if clear else refusal(folder)
     if warm:
         if why_not:
             raise SimulationError(f"--warm: compiled models cannot be kept: {why_not}")
@@ -109,7 +110,7 @@ def _bits() -> Said:
 
 def models_document(folder: Path | None, why_not: str) -> dict[str, Any]:
     """Return compilers and kept models of a cache folder; ``why_not`` says why that one is not used, if so."""
-    from ppafo.engine.cache import LONGEST_UNUSED, MAXIMUM_BYTES, kept_sizes, list_left_out, list_programs
+    from ppafo.engine.cache.tidying import LONGEST_UNUSED, MAXIMUM_BYTES, kept_sizes, list_left_out, list_programs
     from ppafo.engine.loading import compilers_to_try
 
     programs = [] if folder is None else list_programs(folder)

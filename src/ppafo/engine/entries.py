@@ -34,6 +34,9 @@ INLINE = "@inline"
 ENTRY = '@entry("void({})")'
 """The mark of an entry, for the types of its parameters."""
 
+ORIGIN = "# origin"
+"""Beginning of the line before each function that says which lines of which file it was made from."""
+
 _ENTRY = re.compile(r"""^@entry\((["'])void\(([^"'\n]*)\)\1\)\ndef (\w+)\(""", re.MULTILINE)
 _TYPE = re.compile(r"float64\[.*?\]|float64|int64")
 
@@ -63,6 +66,11 @@ def entry_text(name: str, parameters: Mapping[str, str], lines: Iterable[str]) -
 def entry_types(source: str) -> dict[str, list[str]]:
     """Types of the parameters of all entries of a text, in order, by the name of the entry."""
     return {found[3]: _TYPE.findall(found[2]) for found in _ENTRY.finditer(source)}
+
+
+def without_origins(source: str) -> str:
+    """Return the text without the lines that say where its functions stand: what decides the machine code."""
+    return "\n".join(line for line in source.split("\n") if not line.startswith(ORIGIN))
 
 
 def array_module(functions: Iterable[Callable[..., None]]) -> str:

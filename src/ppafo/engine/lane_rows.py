@@ -1,9 +1,21 @@
-"""How many runs of a program go through its steps side by side."""
+"""A loop over the runs of a program: what it is handed, and how many go through their steps side by side."""
 
 from functools import lru_cache
 
+from ppafo.engine.entries import ENTRY
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths
+
+COMPILED = ENTRY.format(
+    "float64[:, ::1], float64[:, ::1], float64[:, :, ::1], float64[:, ::1], float64[:, :, ::1], "
+    "float64[:, :, ::1], int64, int64, int64, int64, float64, int64, int64, int64, int64, int64"
+)
+"""The mark of a loop, with the types of its ``ARGUMENTS``."""
+ARGUMENTS = (
+    "states, parameters, signal_history, command_history, record, trace, "
+    "first_step, step_count, steps_in_all, steps_per_sample, interval, last_record, next_record, trace_every, "
+    "signal_delay, command_delay"
+)
 
 LANES = 32
 """Most runs of a block."""

@@ -1,21 +1,11 @@
 """Writes the source of the lane loop of one program."""
 
-from ppafo.engine.entries import ENTRY, HEADER, INLINE
+from ppafo.engine.entries import HEADER, INLINE
 from ppafo.engine.generator import StepText
+from ppafo.engine.lane_rows import ARGUMENTS, COMPILED
 from ppafo.engine.loop_text import lane_loop
 from ppafo.engine.program import Program
 from ppafo.engine.source_text import SourceCollector
-
-SIGNATURE = (
-    "float64[:, ::1], float64[:, ::1], float64[:, :, ::1], float64[:, ::1], float64[:, :, ::1], "
-    "float64[:, :, ::1], int64, int64, int64, int64, float64, int64, int64, int64, int64, int64"
-)
-COMPILED = ENTRY.format(SIGNATURE)
-ARGUMENTS = (
-    "states, parameters, signal_history, command_history, record, trace, "
-    "first_step, step_count, steps_in_all, steps_per_sample, interval, last_record, next_record, trace_every, "
-    "signal_delay, command_delay"
-)
 
 
 def lane_source(program: Program) -> str:

@@ -22,14 +22,14 @@ from numpy.typing import NDArray
 
 from ppafo import interrupts
 from ppafo.control.kind import ProfileKind
-from ppafo.engine.cache import load_all
+from ppafo.engine.cache.texts import kept_bytes
 from ppafo.engine.entries import INLINE
 from ppafo.engine.lane_rows import VECTOR, lanes_of
-from ppafo.engine.lane_source import write_lanes
 from ppafo.engine.loading import HOW_TO_INSTALL, compiled, compilers_to_try, runs_by_python
+from ppafo.engine.package_key import package_key
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, rebuilt, row_numbers
-from ppafo.engine.source_text import SourceCollector
+from ppafo.engine.source_text import MadeFrom, SourceCollector
 from ppafo.engine.step.lane import SAME_MOMENT
 from ppafo.progress import time_text
 from ppafo.signals.meter import MeterKind
@@ -124,24 +124,43 @@ def load_programs(programs: Iterable[Program]) -> None:
     chosen = dict.fromkeys(programs)
     compilers = compilers_to_try()
     if len(chosen) > 1 and compilers:
+        from ppafo.engine.cache.making import load_all  # most runs have one program
+
         load_all([_current_source(program) for program in chosen], compilers[0], compiled)
 
 
 def _current_source(program: Program) -> str:
-    """The source of a program, written anew where it is out of date."""
-    collector, source = write_source(program)
-    # The kept text may rest on a function that a notebook has defined anew since.
-    if collector.made_from.is_current():
+    """The source of a program, made anew where it is out of date."""
+    made_from, source = _known_source(program)
+    # It may rest on a number or function that a session has changed since.
+    if made_from.is_current():
         return source
+    _known_source.cache_clear()
     write_source.cache_clear()
-    return write_source(program)[1]
+    return _known_source(program)[1]
 
 
 @lru_cache(maxsize=64)
-def write_source(program: Program, lanes: int = 0) -> tuple[SourceCollector, str]:
-    """What a program is made from, and its source for some lanes, 0 for as many as fit; written once, then kept."""
+def _known_source(program: Program) -> tuple[MadeFrom, str]:
+    """What a program is made from, and its source: the one that is kept of its parts, else written."""
+    key = package_key(program)
+    if key is None:
+        return write_source(program)
+
+    def written() -> bytes:
+        return write_source(program)[1].encode()
+
+    return key.made_from, kept_bytes("lanes", key.words, written).decode()
+
+
+@lru_cache(maxsize=64)
+def write_source(program: Program, lanes: int = 0) -> tuple[MadeFrom, str]:
+    """What a program is made from, and its source for some lanes, 0 for as many as fit."""
+    from ppafo.engine.lane_source import write_lanes  # a text that is kept needs nobody who writes one
+
     collector = SourceCollector(INLINE)
-    return collector, write_lanes(program, collector, lanes)
+    source = write_lanes(program, collector, lanes)
+    return collector.made_from, source
 
 
 def run_batch(batch: Batch, threads: int | None = None) -> BatchResult:

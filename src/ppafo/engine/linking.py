@@ -5,17 +5,29 @@ from collections import namedtuple
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 from ppafo.engine.over_samples import called_over_samples, in_columns
 from ppafo.engine.program import Program
 from ppafo.engine.scheme.actuators import links_of
-from ppafo.engine.source_text import Collector, SourceCollector
+from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import ProgramError
 from ppafo.model.effects.kind import Effect, effect_problem, laws_in_order
 
 
-def link_program(program: Program, collector: Collector) -> None:
+class Linked(Protocol):
+    """What functions of the model that are called stand for."""
+
+    links: dict[Any, Any]
+    """What stands for others: under a pair of functions for its second inside its first alone.
+
+    Under a row and ``"_replace"`` is the class that ``row._replace`` makes.
+    """
+    effects: dict[Any, tuple[str, ...]]
+    """Laws of effects, each with the effect's structs that it takes, by the names of its parameters."""
+
+
+def link_program(program: Program, collector: Linked) -> None:
     """Let a collector call what the components of a program have in the place of functions of the model.
 
     ProgramError for an effect that cannot act, or whose name other rows of the program have.
@@ -33,7 +45,7 @@ def link_program(program: Program, collector: Collector) -> None:
     link_effects(program.effects, collector, own)
 
 
-def link_effects(effects: Sequence[Effect], collector: Collector, own: Mapping[Any, Any] | None = None) -> None:
+def link_effects(effects: Sequence[Effect], collector: Linked, own: Mapping[Any, Any] | None = None) -> None:
     """Let a collector call the laws of effects at their ports, of which an actuator may have its ``own``.
 
     ProgramError for an effect that cannot act.

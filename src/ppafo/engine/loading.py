@@ -16,9 +16,9 @@ from functools import cache, lru_cache
 from pathlib import Path
 from types import ModuleType
 
-from ppafo.engine.cache import LEFT_OUT_FOR, cache_folder, load_generated, note_name, refusal
+from ppafo.engine.cache.folder import LEFT_OUT_FOR, cache_folder, refusal
+from ppafo.engine.cache.programs import load_generated, note_name
 from ppafo.engine.compilers import OFFERED, Compiler, CompilerError, UntranslatableError
-from ppafo.engine.interpreted import interpreted
 from ppafo.errors import ProgramError, SimulationError, nearest_name, one_line
 
 logger = logging.getLogger("ppafo")
@@ -76,7 +76,12 @@ def load_source(source: str) -> ModuleType:
 
     ProgramError for a mistake in it, SimulationError where the compiler that ``PPAFO_BACKEND`` names does not work.
     """
-    return compiled(source) or interpreted(source)
+    module = compiled(source)
+    if module is not None:
+        return module
+    from ppafo.engine.interpreted import interpreted  # most computers have a compiler
+
+    return interpreted(source)
 
 
 def compiled(source: str) -> ModuleType | None:

@@ -12,10 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
+from ppafo.engine.entries import ORIGIN
 from ppafo.errors import ProgramError, one_line
-
-ORIGIN = "# origin"
-"""Beginning of the line before each function that says which lines of which file it was made from."""
 
 _PARSING = threading.RLock()
 _PLAIN = {

@@ -19,8 +19,8 @@ from types import CodeType, FunctionType
 from typing import Any, NamedTuple, Protocol
 
 from ppafo.engine.plain_python import parse_module, refusal
-from ppafo.engine.rows import is_number, members
-from ppafo.engine.source_text import is_row, is_step_function
+from ppafo.engine.rows import is_number, is_row, members
+from ppafo.engine.source_text import is_step_function
 from ppafo.errors import ProgramError
 
 HISTORIES = frozenset({"signal_history", "command_history", "trace"})

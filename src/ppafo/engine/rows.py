@@ -6,8 +6,12 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from ppafo.engine.source_text import is_row
 from ppafo.model.declaration import number_of
+
+
+def is_row(candidate: object) -> bool:
+    """True for a NamedTuple class."""
+    return isinstance(candidate, type) and issubclass(candidate, tuple) and hasattr(candidate, "_fields")
 
 
 @cache

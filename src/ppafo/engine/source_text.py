@@ -19,11 +19,13 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from copy import deepcopy
 from dataclasses import dataclass, field
 from types import CodeType, FunctionType, ModuleType
-from typing import Any, Generic, NamedTuple, Protocol, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from ppafo.engine.plain_python import ORIGIN, check_flow, check_grammar, parse_module, place, refusal
+from ppafo.engine.entries import ORIGIN, without_origins
+from ppafo.engine.plain_python import check_flow, check_grammar, parse_module, place, refusal
+from ppafo.engine.rows import is_row
 from ppafo.errors import ProgramError, nearest_name, one_line
 
 COMPILED_BUILTINS = frozenset(
@@ -32,11 +34,6 @@ COMPILED_BUILTINS = frozenset(
 Row = TypeVar("Row", bound=tuple[Any, ...])
 _INSIDE = object()
 """Stands for a value that is known only while the function runs."""
-
-
-def is_row(candidate: object) -> bool:
-    """True for a NamedTuple class."""
-    return isinstance(candidate, type) and issubclass(candidate, tuple) and hasattr(candidate, "_fields")
 
 
 def each(convert: Callable[[float], float], row: Row) -> Row:
@@ -367,11 +364,6 @@ def emitted_name(item: Any) -> str:
     return re.sub(r"\W", "_", f"{path}_{item.__qualname__}")
 
 
-def without_origins(source: str) -> str:
-    """Return the text without the lines that say where its functions stand: what decides the machine code."""
-    return "\n".join(line for line in source.split("\n") if not line.startswith(ORIGIN))
-
-
 def composed_lines(lines: Iterable[str], needs: Mapping[str, tuple[str, ...]]) -> list[str]:
     """Lines of the text around a module, in which calls hand over the rows of effects that functions need."""
     if not needs:
@@ -399,26 +391,6 @@ class MadeFrom:
 
 Adaptation = Callable[[FunctionType, ast.FunctionDef], ast.FunctionDef]
 """Makes a definition one of the part of Python that is compiled; it is handed a copy of its own."""
-
-
-class Collector(Protocol):
-    """Gathers definitions for the module around them: a ``SourceCollector`` writes them, an ``Outline`` hashes them."""
-
-    links: dict[Any, Any]
-    """What stands for others: under a pair of functions for its second inside its first alone.
-
-    Under a row and ``"_replace"`` is the class that ``row._replace`` makes.
-    """
-    effects: dict[Any, tuple[str, ...]]
-    """Laws of effects, each with the effect's structs that it takes, by the names of its parameters."""
-    needs: dict[str, tuple[str, ...]]
-    """Rows of effects that functions of the module are handed before their own arguments, by emitted name."""
-
-    def add(self, item: Callable[..., Any] | type) -> str:
-        """Add a function or NamedTuple class and all that it needs; return the name it has in the module."""
-
-    def text(self) -> str:
-        """What stands for all definitions in the module."""
 
 
 @dataclass(slots=True)

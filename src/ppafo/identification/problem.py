@@ -279,7 +279,7 @@ def run_procedure(sources: tuple[Source, ...], problem: ProcedureProblem, settin
     if not anew or len(sources) == 1:
         return found
     said = (
-        f"bench.each_recording = {list(anew)} acts in a [trajectory] only: here zeros and gains are those of all "
+        f"bench.each_recording = {list(anew)} acts in a [trajectory] only: here zeros and gains are common to all "
         f"{len(sources)} recordings; give each mounting of the sensors its own [[procedure]]"
     )
     return replace(found, remarks=(*found.remarks, said))

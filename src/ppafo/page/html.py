@@ -10,7 +10,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from ppafo.engine.cache import kept_bytes
+from ppafo.engine.cache.texts import kept_bytes
 
 _POLICY = (
     "default-src 'none'; script-src 'sha256-{script}' 'strict-dynamic' 'wasm-unsafe-eval'; style-src 'sha256-{style}'; "

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.engine.cache import kept_bytes
+from ppafo.engine.cache.texts import kept_bytes
 from ppafo.errors import ScenarioError
 from ppafo.page.wasm import WasmModule
 from ppafo.signals.recording import Floats

@@ -6,8 +6,8 @@ from dataclasses import replace
 from typing import Any, NamedTuple, get_type_hints
 
 from ppafo.control.catalog import CONTROLLERS, FIXED_POINT
-from ppafo.engine.rows import is_number, leaf_paths, leaves, members, rebuilt
-from ppafo.engine.source_text import SourceCollector, is_row
+from ppafo.engine.rows import is_number, is_row, leaf_paths, leaves, members, rebuilt
+from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import ProgramError, ScenarioError
 from ppafo.exports import filled, in_markdown, template
 from ppafo.model.declaration import Quantity

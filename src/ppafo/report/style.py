@@ -108,12 +108,15 @@ def render_figure(figure: "Figure", file_formats: Iterable[str]) -> dict[str, by
     """Return file contents by format (``png``, ``svg``, ``pdf``); the same figure gives the same bytes."""
     # A date would give the same figure other bytes every second.
     undated: dict[str, Any] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
-    files = {}
+    files, layout = {}, figure.get_layout_engine()
     with house_style():
         for file_format in file_formats:
             buffer = io.BytesIO()
             figure.savefig(buffer, format=file_format, metadata=undated.get(file_format))
             files[file_format] = buffer.getvalue()
+            # Laid out once for all formats: measuring every text anew takes as long as drawing.
+            figure.set_layout_engine("none")
+    figure.set_layout_engine(layout)
     return files
 
 

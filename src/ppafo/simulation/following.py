@@ -2,14 +2,16 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ppafo.model.declaration import Quantity
-from ppafo.model.regulator import SupplyLines
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import Follows, Graph, Term
 from ppafo.simulation.declaration import SUPPLY_LINES, Reading, line_paths, value_at
 from ppafo.simulation.numbers import device_number_at
+
+if TYPE_CHECKING:
+    from ppafo.model.regulator import SupplyLines
 
 
 def read_followers(
@@ -47,7 +49,7 @@ def numbers_of_sensors(sensors: Mapping[str, Any]) -> dict[str, float]:
     return {f"sensors.{name}": number for name, number in sensors.items()}
 
 
-def numbers_of_lines(lines: SupplyLines | None) -> dict[str, float]:
+def numbers_of_lines(lines: "SupplyLines | None") -> dict[str, float]:
     """Return the numbers of both supply lines by path, {} where there are none."""
     if lines is None:
         return {}

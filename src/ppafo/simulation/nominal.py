@@ -1,7 +1,7 @@
 """What a law with a model, and the observer of the chambers, believe of a device: which of its numbers they follow."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
 from ppafo.control.binding import bind
@@ -11,12 +11,14 @@ from ppafo.model.columns import first
 from ppafo.model.declaration import NOMINAL
 from ppafo.model.gas import critical_pressure_ratio, specific_gas_constant
 from ppafo.model.orifice import area_conductance, sonic_conductance_mass
-from ppafo.model.regulator import SupplyLines
 from ppafo.model.valves.proportional import spool_lag
 from ppafo.parameters.device import VANE, Device, Orifice, SonicOrifice
 from ppafo.parameters.graph import Term
 from ppafo.simulation.declaration import SUPPLY_LINE, SUPPLY_LINES
 from ppafo.simulation.mean_chambers import MeanChambers, Surroundings, chambers_of
+
+if TYPE_CHECKING:
+    from ppafo.model.regulator import SupplyLines
 
 _GAS = ("gas.molar_mass", "gas.heat_capacity_ratio", "gas.temperature")
 _MASS = ("gas.molar_mass", "gas.temperature")
@@ -118,7 +120,7 @@ def rest_of(volume: float, growth: float, stops: Range) -> float:
     return max(volume - 0.5 * growth * (stops.angle_max - stops.angle_min), LEAST_SHARE * volume)
 
 
-def nominal_terms(device: Device, lines: SupplyLines | None) -> dict[str, Term]:
+def nominal_terms(device: Device, lines: "SupplyLines | None") -> dict[str, Term]:
     """Return what each ``nominal_`` setting follows, by the names of ``NOMINAL``.
 
     The valve of another package is not known: then ``nominal_flow`` is 0, and the observer off.

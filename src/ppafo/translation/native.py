@@ -29,8 +29,7 @@ from numpy.typing import NDArray
 
 from ppafo import interrupts
 from ppafo.engine.compilers import FLAGS, CompilerError
-from ppafo.engine.lane_rows import lanes_of
-from ppafo.engine.lane_source import COMPILED
+from ppafo.engine.lane_rows import COMPILED, lanes_of
 from ppafo.engine.lanes import Batch, BatchResult, LaneBlock, join_results
 from ppafo.engine.loading import HOW_TO_INSTALL, WITHOUT_C
 from ppafo.errors import SimulationError, one_line, reason

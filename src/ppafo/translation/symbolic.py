@@ -14,8 +14,8 @@ from functools import lru_cache
 from typing import Any
 
 from ppafo.engine.linking import link_effects
-from ppafo.engine.rows import is_number, members
-from ppafo.engine.source_text import SourceCollector, emitted_name, is_row
+from ppafo.engine.rows import is_number, is_row, members
+from ppafo.engine.source_text import SourceCollector, emitted_name
 from ppafo.errors import ProgramError, SimulationError
 from ppafo.model.effects.kind import Effect
 from ppafo.translation import typed

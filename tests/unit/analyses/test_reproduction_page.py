@@ -72,7 +72,12 @@ def test_the_sentence_on_u_is_said_only_where_the_readings_come_to_it(reproducti
 
 def test_figure_7_has_the_four_panels_of_the_paper_in_its_units(reproduction: Reproduction) -> None:
     figure = step_response_figure(reproduction.step.recording, LEVELS, reproduction.step_events)
-    assert [axes.get_ylabel() for axes in figure.axes] == ["deg", "psi", "psig", "psig"]
+    assert [axes.get_ylabel() for axes in figure.axes] == [
+        "Angle (deg)",
+        "Difference (psi)",
+        "Pressure (psig)",
+        "Pressure (psig)",
+    ]
     angle, difference, pressure_1, pressure_2 = (axes.lines[0].get_ydata() for axes in figure.axes)
     assert (angle[0], angle[-1]) == pytest.approx((20.0, 130.0), abs=0.1)
     assert pressure_1[-1] - pressure_2[-1] == pytest.approx(difference[-1])
@@ -190,7 +195,7 @@ def test_figure_7_names_the_synthetic_measurement_and_shows_below_what_it_differ
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["model", "synthetic measurement"]
     angle, below = figure.axes[0], figure.axes[2]
     model, measured = (line.get_ydata() for line in angle.lines[:2])
-    assert below.get_ylabel() == "Δ deg"
+    assert below.get_ylabel() == "Error (deg)"
     apart = below.lines[0].get_ydata()
     assert apart[0] == pytest.approx(measured[0] - model[0])
     assert apart[-1] == pytest.approx(measured[-1] - model[-1], abs=1e-6)

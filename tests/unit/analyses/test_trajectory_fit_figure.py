@@ -27,12 +27,12 @@ def test_every_fitted_channel_has_a_panel_and_one_for_what_is_left() -> None:
     names = [axes.get_title(loc="left") for axes in figure.axes]
     assert names == [
         "Vane angle (deg)",
-        "model minus sample (deg)",
+        "Residual (measured - model) (deg)",
         "Pressure in chamber 1 (psig)",
-        "model minus sample (psi)",
+        "Residual (measured - model) (psi)",
     ]
     left = figure.axes[1].lines[0].get_ydata()
-    assert np.asarray(left) == pytest.approx(np.full(101, 0.5))
+    assert np.asarray(left) == pytest.approx(np.full(101, -0.5))
 
 
 def test_all_panels_have_one_time_axis() -> None:

@@ -11,7 +11,7 @@ from ppafo import golden_bits
 from ppafo.cli.completion import completion_script
 from ppafo.cli.main import main
 from ppafo.engine import loading
-from ppafo.engine.cache import load_generated
+from ppafo.engine.cache.programs import load_generated
 from ppafo.loading import load_scenario
 from ppafo.simulation import simulate
 from ppafo.simulation.scenario import Scenario

@@ -19,10 +19,10 @@ HEAVY = frozenset(
 )
 READING, DRAWING = {"numpy", "pydantic"}, {"matplotlib", "PIL"}
 WRITING = {"h5netcdf", "h5py", "jinja2"}
-MOST_BEFORE_THE_RUN, MOST = 116, 162
+MOST_BEFORE_THE_RUN, MOST = 132, 178
 """Modules of the package that a run of a scenario may load; what has no part in it stays out."""
-MOST_FROM_PYTHON, MOST_LINES_FROM_PYTHON = 104, 19_600
-"""Modules and their lines that a run from Python may load: 104 and 19,400 when this was written."""
+MOST_FROM_PYTHON, MOST_LINES_FROM_PYTHON = 118, 21_500
+"""Modules and their lines that a run from Python may load: 116 when this was written."""
 
 CODE = """
 import json, sys

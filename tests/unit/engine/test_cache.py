@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from ppafo.control.catalog import CONTROLLERS, PROFILES
-from ppafo.engine.cache import load_generated
+from ppafo.engine.cache.programs import load_generated
 from ppafo.engine.entries import INLINE
 from ppafo.engine.lane_source import lane_source
 from ppafo.engine.program import Program

@@ -7,8 +7,11 @@ from types import ModuleType
 
 import pytest
 
-from ppafo.engine import cache
-from ppafo.engine.cache import announce, compile_side_by_side, estimate_seconds, load_generated
+from ppafo.engine.cache import announcing
+from ppafo.engine.cache.announcing import announce, compile_side_by_side, estimate_seconds
+from ppafo.engine.cache.making import load_all
+from ppafo.engine.cache.programs import load_generated
+from ppafo.engine.cache.tidying import list_programs
 from ppafo.errors import ProgramError
 from tests.compilers_here import ScriptCompiler
 
@@ -17,7 +20,7 @@ QUICK = "answer = {}\n"
 
 @pytest.fixture(autouse=True)
 def _soon(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cache, "QUIET", 0.05)
+    monkeypatch.setattr(announcing, "QUIET", 0.05)
 
 
 def test_nothing_is_said_of_what_is_quick(caplog: pytest.LogCaptureFixture) -> None:
@@ -68,13 +71,13 @@ def test_models_that_are_needed_together_are_compiled_side_by_side_with_one_mess
         loaded.append(source)
         return load_generated(source, compiler)
 
-    cache.load_all([*sources, sources[0]], compiler, load)
+    load_all([*sources, sources[0]], compiler, load)
     assert set(loaded) == {sources[0], sources[2]}
     assert [message.partition(", about")[0] for message in caplog.messages[:1]] == [
         "ppafo: compiling 2 models for this computer"
     ]
     assert len(caplog.messages) == 2
-    kept = [item.place / "seconds.txt" for item in cache.list_programs(fresh_cache)]
+    kept = [item.place / "seconds.txt" for item in list_programs(fresh_cache)]
     assert len(kept) == 3
     assert all(float(file.read_text()) >= 0.0 for file in kept)
 

@@ -8,15 +8,17 @@ from pathlib import Path
 
 import pytest
 
-from ppafo.engine import cache
-from ppafo.engine.cache import LOCK, load_generated, one_process
+from ppafo.engine.cache import lock
+from ppafo.engine.cache.folder import LOCK
+from ppafo.engine.cache.lock import one_process
+from ppafo.engine.cache.programs import load_generated
 from tests.compilers_here import ScriptCompiler
 
 LOAD_ONE = """
 import sys
-from ppafo.engine import cache
+from ppafo.engine.cache.programs import load_generated
 from tests.compilers_here import ScriptCompiler
-cache.load_generated(sys.stdin.read(), ScriptCompiler(says=True))
+load_generated(sys.stdin.read(), ScriptCompiler(says=True))
 """
 """A process that says on the side when it compiles."""
 SLOWLY = "import os, time\nopen(os.environ['SEEN'], 'a').write('x')\ntime.sleep(1.5)\nlast_line = 1\n"
@@ -66,7 +68,7 @@ def test_killed_process_holds_no_lock(fresh_cache: Path, tmp_path: Path) -> None
 
 
 def test_process_that_waits_too_long_goes_on_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cache, "LONGEST_WAIT", 0.2)
+    monkeypatch.setattr(lock, "LONGEST_WAIT", 0.2)
     with one_process(tmp_path / "program"):
         begin = time.monotonic()
         with one_process(tmp_path / "program"):

@@ -7,7 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from ppafo.engine.cache import FOLDER, clear, kept_bytes, kept_sizes
+from ppafo.engine.cache.folder import TEXTS
+from ppafo.engine.cache.texts import kept_bytes
+from ppafo.engine.cache.tidying import clear, kept_sizes
 
 Make = Callable[[], bytes]
 
@@ -26,7 +28,7 @@ class Maker:
 
 def only_file(cache: Path) -> Path:
     """The one file that is kept."""
-    (file,) = (cache / FOLDER).iterdir()
+    (file,) = (cache / TEXTS).iterdir()
     return file
 
 
@@ -65,11 +67,11 @@ def test_nothing_is_left_of_what_could_not_be_made(fresh_cache: Path) -> None:
 
     with pytest.raises(ValueError, match="cannot be made"):
         kept_bytes("text", "a program", fail)
-    assert not (fresh_cache / FOLDER).exists()
+    assert not (fresh_cache / TEXTS).exists()
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid"), reason="folders have no owners here")
-@pytest.mark.parametrize("where", ["", FOLDER])
+@pytest.mark.parametrize("where", ["", TEXTS])
 def test_a_folder_that_others_can_write_is_neither_read_nor_believed(fresh_cache: Path, where: str) -> None:
     make = Maker()
     kept_bytes("text", "a program", make)
@@ -90,7 +92,7 @@ def test_a_link_is_not_read_and_what_it_leads_to_is_not_removed(fresh_cache: Pat
     assert make.times == 2
     clear(fresh_cache)
     fresh_cache.mkdir()
-    (fresh_cache / FOLDER).symlink_to(elsewhere)
+    (fresh_cache / TEXTS).symlink_to(elsewhere)
     assert kept_bytes("text", "a program", make) == b"made"
     assert make.times == 3
     assert clear(fresh_cache) == 0
@@ -100,14 +102,14 @@ def test_a_link_is_not_read_and_what_it_leads_to_is_not_removed(fresh_cache: Pat
 def test_what_was_not_used_for_long_goes_and_what_was_used_stays(fresh_cache: Path) -> None:
     old, used = Maker(), Maker()
     kept_bytes("text", "old", old)
-    before = set((fresh_cache / FOLDER).iterdir())
+    before = set((fresh_cache / TEXTS).iterdir())
     kept_bytes("text", "used", used)
     half_a_year_ago = time.time() - 180.0 * 86400.0
-    for file in (fresh_cache / FOLDER).iterdir():
+    for file in (fresh_cache / TEXTS).iterdir():
         os.utime(file, (half_a_year_ago, half_a_year_ago))
     kept_bytes("text", "used", used)
     kept_bytes("text", "new", Maker())
-    assert before.isdisjoint((fresh_cache / FOLDER).iterdir())
+    assert before.isdisjoint((fresh_cache / TEXTS).iterdir())
     kept_bytes("text", "used", used)
     assert used.times == 1
 
@@ -115,7 +117,7 @@ def test_what_was_not_used_for_long_goes_and_what_was_used_stays(fresh_cache: Pa
 def test_the_largest_size_is_kept_by_removing_what_was_used_first(
     fresh_cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("ppafo.engine.cache.MAXIMUM_MADE_BYTES", 1000)
+    monkeypatch.setattr("ppafo.engine.cache.texts.MAXIMUM_BYTES", 1000)
     for number in range(6):
         kept_bytes("text", f"program {number}", Maker(bytes(300)))
     assert sum(kept_sizes(fresh_cache)) <= 1000
@@ -126,10 +128,10 @@ def test_the_largest_size_is_kept_by_removing_what_was_used_first(
 
 def test_clearing_removes_it_and_leaves_what_others_put_there(fresh_cache: Path) -> None:
     kept_bytes("text", "a program", Maker())
-    theirs = fresh_cache / FOLDER / "notes.txt"
+    theirs = fresh_cache / TEXTS / "notes.txt"
     theirs.write_text("mine")
     assert clear(fresh_cache) == sum(map(len, [b"made"])) + 32
-    assert list((fresh_cache / FOLDER).iterdir()) == [theirs]
+    assert list((fresh_cache / TEXTS).iterdir()) == [theirs]
     theirs.unlink()
     clear(fresh_cache)
-    assert not (fresh_cache / FOLDER).exists()
+    assert not (fresh_cache / TEXTS).exists()

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from ppafo.engine import loading
-from ppafo.engine.cache import LEFT_OUT_FOR, list_left_out, list_programs
+from ppafo.engine.cache.folder import LEFT_OUT_FOR
+from ppafo.engine.cache.tidying import list_left_out, list_programs
 from ppafo.engine.compilers import OFFERED
 from ppafo.engine.loading import BACKEND_VARIABLE, compilers_to_try, load_source
 from ppafo.errors import ProgramError, SimulationError

@@ -9,8 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ppafo.engine import cache
-from ppafo.engine.cache import cache_folder, clear, evict, list_programs, load_generated, refusal
+from ppafo.engine.cache import folder as private
+from ppafo.engine.cache import making, tidying
+from ppafo.engine.cache.folder import cache_folder, refusal
+from ppafo.engine.cache.kept import is_whole
+from ppafo.engine.cache.programs import load_generated
+from ppafo.engine.cache.tidying import clear, evict, list_programs
 from ppafo.translation import native
 from tests.compilers_here import first_compiler
 
@@ -61,6 +65,8 @@ def spoil(path: Path) -> None:
     """Change one bit in the middle of a file."""
     content = bytearray(path.read_bytes())
     content[len(content) // 2] ^= 1
+    # Another file of that name: this one is loaded, and its pages would change in the process.
+    path.unlink()
     path.write_bytes(bytes(content))
 
 
@@ -81,7 +87,7 @@ def test_damaged_program_is_compiled_anew(compiled: Path, ending: str, damage: s
             path.mkdir()
     assert loaded() == 42.0
     assert path.is_file()
-    assert cache._is_whole(compiled)
+    assert is_whole(compiled)
 
 
 def test_what_another_process_tries_beside_a_program_is_no_damage(compiled: Path) -> None:
@@ -96,7 +102,7 @@ def test_file_in_the_place_of_a_program_is_no_error(compiled: Path) -> None:
     compiled.parent.mkdir(mode=0o700)
     compiled.write_text("not a folder")
     assert loaded() == 42.0
-    assert cache._is_whole(compiled)
+    assert is_whole(compiled)
 
 
 def test_unwritable_cache_leads_to_no_shared_temporary_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -114,7 +120,7 @@ def test_compiled_code_in_a_folder_that_is_not_private_is_not_run(
     compiled: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str
 ) -> None:
     set_trap(compiled / LIBRARY, tmp_path / "sprung")
-    (compiled / "checksums.json").write_text(str(cache._checksums(compiled)).replace("'", '"'))
+    (compiled / "checksums.json").write_text(str(making._checksums(compiled)).replace("'", '"'))
     folder = compiled.parent
     if kind == "others can write":
         folder.chmod(0o777)
@@ -176,7 +182,7 @@ def test_two_processes_that_compile_the_same_program_leave_it_whole(tmp_path: Pa
     ]
     assert [process.communicate()[0] for process in started] == [b"42.0\n"] * 2
     (program,) = (tmp_path / "programs").iterdir()
-    assert cache._is_whole(program)
+    assert is_whole(program)
 
 
 def test_program_that_no_one_used_for_long_is_removed_and_a_used_one_stays(compiled: Path) -> None:
@@ -197,7 +203,7 @@ def test_programs_beyond_the_largest_size_are_removed_oldest_first(
     (older / "large").write_bytes(bytes(1000))
     used = compiled.stat().st_mtime
     os.utime(older, (used - 60.0, used - 60.0))
-    monkeypatch.setattr(cache, "MAXIMUM_BYTES", list_programs(compiled.parent)[0].size + 500)
+    monkeypatch.setattr(tidying, "MAXIMUM_BYTES", list_programs(compiled.parent)[0].size + 500)
     evict(compiled.parent)
     assert compiled.is_dir()
     assert not older.exists()
@@ -207,7 +213,7 @@ def test_a_program_that_is_being_removed_is_not_there_half(compiled: Path, monke
     def killed(place: Path) -> None:
         raise PermissionError(place)
 
-    monkeypatch.setattr("ppafo.engine.cache.shutil.rmtree", killed)
+    monkeypatch.setattr("ppafo.engine.cache.kept.shutil.rmtree", killed)
     clear(compiled.parent)
     assert all(place.name.startswith(".writing-") for place in compiled.parent.iterdir())
 
@@ -227,7 +233,7 @@ def test_clearing_leaves_what_is_not_a_program(compiled: Path) -> None:
 def test_program_that_another_user_left_in_the_folder_is_not_run(compiled: Path, tmp_path: Path) -> None:
     set_trap(compiled / LIBRARY, tmp_path / "sprung")
     sums = compiled / "checksums.json"
-    sums.write_text(json.dumps(cache._checksums(compiled)))
+    sums.write_text(json.dumps(making._checksums(compiled)))
     for place in (compiled, *compiled.rglob("*")):
         os.chown(place, 65534, 65534)
     assert loaded() == 42.0
@@ -261,9 +267,9 @@ def test_a_folder_above_may_be_written_by_a_group_of_this_user_alone(
 ) -> None:
     assert refusal(fresh_cache) == ""
     tmp_path.chmod(0o770)
-    monkeypatch.setattr(cache, "_is_own_group", lambda _number: True)
+    monkeypatch.setattr(private, "_is_own_group", lambda _number: True)
     assert refusal(fresh_cache) == ""
-    monkeypatch.setattr(cache, "_is_own_group", lambda _number: False)
+    monkeypatch.setattr(private, "_is_own_group", lambda _number: False)
     assert "others can put another folder in the place" in refusal(fresh_cache)
 
 
@@ -271,6 +277,6 @@ def test_entry_that_is_a_link_to_itself_is_no_error(tmp_path: Path, monkeypatch:
     loop = tmp_path / "loop"
     loop.symlink_to(loop)
     for folder in (loop, loop / "in"):
-        monkeypatch.setenv(cache.CACHE_VARIABLE, str(folder))
+        monkeypatch.setenv(private.CACHE_VARIABLE, str(folder))
         assert refusal(cache_folder()) != ""
         assert loaded() == 42.0

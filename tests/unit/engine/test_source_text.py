@@ -16,7 +16,7 @@ from typing import Any
 
 import pytest
 
-from ppafo.engine.cache import load_generated
+from ppafo.engine.cache.programs import load_generated
 from ppafo.engine.entries import INLINE
 from ppafo.engine.plain_python import parse_module
 from ppafo.engine.source_text import SourceCollector, without_origins

@@ -210,7 +210,7 @@ def test_a_walk_keeps_its_gas_and_its_lines_between_zero_and_their_setting(name:
     assert np.min(line_1) < run.plant.supply_pressure - 1.0e3
 
 
-@pytest.mark.parametrize(("name", "given_back"), [("solenoid", 0.0), ("proportional", 0.02)])
+@pytest.mark.parametrize(("name", "given_back"), [("solenoid", 0.0), ("proportional", 0.01)])
 def test_a_walk_with_short_lines_and_hardly_any_droop_is_the_walk_with_a_constant_supply(
     name: str, given_back: float
 ) -> None:

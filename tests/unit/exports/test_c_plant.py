@@ -115,7 +115,7 @@ def test_an_input_that_is_no_number_leaves_the_run_as_it_was(tmp_path: Path) -> 
     assert bytes(run.memory) != before
 
 
-@pytest.mark.parametrize(("angle", "rate"), [(-3.43, 0.0), (90.0, 0.0), (-0.8, 0.0), (3.4, 1.0e3), (1.5, float("inf"))])
+@pytest.mark.parametrize(("angle", "rate"), [(-3.43, 0.0), (90.0, 0.0), (-2.2, 0.0), (4.7, 1.0e3), (1.5, float("inf"))])
 def test_an_angle_at_which_a_chamber_has_no_volume_is_refused(angle: float, rate: float, tmp_path: Path) -> None:
     run = Run(tmp_path, MOVED, 3)
     assert run.call("initialise")(run.memory, run.settings, 0.5, angle, rate) == 1
@@ -130,7 +130,8 @@ def test_the_c_of_a_run_is_short_and_has_neither_lanes_nor_groups_that_are_packe
     files_of = {"loop": c_library, "plant": plant_library}[shape]
     contents = files_of(load_scenario("torque-task-proportional"))
     (text,) = (content.decode() for file, content in contents.items() if file.endswith(".c") and file != "main.c")
-    assert text.count("\n") < {"loop": 2350, "plant": 1780}[shape]
+    # 2,912 and 2,201 since phases are functions of their own that hand on named structures; 2,194 and 1,756 before.
+    assert text.count("\n") < {"loop": 2950, "plant": 2240}[shape]
     said = {"loop": "The torque task has {:,} lines", "plant": "the plant alone {:,};"}[shape]
     assert said.format(text.count("\n")) in PAGE
     assert not re.search(r"\blane\b|\[0\]\[|PPAFO_|make_PlantParameters|AT_[A-Z]+_", text)

@@ -349,8 +349,9 @@ def test_bench_and_trajectory_hold_a_number_alike() -> None:
     told = FreeDecayProblem(kind="free-decay", recordings=("decay.csv",), inertia="8.4 g m^2").settings(chosen)
     assert decay.inertia_deviation == held["foot_plate.inertia"] == told.inertia_deviation
     assert leak.gas.temperature_deviation == held["gas.temperature"]
+    # The displacement is known as well as the torque constant, which it follows.
     swept = math.radians(60.0) - device.actuator.angle_min
-    volume = math.hypot(held["actuator.dead_volume_1"], swept * held["actuator.displacement_per_radian"])
+    volume = math.hypot(held["actuator.dead_volume_1"], swept * held["actuator.torque_constant"])
     assert leak.volume_1 is not None
     assert leak.volume_deviation == pytest.approx(volume / leak.volume_1)
 

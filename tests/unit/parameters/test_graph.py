@@ -1,10 +1,11 @@
 """Links between settings: which act, what they come to, and when they end."""
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 import pytest
 
+from ppafo.model.declaration import Number
 from ppafo.parameters.graph import Follows, Graph, Term, acting, follows, gauge_link, holding, left, resolved
 
 FIRST, SECOND, ROOM, START = (
@@ -60,11 +61,11 @@ def test_a_gauge_pressure_of_supply_and_start_counts_from_the_atmosphere_and_no_
 class Pair(NamedTuple):
     """Two numbers, by name."""
 
-    x: float
-    y: float
+    x: Annotated[float, Number("-", "a number", minimum=0.0, maximum=10.0)]
+    y: Annotated[float, Number("-", "another one", minimum=0.0, maximum=10.0)]
 
 
 def test_terms_are_summed_and_one_with_settings_takes_them_by_name() -> None:
-    link = Follows((Term(("a", "b"), lambda row: row.x * row.y, Pair), Term(("b",))), 0.5)
+    link = Follows((Term(("a", "b"), lambda row: row.x * row.y, (Pair,)), Term(("b",))), 0.5)
     assert link.sources == ("a", "b", "b")
     assert link.number({"a": 2.0, "b": 3.0}.__getitem__) == pytest.approx(9.5)

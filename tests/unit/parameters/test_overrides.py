@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ppafo.errors import ParameterError
+from ppafo.errors import ArgumentError, ParameterError
 from ppafo.model.catalog import EFFECTS
 from ppafo.model.effects.second_virial import SECOND_VIRIAL
 from ppafo.parameters import apply_overrides, load_device, load_parameter_set
@@ -113,9 +113,14 @@ def test_a_message_names_the_path_that_was_typed_and_no_other(override: str, tol
     assert "valves." not in problem_of(override)
 
 
-@pytest.mark.parametrize("override", ["valve.area", "=3", "valve.area=", "", "valve.area 3"])
+@pytest.mark.parametrize("override", ["valve.area", "=3", "valve.area=", "valve.area 3"])
 def test_what_is_not_path_and_value_is_refused(override: str) -> None:
     assert "is not of the form PATH=VALUE" in problem_of(override)
+
+
+def test_an_empty_text_is_no_override() -> None:
+    with pytest.raises(ArgumentError, match=r"^overrides=\[''\]: must be texts such as 'valve.area=12.6 mm\^2'"):
+        apply_overrides(COMPLETED, [""])
 
 
 def test_a_wrong_dimension_is_refused_with_the_unit_that_is_needed() -> None:
@@ -190,5 +195,5 @@ def test_an_override_reads_back_as_the_value_that_was_given(path: str, factor: f
 def test_any_override_text_is_taken_or_refused_cleanly(path: str, text: str) -> None:
     try:
         apply_overrides(COMPLETED, [f"{path}={text}"])
-    except ParameterError as error:
+    except (ParameterError, ArgumentError) as error:
         assert "\n" not in str(error)

@@ -110,7 +110,7 @@ def test_mass_and_energy_balance_close(preset: str, on_the_rig: OnTheRig) -> Non
     assert np.abs(mass - mass[0] - net).max() < 1e-9 * mass[0]
     gained = of(solution, "enthalpy_in") - of(solution, "work_done") + of(solution, "heat_in")
     assert np.abs(energy - energy[0] - gained).max() < 1e-9 * energy[0]
-    assert np.abs(net).max() > 0.1 * mass[0]
+    assert min(np.ptp(of(solution, name)) for name in ("supplied_mass", "vented_mass")) > 0.1 * mass[0]
     assert np.abs(of(solution, "work_done")).max() > 1e-3 * energy[0]
 
 

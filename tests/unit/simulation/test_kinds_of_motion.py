@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from ppafo.errors import ScenarioError
+from ppafo.loading import load_scenario
 from ppafo.simulation.ensemble import run_ensemble
-from ppafo.simulation.loading import load_scenario
-from ppafo.simulation.motion_kind import MOTIONS, VANE_MOTIONS
+from ppafo.simulation.motion_kind import MOTIONS, VANE_MOTIONS, is_walk
 from ppafo.simulation.numbers import declared_numbers, number_at, with_numbers
 from ppafo.simulation.simulate import simulate
 
@@ -42,14 +42,14 @@ SWAY = replace(
 def test_each_kind_of_motion_of_a_vane_has_the_name_by_which_it_is_found_and_a_section() -> None:
     kinds = [MOTIONS[name] for name in VANE_MOTIONS]
     assert [kind.name for kind in kinds] == list(VANE_MOTIONS)
-    assert all(kind.section is not None and kind.walk is None for kind in kinds)
+    assert all(kind.section is not None and not is_walk(kind.name) for kind in kinds)
 
 
 def test_a_kind_of_another_package_is_read_run_and_varied(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "swaying.py").write_text(SWAY)
     monkeypatch.chdir(tmp_path)
     words = ["motion.kind=swaying:SWAY", "motion.size=5 deg", "run.duration=0.5 s"]
-    scenario = load_scenario("torque-task-proportional", words)
+    scenario = load_scenario("torque-task-proportional", words, plugins=["swaying.py"])
     recording = simulate(scenario).recording
     assert np.ptp(recording["angle"]) == pytest.approx(math.radians(10.0), rel=1e-3)
     assert "motion.size" in declared_numbers(scenario)
@@ -58,4 +58,6 @@ def test_a_kind_of_another_package_is_read_run_and_varied(tmp_path: Path, monkey
     many = run_ensemble(scenario, {"motion.size": np.array([math.radians(5.0), 0.2])}, ["rms_error"])
     assert many.metrics["rms_error"][0] == pytest.approx(alone, rel=1e-9)
     with pytest.raises(ScenarioError, match=r"motion\.size = '40 deg'|motion\.size=40 deg"):
-        load_scenario("torque-task-proportional", ["motion.kind=swaying:SWAY", "motion.size=40 deg"])
+        load_scenario(
+            "torque-task-proportional", ["motion.kind=swaying:SWAY", "motion.size=40 deg"], plugins=["swaying.py"]
+        )

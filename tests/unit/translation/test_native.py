@@ -9,7 +9,8 @@ import pytest
 
 from ppafo.cli.main import main
 from ppafo.engine import loading
-from ppafo.engine.cache import list_programs, load_generated
+from ppafo.engine.cache.programs import load_generated
+from ppafo.engine.cache.tidying import list_programs
 from ppafo.engine.compilers import CompilerError
 from ppafo.engine.lanes import Batch, load_program, run_batch
 from ppafo.engine.run import batch_of

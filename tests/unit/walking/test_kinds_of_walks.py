@@ -27,7 +27,7 @@ def test_a_kind_of_another_package_plans(tmp_path: Path, monkeypatch: pytest.Mon
     (tmp_path / "slow_motion.py").write_text(OF_ANOTHER_PACKAGE)
     monkeypatch.chdir(tmp_path)
     given = ["run.duration=6 s"]
-    other = load_scenario("proportional", [*given, "motion.kind=slow_motion:SLOW"])
+    other = load_scenario("proportional", [*given, "motion.kind=slow_motion:SLOW"], plugins=["slow_motion.py"])
     assert other.motion.motion_kind.name == "slow"
     angles = [walk(scenario).recording["angle"] for scenario in (other, load_walk("proportional", given))]
     assert np.array_equal(*angles)

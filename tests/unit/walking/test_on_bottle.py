@@ -1,6 +1,7 @@
 """A walk on its bottle: what closes, an independent simulator, the coupling, what ends it, and what is refused."""
 
 from dataclasses import replace
+from inspect import unwrap
 from pathlib import Path
 
 import numpy as np
@@ -259,6 +260,6 @@ def test_a_bottle_that_ends_a_walk_within_the_first_strides_is_named_with_its_ti
     assert small.supply is not None
     ending = small.supply.ending._replace(kind="empty", time=3.1, message="the bottle is empty")
     ended = replace(small, supply=replace(small.supply, ending=ending))
-    monkeypatch.setitem(compare_walks.__globals__, "walk", lambda *_, **__: ended)
+    monkeypatch.setitem(unwrap(compare_walks).__globals__, "walk", lambda *_, **__: ended)
     with pytest.raises(SimulationError, match=r"the bottle is empty, after 3\.1 s: fewer than 5 strides"):
         compare_walks(small.scenario)

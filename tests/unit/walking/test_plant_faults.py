@@ -35,10 +35,10 @@ def test_every_fault_of_the_catalogue_sets_fields_that_there_are() -> None:
 
 def test_a_walk_without_faults_is_composed_without_them_and_sound_numbers_change_no_bit() -> None:
     sound = plan_walk(with_duration(load_walk("solenoid"), 6.0))
-    assert not sound.program.fails
+    assert not sound.program.faults
     assert sound.walk is not None
     never = plan_walk(with_duration(load_walk("solenoid", ["faults.vane.kind=leaking", "faults.vane.time=1e5 s"]), 6.0))
-    assert never.program.fails
+    assert never.program.faults
     first, second = (run_batch(batch_of(run)).states[:, 0] for run in (sound, never))
     for path, row in rows_of(sound).items():
         assert first[row] == second[rows_of(never)[path]], path

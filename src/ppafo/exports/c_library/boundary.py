@@ -7,8 +7,7 @@ row for each; the composed functions are the same but for their first and last l
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
-from ppafo.engine.rows import is_number, leaf_paths, members, row_expression
-from ppafo.engine.source_text import is_row
+from ppafo.engine.rows import is_number, is_row, leaf_paths, members, row_expression
 from ppafo.translation.typed import FLOAT, Items, Row, Shared, Type
 
 NameOf = Callable[[type], str]

@@ -12,7 +12,7 @@ from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, leaves, numbers, row_expression
 from ppafo.engine.run import NEVER_FAILED, moment_at_start, whole_and_rest
 from ppafo.engine.scheme.motion import Pace
-from ppafo.engine.source_text import Collector, composed_lines
+from ppafo.engine.source_text import SourceCollector, composed_lines
 from ppafo.engine.step.lane import LaneResult, LaneTiming
 from ppafo.exports.c_library.boundary import Boundary
 from ppafo.exports.c_library.files import Relation, Setting, c_identifier
@@ -59,7 +59,7 @@ FLAWS = ("angle_noise", "pressure_noise", "angle_resolution", "pressure_resoluti
 """Settings of noise and rounding, in the order of ``SensorParameters``."""
 
 
-def following_text(settings: Sequence[Setting], links: Graph, collector: Collector, boundary: Boundary) -> str:
+def following_text(settings: Sequence[Setting], links: Graph, collector: SourceCollector, boundary: Boundary) -> str:
     """The composed function ``follow``: settings that still have their default follow others; see ``Graph``."""
     places = {item.path: place for place, item in enumerate(settings)}
 
@@ -85,7 +85,7 @@ def following_text(settings: Sequence[Setting], links: Graph, collector: Collect
     return "\n".join([*rows, head, *indent(lines)])
 
 
-def _term(term: Term, rows: list[str], collector: Collector) -> str:
+def _term(term: Term, rows: list[str], collector: SourceCollector) -> str:
     """A term of what is followed; structs that only it has are added to ``rows``."""
 
     def filled(row: type, numbers: Sequence[str]) -> str:
@@ -133,7 +133,7 @@ def _text(number: Written | float) -> str:
 class Writing:
     """Writes lines for one device and program; what they call is gathered by ``add``."""
 
-    def __init__(self, device: Device, lines: SupplyLines | None, program: Program, collector: Collector) -> None:
+    def __init__(self, device: Device, lines: SupplyLines | None, program: Program, collector: SourceCollector) -> None:
         self.device = device
         self.lines = lines
         self.program = program
@@ -374,7 +374,7 @@ def declared_settings(scenario: Scenario) -> dict[str, Quantity]:
     return {path: item for path, item in declared_numbers(scenario).items() if path not in unused}
 
 
-def preparation_of(scenario: Scenario, program: Program, collector: Collector, boundary: Boundary) -> str:
+def preparation_of(scenario: Scenario, program: Program, collector: SourceCollector, boundary: Boundary) -> str:
     """The composed function ``prepare`` of a scenario, once everything it calls is gathered."""
     writing = Writing(scenario.device, scenario.supply_lines, program, collector)
     return writing.text(settings_of(scenario), _lines(scenario, writing), boundary)

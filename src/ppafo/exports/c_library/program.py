@@ -19,13 +19,12 @@ import numpy as np
 from ppafo.engine.channels import REQUEST, TRACED, walk_traces
 from ppafo.engine.entries import HEADER, INLINE
 from ppafo.engine.generator import StepText
-from ppafo.engine.lane_rows import HANDED
-from ppafo.engine.lane_source import ARGUMENTS, COMPILED
+from ppafo.engine.lane_rows import ARGUMENTS, COMPILED, HANDED
 from ppafo.engine.linking import link_program
 from ppafo.engine.loop_text import LOOP_ARRAYS, LOOP_NUMBERS, indent, lane_loop, run_loop
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths
-from ppafo.engine.source_text import Collector, SourceCollector, composed_lines
+from ppafo.engine.source_text import SourceCollector, composed_lines
 from ppafo.exports.c_library.boundary import Arrays, Boundary, Structs, struct_of, struct_of_numbers
 from ppafo.metrics import METRICS
 from ppafo.metrics.metric import WALK, MetricKind, ReadAt, Readings
@@ -96,7 +95,7 @@ COUNTS = ("interval", "steps", "steps_per_sample", "signal_delay", "command_dela
 
 The last one is 1 where the error decides about the parts of a step, else 0.
 """
-Further = Callable[[Collector, Boundary], str]
+Further = Callable[[SourceCollector, Boundary], str]
 """Writes a further composed function, once it has gathered what that calls."""
 
 
@@ -343,7 +342,7 @@ def _read_expression(read: Callable[[Readings], Any], add: Callable[[Any], str])
     return numbers if read.function is None else f"{add(read.function)}({numbers})"
 
 
-def metrics_entry(item: ExportedProgram, collector: Collector, boundary: Boundary) -> str:
+def metrics_entry(item: ExportedProgram, collector: SourceCollector, boundary: Boundary) -> str:
     """The metrics of a run, from its first and its last states."""
     program, groups = item.program, item.program.state_rows()
     names = [kind.name for kind in program.meters]

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from ppafo.control.walking.catalog import walking_controllers
 from ppafo.engine.program import Program
-from ppafo.engine.source_text import Collector
+from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import ScenarioError
 from ppafo.exports.c_library.boundary import Boundary
 from ppafo.exports.c_library.files import Relation, Setting, c_identifier
@@ -134,7 +134,9 @@ def relations_of_walk(configuration: Scenario) -> tuple[Relation, ...]:
     )
 
 
-def preparation_of_walk(configuration: Scenario, program: Program, collector: Collector, boundary: Boundary) -> str:
+def preparation_of_walk(
+    configuration: Scenario, program: Program, collector: SourceCollector, boundary: Boundary
+) -> str:
     """The composed function ``prepare`` of a walk, once everything it calls is gathered."""
     writing = Writing(configuration.device, configuration.supply_lines, program, collector)
     return writing.text(settings_of_walk(configuration), _lines(configuration, writing), boundary)

@@ -76,8 +76,8 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
 
-from ppafo.engine.cache import kept_bytes
-from ppafo.engine.outline import file_hash
+from ppafo.engine.cache.texts import kept_bytes
+from ppafo.engine.package_key import COMPOSED, package_key
 from ppafo.errors import PpafoError, ProgramError
 from ppafo.exports import filled, template
 from ppafo.exports.c_library import library_of
@@ -312,26 +312,41 @@ _COUNT = re.compile(r"counts\.(\w+)")
 _HOW_TO_INSTALL = "pip install 'ppafo[workbench]'"
 
 
-def program_of(library: Library) -> bytes:
-    """The module of a library: the one that comes with the package where the text is the same, else a new one.
+_WRITERS = ("exports", "gait", "page", "parameters", "simulation", "translation", "walking")
+"""Folders of the package that have a part in the text of a module, beside those of a program."""
+
+
+def program_of(library: Library, item: Scenario) -> bytes:
+    """The module of a scenario's library: the one that comes with the package where it is the same, else a new one.
 
     Neither the text nor a module is made twice on a computer.
     """
-    # What decides the translation unit: what its functions are made from, and what translates them.
-    names = [item.name for item in library.settings]
-    outline = _unit(library, outline_of(library.program, names, library.further, LANES))
-    translators = [*(files("ppafo.translation").iterdir()), *(files("ppafo.exports.c_library").iterdir()), __file__]
-    hashes = sorted(f"{Path(str(file)).name} {file_hash(str(file))}" for file in translators)
-    digest = kept_bytes(
-        "digest",
-        "\n".join([__version__, *hashes, *FLAGS, template(__name__, "math.h"), outline]),
-        lambda: digest_of(source_of(library)).encode(),
-    ).decode()
+    key = package_key(item, (*COMPOSED, *_WRITERS))
+    if key is None:
+        digest = _known_digest(library)
+    else:
+        words = "\n".join([__version__, *FLAGS, key.words])
+        digest = kept_bytes("module", words, lambda: _known_digest(library).encode()).decode()
     prebuilt = prebuilt_programs().get(digest)
     if prebuilt is not None:
         return _PROGRAMS.joinpath(prebuilt).read_bytes()
     check_can_build()
     return kept_bytes("wasm", f"{digest} {compiler_version()}", lambda: build(source_of(library)))
+
+
+def _known_digest(library: Library) -> str:
+    """The digest of a library's text, whatever the values of its settings are."""
+    # What decides the translation unit: what its functions are made from, and what translates them.
+    names = [item.name for item in library.settings]
+    outline = _unit(library, outline_of(library.program, names, library.further, LANES))
+    translators = [*(files("ppafo.translation").iterdir()), *(files("ppafo.exports.c_library").iterdir()), __file__]
+    contents = {Path(str(file)).name: Path(str(file)).read_bytes() for file in translators if Path(str(file)).is_file()}
+    hashes = [f"{name} {hashlib.sha256(content).hexdigest()}" for name, content in sorted(contents.items())]
+    return kept_bytes(
+        "digest",
+        "\n".join([__version__, *hashes, *FLAGS, template(__name__, "math.h"), outline]),
+        lambda: digest_of(source_of(library)).encode(),
+    ).decode()
 
 
 def source_of(library: Library) -> str:
@@ -456,4 +471,4 @@ def module_of(item: Scenario) -> WasmModule:
     it cannot be translated; ScenarioError for a walk that cannot be exported.
     """
     library = library_of(item)
-    return WasmModule(program_of(library), description_of(item, library))
+    return WasmModule(program_of(library, item), description_of(item, library))

@@ -276,7 +276,7 @@ def test_what_matters_for_the_error_and_what_for_the_gas() -> None:
     change = dict(zip(found.paths, found.metrics[1].change_from_5_to_95_percent, strict=True))
     assert change["actuator.leak.area"] > 0.0 > change["gas.temperature"]
     assert np.sum(found.metrics[0].indices.values["first"]) == pytest.approx(1.0, abs=0.1)
-    assert found.runs == 256 * 10
+    assert found.runs == 256 * 9
 
 
 def test_few_base_points_are_not_taken_for_interactions() -> None:
@@ -313,7 +313,7 @@ def test_noise_of_the_sensors_is_one_of_the_values_and_has_no_ends() -> None:
     (metric,) = found.metrics
     total = dict(zip(found.paths, metric.indices.values["total"], strict=True))
     assert total["sensors.seed"] > 0.05
-    assert found.runs == 64 * 11
+    assert found.runs == 64 * 10
     change = metric.change_from_5_to_95_percent
     assert [path for path, each in zip(found.paths, change, strict=True) if math.isnan(each)] == ["sensors.seed"]
     *_, shown, band = (

@@ -80,7 +80,7 @@ def test_a_fault_of_a_column_map_names_the_file_of_the_map(
     columns = 'time = { column = 1, unit = "s" }\npressure_1 = { column = 3, unit = "bar" }\n'
     (tmp_path / "rig.toml").write_text(f"[columns.a.channels]\n{columns}")
     assert main([*SET, str(bench / "step.csv"), "--columns", f"{tmp_path / 'rig.toml'}:a"]) == 2
-    assert "rig.toml:a: channel 'pressure_1', unit = 'bar': 'bar'" in capsys.readouterr().err
+    assert "rig.toml:a: channels.pressure_1.unit = 'bar': 'bar'" in capsys.readouterr().err
 
 
 def test_several_recordings_of_any_format_are_compared_at_once(

@@ -59,7 +59,9 @@ def finding_of(sizing: WearerSizing) -> Finding[WearerSizing]:
         stature += f" (assumed: a body mass index of {BODY_MASS_INDEX:g} kg/m^2; give --stature)"
     said = [f"a wearer of {wish.mass:.4g} kg and {stature}; {wish.text()}"]
     if wish.toes is None and wish.clearance < TOES:
-        said.append(f"the toes of the healthy gait itself come down to {CLEARANCE.text(sizing.healthy_toes)}")
+        said.append(
+            f"the lowest height of the toes in the healthy gait itself is {CLEARANCE.text(sizing.healthy_toes)}"
+        )
     sections = (
         (finding.Part(remarks=("No device in the catalogue can do this. Alternatives:", *sizing.instead)), table)
         if device is None

@@ -317,8 +317,10 @@ def test_a_design_is_drawn_and_told_as_data_like_any_answer(study: Design) -> No
 
 def test_a_seed_stands_in_for_that_of_the_file(folder: Path) -> None:
     assert load_design(folder / "small.toml", seed=7).search.seed == 7
-    with pytest.raises(PpafoError, match="seed = -1: must be a whole number from 0 to 4294967295"):
+    with pytest.raises(PpafoError, match="seed=-1: must be a whole number, 0 or more"):
         load_design(folder / "small.toml", seed=-1)
+    with pytest.raises(PpafoError, match="seed = 4294967296: must be a whole number from 0 to 4294967295"):
+        load_design(folder / "small.toml", seed=2**32)
 
 
 def test_constraints_that_nothing_keeps_are_said_in_one_line(folder: Path) -> None:

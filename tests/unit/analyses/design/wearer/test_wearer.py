@@ -16,7 +16,7 @@ from ppafo.analyses.design.wearer.answer import finding_of
 from ppafo.analyses.design.wearer.electrical import electrical_of, valve_power
 from ppafo.analyses.design.wearer.wish import Device, WearerSizing, Wish
 from ppafo.cli.main import main
-from ppafo.errors import StudyError
+from ppafo.errors import ArgumentError, StudyError
 from ppafo.parameters.parts import load_catalogue
 from ppafo.parameters.parts.catalogue import Catalogue
 from ppafo.progress import report_nothing
@@ -74,7 +74,7 @@ def test_what_is_suggested_is_the_walk_that_is_shown_and_its_toes_clear_the_grou
     said = text_of(finding_of(found))
     assert device.command in said.splitlines()
     assert f"lowest toes  {1e3 * device.toes:.1f} mm over the ground" in said
-    assert "the toes of the healthy gait itself come down to 5.2 mm" in said
+    assert "the lowest height of the toes in the healthy gait itself is 5.2 mm" in said
     # The printed command walks the same walk, with the same torque.
     words = shlex.split(device.command)[1:]
     assert main([*words, "--out", str(tmp_path / "again")]) == 0
@@ -246,16 +246,22 @@ def test_a_catalogue_whose_valves_have_no_walk_is_refused(tmp_path: Path) -> Non
         {"mass": 5.0},
         {"mass": 400.0},
         {"pressure": 9.0e4},
-        {"torque": 0.0},
         {"minutes": 90.0},
         {"stature": 0.9},
-        {"toes": -0.001},
         {"toes": 0.5},
     ],
 )
 def test_what_no_walk_can_be_asked_is_refused(change: dict[str, float]) -> None:
     wanted = {"mass": 70.0, "stature": 1.7, "torque": 2.0, "pressure": 4.5e5, "minutes": 5.0}
     with pytest.raises(StudyError, match=f"--{next(iter(change))}"):
+        ppafo.design(**{**wanted, **change})
+
+
+@pytest.mark.parametrize("change", [{"torque": 0.0}, {"toes": -0.001}])
+def test_what_is_not_above_zero_is_refused_by_the_name_of_the_argument(change: dict[str, float]) -> None:
+    wanted = {"mass": 70.0, "stature": 1.7, "torque": 2.0, "pressure": 4.5e5, "minutes": 5.0}
+    ((name, value),) = change.items()
+    with pytest.raises(ArgumentError, match=rf"^{name}={value}: must be a number in N? ?m, above 0"):
         ppafo.design(**{**wanted, **change})
 
 

@@ -1,0 +1,89 @@
+"""How a program is compiled and kept: aside, by one process while others wait, with a word where it takes long."""
+
+import contextlib
+import hashlib
+import json
+import logging
+import secrets
+import sys
+import time
+from collections.abc import Callable, Iterable
+from functools import partial
+from pathlib import Path
+from types import ModuleType
+
+from ppafo.documents.regular_file import read_regular_file
+from ppafo.engine.cache.announcing import SECONDS_FILE, announce, compile_side_by_side, estimate_seconds
+from ppafo.engine.cache.folder import cache_folder, refusal
+from ppafo.engine.cache.kept import CHECKSUMS, Wanted, is_kept, load_kept_module, remove
+from ppafo.engine.cache.lock import one_process
+from ppafo.engine.cache.tidying import PROGRAM, entries_named, evict
+from ppafo.engine.compilers import Compiler
+from ppafo.errors import reason
+
+logger = logging.getLogger("ppafo")
+
+
+def make(wanted: Wanted, kept: Path | None) -> ModuleType:
+    """Compile a program and keep it at its place, or in memory alone where there is none or it cannot be kept."""
+    if kept is not None:
+        try:
+            with one_process(kept):
+                # Another process may have compiled it while this one waited for the lock.
+                return load_kept_module(kept, wanted) or _compile_and_keep(kept, wanted)
+        except OSError as error:
+            logger.warning("ppafo: the compiled model is not kept in %s: %s", kept.parent, reason(error))
+    with announce(_estimate(wanted, ()), "not kept"):
+        return wanted.compile(Path(f"<{wanted.name}>"))
+
+
+def load_all(sources: Iterable[str], compiler: Compiler, load: Callable[[str], object]) -> None:
+    """Import the modules with these sources by ``load``; several that ``compiler`` must make are made side by side."""
+    missing = [source for source in dict.fromkeys(sources) if not is_kept(source, compiler)]
+    # One alone is compiled where it is needed, with its own message.
+    if len(missing) < 2:
+        return
+    folder = cache_folder()
+    kept = [] if folder is None else entries_named(folder, PROGRAM)
+    expected = sum(_estimate(Wanted(source, compiler), kept) for source in missing)
+    where = "not kept" if folder is None or refusal(folder) else f"kept in {folder}"
+    compile_side_by_side([partial(load, source) for source in missing], expected, where)
+
+
+def _compile_and_keep(kept: Path, wanted: Wanted) -> ModuleType:
+    """Compile a program in a folder aside, which takes its place when it is whole."""
+    # Written aside and renamed: to other processes a program is whole, or not there.
+    aside = kept.with_name(f".writing-{secrets.token_hex(8)}")
+    try:
+        aside.mkdir(mode=0o700)
+        path = aside / f"{wanted.name}.py"
+        path.write_text(wanted.source, encoding="utf-8")
+        start = time.perf_counter()
+        with announce(_estimate(wanted, entries_named(kept.parent, PROGRAM)), f"kept in {kept.parent}"):
+            module = wanted.compile(path)
+        (aside / SECONDS_FILE).write_text(f"{time.perf_counter() - start:.2f}", encoding="ascii")
+        (aside / CHECKSUMS).write_text(json.dumps(_checksums(aside), indent=2), encoding="utf-8")
+        for place in aside.rglob("*"):  # compilers let a group write where the user's habits (umask) do
+            place.chmod(0o700 if place.is_dir() else 0o600)
+        with contextlib.suppress(OSError):  # another process was quicker, with the same program
+            aside.rename(kept)
+        evict(kept.parent)
+    except OSError:
+        sys.modules.pop(wanted.name, None)
+        raise
+    finally:
+        remove(aside)
+    return module
+
+
+def _estimate(wanted: Wanted, kept: Iterable[Path]) -> float:
+    """About how long a program takes to compile [s]."""
+    kind = wanted.name.rpartition("_")[0]
+    alike = [place for place in kept if place.name.startswith(f"{kind}_")]
+    return estimate_seconds(wanted.source, alike, wanted.compiler.seconds_per_byte)
+
+
+def _checksums(folder: Path) -> dict[str, str]:
+    """Return the hash of every file of a program but the list of them itself."""
+    files = sorted(path for path in folder.rglob("*") if not path.is_dir() and path.name != CHECKSUMS)
+    return {path.relative_to(folder).as_posix(): hashlib.sha256(read_regular_file(path)).hexdigest() for path in files}

@@ -1,0 +1,46 @@
+"""Compiled programs: found in the cache where they are whole, else compiled and kept."""
+
+import logging
+import sys
+import threading
+from types import ModuleType
+
+from ppafo.engine.cache.folder import CACHE_VARIABLE, NOTE, cache_folder, refusal
+from ppafo.engine.cache.kept import Wanted, load_kept_module, short_hash
+from ppafo.engine.compilers import Compiler
+
+logger = logging.getLogger("ppafo")
+
+_LOADING: dict[str, threading.RLock] = {}
+
+
+def load_generated(source: str, compiler: Compiler) -> ModuleType:
+    """Import the module with this source, from the cache where it is there and whole; else it is compiled.
+
+    ProgramError where it cannot be compiled, in terms of the file that the function at fault was written in;
+    CompilerError where the compiler does not work.
+    """
+    wanted = Wanted(source, compiler)
+    # A second thread must not get a module of which only the beginning has run.
+    with _LOADING.setdefault(wanted.name, threading.RLock()):
+        return sys.modules[wanted.name] if wanted.name in sys.modules else _import_program(wanted)
+
+
+def _import_program(wanted: Wanted) -> ModuleType:
+    folder = cache_folder()
+    # Loading runs what lies there, so the folder is looked at each time, not once for the process.
+    why_not = refusal(folder)
+    kept = None if folder is None or why_not else wanted.place(folder)
+    if kept is None:
+        logger.warning("ppafo: compiled models are not kept: %s; %s names another folder", why_not, CACHE_VARIABLE)
+    module = None if kept is None else load_kept_module(kept, wanted)
+    if module is not None:
+        return module
+    from ppafo.engine.cache.making import make  # most programs are there
+
+    return make(wanted, kept)
+
+
+def note_name(compiler: Compiler) -> str:
+    """Name of the file in the cache that says why a compiler does not work on this computer."""
+    return f"{NOTE}{compiler.name}-{short_hash(compiler.identity())}"

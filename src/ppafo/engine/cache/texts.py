@@ -1,0 +1,63 @@
+"""Texts that are expensive to compose, kept by a key of what they were composed from."""
+
+import contextlib
+import hashlib
+import os
+import secrets
+from collections.abc import Callable
+from pathlib import Path
+
+from ppafo.documents.regular_file import read_regular_file
+from ppafo.engine.cache.folder import TEXTS, cache_folder, is_own_file, refusal
+
+MAXIMUM_BYTES = 50_000_000
+"""Size of all texts above which those that were not used for longest are removed."""
+
+_HASH_BYTES = hashlib.sha256().digest_size
+
+
+def kept_bytes(kind: str, made_from: str, make: Callable[[], bytes]) -> bytes:
+    """Return what ``make`` makes of ``made_from``, all that it depends on; from the disk where it was made before."""
+    folder = cache_folder()
+    if folder is None or refusal(folder):
+        return make()
+    # The name is the hash of all that the content depends on, so that nothing kept is ever out of date.
+    key = hashlib.sha256(made_from.encode("utf-8", "surrogatepass")).hexdigest()[:32]
+    place = folder / TEXTS / f"{kind}-{key}"
+    content = _read(place)
+    if content is None:
+        content = make()
+        with contextlib.suppress(OSError):
+            _write(place, content)
+            from ppafo.engine.cache.tidying import evict_beyond, measured, texts  # most texts are there
+
+            evict_beyond(measured(texts(folder)), MAXIMUM_BYTES)
+    return content
+
+
+def _read(place: Path) -> bytes | None:
+    try:
+        # It may be run: file and folder must be this user's, and nobody else may write there.
+        if not is_own_file(place.lstat(), place.parent.lstat()):
+            return None
+        content = read_regular_file(place)
+        os.utime(place)
+    except OSError:
+        return None
+    # A file that was cut by a full disk, or changed, counts as not there.
+    stated, rest = content[:_HASH_BYTES], content[_HASH_BYTES:]
+    return rest if hashlib.sha256(rest).digest() == stated else None
+
+
+def _write(place: Path, content: bytes) -> None:
+    # Through a link the file would land in a folder that nobody has checked.
+    if place.parent.is_symlink():
+        return
+    place.parent.mkdir(mode=0o700, exist_ok=True)
+    aside = place.with_name(f".writing-{secrets.token_hex(8)}")
+    try:
+        aside.write_bytes(hashlib.sha256(content).digest() + content)
+        aside.chmod(0o600)
+        aside.replace(place)
+    finally:
+        aside.unlink(missing_ok=True)
