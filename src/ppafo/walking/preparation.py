@@ -64,11 +64,6 @@ def with_leg(plant: PlantParameters, leg: LegParameters) -> PlantParameters:
     )
 
 
-def without_leg(plant: PlantParameters) -> PlantParameters:
-    """The plant of a device whose foot belongs to a body: its own gravity is accounted for there."""
-    return plant._replace(gravity_torque=0.0, external_torque=0.0)
-
-
 def smallest_chamber(plant: PlantParameters) -> float:
     """Smallest volume [m^3] of either chamber at the angles of walking."""
     # Chamber 1 is smallest in dorsiflexion, chamber 2 in plantarflexion.

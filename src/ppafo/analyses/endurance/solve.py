@@ -15,15 +15,12 @@ from ppafo.arguments import checked
 from ppafo.errors import DataError
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, Bottle
 from ppafo.report.kind import Kind
-from ppafo.signals import Recording
 from ppafo.walking import WalkResult
 from ppafo.walking.bottle import Schedule
 from ppafo.walking.loading import on_bottle
 from ppafo.walking.motion import walk_of
 from ppafo.walking.walk import bottle_life
 
-GasUse = str | Path | Recording | WalkResult
-"""A file, a result folder, the folder of a walk, or what was read or returned of them."""
 BETWEEN_RESTS = 600.0
 STRIDE_TIME = 1.1
 LONGEST = 24.0 * 3600.0
