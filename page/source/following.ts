@@ -67,16 +67,22 @@ function flowOfSonic(mass: number, temperature: number, sonic: number): number {
   return constant * temperature * (sameGas * Math.sqrt(AIR_CONSTANT / constant));
 }
 
+const lagOfBandwidth = (bandwidth: number) => (bandwidth > 0 ? 1 / (TURN * bandwidth) : 0);
+
+/** How long a spool follows a command, at the slew limit too. */
+const spoolLag = (frequency: number, damping: number, slew: number) =>
+  (frequency > 0 ? (2 * damping) / (TURN * frequency) : 0) + (slew > 0 ? 1 / slew : 0);
+
 const RULES: Readonly<Record<string, (...given: number[]) => number>> = {
   "clock.step_unless_given": (duration = 0, period = 0) => stepUnlessGiven(duration, period),
   "clock.step_with_output": (duration = 0, period = 0, output = 0) => Math.min(stepUnlessGiven(duration, period), output),
   "clock.output_unless_given": (duration = 0, period = 0, step = 0) => duration / Math.max(1, nearestWhole(duration / dividingStep(period, step))),
   "walk.record_interval": (seconds = 0) => (seconds <= 61 ? 1e-3 : seconds <= 601 ? 5e-3 : 2e-2),
-  "loading.lag_of_bandwidth": (bandwidth = 0) => (bandwidth > 0 ? 1 / (TURN * bandwidth) : 0),
+  "loading.lag_of_bandwidth": (bandwidth = 0) => lagOfBandwidth(bandwidth),
   "solenoid.lag": (_opening = 0, closing = 0, interval = 0) => closing + interval,
   "solenoid.no_dead_time": () => 0,
-  "proportional.lag": (_band = 0, delay = 0, frequency = 0, damping = 0, slew = 0) =>
-    delay + (frequency > 0 ? (2 * damping) / (TURN * frequency) : 0) + (slew > 0 ? 1 / slew : 0),
+  "proportional.lag": (_band = 0, delay = 0, frequency = 0, damping = 0, slew = 0) => delay + spoolLag(frequency, damping, slew),
+  "proportional.spool_lag": (_band = 0, _delay = 0, frequency = 0, damping = 0, slew = 0) => spoolLag(frequency, damping, slew),
   "graph.itself": (number = 0) => number,
   "gas.critical_pressure_ratio": (k = 0) => criticalRatio(k),
   "nominal.flow_of_area": (mass = 0, k = 0, temperature = 0, area = 0, discharge = 0) => flowOfArea(mass, k, temperature, area, discharge),
@@ -87,7 +93,75 @@ const RULES: Readonly<Record<string, (...given: number[]) => number>> = {
   "nominal.yes": () => 1,
   "nominal.no": () => 0,
   "proportional.dead_time": (_band = 0, delay = 0) => delay,
+  "torque_loop.learning_gain": (proportional = 0) => 0.5 * proportional,
 };
+
+const RIGHT_ANGLE = 1.5707963267948966;
+const INSIDE = 0.2;
+const SAMPLES_LATE = 1.5;
+const LEAST_TORQUE = 5e-4;
+const LARGEST_OPENING = 0.77;
+const USUAL_LEAD = 0.0185;
+
+/** What a rule of the torque loop may ask: a number of the device by its path, and whether it has one. */
+interface Numbers {
+  readonly at: (path: string) => number;
+  readonly has: (path: string) => boolean;
+  /** The setting of the law that the rule takes beside the device. */
+  readonly setting: number;
+}
+
+interface TorqueLoop {
+  /** Torque rate at full opening, N m/s. */
+  readonly rate: number;
+  /** Dead time, s. */
+  readonly late: number;
+}
+
+/** The torque loop of a vane, as `ppafo.simulation.torque_loop` has it. The order of operations is the package's. */
+function torqueLoop({ at, has }: Numbers): TorqueLoop {
+  const [lowest, highest] = [at("actuator.angle_min"), at("actuator.angle_max")];
+  const inside = Math.min(Math.max(RIGHT_ANGLE, lowest + INSIDE), highest - INSIDE);
+  const angle = highest - lowest > 2 * INSIDE ? inside : 0.5 * (lowest + highest);
+  const [torque, growth] = [at("actuator.torque_constant"), at("actuator.displacement_per_radian")];
+  const volume1 = at("actuator.dead_volume_1") + growth * (angle - lowest);
+  const volume2 = at("actuator.dead_volume_2") + growth * (highest - angle);
+  const perFlow = Math.max((torque * at("supply.pressure")) / volume1, (torque * at("supply.dorsiflexion_pressure")) / volume2);
+  const [mass, temperature, period] = [at("gas.molar_mass"), at("gas.temperature"), at("controller.period")];
+  const flow = has("valve.sonic_conductance")
+    ? flowOfSonic(mass, temperature, at("valve.sonic_conductance"))
+    : flowOfArea(mass, at("gas.heat_capacity_ratio"), temperature, at("valve.area"), at("valve.discharge_coefficient"));
+  const valve = has("valve.switching_interval")
+    ? Math.max(at("valve.opening_delay"), at("valve.closing_delay")) + Math.max(SAMPLES_LATE * period, at("valve.switching_interval"))
+    : at("valve.delay") + spoolLag(at("valve.spool_frequency"), at("valve.spool_damping_ratio"), at("valve.slew_limit")) + SAMPLES_LATE * period;
+  const signals = (has("sensors.delay") ? at("sensors.delay") : 0) + lagOfBandwidth(at("sensors.pressure_bandwidth"));
+  return { rate: flow * perFlow, late: valve + signals };
+}
+
+const torqueInDeadTime = ({ rate, late }: TorqueLoop) => Math.max(rate * late, LEAST_TORQUE);
+
+/** Gains that follow the torque loop of a vane; of another actuator the page knows none, and they stay as they are. */
+const LOOP_RULES: Readonly<Record<string, (loop: TorqueLoop, numbers: Numbers) => number>> = {
+  "torque_loop.proportional_gain_of_device": (loop) => 0.5 / torqueInDeadTime(loop),
+  "torque_loop.integral_rate_of_device": ({ late }) => 0.125 / late,
+  "torque_loop.integral_gain_of_device": ({ late }, { setting }) => setting * (0.125 / late),
+  "torque_loop.boundary_layer_of_device": (loop) => 2 * torqueInDeadTime(loop),
+  "torque_loop.convergence_rate_of_device": ({ late }) => 0.5 / late,
+  "torque_loop.lead_of_device": ({ late }) => USUAL_LEAD + late,
+  "torque_loop.torque_rate_of_device": ({ rate }) => rate,
+  "torque_loop.dead_time_of_device": ({ late }) => late,
+  "torque_loop.dead_zone_opening_of_device": (loop, { at, has, setting }) => {
+    const opening = Math.min(LARGEST_OPENING, setting / torqueInDeadTime(loop));
+    return has("valve.dead_band") ? at("valve.dead_band") + (1 - at("valve.dead_band")) * opening : opening;
+  },
+};
+
+function numberOfLoop(rule: string, sources: readonly string[], valueOf: (key: string) => number): number | null {
+  const known = LOOP_RULES[rule];
+  if (known === undefined || !sources.includes("actuator.torque_constant")) return null;
+  const numbers = { at: valueOf, has: (path: string) => sources.includes(path), setting: valueOf(sources.at(-1) ?? "") };
+  return known(torqueLoop(numbers), numbers);
+}
 
 /** A number that is the sum of what some rules make of other settings, and a gap. */
 export interface Made {
@@ -100,8 +174,9 @@ export function madeOf({ terms, gap }: Made, valueOf: (key: string) => number): 
   const found: number[] = [];
   for (const { rule, sources } of terms) {
     const known = RULES[rule];
-    if (known === undefined) return null;
-    found.push(known(...sources.map(valueOf)));
+    const number = known === undefined ? numberOfLoop(rule, sources, valueOf) : known(...sources.map(valueOf));
+    if (number === null) return null;
+    found.push(number);
   }
   return found.reduce((sum, term) => sum + term) + gap;
 }

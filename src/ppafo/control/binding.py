@@ -2,16 +2,25 @@
 
 import types
 from collections.abc import Callable, Mapping
+from functools import lru_cache
 from typing import Any
 
 
 def bind(frame: Callable[..., Any], name: str, components: Mapping[str, Any]) -> Callable[..., Any]:
     """Return the function of a frame in which some names of its module stand for other components.
 
-    The code is the same and only those names differ, so that the engine compiles it as any other function.
+    The code is the same and only those names differ, so that the engine compiles it as any other function. Equal
+    components give the same function, so that what has it is equal too: a scenario that is loaded twice, or in another
+    order of its overrides.
     """
+    return _bound(frame, name, tuple(sorted(components.items())))
+
+
+# Far more than the laws, valves and actuators of a process; a table is part of what its actuator is bound to.
+@lru_cache(maxsize=512)
+def _bound(frame: Callable[..., Any], name: str, components: tuple[tuple[str, Any], ...]) -> Callable[..., Any]:
     assert isinstance(frame, types.FunctionType), "a frame is a plain function"
-    made = types.FunctionType(frame.__code__, {**frame.__globals__, **components}, name)
+    made = types.FunctionType(frame.__code__, {**frame.__globals__, **dict(components)}, name)
     made.__qualname__ = name
     # The name and module decide the name in the composed text, where two laws must not share one.
     made.__module__ = frame.__module__
