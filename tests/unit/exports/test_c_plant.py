@@ -135,7 +135,7 @@ def test_the_c_of_a_run_is_short_and_has_neither_lanes_nor_groups_that_are_packe
     said = {"loop": "The torque task has {:,} lines", "plant": "the plant alone {:,};"}[shape]
     assert said.format(text.count("\n")) in PAGE
     assert not re.search(r"\blane\b|\[0\]\[|PPAFO_|make_PlantParameters|AT_[A-Z]+_", text)
-    assert text.count("for (int64_t step_index") == 1
+    assert text.count("for (int64_t step = ") == 1
     functions = set(re.findall(r"^static [\w ]+?\b\*?(\w+)\(", text, re.MULTILINE))
     assert functions
     unused = [name for name in functions if len(re.findall(rf"\b{name}\b", text)) < 2]

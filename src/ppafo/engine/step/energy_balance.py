@@ -60,7 +60,7 @@ def shift_error(parts: Program, lane: Lane, shift: float, ahead: float, length: 
 
 
 def add(parts: Program, lane: Lane) -> None:
-    """``lane.fed`` and ``lane.warmed``, state and true masses with the gas of the step."""
+    """Set state and true masses with the gas of the step."""
     lane.fed, lane.warmed = thermal_gas.with_thermal_gas(lane.state, lane.masses, lane.thermal_change)
 
 

@@ -74,7 +74,7 @@ def shift_error(parts: Program, lane: Lane, shift: float, ahead: float, length: 
 
 
 def add(parts: Program, lane: Lane) -> None:
-    """``lane.fed``, the state with the gas of the step."""
+    """Set the state with the gas of the step."""
     lane.fed = with_gas(lane.state, lane.change)
 
 

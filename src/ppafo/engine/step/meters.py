@@ -13,7 +13,7 @@ NO_STRIDE = StrideSample(**dict.fromkeys(StrideSample._fields, 0.0))
 
 
 def make_sample(parts: Program, lane: Lane, moment: float, number: int, interval: float) -> None:
-    """``lane.sample``, number ``number`` at a ``moment`` counted in steps."""
+    """Set the sample ``number``, at a ``moment`` counted in steps."""
     pressure_1, pressure_2 = present_pressures(parts, lane)
     time = moment * lane.timing.step
     lane.sample = Sample(

@@ -59,7 +59,7 @@ def shift_error(parts: Program, lane: Lane, shift: float, ahead: float, length: 
 
 
 def add(parts: Program, lane: Lane) -> None:
-    """``lane.fed`` and ``lane.warmed``, state and true masses with the gas of the step."""
+    """Set state and true masses with the gas of the step."""
     lane.fed, lane.warmed = real_gas.with_real_gas(lane.state, lane.masses, lane.real_change)
 
 

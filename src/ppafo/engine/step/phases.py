@@ -273,7 +273,7 @@ def finish(parts: Program, lane: Lane, now: Now) -> None:
 
 
 def end_motion(parts: Program, lane: Lane) -> None:
-    """``lane.after``, the state at the end of the step."""
+    """Set the state at the end of the step."""
     if parts.leg is not None:
         # The chambers that the next step finds are those where this one ends.
         parts.leg.end(parts, lane, length_of(parts, lane))
@@ -318,7 +318,7 @@ def is_possible(parts: Program, lane: Lane) -> bool:
 
 
 def keep_state(parts: Program, lane: Lane, waits: bool) -> None:
-    """The state after the step becomes the state, unless the lane waits."""
+    """The state after the step becomes the state, unless the run waits."""
     lane.state = lane.state if waits else lane.after
     if parts.has_true_masses:
         lane.masses = lane.masses if waits else lane.warmed

@@ -39,7 +39,7 @@ def reference_at(parts: Program, lane: Lane, time: float) -> float:
 
 
 def sense(parts: Program, lane: Lane, now: Now) -> None:
-    """``lane.seen``, what the sensors show."""
+    """Set what the sensors show."""
     if parts.late_readings:
         lane.seen = late_gait(parts, lane, now)
     elif parts.leg is not None and not parts.ideal_sensors:
@@ -113,7 +113,7 @@ def gait(parts: Program, lane: Lane) -> GaitMeasurement:
 
 
 def measure_walk(parts: Program, lane: Lane, now: Now) -> None:
-    """``lane.seen`` and ``lane.gait_seen``, what the sensors of a walk show, and what they remember."""
+    """Set what the sensors of a walk show, and what they remember."""
     pressure_1, pressure_2 = present_pressures(parts, lane)
     lane.seen, lane.gait_seen = measure_gait(
         lane.sensors,

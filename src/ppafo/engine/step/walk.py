@@ -135,7 +135,7 @@ def depart(parts: Program, lane: Lane) -> None:
 
 
 def end(parts: Program, lane: Lane, length: float) -> None:
-    """``lane.after`` and ``lane.walk_after``, state and walk after the step."""
+    """Set state and walk after the step."""
     lane.held = lane.ahead
     lane.after, lane.walk_after = walking.end_walk(
         lane.plant,
