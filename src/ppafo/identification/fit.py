@@ -50,7 +50,8 @@ class Block:
     """Rows of the residuals that are one channel of one recording or a part of it, in the order of time.
 
     ``floor`` is the error of the engine, or of the resolution [SI], below which no residual says anything: one for all
-    rows, or each row's. ``groups`` are further groups, such as a branch, whose numbers are compared with the numbers of
+    rows, or each row's. ``shared`` is an error [SI] by row that all rows of the recording have at once, as one normal
+    deviate times it. ``groups`` are further groups, such as a branch, whose numbers are compared with the numbers of
     all.
     """
 
@@ -58,6 +59,7 @@ class Block:
     channel: str
     rows: slice
     floor: float | Floats = 0.0
+    shared: Floats | None = None
     groups: tuple[str, ...] = ()
 
 
@@ -153,6 +155,9 @@ Noise with a lag of 33 samples, 0.24, is estimated down to 0.19 in two recording
 
 _LEFT_OUT = 0.01
 """Largest fraction of the samples that are left out because an event, such as an impact, passes them."""
+
+_OF_ANY_SIZE = 1.0e8
+"""Standard deviation of an error of which nothing is known, over the noise [-]."""
 
 _LEVERAGE = 0.1
 """Share of a combination of numbers that one sample decides alone from which it is left out."""
@@ -309,6 +314,16 @@ class _Work:
         """The channels, each once."""
         return tuple(dict.fromkeys(one.channel for one in self.blocks))
 
+    def shared(self) -> Floats:
+        """Return the errors [SI] that rows of a recording share, a column for each recording that has some."""
+        names = dict.fromkeys(one.recording for one in self.blocks if one.shared is not None)
+        columns = np.zeros((self.blocks[-1].rows.stop, len(names)))
+        for place, name in enumerate(names):
+            for one in self.blocks:
+                if one.recording == name and one.shared is not None:
+                    columns[one.rows, place] = one.shared
+        return columns
+
     def deviations(self, series: Floats) -> tuple[Floats, dict[str, float]]:
         """Return the noise [SI] of each row, and by channel, pooled over its recordings; no less than the floor.
 
@@ -426,11 +441,12 @@ def whiten(values: Floats, noise: Noise) -> Floats:
 class _Linear(NamedTuple):
     """Residuals and Jacobian whitened [-] side by side, root of the covariance of scaled numbers, noise by channel.
 
-    ``without`` are orthonormal columns [-] of the samples that are left out.
+    ``shared`` are columns [-] of what rows have in common: errors of all samples of a recording, and samples that are
+    left out. Rows less ``shared`` times their products with it have errors that are independent.
     """
 
     rows: Floats
-    without: Floats
+    shared: Floats
     root: Floats
     noise: Floats
     sensors: dict[str, Noise]
@@ -444,23 +460,28 @@ def _linear(work: _Work, point: Floats, left: Floats, slopes: Floats) -> tuple[_
     """
     step, hidden = np.zeros(len(point)), np.zeros((len(left), 0))
     limits = work.low - point - 1.0e-300, work.high - point + 1.0e-300
-    # A sample with a number of its own says nothing: so it is left out of any noise.
+    # A sample with a number of its own, of no known size, says nothing: so it is left out of any noise.
     own_numbers = np.zeros((len(left), len(work.left_out)))
-    own_numbers[work.left_out, np.arange(len(work.left_out))] = 1.0
+    own_numbers[work.left_out, np.arange(len(work.left_out))] = _OF_ANY_SIZE
+    common = work.shared()
     for _ in range(_ROUNDS):
         series = np.column_stack([left + slopes @ step, hidden])
         series[work.left_out] = 0.0
         noise, sizes = work.deviations(series)
-        known, rows = {}, np.column_stack([np.column_stack([left, slopes]) / noise[:, None], own_numbers])
+        known, scaled = {}, np.column_stack([left, slopes, common]) / noise[:, None]
+        rows = np.column_stack([scaled, own_numbers])
         for channel in work.channels:
             own = work.rows_of(channel)
             kind = noise_of([series[one] / noise[one, None] for one in own], work.memory, work.is_motion)
             known[channel] = replace(kind, deviation=sizes[channel])
             for one in own:
                 rows[one] = whiten(rows[one], kind)
-        without = np.linalg.qr(rows[:, 1 + len(point) :])[0]
+        # With D = U S V' the covariance is 1 + D D', and 1 - U (1 - 1 / sqrt(1 + S^2)) U' makes it 1.
+        axes, triangle = np.linalg.qr(rows[:, 1 + len(point) :])
+        turned, spread, _ = np.linalg.svd(triangle)
+        shared = axes @ (turned * np.sqrt(1.0 - 1.0 / np.hypot(1.0, spread)))
         rows = rows[:, : 1 + len(point)]
-        rows = rows - without @ (without.T @ rows)
+        rows = rows - shared @ (shared.T @ rows)
         root, _ = _root_of_inverse(rows[:, 1:].T @ rows[:, 1:] + np.diag(np.square(work.prior)))
         hidden = slopes @ root
         before = step
@@ -473,7 +494,7 @@ def _linear(work: _Work, point: Floats, left: Floats, slopes: Floats) -> tuple[_
         step = np.asarray(solved.x)
         if np.abs((step - before) @ np.linalg.pinv(root)).max() < 0.01 and series.shape[1] > 1:
             break
-    return _Linear(rows=rows, without=without, root=root, noise=noise, sensors=known), step
+    return _Linear(rows=rows, shared=shared, root=root, noise=noise, sensors=known), step
 
 
 def _root_of_inverse(curvature: Floats) -> tuple[Floats, Mask]:
@@ -557,7 +578,7 @@ def _cost(work: _Work, left: Floats, point: Floats, linear: _Linear) -> float:
     scaled = (left / linear.noise)[:, None]
     kinds = {channel: replace(one, deviation=1.0) for channel, one in linear.sensors.items()}
     errors = np.concatenate([whiten(scaled[one.rows], kinds[one.channel]) for one in work.blocks])
-    errors = errors - linear.without @ (linear.without.T @ errors)
+    errors = errors - linear.shared @ (linear.shared.T @ errors)
     return float(np.square(errors).sum()) + float(np.square((point - work.mean) * work.prior).sum())
 
 

@@ -82,7 +82,7 @@ def solve(
     for (recording, sensor, *groups), rank in ranks.items():
         rows = slice(int(ends[rank]), int(ends[rank + 1]))
         floor = np.maximum(least, rounding_of(measured[order][rows], resolutions[sensor]))
-        blocks.append(Block(recording, sensor, rows, floor, tuple(groups)))
+        blocks.append(Block(recording, sensor, rows, floor, groups=tuple(groups)))
 
     def at(point: Floats) -> Values:
         return defaultdict(float, zip(names, point.tolist(), strict=True))
